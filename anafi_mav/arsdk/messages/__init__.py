@@ -1,0 +1,48 @@
+"""Parrot's message tables, one module per project or feature, in Parrot's words.
+
+Importing this package declares all of them. Ids, argument names, types and enum values are facts of Parrot's own
+XML (arsdk-xml, in the parrot-olympe wheel) and are compared with it by ``tests/unit/test_arsdk_xml.py``.
+A message class is the PascalCase of Parrot's name; arguments keep Parrot's spelling.
+"""
+
+from anafi_mav.arsdk.messages import (
+    alarms,
+    animation,
+    ardrone3,
+    battery,
+    camera,
+    common,
+    flight_plan,
+    follow_me,
+    generic,
+    gimbal,
+    mediastore,
+    move,
+    piloting_style,
+    poi,
+    precise_home,
+    rth,
+    user_storage,
+    wifi,
+)
+
+__all__ = [
+    "alarms",
+    "animation",
+    "ardrone3",
+    "battery",
+    "camera",
+    "common",
+    "flight_plan",
+    "follow_me",
+    "generic",
+    "gimbal",
+    "mediastore",
+    "move",
+    "piloting_style",
+    "poi",
+    "precise_home",
+    "rth",
+    "user_storage",
+    "wifi",
+]

@@ -1,0 +1,279 @@
+"""How an ARSDK command looks in bytes: the wire types, the message record and its codec.
+
+A message is a frozen `msgspec.Struct` (decoding is hot: a hundred drones send ten thousand a second) whose
+annotations carry the wire type::
+
+    @event("ardrone3.PilotingState.AltitudeChanged", 1, 4, 8, Buffer.NON_ACK)
+    class AltitudeChanged(Message, frozen=True):
+        altitude: Annotated[float, F64]
+
+Command bytes are ``project u8, class u8, command u16`` followed by the packed arguments, little-endian; an enum
+travels as i32, a string NUL-terminated, a binary behind a u32 length (arsdk-ng libarsdk/src/arsdk_encoder.c).
+Frames, acknowledgements and splitting are one floor up, in `frame` and `transport`.
+"""
+
+from __future__ import annotations
+
+import enum
+import struct
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
+
+import msgspec
+
+from anafi_mav.errors import LocalProtocolError
+
+
+class MessageId(NamedTuple):
+    """Parrot's three numbers of a message; features have class 0."""
+
+    project: int
+    cls: int
+    command: int
+
+    def __str__(self) -> str:
+        return f"{self.project}-{self.cls}-{self.command}"
+
+
+class Buffer(enum.Enum):
+    """Which queue a message travels in (the XML's ``buffer`` attribute; ACK is its default)."""
+
+    NON_ACK = "non_ack"
+    ACK = "ack"
+    HIGH_PRIO = "high_prio"
+    LOW_PRIO = "low_prio"
+
+
+class Direction(enum.Enum):
+    """Who may send a message."""
+
+    COMMAND = "controller to device"
+    EVENT = "device to controller"
+
+
+class OpenEnum(enum.IntEnum):
+    """An enum whose unknown values survive as integers: firmware is newer than our tables."""
+
+    @classmethod
+    def _missing_(cls, value: object) -> OpenEnum | None:
+        if not isinstance(value, int):
+            return None
+        member = int.__new__(cls, value)
+        member._name_ = f"UNKNOWN_{value}"
+        member._value_ = value
+        return member
+
+
+@dataclass(frozen=True)
+class Scalar:
+    """A number of fixed size; `code` is its letter in the struct module, `parrot` its name in Parrot's XML."""
+
+    code: str
+    parrot: str
+
+
+@dataclass(frozen=True)
+class Text:
+    """UTF-8, NUL-terminated. Bytes that are no UTF-8 are replaced, never refused."""
+
+    parrot: str = "string"
+
+
+@dataclass(frozen=True)
+class Blob:
+    """u32 length, then as many bytes."""
+
+    parrot: str = "binary"
+
+
+@dataclass(frozen=True)
+class Bits:
+    """An integer in which bit n stands for value n of `names`."""
+
+    base: Scalar
+    names: type[enum.IntEnum]
+
+
+U8, I8 = Scalar("B", "u8"), Scalar("b", "i8")
+U16, I16 = Scalar("H", "u16"), Scalar("h", "i16")
+U32, I32 = Scalar("I", "u32"), Scalar("i", "i32")
+U64, I64 = Scalar("Q", "u64"), Scalar("q", "i64")
+F32, F64 = Scalar("f", "float"), Scalar("d", "double")
+ENUM = Scalar("i", "enum")
+STRING, BINARY = Text(), Blob()
+
+WireType = Scalar | Text | Blob | Bits
+
+HEADER = struct.Struct("<BBH")
+"""project, class, command."""
+
+
+class Message(msgspec.Struct, frozen=True):
+    """Base of every declared message."""
+
+    NAME: ClassVar[str]
+    """Parrot's own dotted name: "ardrone3.Piloting.PCMD", "rth.state"."""
+    ID: ClassVar[MessageId]
+    BUFFER: ClassVar[Buffer]
+    DIRECTION: ClassVar[Direction]
+
+
+class UnknownMessage(msgspec.Struct, frozen=True):
+    """A message that no table of ours has, kept as it came so that it can be logged, recorded or forwarded."""
+
+    id: MessageId
+    payload: bytes
+    """The packed arguments, without the four header bytes."""
+
+
+MessageT = TypeVar("MessageT", bound=Message)
+
+_CODECS: dict[MessageId, _Codec] = {}
+
+
+def command(
+    name: str, project: int, cls: int, number: int, buffer: Buffer = Buffer.ACK
+) -> Callable[[type[MessageT]], type[MessageT]]:
+    """Declare a message that a controller sends."""
+    return _declare(Direction.COMMAND, name, MessageId(project, cls, number), buffer)
+
+
+def event(
+    name: str, project: int, cls: int, number: int, buffer: Buffer = Buffer.ACK
+) -> Callable[[type[MessageT]], type[MessageT]]:
+    """Declare a message that a device sends."""
+    return _declare(Direction.EVENT, name, MessageId(project, cls, number), buffer)
+
+
+def _declare(
+    direction: Direction, name: str, id: MessageId, buffer: Buffer
+) -> Callable[[type[MessageT]], type[MessageT]]:
+    def register(declared: type[MessageT]) -> type[MessageT]:
+        if id in _CODECS:
+            raise LocalProtocolError(f"{name}: id {id} belongs to {_CODECS[id].message.NAME} already")
+        declared.NAME, declared.ID, declared.BUFFER, declared.DIRECTION = name, id, buffer, direction
+        _CODECS[id] = _Codec(declared)
+        return declared
+
+    return register
+
+
+def declared_messages() -> Iterator[type[Message]]:
+    """Every message class declared so far (import `anafi_mav.arsdk.messages` to have all of them)."""
+    return (codec.message for codec in _CODECS.values())
+
+
+def wire_fields(message: type[Message]) -> list[tuple[str, WireType, type]]:
+    """(Parrot's argument name, wire type, Python type) of each argument in wire order."""
+    hints = get_type_hints(message, include_extras=True)
+    fields: list[tuple[str, WireType, type]] = []
+    for name in message.__struct_fields__:
+        hint = hints[name]
+        wire = [extra for extra in get_args(hint)[1:] if isinstance(extra, Scalar | Text | Blob | Bits)]
+        if get_origin(hint) is not Annotated or len(wire) != 1:
+            raise LocalProtocolError(f"{message.__name__}.{name}: annotate it with one wire type")
+        fields.append((name, wire[0], get_args(hint)[0]))
+    return fields
+
+
+class _Codec:
+    """Packs and unpacks one message class; one struct call when every argument has a fixed size."""
+
+    __slots__ = ("_converters", "_header", "_parts", "_struct", "message")
+
+    def __init__(self, message: type[Message]) -> None:
+        self.message: type[Message] = message
+        self._header = HEADER.pack(*message.ID)
+        fields = wire_fields(message)
+        self._parts: list[struct.Struct | Text | Blob] = []
+        codes: list[str] = []
+        for _, wire, _ in fields:
+            if isinstance(wire, Scalar | Bits):
+                code = wire.base.code if isinstance(wire, Bits) else wire.code
+                codes.append(code)
+                self._parts.append(struct.Struct("<" + code))
+            else:
+                self._parts.append(wire)
+        fixed = len(codes) == len(fields)
+        self._struct = struct.Struct("<" + "".join(codes)) if fixed else None
+        self._converters: list[tuple[int, type[OpenEnum]]] = [
+            (index, python) for index, (_, _, python) in enumerate(fields) if issubclass(python, OpenEnum)
+        ]
+
+    def encode(self, message: Message) -> bytes:
+        values = [getattr(message, name) for name in message.__struct_fields__]
+        try:
+            if self._struct is not None:
+                return self._header + self._struct.pack(*values)
+            pieces = [self._header]
+            for part, value in zip(self._parts, values, strict=True):
+                if isinstance(part, struct.Struct):
+                    pieces.append(part.pack(value))
+                elif isinstance(part, Text):
+                    if "\0" in value:
+                        raise ValueError("a string holds NUL, which ends it on the wire")
+                    pieces.append(value.encode() + b"\0")
+                else:
+                    pieces.append(struct.pack("<I", len(value)) + bytes(value))
+            return b"".join(pieces)
+        except (struct.error, TypeError, ValueError, OverflowError) as error:
+            raise LocalProtocolError(f"cannot encode {message!r}: {error}") from error
+
+    def decode(self, data: bytes) -> Message | None:
+        values: list[Any]
+        if self._struct is not None:
+            if len(data) < HEADER.size + self._struct.size:
+                return None
+            values = list(self._struct.unpack_from(data, HEADER.size))
+        else:
+            values = []
+            position = HEADER.size
+            for part in self._parts:
+                if isinstance(part, struct.Struct):
+                    if len(data) < position + part.size:
+                        return None
+                    values += part.unpack_from(data, position)
+                    position += part.size
+                elif isinstance(part, Text):
+                    end = data.find(b"\0", position)
+                    if end < 0:
+                        return None
+                    values.append(data[position:end].decode(errors="replace"))
+                    position = end + 1
+                else:
+                    if len(data) < position + 4:
+                        return None
+                    (size,) = struct.unpack_from("<I", data, position)
+                    position += 4
+                    if len(data) < position + size:
+                        return None
+                    values.append(data[position : position + size])
+                    position += size
+        for index, python in self._converters:
+            values[index] = python(values[index])
+        return self.message(*values)
+
+
+def encode(message: Message | UnknownMessage) -> bytes:
+    """The command bytes of a message.
+
+    Raises `LocalProtocolError` when an argument does not fit its wire type.
+    """
+    if isinstance(message, UnknownMessage):
+        return HEADER.pack(*message.id) + message.payload
+    return _CODECS[message.ID].encode(message)
+
+
+def decode(data: bytes) -> Message | UnknownMessage | None:
+    """The message in these command bytes; None when they are too short for what their header says.
+
+    Bytes after the last argument are ignored: later firmware appends arguments to old messages.
+    """
+    if len(data) < HEADER.size:
+        return None
+    id = MessageId(*HEADER.unpack_from(data))
+    codec = _CODECS.get(id)
+    if codec is None:
+        return UnknownMessage(id, bytes(data[HEADER.size :]))
+    return codec.decode(data)

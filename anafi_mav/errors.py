@@ -1,0 +1,67 @@
+"""The error tree. Every error this package raises on purpose is an `AnafiMavError`.
+
+A leaf says whose fault it is and keeps the facts in attributes, so that a caller can react without
+parsing text. Bytes of a peer never raise: they are dropped and counted where they arrive.
+"""
+
+from __future__ import annotations
+
+
+class AnafiMavError(Exception):
+    """Root of the tree; catch this to catch everything of ours."""
+
+
+class LocalProtocolError(AnafiMavError, ValueError):
+    """Our own code asked a protocol for something it cannot express (value out of range, wrong state)."""
+
+
+class RemoteProtocolError(AnafiMavError):
+    """The peer broke the protocol in a way that ends the exchange, e.g. an unreadable handshake reply."""
+
+
+class LinkLost(AnafiMavError, ConnectionError):
+    """The link to a drone is gone, or could not be made.
+
+    `reason` is one readable clause: "nothing received for 2.5 s", "connection refused by 192.168.42.1:44444".
+    """
+
+    def __init__(self, reason: str) -> None:
+        super().__init__(reason)
+        self.reason = reason
+
+
+class CommandTimeout(AnafiMavError, TimeoutError):
+    """The drone did not confirm a command in time. ARSDK has no refusal: silence is how a drone says no.
+
+    `command` is Parrot's name of the command, `seconds` how long we waited.
+    """
+
+    def __init__(self, command: str, seconds: float) -> None:
+        super().__init__(f"the drone did not confirm {command} within {seconds:g} s")
+        self.command = command
+        self.seconds = seconds
+
+
+class CommandRejected(AnafiMavError):
+    """The drone, or its present state as it reported it, refuses the command. `reason` is shown to users."""
+
+    def __init__(self, reason: str) -> None:
+        super().__init__(reason)
+        self.reason = reason
+
+
+class NotSupported(AnafiMavError):
+    """This drone has no such feature: it did not announce it when it connected. `feature` names it."""
+
+    def __init__(self, feature: str) -> None:
+        super().__init__(f"this drone has no {feature}")
+        self.feature = feature
+
+
+class ConfigError(AnafiMavError, ValueError):
+    """The configuration is unusable at `key_path` ("drones[0].sysid"); the text says what was expected there."""
+
+    def __init__(self, key_path: str, problem: str) -> None:
+        super().__init__(f"{key_path}: {problem}" if key_path else problem)
+        self.key_path = key_path
+        self.problem = problem
