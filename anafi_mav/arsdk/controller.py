@@ -1,0 +1,165 @@
+"""The controller's end: find a drone, shake hands, run a session with it."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import socket
+from collections.abc import Callable
+from typing import TypeVar
+
+from anafi_mav.arsdk import handshake
+from anafi_mav.arsdk.handshake import ConnectReply, ConnectRequest, DeviceInfo
+from anafi_mav.arsdk.session import OnMessage, Session
+from anafi_mav.arsdk.transport import Role, Transport
+from anafi_mav.errors import LinkLost, RemoteProtocolError
+
+CONTROLLER_NAME = "anafi-mav"
+CONTROLLER_TYPE = "computer"
+
+ParsedT = TypeVar("ParsedT")
+
+
+class ControllerSession(Session):
+    """A connection to a drone. It owns the discovery connection too, whose end is the drone's way to say goodbye."""
+
+    def __init__(
+        self,
+        transport: Transport,
+        on_message: OnMessage,
+        device: DeviceInfo,
+        discovery: tuple[asyncio.StreamReader, asyncio.StreamWriter],
+    ) -> None:
+        super().__init__(transport, on_message)
+        self.device = device
+        """What the drone said of itself."""
+        self._discovery = discovery[1]
+        self._watch = asyncio.create_task(self._watch_discovery(discovery[0]))
+
+    async def _watch_discovery(self, reader: asyncio.StreamReader) -> None:
+        with contextlib.suppress(OSError):
+            while await reader.read(handshake.MAX_JSON):
+                pass
+        self.end("the drone closed the connection")
+
+    def end(self, reason: str) -> None:
+        super().end(reason)
+        self._watch.cancel()
+        self._discovery.close()
+
+
+async def connect(
+    host: str,
+    *,
+    discovery_port: int = handshake.DISCOVERY_PORT,
+    handshake_port: int | None = None,
+    versions: tuple[int, int] = (1, 3),
+    local_address: str | None = None,
+    on_message: OnMessage,
+    ping_after: float = 0.5,
+    silence_limit: float | None = 2.5,
+    timeout: float = 3.0,
+) -> ControllerSession:
+    """Connect to the drone at `host`.
+
+    `handshake_port` None means the one that discovery tells. `versions` is the (lowest, highest) ARSDK protocol
+    version offered. `local_address` binds all our sockets; None: whatever routes to the drone. Raises `LinkLost`
+    when nobody answers within `timeout` seconds or the drone refuses, `RemoteProtocolError` when what answers is
+    no drone.
+    """
+    handshake.check_versions(versions)
+    opening = _connect(
+        host, discovery_port, handshake_port, versions, local_address, on_message, ping_after, silence_limit
+    )
+    try:
+        return await asyncio.wait_for(opening, timeout)
+    except asyncio.TimeoutError:
+        raise LinkLost(f"no answer from {host} within {timeout:g} s") from None
+
+
+async def _connect(
+    host: str,
+    discovery_port: int,
+    handshake_port: int | None,
+    versions: tuple[int, int],
+    local_address: str | None,
+    on_message: OnMessage,
+    ping_after: float,
+    silence_limit: float | None,
+) -> ControllerSession:
+    reader, writer = await _open(host, discovery_port, local_address)
+    try:
+        device = await _read(reader, handshake.parse_discovery, f"{host}:{discovery_port}")
+        here, there = writer.get_extra_info("sockname")[0], writer.get_extra_info("peername")[0]
+        sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            sock.setblocking(False)
+            sock.bind((here, 0))
+            request = ConnectRequest(
+                CONTROLLER_NAME,
+                CONTROLLER_TYPE,
+                d2c_port=sock.getsockname()[1],
+                device_id=device.serial,
+                proto_v_min=versions[0],
+                proto_v_max=versions[1],
+            )
+            reply = await _shake_hands(there, handshake_port or device.port, here, request)
+            # Connected, the socket hears that drone only, and hears at once when nobody listens there.
+            sock.connect((there, reply.c2d_port))
+            transport = Transport(
+                Role.CONTROLLER,
+                reply.proto_v,
+                asyncio.get_running_loop().time(),
+                ping_after=ping_after,
+                silence_limit=silence_limit,
+            )
+            session = ControllerSession(transport, on_message, device, (reader, writer))
+            await session.open(sock)
+        except BaseException:
+            sock.close()
+            raise
+    except BaseException:
+        writer.close()
+        raise
+    return session
+
+
+async def _shake_hands(host: str, port: int, local_address: str, request: ConnectRequest) -> ConnectReply:
+    reader, writer = await _open(host, port, local_address)
+    try:
+        writer.write(handshake.format_request(request))
+        reply = await _read(reader, handshake.parse_reply, f"{host}:{port}")
+    finally:
+        writer.close()
+    if reply.status != 0:
+        raise LinkLost(f"{host}:{port} refused the connection (status {reply.status})")
+    if not request.proto_v_min <= reply.proto_v <= request.proto_v_max:
+        raise RemoteProtocolError(
+            f"{host}:{port} chose protocol version {reply.proto_v}, "
+            f"offered were {request.proto_v_min} to {request.proto_v_max}"
+        )
+    return reply
+
+
+async def _open(host: str, port: int, local_address: str | None) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
+    local = None if local_address is None else (local_address, 0)
+    try:
+        # ARSDK is IPv4 only.
+        return await asyncio.open_connection(host, port, family=socket.AF_INET, local_addr=local)
+    except OSError as error:
+        raise LinkLost(f"cannot connect to {host}:{port}: {error.strerror or error}") from error
+
+
+async def _read(reader: asyncio.StreamReader, parse: Callable[[bytes], ParsedT | None], where: str) -> ParsedT:
+    data = b""
+    while True:
+        try:
+            piece = await reader.read(handshake.MAX_JSON)
+        except OSError as error:
+            raise LinkLost(f"{where}: {error.strerror or error}") from error
+        if not piece:
+            raise LinkLost(f"{where} closed the connection without a complete answer")
+        data += piece
+        parsed = parse(data)
+        if parsed is not None:
+            return parsed

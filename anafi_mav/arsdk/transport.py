@@ -1,0 +1,523 @@
+"""The ARSDK transport without I/O: queues, acknowledgements, retries, pings, for both ends of the link.
+
+The same object plays the controller and the device; `Role` picks the queue ids. The shell hands datagrams and the
+time to `receive`, sends what `outgoing` returns and calls `expire` when `deadline` has come.
+
+Rules (arsdk-ng libarsdk/src/cmd_itf/arsdk_cmd_itf{1,2,3}.c and arsdk_transport.c):
+
+- an acknowledged queue is stop-and-wait: one frame is in flight and is repeated with its sequence number until it
+  is acknowledged; versions 2 and 3 repeat for ever, in version 1 a controller gives up after five repetitions;
+- a receiver takes a frame when its sequence number is above the last one, or more than ten below it (a wrap, or a
+  peer that began anew); it acknowledges duplicates too, since it is the acknowledgement that got lost;
+- a side that has received nothing for a while pings; three pings without any answer end the link.
+"""
+
+from __future__ import annotations
+
+import enum
+import itertools
+import struct
+from collections import Counter, deque
+from typing import NamedTuple, TypeAlias
+
+import msgspec
+
+from anafi_mav.arsdk import wire
+from anafi_mav.arsdk.frame import (
+    MAX_COMMAND,
+    PACK_LIMIT,
+    VERSIONS,
+    FrameType,
+    decode_frames,
+    decode_varint,
+    encode_frame,
+    encode_varint,
+)
+from anafi_mav.arsdk.wire import Buffer, Message, MessageId, UnknownMessage
+from anafi_mav.errors import LocalProtocolError
+
+PING, PONG = 0, 1
+"""Queue ids of the link check (arsdk-ng libarsdk/src/arsdk_transport_ids.h, as all ids here)."""
+
+ACK_OFFSET = 128
+"""The acknowledgement of queue n travels as id n + 128."""
+
+ACK_TIMEOUT = 0.15
+"""s until a frame in flight is repeated (arsdk-ng libarsdkctrl/src/arsdk_device.c, ack_timeout_ms)."""
+
+MAX_RETRIES_V1 = 5
+"""Repetitions after which a version 1 controller gives a command up (same file, default_max_retry_count)."""
+
+MAX_UNANSWERED_PINGS = 3
+"""arsdk-ng arsdk_transport.c, send_ping."""
+
+_RETRY = frozenset({MessageId(0, 2, 0), MessageId(0, 4, 0), MessageId(1, 0, 4)})
+"""AllSettings, AllStates, Emergency: timeout="RETRY" in Parrot's XML, version 1 does not give them up either."""
+
+MAX_QUEUED = 4096
+"""Messages waiting in an acknowledged queue. All states and settings of a drone are a few hundred; a queue this
+long means that the peer is gone, and the pings will say so."""
+
+MAX_QUEUED_NOACK = 512
+"""Messages waiting in the unacknowledged queue; beyond it the oldest is dropped, as the newest value counts."""
+
+MAX_REPLIES = 512
+"""Acknowledgements and pongs waiting to be sent: a datagram can hold thousands of pings, we need not answer all."""
+
+
+class Role(enum.Enum):
+    """Which end of the link."""
+
+    CONTROLLER = "controller"
+    DEVICE = "device"
+
+
+class Received(msgspec.Struct, frozen=True):
+    """The peer sent a message; each acknowledged one arrives once and in order."""
+
+    message: Message | UnknownMessage
+
+
+class Delivered(msgspec.Struct, frozen=True):
+    """The peer acknowledged the frame that carried the last byte of this message."""
+
+    token: int
+
+
+class Undelivered(msgspec.Struct, frozen=True):
+    """This message was given up: "no acknowledgement" (version 1 only) or "queue full"."""
+
+    token: int
+    reason: str
+
+
+class Garbage(msgspec.Struct, frozen=True):
+    """The peer sent something unreadable; `reason` is the key it is counted under."""
+
+    reason: str
+
+
+class LinkDown(msgspec.Struct, frozen=True):
+    """The link is dead. Nothing is sent or received any more; a new connection needs a new transport."""
+
+    reason: str
+
+
+Event: TypeAlias = Received | Delivered | Undelivered | Garbage | LinkDown
+
+_ACK, _NOACK, _WITHACK = int(FrameType.ACK), int(FrameType.NOACK), int(FrameType.WITHACK)
+
+_NOACK_ID = {Role.CONTROLLER: 10, Role.DEVICE: 127}
+_ACK_ID = {Role.CONTROLLER: 11, Role.DEVICE: 126}
+_LOW_PRIO_ID = {Role.CONTROLLER: 11, Role.DEVICE: 125}
+_RECEIVED_IDS = {Role.CONTROLLER: frozenset({125, 126, 127}), Role.DEVICE: frozenset({10, 11, 12})}
+
+_U16 = struct.Struct("<H")
+_U64 = struct.Struct("<Q")
+_V3_LENGTH = 2
+"""A varint of at most PACK_LIMIT[3] has two bytes."""
+_NEVER = float("inf")
+
+
+class _Entry:
+    """A command that waits to be packed; `packed` counts the bytes that went into frames (split commands only)."""
+
+    __slots__ = ("data", "forever", "packed", "token")
+
+    def __init__(self, token: int, data: bytes, forever: bool) -> None:
+        self.token = token
+        self.data = data
+        self.forever = forever
+        self.packed = 0
+
+
+class _Piece(NamedTuple):
+    """A command, or a part of a split one, in the frame that is in flight."""
+
+    entry: _Entry
+    data: bytes
+    last: bool
+
+
+class _AckQueue:
+    """Sending side of one acknowledged queue."""
+
+    __slots__ = ("due", "flight", "id", "sendings", "seq", "waiting")
+
+    def __init__(self, id: int) -> None:
+        self.id = id
+        self.waiting: deque[_Entry] = deque()
+        self.flight: list[_Piece] = []
+        self.seq = -1
+        self.due = _NEVER
+        self.sendings = 0
+
+    def pack(self, version: int, limit: int) -> None:
+        """Put as many waiting commands into the next frame as it takes; only one that is too long is split."""
+        room = 1 if version == 1 else limit
+        waiting = self.waiting
+        while waiting and room > 0:
+            entry = waiting[0]
+            piece = entry.data if version == 1 else _prefixed(version, entry)
+            if len(piece) <= room or version == 1:
+                self.flight.append(_Piece(entry, piece, True))
+                waiting.popleft()
+                room -= len(piece)
+            elif self.flight:
+                break
+            else:
+                self.flight.append(_Piece(entry, piece[:limit], False))
+                entry.packed += limit - (len(piece) - (len(entry.data) - entry.packed))
+                break
+        self.sendings = 0
+
+    def land(self) -> None:
+        """Nothing is in flight any more."""
+        self.flight = []
+        self.due = _NEVER
+
+
+def _prefixed(version: int, entry: _Entry) -> bytes:
+    """What is left of a command, behind its length unless that went out with an earlier part."""
+    if entry.packed:
+        return entry.data[entry.packed :]
+    return _with_length(version, entry.data)
+
+
+def _with_length(version: int, data: bytes) -> bytes:
+    return (_U16.pack(len(data)) if version == 2 else encode_varint(len(data))) + data
+
+
+class Transport:
+    """One connection. Construct it when the handshake is done; `version` is the negotiated protocol version.
+
+    A ping goes out when nothing was received for `ping_after` seconds, and again every `ping_after`. The link is
+    down after three unanswered pings, or when nothing was received for `silence_limit` seconds.
+
+    Call `outgoing` after every `receive`, `send`, `cancel` and `expire`.
+    """
+
+    def __init__(
+        self,
+        role: Role,
+        version: int,
+        now: float,
+        *,
+        ping_after: float = 2.0,
+        silence_limit: float | None = None,
+    ) -> None:
+        if version not in VERSIONS:
+            raise LocalProtocolError(f"protocol version {version}, expected one of {VERSIONS}")
+        if ping_after <= 0 or (silence_limit is not None and silence_limit <= 0):
+            raise LocalProtocolError("ping_after and silence_limit must be positive")
+        self.role = role
+        self.version = version
+        self.counters: Counter[str] = Counter()
+        """What happened how often: "received", "sent", "retransmitted", "duplicate", "garbage.<reason>", …"""
+        self._ping_after = ping_after
+        self._silence_limit = _NEVER if silence_limit is None else silence_limit
+        self._tokens = itertools.count(1)
+        self._seq_mask = 0xFF if version == 1 else 0xFFFF
+        self._limit = PACK_LIMIT[version]
+        self._received_ids = _RECEIVED_IDS[role]
+        # The first frame has number 0 and must count as new, hence a wrap from the highest number.
+        self._last_seq = dict.fromkeys(self._received_ids, self._seq_mask)
+        self._partial: dict[int, tuple[int, bytearray]] = {}
+        self._noack: deque[tuple[int, bytes]] = deque()
+        self._noack_seq = -1
+        self._queues = {id: _AckQueue(id) for id in (_ACK_ID[role], _LOW_PRIO_ID[role])}
+        self._ack_seq = -1
+        self._replies: list[bytes] = []
+        self._pending: list[Event] = []
+        self._last_received = now
+        self._ping_due = now + ping_after
+        self._ping_seq = -1
+        self._unanswered = 0
+        self._down = False
+
+    # -- receiving
+
+    def receive(self, data: bytes, now: float) -> list[Event]:
+        """What this datagram means. Never raises, whatever the bytes are."""
+        if self._down:
+            return []
+        events = self._take_pending()
+        frames, garbage = decode_frames(self.version, data)
+        if frames:
+            # Any frame proves that the peer lives, not the pong alone.
+            self._last_received = now
+            self._ping_due = now + self._ping_after
+            self._unanswered = 0
+        for type, id, seq, payload in frames:
+            if id in self._received_ids and type != _ACK:
+                if type == _WITHACK:
+                    self._acknowledge(id, seq)
+                if -10 <= seq - self._last_seq[id] <= 0:
+                    self.counters["duplicate"] += 1
+                    continue
+                self._last_seq[id] = seq
+                self._unpack(type, id, payload, events)
+            elif type == _ACK and id - ACK_OFFSET in self._queues:
+                self._acknowledged(self._queues[id - ACK_OFFSET], payload, events)
+            elif id == PING and type != _ACK:
+                self._reply(encode_frame(self.version, type, PONG, seq, payload))
+            elif id != PONG or type == _ACK:
+                self._garbage("queue", events)
+        if garbage is not None:
+            self._garbage(garbage, events)
+        return events
+
+    def _unpack(self, type: int, id: int, payload: bytes, events: list[Event]) -> None:
+        if self.version == 1:
+            self._command(payload, events)
+            return
+        position, end = 0, len(payload)
+        if type == _WITHACK and id in self._partial:
+            # The frame begins with the rest of a split command, which has no length of its own.
+            size, collected = self._partial.pop(id)
+            position = min(end, size - len(collected))
+            collected += payload[:position]
+            if len(collected) < size:
+                self._partial[id] = (size, collected)
+                return
+            self._command(bytes(collected), events)
+        while position < end:
+            size, position = self._command_size(payload, position)
+            if size < 0:
+                self._garbage("command", events)
+                return
+            if size > end - position:
+                if self.version == 2 or type != _WITHACK:
+                    self._garbage("command", events)
+                else:
+                    self._partial[id] = (size, bytearray(payload[position:]))
+                return
+            self._command(payload[position : position + size], events)
+            position += size
+
+    def _command_size(self, payload: bytes, position: int) -> tuple[int, int]:
+        """(length of the next command, where it begins); a negative length is an unreadable one."""
+        if self.version == 2:
+            if len(payload) - position < _U16.size:
+                return -1, position
+            return _U16.unpack_from(payload, position)[0], position + _U16.size
+        read = decode_varint(payload, position)
+        if read is None or read[0] > MAX_COMMAND:
+            return -1, position
+        return read
+
+    def _command(self, data: bytes, events: list[Event]) -> None:
+        message = wire.decode(data)
+        if message is None:
+            self._garbage("command", events)
+        else:
+            self.counters["received"] += 1
+            events.append(Received(message))
+
+    def _acknowledge(self, id: int, seq: int) -> None:
+        self._ack_seq = (self._ack_seq + 1) & self._seq_mask
+        payload = bytes((seq,)) if self.version == 1 else _U16.pack(seq)
+        self._reply(encode_frame(self.version, _ACK, id + ACK_OFFSET, self._ack_seq, payload))
+
+    def _reply(self, frame: bytes) -> None:
+        if len(self._replies) < MAX_REPLIES:
+            self._replies.append(frame)
+        else:
+            self.counters["dropped.reply"] += 1
+
+    def _acknowledged(self, queue: _AckQueue, payload: bytes, events: list[Event]) -> None:
+        width = 1 if self.version == 1 else 2
+        if len(payload) < width:
+            self._garbage("ack", events)
+        elif not queue.flight or int.from_bytes(payload[:width], "little") != queue.seq:
+            # It answers another copy of a frame that is done with.
+            self.counters["stale ack"] += 1
+        else:
+            events.extend(Delivered(piece.entry.token) for piece in queue.flight if piece.last)
+            queue.land()
+
+    def _garbage(self, reason: str, events: list[Event]) -> None:
+        self.counters["garbage." + reason] += 1
+        events.append(Garbage(reason))
+
+    # -- sending
+
+    def send(self, message: Message | UnknownMessage, now: float) -> int:
+        """Queue a message; the token names it in `cancel`, `Delivered` and `Undelivered`.
+
+        An unknown message travels in the acknowledged queue. A HIGH_PRIO message overtakes what waits there.
+        Raises `LocalProtocolError` when it cannot be encoded or is too long for its queue. On a link that is down
+        the message is counted and forgotten.
+        """
+        data = wire.encode(message)
+        buffer = message.BUFFER if isinstance(message, Message) else Buffer.ACK
+        longest = self._longest(buffer)
+        if len(data) > longest:
+            raise LocalProtocolError(f"{type(message).__name__} has {len(data)} bytes, its queue takes {longest}")
+        token = next(self._tokens)
+        if self._down:
+            self.counters["dropped.down"] += 1
+        elif buffer is Buffer.NON_ACK:
+            if len(self._noack) >= MAX_QUEUED_NOACK:
+                self._noack.popleft()
+                self.counters["dropped.noack"] += 1
+            self._noack.append((token, data))
+        else:
+            self._enqueue(buffer, token, data)
+        return token
+
+    def _longest(self, buffer: Buffer) -> int:
+        """Most bytes of one command in this buffer's queue."""
+        if self.version == 3:
+            return self._limit - _V3_LENGTH if buffer is Buffer.NON_ACK else MAX_COMMAND
+        return self._limit - _U16.size if self.version == 2 else self._limit
+
+    def _enqueue(self, buffer: Buffer, token: int, data: bytes) -> None:
+        queue = self._queues[(_LOW_PRIO_ID if buffer is Buffer.LOW_PRIO else _ACK_ID)[self.role]]
+        if len(queue.waiting) >= MAX_QUEUED:
+            self.counters["dropped.full"] += 1
+            self._pending.append(Undelivered(token, "queue full"))
+            return
+        forever = self.version > 1 or self.role is Role.DEVICE or MessageId(*wire.HEADER.unpack_from(data)) in _RETRY
+        entry = _Entry(token, data, forever)
+        if buffer is not Buffer.HIGH_PRIO:
+            queue.waiting.append(entry)
+        else:
+            # In front of all, but not between the parts of a split command.
+            queue.waiting.insert(1 if queue.waiting and queue.waiting[0].packed else 0, entry)
+
+    def cancel(self, token: int) -> None:
+        """Forget a message that is not yet acknowledged: it is never sent (again). Unknown tokens are ignored.
+
+        A frame in flight is repeated without it, under the same number: a peer that has the frame drops the
+        repetition, one that has not never sees the message. The exception is a command too long for one frame
+        (1000 bytes in version 3) of which a part was sent: the peer would take whatever follows for its rest, so
+        it is completed.
+        """
+        for index, (queued, _) in enumerate(self._noack):
+            if queued == token:
+                del self._noack[index]
+                return
+        for queue in self._queues.values():
+            for index, entry in enumerate(queue.waiting):
+                if entry.token == token and not entry.packed:
+                    del queue.waiting[index]
+                    return
+            kept = [piece for piece in queue.flight if piece.entry.token != token or piece.entry.packed]
+            if len(kept) != len(queue.flight):
+                queue.flight = kept
+                if not kept:
+                    queue.land()
+                return
+
+    def outgoing(self, now: float) -> list[bytes]:
+        """The datagrams to send now; they are forgotten here, repetitions come by themselves."""
+        if self._down:
+            return []
+        datagrams = self._replies
+        self._replies = []
+        while self._noack:
+            datagrams.append(self._next_noack())
+        for queue in self._queues.values():
+            if queue.flight and now >= queue.due:
+                self._give_up(queue)
+            if not queue.flight:
+                if not queue.waiting:
+                    continue
+                queue.seq = (queue.seq + 1) & self._seq_mask
+                queue.pack(self.version, self._limit)
+                queue.due = now
+            if now >= queue.due:
+                datagrams.append(self._sending(queue, now))
+        return datagrams
+
+    def _next_noack(self) -> bytes:
+        _, data = self._noack.popleft()
+        self.counters["sent"] += 1
+        if self.version == 1:
+            payload = data
+        else:
+            payload = _with_length(self.version, data)
+            while self._noack:
+                more = _with_length(self.version, self._noack[0][1])
+                if len(payload) + len(more) > self._limit:
+                    break
+                payload += more
+                self._noack.popleft()
+                self.counters["sent"] += 1
+        self._noack_seq = (self._noack_seq + 1) & self._seq_mask
+        return encode_frame(self.version, _NOACK, _NOACK_ID[self.role], self._noack_seq, payload)
+
+    def _sending(self, queue: _AckQueue, now: float) -> bytes:
+        if queue.sendings:
+            self.counters["retransmitted"] += 1
+        else:
+            self.counters["sent"] += sum(piece.last for piece in queue.flight)
+        queue.sendings += 1
+        queue.due = now + ACK_TIMEOUT
+        payload = b"".join([piece.data for piece in queue.flight])
+        return encode_frame(self.version, _WITHACK, queue.id, queue.seq, payload)
+
+    def _give_up(self, queue: _AckQueue) -> None:
+        """Version 1, controller: a command is repeated five times, then the next one has its turn."""
+        if queue.sendings > MAX_RETRIES_V1 and not queue.flight[0].entry.forever:
+            self.counters["undelivered"] += 1
+            self._pending.append(Undelivered(queue.flight[0].entry.token, "no acknowledgement"))
+            queue.land()
+
+    # -- time
+
+    def deadline(self) -> float | None:
+        """When `expire` wants to be called; None when the link is down. It may move later without notice."""
+        if self._down:
+            return None
+        if self._pending:
+            return self._last_received
+        deadline = min(self._ping_due, self._last_received + self._silence_limit)
+        for queue in self._queues.values():
+            if queue.due < deadline:
+                deadline = queue.due
+        return deadline
+
+    def expire(self, now: float) -> list[Event]:
+        """What the time that passed means: pings and repetitions for `outgoing`, messages given up, a dead link."""
+        if self._down:
+            return []
+        for queue in self._queues.values():
+            if queue.flight and now >= queue.due:
+                self._give_up(queue)
+        events = self._take_pending()
+        silence = now - self._last_received
+        if silence >= self._silence_limit:
+            self._go_down(f"nothing received for {silence:.1f} s", events)
+        elif now >= self._ping_due:
+            if self._unanswered >= MAX_UNANSWERED_PINGS:
+                self._go_down(f"{self._unanswered} pings unanswered, nothing received for {silence:.1f} s", events)
+            else:
+                self._send_ping(now)
+        return events
+
+    def _send_ping(self, now: float) -> None:
+        self._unanswered += 1
+        self._ping_due = now + self._ping_after
+        self._ping_seq = (self._ping_seq + 1) & self._seq_mask
+        payload = _U64.pack(int(now * 1e6) & 0xFFFF_FFFF_FFFF_FFFF)
+        self.counters["ping"] += 1
+        self._reply(encode_frame(self.version, _NOACK, PING, self._ping_seq, payload))
+
+    def _go_down(self, reason: str, events: list[Event]) -> None:
+        self._down = True
+        self._noack.clear()
+        self._replies.clear()
+        self._partial.clear()
+        for queue in self._queues.values():
+            queue.waiting.clear()
+            queue.land()
+        events.append(LinkDown(reason))
+
+    def _take_pending(self) -> list[Event]:
+        events = self._pending
+        if events:
+            self._pending = []
+            return events
+        return []
