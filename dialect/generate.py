@@ -1,0 +1,149 @@
+"""Makes anafi_mav/mavlink/dialect.py: pymavlink's message definitions, overlaid with what they lack.
+
+pymavlink carries its definitions as XML inside the package and a generator, mavgen, that turns them into a Python
+module. mavgen refuses a second definition of a message, so the overlay is merged into copies of the XML files first.
+Run ``python dialect/generate.py`` to make the module in place; the build hook does the same for wheels.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import copy
+import io
+import sys
+import tempfile
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator
+from pathlib import Path
+
+import pymavlink
+from pymavlink.generator import mavgen, mavparse
+
+HERE = Path(__file__).resolve().parent
+ROOT = "anafi.xml"
+"""The dialect itself; it includes pymavlink's files by name."""
+OVERLAY = HERE / "overlay.xml"
+HOST = "common.xml"
+"""The file of pymavlink's that new messages and enums are put into: everything else includes it."""
+OUTPUT = HERE.parent / "anafi_mav" / "mavlink" / "dialect.py"
+
+
+class OverlayError(Exception):
+    """The overlay contradicts pymavlink's definitions, or mavgen refuses the result."""
+
+
+def generate(output: Path = OUTPUT) -> Path:
+    """Write the module and return its path. Raises `OverlayError`; the old module is then untouched."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        root = write_definitions(folder)
+        module = folder / "dialect.py"
+        options = mavgen.Opts(str(module), wire_protocol=mavparse.PROTOCOL_2_0, language="Python3", validate=True)
+        chatter = io.StringIO()
+        with contextlib.redirect_stdout(chatter), contextlib.redirect_stderr(chatter):
+            try:
+                done = mavgen.mavgen(options, [str(root)])
+            except SystemExit as refusal:  # its argument is the reason
+                done = False
+                chatter.write(str(refusal))
+        if not done or not module.is_file():
+            raise OverlayError(f"mavgen refused the definitions:\n{chatter.getvalue()}")
+        text = module.read_text(encoding="utf-8")
+    output.write_text(text, encoding="utf-8")
+    return output
+
+
+def write_definitions(folder: Path) -> Path:
+    """Write the root dialect and all it includes, overlaid, into `folder`; returns the root's path."""
+    trees = read_definitions()
+    merge(trees, ET.parse(OVERLAY))
+    for name, tree in trees.items():
+        tree.write(folder / name, encoding="utf-8", xml_declaration=True)
+    return folder / ROOT
+
+
+def read_definitions() -> dict[str, ET.ElementTree]:
+    """The root dialect and every file of pymavlink's that it includes, by file name."""
+    source = Path(pymavlink.__file__).parent / "dialects" / "v20"
+    trees = {ROOT: ET.parse(HERE / ROOT)}
+    waiting = list(_included(trees[ROOT]))
+    while waiting:
+        name = waiting.pop()
+        if name not in trees:
+            trees[name] = ET.parse(source / name)
+            waiting.extend(_included(trees[name]))
+    return trees
+
+
+def merge(trees: dict[str, ET.ElementTree], overlay: ET.ElementTree) -> None:
+    """Add to `trees` what `overlay` has and they lack. Raises `OverlayError` where both contradict."""
+    host = trees[HOST].getroot()
+    known = {message.get("name"): message for tree in trees.values() for message in tree.iterfind("messages/message")}
+    taken = {message.get("id"): name for name, message in known.items()}
+    for message in overlay.iterfind("messages/message"):
+        name, id = message.get("name"), message.get("id")
+        if taken.get(id, name) != name:
+            raise OverlayError(f"message id {id} of {name} belongs to {taken[id]}")
+        if name in known:
+            _extend_message(known[name], message)
+        else:
+            _child(host, "messages").append(copy.deepcopy(message))
+    for enum in overlay.iterfind("enums/enum"):
+        _extend_enum(trees, enum)
+
+
+def _extend_message(known: ET.Element, wanted: ET.Element) -> None:
+    """Append the extension fields that `wanted` has beyond `known`."""
+    name = wanted.get("name")
+    if known.get("id") != wanted.get("id"):
+        raise OverlayError(f"{name} has id {known.get('id')}, not {wanted.get('id')}")
+    had, asked = list(_fields(known)), list(_fields(wanted))
+    common = min(len(had), len(asked))
+    if [entry[:3] for entry in had[:common]] != [entry[:3] for entry in asked[:common]]:
+        raise OverlayError(f"{name} is another message in pymavlink")
+    missing = asked[len(had) :]
+    if not all(extension for _, _, extension, _ in missing):
+        raise OverlayError(f"{name} has too few fields in pymavlink")
+    if missing and known.find("extensions") is None:
+        known.append(ET.Element("extensions"))
+    known.extend(copy.deepcopy(element) for _, _, _, element in missing)
+
+
+def _extend_enum(trees: dict[str, ET.ElementTree], wanted: ET.Element) -> None:
+    """Add the entries of `wanted` that no file has; mavgen itself merges an enum that several files declare."""
+    name = wanted.get("name")
+    declared = [enum for tree in trees.values() for enum in tree.iterfind("enums/enum") if enum.get("name") == name]
+    if not declared:
+        _child(trees[HOST].getroot(), "enums").append(copy.deepcopy(wanted))
+        return
+    entries = {entry.get("name"): entry.get("value") for enum in declared for entry in enum.iterfind("entry")}
+    for entry in wanted.iterfind("entry"):
+        if entry.get("name") not in entries:
+            declared[0].append(copy.deepcopy(entry))
+        elif entries[entry.get("name")] != entry.get("value"):
+            raise OverlayError(f"{entry.get('name')} is {entries[entry.get('name')]} in pymavlink")
+
+
+def _fields(message: ET.Element) -> Iterator[tuple[str | None, str | None, bool, ET.Element]]:
+    """(type, name, whether it is an extension, the element) of each field, in order."""
+    extension = False
+    for element in message:
+        if element.tag == "extensions":
+            extension = True
+        elif element.tag == "field":
+            yield element.get("type"), element.get("name"), extension, element
+
+
+def _included(tree: ET.ElementTree) -> Iterator[str]:
+    return (include.text.strip() for include in tree.iterfind("include") if include.text)
+
+
+def _child(parent: ET.Element, tag: str) -> ET.Element:
+    child = parent.find(tag)
+    if child is None:
+        raise OverlayError(f"{HOST} has no <{tag}>")
+    return child
+
+
+if __name__ == "__main__":
+    sys.stdout.write(f"{generate()}\n")
