@@ -43,9 +43,15 @@ class ControllerSession(Session):
         self.end("the drone closed the connection")
 
     def end(self, reason: str) -> None:
+        """See `Session.end`; the discovery connection goes too."""
         super().end(reason)
         self._watch.cancel()
         self._discovery.close()
+
+    async def close(self) -> None:
+        """See `Session.close`."""
+        await super().close()
+        await asyncio.wait([self._watch])
 
 
 async def connect(
@@ -63,9 +69,9 @@ async def connect(
     """Connect to the drone at `host`.
 
     `handshake_port` None means the one that discovery tells. `versions` is the (lowest, highest) ARSDK protocol
-    version offered. `local_address` binds all our sockets; None: whatever routes to the drone. Raises `LinkLost`
-    when nobody answers within `timeout` seconds or the drone refuses, `RemoteProtocolError` when what answers is
-    no drone.
+    version offered. `local_address` binds all our sockets; None: whatever routes to the drone. `on_message` may be
+    called before this returns. Raises `LinkLost` when nobody answers within `timeout` seconds or the drone refuses,
+    `RemoteProtocolError` when what answers is no drone.
     """
     handshake.check_versions(versions)
     opening = _connect(
@@ -93,7 +99,6 @@ async def _connect(
         here, there = writer.get_extra_info("sockname")[0], writer.get_extra_info("peername")[0]
         sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
-            sock.setblocking(False)
             sock.bind((here, 0))
             request = ConnectRequest(
                 CONTROLLER_NAME,
@@ -106,20 +111,25 @@ async def _connect(
             reply = await _shake_hands(there, handshake_port or device.port, here, request)
             # Connected, the socket hears that drone only, and hears at once when nobody listens there.
             sock.connect((there, reply.c2d_port))
-            transport = Transport(
-                Role.CONTROLLER,
-                reply.proto_v,
-                asyncio.get_running_loop().time(),
-                ping_after=ping_after,
-                silence_limit=silence_limit,
-            )
-            session = ControllerSession(transport, on_message, device, (reader, writer))
-            await session.open(sock)
         except BaseException:
             sock.close()
             raise
     except BaseException:
         writer.close()
+        raise
+    transport = Transport(
+        Role.CONTROLLER,
+        reply.proto_v,
+        asyncio.get_running_loop().time(),
+        ping_after=ping_after,
+        silence_limit=silence_limit,
+    )
+    session = ControllerSession(transport, on_message, device, (reader, writer))
+    try:
+        await session.open(sock)
+    except BaseException:
+        session.end("closed")
+        sock.close()
         raise
     return session
 

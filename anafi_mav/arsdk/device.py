@@ -68,8 +68,9 @@ class DeviceServer:
         self._on_session = on_session
         self._ping_after = ping_after
         self._servers: list[asyncio.AbstractServer] = []
-        self._connections: set[asyncio.Task[None]] = set()
+        self._connections: set[asyncio.StreamWriter] = set()
         self._turn = asyncio.Lock()
+        self._mute = False
 
     @classmethod
     async def start(
@@ -107,13 +108,24 @@ class DeviceServer:
         """TCP port of the handshake."""
         return self.info.port
 
+    @property
+    def mute(self) -> bool:
+        """True: as if the air were gone. The session is mute, and nobody who connects gets an answer."""
+        return self._mute
+
+    @mute.setter
+    def mute(self, mute: bool) -> None:
+        self._mute = mute
+        if self.session is not None:
+            self.session.mute = mute
+
     async def close(self) -> None:
         """Stop listening and end the session. Idempotent."""
         for server in self._servers:
             server.close()
-        for task in list(self._connections):
-            task.cancel()
-        await asyncio.gather(*self._connections, return_exceptions=True)
+        # Their handlers then read an end of file and return.
+        for writer in list(self._connections):
+            writer.close()
         for server in self._servers:
             await server.wait_closed()
         self._servers.clear()
@@ -124,25 +136,22 @@ class DeviceServer:
 
     def _serving(self, handler: _Handler) -> _Handler:
         async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-            task = asyncio.current_task()
-            assert task is not None
-            self._connections.add(task)
+            self._connections.add(writer)
             try:
-                if len(self._connections) <= MAX_CONNECTIONS:
-                    await handler(reader, writer)
+                if len(self._connections) > MAX_CONNECTIONS:
+                    return
+                await (_hang if self._mute else handler)(reader, writer)
             except OSError as error:
                 log.debug("controller gone: %s", error)
             finally:
-                self._connections.discard(task)
+                self._connections.discard(writer)
                 writer.close()
 
         return serve
 
     async def _tell(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         writer.write(handshake.format_discovery(self.info))
-        # Open as long as both live; what a controller says here means nothing.
-        while await reader.read(handshake.MAX_JSON):
-            pass
+        await _hang(reader, writer)
 
     async def _shake_hands(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         try:
@@ -183,6 +192,12 @@ class DeviceServer:
             raise
         self.session = session
         return ConnectReply(0, sock.getsockname()[1], 0, version)
+
+
+async def _hang(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    """Keep a connection as long as the other side does, whatever it says."""
+    while await reader.read(handshake.MAX_JSON):
+        pass
 
 
 def _refusal(reason: str) -> ConnectReply:

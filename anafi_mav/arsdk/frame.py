@@ -1,9 +1,8 @@
 """Frames of the ARSDK transport: what one datagram holds, in the three protocol versions.
 
-A datagram is a row of frames. A frame has a type, the id of a queue, a sequence number and a payload; version 1
-carries one command per frame, versions 2 and 3 pack several (arsdk-ng libarsdk/src/net/arsdk_transport_net.c for
-the headers, cmd_itf/arsdk_cmd_itf{1,2,3}.c for the payloads). Everything is little-endian. Who sends which queue
-and when is one floor up, in `transport`.
+A datagram is a row of frames. A frame has a type, the id of a queue, a sequence number and a payload; everything is
+little-endian (arsdk-ng libarsdk/src/net/arsdk_transport_net.c). What payloads hold is in `packing`, who sends which
+queue and when in `transport`.
 """
 
 from __future__ import annotations
@@ -19,12 +18,6 @@ VERSIONS = (1, 2, 3)
 
 VERSION_OFFSET = 10
 """Versions 2 and 3 begin a frame with varint(version + 10); lower first bytes are the type of a v1 frame."""
-
-PACK_LIMIT = {1: 65_000, 2: 1400, 3: 1000}
-"""Most payload bytes of a frame. v2, v3: ARSDK_PACK_MAX_SIZE of cmd_itf2/3; v1: what a UDP datagram can carry."""
-
-MAX_COMMAND = 65_535
-"""Longest command reassembled from a split one. v2 cannot express more, and no command of Parrot's comes near."""
 
 MAX_VARINT_BYTES = 5
 """A u32 in groups of 7 bits."""

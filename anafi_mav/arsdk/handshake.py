@@ -153,7 +153,7 @@ def pick_version(request: ConnectRequest, versions: tuple[int, int]) -> int | No
 
 
 def _format(members: dict[str, object]) -> bytes:
-    return json.dumps(members, separators=(", ", ": ")).encode()
+    return json.dumps(members).encode()
 
 
 def _parse(data: bytes, what: str) -> dict[str, Any] | None:

@@ -32,9 +32,9 @@ SOCKET_BUFFER = 1 << 18
 class Session(asyncio.DatagramProtocol):
     """One ARSDK connection over UDP. `open` makes one from a transport and a bound socket.
 
-    `peer` is for a socket that is not connected: where datagrams go, and the only address heard (its port may differ,
-    as behind a NAT). Messages arrive at `on_message`; an exception in it is reported to the loop's exception handler
-    and does not cost the messages behind it.
+    `peer` is for a socket that is not connected: where datagrams go, and the only source that is heard. Messages arrive
+    at `on_message`; an exception in it is reported to the loop's exception handler and does not cost the messages
+    behind it.
     """
 
     def __init__(self, transport: Transport, on_message: OnMessage, peer: tuple[str, int] | None = None) -> None:
@@ -51,6 +51,7 @@ class Session(asyncio.DatagramProtocol):
         self._timer: asyncio.TimerHandle | None = None
         self._timer_at = float("inf")
         self._flush_due = False
+        self._congested = False
 
     async def open(self, sock: socket.socket) -> None:
         """Begin on this bound socket, which belongs to the session from now on."""
@@ -84,7 +85,8 @@ class Session(asyncio.DatagramProtocol):
         self._flush_soon()
 
     async def close(self) -> None:
-        """End the session and free its port. Idempotent."""
+        """Send what is queued, once, then end the session and free its port. Idempotent."""
+        self._flush()
         self.end("closed")
         if self._endpoint is not None:
             await self._closed.wait()
@@ -111,7 +113,7 @@ class Session(asyncio.DatagramProtocol):
     def datagram_received(self, data: bytes, addr: tuple[str, int]) -> None:
         if self.mute or self.lost.done():
             return
-        if self._peer is not None and addr[0] != self._peer[0]:
+        if self._peer is not None and addr != self._peer:
             self._transport.counters["foreign"] += 1
             return
         if raw_log.isEnabledFor(logging.DEBUG):
@@ -129,10 +131,19 @@ class Session(asyncio.DatagramProtocol):
         else:
             log.debug("UDP error: %s", exc)
 
+    def pause_writing(self) -> None:
+        # The network takes nothing and asyncio's buffer is full: telemetry that waits is telemetry that is old.
+        self._congested = True
+
+    def resume_writing(self) -> None:
+        self._congested = False
+
     # -- inside
 
     def _handle(self, events: list[Event], now: float) -> None:
         for event in events:
+            if self.lost.done():
+                return
             if type(event) is Received:
                 try:
                     self.on_message(event.message, now)
@@ -164,7 +175,9 @@ class Session(asyncio.DatagramProtocol):
         if endpoint is None or self.lost.done():
             return
         for datagram in self._transport.outgoing(self._loop.time()):
-            if not self.mute:
+            if self._congested:
+                self.counters["dropped.congested"] += 1
+            elif not self.mute:
                 endpoint.sendto(datagram, self._peer)
         deadline = self._transport.deadline()
         if deadline is not None and deadline < self._timer_at:

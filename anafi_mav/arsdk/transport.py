@@ -18,21 +18,13 @@ import enum
 import itertools
 import struct
 from collections import Counter, deque
-from typing import NamedTuple, TypeAlias
+from typing import TypeAlias
 
 import msgspec
 
 from anafi_mav.arsdk import wire
-from anafi_mav.arsdk.frame import (
-    MAX_COMMAND,
-    PACK_LIMIT,
-    VERSIONS,
-    FrameType,
-    decode_frames,
-    decode_varint,
-    encode_frame,
-    encode_varint,
-)
+from anafi_mav.arsdk.frame import VERSIONS, FrameType, decode_frames, encode_frame
+from anafi_mav.arsdk.packing import PACK_LIMIT, Piece, Unpacker, Waiting, longest_command, pack, with_length
 from anafi_mav.arsdk.wire import Buffer, Message, MessageId, UnknownMessage
 from anafi_mav.errors import LocalProtocolError
 
@@ -114,29 +106,7 @@ _RECEIVED_IDS = {Role.CONTROLLER: frozenset({125, 126, 127}), Role.DEVICE: froze
 
 _U16 = struct.Struct("<H")
 _U64 = struct.Struct("<Q")
-_V3_LENGTH = 2
-"""A varint of at most PACK_LIMIT[3] has two bytes."""
 _NEVER = float("inf")
-
-
-class _Entry:
-    """A command that waits to be packed; `packed` counts the bytes that went into frames (split commands only)."""
-
-    __slots__ = ("data", "forever", "packed", "token")
-
-    def __init__(self, token: int, data: bytes, forever: bool) -> None:
-        self.token = token
-        self.data = data
-        self.forever = forever
-        self.packed = 0
-
-
-class _Piece(NamedTuple):
-    """A command, or a part of a split one, in the frame that is in flight."""
-
-    entry: _Entry
-    data: bytes
-    last: bool
 
 
 class _AckQueue:
@@ -146,46 +116,18 @@ class _AckQueue:
 
     def __init__(self, id: int) -> None:
         self.id = id
-        self.waiting: deque[_Entry] = deque()
-        self.flight: list[_Piece] = []
+        self.waiting: deque[Waiting] = deque()
+        self.flight: list[Piece] = []
+        """The frame that waits for its acknowledgement; empty: none does."""
         self.seq = -1
         self.due = _NEVER
-        self.sendings = 0
-
-    def pack(self, version: int, limit: int) -> None:
-        """Put as many waiting commands into the next frame as it takes; only one that is too long is split."""
-        room = 1 if version == 1 else limit
-        waiting = self.waiting
-        while waiting and room > 0:
-            entry = waiting[0]
-            piece = entry.data if version == 1 else _prefixed(version, entry)
-            if len(piece) <= room or version == 1:
-                self.flight.append(_Piece(entry, piece, True))
-                waiting.popleft()
-                room -= len(piece)
-            elif self.flight:
-                break
-            else:
-                self.flight.append(_Piece(entry, piece[:limit], False))
-                entry.packed += limit - (len(piece) - (len(entry.data) - entry.packed))
-                break
+        """When the frame in flight has to be sent (again)."""
         self.sendings = 0
 
     def land(self) -> None:
         """Nothing is in flight any more."""
         self.flight = []
         self.due = _NEVER
-
-
-def _prefixed(version: int, entry: _Entry) -> bytes:
-    """What is left of a command, behind its length unless that went out with an earlier part."""
-    if entry.packed:
-        return entry.data[entry.packed :]
-    return _with_length(version, entry.data)
-
-
-def _with_length(version: int, data: bytes) -> bytes:
-    return (_U16.pack(len(data)) if version == 2 else encode_varint(len(data))) + data
 
 
 class Transport:
@@ -218,11 +160,10 @@ class Transport:
         self._silence_limit = _NEVER if silence_limit is None else silence_limit
         self._tokens = itertools.count(1)
         self._seq_mask = 0xFF if version == 1 else 0xFFFF
-        self._limit = PACK_LIMIT[version]
         self._received_ids = _RECEIVED_IDS[role]
         # The first frame has number 0 and must count as new, hence a wrap from the highest number.
         self._last_seq = dict.fromkeys(self._received_ids, self._seq_mask)
-        self._partial: dict[int, tuple[int, bytearray]] = {}
+        self._unpacker = Unpacker(version)
         self._noack: deque[tuple[int, bytes]] = deque()
         self._noack_seq = -1
         self._queues = {id: _AckQueue(id) for id in (_ACK_ID[role], _LOW_PRIO_ID[role])}
@@ -256,7 +197,11 @@ class Transport:
                     self.counters["duplicate"] += 1
                     continue
                 self._last_seq[id] = seq
-                self._unpack(type, id, payload, events)
+                commands, readable = self._unpacker.unpack(id, type == _WITHACK, payload)
+                for command in commands:
+                    self._command(command, events)
+                if not readable:
+                    self._garbage("payload", events)
             elif type == _ACK and id - ACK_OFFSET in self._queues:
                 self._acknowledged(self._queues[id - ACK_OFFSET], payload, events)
             elif id == PING and type != _ACK:
@@ -266,45 +211,6 @@ class Transport:
         if garbage is not None:
             self._garbage(garbage, events)
         return events
-
-    def _unpack(self, type: int, id: int, payload: bytes, events: list[Event]) -> None:
-        if self.version == 1:
-            self._command(payload, events)
-            return
-        position, end = 0, len(payload)
-        if type == _WITHACK and id in self._partial:
-            # The frame begins with the rest of a split command, which has no length of its own.
-            size, collected = self._partial.pop(id)
-            position = min(end, size - len(collected))
-            collected += payload[:position]
-            if len(collected) < size:
-                self._partial[id] = (size, collected)
-                return
-            self._command(bytes(collected), events)
-        while position < end:
-            size, position = self._command_size(payload, position)
-            if size < 0:
-                self._garbage("command", events)
-                return
-            if size > end - position:
-                if self.version == 2 or type != _WITHACK:
-                    self._garbage("command", events)
-                else:
-                    self._partial[id] = (size, bytearray(payload[position:]))
-                return
-            self._command(payload[position : position + size], events)
-            position += size
-
-    def _command_size(self, payload: bytes, position: int) -> tuple[int, int]:
-        """(length of the next command, where it begins); a negative length is an unreadable one."""
-        if self.version == 2:
-            if len(payload) - position < _U16.size:
-                return -1, position
-            return _U16.unpack_from(payload, position)[0], position + _U16.size
-        read = decode_varint(payload, position)
-        if read is None or read[0] > MAX_COMMAND:
-            return -1, position
-        return read
 
     def _command(self, data: bytes, events: list[Event]) -> None:
         message = wire.decode(data)
@@ -333,7 +239,7 @@ class Transport:
             # It answers another copy of a frame that is done with.
             self.counters["stale ack"] += 1
         else:
-            events.extend(Delivered(piece.entry.token) for piece in queue.flight if piece.last)
+            events.extend(Delivered(piece.source.token) for piece in queue.flight if piece.last)
             queue.land()
 
     def _garbage(self, reason: str, events: list[Event]) -> None:
@@ -351,7 +257,7 @@ class Transport:
         """
         data = wire.encode(message)
         buffer = message.BUFFER if isinstance(message, Message) else Buffer.ACK
-        longest = self._longest(buffer)
+        longest = longest_command(self.version, buffer is not Buffer.NON_ACK)
         if len(data) > longest:
             raise LocalProtocolError(f"{type(message).__name__} has {len(data)} bytes, its queue takes {longest}")
         token = next(self._tokens)
@@ -366,12 +272,6 @@ class Transport:
             self._enqueue(buffer, token, data)
         return token
 
-    def _longest(self, buffer: Buffer) -> int:
-        """Most bytes of one command in this buffer's queue."""
-        if self.version == 3:
-            return self._limit - _V3_LENGTH if buffer is Buffer.NON_ACK else MAX_COMMAND
-        return self._limit - _U16.size if self.version == 2 else self._limit
-
     def _enqueue(self, buffer: Buffer, token: int, data: bytes) -> None:
         queue = self._queues[(_LOW_PRIO_ID if buffer is Buffer.LOW_PRIO else _ACK_ID)[self.role]]
         if len(queue.waiting) >= MAX_QUEUED:
@@ -379,7 +279,7 @@ class Transport:
             self._pending.append(Undelivered(token, "queue full"))
             return
         forever = self.version > 1 or self.role is Role.DEVICE or MessageId(*wire.HEADER.unpack_from(data)) in _RETRY
-        entry = _Entry(token, data, forever)
+        entry = Waiting(token, data, forever)
         if buffer is not Buffer.HIGH_PRIO:
             queue.waiting.append(entry)
         else:
@@ -403,7 +303,7 @@ class Transport:
                 if entry.token == token and not entry.packed:
                     del queue.waiting[index]
                     return
-            kept = [piece for piece in queue.flight if piece.entry.token != token or piece.entry.packed]
+            kept = [piece for piece in queue.flight if piece.source.token != token or piece.source.packed]
             if len(kept) != len(queue.flight):
                 queue.flight = kept
                 if not kept:
@@ -425,26 +325,23 @@ class Transport:
                 if not queue.waiting:
                     continue
                 queue.seq = (queue.seq + 1) & self._seq_mask
-                queue.pack(self.version, self._limit)
+                queue.flight = pack(self.version, queue.waiting)
+                queue.sendings = 0
                 queue.due = now
             if now >= queue.due:
                 datagrams.append(self._sending(queue, now))
         return datagrams
 
     def _next_noack(self) -> bytes:
-        _, data = self._noack.popleft()
+        payload = with_length(self.version, self._noack.popleft()[1])
         self.counters["sent"] += 1
-        if self.version == 1:
-            payload = data
-        else:
-            payload = _with_length(self.version, data)
-            while self._noack:
-                more = _with_length(self.version, self._noack[0][1])
-                if len(payload) + len(more) > self._limit:
-                    break
-                payload += more
-                self._noack.popleft()
-                self.counters["sent"] += 1
+        while self._noack and self.version > 1:
+            more = with_length(self.version, self._noack[0][1])
+            if len(payload) + len(more) > PACK_LIMIT[self.version]:
+                break
+            payload += more
+            self._noack.popleft()
+            self.counters["sent"] += 1
         self._noack_seq = (self._noack_seq + 1) & self._seq_mask
         return encode_frame(self.version, _NOACK, _NOACK_ID[self.role], self._noack_seq, payload)
 
@@ -460,9 +357,9 @@ class Transport:
 
     def _give_up(self, queue: _AckQueue) -> None:
         """Version 1, controller: a command is repeated five times, then the next one has its turn."""
-        if queue.sendings > MAX_RETRIES_V1 and not queue.flight[0].entry.forever:
+        if queue.sendings > MAX_RETRIES_V1 and not queue.flight[0].source.forever:
             self.counters["undelivered"] += 1
-            self._pending.append(Undelivered(queue.flight[0].entry.token, "no acknowledgement"))
+            self._pending.append(Undelivered(queue.flight[0].source.token, "no acknowledgement"))
             queue.land()
 
     # -- time
@@ -509,7 +406,6 @@ class Transport:
         self._down = True
         self._noack.clear()
         self._replies.clear()
-        self._partial.clear()
         for queue in self._queues.values():
             queue.waiting.clear()
             queue.land()
