@@ -1,0 +1,280 @@
+"""A drone: one connection at a time, and the elements that its events fill.
+
+A value flows: session -> `Drone._receive` -> reducers (new frozen states) -> waiting verbs -> subscribers.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections import Counter
+from collections.abc import Callable
+from datetime import datetime
+from functools import partial
+from typing import Any, TypeAlias, TypeVar
+
+from anafi_mav.arsdk import controller
+from anafi_mav.arsdk.controller import ControllerSession
+from anafi_mav.arsdk.handshake import DISCOVERY_PORT
+from anafi_mav.arsdk.messages import common
+from anafi_mav.arsdk.wire import Message, UnknownMessage
+from anafi_mav.clock import Clock, SystemClock
+from anafi_mav.drone.alerts import Alerts, takeoff_blockers
+from anafi_mav.drone.battery import Battery
+from anafi_mav.drone.calibration import Calibration
+from anafi_mav.drone.element import Element, Reducer
+from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander
+from anafi_mav.drone.gps import Gps
+from anafi_mav.drone.home import Home
+from anafi_mav.drone.link import Link
+from anafi_mav.drone.moves import Move
+from anafi_mav.drone.piloting import Piloting
+from anafi_mav.drone.product import MODELS, Identity, Model, Product
+from anafi_mav.errors import CommandTimeout, LinkLost, LocalProtocolError
+
+log = logging.getLogger("anafi_mav")
+message_log = logging.getLogger("anafi_mav.message")
+
+MessageT = TypeVar("MessageT", bound=Message)
+
+Callback: TypeAlias = Callable[[Message, float], None]
+"""(message, loop time of its arrival)."""
+
+STATES_TIMEOUT = 5.0
+"""s that a drone may take to send all its states, and all its settings: a few hundred messages."""
+
+
+class Drone:
+    """An ANAFI at a network address. Make it inside a running loop; connect, lose the link and connect again."""
+
+    def __init__(
+        self,
+        address: str,
+        *,
+        discovery_port: int = DISCOVERY_PORT,
+        handshake_port: int | None = None,
+        local_address: str | None = None,
+        name: str = "",
+        clock: Clock | None = None,
+    ) -> None:
+        """`handshake_port` None: the one that discovery tells. `name` is ours, for the log."""
+        self.address = address
+        self.name = name or address
+        self._discovery_port = discovery_port
+        self._handshake_port = handshake_port
+        self._local_address = local_address
+        self._clock = clock or SystemClock()
+
+        self._commander = Commander()
+        self.alerts = Alerts()
+        self.battery = Battery()
+        self.calibration = Calibration()
+        self.gps = Gps()
+        self.home = Home()
+        self.link = Link()
+        self.product = Product()
+        self.piloting = Piloting(self._commander, self.home, self.takeoff_blockers)
+        self._elements: tuple[Element[Any], ...] = (
+            self.alerts,
+            self.battery,
+            self.calibration,
+            self.gps,
+            self.home,
+            self.link,
+            self.product,
+            self.piloting,
+        )
+        self._routes: dict[type[Message], list[tuple[Element[Any], Reducer]]] = {}
+        for element in self._elements:
+            for message, reducer in element.REDUCERS.items():
+                self._routes.setdefault(message, []).append((element, reducer))
+        self._reactions = self.piloting.reactions()
+        self._subscribers: tuple[Callback, ...] = ()
+
+        self._session: ControllerSession | None = None
+        self._opening = False
+        self._complete = False
+        self._counters: Counter[str] = Counter()
+        self._model = Model(0, "", "")
+        self._announced_serial = ""
+        self._announced_name = ""
+        self._lost: asyncio.Future[str] = asyncio.get_running_loop().create_future()
+
+    # -- the connection
+
+    async def connect(self) -> None:
+        """Connect and read the drone's state anew; returns when it has sent all of it.
+
+        What was known before is forgotten first, and nothing of before is sent again. Raises `LinkLost`, or
+        `RemoteProtocolError` when what answers there is no drone.
+        """
+        if self._session is not None or self._opening:
+            raise LocalProtocolError(f"{self.name} is connected, or about to be")
+        self._opening = True
+        try:
+            self._reset()
+            session = await controller.connect(
+                self.address,
+                discovery_port=self._discovery_port,
+                handshake_port=self._handshake_port,
+                local_address=self._local_address,
+                on_message=self._receive,
+            )
+            self._begin(session)
+            try:
+                await self._read_states()
+            except BaseException:
+                await self.close()
+                raise
+            self._complete = True
+        finally:
+            self._opening = False
+        log.info("%s: connected to %s, protocol %d", self.name, self.identity, session.version)
+
+    def _reset(self) -> None:
+        for element in self._elements:
+            element.reset()
+        self._complete = False
+        if self._lost.done():
+            self._lost = asyncio.get_running_loop().create_future()
+
+    def _begin(self, session: ControllerSession) -> None:
+        device = session.device
+        self._model = MODELS.get(device.model_id) or Model(device.model_id, f"0x{device.model_id:04x}", "unknown model")
+        self._announced_serial, self._announced_name = device.serial, device.name
+        self._session = session
+        self._counters = session.counters
+        self._commander.attach(session)
+        session.lost.add_done_callback(partial(self._on_lost, session))
+
+    async def _read_states(self) -> None:
+        """What Parrot's own SDK does first (olympe arsdkng/drone): set the clock, ask for all states and settings."""
+        send = self._commander.send
+        waits = [
+            (name, self._commander.expect((marker,), lambda message: True))
+            for name, marker in (("states", common.AllStatesChanged), ("settings", common.AllSettingsChanged))
+        ]
+        try:
+            now = datetime.fromtimestamp(self._clock.time()).astimezone()
+            send(common.CurrentDateTime(now.strftime("%Y%m%dT%H%M%S%z")))
+            send(common.AllStates())
+            send(common.AllSettings())
+            for name, wait in waits:
+                wait.expire_after(STATES_TIMEOUT, CommandTimeout(f"all {name}", STATES_TIMEOUT))
+            for name, wait in waits:
+                try:
+                    await wait.wait()
+                except CommandTimeout:
+                    raise LinkLost(f"the drone did not send all its {name} within {STATES_TIMEOUT:g} s") from None
+        finally:
+            for _, wait in waits:
+                wait.close()
+
+    def _on_lost(self, session: ControllerSession, reason: asyncio.Future[str]) -> None:
+        if session is not self._session:
+            return
+        why = "closed" if reason.cancelled() else reason.result()
+        log.info("%s: link lost: %s", self.name, why)
+        self._session = None
+        self._complete = False
+        self._commander.detach(why)
+        self.piloting.link_lost()
+        if not self._lost.done():
+            self._lost.set_result(why)
+
+    async def close(self) -> None:
+        """End the connection. What was sent just before still leaves. Idempotent."""
+        session = self._session
+        if session is not None:
+            await asyncio.sleep(0)  # a session sends at the end of a turn of the loop
+            await session.close()
+            self._on_lost(session, session.lost)
+
+    @property
+    def connected(self) -> bool:
+        """The link is up and the drone has sent all its states."""
+        return self._complete
+
+    @property
+    def lost(self) -> asyncio.Future[str]:
+        """Done when this connection is lost or closed, with the reason; `connect` makes a new one.
+
+        Wait for it with `asyncio.wait` or a shield: cancelling a bare wait would cancel it for everybody.
+        """
+        return self._lost
+
+    @property
+    def counters(self) -> Counter[str]:
+        """What the transport counted on the present or last connection."""
+        return self._counters
+
+    @property
+    def identity(self) -> Identity:
+        """Who answered. Before a first connection its texts are empty."""
+        product = self.product.state
+        return Identity(
+            model=self._model,
+            serial=product.serial or self._announced_serial,
+            firmware=product.firmware,
+            hardware=product.hardware,
+            name=product.name or self._announced_name,
+        )
+
+    # -- what others may look at
+
+    @property
+    def moves_started(self) -> tuple[Move, ...]:
+        """See `Piloting.moves_started`."""
+        return self.piloting.moves_started
+
+    def takeoff_blockers(self) -> list[str]:
+        """What the drone has reported against a take-off, in words."""
+        return takeoff_blockers(self.alerts.state, self.battery.state, self.calibration.state)
+
+    def subscribe(self, callback: Callback) -> Callable[[], None]:
+        """Call this with every known message once the states have it. Returns the function that ends it.
+
+        It also hears the messages that come while `connect` runs. What it raises is logged and goes no further.
+        """
+        self._subscribers = (*self._subscribers, callback)
+
+        def undo() -> None:
+            self._subscribers = tuple(other for other in self._subscribers if other is not callback)
+
+        return undo
+
+    async def expect(
+        self,
+        answer: type[MessageT],
+        predicate: Callable[[MessageT], bool] | None = None,
+        timeout: float = ANSWER_TIMEOUT,
+    ) -> MessageT:
+        """The next message of this class that the predicate accepts. Raises `CommandTimeout` or `LinkLost`."""
+
+        def judge(message: MessageT) -> MessageT | None:
+            return message if predicate is None or predicate(message) else None
+
+        expectation = self._commander.expect((answer,), judge)
+        expectation.expire_after(timeout, CommandTimeout(answer.NAME, timeout))
+        return await expectation.wait()
+
+    # -- the hot path
+
+    def _receive(self, message: Message | UnknownMessage, now: float) -> None:
+        if isinstance(message, UnknownMessage):
+            self._counters["unknown message"] += 1
+            return
+        kind = type(message)
+        for element, reducer in self._routes.get(kind, ()):
+            element.state = reducer(element.state, message)
+        reaction = self._reactions.get(kind)
+        if reaction is not None:
+            reaction(message, now)
+        self._commander.offer(message)
+        for callback in self._subscribers:
+            try:
+                callback(message, now)
+            except Exception:
+                log.exception("%s: a subscriber failed on %s", self.name, message.NAME)
+        if message_log.isEnabledFor(logging.DEBUG):
+            message_log.debug("%s: %r", self.name, message)

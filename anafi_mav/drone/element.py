@@ -1,0 +1,100 @@
+"""What every element of a drone has in common: a frozen state, and a table that says how events change it.
+
+An element is one noun of the aircraft (battery, link, home, ...). Its state is what the drone last reported; `None`
+means that it has not reported it since the connection was made. States hold ARSDK's own units and signs, the
+field names say which; they are converted where they meet MAVLink.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar, Generic, TypeAlias, TypeVar
+
+import msgspec
+
+from anafi_mav.arsdk.messages.generic import ListFlags
+from anafi_mav.arsdk.wire import Message
+
+StateT = TypeVar("StateT")
+KeyT = TypeVar("KeyT")
+ValueT = TypeVar("ValueT")
+
+MAX_ITEMS = 64
+"""Items kept of a map that the drone reports. The longest we declare has 25 keys; more is a confused peer."""
+
+Reducer: TypeAlias = Callable[[Any, Any], Any]
+"""(state, message) -> state. Pure; must accept whatever a peer can put on the wire."""
+
+FIRST, LAST, EMPTY, REMOVE = (
+    1 << flag for flag in (ListFlags.FIRST, ListFlags.LAST, ListFlags.EMPTY, ListFlags.REMOVE)
+)
+
+
+class Range(msgspec.Struct, frozen=True):
+    """A setting as the drone reports it, with the range it accepts."""
+
+    current: float
+    min: float
+    max: float
+
+
+class Position(msgspec.Struct, frozen=True):
+    """A known place. Which zero `altitude` has is said where the position is a field."""
+
+    latitude: float
+    """deg, -90..90."""
+    longitude: float
+    """deg, -180..180."""
+    altitude: float
+    """m."""
+
+
+class Element(Generic[StateT]):
+    """One noun of the aircraft. Subclasses declare `NOTHING` and `REDUCERS`; some add verbs."""
+
+    NOTHING: ClassVar[Any]
+    """The state in which nothing has been reported."""
+    REDUCERS: ClassVar[Mapping[type[Message], Reducer]]
+
+    def __init__(self) -> None:
+        self.state: StateT = self.NOTHING
+
+    def reset(self) -> None:
+        """Forget everything the drone reported."""
+        self.state = self.NOTHING
+
+
+def finite(value: float) -> float | None:
+    """The number, or None for NaN and infinities, which no MAVLink integer can carry."""
+    return value if math.isfinite(value) else None
+
+
+def setting(message: Any) -> Range | None:
+    """The current, min and max of a setting event; None when one of them is not a number."""
+    if not math.isfinite(message.current + message.min + message.max):
+        return None
+    return Range(message.current, message.min, message.max)
+
+
+def position(latitude: float, longitude: float, altitude: float) -> Position | None:
+    """A reported place; None when the drone does not know it (Parrot says so with 500 degrees)."""
+    if not (-90.0 <= latitude <= 90.0 and -180.0 <= longitude <= 180.0 and math.isfinite(altitude)):
+        return None
+    return Position(latitude, longitude, altitude)
+
+
+def with_item(items: Mapping[KeyT, ValueT] | None, key: KeyT, value: ValueT, flags: int) -> dict[KeyT, ValueT]:
+    """A map after one MAP_ITEM event: `flags` is its `list_flags` (generic.xml list_flags).
+
+    First starts the list anew, Empty is a list without items, Remove takes the item out. Events that belong
+    to no list (keyed, but without `list_flags`) pass 0.
+    """
+    if flags & EMPTY:
+        return {}
+    changed = {} if items is None or flags & FIRST else dict(items)
+    if flags & REMOVE:
+        changed.pop(key, None)
+    elif len(changed) < MAX_ITEMS or key in changed:
+        changed[key] = value
+    return changed

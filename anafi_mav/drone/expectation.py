@@ -1,0 +1,183 @@
+"""Sending a command and waiting for what the drone says about it.
+
+ARSDK has no replies: a command is acknowledged by the transport, and what came of it is an event like any other.
+A judge looks at every event of the kinds it is interested in and says: not mine (None), done (any other value), or
+refused (an error of ours). Silence is a timeout.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Sequence
+from typing import Any, Generic, Protocol, TypeVar
+
+from anafi_mav.arsdk.wire import Message, UnknownMessage
+from anafi_mav.errors import AnafiMavError, CommandTimeout, LinkLost
+
+T = TypeVar("T")
+
+ANSWER_TIMEOUT = 5.0
+"""s. A drone answers within tens of milliseconds, over a bad link within a few retransmissions of 150 ms; Parrot's
+own SDK waits 10 s, too long for a ground station that repeats its command every second."""
+
+
+class Wire(Protocol):
+    """What is needed of a session: see `arsdk.session.Session`."""
+
+    def send(self, message: Message | UnknownMessage) -> int: ...
+
+    def cancel(self, token: int) -> None: ...
+
+
+class Expectation(Generic[T]):
+    """One awaited answer. It starts to listen when it is made, so make it before the command is sent."""
+
+    __slots__ = ("_commander", "_judge", "_timer", "answers", "future", "token")
+
+    def __init__(
+        self, commander: Commander, answers: Sequence[type[Message]], judge: Callable[[Any], T | AnafiMavError | None]
+    ) -> None:
+        self._commander = commander
+        self._judge = judge
+        self._timer: asyncio.TimerHandle | None = None
+        self.answers = answers
+        self.future: asyncio.Future[T] = asyncio.get_running_loop().create_future()
+        self.token: int | None = None
+        """Our command's name in the transport, once it is sent."""
+
+    def offer(self, message: Message) -> None:
+        """Let the judge look at an event."""
+        if self.future.done():
+            return
+        try:
+            verdict = self._judge(message)
+        except Exception as error:  # a caller's predicate; the link must survive it
+            self.future.set_exception(error)
+            return
+        if isinstance(verdict, AnafiMavError):
+            self.fail(verdict)
+        elif verdict is not None:
+            self.succeed(verdict)
+
+    def succeed(self, value: T) -> None:
+        """End the wait with this result, unless it has ended."""
+        if not self.future.done():
+            self.future.set_result(value)
+
+    def fail(self, error: Exception) -> None:
+        """End the wait with this error, unless it has ended."""
+        if not self.future.done():
+            self.future.set_exception(error)
+
+    def expire_after(self, seconds: float, error: AnafiMavError) -> None:
+        """(Re)start the clock: the wait fails with this error when nothing has come by then."""
+        if self._timer is not None:
+            self._timer.cancel()
+        self._timer = self.future.get_loop().call_later(seconds, self.fail, error)
+
+    async def wait(self) -> T:
+        """The judge's result. Raises what the judge returned, `CommandTimeout` or `LinkLost`.
+
+        When it fails or is cancelled, the command is taken back: it must not be carried out after we have said
+        that it failed.
+        """
+        try:
+            return await self.future
+        except BaseException:
+            if self.token is not None:
+                self._commander.cancel(self.token)
+            raise
+        finally:
+            self.close()
+
+    def close(self) -> None:
+        """Stop listening."""
+        if self._timer is not None:
+            self._timer.cancel()
+        self._commander.forget(self)
+        if self.future.done() and not self.future.cancelled():
+            self.future.exception()  # nobody may be waiting any more; asyncio would complain
+
+
+class Commander:
+    """The way out to the drone while there is one, and everybody who waits for something from it."""
+
+    def __init__(self) -> None:
+        self._wire: Wire | None = None
+        self._open: set[Expectation[Any]] = set()
+        self._waiting: dict[type[Message], list[Expectation[Any]]] = {}
+
+    @property
+    def connected(self) -> bool:
+        return self._wire is not None
+
+    def attach(self, wire: Wire) -> None:
+        """Commands go out here from now on."""
+        self._wire = wire
+
+    def detach(self, reason: str) -> None:
+        """The link is gone: every wait ends with `LinkLost`."""
+        self._wire = None
+        for expectation in tuple(self._open):
+            expectation.fail(LinkLost(reason))
+
+    def send(self, message: Message) -> int:
+        """Hand a command to the transport. Raises `LinkLost` when there is no link."""
+        if self._wire is None:
+            raise LinkLost("not connected")
+        return self._wire.send(message)
+
+    def cancel(self, token: int) -> None:
+        """Take a command back if it has not been delivered."""
+        if self._wire is not None:
+            self._wire.cancel(token)
+
+    def expect(
+        self, answers: Sequence[type[Message]], judge: Callable[[Any], T | AnafiMavError | None]
+    ) -> Expectation[T]:
+        """Listen for an answer among these kinds of events. Raises `LinkLost` when there is no link."""
+        if self._wire is None:
+            raise LinkLost("not connected")
+        expectation = Expectation(self, answers, judge)
+        self._open.add(expectation)
+        for answer in answers:
+            self._waiting.setdefault(answer, []).append(expectation)
+        return expectation
+
+    def forget(self, expectation: Expectation[Any]) -> None:
+        """Stop showing events to this one."""
+        self._open.discard(expectation)
+        for answer in expectation.answers:
+            listening = self._waiting.get(answer, [])
+            if expectation in listening:
+                listening.remove(expectation)
+            if not listening:
+                self._waiting.pop(answer, None)
+
+    def offer(self, message: Message) -> None:
+        """Show an event to those who wait for its kind."""
+        waiting = self._waiting.get(type(message))
+        if waiting is not None:
+            for expectation in tuple(waiting):
+                expectation.offer(message)
+
+    async def confirm(
+        self,
+        command: Message,
+        answers: Sequence[type[Message]],
+        judge: Callable[[Any], T | AnafiMavError | None],
+        timeout: float = ANSWER_TIMEOUT,
+    ) -> T:
+        """Send a command and return what the judge makes of the answer."""
+        expectation = self.expect(answers, judge)
+        self.dispatch(expectation, command, timeout)
+        return await expectation.wait()
+
+    def dispatch(self, expectation: Expectation[Any], command: Message, timeout: float) -> None:
+        """Send the command whose answer is expected."""
+        try:
+            expectation.token = self.send(command)
+        except BaseException:
+            expectation.close()
+            raise
+        expectation.expire_after(timeout, CommandTimeout(command.NAME, timeout))

@@ -1,0 +1,262 @@
+"""What we started and has not ended: the moveTo, the moveBys and the return home of this connection.
+
+Hover must cancel exactly these, and only these. The drone's events say how a move goes on and ends; this module
+reads them, `piloting` sends the commands.
+
+Two facts make the bookkeeping more than a flag. A new moveTo replaces the running one without a word about it, and
+a new moveBy makes the previous one end as "interrupted" (ardrone3.xml 1-0-10, 1-0-7). And an event does not say
+which command it answers: it may belong to a move that was cancelled a moment ago.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import enum
+import math
+from collections import deque
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import msgspec
+
+from anafi_mav.arsdk.messages import ardrone3, rth
+from anafi_mav.arsdk.messages.ardrone3 import FlyingState, MoveByError, MoveToStatus
+from anafi_mav.arsdk.messages.rth import StateReason
+from anafi_mav.arsdk.wire import Message
+from anafi_mav.drone.element import Position
+from anafi_mav.drone.expectation import Expectation
+from anafi_mav.drone.home import Home
+from anafi_mav.drone.piloting_state import MOTORS_OFF
+from anafi_mav.errors import CommandRejected
+
+STRAY_FOR = 2.0
+"""s after a cancelled moveBy in which a moveByEnd may still be its own, or that of the zero move that cancelled it."""
+
+_SAME_PLACE_DEG = 1e-7
+"""About a centimetre. The drone echoes a target as it got it; this tolerates a detour through single precision."""
+_SAME_HEIGHT = 1e-3
+_NO_MOVE = 1e-3
+"""m or rad below which a moveBy went nowhere."""
+
+
+class MoveEnd(enum.Enum):
+    """How a move ended."""
+
+    DONE = "done"
+    CANCELED = "canceled"
+    """By us, by landing, or because somebody took over."""
+    ERROR = "error"
+    """The drone could not do it."""
+    REPLACED = "replaced"
+    """A newer move took its place."""
+    LINK_LOST = "link lost"
+    """Nobody knows: the link was lost on the way."""
+
+
+class Displacement(msgspec.Struct, frozen=True):
+    """What a moveBy has flown, in the body's axes at its start."""
+
+    front: float
+    """m."""
+    right: float
+    """m."""
+    down: float
+    """m."""
+    turn: float
+    """rad, + clockwise."""
+
+
+class Move:
+    """A move that we asked for. `target` is set for a moveTo only; its altitude is above the take-off point."""
+
+    __slots__ = ("answer", "ended", "running", "target")
+
+    def __init__(self, answer: Expectation[Any], target: Position | None = None) -> None:
+        self.answer = answer
+        """The wait of the verb that started it."""
+        self.target = target
+        self.running = False
+        """The drone said that it is under way."""
+        self.ended: asyncio.Future[MoveEnd] = asyncio.get_running_loop().create_future()
+        """Do not await this one, a cancelled wait would cancel it: use `result`."""
+
+    async def result(self) -> MoveEnd:
+        """Wait until the move has ended, and how. Never raises."""
+        return await asyncio.shield(self.ended)
+
+    def end(self, how: MoveEnd) -> None:
+        if not self.ended.done():
+            self.ended.set_result(how)
+
+    def is_to(self, message: ardrone3.MoveToChanged) -> bool:
+        """Does this event speak of this move's target?"""
+        target = self.target
+        return (
+            target is not None
+            and math.isclose(message.latitude, target.latitude, rel_tol=0.0, abs_tol=_SAME_PLACE_DEG)
+            and math.isclose(message.longitude, target.longitude, rel_tol=0.0, abs_tol=_SAME_PLACE_DEG)
+            and math.isclose(message.altitude, target.altitude, rel_tol=1e-6, abs_tol=_SAME_HEIGHT)
+        )
+
+
+_MOVE_TO_ENDS = {
+    MoveToStatus.DONE: MoveEnd.DONE,
+    MoveToStatus.CANCELED: MoveEnd.CANCELED,
+    MoveToStatus.ERROR: MoveEnd.ERROR,
+}
+
+_MOVE_BY_REFUSALS = {
+    MoveByError.BUSY: "the drone is busy",
+    MoveByError.NOT_AVAILABLE: "a relative move is not available now",
+    MoveByError.INTERRUPTED: "the move was interrupted",
+}
+
+_RETURN_ENDS = {StateReason.FINISHED: MoveEnd.DONE, StateReason.STOPPED: MoveEnd.CANCELED}
+
+
+class Moves:
+    """The moves of ours that have not ended."""
+
+    def __init__(self, home: Home) -> None:
+        self._home = home
+        self.to: Move | None = None
+        self.by: deque[Move] = deque()
+        """Oldest first: the drone ends them in this order."""
+        self.returning: Move | None = None
+        self._replaced: Move | None = None
+        """The moveTo before `to`; a late event may still speak of it."""
+        self._cancelling: Move | None = None
+        """The moveTo that we cancelled and whose CANCELED has not come yet."""
+        self._stray_until = 0.0
+
+    def started(self) -> tuple[Move, ...]:
+        """All of them."""
+        return tuple(move for move in (self.to, *self.by, self.returning) if move is not None)
+
+    # -- what we do
+
+    def begin_to(self, move: Move) -> Move | None:
+        """A moveTo is about to be sent. Returns the one whose place it takes."""
+        self._replaced, self.to = self.to, move
+        if self._replaced is not None:
+            self._replaced.end(MoveEnd.REPLACED)
+            self._replaced.answer.fail(CommandRejected("replaced by a newer moveTo"))
+        return self._replaced
+
+    def cancel_to(self, why: str) -> Move | None:
+        """The moveTo is about to be cancelled; returns it. It ends when the drone says so, if it was under way."""
+        move, self.to = self.to, None
+        if move is not None:
+            move.answer.fail(CommandRejected(why))
+            if move.running:
+                self._cancelling = move
+            else:
+                move.end(MoveEnd.CANCELED)
+        return move
+
+    def cancel_by(self, why: str, now: float) -> list[Move]:
+        """The moveBys are about to be cancelled; returns them. They end here: the drone's event names none of them."""
+        moves, self.by = list(self.by), deque()
+        for move in moves:
+            move.answer.fail(CommandRejected(why))
+            move.end(MoveEnd.CANCELED)
+        if moves:
+            self._stray_until = now + STRAY_FOR
+        return moves
+
+    def drop_by(self, move: Move, now: float) -> None:
+        """The verb of this moveBy has given it up."""
+        if move in self.by:
+            self.by.remove(move)
+            self._stray_until = now + STRAY_FOR
+        move.end(MoveEnd.CANCELED)
+
+    def clear(self, how: MoveEnd) -> None:
+        """All have ended, as far as we are concerned."""
+        for move in (*self.started(), self._cancelling):
+            if move is not None:
+                move.end(how)
+                move.answer.fail(CommandRejected(how.value))
+        self.to = self.returning = self._replaced = self._cancelling = None
+        self.by.clear()
+        self._stray_until = 0.0
+
+    # -- what the drone says
+
+    def reactions(self) -> Mapping[type[Message], Callable[[Any, float], None]]:
+        """Who wants to hear which event, after the reducers."""
+        return {
+            ardrone3.MoveToChanged: self._on_move_to,
+            ardrone3.MoveByEnd: self._on_move_by_end,
+            ardrone3.FlyingStateChanged: self._on_flying_state,
+            rth.State: self._on_return,
+        }
+
+    def _on_move_to(self, message: ardrone3.MoveToChanged, now: float) -> None:
+        move = self.to
+        if message.status == MoveToStatus.RUNNING:
+            if move is not None and move.is_to(message):
+                move.running = True
+                move.answer.succeed(move)
+                if self._cancelling is not None:
+                    # Acknowledged commands are carried out in order: that one is over, whatever became of its event.
+                    self._cancelling.end(MoveEnd.CANCELED)
+                    self._cancelling = None
+            return
+        how = _MOVE_TO_ENDS.get(message.status)
+        if how is None:
+            return
+        if self._cancelling is not None and self._cancelling.is_to(message) and (move is None or not move.running):
+            self._cancelling.end(how)
+            self._cancelling = None
+            return
+        if move is None or (not move.is_to(message) and self._replaced is not None and self._replaced.is_to(message)):
+            return
+        self.to = None
+        move.end(how)
+        move.answer.fail(CommandRejected(f"the drone answered the moveTo with {how.value}"))
+
+    def _on_move_by_end(self, message: ardrone3.MoveByEnd, now: float) -> None:
+        if not self.by or self._is_stray(message, now):
+            return
+        move = self.by.popleft()
+        if message.error == MoveByError.OK:
+            move.end(MoveEnd.DONE)
+            move.answer.succeed(Displacement(message.dX, message.dY, message.dZ, message.dPsi))
+            return
+        move.end(MoveEnd.CANCELED if message.error == MoveByError.INTERRUPTED else MoveEnd.ERROR)
+        move.answer.fail(CommandRejected(_MOVE_BY_REFUSALS.get(message.error, "the drone could not make the move")))
+
+    def _is_stray(self, message: ardrone3.MoveByEnd, now: float) -> bool:
+        """Does this event belong to a moveBy that was cancelled before the present one was asked for?
+
+        Nothing but a newer moveBy interrupts one, and a move that is not zero does not succeed by staying.
+        """
+        if now >= self._stray_until or len(self.by) > 1:
+            return False
+        if message.error == MoveByError.INTERRUPTED:
+            return True
+        went_nowhere = max(abs(message.dX), abs(message.dY), abs(message.dZ), abs(message.dPsi)) < _NO_MOVE
+        return message.error == MoveByError.OK and went_nowhere
+
+    def _on_flying_state(self, message: ardrone3.FlyingStateChanged, now: float) -> None:
+        if message.state in MOTORS_OFF:
+            self.cancel_to("the drone is on the ground" if message.state == FlyingState.LANDED else "motors cut")
+            if self._cancelling is not None:
+                self._cancelling.end(MoveEnd.CANCELED)
+                self._cancelling = None
+            self.cancel_by("the drone is on the ground", now)
+
+    def _on_return(self, message: rth.State, now: float) -> None:
+        move = self.returning
+        if move is None:
+            return
+        if self._home.state.returning_by_itself:
+            # The drone has reasons of its own now: it is no longer ours to stop.
+            self.returning = None
+            move.end(MoveEnd.REPLACED)
+        elif self._home.state.returning:
+            move.running = True
+        elif move.running:
+            self.returning = None
+            move.end(_RETURN_ENDS.get(message.reason, MoveEnd.ERROR))

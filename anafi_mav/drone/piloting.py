@@ -1,0 +1,478 @@
+"""Element piloting: the verbs that fly the drone. Each returns when the drone has confirmed it.
+
+A verb raises `CommandRejected` when the drone, or what it reported, refuses; `CommandTimeout` when it stays silent,
+and then its command is taken back; `LinkLost` when the link dies meanwhile. Signs and units are the drone's own:
+body axes front, right, down; heights above the take-off point.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import math
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar
+
+from anafi_mav.arsdk.messages import ardrone3, rth
+from anafi_mav.arsdk.messages import move as guided
+from anafi_mav.arsdk.messages.ardrone3 import FlyingState, OrientationMode, PoiStatus
+from anafi_mav.arsdk.messages.rth import RthState
+from anafi_mav.arsdk.wire import Message
+from anafi_mav.drone.alerts import spoken
+from anafi_mav.drone.element import Element, Position, Range, Reducer
+from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander
+from anafi_mav.drone.home import Home
+from anafi_mav.drone.moves import Displacement, Move, MoveEnd, Moves
+from anafi_mav.drone.piloting_state import REDUCERS, PilotingState
+from anafi_mav.drone.sticks import Limits, PilotingCommand, Sticks, percent
+from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost, LocalProtocolError, NotSupported
+from anafi_mav.units import wrap_360
+
+log = logging.getLogger("anafi_mav")
+
+RAMPING_TIMEOUT = 10.0
+"""s that the motors may take from their first turn to the take-off."""
+
+MOVE_BY_MARGIN = 20.0
+"""s that a relative move may take beyond the flight itself."""
+MOVE_BY_SLOWEST = 0.5
+"""m/s and rad/s below which a relative move is given up: the speed is the drone's choice, this is far below it."""
+
+_STICKS_DEAD = frozenset(
+    {FlyingState.LANDED, FlyingState.LANDING, FlyingState.EMERGENCY, FlyingState.EMERGENCY_LANDING}
+)
+"""States in which no PCMD is sent: positive gaz cancels a landing (ardrone3.xml 1-0-3)."""
+_TAKEN_OFF = frozenset({FlyingState.TAKINGOFF, FlyingState.HOVERING, FlyingState.FLYING})
+_LANDING = frozenset({FlyingState.LANDING, FlyingState.LANDED, FlyingState.EMERGENCY_LANDING})
+_MOTORS_CUT = frozenset({FlyingState.EMERGENCY, FlyingState.LANDED})
+
+
+class Piloting(Element[PilotingState]):
+    """Takes off, lands, moves, returns, hovers. `pilot` and `hover` act at once; all others are coroutines."""
+
+    NOTHING = PilotingState()
+    REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = REDUCERS
+
+    def __init__(self, commander: Commander, home: Home, takeoff_blockers: Callable[[], list[str]]) -> None:
+        super().__init__()
+        self._commander = commander
+        self._home = home
+        self._takeoff_blockers = takeoff_blockers
+        self._moves = Moves(home)
+        self._sticks = Sticks()
+        self._timer: asyncio.TimerHandle | None = None
+        self._landings_asked = 0
+        self._setting_locks: dict[type[Message], asyncio.Lock] = {}
+
+    def reset(self) -> None:
+        super().reset()
+        self.link_lost()
+
+    def link_lost(self) -> None:
+        """Nothing of before is sent again, and what was started is nobody's any more."""
+        self._silence_sticks()
+        self._moves.clear(MoveEnd.LINK_LOST)
+
+    def reactions(self) -> Mapping[type[Message], Callable[[Any, float], None]]:
+        """Events to be shown to this element beyond its reducers."""
+        return self._moves.reactions()
+
+    # -- facts about what we do
+
+    @property
+    def moves_started(self) -> tuple[Move, ...]:
+        """The moves of ours that have not ended; empty after a new connection."""
+        return self._moves.started()
+
+    @property
+    def move(self) -> Move | None:
+        """Our moveTo that has not ended."""
+        return self._moves.to
+
+    @property
+    def sticks_blocked(self) -> str | None:
+        """Why no PCMD is sent at present; None when the sticks work."""
+        flying = self.state.flying
+        if not self._commander.connected:
+            return "not connected"
+        if flying is None:
+            return "the drone has not reported its flying state"
+        if flying in _STICKS_DEAD:
+            return f"the drone is in the state {spoken(flying)}"
+        if self._landings_asked:
+            return "the drone is about to land"
+        if self._home.state.returning_by_itself and self._home.state.reason is not None:
+            return f"the drone returns home by itself: {spoken(self._home.state.reason)}"
+        return None
+
+    @property
+    def limits(self) -> Limits | None:
+        """What 100 % stick is; None before the drone has reported all of it."""
+        tilt, yaw, climb = self.state.max_tilt, self.state.max_rotation_speed, self.state.max_vertical_speed
+        if tilt is None or yaw is None or climb is None:
+            return None
+        return Limits(tilt.current, yaw.current, climb.current)
+
+    # -- up and down
+
+    async def take_off(self, timeout: float = ANSWER_TIMEOUT) -> None:
+        """Motors on and up to about a metre; returns when the drone says that it is taking off.
+
+        A drone refuses by silence; `CommandRejected` then tells what it has reported against a take-off.
+        """
+        flying = self.state.flying
+        if flying in _TAKEN_OFF:
+            return
+        if flying in _STICKS_DEAD and flying != FlyingState.LANDED:
+            raise CommandRejected(f"the drone is in the state {spoken(flying)}")
+        self._silence_sticks()
+
+        def judge(message: ardrone3.FlyingStateChanged) -> bool | AnafiMavError | None:
+            if message.state in _TAKEN_OFF:
+                return True
+            if message.state == FlyingState.MOTOR_RAMPING:
+                answer.expire_after(RAMPING_TIMEOUT, CommandTimeout(ardrone3.TakeOff.NAME, RAMPING_TIMEOUT))
+            elif message.state in _MOTORS_CUT:
+                return CommandRejected(self._why_on_the_ground("the motors stopped again"))
+            return None
+
+        answer = self._commander.expect((ardrone3.FlyingStateChanged,), judge)
+        self._commander.dispatch(answer, ardrone3.TakeOff(), timeout)
+        try:
+            await answer.wait()
+        except CommandTimeout:
+            reasons = self._why_on_the_ground("")
+            if reasons:
+                raise CommandRejected(reasons) from None
+            raise
+
+    def _why_on_the_ground(self, otherwise: str) -> str:
+        return ", ".join(self._takeoff_blockers()) or otherwise
+
+    async def land(self, timeout: float = ANSWER_TIMEOUT) -> None:
+        """Land here; returns when the drone is landing, at once when it is or has landed."""
+        if self.state.flying in _LANDING:
+            return
+        # From here on, not from the drone's answer on: a positive gaz would cancel the landing.
+        self._silence_sticks()
+        self._landings_asked += 1
+        try:
+            await self._commander.confirm(
+                ardrone3.Landing(),
+                (ardrone3.FlyingStateChanged,),
+                lambda message: True if message.state in _LANDING else None,
+                timeout,
+            )
+        finally:
+            self._landings_asked -= 1
+
+    async def emergency(self, timeout: float = ANSWER_TIMEOUT) -> None:
+        """Cut the motors, wherever the drone is: in the air it falls. Returns when the drone says that they are."""
+        self._silence_sticks()
+        await self._commander.confirm(
+            ardrone3.Emergency(),
+            (ardrone3.FlyingStateChanged,),
+            lambda message: True if message.state in _MOTORS_CUT else None,
+            timeout,
+        )
+
+    # -- guided moves
+
+    async def move_by(
+        self, front: float, right: float, down: float, turn: float, timeout: float | None = None
+    ) -> Displacement:
+        """Fly a straight line relative to the body (m) while turning clockwise by `turn` (rad).
+
+        Returns at the end of the move what was flown. Without a `timeout` the time given grows with the move.
+        Giving up, by time or by cancellation of this coroutine, stops the drone.
+        """
+        if not math.isfinite(front + right + down + turn):
+            raise LocalProtocolError("a relative move is not a number")
+        if timeout is None:
+            timeout = MOVE_BY_MARGIN + (math.hypot(front, right, down) + abs(turn)) / MOVE_BY_SLOWEST
+        move = Move(self._commander.expect((), _decided_elsewhere))
+        self._silence_sticks()
+        self._moves.by.append(move)
+        try:
+            self._commander.dispatch(move.answer, ardrone3.MoveBy(front, right, down, turn), timeout)
+            flown: Displacement = await move.answer.wait()
+        finally:
+            if move in self._moves.by:  # given up: neither the drone nor hover has ended it
+                self._moves.drop_by(move, self._now())
+                self._send_if_connected(ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0))
+        return flown
+
+    async def move_to(
+        self,
+        latitude: float,
+        longitude: float,
+        altitude: float,
+        heading_deg: float | None = None,
+        horizontal_speed: float | None = None,
+        timeout: float = ANSWER_TIMEOUT,
+    ) -> Move:
+        """Fly to a place (deg, deg, m above take-off); returns when the drone is on its way.
+
+        `heading_deg` (clockwise from north) is turned to on the way; None keeps the heading. `horizontal_speed`
+        (m/s) limits the speed; None leaves it to the drone. `Move.result` tells how it ends. A newer moveTo
+        replaces an older one.
+        """
+        if not math.isfinite(latitude + longitude + altitude + (heading_deg or 0.0) + (horizontal_speed or 0.0)):
+            raise LocalProtocolError("a target is not a number")
+        command = self._move_to_command(Position(latitude, longitude, altitude), heading_deg, horizontal_speed)
+        move = Move(self._commander.expect((), _decided_elsewhere), Position(latitude, longitude, altitude))
+        self._silence_sticks()
+        replaced = self._moves.begin_to(move)
+        if replaced is not None and replaced.answer.token is not None:
+            self._commander.cancel(replaced.answer.token)
+        try:
+            self._commander.dispatch(move.answer, command, timeout)
+            await move.answer.wait()
+        finally:
+            if not move.running and self._moves.to is move:  # given up: it must not start later
+                self._moves.cancel_to("given up")
+                self._send_if_connected(ardrone3.CancelMoveTo())
+        return move
+
+    def _move_to_command(self, to: Position, heading_deg: float | None, horizontal_speed: float | None) -> Message:
+        mode = OrientationMode.NONE if heading_deg is None else OrientationMode.HEADING_DURING
+        heading = 0.0 if heading_deg is None else wrap_360(heading_deg)
+        if horizontal_speed is None:
+            return ardrone3.MoveTo(to.latitude, to.longitude, to.altitude, mode, heading)
+        if horizontal_speed <= 0.0:
+            raise LocalProtocolError("a moveTo needs a speed above zero")
+        limits = self.limits
+        if limits is None:
+            raise NotSupported("reported speed limits")
+        return guided.ExtendedMoveTo(
+            to.latitude,
+            to.longitude,
+            to.altitude,
+            guided.OrientationMode(mode.value),
+            heading,
+            horizontal_speed,
+            limits.climb_mps,
+            limits.yaw_rate_dps,
+        )
+
+    # -- home
+
+    async def return_home(self, timeout: float = ANSWER_TIMEOUT) -> Move | None:
+        """Fly home; returns when the drone is on its way or about to be. None: it was returning already."""
+        if self._home.state.returning:
+            return None
+        if self._home.state.rth == RthState.UNAVAILABLE:
+            raise CommandRejected("return home is unavailable")
+
+        def judge(message: rth.State) -> bool | AnafiMavError | None:
+            if message.state in (RthState.IN_PROGRESS, RthState.PENDING):
+                return True
+            if message.state == RthState.UNAVAILABLE:
+                return CommandRejected(f"return home is unavailable: {spoken(message.reason)}")
+            return None
+
+        move = Move(self._commander.expect((rth.State,), judge))
+        self._release_sticks()
+        self._moves.returning = move
+        try:
+            self._commander.dispatch(move.answer, rth.ReturnToHome(), timeout)
+            await move.answer.wait()
+        except (CommandRejected, LinkLost):
+            if self._moves.returning is move:
+                self._moves.returning = None
+            move.end(MoveEnd.ERROR)
+            raise
+        # After a timeout it stays ours: should the drone begin to return all the same, hover has to stop it.
+        return move
+
+    async def cancel_return_home(self, timeout: float = ANSWER_TIMEOUT) -> None:
+        """Stop a return, whoever began it: unlike `hover`, this is an explicit order to do so."""
+        if not self._home.state.returning:
+            return
+        await self._commander.confirm(
+            rth.Abort(),
+            (rth.State,),
+            lambda message: True if message.state in (RthState.AVAILABLE, RthState.UNAVAILABLE) else None,
+            timeout,
+        )
+
+    # -- sticks
+
+    def pilot(self, command: PilotingCommand | None) -> None:
+        """Hold these sticks: a PCMD leaves now and every 50 ms until another command, a move, `hover` or None.
+
+        None lets the sticks go (centred for two seconds). A setpoint takes over from a moveTo or moveBy of ours,
+        during which the drone would ignore it. Nothing is sent and nothing kept while `sticks_blocked`.
+        Raises `NotSupported` before the drone has reported its limits, `LinkLost` without a link.
+        """
+        self._require_link()
+        limits = self.limits
+        if limits is None:
+            raise NotSupported("reported tilt and speed limits")
+        position = percent(command or PilotingCommand(), limits)
+        if self.sticks_blocked is None:
+            if command is not None:
+                self._stop_moves("taken over by the sticks")
+                self._sticks.command(position, self._now())
+            elif self._sticks.active:
+                self._sticks.centre(self._now())
+        self._pump()
+
+    def hover(self) -> None:
+        """Stop now, whatever we had started, and stay: takes effect before it returns.
+
+        Cancels our moveTo and moveBys, a running point of interest and a return that was asked for through us,
+        then centres the sticks for two seconds, since a PCMD alone neither stops a moveTo nor is it acknowledged.
+        A landing or a return that the drone began by itself goes on. Raises `LinkLost` without a link.
+        """
+        self._require_link()
+        self._stop_moves("stopped by hover")
+        if self.state.poi in (PoiStatus.RUNNING, PoiStatus.PENDING):
+            self._commander.send(ardrone3.StopPilotedPOI())
+        returning = self._moves.returning
+        if returning is not None:
+            self._moves.returning = None
+            returning.end(MoveEnd.CANCELED)
+            returning.answer.fail(CommandRejected("stopped by hover"))
+            if returning.answer.token is not None:
+                self._commander.cancel(returning.answer.token)
+            self._commander.send(rth.Abort())
+        self._sticks.centre(self._now())
+        self._pump()
+
+    async def stop(self, timeout: float = ANSWER_TIMEOUT) -> None:
+        """`hover`, then wait until the drone has confirmed the end of what was running."""
+        answers = []
+        if self._moves.to is not None and self._moves.to.running:
+            answers.append(self._commander.expect((ardrone3.MoveToChanged,), _ends_move_to))
+        if self._moves.by:
+            answers.append(self._commander.expect((ardrone3.MoveByEnd,), lambda message: True))
+        if self._moves.returning is not None and self._moves.returning.running:
+            answers.append(self._commander.expect((rth.State,), _ends_return))
+        try:
+            self.hover()
+            for answer in answers:
+                answer.expire_after(timeout, CommandTimeout("hover", timeout))
+                await answer.wait()
+        finally:
+            for answer in answers:
+                answer.close()
+
+    def _stop_moves(self, why: str) -> None:
+        """Cancel our moveTo and moveBys; in the order of the queue, so a later move is not hit."""
+        move = self._moves.cancel_to(why)
+        if move is not None:
+            if move.answer.token is not None:
+                self._commander.cancel(move.answer.token)
+            self._commander.send(ardrone3.CancelMoveTo())
+        moves = self._moves.cancel_by(why, self._now())
+        for move in moves:
+            if move.answer.token is not None:
+                self._commander.cancel(move.answer.token)
+        if moves:
+            self._commander.send(ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0))
+
+    def _pump(self) -> None:
+        """Send the PCMD that is due and come back for the next."""
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        if self.sticks_blocked is not None:
+            self._sticks.stop()
+        now = self._now()
+        pcmd = self._sticks.due(now)
+        if pcmd is not None:
+            self._send_if_connected(pcmd)
+        deadline = self._sticks.deadline
+        if deadline is not None:
+            self._timer = asyncio.get_running_loop().call_at(deadline, self._pump)
+
+    def _silence_sticks(self) -> None:
+        """No more PCMDs: something else flies the drone now."""
+        self._sticks.stop()
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
+    def _release_sticks(self) -> None:
+        """Take the hands off: a return waits for a PCMD with flag 0 (rth.xml 146-0-11)."""
+        if self._sticks.active and self.sticks_blocked is None:
+            self._commander.send(self._sticks.released(self._now()))
+        self._silence_sticks()
+
+    # -- settings
+
+    async def set_min_altitude(self, metres: float) -> float:
+        """Height above take-off that a return climbs to first. Returns what the drone made of it, like all `set_`."""
+        return await self._set(rth.SetMinAltitude(metres), rth.MinAltitude, self._home.state.min_altitude)
+
+    async def set_max_tilt(self, degrees: float) -> float:
+        return await self._set(ardrone3.MaxTilt(degrees), ardrone3.MaxTiltChanged, self.state.max_tilt)
+
+    async def set_max_altitude(self, metres: float) -> float:
+        """Ceiling above take-off."""
+        return await self._set(ardrone3.MaxAltitude(metres), ardrone3.MaxAltitudeChanged, self.state.max_altitude)
+
+    async def set_max_distance(self, metres: float) -> float:
+        """Radius of the geofence."""
+        return await self._set(ardrone3.MaxDistance(metres), ardrone3.MaxDistanceChanged, self.state.max_distance)
+
+    async def set_max_vertical_speed(self, metres_per_second: float) -> float:
+        return await self._set(
+            ardrone3.MaxVerticalSpeed(metres_per_second),
+            ardrone3.MaxVerticalSpeedChanged,
+            self.state.max_vertical_speed,
+        )
+
+    async def set_max_rotation_speed(self, degrees_per_second: float) -> float:
+        return await self._set(
+            ardrone3.MaxRotationSpeed(degrees_per_second),
+            ardrone3.MaxRotationSpeedChanged,
+            self.state.max_rotation_speed,
+        )
+
+    async def _set(self, command: Message, answer: type[Message], reported: Range | None) -> float:
+        """Change a setting and return the value the drone confirms, which it may have clamped to its range.
+
+        A setting that the drone did not report when it connected does not exist: `NotSupported`.
+        """
+        (value,) = (getattr(command, name) for name in command.__struct_fields__)
+        if not math.isfinite(value):
+            raise LocalProtocolError(f"{command.NAME}: the value is not a number")
+        if reported is None:
+            raise NotSupported(command.NAME)
+        # One at a time: the answers of two could not be told apart.
+        async with self._setting_locks.setdefault(answer, asyncio.Lock()):
+            return await self._commander.confirm(
+                command, (answer,), lambda message: float(message.current) if math.isfinite(message.current) else None
+            )
+
+    # -- small change
+
+    @staticmethod
+    def _now() -> float:
+        return asyncio.get_running_loop().time()
+
+    def _require_link(self) -> None:
+        if not self._commander.connected:
+            raise LinkLost("not connected")
+
+    def _send_if_connected(self, message: Message) -> None:
+        """For what is worth sending only while there is a link; its loss is reported elsewhere."""
+        try:
+            self._commander.send(message)
+        except LinkLost as error:
+            log.debug("%s not sent: %s", message.NAME, error)
+            self._sticks.stop()
+
+
+def _decided_elsewhere(message: Message) -> None:
+    """The judge of moves: `Moves` knows which of them an event speaks of."""
+
+
+def _ends_move_to(message: ardrone3.MoveToChanged) -> bool | None:
+    return True if message.status != ardrone3.MoveToStatus.RUNNING else None
+
+
+def _ends_return(message: rth.State) -> bool | None:
+    return True if message.state in (RthState.AVAILABLE, RthState.UNAVAILABLE) else None

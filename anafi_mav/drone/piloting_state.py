@@ -1,0 +1,114 @@
+"""What the drone reports about its flight: attitude, motion, flying state, limits. The verbs are in `piloting`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import msgspec
+from msgspec.structs import replace
+
+from anafi_mav.arsdk.messages import ardrone3, move
+from anafi_mav.arsdk.messages.ardrone3 import FlyingState, Motion, MoveToStatus, PoiStatus
+from anafi_mav.arsdk.wire import Message
+from anafi_mav.drone.element import Position, Range, Reducer, finite, position, setting
+
+MOTORS_OFF = frozenset({FlyingState.LANDED, FlyingState.EMERGENCY})
+ON_THE_GROUND = MOTORS_OFF | {FlyingState.MOTOR_RAMPING, FlyingState.USERTAKEOFF}
+
+
+class Attitude(msgspec.Struct, frozen=True):
+    """rad: roll + right wing down, pitch + nose up, yaw clockwise from north."""
+
+    roll: float
+    pitch: float
+    yaw: float
+
+
+class Velocity(msgspec.Struct, frozen=True):
+    """Over ground, m/s."""
+
+    north: float
+    east: float
+    down: float
+
+
+class PilotingState(msgspec.Struct, frozen=True):
+    flying: FlyingState | None = None
+    attitude: Attitude | None = None
+    velocity: Velocity | None = None
+    altitude: float | None = None
+    """m above the take-off point."""
+    height: float | None = None
+    """m above the ground below."""
+    steady: bool | None = None
+    """The drone lies or hovers still."""
+    move_to: MoveToStatus | None = None
+    """What became of the last moveTo."""
+    move_target: Position | None = None
+    """Where that moveTo goes or went; altitude above the take-off point."""
+    poi: PoiStatus | None = None
+    move_missing: int | None = None
+    """What a guided move lacks, as bits of `move.Indicator`; 0 = available. Ai only."""
+    max_tilt: Range | None = None
+    """deg."""
+    max_vertical_speed: Range | None = None
+    """m/s."""
+    max_rotation_speed: Range | None = None
+    """deg/s, of the heading."""
+    max_tilt_speed: Range | None = None
+    """deg/s, of roll and pitch."""
+    max_altitude: Range | None = None
+    """m above the take-off point; always enforced."""
+    max_distance: Range | None = None
+    """m from home; enforced when `geofence` is on."""
+    geofence: bool | None = None
+    banked_turn: bool | None = None
+
+    @property
+    def motors_on(self) -> bool | None:
+        """Do the motors turn? None when the drone has not said."""
+        return None if self.flying is None else self.flying not in MOTORS_OFF
+
+    @property
+    def in_air(self) -> bool | None:
+        """Is the drone off the ground? None when the drone has not said."""
+        return None if self.flying is None else self.flying not in ON_THE_GROUND
+
+
+def _attitude(state: PilotingState, message: ardrone3.AttitudeChanged) -> PilotingState:
+    if not math.isfinite(message.roll + message.pitch + message.yaw):
+        return replace(state, attitude=None)
+    return replace(state, attitude=Attitude(message.roll, message.pitch, message.yaw))
+
+
+def _velocity(state: PilotingState, message: ardrone3.SpeedChanged) -> PilotingState:
+    if not math.isfinite(message.speedX + message.speedY + message.speedZ):
+        return replace(state, velocity=None)
+    return replace(state, velocity=Velocity(message.speedX, message.speedY, message.speedZ))
+
+
+def _move_to(state: PilotingState, message: ardrone3.MoveToChanged) -> PilotingState:
+    target = position(message.latitude, message.longitude, message.altitude)
+    return replace(state, move_to=message.status, move_target=target)
+
+
+REDUCERS: Mapping[type[Message], Reducer] = {
+    ardrone3.FlyingStateChanged: lambda state, message: replace(state, flying=message.state),
+    ardrone3.AttitudeChanged: _attitude,
+    ardrone3.SpeedChanged: _velocity,
+    ardrone3.AltitudeChanged: lambda state, message: replace(state, altitude=finite(message.altitude)),
+    ardrone3.AltitudeAboveGroundChanged: lambda state, message: replace(state, height=finite(message.altitude)),
+    ardrone3.MotionState: lambda state, message: replace(state, steady=message.state == Motion.STEADY),
+    ardrone3.MoveToChanged: _move_to,
+    ardrone3.PilotedPOIV2: lambda state, message: replace(state, poi=message.status),
+    move.Info: lambda state, message: replace(state, move_missing=message.missing_inputs),
+    ardrone3.MaxTiltChanged: lambda state, message: replace(state, max_tilt=setting(message)),
+    ardrone3.MaxVerticalSpeedChanged: lambda state, message: replace(state, max_vertical_speed=setting(message)),
+    ardrone3.MaxRotationSpeedChanged: lambda state, message: replace(state, max_rotation_speed=setting(message)),
+    ardrone3.MaxPitchRollRotationSpeedChanged: lambda state, message: replace(state, max_tilt_speed=setting(message)),
+    ardrone3.MaxAltitudeChanged: lambda state, message: replace(state, max_altitude=setting(message)),
+    ardrone3.MaxDistanceChanged: lambda state, message: replace(state, max_distance=setting(message)),
+    ardrone3.NoFlyOverMaxDistanceChanged: lambda state, message: replace(state, geofence=message.shouldNotFlyOver != 0),
+    ardrone3.BankedTurnChanged: lambda state, message: replace(state, banked_turn=message.state != 0),
+}

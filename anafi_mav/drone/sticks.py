@@ -1,0 +1,132 @@
+"""The sticks: a setpoint as PCMD percentages, and when which PCMD is due. No I/O; time is handed in.
+
+PCMD is not acknowledged and the drone forgets it soon, so what holds is repeated every 50 ms (ardrone3.xml 1-0-2).
+Letting go is explicit: centred sticks are repeated for two seconds, because a single datagram can be lost.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import msgspec
+
+from anafi_mav.arsdk.messages.ardrone3 import PCMD
+from anafi_mav.errors import LocalProtocolError
+from anafi_mav.units import clip
+
+PERIOD = 0.05
+"""s between two PCMDs: "sends each 50 ms" (ardrone3.xml 1-0-2)."""
+
+CENTRED_REPEATS = 40
+"""PCMDs that centre the sticks: two seconds of them."""
+
+
+class PilotingCommand(msgspec.Struct, frozen=True):
+    """What a pilot wants, in aerospace signs (FRD body, and up for the climb). Values beyond the limits are clipped."""
+
+    roll_deg: float = 0.0
+    """Tilt, + right."""
+    pitch_deg: float = 0.0
+    """Tilt, + nose UP (that is backwards)."""
+    yaw_rate_dps: float = 0.0
+    """Turn, deg/s, + clockwise seen from above."""
+    climb_mps: float = 0.0
+    """m/s, + up."""
+
+
+class Limits(msgspec.Struct, frozen=True):
+    """What 100 % is: the drone's own settings, as it reported them."""
+
+    tilt_deg: float
+    yaw_rate_dps: float
+    climb_mps: float
+
+
+class Percent(NamedTuple):
+    """Stick positions in PCMD's signs: roll + right, pitch + nose DOWN, yaw + clockwise, gaz + up; -100..100."""
+
+    roll: int
+    pitch: int
+    yaw: int
+    gaz: int
+
+
+CENTRED = Percent(0, 0, 0, 0)
+
+
+def percent(command: PilotingCommand, limits: Limits) -> Percent:
+    """The stick positions of a setpoint, rounded to the nearest percent and clipped to -100..100.
+
+    Raises `LocalProtocolError` for a setpoint that is not a number.
+    """
+    return Percent(
+        _share(command.roll_deg, limits.tilt_deg),
+        _share(-command.pitch_deg, limits.tilt_deg),
+        _share(command.yaw_rate_dps, limits.yaw_rate_dps),
+        _share(command.climb_mps, limits.climb_mps),
+    )
+
+
+def _share(value: float, limit: float) -> int:
+    if math.isnan(value):
+        raise LocalProtocolError("a piloting setpoint is not a number")
+    # A limit of zero is a drone that may not move that way at all.
+    return round(clip(100.0 * value / limit, -100.0, 100.0)) if limit > 0.0 else 0
+
+
+class Sticks:
+    """When to send which stick position. `deadline` says when `due` has something, `due` hands it out once."""
+
+    __slots__ = ("_next", "_position", "_remaining", "_seq")
+
+    def __init__(self) -> None:
+        self._position = CENTRED
+        self._remaining: int | None = 0
+        """PCMDs still to come; None: until further notice."""
+        self._next = 0.0
+        self._seq = 0
+
+    @property
+    def active(self) -> bool:
+        """Is there anything left to send?"""
+        return self._remaining != 0
+
+    @property
+    def deadline(self) -> float | None:
+        """When the next PCMD is due; None when none is."""
+        return self._next if self.active else None
+
+    def command(self, position: Percent, now: float) -> None:
+        """Hold this position from now on, until something else is said."""
+        self._position, self._remaining, self._next = position, None, now
+
+    def centre(self, now: float) -> None:
+        """Let go: centred from now on, for two seconds."""
+        self._position, self._remaining, self._next = CENTRED, CENTRED_REPEATS, now
+
+    def stop(self) -> None:
+        """Send nothing any more."""
+        self._remaining = 0
+
+    def due(self, now: float) -> PCMD | None:
+        """The PCMD to send at this moment, if its time has come.
+
+        Repetitions keep their 20 Hz grid when a call is a little late; after a longer pause the missed ones are
+        not made up for.
+        """
+        if not self.active or now < self._next:
+            return None
+        if self._remaining is not None:
+            self._remaining -= 1
+        self._next = self._next + PERIOD if now - self._next < PERIOD else now + PERIOD
+        return PCMD(1, *self._position, self._stamp(now))
+
+    def released(self, now: float) -> PCMD:
+        """A PCMD that says that nobody holds the sticks: its flag tells the drone to ignore roll and pitch."""
+        return PCMD(0, *CENTRED, self._stamp(now))
+
+    def _stamp(self, now: float) -> int:
+        """timestampAndSeqNum: a counter in the top byte, milliseconds below; the drone keeps statistics of it."""
+        self._seq = (self._seq + 1) & 0xFF
+        return self._seq << 24 | int(now * 1000.0) & 0xFFFFFF
