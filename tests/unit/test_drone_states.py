@@ -309,8 +309,8 @@ def test_whatever_the_peer_sends_no_reducer_raises() -> None:
                 filler = rng.choice(extremes)
                 body = bytes(rng.randrange(256) if rng.random() < 0.5 else filler for _ in range(64)) + b"\0\0"
                 event = wire.decode(struct.pack("<BBH", *message.ID) + body)
-                assert isinstance(event, message)
-                state = element.REDUCERS[message](state, event)
+                if event is not None:  # several strings, and too few ends in the noise
+                    state = element.REDUCERS[message](state, event)
         for name in dir(type(state)):
             getattr(state, name)
 
