@@ -1,0 +1,12 @@
+"""Configuration: a YAML file becomes a frozen, checked `Config`, or one `ConfigError` that names the key.
+
+`schema` says what exists and what it means, `load` reads and checks. The gateway takes the result.
+"""
+
+from anafi_mav.config.load import from_mapping as from_mapping
+from anafi_mav.config.load import from_text as from_text
+from anafi_mav.config.load import load as load
+from anafi_mav.config.load import remarks as remarks
+from anafi_mav.config.schema import Config as Config
+from anafi_mav.config.schema import DroneConfig as DroneConfig
+from anafi_mav.config.schema import SimConfig as SimConfig

@@ -1,0 +1,249 @@
+"""Reads a configuration: YAML text → plain mapping → the structs of `schema`, checked as a whole.
+
+Whatever is wrong becomes one `ConfigError` of one line, "drones[1].sysid: expected a whole number from 1 to 250,
+got 'x'". Of msgspec's own error only the place is used; what was expected there stands in the schema.
+"""
+
+from __future__ import annotations
+
+import difflib
+import ipaddress
+import re
+import reprlib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import yaml
+
+from anafi_mav.config.schema import MAVSDK_SYSID, Config, DroneConfig, SimConfig
+from anafi_mav.errors import ConfigError
+
+MAX_FILE_BYTES = 1 << 20
+"""A fleet of 250 drones with every key written out is a tenth of this."""
+
+MAX_LINE = 300
+"""Characters of a YAML parser's sentence that are passed on."""
+
+_HOST_NAME = re.compile(r"(?!-)[A-Za-z0-9-]{1,63}(?<!-)(\.(?!-)[A-Za-z0-9-]{1,63}(?<!-))*\.?")
+"""RFC 1123 §2.1, without the limit on the whole length: the schema has a smaller one."""
+
+
+def load(path: Path) -> Config:
+    """The configuration in the file at `path`. Raises `ConfigError`."""
+    try:
+        with path.open("rb") as file:
+            content = file.read(MAX_FILE_BYTES + 1)
+    except OSError as error:
+        raise ConfigError("", f"cannot read {path}: {error.strerror or error}") from error
+    if len(content) > MAX_FILE_BYTES:
+        raise ConfigError("", f"{path}: expected a file of at most {MAX_FILE_BYTES} bytes")
+    return from_text(content, str(path))
+
+
+def from_text(text: str | bytes, source: str) -> Config:
+    """The configuration in YAML `text`; `source` names it in messages. Raises `ConfigError`."""
+    try:
+        document = yaml.load(text, _Loader)
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        where = f"{source}, line {mark.line + 1}, column {mark.column + 1}" if mark else source
+        raise ConfigError("", f"{where}: {_one_line(error.problem or error.context or 'not YAML')}") from error
+    except yaml.YAMLError as error:  # characters that YAML does not have: no line, but an offset
+        raise ConfigError("", f"{source}: {_one_line(str(error))}") from error
+    except RecursionError as error:
+        raise ConfigError("", f"{source}: lists or mappings inside each other without end") from error
+    except ValueError as error:  # a date like 2026-02-31
+        raise ConfigError("", f"{source}: {_one_line(str(error))}") from error
+    return from_mapping({} if document is None else document)
+
+
+def from_mapping(document: object) -> Config:
+    """The configuration in a mapping of plain values, as a YAML or JSON parser returns it. Raises `ConfigError`."""
+    try:
+        config = msgspec.convert(document, Config)
+    except msgspec.ValidationError as error:
+        raise _explain(document, _steps(str(error))) from error
+    for key_path, problem in _contradictions(config):
+        raise ConfigError(key_path, problem)
+    return config
+
+
+def remarks(config: Config) -> list[str]:
+    """What is legal but probably not meant, a line each."""
+    return [
+        f"drones[{index}].sysid: {MAVSDK_SYSID} is what MAVSDK calls itself unless told otherwise: "
+        "such a client will not see this drone"
+        for index, drone in enumerate(config.drones)
+        if drone.sysid == MAVSDK_SYSID
+    ]
+
+
+class _Loader(yaml.SafeLoader):
+    """SafeLoader that refuses a key written twice: YAML forbids it, PyYAML keeps the last one silently."""
+
+    def compose_mapping_node(self, anchor: Any) -> yaml.MappingNode:
+        node = super().compose_mapping_node(anchor)
+        seen: set[str] = set()
+        for key, _ in node.value:
+            if isinstance(key, yaml.ScalarNode):
+                if key.value in seen:
+                    raise yaml.composer.ComposerError(
+                        None, None, f"the key {_shown(key.value)} stands twice in one mapping", key.start_mark
+                    )
+                seen.add(key.value)
+        return node
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())[:MAX_LINE]
+
+
+_short = reprlib.Repr()
+_short.maxstring = _short.maxother = _short.maxlong = 60
+_short.maxdict = _short.maxlist = _short.maxlevel = 3
+
+
+def _shown(value: object) -> str:
+    """`value` as the user wrote it, nearly: bounded however large it is."""
+    match value:
+        case None:
+            return "nothing"
+        case bool():
+            return "true" if value else "false"
+        case _:
+            return _one_line(_short.repr(value))
+
+
+def _key_path(steps: list[str | int]) -> str:
+    """["drones", 1, "sysid"] → "drones[1].sysid"."""
+    return "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in steps).removeprefix(".")
+
+
+def _steps(message: str) -> list[str | int]:
+    """The place that a message of msgspec names: "… - at `$.drones[1].sysid`" → ["drones", 1, "sysid"]."""
+    place = re.search(r"`\$([^`]*)`$", message)
+    found = re.findall(r"\.([A-Za-z_]\w*)|\[(\d+)\]", place[1] if place else "")
+    return [name or int(index) for name, index in found]
+
+
+def _inner(node: Any) -> Any:
+    """The type below its annotations and below "or None"."""
+    while isinstance(node, msgspec.inspect.Metadata | msgspec.inspect.UnionType):
+        if isinstance(node, msgspec.inspect.Metadata):
+            node = node.type
+        else:
+            node = next(kind for kind in node.types if not isinstance(kind, msgspec.inspect.NoneType))
+    return node
+
+
+def _expected(node: Any) -> str:
+    """What the schema says a value of this type must be."""
+    while isinstance(node, msgspec.inspect.Metadata | msgspec.inspect.UnionType):
+        if isinstance(node, msgspec.inspect.Metadata) and node.extra and "expected" in node.extra:
+            return str(node.extra["expected"])
+        node = node.type if isinstance(node, msgspec.inspect.Metadata) else _inner(node)
+    if isinstance(node, msgspec.inspect.StructType):
+        return f"a mapping with the keys {', '.join(field.name for field in node.fields)}"
+    raise AssertionError(f"the schema does not say what {node} must be")
+
+
+def _explain(document: object, steps: list[str | int]) -> ConfigError:
+    """Walks schema and document side by side to `steps`, where msgspec refused the value."""
+    node: Any = msgspec.inspect.type_info(Config)
+    value: Any = document
+    for step in steps:
+        kind = _inner(node)
+        if isinstance(step, int):
+            node = kind.item_types[step] if isinstance(kind, msgspec.inspect.TupleType) else kind.item_type
+        else:
+            node = next(field.type for field in kind.fields if field.name == step)
+        value = value[step]
+    kind = _inner(node)
+    if isinstance(kind, msgspec.inspect.StructType) and isinstance(value, Mapping):
+        names = [field.name for field in kind.fields]
+        for key in value:
+            if key not in names:
+                near = difflib.get_close_matches(str(key), names, n=1)
+                hint = f"did you mean {near[0]}?" if near else f"expected one of {', '.join(names)}"
+                return ConfigError(_key_path([*steps, _plain_key(key)]), f"unknown key; {hint}")
+        for field in kind.fields:
+            if field.required and field.name not in value:
+                return ConfigError(_key_path([*steps, field.name]), f"missing; expected {_expected(field.type)}")
+    return ConfigError(_key_path(steps), f"expected {_expected(node)}, got {_shown(value)}")
+
+
+def _plain_key(key: object) -> str:
+    """A key the user invented, fit for a key path."""
+    text = key if isinstance(key, str) else _shown(key)
+    return text if re.fullmatch(r"[\w-]{1,60}", text) else _shown(text)
+
+
+def _is_ipv4(text: str) -> bool:
+    try:
+        ipaddress.IPv4Address(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _is_host(text: str) -> bool:
+    """An IPv4 address, or a name; what ends in a number is an address or wrong (WHATWG URL §3.5, ends in a number)."""
+    if text.rstrip(".").rpartition(".")[2].isdigit():
+        return _is_ipv4(text)
+    return _HOST_NAME.fullmatch(text) is not None
+
+
+def _twice(what: str, values: Mapping[str, object]) -> Iterator[tuple[str, str]]:
+    first: dict[object, str] = {}
+    for key_path, value in values.items():
+        if value in first:
+            yield key_path, f"expected {what} of its own, {_shown(value)} is already at {first[value]}"
+        first.setdefault(value, key_path)
+
+
+def _contradictions(config: Config) -> Iterator[tuple[str, str]]:
+    """What no single value shows: (key path, problem) of each rule that is broken."""
+    drones = {f"drones[{index}]": drone for index, drone in enumerate(config.drones)}
+    for key_path, drone in drones.items():
+        yield from _of_one_drone(key_path, drone)
+    yield from _twice("an endpoint", {f"endpoints[{index}]": url for index, url in enumerate(config.endpoints)})
+    yield from _twice("a sysid", {f"{key_path}.sysid": drone.sysid for key_path, drone in drones.items()})
+    yield from _twice("a name", {f"{key_path}.name": drone.name for key_path, drone in drones.items()})
+    simulated = {f"{path}.sim": drone.sim for path, drone in drones.items() if drone.sim is not None}
+    bound = {f"{path}.address": sim.address for path, sim in simulated.items() if sim.address is not None}
+    met = {
+        (f"{path}.sim.address" if drone.sim else f"{path}.address"): f"{address}:{drone.discovery_port}"
+        for path, drone in drones.items()
+        if (address := drone.sim.address if drone.sim else drone.address) is not None
+    }
+    yield from _twice("an address", bound)
+    yield from _twice("an address and discovery_port", met)
+    yield from _agree("speed", {path: sim.speed for path, sim in simulated.items()})
+    yield from _agree("seed", {path: sim.seed for path, sim in simulated.items() if sim.seed is not None})
+
+
+def _agree(key: str, values: Mapping[str, float]) -> Iterator[tuple[str, str]]:
+    """All simulated drones live in one process with one clock and one source of randomness."""
+    for key_path, value in values.items():
+        first, common = next(iter(values.items()))
+        if value != common:
+            yield f"{key_path}.{key}", f"expected {common:g} as at {first}.{key}, got {value:g}"
+
+
+def _of_one_drone(key_path: str, drone: DroneConfig) -> Iterator[tuple[str, str]]:
+    if (drone.address is None) == (drone.sim is None):
+        got = "neither" if drone.sim is None else "both"
+        yield key_path, f"expected either address or sim, got {got}"
+    if drone.address is not None and not _is_host(drone.address):
+        yield f"{key_path}.address", _wrong(DroneConfig, "address", drone.address)
+    if drone.sim is not None and drone.sim.address is not None and not _is_ipv4(drone.sim.address):
+        yield f"{key_path}.sim.address", _wrong(SimConfig, "address", drone.sim.address)
+
+
+def _wrong(struct: type[msgspec.Struct], key: str, value: object) -> str:
+    info = msgspec.inspect.type_info(struct)
+    assert isinstance(info, msgspec.inspect.StructType)
+    wanted = next(_expected(field.type) for field in info.fields if field.name == key)
+    return f"expected {wanted}, got {_shown(value)}"

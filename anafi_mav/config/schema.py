@@ -1,0 +1,196 @@
+"""What a configuration file may say. Data only: reading and checking is `anafi_mav.config.load`.
+
+Each key carries its meaning (`description`) and, as `expected`, what a value must be. Both are used twice: the
+first makes docs/configuration.md, the second makes that page and the error messages.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+import msgspec
+from msgspec import Meta
+
+MAX_ENDPOINTS = 32
+"""Each endpoint is a socket and gets every message: more than this is a mistake, not a fleet."""
+
+MAX_DRONES = 250
+"""As many as there are system ids."""
+
+MAX_TEXT = 200
+"""Characters of a URL or host name; DNS ends at 253, no sensible one comes near."""
+
+MAVSDK_SYSID = 245
+"""The system id that MAVSDK gives itself unless told otherwise (MAVSDK mavsdk.h, DEFAULT_SYSTEM_ID_GCS)."""
+
+
+def expected(what: str) -> dict[str, Any]:
+    """The `extra` of a key: what its value must be, as it reads after the word "expected"."""
+    return {"expected": what}
+
+
+Port = Annotated[int, Meta(ge=1, le=65535)]
+
+
+class SimConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A simulated drone. `anafi-mav run` starts it: all of them together in one process of their own."""
+
+    model: Annotated[
+        Literal["4k"],
+        Meta(description="Which ANAFI is simulated.", extra=expected("4k, the one model that is simulated so far")),
+    ] = "4k"
+    home: Annotated[
+        tuple[
+            Annotated[float, Meta(ge=-90, le=90, extra=expected("a latitude from -90 to 90 degrees"))],
+            Annotated[float, Meta(ge=-180, le=180, extra=expected("a longitude from -180 to 180 degrees"))],
+            Annotated[float, Meta(ge=-500, le=9000, extra=expected("a height of -500 to 9000 m above sea level"))],
+        ],
+        Meta(
+            description="Where it stands at the start: latitude and longitude (WGS 84, degrees), height of the ground "
+            "(metres above mean sea level).",
+            extra=expected("[latitude, longitude, height]"),
+        ),
+    ] = (48.8789, 2.3677, 35.0)
+    address: Annotated[
+        Annotated[str, Meta(max_length=MAX_TEXT)] | None,
+        Meta(
+            description="The address it binds. Left out: the first of 127.0.42.1, 127.0.42.2, … with free ports.",
+            extra=expected("an IPv4 address of this machine, like 127.0.42.1"),
+        ),
+    ] = None
+    speed: Annotated[
+        float,
+        Meta(
+            ge=0.1,
+            le=20,
+            description="Simulated seconds per second. The same for every simulated drone: they share one clock.",
+            extra=expected("a number from 0.1 to 20"),
+        ),
+    ] = 1.0
+    telemetry_rate: Annotated[
+        float,
+        Meta(
+            ge=1,
+            le=200,
+            description="How often attitude, speed and altitude are sent, per second. The aircraft does 5.",
+            extra=expected("a number of events per second from 1 to 200"),
+        ),
+    ] = 5.0
+    seed: Annotated[
+        Annotated[int, Meta(ge=0, le=2**32 - 1)] | None,
+        Meta(
+            description="Start of the random numbers, for a flight that can be repeated. The same for every simulated "
+            "drone that names one. Left out: different each time.",
+            extra=expected("a whole number from 0 to 4294967295"),
+        ),
+    ] = None
+    protocol: Annotated[
+        Literal[1, 2, 3],
+        Meta(
+            description="The newest version of Parrot's transport that it offers.",
+            extra=expected("1, 2 or 3"),
+        ),
+    ] = 3
+    http_port: Annotated[
+        Port | None,
+        Meta(
+            description="Port of its web server. Left out: 80 as on the aircraft, or 8080 where this user may not "
+            "open port 80.",
+            extra=expected("a port from 1 to 65535"),
+        ),
+    ] = None
+
+
+class DroneConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A drone: one MAVLink system. It has either an `address` or a `sim`."""
+
+    name: Annotated[
+        str,
+        Meta(
+            pattern=r"\A[A-Za-z0-9][A-Za-z0-9_.-]{0,31}\Z",
+            description="What messages and logs call it.",
+            extra=expected("1 to 32 letters, digits, '-', '_' or '.', beginning with a letter or digit"),
+        ),
+    ]
+    sysid: Annotated[
+        int,
+        Meta(
+            ge=1,
+            le=250,
+            description="Its MAVLink system id; each drone has its own. 245 is legal but draws a warning: MAVSDK "
+            "calls itself 245 unless told otherwise.",
+            extra=expected("a whole number from 1 to 250"),
+        ),
+    ]
+    address: Annotated[
+        Annotated[str, Meta(max_length=MAX_TEXT)] | None,
+        Meta(
+            description="Where the drone is. An ANAFI that you joined by Wi-Fi is 192.168.42.1.",
+            extra=expected("an IPv4 address or a host name, like 192.168.42.1"),
+        ),
+    ] = None
+    sim: Annotated[
+        SimConfig | None,
+        Meta(
+            description="Simulate this drone; `{}` takes every default.",
+            extra=expected("a mapping with the keys of a simulated drone, or {}"),
+        ),
+    ] = None
+    discovery_port: Annotated[
+        Port,
+        Meta(
+            description="TCP port where the drone introduces itself and names the port of its handshake.",
+            extra=expected("a port from 1 to 65535"),
+        ),
+    ] = 44445
+    allow_kill: Annotated[
+        bool | None,
+        Meta(
+            description="The same for this drone alone. Left out: as the file says for all.",
+            extra=expected("true or false"),
+        ),
+    ] = None
+
+
+class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The whole file. Every key may be left out: an empty file is what `anafi-mav` flies without one."""
+
+    endpoints: Annotated[
+        tuple[
+            Annotated[
+                str, Meta(min_length=1, max_length=MAX_TEXT, extra=expected("a URL like udpout://127.0.0.1:14550"))
+            ],
+            ...,
+        ],
+        Meta(
+            min_length=1,
+            max_length=MAX_ENDPOINTS,
+            description="Where MAVLink is spoken. Every drone speaks on every endpoint. The forms of a URL are listed "
+            "below.",
+            extra=expected(f"a list of 1 to {MAX_ENDPOINTS} URLs"),
+        ),
+    ] = ("udpout://127.0.0.1:14550", "udpout://127.0.0.1:14540", "tcpin://127.0.0.1:5760")
+    drones: Annotated[
+        tuple[DroneConfig, ...],
+        Meta(
+            min_length=1,
+            max_length=MAX_DRONES,
+            description="The drones, each one MAVLink system.",
+            extra=expected(f"a list of 1 to {MAX_DRONES} drones"),
+        ),
+    ] = (DroneConfig(name="anafi", sysid=1, sim=SimConfig()),)
+    allow_kill: Annotated[
+        bool,
+        Meta(
+            description="Whether a client may have the motors cut in the air. A drone whose motors are cut falls.",
+            extra=expected("true or false"),
+        ),
+    ] = False
+
+
+SECTIONS: dict[str, type[msgspec.Struct]] = {
+    "the file": Config,
+    "drones[…]": DroneConfig,
+    "drones[…].sim": SimConfig,
+}
+"""Where in the file each group of keys stands, in the order of the manual."""

@@ -1,0 +1,107 @@
+"""Writes the pages of this folder that follow from the code. With --check it only says which are stale (exit 1)."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from anafi_mav.config import schema
+
+HERE = Path(__file__).parent
+
+CONFIGURATION = """\
+# Configuration
+
+<!-- Made by docs/generate.py from anafi_mav/config/schema.py. -->
+
+`anafi-mav run -c fleet.yaml` reads one YAML file. Two drones or a hundred are a longer list, nothing else:
+
+```yaml
+endpoints: ["udpout://127.0.0.1:14550", "udpout://127.0.0.1:14540", "tcpin://127.0.0.1:5760"]
+drones:
+  - {name: alpha, sysid: 1, address: 192.168.42.1}            # a real ANAFI
+  - {name: bravo, sysid: 2, sim: {model: 4k, home: [48.8789, 2.3677, 35.0]}}
+```
+
+Whatever is wrong is told in one line with the place of the key and what was expected there, the exit status is 2 and
+nothing has been started:
+
+```
+anafi-mav: drones[1].sysid: expected a sysid of its own, 1 is already at drones[0].sysid
+```
+
+Two options of the command line stand in for a list of the file, or of the defaults: `--drone ADDRESS` (repeatable;
+the drones get the system ids 1, 2, …) and `--endpoint URL` (repeatable). `--allow-kill` is `allow_kill: true`.
+"""
+
+ENDPOINTS = """
+## Endpoint URLs
+
+| URL | what happens |
+|---|---|
+| `udpout://HOST:PORT` | sends to HOST:PORT and takes the answers: for a client that waits at a known port |
+| `udpin://HOST:PORT` | waits at HOST:PORT; each client that sends something is served |
+| `tcpin://HOST:PORT` | waits at HOST:PORT for TCP connections |
+| `tcpout://HOST:PORT` | connects to HOST:PORT by TCP |
+| `serial:///dev/ttyUSB0:57600` | a serial line, here with 57600 baud |
+
+`udpin` and `tcpin` listen on loopback unless HOST says otherwise. MAVLink has no password: who reaches an endpoint
+flies the drones.
+"""
+
+
+def _default(field: Any) -> str:
+    if field.required:
+        return "required"
+    value = msgspec.to_builtins(field.default)
+    if isinstance(value, list | tuple) and value and isinstance(value[0], dict):
+        return "one simulated drone, `{name: anafi, sysid: 1, sim: {}}`"
+    return "–" if value is None else f"`{msgspec.json.encode(value).decode()}`"
+
+
+def _rows(struct: type[msgspec.Struct]) -> Iterator[str]:
+    info = msgspec.inspect.type_info(struct)
+    assert isinstance(info, msgspec.inspect.StructType)
+    for field in info.fields:
+        meta = field.type
+        assert isinstance(meta, msgspec.inspect.Metadata), f"{struct.__name__}.{field.name} has no Meta"
+        assert meta.extra is not None
+        assert meta.extra_json_schema is not None
+        meaning = meta.extra_json_schema["description"]
+        yield f"| `{field.name}` | {meta.extra['expected']} | {_default(field)} | {meaning} |"
+
+
+def configuration() -> str:
+    """docs/configuration.md."""
+    parts = [CONFIGURATION]
+    for place, struct in schema.SECTIONS.items():
+        doc = " ".join((struct.__doc__ or "").split())
+        title = "The file" if place == "the file" else f"`{place}`"
+        parts.append(f"\n## {title}\n\n{doc}\n\n| key | value | default | meaning |\n|---|---|---|---|\n")
+        parts.extend(row + "\n" for row in _rows(struct))
+    return "".join(parts) + ENDPOINTS
+
+
+PAGES: dict[str, Callable[[], str]] = {"configuration.md": configuration}
+
+
+def main(arguments: list[str]) -> int:
+    stale = [name for name, page in PAGES.items() if _read(HERE / name) != page()]
+    for name in stale:
+        if "--check" in arguments:
+            sys.stderr.write(f"docs/{name} is stale: run python docs/generate.py\n")
+        else:
+            (HERE / name).write_text(PAGES[name](), encoding="utf-8")
+    return 1 if stale and "--check" in arguments else 0
+
+
+def _read(path: Path) -> str | None:
+    return path.read_text(encoding="utf-8") if path.exists() else None
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
