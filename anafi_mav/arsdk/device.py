@@ -68,9 +68,10 @@ class DeviceServer:
         self._on_session = on_session
         self._ping_after = ping_after
         self._servers: list[asyncio.AbstractServer] = []
-        self._connections: set[asyncio.StreamWriter] = set()
+        self._connections: dict[asyncio.StreamWriter, asyncio.Task[None]] = {}
         self._turn = asyncio.Lock()
         self._mute = False
+        self._closed = False
 
     @classmethod
     async def start(
@@ -121,11 +122,15 @@ class DeviceServer:
 
     async def close(self) -> None:
         """Stop listening and end the session. Idempotent."""
+        self._closed = True
         for server in self._servers:
             server.close()
-        # Their handlers then read an end of file and return.
+        # Their handlers then read an end of file and return; cancelled ones would be reported as failed (Python 3.11).
+        handlers = list(self._connections.values())
         for writer in list(self._connections):
             writer.close()
+        if handlers:
+            await asyncio.wait(handlers)
         for server in self._servers:
             await server.wait_closed()
         self._servers.clear()
@@ -136,7 +141,9 @@ class DeviceServer:
 
     def _serving(self, handler: _Handler) -> _Handler:
         async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-            self._connections.add(writer)
+            task = asyncio.current_task()
+            assert task is not None
+            self._connections[writer] = task
             try:
                 if len(self._connections) > MAX_CONNECTIONS:
                     return
@@ -144,7 +151,7 @@ class DeviceServer:
             except OSError as error:
                 log.debug("controller gone: %s", error)
             finally:
-                self._connections.discard(writer)
+                del self._connections[writer]
                 writer.close()
 
         return serve
@@ -170,6 +177,8 @@ class DeviceServer:
 
     async def _accept(self, request: ConnectRequest, peer: str) -> ConnectReply:
         version = handshake.pick_version(request, self._versions)
+        if self._closed:
+            return _refusal("closing")
         if version is None:
             return _refusal(f"{peer} speaks protocol versions {request.proto_v_min} to {request.proto_v_max}")
         if request.device_id not in ("", self.info.serial):
