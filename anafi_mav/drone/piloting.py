@@ -120,6 +120,7 @@ class Piloting(Element[PilotingState]):
 
         A drone refuses by silence; `CommandRejected` then tells what it has reported against a take-off.
         """
+        self._require_link()
         flying = self.state.flying
         if flying in _TAKEN_OFF:
             return
@@ -151,6 +152,7 @@ class Piloting(Element[PilotingState]):
 
     async def land(self, timeout: float = ANSWER_TIMEOUT) -> None:
         """Land here; returns when the drone is landing, at once when it is or has landed."""
+        self._require_link()
         if self.state.flying in _LANDING:
             return
         # From here on, not from the drone's answer on: a positive gaz would cancel the landing.
@@ -259,6 +261,7 @@ class Piloting(Element[PilotingState]):
 
     async def return_home(self, timeout: float = ANSWER_TIMEOUT) -> Move | None:
         """Fly home; returns when the drone is on its way or about to be. None: it was returning already."""
+        self._require_link()
         if self._home.state.returning:
             return None
         if self._home.state.rth == RthState.UNAVAILABLE:
@@ -287,6 +290,7 @@ class Piloting(Element[PilotingState]):
 
     async def cancel_return_home(self, timeout: float = ANSWER_TIMEOUT) -> None:
         """Stop a return, whoever began it: unlike `hover`, this is an explicit order to do so."""
+        self._require_link()
         if not self._home.state.returning:
             return
         await self._commander.confirm(
