@@ -20,7 +20,7 @@ from typing import Any
 import msgspec
 
 from anafi_mav.arsdk.messages import ardrone3, rth
-from anafi_mav.arsdk.messages.ardrone3 import FlyingState, MoveByError, MoveToStatus
+from anafi_mav.arsdk.messages.ardrone3 import MoveByError, MoveToStatus
 from anafi_mav.arsdk.messages.rth import StateReason
 from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone.element import Position
@@ -241,11 +241,11 @@ class Moves:
 
     def _on_flying_state(self, message: ardrone3.FlyingStateChanged, now: float) -> None:
         if message.state in MOTORS_OFF:
-            self.cancel_to("the drone is on the ground" if message.state == FlyingState.LANDED else "motors cut")
+            self.cancel_to("the motors are off")
             if self._cancelling is not None:
                 self._cancelling.end(MoveEnd.CANCELED)
                 self._cancelling = None
-            self.cancel_by("the drone is on the ground", now)
+            self.cancel_by("the motors are off", now)
 
     def _on_return(self, message: rth.State, now: float) -> None:
         move = self.returning

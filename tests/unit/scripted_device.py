@@ -17,8 +17,6 @@ from anafi_mav.drone import Drone
 
 MessageT = TypeVar("MessageT", bound=Message)
 
-INFO = DeviceInfo(0x0914, "PI040416DA9H000001", 0, "ANAFI-H000001")
-
 STATES: list[Message] = [
     ardrone3.FlyingStateChanged(FlyingState.LANDED),
     rth.State(rth.RthState.AVAILABLE, rth.StateReason.ENABLED),
@@ -37,7 +35,8 @@ SETTINGS: list[Message] = [
 class ScriptedDevice:
     """Keeps every command it receives; `script` says which events answer a kind of command."""
 
-    def __init__(self) -> None:
+    def __init__(self, model_id: int = 0x0914) -> None:
+        self._info = DeviceInfo(model_id, "PI040416DA9H000001", 0, "ANAFI-H000001")
         self.received: list[tuple[float, Message | UnknownMessage]] = []
         """(loop time, command), oldest first."""
         self.script: dict[type[Message], Callable[[Any], Sequence[Message]]] = {
@@ -50,7 +49,7 @@ class ScriptedDevice:
 
     async def __aenter__(self) -> ScriptedDevice:
         self._server = await DeviceServer.start(
-            "127.0.0.1", discovery_port=0, handshake_port=0, c2d_port=0, info=INFO, on_session=self._on_session
+            "127.0.0.1", discovery_port=0, handshake_port=0, c2d_port=0, info=self._info, on_session=self._on_session
         )
         return self
 

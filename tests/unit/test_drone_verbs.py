@@ -20,7 +20,7 @@ from anafi_mav.arsdk.messages.ardrone3 import (
     PoiStatus,
 )
 from anafi_mav.arsdk.messages.rth import RthState, StateReason
-from anafi_mav.arsdk.wire import Message
+from anafi_mav.arsdk.wire import Message, MessageId, UnknownMessage
 from anafi_mav.drone import Displacement, Drone, MoveEnd, PilotingCommand, Range
 from anafi_mav.errors import (
     CommandRejected,
@@ -46,6 +46,9 @@ async def drone(device: ScriptedDevice) -> AsyncIterator[Drone]:
     await drone.connect()
     yield drone
     await drone.close()
+    await asyncio.sleep(0)
+    assert not drone._commander._open, "somebody still waits for an answer"
+    assert not drone._commander._waiting
 
 
 async def reported(drone: Drone, device: ScriptedDevice, *events: Message) -> None:
@@ -198,6 +201,20 @@ async def test_a_failing_subscriber_harms_nobody(
     assert "a subscriber failed on common.CommonState.BatteryStateChanged" in caplog.text
 
 
+async def test_a_message_nobody_knows_is_counted(drone: Drone, device: ScriptedDevice) -> None:
+    device.session.send(UnknownMessage(MessageId(200, 1, 2), b"whatever"))
+    await reported(drone, device, common.BatteryStateChanged(50))
+    assert drone.counters["unknown message"] == 1
+
+
+async def test_a_model_nobody_knows_is_named_by_its_number() -> None:
+    async with ScriptedDevice(model_id=0x0999) as device:
+        drone = device.drone()
+        await drone.connect()
+        assert (drone.identity.model.id, drone.identity.model.key) == (0x0999, "0x0999")
+        await drone.close()
+
+
 async def test_expect_takes_the_next_one_that_fits(drone: Drone, device: ScriptedDevice) -> None:
     wait = asyncio.ensure_future(drone.expect(common.BatteryStateChanged, lambda m: m.percent < 50))
     await asyncio.sleep(0)
@@ -272,6 +289,19 @@ async def test_no_take_off_while_landing(drone: Drone, device: ScriptedDevice) -
     with pytest.raises(CommandRejected, match="landing"):
         await drone.piloting.take_off()
     assert device.got(ardrone3.TakeOff) == []
+
+
+async def test_cut_motors_end_the_moves(drone: Drone, device: ScriptedDevice) -> None:
+    await flying(drone, device)
+    device.script[ardrone3.MoveTo] = lambda command: [running(command)]
+    journey = await drone.piloting.move_to(48.0, 2.0, 15.0)
+    relative = asyncio.ensure_future(drone.piloting.move_by(1.0, 0.0, 0.0, 0.0))
+    await device.until(ardrone3.MoveBy)
+    device.say(ardrone3.FlyingStateChanged(FlyingState.EMERGENCY))
+    with pytest.raises(CommandRejected, match="motors are off"):
+        await relative
+    assert await journey.result() is MoveEnd.CANCELED
+    assert drone.moves_started == ()
 
 
 @pytest.mark.parametrize("state", [FlyingState.LANDING, FlyingState.LANDED])
@@ -732,6 +762,17 @@ async def test_stop_waits_for_the_end_of_what_was_running(drone: Drone, device: 
     await asyncio.wait_for(stopped, 3.0)
     with pytest.raises(CommandRejected):
         await relative
+
+
+async def test_stop_waits_for_the_end_of_a_return(drone: Drone, device: ScriptedDevice) -> None:
+    await flying(drone, device)
+    device.script[rth.ReturnToHome] = lambda _: [rth.State(RthState.IN_PROGRESS, StateReason.USER_REQUEST)]
+    await drone.piloting.return_home()
+    stopped = asyncio.ensure_future(drone.piloting.stop())
+    await device.until(rth.Abort)
+    assert not stopped.done()
+    device.say(rth.State(RthState.AVAILABLE, StateReason.STOPPED))
+    await asyncio.wait_for(stopped, 3.0)
 
 
 async def test_stop_says_when_the_drone_does_not_confirm(drone: Drone, device: ScriptedDevice) -> None:
