@@ -1,0 +1,69 @@
+"""The command line: one small module per subcommand, each with `add_arguments(parser)` and `run(arguments)`.
+
+A module is imported when its command is asked for, so that a simulator does not load the MAVLink side.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import sys
+from collections.abc import Sequence
+from typing import Protocol, cast
+
+from anafi_mav import __version__
+from anafi_mav.cli.terminal import complain
+from anafi_mav.errors import AnafiMavError, ConfigError
+
+DONE, FAILED, MISUSED, INTERRUPTED = 0, 1, 2, 130
+"""Exit statuses. 2 is also argparse's for a wrong option; 130 is a shell's for "ended by Ctrl-C"."""
+
+COMMANDS = {
+    "run": "be the gateway: real and simulated drones become MAVLink systems (the default)",
+    "sim": "simulated drones alone, on Parrot's own wire protocol",
+}
+"""Name of a command, which is the name of its module in this folder, and what it does."""
+
+
+class Command(Protocol):
+    """What each module of this folder offers."""
+
+    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
+        """Declare the options of the command."""
+
+    def run(self, arguments: argparse.Namespace) -> int:
+        """Do it; returns the exit status. Raises `AnafiMavError` for what one line on stderr explains."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line `argv` (without the program's name); returns the exit status."""
+    words = _with_command(list(sys.argv[1:] if argv is None else argv))
+    parser = argparse.ArgumentParser(prog="anafi-mav", description="Parrot ANAFI drones as MAVLink systems.")
+    parser.add_argument("--version", action="version", version=f"anafi-mav {__version__}")
+    subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    command: Command | None = None
+    for name, purpose in COMMANDS.items():
+        subparser = subparsers.add_parser(name, help=purpose, description=purpose[0].upper() + purpose[1:] + ".")
+        if name == words[0]:
+            command = cast(Command, importlib.import_module(f"{__name__}.{name}"))
+            command.add_arguments(subparser)
+    arguments = parser.parse_args(words)
+    assert command is not None, "argparse has ended the program"
+    try:
+        return command.run(arguments)
+    except ConfigError as error:
+        complain(str(error))
+        return MISUSED
+    except AnafiMavError as error:
+        complain(str(error))
+        return FAILED
+    except KeyboardInterrupt:  # before the command could make its own arrangements
+        return INTERRUPTED
+
+
+def _with_command(words: list[str]) -> list[str]:
+    """Without a command it is `run`: `anafi-mav`, `anafi-mav -c fleet.yaml`."""
+    asks_for_help = words and words[0] in ("-h", "--help", "--version")
+    if not words or (words[0].startswith("-") and not asks_for_help):
+        return ["run", *words]
+    return words

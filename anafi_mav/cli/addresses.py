@@ -1,0 +1,87 @@
+"""Finds loopback addresses for simulated drones: each has a whole one to itself, with the ports of the aircraft."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import ipaddress
+import socket
+from collections.abc import Collection
+
+from anafi_mav.arsdk.handshake import C2D_PORT, HANDSHAKE_PORT
+from anafi_mav.errors import ConfigError
+
+HTTP_PORT, HTTP_PORT_FOR_USERS = 80, 8080
+"""The aircraft's web server, and its stand-in where an ordinary user may not open port 80."""
+
+CANDIDATES = [f"127.0.42.{host}" for host in range(1, 255)] + ["127.0.0.1"]
+"""Where simulated drones live. The last is for systems whose loopback is that one address (macOS)."""
+
+
+class Reservations(contextlib.ExitStack):
+    """Addresses that no other `anafi-mav run` on this machine will choose until this is closed.
+
+    Between choosing an address and the simulator's binding it, another program may choose the same. So each address
+    is marked by a UDP socket at the number of its discovery port, where ARSDK has nothing but TCP.
+    """
+
+    def choose(
+        self, key_path: str, discovery_port: int, http_port: int | None, avoid: Collection[str | None] = ()
+    ) -> tuple[str, int]:
+        """The first address whose ports are free, and the port of its web server. Raises `ConfigError`."""
+        for address in CANDIDATES:
+            if address in avoid:
+                continue
+            try:
+                return address, self.take(address, discovery_port, http_port)
+            except OSError as error:
+                if error.errno not in (errno.EADDRINUSE, errno.EADDRNOTAVAIL):
+                    raise ConfigError(key_path, f"cannot open ports on {address}: {error.strerror}") from error
+        raise ConfigError(key_path, f"expected free ports on one of {CANDIDATES[0]} to {CANDIDATES[-2]}, found none")
+
+    def take(self, address: str, discovery_port: int, http_port: int | None) -> int:
+        """Mark `address` as ours; returns the port of its web server. Raises OSError if a port is not free."""
+        with contextlib.ExitStack() as attempt:
+            attempt.enter_context(_bound(socket.SOCK_DGRAM, address, discovery_port))
+            with _bound(socket.SOCK_DGRAM, address, C2D_PORT):
+                for port in (discovery_port, HANDSHAKE_PORT):
+                    _bound(socket.SOCK_STREAM, address, port).close()
+                found = _web_port(address, http_port)
+            self.push(attempt.pop_all())
+        return found
+
+    def take_configured(self, key_path: str, address: str, discovery_port: int, http_port: int | None) -> int:
+        """As `take`, for an address that the user wrote down. Raises `ConfigError`."""
+        try:
+            return self.take(address, discovery_port, http_port)
+        except OSError as error:
+            ports = f"{discovery_port}, {HANDSHAKE_PORT}, {C2D_PORT} and {http_port or HTTP_PORT}"
+            wanted = f"an address of this machine with free ports {ports}"
+            raise ConfigError(key_path, f"expected {wanted}, got {address}: {error.strerror}") from error
+
+
+def _web_port(address: str, wanted: int | None) -> int:
+    """The port that a web server may have there: `wanted`, else 80 or its stand-in. Raises OSError if it is taken."""
+    if wanted is None:
+        try:
+            _bound(socket.SOCK_STREAM, address, HTTP_PORT).close()
+            return HTTP_PORT
+        except PermissionError:
+            wanted = HTTP_PORT_FOR_USERS
+    _bound(socket.SOCK_STREAM, address, wanted).close()
+    return wanted
+
+
+def _bound(kind: socket.SocketKind, address: str, port: int) -> socket.socket:
+    """A socket at that place; raises OSError (EADDRINUSE, EADDRNOTAVAIL, EACCES) if it cannot be had."""
+    bound = socket.socket(socket.AF_INET, kind)
+    try:
+        if kind is socket.SOCK_STREAM:  # as asyncio's servers do it: a port is free while old connections fade
+            bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        bound.bind((str(ipaddress.IPv4Address(address)), port))
+        if kind is socket.SOCK_STREAM:  # with SO_REUSEADDR two may bind on Linux as long as none listens
+            bound.listen(1)
+    except OSError:
+        bound.close()
+        raise
+    return bound

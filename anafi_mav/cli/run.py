@@ -1,0 +1,195 @@
+"""`anafi-mav run`: the gateway, with a simulator beside it when the configuration has simulated drones."""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import contextlib
+import logging
+import signal
+from collections.abc import Callable, Coroutine, Sequence
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from anafi_mav.cli.addresses import Reservations
+from anafi_mav.cli.child import SimulatorProcess
+from anafi_mav.cli.terminal import complain, say
+from anafi_mav.config import Config, DroneConfig, SimConfig, from_mapping, load, remarks
+from anafi_mav.gateway import Gateway
+
+READY_LIMIT = 15.0
+"""s after which "ready" is said though a drone has not answered: its connection takes 3 s at most, its settings and
+its states 5 s each."""
+
+CLOSE_LIMIT = 5.0
+"""s for the last hover and the closing of the sockets; a drone that does not answer must not keep us here."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of `anafi-mav run`."""
+    parser.add_argument("-c", "--config", type=Path, metavar="FILE", help="the fleet, see docs/configuration.md")
+    parser.add_argument(
+        "--drone",
+        action="append",
+        metavar="ADDRESS",
+        help="a drone, instead of those of FILE; repeatable",
+    )
+    parser.add_argument(
+        "--endpoint", action="append", metavar="URL", help="a MAVLink endpoint, instead of those of FILE; repeatable"
+    )
+    parser.add_argument("--allow-kill", action="store_true", help="let clients cut the motors in the air")
+    parser.add_argument("-v", "--verbose", action="count", default=0, help="tell more; twice: each message")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Be the gateway until SIGINT or SIGTERM. Raises `ConfigError` before anything is started."""
+    level = (logging.WARNING, logging.INFO, logging.DEBUG)[min(arguments.verbose, 2)]
+    logging.basicConfig(level=level, format="%(asctime)s %(name)s: %(message)s")
+    config = configuration(arguments.config, arguments.drone, arguments.endpoint, arguments.allow_kill)
+    for remark in remarks(config):
+        complain(f"warning: {remark}", "yellow")
+    asyncio.run(_run(config))
+    return 0
+
+
+def configuration(
+    path: Path | None, drones: Sequence[str] | None, endpoints: Sequence[str] | None, allow_kill: bool
+) -> Config:
+    """The file at `path`, or the defaults, with what the command line says instead. Raises `ConfigError`."""
+    config = load(path) if path is not None else Config()
+    if drones:
+        entries = [
+            {"name": f"drone{sysid}", "sysid": sysid, "address": address} for sysid, address in enumerate(drones, 1)
+        ]
+        config = msgspec.structs.replace(config, drones=from_mapping({"drones": entries}).drones)
+    if endpoints:
+        config = msgspec.structs.replace(config, endpoints=from_mapping({"endpoints": endpoints}).endpoints)
+    return msgspec.structs.replace(config, allow_kill=True) if allow_kill else config
+
+
+class _Interrupts:
+    """SIGINT, SIGTERM and SIGHUP set `stop`; a SIGINT while drones fly asks for a second one first."""
+
+    def __init__(self) -> None:
+        self.stop = asyncio.Event()
+        self.flying: Callable[[], list[str]] = list
+        self._told = False
+
+    def install(self) -> None:
+        loop = asyncio.get_running_loop()
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            if number == signal.SIGHUP and signal.getsignal(number) is signal.SIG_IGN:
+                continue  # nohup
+            loop.add_signal_handler(number, self.receive, number)
+
+    def receive(self, number: signal.Signals) -> None:
+        sentences = self.flying() if number == signal.SIGINT and not self._told else []
+        if not sentences:
+            self.stop.set()
+            return
+        self._told = True
+        for sentence in sentences:
+            say(sentence, "yellow")
+        say("Ctrl-C once more ends the gateway all the same", "yellow")
+
+
+async def _run(config: Config) -> None:
+    interrupts = _Interrupts()
+    interrupts.install()
+    async with contextlib.AsyncExitStack() as stack:
+        gateway_config, fleet = place(config, stack.enter_context(Reservations()))
+        gateway = Gateway(gateway_config)
+        if not await _unless(interrupts.stop, _start(gateway, fleet, stack)):
+            return
+        interrupts.flying = gateway.drones_in_air
+        for line in gateway.lines():
+            say(line)
+        say("ready, Ctrl-C ends", "green")
+        await interrupts.stop.wait()
+
+
+async def _start(gateway: Gateway, fleet: dict[str, Any] | None, stack: contextlib.AsyncExitStack) -> None:
+    if fleet is not None:
+        simulator = SimulatorProcess()
+        stack.push_async_callback(simulator.close)
+        await simulator.start(fleet)
+        names = ", ".join(drone["name"] for drone in fleet["drones"])
+        death = asyncio.create_task(_tell_death(simulator, names))
+        stack.callback(death.cancel)
+    stack.push_async_callback(_close, gateway)
+    await gateway.start()
+    await gateway.ready(READY_LIMIT)
+
+
+async def _unless(stop: asyncio.Event, work: Coroutine[Any, Any, None]) -> bool:
+    """Do `work`; when `stop` is set before it is done, abandon it and return False."""
+    doing, stopped = asyncio.create_task(work), asyncio.create_task(stop.wait())
+    try:
+        await asyncio.wait({doing, stopped}, return_when=asyncio.FIRST_COMPLETED)
+        if doing.done():
+            doing.result()
+        return doing.done()
+    finally:
+        doing.cancel()
+        stopped.cancel()
+        await asyncio.gather(doing, stopped, return_exceptions=True)
+
+
+async def _close(gateway: Gateway) -> None:
+    try:
+        await asyncio.wait_for(gateway.close(), CLOSE_LIMIT)
+    except asyncio.TimeoutError:
+        complain(f"the gateway did not close within {CLOSE_LIMIT:g} s, leaving it")
+
+
+async def _tell_death(simulator: SimulatorProcess, names: str) -> None:
+    status = await simulator.wait()
+    how = f"by signal {-status}" if status < 0 else f"with status {status}"
+    complain(f"the simulator ended {how}; with it went {names}")
+
+
+def place(config: Config, reservations: Reservations) -> tuple[Config, dict[str, Any] | None]:
+    """Give each simulated drone an address. Raises `ConfigError`.
+
+    Returns the configuration for the gateway, which knows addresses only, and the fleet for the simulator, if any.
+    """
+    simulated = {index: drone.sim for index, drone in enumerate(config.drones) if drone.sim is not None}
+    if not simulated:
+        return config, None
+    real = {drone.address for drone in config.drones}
+    places: dict[int, tuple[str, int]] = {}
+    # Addresses that the user wrote down come first, so that none of them is chosen for another drone.
+    for index, sim in sorted(simulated.items(), key=lambda item: item[1].address is None):
+        key_path, port = f"drones[{index}].sim", config.drones[index].discovery_port
+        if sim.address is None:
+            places[index] = reservations.choose(key_path, port, sim.http_port, avoid=real)
+        else:
+            web = reservations.take_configured(f"{key_path}.address", sim.address, port, sim.http_port)
+            places[index] = sim.address, web
+    drones = tuple(
+        msgspec.structs.replace(drone, address=places[index][0], sim=None) if index in places else drone
+        for index, drone in enumerate(config.drones)
+    )
+    first = next(iter(simulated.values()))
+    fleet = {
+        "speed": first.speed,
+        "seed": next((sim.seed for sim in simulated.values() if sim.seed is not None), None),
+        "drones": [_entry(config.drones[index], sim, *places[index]) for index, sim in simulated.items()],
+    }
+    return msgspec.structs.replace(config, drones=drones), fleet
+
+
+def _entry(drone: DroneConfig, sim: SimConfig, address: str, http_port: int) -> dict[str, Any]:
+    """A drone as `anafi-mav sim --fleet` reads it."""
+    return {
+        "name": drone.name,
+        "model": sim.model,
+        "address": address,
+        "home": sim.home,
+        "discovery_port": drone.discovery_port,
+        "http_port": http_port,
+        "versions": (1, sim.protocol),
+        "telemetry_rate": sim.telemetry_rate,
+    }
