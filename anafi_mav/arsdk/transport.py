@@ -43,8 +43,9 @@ MAX_RETRIES_V1 = 5
 MAX_UNANSWERED_PINGS = 3
 """arsdk-ng arsdk_transport.c, send_ping."""
 
-_RETRY = frozenset({MessageId(0, 2, 0), MessageId(0, 4, 0), MessageId(1, 0, 4)})
-"""AllSettings, AllStates, Emergency: timeout="RETRY" in Parrot's XML, version 1 does not give them up either."""
+RETRIED_FOR_EVER = frozenset(MessageId(*numbers) for numbers in [(0, 2, 0), (0, 4, 0), (1, 0, 4), (4, 4, 0), (4, 6, 0)])
+"""AllSettings and AllStates (of drone and Skycontroller) and Emergency: commands with timeout="RETRY" in Parrot's
+XML; version 1 does not give them up either."""
 
 MAX_QUEUED = 4096
 """Messages waiting in an acknowledged queue. All states and settings of a drone are a few hundred; a queue this
@@ -278,7 +279,11 @@ class Transport:
             self.counters["dropped.full"] += 1
             self._pending.append(Undelivered(token, "queue full"))
             return
-        forever = self.version > 1 or self.role is Role.DEVICE or MessageId(*wire.HEADER.unpack_from(data)) in _RETRY
+        forever = (
+            self.version > 1
+            or self.role is Role.DEVICE
+            or MessageId(*wire.HEADER.unpack_from(data)) in RETRIED_FOR_EVER
+        )
         entry = Waiting(token, data, forever)
         if buffer is not Buffer.HIGH_PRIO:
             queue.waiting.append(entry)

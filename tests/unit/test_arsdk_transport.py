@@ -335,6 +335,14 @@ def test_a_split_command_that_was_begun_is_completed() -> None:
     assert [event for event in link.heard[0] if isinstance(event, Delivered)] == [Delivered(token), Delivered(last)]
 
 
+def test_the_part_of_a_split_command_in_flight_is_still_repeated() -> None:
+    transport = Transport(Role.CONTROLLER, 3, 0.0)
+    token = transport.send(custom(1, bytes(2500)), 0.0)
+    lost = transport.outgoing(0.0)
+    transport.cancel(token)
+    assert transport.outgoing(0.2) == lost
+
+
 # -- pings
 
 

@@ -1,0 +1,165 @@
+"""Our message tables against Parrot's own XML, which the parrot-olympe wheel carries."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+import xml.etree.ElementTree as ElementTree
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+
+import anafi_mav.arsdk.messages
+from anafi_mav.arsdk import wire
+from anafi_mav.arsdk.transport import RETRIED_FOR_EVER
+
+
+def find_xml() -> Path | None:
+    spec = importlib.util.find_spec("arsdk")
+    for place in (spec.submodule_search_locations or []) if spec else []:
+        folder = Path(place) / "xml"
+        if folder.is_dir():
+            return folder
+    return None
+
+
+XML = find_xml()
+pytestmark = pytest.mark.skipif(
+    XML is None, reason="Parrot's XML is not installed: package parrot-olympe (x86-64 Linux, Python < 3.12) has it"
+)
+
+
+@dataclass(frozen=True)
+class Argument:
+    """An argument as both sides describe it; `names` are the values of its enum or bitfield, from 0 on."""
+
+    name: str
+    type: str
+    names: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Description:
+    """A message as both sides describe it."""
+
+    name: str
+    direction: wire.Direction
+    buffer: wire.Buffer
+    arguments: tuple[Argument, ...]
+    retried: bool = field(default=False, compare=False)
+
+
+def enum_names(element: ElementTree.Element, tag: str) -> tuple[str, ...]:
+    return tuple(bare(child.attrib["name"]) for child in element.findall(tag))
+
+
+def bare(name: str) -> str:
+    """A name of an enum value without what differs by spelling habit only: flyingState, FLYING_STATE, _2_4_GHZ."""
+    return re.sub(r"[\W_]", "", name).upper()
+
+
+def parrot_argument(element: ElementTree.Element, enums: dict[str, tuple[str, ...]]) -> Argument:
+    name, type = element.attrib["name"], element.attrib["type"]
+    if type == "enum":
+        return Argument(name, "enum", enum_names(element, "enum"))
+    kind, _, rest = type.partition(":")
+    if kind == "enum":
+        return Argument(name, "enum", enums[rest])
+    if kind == "bitfield":
+        base, _, enum = rest.partition(":")
+        return Argument(name, "bitfield:" + base, enums[enum])
+    return Argument(name, type)
+
+
+def parrot_message(
+    element: ElementTree.Element, scope: str, event: bool, enums: dict[str, tuple[str, ...]]
+) -> Description:
+    return Description(
+        f"{scope}.{element.attrib['name']}",
+        wire.Direction.EVENT if event else wire.Direction.COMMAND,
+        wire.Buffer(element.attrib.get("buffer", "ACK").lower()),
+        tuple(parrot_argument(argument, enums) for argument in element.findall("arg")),
+        element.attrib.get("timeout") == "RETRY",
+    )
+
+
+def read_parrot() -> dict[wire.MessageId, Description]:
+    """Every message of Parrot's."""
+    assert XML is not None
+    result: dict[wire.MessageId, Description] = {}
+    common_enums: dict[str, tuple[str, ...]] = {}
+    generic = ElementTree.parse(XML / "generic.xml").getroot()
+    common_enums |= {enum.attrib["name"]: enum_names(enum, "value") for enum in generic.iter("enum")}
+    for path in sorted(XML.glob("*.xml")):
+        root = ElementTree.parse(path).getroot()
+        scope, number = root.attrib["name"], int(root.attrib["id"])
+        if root.tag == "feature":
+            enums = common_enums | {
+                enum.attrib["name"]: enum_names(enum, "value") for enum in root.findall("enums/enum")
+            }
+            for element in root.findall("msgs/*"):
+                id = wire.MessageId(number, 0, int(element.attrib["id"]))
+                assert id not in result
+                result[id] = parrot_message(element, scope, element.tag == "evt", enums)
+        else:
+            for group in root.findall("class"):
+                # A project does not say who sends; the convention is in the name of the class.
+                event = group.attrib["name"].endswith(("State", "Event"))
+                for element in group.findall("cmd"):
+                    id = wire.MessageId(number, int(group.attrib["id"]), int(element.attrib["id"]))
+                    assert id not in result
+                    result[id] = parrot_message(element, f"{scope}.{group.attrib['name']}", event, {})
+    return result
+
+
+def our_argument(name: str, type: wire.WireType, python: type) -> Argument:
+    if isinstance(type, wire.Bits):
+        return Argument(name, "bitfield:" + type.base.parrot, value_names(type.names))
+    if issubclass(python, wire.OpenEnum):
+        return Argument(name, type.parrot, value_names(python))
+    return Argument(name, type.parrot)
+
+
+def value_names(enum: type) -> tuple[str, ...]:
+    assert issubclass(enum, wire.OpenEnum)
+    members = list(enum)
+    assert [int(member) for member in members] == list(range(len(members)))
+    return tuple(bare(member.name) for member in members)
+
+
+def our_message(message: type[wire.Message]) -> Description:
+    return Description(
+        message.NAME,
+        message.DIRECTION,
+        message.BUFFER,
+        tuple(our_argument(*field) for field in wire.wire_fields(message)),
+    )
+
+
+def declared() -> list[type[wire.Message]]:
+    home = anafi_mav.arsdk.messages.__name__
+    return [message for message in wire.declared_messages() if message.__module__.startswith(home)]
+
+
+@pytest.fixture(scope="module")
+def parrot() -> dict[wire.MessageId, Description]:
+    return read_parrot()
+
+
+@pytest.mark.parametrize("message", declared(), ids=lambda message: message.NAME)
+def test_message_is_as_parrot_describes_it(
+    message: type[wire.Message], parrot: dict[wire.MessageId, Description]
+) -> None:
+    assert our_message(message) == parrot[message.ID]
+
+
+def test_the_transport_knows_which_commands_are_never_given_up(parrot: dict[wire.MessageId, Description]) -> None:
+    commands = {id for id, message in parrot.items() if message.retried and message.direction is wire.Direction.COMMAND}
+    assert commands == RETRIED_FOR_EVER
+
+
+def test_the_comparison_saw_something(parrot: dict[wire.MessageId, Description]) -> None:
+    assert len(parrot) == 784
+    assert len(declared()) > 150
+    assert parrot[wire.MessageId(146, 0, 13)].arguments[0].names[:2] == ("AVAILABLE", "INPROGRESS")
