@@ -10,7 +10,7 @@ from typing import TypeVar
 
 from anafi_mav.arsdk import handshake
 from anafi_mav.arsdk.handshake import ConnectReply, ConnectRequest, DeviceInfo
-from anafi_mav.arsdk.session import OnMessage, Session
+from anafi_mav.arsdk.session import OnMessage, Session, reason_of
 from anafi_mav.arsdk.transport import Role, Transport
 from anafi_mav.errors import LinkLost, RemoteProtocolError
 
@@ -157,7 +157,7 @@ async def _open(host: str, port: int, local_address: str | None) -> tuple[asynci
         # ARSDK is IPv4 only.
         return await asyncio.open_connection(host, port, family=socket.AF_INET, local_addr=local)
     except OSError as error:
-        raise LinkLost(f"cannot connect to {host}:{port}: {error.strerror or error}") from error
+        raise LinkLost(f"cannot connect to {host}:{port}: {reason_of(error)}") from error
 
 
 async def _read(reader: asyncio.StreamReader, parse: Callable[[bytes], ParsedT | None], where: str) -> ParsedT:
@@ -166,7 +166,7 @@ async def _read(reader: asyncio.StreamReader, parse: Callable[[bytes], ParsedT |
         try:
             piece = await reader.read(handshake.MAX_JSON)
         except OSError as error:
-            raise LinkLost(f"{where}: {error.strerror or error}") from error
+            raise LinkLost(f"{where}: {reason_of(error)}") from error
         if not piece:
             raise LinkLost(f"{where} closed the connection without a complete answer")
         data += piece

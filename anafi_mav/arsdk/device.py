@@ -11,7 +11,7 @@ from typing import TypeAlias
 
 from anafi_mav.arsdk import handshake
 from anafi_mav.arsdk.handshake import ConnectReply, ConnectRequest, DeviceInfo
-from anafi_mav.arsdk.session import OnMessage, Session
+from anafi_mav.arsdk.session import OnMessage, Session, reason_of
 from anafi_mav.arsdk.transport import Role, Transport
 from anafi_mav.arsdk.wire import Message, UnknownMessage
 from anafi_mav.errors import RemoteProtocolError
@@ -195,7 +195,7 @@ class DeviceServer:
             await session.open(sock)
         except OSError as error:
             sock.close()
-            return _refusal(f"UDP port {self._c2d_port}: {error.strerror or error}")
+            return _refusal(f"UDP port {self._c2d_port}: {reason_of(error)}")
         except BaseException:
             sock.close()
             raise

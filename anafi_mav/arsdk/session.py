@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import os
 import socket
 from collections import Counter
 from collections.abc import Callable
@@ -27,6 +28,11 @@ OnMessage: TypeAlias = Callable[[Message | UnknownMessage, float], None]
 
 SOCKET_BUFFER = 1 << 18
 """Bytes the kernel may hold for us while the loop is busy: some seconds of a drone's telemetry."""
+
+
+def reason_of(error: OSError) -> str:
+    """The system's own words for an error; asyncio hides them behind "Connect call failed"."""
+    return os.strerror(error.errno) if (error.errno or 0) > 0 else error.strerror or str(error)
 
 
 class Session(asyncio.DatagramProtocol):
@@ -59,6 +65,13 @@ class Session(asyncio.DatagramProtocol):
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, SOCKET_BUFFER)
         await self._loop.create_datagram_endpoint(lambda: self, sock=sock)
         self._flush()
+
+    @property
+    def address(self) -> tuple[str, int]:
+        """Our own UDP address, once open."""
+        assert self._endpoint is not None
+        ip, port = self._endpoint.get_extra_info("sockname")
+        return ip, port
 
     @property
     def version(self) -> int:
