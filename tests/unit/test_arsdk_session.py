@@ -385,7 +385,7 @@ async def test_ports_are_free_after_close() -> None:
 async def test_a_taken_udp_port_is_a_refusal() -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
         taken.bind((HOST, 0))
-        async with flying(c2d_port=taken.getsockname()[1]) as (drone, server):
+        async with flying(c2d_port=taken.getsockname()[1]) as (_, server):
             with pytest.raises(LinkLost, match="refused"):
                 await join(server)
             assert server.session is None
