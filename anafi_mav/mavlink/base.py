@@ -1,0 +1,217 @@
+"""What every endpoint is: the owner of a URL that brings channels. `udp`, `tcp` and `serial_line` are the kinds.
+
+Endpoints are the only asyncio code of this room beside `node`, which is their sink.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import os
+from abc import ABC, abstractmethod
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Protocol
+
+from anafi_mav.clock import Clock
+from anafi_mav.mavlink.channel import QUEUE_BYTES, Channel
+from anafi_mav.mavlink.frames import Received
+
+logger = logging.getLogger(__name__)
+
+RETRY_FIRST, RETRY_LAST = 0.25, 4.0
+"""s between attempts to open what the other side must provide: doubled from the first to the last. A ground station
+that restarts is back at once, one that is away for the night costs four system calls a minute."""
+
+MAX_PEERS = 32
+"""Clients of one listening endpoint. Each costs a frame per message; a field has a handful."""
+
+WRITE_AHEAD = 16 * 1024
+"""Bytes that asyncio may hold for a full socket before the channel's own queue, which knows what to drop, begins."""
+
+CLOSE_WAIT = 1.0
+"""s that closing waits for transports to say that they are closed."""
+
+
+@dataclass(frozen=True)
+class EndpointUrl:
+    """A parsed URL."""
+
+    text: str
+    """As the user wrote it."""
+    scheme: str
+    place: str
+    """Host name or address; the device of a serial line."""
+    number: int
+    """Port, 0 for any free one; the baud rate of a serial line."""
+    flavour: str | None = None
+    """The autopilot that clients of this endpoint want to see."""
+
+
+class Sink(Protocol):
+    """Who hears of channels and what arrives on them."""
+
+    def opened(self, channel: Channel) -> None: ...
+
+    def closed(self, channel: Channel) -> None: ...
+
+    def received(self, channel: Channel, frames: list[Received]) -> None: ...
+
+
+class Endpoint(ABC):
+    """One URL. `open` once, `close` once; between them it brings channels and takes them away."""
+
+    def __init__(self, url: EndpointUrl, sink: Sink, clock: Clock) -> None:
+        self.parsed = url
+        self.counters: Counter[str] = Counter()
+        """refused_peers, garbage_bytes and bad_checksums of senders that are no peer, reopened, send_errors."""
+        self._sink = sink
+        self._clock = clock
+
+    @property
+    def url(self) -> str:
+        """As in the configuration."""
+        return self.parsed.text
+
+    @property
+    def local_port(self) -> int | None:
+        """The port that it listens on; None where it listens on none."""
+        return None
+
+    @abstractmethod
+    async def open(self) -> None:
+        """Begin. Raises OSError if what the URL asks of this machine cannot be had; nothing is then left open."""
+
+    @abstractmethod
+    async def close(self) -> None:
+        """End every channel and release every socket."""
+
+    @abstractmethod
+    def describe(self) -> str:
+        """One line for people: the URL and how it stands."""
+
+
+class StreamPeer(asyncio.Protocol):
+    """A byte stream to one peer: glue between an asyncio transport and a channel."""
+
+    def __init__(
+        self,
+        url: EndpointUrl,
+        name: str,
+        sink: Sink,
+        *,
+        write_ahead: int = WRITE_AHEAD,
+        queue_bytes: int = QUEUE_BYTES,
+    ) -> None:
+        self.lost: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self._sink = sink
+        self._write_ahead = write_ahead
+        self._transport: asyncio.Transport | None = None
+        self.channel = Channel(name, self._write, flavour=url.flavour, queue_bytes=queue_bytes)
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        # Duck-typed by pyserial-asyncio-fast's transport, too.
+        assert hasattr(transport, "set_write_buffer_limits")
+        self._transport = transport  # type: ignore[assignment]
+        transport.set_write_buffer_limits(high=self._write_ahead)
+        self._sink.opened(self.channel)
+
+    def data_received(self, data: bytes) -> None:
+        self._sink.received(self.channel, self.channel.receive(data))
+
+    def pause_writing(self) -> None:
+        self.channel.pause()
+
+    def resume_writing(self) -> None:
+        self.channel.resume()
+
+    def connection_lost(self, error: Exception | None) -> None:
+        if error is not None:
+            logger.debug("%s: %s", self.channel.name, error)
+        self.channel.close()
+        self._sink.closed(self.channel)
+        if not self.lost.done():
+            self.lost.set_result(None)
+
+    def abort(self) -> None:
+        """Close without waiting for what is still buffered."""
+        if self._transport is not None and not self._transport.is_closing():
+            self._transport.abort()
+
+    def _write(self, raw: bytes) -> None:
+        if self._transport is not None:
+            self._transport.write(raw)
+
+
+def reason(error: Exception) -> str:
+    """What an error of the operating system says, without asyncio's and pyserial's words around it."""
+    number = getattr(error, "errno", None)
+    # Name resolution numbers its errors below 0 and has its own text.
+    return os.strerror(number) if number is not None and number > 0 else getattr(error, "strerror", "") or str(error)
+
+
+async def close_peers(peers: Iterable[StreamPeer]) -> None:
+    """Abort these streams and wait, for a moment, until they are gone."""
+    peers = list(peers)
+    for peer in peers:
+        peer.abort()
+    if peers:
+        await asyncio.wait([peer.lost for peer in peers], timeout=CLOSE_WAIT)
+
+
+class Reopening(Endpoint):
+    """An endpoint with at most one stream, that is opened anew whenever it ends."""
+
+    def __init__(self, url: EndpointUrl, sink: Sink, clock: Clock) -> None:
+        super().__init__(url, sink, clock)
+        self._peer: StreamPeer | None = None
+        self._problem = "not tried yet"
+        self._task: asyncio.Task[None] | None = None
+
+    @abstractmethod
+    async def _connect(self) -> StreamPeer:
+        """One attempt. Raises OSError."""
+
+    async def open(self) -> None:
+        self._task = asyncio.get_running_loop().create_task(self._keep_open())
+
+    async def close(self) -> None:
+        if self._task is not None:
+            self._task.cancel()
+            await asyncio.wait([self._task])
+            self._task = None
+        if self._peer is not None:
+            await close_peers([self._peer])
+            self._peer = None
+
+    def describe(self) -> str:
+        if self._peer is not None:
+            return f"{self.url}: connected"
+        return f"{self.url}: not connected ({self._problem}), retrying"
+
+    async def _keep_open(self) -> None:
+        pause = RETRY_FIRST
+        while True:
+            begun = self._clock.monotonic()
+            if self._peer is None:
+                try:
+                    self._peer = await self._connect()
+                except OSError as error:
+                    self._note(reason(error))
+            if self._peer is not None:
+                logger.info("%s: connected", self.url)
+                await asyncio.shield(self._peer.lost)
+                self._peer = None
+                self._note("the connection ended")
+                # Who lets us in and hangs up at once is no better than who does not let us in.
+                if self._clock.monotonic() - begun > RETRY_LAST:
+                    pause = RETRY_FIRST
+            await asyncio.sleep(pause)
+            pause = min(2 * pause, RETRY_LAST)
+            self.counters["reopened"] += 1
+
+    def _note(self, problem: str) -> None:
+        if problem != self._problem:
+            logger.warning("%s: %s", self.url, problem)
+        self._problem = problem

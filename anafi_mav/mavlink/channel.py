@@ -1,0 +1,138 @@
+"""A channel: one remote peer on one endpoint, with its own parser, sequence numbers and outgoing queue. No I/O.
+
+The endpoint that owns it hands in bytes and takes frames through `write`; it calls `pause` and `resume` when its
+socket is full and empty again. Sequence numbers are given when a frame leaves, so that they are contiguous for each
+sender whatever was dropped before.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from collections.abc import Callable, Iterable
+
+from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.frames import Packed, Parser, Received, frame, pack
+from anafi_mav.mavlink.streams import DEFAULT_INTERVALS
+
+QUEUE_BYTES = 64 * 1024
+"""What waits for a slow peer: some seconds of a small fleet. A serial line, being slow by nature, gets less."""
+
+TELEMETRY = frozenset(DEFAULT_INTERVALS) | {dialect.MAVLINK_MSG_ID_HEARTBEAT}
+"""Message ids that the next one of their kind makes worthless: they give way to answers when a queue is full."""
+
+FRAME_BYTES = 12
+"""A version 2 frame has so much more than its payload (MAVLink serialization.md §mavlink2_packet_format)."""
+
+_Waiting = tuple[Packed, int, int] | bytes
+"""What waits in a queue: a message with its sender's system and component, or another system's finished frame."""
+
+
+class Channel:
+    """One remote peer. Sending never blocks and never raises for the peer's sake."""
+
+    def __init__(
+        self,
+        name: str,
+        write: Callable[[bytes], None],
+        *,
+        flavour: str | None = None,
+        datagrams: bool = False,
+        queue_bytes: int = QUEUE_BYTES,
+    ) -> None:
+        self.name = name
+        """For people: the endpoint's URL and, where it has several peers, which one."""
+        self.flavour = flavour
+        """The autopilot that clients of this endpoint want to see; None: as configured for all."""
+        self.counters: Counter[str] = Counter()
+        """sent_frames, dropped_frames (queue full, or sent after the channel had closed)."""
+        self.is_open = True
+        self.parser = Parser()
+        self._write = write
+        self._datagrams = datagrams
+        self._queue_bytes = queue_bytes
+        self._paused = False
+        self._waiting_bytes = 0
+        self._answers: deque[_Waiting] = deque()
+        self._telemetry: deque[_Waiting] = deque()
+        self._sequence: dict[tuple[int, int], int] = {}
+
+    def __repr__(self) -> str:
+        return f"<Channel {self.name}>"
+
+    def receive(self, data: bytes) -> list[Received]:
+        """The frames in bytes that arrived; what is none is counted by the parser."""
+        return self.parser.receive_datagram(data) if self._datagrams else self.parser.receive(data)
+
+    def send(self, message: dialect.MAVLink_message, sysid: int, compid: int) -> None:
+        """Send as this system and component. Raises `LocalProtocolError` for a field that does not fit."""
+        self.send_packed(pack(message), sysid, compid)
+
+    def send_packed(self, packed: Packed, sysid: int, compid: int) -> None:
+        """Send a message that was packed already, for several channels at once."""
+        if self.is_open and not self._paused:
+            self._leave(packed, sysid, compid)
+        else:
+            self._wait((packed, sysid, compid), packed.id)
+
+    def forward(self, raw: bytes, id: int) -> None:
+        """Send another system's version 2 frame as it is; `id` is its message id."""
+        if self.is_open and not self._paused:
+            self.counters["sent_frames"] += 1
+            self._write(raw)
+        else:
+            self._wait(raw, id)
+
+    def pause(self) -> None:
+        """The peer takes no more for now: frames wait from here on, the oldest telemetry is dropped first."""
+        self._paused = True
+
+    def resume(self) -> None:
+        """The peer takes frames again. Answers leave before telemetry."""
+        self._paused = False
+        for queue in (self._answers, self._telemetry):
+            while queue and not self._paused:  # a write may fill the socket again
+                waiting = queue.popleft()
+                self._waiting_bytes -= _size(waiting)
+                if isinstance(waiting, bytes):
+                    self.counters["sent_frames"] += 1
+                    self._write(waiting)
+                else:
+                    self._leave(*waiting)
+
+    def close(self) -> None:
+        """The peer is gone. What waits is forgotten, what is still sent is counted and dropped."""
+        self.is_open = False
+        self.counters["dropped_frames"] += len(self._answers) + len(self._telemetry)
+        self._answers.clear()
+        self._telemetry.clear()
+        self._waiting_bytes = 0
+
+    def _leave(self, packed: Packed, sysid: int, compid: int) -> None:
+        sender = (sysid, compid)
+        sequence = self._sequence.get(sender, 0)
+        self._sequence[sender] = (sequence + 1) & 0xFF
+        self.counters["sent_frames"] += 1
+        self._write(frame(packed, sequence, sysid, compid))
+
+    def _wait(self, waiting: _Waiting, id: int) -> None:
+        if not self.is_open:
+            self.counters["dropped_frames"] += 1
+            return
+        (self._telemetry if id in TELEMETRY else self._answers).append(waiting)
+        self._waiting_bytes += _size(waiting)
+        while self._waiting_bytes > self._queue_bytes:
+            self._waiting_bytes -= _size((self._telemetry or self._answers).popleft())
+            self.counters["dropped_frames"] += 1
+
+
+def _size(waiting: _Waiting) -> int:
+    return len(waiting) if isinstance(waiting, bytes) else len(waiting[0].payload) + FRAME_BYTES
+
+
+def total(channels: Iterable[Channel]) -> Counter[str]:
+    """The sum of the counters of channels and their parsers."""
+    result: Counter[str] = Counter()
+    for channel in channels:
+        result.update(channel.counters)
+        result.update(channel.parser.counters)
+    return result

@@ -1,0 +1,100 @@
+"""Endpoint URLs: their grammar, and the table of schemes from which endpoints are made and help is printed.
+
+    udpout://HOST:PORT      udpin://HOST:PORT      tcpin://HOST:PORT      tcpout://HOST:PORT
+    serial://DEVICE:BAUD    each with ?flavour=px4
+
+The names are MAVSDK's. An endpoint listens on the address in its URL and no other: beyond loopback only if that says
+so.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from urllib.parse import parse_qsl
+
+from anafi_mav.clock import Clock
+from anafi_mav.errors import ConfigError
+from anafi_mav.mavlink.base import Endpoint, EndpointUrl, Sink
+from anafi_mav.mavlink.serial_line import SerialLine
+from anafi_mav.mavlink.tcp import TcpIn, TcpOut
+from anafi_mav.mavlink.udp import UdpIn, UdpOut
+
+FLAVOURS = ("px4",)
+"""Autopilots that a client can be shown."""
+
+MAX_PORT = 65535
+MAX_BAUD = 4_000_000
+"""What USB bridges go up to."""
+
+
+@dataclass(frozen=True)
+class Scheme:
+    """One kind of endpoint."""
+
+    arguments: str
+    """What follows "scheme://"."""
+    description: str
+    factory: Callable[[EndpointUrl, Sink, Clock], Endpoint]
+    any_port: bool = False
+    """Port 0, any free one, makes sense."""
+
+
+SCHEMES: dict[str, Scheme] = {
+    "udpout": Scheme("HOST:PORT", "send to HOST:PORT and hear its answers (QGroundControl, MAVSDK)", UdpOut),
+    "udpin": Scheme("HOST:PORT", "listen on HOST:PORT, answer whoever speaks MAVLink there", UdpIn, any_port=True),
+    "tcpin": Scheme("HOST:PORT", "serve TCP clients on HOST:PORT (MAVProxy, Mission Planner)", TcpIn, any_port=True),
+    "tcpout": Scheme("HOST:PORT", "connect to a TCP server, again and again", TcpOut),
+    "serial": Scheme("DEVICE:BAUD", "a serial line, e.g. serial:///dev/ttyUSB0:57600", SerialLine),
+}
+
+_URL = re.compile(r"(?P<scheme>[a-z]+)://(?P<rest>[^?#\s]*)(?:\?(?P<query>[^#\s]*))?")
+_LABEL = r"[A-Za-z0-9_](?:[A-Za-z0-9_-]{0,62})"
+_PLACE = re.compile(
+    rf"(?:\[(?P<v6>[0-9A-Fa-f:.]+(?:%\w+)?)\]|(?P<host>{_LABEL}(?:\.{_LABEL})*\.?)):(?P<number>[0-9]{{1,5}})"
+)
+_LINE = re.compile(r"(?P<device>[^:]+):(?P<number>[0-9]{1,7})")
+
+
+def parse_endpoint(url: str) -> EndpointUrl:
+    """The parts of a URL. Raises `ConfigError`, without a key path, that says what was expected."""
+    parts = _URL.fullmatch(url)
+    scheme = SCHEMES.get(parts["scheme"]) if parts else None
+    if parts is None or scheme is None:
+        kinds = ", ".join(f"{name}://" for name in SCHEMES)
+        raise ConfigError("", f"{url!r}: expected a URL that begins with one of {kinds}")
+    name = parts["scheme"]
+    form = f"{name}://{scheme.arguments}"
+    if name == "serial":
+        place = _LINE.fullmatch(parts["rest"])
+        if place is None or not 0 < int(place["number"]) <= MAX_BAUD:
+            raise ConfigError("", f"{url!r}: expected {form}, e.g. serial:///dev/ttyUSB0:57600")
+        return EndpointUrl(url, name, place["device"], int(place["number"]), _flavour(url, parts["query"]))
+    place = _PLACE.fullmatch(parts["rest"])
+    if place is None:
+        raise ConfigError("", f"{url!r}: expected {form}, e.g. {name}://127.0.0.1:14550")
+    port, lowest = int(place["number"]), 0 if scheme.any_port else 1
+    if not lowest <= port <= MAX_PORT:
+        raise ConfigError("", f"{url!r}: expected a port from {lowest} to {MAX_PORT}")
+    return EndpointUrl(url, name, place["v6"] or place["host"], port, _flavour(url, parts["query"]))
+
+
+def make_endpoint(url: EndpointUrl, sink: Sink, clock: Clock) -> Endpoint:
+    """The endpoint of a parsed URL, not open yet."""
+    return SCHEMES[url.scheme].factory(url, sink, clock)
+
+
+def _flavour(url: str, query: str | None) -> str | None:
+    if query is None:
+        return None
+    try:
+        options = parse_qsl(query, strict_parsing=True, keep_blank_values=True)
+    except ValueError:
+        options = []
+    if len(options) != 1 or options[0][0] != "flavour":
+        raise ConfigError("", f"{url!r}: expected no option but ?flavour={'|'.join(FLAVOURS)}")
+    flavour = options[0][1]
+    if flavour not in FLAVOURS:
+        raise ConfigError("", f"{url!r}: expected flavour {' or '.join(FLAVOURS)}, got {flavour!r}")
+    return flavour

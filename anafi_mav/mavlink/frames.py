@@ -1,0 +1,245 @@
+"""MAVLink frames without I/O: messages into version 2 frames, any bytes into messages.
+
+Going out, a message is packed once (`pack`) and framed per channel (`frame`), for only the sequence number and with it
+the checksum differ. Coming in, `Parser` finds frames of version 1 and 2 between whatever else arrives and has the
+generated dialect decode them. Next floor: `channel`.
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+import struct
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from operator import attrgetter
+from typing import Any, NamedTuple
+
+import fastcrc
+
+from anafi_mav.errors import LocalProtocolError
+from anafi_mav.mavlink import dialect
+
+MAGIC_1, MAGIC_2 = 0xFE, 0xFD
+HEADER_1, HEADER_2 = 6, 10
+"""Bytes before the payload (MAVLink serialization.md §packet_format)."""
+CHECKSUM, SIGNATURE = 2, 13
+SIGNED = 0x01
+"""The only incompatibility flag there is; a frame with another one must be discarded (serialization.md)."""
+
+MAX_FRAME = HEADER_2 + 255 + CHECKSUM + SIGNATURE
+"""What a parser may hold back while it waits for the rest of a frame."""
+
+MAX_SOURCES = 256
+"""Systems and components that one channel may bring: a fleet behind a radio is tens. More are not remembered."""
+
+_BODY = struct.Struct("<BBBBBBHB")
+_CHECKSUM = struct.Struct("<H")
+_crc: Callable[[bytes], int] = fastcrc.crc16.mcrf4xx
+_EXTRA = {id: bytes((kind.crc_extra,)) for id, kind in dialect.mavlink_map.items()}
+_NEXT_MAGIC = re.compile(rb"[\xfd\xfe]")
+
+
+class Packed(NamedTuple):
+    """A message as payload bytes, not yet of a sender."""
+
+    id: int
+    payload: bytes
+    """Without the trailing zeros, but at least one byte (serialization.md §payload_truncation)."""
+
+
+def pack(message: dialect.MAVLink_message) -> Packed:
+    """The payload of a message. Raises `LocalProtocolError` when a field does not fit its wire type."""
+    kind = type(message)
+    try:
+        packer = _packers.get(kind) or _payload_packer(kind)
+        payload = packer(message)
+    except (struct.error, TypeError, ValueError, AttributeError, OverflowError) as error:
+        raise LocalProtocolError(f"cannot encode {message.get_type()}: {error}") from error
+    # Not message.id: some messages have a field of that name.
+    return Packed(kind.id, payload.rstrip(b"\0") or payload[:1])
+
+
+def frame(packed: Packed, seq: int, sysid: int, compid: int) -> bytes:
+    """The version 2 frame of a packed message."""
+    id, payload = packed
+    body = _BODY.pack(len(payload), 0, 0, seq, sysid, compid, id & 0xFFFF, id >> 16) + payload
+    return b"\xfd" + body + _CHECKSUM.pack(_crc(body + _EXTRA[id]))
+
+
+_packers: dict[type[dialect.MAVLink_message], Callable[[Any], bytes]] = {}
+"""One per message class, made when it is first sent."""
+
+
+def _payload_packer(kind: type[dialect.MAVLink_message]) -> Callable[[Any], bytes]:
+    """A function that packs messages of this class; pymavlink's own builds a header and copies on each call."""
+    if kind.id not in dialect.mavlink_map:
+        raise TypeError("it is no message of the dialect")
+    codes = re.findall(r"(\d*)([a-zA-Z])", kind.unpacker.format)
+    # pymavlink keeps the bytes of a text, which it decodes for its readers, under another name.
+    fields = zip(kind.ordered_fieldnames, codes, strict=True)
+    names = [f"_{name}_raw" if code in "cs" else name for name, (_, code) in fields]
+    lengths = [int(count) if count and code != "s" else None for count, code in codes]
+    packer, values = kind.unpacker.pack, attrgetter(*names)
+
+    def pack_one(message: Any) -> bytes:
+        return packer(values(message))
+
+    def pack_scalars(message: Any) -> bytes:
+        return packer(*values(message))
+
+    def pack_arrays(message: Any) -> bytes:
+        flat: list[Any] = []
+        for name, length in zip(names, lengths, strict=True):
+            value = getattr(message, name)
+            if length is None:
+                flat.append(value)
+            elif len(value) != length:
+                raise ValueError(f"{name} has {len(value)} elements, not {length}")
+            else:
+                flat += value
+        return packer(*flat)
+
+    if any(length is not None for length in lengths):
+        _packers[kind] = pack_arrays
+    else:
+        _packers[kind] = pack_one if len(names) == 1 else pack_scalars
+    return _packers[kind]
+
+
+@dataclass(frozen=True)
+class Received:
+    """One frame that arrived whole."""
+
+    message: Any
+    """A message of the dialect, or None: its id is in none of our definitions, and so its checksum means nothing."""
+    id: int
+    sysid: int
+    compid: int
+    raw: bytes
+
+    def version_2(self) -> bytes:
+        """The frame as it may be sent on: a version 1 frame is framed anew, its sequence number kept."""
+        if self.raw[0] == MAGIC_2:
+            return self.raw
+        payload = self.raw[HEADER_1:-CHECKSUM]
+        return frame(Packed(self.id, payload.rstrip(b"\0") or payload[:1]), self.raw[2], self.sysid, self.compid)
+
+
+class Parser:
+    """Finds frames in bytes. What is none costs a counter, and at most one checksum per start mark in it.
+
+    A frame that fails its checksum is given up by one byte, not by its length, so a false start mark never hides
+    the real frame behind it. Ids that we do not know have no checksum to test; they pass only from a source that
+    has sent a message with a good one.
+    """
+
+    def __init__(self) -> None:
+        self.counters: Counter[str] = Counter()
+        """frames, unknown_frames, bad_checksums (start marks with a plausible header that were none), garbage_bytes."""
+        self._pending = b""
+        self._sources: set[tuple[int, int]] = set()
+        self._decoder = dialect.MAVLink(None)
+
+    def receive(self, data: bytes) -> list[Received]:
+        """The frames that end in `data`; the beginning of another is kept for the next call."""
+        buffer = self._pending + data
+        found, end = self._scan(buffer)
+        self._pending = buffer[end:]
+        return found
+
+    def receive_datagram(self, data: bytes) -> list[Received]:
+        """The frames in `data`, which is a whole: a frame that does not end in it is none."""
+        self._pending = b""
+        found: list[Received] = []
+        while data:
+            more, end = self._scan(data)
+            found += more
+            # What looked like a beginning is given up by one byte, too: a real frame may be in it.
+            self.counters["garbage_bytes"] += end < len(data)
+            data = data[end + 1 :]
+        return found
+
+    def _scan(self, buffer: bytes) -> tuple[list[Received], int]:
+        """The frames in `buffer`, and where the one begins that is not complete yet (its length if none does)."""
+        found: list[Received] = []
+        position, size = 0, len(buffer)
+        while position < size:
+            start = _NEXT_MAGIC.search(buffer, position)
+            if start is None:
+                self.counters["garbage_bytes"] += size - position
+                return found, size
+            self.counters["garbage_bytes"] += start.start() - position
+            position = start.start()
+            length = self._length(buffer, position, size)
+            if length is None:
+                return found, position
+            if length and position + length > size:
+                return found, position
+            received = self._decode(buffer[position : position + length]) if length else None
+            if received is None:
+                self.counters["garbage_bytes"] += 1
+                position += 1
+            else:
+                found.append(received)
+                position += length
+        return found, size
+
+    def _length(self, buffer: bytes, position: int, size: int) -> int | None:
+        """Length of the frame that begins here; 0 if its header cannot be one, None if that is not to be seen yet."""
+        if buffer[position] == MAGIC_1:
+            if size < position + HEADER_1:
+                return None
+            payload, id = buffer[position + 1], buffer[position + 5]
+            limits = _VERSION_1_LENGTHS.get(id)
+            return HEADER_1 + payload + CHECKSUM if limits and limits[0] <= payload <= limits[1] else 0
+        if size < position + 3:
+            return None
+        flags = buffer[position + 2]
+        if flags & ~SIGNED:
+            return 0
+        if size < position + HEADER_2:
+            return None
+        id = int.from_bytes(buffer[position + 7 : position + 10], "little")
+        if id not in dialect.mavlink_map and (buffer[position + 5], buffer[position + 6]) not in self._sources:
+            return 0
+        return HEADER_2 + buffer[position + 1] + CHECKSUM + (SIGNATURE if flags else 0)
+
+    def _decode(self, raw: bytes) -> Received | None:
+        """The message in a frame of the right length; None if the checksum says that it is none."""
+        if raw[0] == MAGIC_1:
+            sysid, compid, id = raw[3], raw[4], raw[5]
+        else:
+            sysid, compid, id = raw[5], raw[6], int.from_bytes(raw[7:10], "little")
+        extra = _EXTRA.get(id)
+        if extra is None:
+            self.counters["unknown_frames"] += 1
+            return Received(None, id, sysid, compid, raw)
+        end = len(raw) - CHECKSUM - (SIGNATURE if raw[0] == MAGIC_2 and raw[2] & SIGNED else 0)
+        if _crc(raw[1:end] + extra) != int.from_bytes(raw[end : end + CHECKSUM], "little"):
+            self.counters["bad_checksums"] += 1
+            return None
+        try:
+            message = self._decoder.decode(bytearray(raw))
+        except dialect.MAVError:  # not reached as far as we know; a peer must not be able to raise
+            self.counters["bad_checksums"] += 1
+            return None
+        self.counters["frames"] += 1
+        if len(self._sources) < MAX_SOURCES:
+            self._sources.add((sysid, compid))
+        return Received(message, id, sysid, compid, raw)
+
+
+def _base_length(kind: type[dialect.MAVLink_message]) -> int:
+    """Length without extension fields: those are the ones that a constructor gives a default."""
+    parameters = inspect.signature(kind.__init__).parameters.values()
+    extensions = sum(parameter.default is not parameter.empty for parameter in parameters)
+    codes = re.findall(r"\d*[a-zA-Z]", kind.unpacker.format)
+    return struct.calcsize("<" + "".join(codes[: len(codes) - extensions]))
+
+
+_VERSION_1_LENGTHS = {
+    id: (_base_length(kind), kind.unpacker.size) for id, kind in dialect.mavlink_map.items() if id <= 0xFF
+}
+"""Version 1 knows neither truncation nor extensions, but pymavlink sends the latter in it."""

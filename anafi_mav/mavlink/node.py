@@ -1,0 +1,167 @@
+"""The node: all endpoints of the gateway, the router between them and the way to our own services.
+
+node = Node(on_message=services.receive)
+await node.start(["udpout://127.0.0.1:14550", "tcpin://127.0.0.1:5760"])
+node.own(1)
+node.send(heartbeat, sysid=1, compid=1)
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from anafi_mav.clock import Clock, SystemClock
+from anafi_mav.errors import ConfigError
+from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.base import Endpoint, reason
+from anafi_mav.mavlink.channel import Channel, total
+from anafi_mav.mavlink.endpoint import make_endpoint, parse_endpoint
+from anafi_mav.mavlink.frames import Received, pack
+from anafi_mav.mavlink.router import Router
+
+logger = logging.getLogger(__name__)
+message_logger = logging.getLogger("anafi_mav.message")
+"""Every message that reaches our services, decoded."""
+
+
+@dataclass(frozen=True)
+class Inbound:
+    """A message for our services: addressed to one of our systems, or to everybody."""
+
+    message: Any
+    """A message of the dialect. Whether it is for a certain system or component is for the reader to look up."""
+    channel: Channel
+    """Where it came from, and where an answer goes."""
+    sysid: int
+    """System id of the sender."""
+    compid: int
+    """Component id of the sender."""
+    now: float
+    """When it arrived, by the clock's monotonic time."""
+
+
+class Node:
+    """Our place in the MAVLink network. `start` once, `close` once (twice does no harm)."""
+
+    def __init__(
+        self,
+        *,
+        on_message: Callable[[Inbound], None] | None = None,
+        on_channel: Callable[[Channel, bool], None] | None = None,
+        clock: Clock | None = None,
+    ) -> None:
+        self.on_message = on_message
+        self.on_channel = on_channel
+        """Called with True when a channel opened and with False when it closed."""
+        self.channels: list[Channel] = []
+        """The channels that are open now. A new list whenever they change: safe to iterate over while sending."""
+        self.endpoints: list[Endpoint] = []
+        """In the order of the URLs."""
+        self._clock = clock or SystemClock()
+        self._router: Router[Channel] = Router()
+        self._closed_counters: Counter[str] = Counter()
+
+    async def start(self, urls: Sequence[str]) -> None:
+        """Open an endpoint for each URL. Raises `ConfigError` with key path "endpoints[i]"; nothing is left open."""
+        parsed = []
+        for index, text in enumerate(urls):
+            try:
+                parsed.append(parse_endpoint(text))
+            except ConfigError as error:
+                raise ConfigError(f"endpoints[{index}]", error.problem) from error
+        for index, url in enumerate(parsed):
+            endpoint = make_endpoint(url, self, self._clock)
+            try:
+                await endpoint.open()
+            except OSError as error:
+                await self.close()
+                problem = f"cannot open {url.text}: {reason(error)}"
+                raise ConfigError(f"endpoints[{index}]", problem) from error
+            except BaseException:
+                await self.close()
+                raise
+            self.endpoints.append(endpoint)
+
+    async def close(self) -> None:
+        """Close every endpoint."""
+        while self.endpoints:
+            await self.endpoints.pop().close()
+
+    def own(self, sysid: int) -> None:
+        """Messages to this system are for our services."""
+        self._router.own(sysid)
+
+    def disown(self, sysid: int) -> None:
+        """Messages to this system are not for us any more."""
+        self._router.disown(sysid)
+
+    def send(
+        self,
+        message: dialect.MAVLink_message,
+        *,
+        sysid: int,
+        compid: int,
+        to: Channel | Iterable[Channel] | None = None,
+    ) -> None:
+        """Send as this system and component to one channel, to some, or to all. A closed one only counts it.
+
+        Raises `LocalProtocolError` for a field that does not fit; nothing is then sent to anybody.
+        """
+        self._router.spoke(sysid, compid)
+        packed = pack(message)
+        if isinstance(to, Channel):
+            to.send_packed(packed, sysid, compid)
+            return
+        for channel in self.channels if to is None else to:
+            channel.send_packed(packed, sysid, compid)
+
+    def counters(self) -> Counter[str]:
+        """Everything counted since the start: by channels, endpoints and the router."""
+        result = self._closed_counters + total(self.channels) + self._router.counters
+        for endpoint in self.endpoints:
+            result.update(endpoint.counters)
+        return result
+
+    # What endpoints report.
+
+    def opened(self, channel: Channel) -> None:
+        logger.info("%s: open", channel.name)
+        self._router.add(channel)
+        self.channels = [*self.channels, channel]
+        if self.on_channel is not None:
+            self._guarded(self.on_channel, channel, True)
+
+    def closed(self, channel: Channel) -> None:
+        logger.info("%s: closed", channel.name)
+        self._router.remove(channel)
+        self.channels = [other for other in self.channels if other is not channel]
+        self._closed_counters.update(total([channel]))
+        if self.on_channel is not None:
+            self._guarded(self.on_channel, channel, False)
+
+    def received(self, channel: Channel, frames: list[Received]) -> None:
+        now = self._clock.monotonic()
+        for received in frames:
+            route = self._router.route(channel, received, now)
+            if route.forward:
+                raw = received.version_2()
+                for other in route.forward:
+                    other.forward(raw, received.id)
+            if route.ours and self.on_message is not None:
+                message_logger.debug("%s: %s", channel.name, received.message)
+                inbound = Inbound(received.message, channel, received.sysid, received.compid, now)
+                self._guarded(self.on_message, inbound)
+
+    def _guarded(self, callback: Callable[..., None], *arguments: object) -> None:
+        """Call back. A mistake in a service must not close the socket that brought the message."""
+        try:
+            callback(*arguments)
+        except Exception as error:
+            asyncio.get_running_loop().call_exception_handler(
+                {"message": f"{callback!r} failed on a MAVLink message", "exception": error}
+            )

@@ -1,0 +1,130 @@
+"""Who gets a message: we ourselves, other channels, or nobody (MAVLink routing.md §rules). No I/O.
+
+Our vehicles are on every channel; whatever else speaks MAVLink is learned from what it sends. Rules beyond
+routing.md: a frame that comes back to us is not passed on again, for endpoints are easily wired into a ring, and
+SETUP_SIGNING, which carries a key, never is.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, OrderedDict
+from collections.abc import Hashable
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.frames import MAX_SOURCES, Received
+
+KeyT = TypeVar("KeyT", bound=Hashable)
+
+RING_WINDOW = 0.5
+"""s in which the same frame is not passed on twice. A sender's sequence number makes all its frames differ, and half
+a second is longer than the way round through other routers."""
+
+RING_FRAMES = 512
+"""Frames remembered for that: what some busy systems send in half a second. With more traffic the window is shorter."""
+
+
+@dataclass(frozen=True)
+class Route(Generic[KeyT]):
+    """Where a message goes."""
+
+    ours: bool
+    """Our own services get it."""
+    forward: tuple[KeyT, ...]
+    """The channels that it is passed on to."""
+
+
+class Router(Generic[KeyT]):
+    """Routes between channels, each known by a key. Several channels may lead to one system."""
+
+    def __init__(self) -> None:
+        self.counters: Counter[str] = Counter()
+        """forwarded (per channel), own_sources (a frame in one of our names came in), rings, sources_ignored."""
+        self._channels: dict[KeyT, set[tuple[int, int]]] = {}
+        self._own: set[int] = set()
+        self._spoken: set[tuple[int, int]] = set()
+        self._recent: OrderedDict[bytes, float] = OrderedDict()
+
+    def add(self, channel: KeyT) -> None:
+        """This channel is open; nobody has been heard on it yet."""
+        self._channels[channel] = set()
+
+    def remove(self, channel: KeyT) -> None:
+        """This channel is gone, and with it whoever was behind it."""
+        self._channels.pop(channel, None)
+
+    def own(self, sysid: int) -> None:
+        """This system is one of ours: what is addressed to it is for our services."""
+        self._own.add(sysid)
+
+    def disown(self, sysid: int) -> None:
+        """This system is not ours at present, e.g. because its drone is away."""
+        self._own.discard(sysid)
+
+    def spoke(self, sysid: int, compid: int) -> None:
+        """We send in this name: frames in it that come in are echoes, and not learned from."""
+        self._spoken.add((sysid, compid))
+
+    def heard_on(self, sysid: int, compid: int | None = None) -> list[KeyT]:
+        """The channels on which this system, or this component of it, has been heard."""
+        return [
+            channel
+            for channel, sources in self._channels.items()
+            if any(source[0] == sysid and compid in (None, source[1]) for source in sources)
+        ]
+
+    def route(self, channel: KeyT, received: Received, now: float) -> Route[KeyT]:
+        """Where a frame from this channel goes; its source is learned."""
+        source = (received.sysid, received.compid)
+        if source in self._spoken:
+            self.counters["own_sources"] += 1
+            return Route(False, ())
+        # 0 is the address of all, nobody's name.
+        if received.message is not None and received.sysid != 0:
+            self._learn(channel, source)
+        target, component = targets(received.message)
+        ours = received.message is not None and (target == 0 or target in self._own)
+        destinations = self._destinations(target, component, received.id)
+        forward = tuple(other for other in destinations if other != channel)
+        if forward and self._is_repeated(received.raw, now):
+            self.counters["rings"] += 1
+            forward = ()
+        self.counters["forwarded"] += len(forward)
+        return Route(ours, forward)
+
+    def _destinations(self, target: int, component: int, id: int) -> list[KeyT]:
+        if id == dialect.MAVLINK_MSG_ID_SETUP_SIGNING:
+            return []
+        if target == 0:
+            return list(self._channels)
+        if target in self._own:
+            # A companion computer may share the system of one of our drones.
+            return self.heard_on(target, component) if component else []
+        return self.heard_on(target)
+
+    def _learn(self, channel: KeyT, source: tuple[int, int]) -> None:
+        sources = self._channels.get(channel)
+        if sources is None or source in sources:
+            return
+        if len(sources) < MAX_SOURCES:
+            sources.add(source)
+        else:
+            self.counters["sources_ignored"] += 1
+
+    def _is_repeated(self, raw: bytes, now: float) -> bool:
+        last = self._recent.get(raw)
+        if last is not None and now - last < RING_WINDOW:
+            return True  # the first time stays: a sender without sequence numbers gets a frame through now and then
+        self._recent.pop(raw, None)
+        self._recent[raw] = now
+        if len(self._recent) > RING_FRAMES:
+            self._recent.popitem(last=False)
+        return False
+
+
+def targets(message: object) -> tuple[int, int]:
+    """Target system and component of a message; 0 is everybody, also where the message has no such field."""
+    if isinstance(message, dialect.MAVLink_manual_control_message):
+        return message.target, 0
+    return getattr(message, "target_system", 0), getattr(message, "target_component", 0)

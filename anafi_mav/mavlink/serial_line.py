@@ -1,0 +1,106 @@
+"""Serial lines: telemetry radios, USB, pseudo-terminals. A device that is away is opened when it comes."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import errno
+import os
+from functools import partial
+
+import serial
+import serial_asyncio_fast
+
+from anafi_mav.clock import Clock
+from anafi_mav.mavlink.base import EndpointUrl, Reopening, Sink, StreamPeer, reason
+
+BITS_PER_BYTE = 10
+"""8 data bits, start and stop."""
+
+WRITE_AHEAD_S, QUEUE_S = 0.1, 0.5
+"""s of the line's own speed that may wait outside and inside the channel: telemetry that left the queue later than
+this would be history. The kernel holds some 4 KB more."""
+
+MIN_WRITE_AHEAD, MIN_QUEUE = 280, 2048
+"""Bytes: one frame, and a burst of answers, on however slow a line."""
+
+_AWAY = {errno.ENOENT, errno.ENXIO, errno.ENODEV, errno.EIO}
+"""What opening says of a device that is not there (now). Anything else is a mistake or somebody else's port."""
+
+
+class _Port(serial.Serial):  # type: ignore[misc]  # pyserial has no annotations
+    """A port whose reads and writes never wait.
+
+    pyserial's own `write` tries again, without end, while the line's buffer is full; in an event loop that stops
+    everything. Its `read` uses select, which knows only the first 1024 files of a process.
+    """
+
+    def read(self, size: int = 1) -> bytes:
+        try:
+            data = os.read(self.fd, size)
+        except (BlockingIOError, InterruptedError):
+            return b""
+        except OSError as error:
+            raise serial.SerialException(error.errno, str(error)) from error
+        if not data:
+            raise serial.SerialException("the device is gone")
+        return data
+
+    def write(self, data: bytes) -> int:
+        """Number of bytes taken. Raises BlockingIOError if the line takes none, as the transport expects."""
+        try:
+            return os.write(self.fd, data)
+        except (BlockingIOError, InterruptedError):
+            raise
+        except OSError:
+            return len(data)  # the device is gone, which reading notices and reports
+
+
+class SerialLine(Reopening):
+    """One device at one speed."""
+
+    def __init__(self, url: EndpointUrl, sink: Sink, clock: Clock) -> None:
+        super().__init__(url, sink, clock)
+        self._port: serial.Serial | None = None
+
+    async def open(self) -> None:
+        try:
+            self._peer = await self._connect()
+        except OSError as error:
+            if error.errno not in _AWAY:
+                raise
+            self._note(reason(error))
+        await super().open()
+
+    async def close(self) -> None:
+        if self._port is not None and self._port.is_open:
+            # Or else closing waits until a line that may be stuck has taken the rest.
+            with contextlib.suppress(OSError, serial.SerialException):
+                self._port.reset_output_buffer()
+        await super().close()
+
+    async def _connect(self) -> StreamPeer:
+        loop = asyncio.get_running_loop()
+        device, baud = self.parsed.place, self.parsed.number
+        kind = _Port if os.name == "posix" else serial.Serial
+        # Opening may wait for a modem line. Exclusive: two processes on one line would both get half of each frame.
+        opening = partial(kind, device, baudrate=baud, exclusive=True, timeout=0, write_timeout=0)
+        try:
+            self._port = await loop.run_in_executor(None, opening)
+        except ValueError as error:
+            raise OSError(f"{baud} baud: {error}") from error
+        bytes_per_second = baud / BITS_PER_BYTE
+
+        def peer() -> StreamPeer:
+            return StreamPeer(
+                self.parsed,
+                self.url,
+                self._sink,
+                write_ahead=max(MIN_WRITE_AHEAD, round(bytes_per_second * WRITE_AHEAD_S)),
+                queue_bytes=max(MIN_QUEUE, round(bytes_per_second * QUEUE_S)),
+            )
+
+        _, made = await serial_asyncio_fast.connection_for_serial(loop, peer, self._port)
+        assert isinstance(made, StreamPeer)
+        await asyncio.sleep(0)  # the transport calls connection_made in the loop's next turn; from then on it is usable
+        return made

@@ -1,0 +1,81 @@
+"""Which message goes to which channel how often. No I/O, no clock: a vehicle's telemetry asks `due` with its own time.
+
+The defaults are intervals at most: a message leaves when there is news, and no more often than this.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Generic, TypeVar
+from weakref import WeakKeyDictionary
+
+from anafi_mav.errors import LocalProtocolError
+from anafi_mav.mavlink import dialect as mav
+
+ChannelT = TypeVar("ChannelT")
+
+DEFAULT_INTERVALS: Mapping[int, float] = {
+    mav.MAVLINK_MSG_ID_ATTITUDE: 0.1,
+    mav.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: 0.1,
+    mav.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 0.2,
+    mav.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 0.2,
+    mav.MAVLINK_MSG_ID_ALTITUDE: 0.2,
+    mav.MAVLINK_MSG_ID_VFR_HUD: 0.2,
+    mav.MAVLINK_MSG_ID_GPS_RAW_INT: 0.5,
+    mav.MAVLINK_MSG_ID_SYS_STATUS: 1.0,
+    mav.MAVLINK_MSG_ID_BATTERY_STATUS: 1.0,
+    mav.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 0.5,
+    mav.MAVLINK_MSG_ID_HOME_POSITION: 2.0,
+}
+"""Seconds by message id: what ground stations need to look alive, and a 57600 baud radio can carry."""
+
+
+class _Stream:
+    __slots__ = ("interval", "next")
+
+    def __init__(self, interval: float | None) -> None:
+        self.interval = interval
+        self.next = -float("inf")
+
+
+class Streams(Generic[ChannelT]):
+    """The intervals of one vehicle's messages on every channel. A channel that is gone is forgotten by itself."""
+
+    def __init__(self, defaults: Mapping[int, float] = DEFAULT_INTERVALS) -> None:
+        self._defaults = dict(defaults)
+        self._channels: WeakKeyDictionary[ChannelT, dict[int, _Stream]] = WeakKeyDictionary()
+
+    def interval(self, channel: ChannelT, id: int) -> float | None:
+        """Seconds between two messages on this channel; None: not streamed."""
+        stream = self._channels.get(channel, {}).get(id)
+        return self._defaults.get(id) if stream is None else stream.interval
+
+    def set(self, channel: ChannelT, id: int, interval: float | None) -> None:
+        """Stream at this interval (s, above 0) on this channel, or not at all (None)."""
+        if interval is not None and not 0.0 < interval < float("inf"):
+            raise LocalProtocolError(f"an interval is a positive number of seconds or None, not {interval}")
+        self._channels.setdefault(channel, {})[id] = _Stream(interval)
+
+    def reset(self, channel: ChannelT, id: int) -> None:
+        """Stream at the default interval again."""
+        self._channels.get(channel, {}).pop(id, None)
+
+    def due(self, channel: ChannelT, id: int, now: float) -> bool:
+        """Whether a message of this kind may leave now; if so, it counts as sent.
+
+        Times are kept on a grid, not from message to message, so that jitter of the source costs no rate: an
+        interval equal to the source's passes all but perhaps one of its messages.
+        """
+        streams = self._channels.get(channel)
+        if streams is None:
+            streams = self._channels.setdefault(channel, {})
+        stream = streams.get(id)
+        if stream is None:
+            stream = streams[id] = _Stream(self._defaults.get(id))
+        interval = stream.interval
+        if interval is None or now < stream.next:
+            return False
+        late = now - stream.next
+        # After a silence the grid begins anew; half an interval early, so that the next message may jitter.
+        stream.next = stream.next + interval if late <= interval else now + interval / 2
+        return True

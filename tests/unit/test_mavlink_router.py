@@ -1,0 +1,152 @@
+"""Routing: what is ours, what is passed on, and what never is."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.frames import MAX_SOURCES, Parser, Received, frame, pack
+from anafi_mav.mavlink.router import RING_FRAMES, RING_WINDOW, Router, targets
+
+GCS, OTHER_GCS, OURS, FOREIGN = (255, 190), (254, 190), 1, 42
+
+
+def received(message: Any, source: tuple[int, int] = GCS, seq: int = 0) -> Received:
+    [one] = Parser().receive(frame(pack(message), seq, *source))
+    return one
+
+
+def heartbeat(seq: int = 0, source: tuple[int, int] = GCS) -> Received:
+    return received(dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3), source, seq)
+
+
+def command(system: int, component: int, seq: int = 0, source: tuple[int, int] = GCS) -> Received:
+    return received(dialect.MAVLink_command_long_message(system, component, 512, 0, 1, 0, 0, 0, 0, 0, 0), source, seq)
+
+
+@pytest.fixture
+def router() -> Router[str]:
+    router = Router[str]()
+    for name in ("a", "b", "c"):
+        router.add(name)
+    router.own(OURS)
+    router.spoke(OURS, 1)
+    return router
+
+
+def test_a_message_without_target_is_for_everybody_but_its_sender(router: Router[str]) -> None:
+    route = router.route("a", heartbeat(), 0.0)
+    assert (route.ours, route.forward) == (True, ("b", "c"))
+    assert router.counters["forwarded"] == 2
+
+
+def test_target_0_is_everybody(router: Router[str]) -> None:
+    route = router.route("a", command(0, 0), 0.0)
+    assert (route.ours, route.forward) == (True, ("b", "c"))
+
+
+@pytest.mark.parametrize("component", [0, 1, 77])
+def test_a_message_to_our_system_stays_with_us(router: Router[str], component: int) -> None:
+    router.route("b", heartbeat(source=OTHER_GCS), 0.0)
+    route = router.route("a", command(OURS, component), 0.0)
+    assert (route.ours, route.forward) == (True, ())
+
+
+def test_a_companion_in_our_system_gets_what_is_addressed_to_it(router: Router[str]) -> None:
+    router.route("c", heartbeat(source=(OURS, 191)), 0.0)
+    assert router.route("a", command(OURS, 191), 0.0).forward == ("c",)
+    assert router.route("a", command(OURS, 1), 0.0).forward == ()
+    assert router.route("a", command(OURS, 0), 0.0).forward == ()
+
+
+def test_a_foreign_system_is_reached_where_it_was_heard_and_only_there(router: Router[str]) -> None:
+    assert router.route("a", command(FOREIGN, 1, seq=1), 0.0).forward == ()
+    router.route("b", heartbeat(source=(FOREIGN, 1)), 0.0)
+    route = router.route("a", command(FOREIGN, 1, seq=2), 0.0)
+    assert (route.ours, route.forward) == (False, ("b",))
+    # By its system, whatever component is meant (MAVLink routing.md §rules).
+    assert router.route("a", command(FOREIGN, 100, seq=3), 0.0).forward == ("b",)
+    # Its own channel is where the message came from: no echo.
+    assert router.route("b", command(FOREIGN, 1, seq=4), 0.0).forward == ()
+
+
+def test_an_answer_finds_the_way_back(router: Router[str]) -> None:
+    router.route("a", heartbeat(), 0.0)
+    ack = dialect.MAVLink_command_ack_message(400, 0, 0, 0, GCS[0], GCS[1])
+    route = router.route("b", received(ack, (FOREIGN, 1)), 0.0)
+    assert (route.ours, route.forward) == (False, ("a",))
+
+
+def test_a_closed_channel_takes_its_systems_along(router: Router[str]) -> None:
+    router.route("b", heartbeat(source=(FOREIGN, 1)), 0.0)
+    router.remove("b")
+    assert router.heard_on(FOREIGN) == []
+    assert router.route("a", command(FOREIGN, 1), 0.0).forward == ()
+    router.add("b")
+    assert router.route("a", command(FOREIGN, 1), 0.0).forward == ()
+
+
+def test_a_disowned_system_is_nobodys(router: Router[str]) -> None:
+    router.disown(OURS)
+    route = router.route("a", command(OURS, 1), 0.0)
+    assert (route.ours, route.forward) == (False, ())
+
+
+def test_setup_signing_is_never_passed_on(router: Router[str]) -> None:
+    router.route("b", heartbeat(source=(FOREIGN, 1)), 0.0)
+    for target, ours in ((FOREIGN, False), (0, True), (OURS, True)):
+        message = dialect.MAVLink_setup_signing_message(target, 1, [7] * 32, 1)
+        route = router.route("a", received(message), 0.0)
+        assert (route.ours, route.forward) == (ours, ())
+
+
+def test_our_own_echo_is_dropped_and_teaches_nothing(router: Router[str]) -> None:
+    route = router.route("a", heartbeat(source=(OURS, 1)), 0.0)
+    assert (route.ours, route.forward) == (False, ())
+    assert router.counters["own_sources"] == 1
+    assert router.heard_on(OURS) == []
+
+
+def test_a_frame_that_went_round_is_passed_on_once(router: Router[str]) -> None:
+    frame = heartbeat(seq=9)
+    assert router.route("a", frame, 10.0).forward == ("b", "c")
+    assert router.route("b", frame, 10.1).forward == ()
+    assert router.route("a", frame, 10.2).forward == ()
+    assert router.counters["rings"] == 2
+    # Another sequence number is another frame, and so is the same one much later.
+    assert router.route("a", heartbeat(seq=10), 10.2).forward == ("b", "c")
+    assert router.route("a", frame, 10.0 + RING_WINDOW).forward == ("b", "c")
+
+
+def test_what_a_peer_can_make_us_remember_is_bounded(router: Router[str]) -> None:
+    for sysid in range(2, 250):
+        for compid in (1, 2, 3):
+            router.route("a", heartbeat(seq=compid, source=(sysid, compid)), 0.0)
+    assert len(router._channels["a"]) == MAX_SOURCES
+    assert router.counters["sources_ignored"] == 248 * 3 - MAX_SOURCES
+    assert len(router._recent) == RING_FRAMES
+    # Its flood takes no room from others.
+    router.route("b", heartbeat(source=(FOREIGN, 9)), 0.0)
+    assert "b" in router.heard_on(FOREIGN)
+
+
+def test_system_0_is_nobodys_name(router: Router[str]) -> None:
+    assert router.route("a", heartbeat(source=(0, 0)), 0.0).ours
+    assert router.heard_on(0) == []
+
+
+def test_an_unknown_message_is_passed_on_to_all_and_not_ours(router: Router[str]) -> None:
+    unknown = Received(None, 0xABCDE, *GCS, b"\xfd\x00\x00\x00\x00\xff\xbe\xde\xbc\x0a\x00\x00")
+    route = router.route("a", unknown, 0.0)
+    assert (route.ours, route.forward) == (False, ("b", "c"))
+    assert router.heard_on(GCS[0]) == []
+
+
+def test_targets_of_messages() -> None:
+    assert targets(dialect.MAVLink_manual_control_message(7, 0, 0, 0, 0, 0)) == (7, 0)
+    assert targets(dialect.MAVLink_set_mode_message(5, 1, 0)) == (5, 0)
+    assert targets(dialect.MAVLink_command_long_message(3, 100, 1, 0, 0, 0, 0, 0, 0, 0, 0)) == (3, 100)
+    assert targets(dialect.MAVLink_system_time_message(1, 2)) == (0, 0)
+    assert targets(None) == (0, 0)
