@@ -32,7 +32,7 @@ SOCKET_BUFFER = 1 << 18
 
 def reason_of(error: OSError) -> str:
     """The system's own words for an error; asyncio hides them behind "Connect call failed"."""
-    return os.strerror(error.errno) if (error.errno or 0) > 0 else error.strerror or str(error)
+    return os.strerror(error.errno) if error.errno is not None and error.errno > 0 else error.strerror or str(error)
 
 
 class Session(asyncio.DatagramProtocol):

@@ -1,0 +1,163 @@
+"""The gateway: a configuration becomes endpoints, drones and systems, and is kept running.
+
+    async with Gateway(config) as gateway:
+        await gateway.ready(10.0)
+
+One supervisor per drone connects, hands the drone to its `System`, waits for the link to end and begins anew. The
+gateway knows addresses only; that some of them are simulated is the command line's business.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+from types import TracebackType
+
+from typing_extensions import Self
+
+from anafi_mav.clock import Clock, SystemClock
+from anafi_mav.config import Config, DroneConfig
+from anafi_mav.drone import Drone
+from anafi_mav.errors import AnafiMavError, ConfigError
+from anafi_mav.mavlink.node import Inbound, Node
+from anafi_mav.services.system import System
+
+logger = logging.getLogger(__name__)
+
+RETRY_FIRST, RETRY_LAST = 0.5, 2.0
+"""s between attempts to connect: doubled from the first to the last, so that a drone that comes back is a system
+again within five seconds."""
+
+
+class _Supervised:
+    """A drone with its system and the task that keeps them connected."""
+
+    def __init__(self, config: DroneConfig, drone: Drone, system: System) -> None:
+        self.config = config
+        self.drone = drone
+        self.system = system
+        self.first_attempt = asyncio.Event()
+        self.problem = ""
+        """Why the last attempt to connect failed; empty while connected."""
+        self.task: asyncio.Task[None] | None = None
+
+    async def run(self) -> None:
+        pause = RETRY_FIRST
+        while True:
+            try:
+                await self.drone.connect()
+            except AnafiMavError as error:
+                if str(error) != self.problem:
+                    logger.warning("%s: %s", self.config.name, error)
+                self.problem = str(error)
+                self.first_attempt.set()
+                await asyncio.sleep(pause)
+                pause = min(2.0 * pause, RETRY_LAST)
+                continue
+            self.problem, pause = "", RETRY_FIRST
+            self.system.link_up()
+            self.first_attempt.set()
+            try:
+                reason = await asyncio.shield(self.drone.lost)
+                logger.warning("%s: link lost: %s", self.config.name, reason)
+                self.problem = f"link lost: {reason}"
+            finally:
+                self.system.link_down()
+                await self.drone.close()
+
+    def line(self) -> str:
+        """One line for people: who, where, and how it stands."""
+        head = f"drone {self.config.name}: system {self.config.sysid} at {self.config.address}"
+        if not self.system.active:
+            return f"{head}: not connected ({self.problem or 'no answer yet'}), retrying"
+        identity = self.drone.identity
+        percent = self.drone.battery.state.percent
+        battery = "" if percent is None else f", battery {percent} %"
+        return f"{head}: {identity.model.title} {identity.serial}, firmware {identity.firmware}{battery}"
+
+
+class Gateway:
+    """Drones on one side, MAVLink endpoints on the other. Every drone of the configuration needs an address."""
+
+    def __init__(self, config: Config, *, clock: Clock | None = None) -> None:
+        for index, drone in enumerate(config.drones):
+            if drone.address is None:
+                raise ConfigError(f"drones[{index}].address", "the gateway connects to addresses; expected one")
+        self.config = config
+        self._clock: Clock = clock or SystemClock()
+        self._node = Node(on_message=self._receive, clock=self._clock)
+        self._supervised: list[_Supervised] = []
+
+    async def __aenter__(self) -> Self:
+        await self.start()
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        await self.close()
+
+    async def open(self) -> None:
+        """Open every endpoint, and no more; `start` does it where this has not. Raises `ConfigError`; nothing is left
+        open. It is a step of its own for the command line, which starts a simulator only when all endpoints are."""
+        if not self._node.endpoints:
+            await self._node.start(self.config.endpoints)
+
+    async def start(self) -> None:
+        """Open every endpoint, then begin to connect to every drone. Raises `ConfigError`; nothing is left open."""
+        await self.open()
+        started = self._clock.monotonic()
+        for config in self.config.drones:
+            assert config.address is not None
+            drone = Drone(config.address, discovery_port=config.discovery_port, name=config.name)
+            allow_kill = self.config.allow_kill if config.allow_kill is None else config.allow_kill
+            system = System(self._node, drone, config.sysid, self._clock, started, allow_kill=allow_kill)
+            supervised = _Supervised(config, drone, system)
+            supervised.task = asyncio.get_running_loop().create_task(supervised.run())
+            self._supervised.append(supervised)
+
+    async def ready(self, timeout: float) -> bool:
+        """Wait until each drone is connected or one attempt has failed. True when all of them are connected."""
+        waits = [asyncio.ensure_future(s.first_attempt.wait()) for s in self._supervised]
+        if waits:
+            _, pending = await asyncio.wait(waits, timeout=timeout)
+            for wait in pending:
+                wait.cancel()
+        return all(s.system.active for s in self._supervised)
+
+    async def close(self) -> None:
+        """Hover what flies by our doing, then close every socket. Safe to call twice."""
+        await asyncio.gather(*(self._leave(s) for s in self._supervised))
+        self._supervised.clear()
+        await self._node.close()
+
+    async def _leave(self, supervised: _Supervised) -> None:
+        if supervised.system.active and not supervised.system.vehicle.on_ground:
+            with contextlib.suppress(AnafiMavError):
+                await supervised.drone.piloting.stop()
+        if supervised.task is not None:
+            supervised.task.cancel()
+            await asyncio.wait([supervised.task])
+
+    def lines(self) -> list[str]:
+        """One line per drone and per endpoint."""
+        return [s.line() for s in self._supervised] + [
+            f"endpoint {endpoint.describe()}" for endpoint in self._node.endpoints
+        ]
+
+    def drones_in_air(self) -> list[str]:
+        """For each flying drone one sentence on what it will do by itself when the gateway ends."""
+        sentences = []
+        for s in self._supervised:
+            if not s.system.active or s.system.vehicle.on_ground:
+                continue
+            delay = s.drone.home.state.delay_s
+            after = "after its own delay" if delay is None else f"{delay} s after it lost the link"
+            home = "fly home " + after if s.system.vehicle.home is not None else "stay there, for it knows no home"
+            sentences.append(f"{s.config.name} is in the air: it will hover and {home}")
+        return sentences
+
+    def _receive(self, inbound: Inbound) -> None:
+        for supervised in self._supervised:
+            supervised.system.receive(inbound)

@@ -1,0 +1,129 @@
+"""The command table: MAV_CMD → what the vehicle does. A handler returns when the drone confirmed, or raises."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Awaitable, Callable
+
+from anafi_mav.mavlink import dialect
+from anafi_mav.services.commands import Command
+from anafi_mav.services.modes import FlightMode, from_px4_parameters
+from anafi_mav.services.vehicle import Place, Refused, Vehicle
+
+Handler = Callable[[Vehicle, Command], Awaitable[None]]
+
+FORCE = 21196
+"""param2 of an arm or disarm that overrides checks (MAVLink common.xml MAV_CMD_COMPONENT_ARM_DISARM)."""
+
+_AMSL_FRAMES = (None, dialect.MAV_FRAME_GLOBAL, dialect.MAV_FRAME_GLOBAL_INT)
+_RELATIVE_FRAMES = (dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT, dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
+
+
+class UnsupportedFrame(Refused):
+    """A place in a frame we cannot resolve."""
+
+    def __init__(self, frame: int | None) -> None:
+        super().__init__(f"Refused: positions in frame {frame} are not supported", lasting=True)
+
+
+def _height(vehicle: Vehicle, command: Command) -> float | None:
+    """Height above take-off (m) of a command's z in its frame; None when z is unset. COMMAND_LONG has AMSL."""
+    if math.isnan(command.z):
+        return None
+    if not math.isfinite(command.z):
+        raise Refused("Refused: the height is not a number", lasting=True)
+    if command.frame in _AMSL_FRAMES:
+        return vehicle.amsl_to_ato(command.z)
+    if command.frame in _RELATIVE_FRAMES:
+        return command.z
+    raise UnsupportedFrame(command.frame)
+
+
+def _place(command: Command) -> Place | None:
+    """The command's position; None when it is unset. Half a position is refused."""
+    if math.isnan(command.x) and math.isnan(command.y):
+        return None
+    if not (math.isfinite(command.x) and math.isfinite(command.y)):
+        raise Refused("Refused: latitude and longitude are not both numbers", lasting=True)
+    return Place(command.x, command.y)
+
+
+async def arm_disarm(vehicle: Vehicle, command: Command) -> None:
+    """MAV_CMD_COMPONENT_ARM_DISARM: param1 1 arm, 0 disarm; param2 21196 disarms by force."""
+    if command.params[0] == 1.0:
+        await vehicle.arm()
+    elif command.params[0] == 0.0:
+        await vehicle.disarm(force=command.params[1] == FORCE)
+    else:
+        raise Refused("Refused: param1 is 1 to arm, 0 to disarm", lasting=True)
+
+
+async def takeoff(vehicle: Vehicle, command: Command) -> None:
+    """MAV_CMD_NAV_TAKEOFF. What z means depends on who asks (conformance E2).
+
+    Unset: the height of MIS_TAKEOFF_ALT. COMMAND_LONG with latitude and longitude exactly 0: above the take-off
+    point (MAVProxy, dronekit, Mission Planner). Any other COMMAND_LONG: AMSL (QGroundControl). COMMAND_INT: as its
+    frame says. The position is not used: an ANAFI takes off where it stands.
+    """
+    if command.frame is None and command.x == 0.0 and command.y == 0.0 and not math.isnan(command.z):
+        await vehicle.take_off(command.z)
+        return
+    await vehicle.take_off(_height(vehicle, command))
+
+
+async def land(vehicle: Vehicle, command: Command) -> None:
+    """MAV_CMD_NAV_LAND: here, whatever position it names."""
+    await vehicle.land()
+
+
+async def return_to_launch(vehicle: Vehicle, command: Command) -> None:
+    """MAV_CMD_NAV_RETURN_TO_LAUNCH."""
+    await vehicle.return_home()
+
+
+async def reposition(vehicle: Vehicle, command: Command) -> None:
+    """MAV_CMD_DO_REPOSITION: param1 speed in m/s (unset or <= 0: the drone's own), param4 heading in rad, x, y, z.
+
+    z obeys the frame: 0 and 5 AMSL, 3 and 6 above take-off. All unset is pause.
+    """
+    speed, yaw = command.params[0], command.params[3]
+    if math.isinf(yaw) or math.isinf(speed):
+        raise Refused("Refused: speed and heading must be numbers", lasting=True)
+    place, height = _place(command), _height(vehicle, command)
+    heading = None if math.isnan(yaw) else yaw
+    if place is None and height is None and heading is None:
+        await vehicle.hold()
+        return
+    await vehicle.reposition(place, height, heading, speed if speed > 0.0 else None)
+
+
+async def set_mode(vehicle: Vehicle, command: Command) -> None:
+    """MAV_CMD_DO_SET_MODE in PX4's numbers."""
+    mode = from_px4_parameters(command.params[1], command.params[2])
+    await change_mode(vehicle, mode)
+
+
+async def change_mode(vehicle: Vehicle, mode: FlightMode | None) -> None:
+    """Enter a mode that some message named; None is one that we do not have."""
+    if mode is None:
+        raise Refused("Mode refused: an ANAFI has no such mode", lasting=True)
+    await vehicle.set_mode(mode)
+
+
+async def terminate(vehicle: Vehicle, command: Command) -> None:
+    """MAV_CMD_DO_FLIGHTTERMINATION: param1 1 cuts the motors."""
+    if command.params[0] != 1.0:
+        raise Refused("Refused: flight termination cannot be taken back", lasting=True)
+    await vehicle.terminate()
+
+
+ACTIONS: dict[int, Handler] = {
+    dialect.MAV_CMD_COMPONENT_ARM_DISARM: arm_disarm,
+    dialect.MAV_CMD_NAV_TAKEOFF: takeoff,
+    dialect.MAV_CMD_NAV_LAND: land,
+    dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH: return_to_launch,
+    dialect.MAV_CMD_DO_REPOSITION: reposition,
+    dialect.MAV_CMD_DO_SET_MODE: set_mode,
+    dialect.MAV_CMD_DO_FLIGHTTERMINATION: terminate,
+}
+"""Commands that change what the vehicle does. The newest one wins; each is executed once however often it comes."""

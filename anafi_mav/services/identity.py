@@ -1,0 +1,60 @@
+"""Who a vehicle says it is: AUTOPILOT_VERSION and PROTOCOL_VERSION, and what its capability bits promise."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+
+from anafi_mav import __version__
+from anafi_mav.drone import Drone
+from anafi_mav.mavlink import dialect
+
+PX4_VERSION = (1, 16, 0)
+"""The PX4 release whose behaviour the PX4 flavour follows. Its type byte is 0, a development build: QGroundControl
+nags about official releases that are older than the newest (conformance A2)."""
+
+CAPABILITIES = (
+    dialect.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
+    | dialect.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
+    | dialect.MAV_PROTOCOL_CAPABILITY_SET_ATTITUDE_TARGET
+    | dialect.MAV_PROTOCOL_CAPABILITY_MAVLINK2
+)
+"""Exactly what the services implement: no mission, fence or rally items yet, no FTP, no position setpoints."""
+
+
+def _version(text: str) -> int:
+    """ "1.8.2" as MAVLink's four version bytes, the last one 0."""
+    numbers = [int(number) for number in re.findall(r"\d+", text)[:3]]
+    numbers += [0] * (3 - len(numbers))
+    return min(numbers[0], 255) << 24 | min(numbers[1], 255) << 16 | min(numbers[2], 255) << 8
+
+
+def autopilot_version(drone: Drone, *, allow_kill: bool) -> dialect.MAVLink_message:
+    """AUTOPILOT_VERSION. The serial number is the unique id; its hash is the older 64-bit one.
+
+    flight_sw_version is the PX4 release that the flavour follows, middleware_sw_version is anafi-mav's own,
+    os_sw_version the ANAFI's firmware.
+    """
+    identity = drone.identity
+    serial = identity.serial.encode()
+    firmware = identity.firmware or ""
+    major, minor, patch = PX4_VERSION
+    return dialect.MAVLink_autopilot_version_message(
+        CAPABILITIES | (dialect.MAV_PROTOCOL_CAPABILITY_FLIGHT_TERMINATION if allow_kill else 0),
+        major << 24 | minor << 16 | patch << 8,
+        _version(__version__),
+        _version(firmware),
+        identity.model.id,
+        hashlib.sha256(__version__.encode()).digest()[:8],
+        bytes(8),
+        bytes(8),
+        0x19CF,  # Parrot's USB vendor id
+        identity.model.id,
+        int.from_bytes(hashlib.sha256(serial).digest()[:8], "little"),
+        serial[:18].ljust(18, b"\0"),
+    )
+
+
+def protocol_version() -> dialect.MAVLink_message:
+    """PROTOCOL_VERSION: MAVLink 1 is understood, 2 is spoken."""
+    return dialect.MAVLink_protocol_version_message(200, 100, 200, bytes(8), bytes(8))

@@ -1,0 +1,458 @@
+"""One MAVLink system: the services of one drone on every channel, from link up to link down.
+
+Messages come in from the node by their addressing, answers go back to the asking channel alone, streams go to
+every channel at its own rate. While the drone's link is down the system does not exist: no heartbeat, no answer.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import math
+from collections.abc import Callable
+from typing import Any
+
+from anafi_mav.clock import Clock
+from anafi_mav.drone import Drone, events
+from anafi_mav.drone.events import Message
+from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, NotSupported
+from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.channel import Channel
+from anafi_mav.mavlink.node import Inbound, Node
+from anafi_mav.mavlink.streams import Streams
+from anafi_mav.services import identity, plan_lists, telemetry
+from anafi_mav.services.actions import ACTIONS, UnsupportedFrame, change_mode
+from anafi_mav.services.commands import (
+    PROGRESS_AFTER,
+    PROGRESS_EVERY,
+    Command,
+    CommandDesk,
+    Execution,
+    from_int,
+    from_long,
+)
+from anafi_mav.services.modes import FlightMode, from_px4_custom_mode, px4_custom_mode
+from anafi_mav.services.offboard import attitude_setpoint
+from anafi_mav.services.parameters import ParameterService, table
+from anafi_mav.services.statustext import Severity, TextNumbers
+from anafi_mav.services.vehicle import Health, Landed, Refused, Vehicle
+
+logger = logging.getLogger(__name__)
+
+AUTOPILOT = dialect.MAV_COMP_ID_AUTOPILOT1
+
+HEARTBEAT_EVERY = 1.0
+"""s (MAVLink heartbeat.md)."""
+
+TICK = 0.05
+"""s between looks at the periodic messages."""
+
+STATUS_EVERY = 5.0
+"""s before the same complaint about a setpoint is repeated as text."""
+
+_RESULT_BY_ERROR: tuple[tuple[type[AnafiMavError], int], ...] = (
+    (UnsupportedFrame, dialect.MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME),
+    (NotSupported, dialect.MAV_RESULT_UNSUPPORTED),
+    (CommandRejected, dialect.MAV_RESULT_TEMPORARILY_REJECTED),
+    (CommandTimeout, dialect.MAV_RESULT_FAILED),
+)
+
+
+class System:
+    """The MAVLink side of one drone."""
+
+    def __init__(self, node: Node, drone: Drone, sysid: int, clock: Clock, started: float, *, allow_kill: bool) -> None:
+        self.sysid = sysid
+        self.drone = drone
+        self.active = False
+        self._node = node
+        self._clock = clock
+        self._started = started
+        self._allow_kill = allow_kill
+        self._streams: Streams[Channel] = Streams()
+        self._texts = TextNumbers()
+        self._desk = CommandDesk()
+        self.vehicle = Vehicle(
+            drone,
+            clock,
+            allow_kill=allow_kill,
+            text=self.text,
+            changed=self._changed,
+            end_others=self._end_other_actions,
+        )
+        self._parameters = ParameterService(table(self.vehicle, sysid), self.text)
+        self._undo: Callable[[], None] | None = None
+        self._ticker: asyncio.Task[None] | None = None
+        self._tasks: set[asyncio.Task[Any]] = set()
+        self._actions: dict[asyncio.Task[None], tuple[Inbound, Execution] | None] = {}
+        self._last_state: tuple[FlightMode, bool, Health, Landed] | None = None
+        self._next_heartbeat = 0.0
+        self._complained: dict[str, float] = {}
+        self._handlers: dict[int, Callable[[Inbound], None]] = {
+            dialect.MAVLINK_MSG_ID_COMMAND_LONG: lambda inbound: self._command(inbound, from_long(inbound.message)),
+            dialect.MAVLINK_MSG_ID_COMMAND_INT: lambda inbound: self._command(inbound, from_int(inbound.message)),
+            dialect.MAVLINK_MSG_ID_SET_MODE: self._set_mode,
+            dialect.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET: self._set_attitude_target,
+            dialect.MAVLINK_MSG_ID_PARAM_REQUEST_LIST: self._param_list,
+            dialect.MAVLINK_MSG_ID_PARAM_REQUEST_READ: self._param_read,
+            dialect.MAVLINK_MSG_ID_PARAM_SET: self._param_set,
+            dialect.MAVLINK_MSG_ID_PING: self._ping,
+            dialect.MAVLINK_MSG_ID_TIMESYNC: self._timesync,
+            **dict.fromkeys(
+                (
+                    dialect.MAVLINK_MSG_ID_MISSION_REQUEST_LIST,
+                    dialect.MAVLINK_MSG_ID_MISSION_CLEAR_ALL,
+                    dialect.MAVLINK_MSG_ID_MISSION_COUNT,
+                    dialect.MAVLINK_MSG_ID_MISSION_REQUEST,
+                    dialect.MAVLINK_MSG_ID_MISSION_REQUEST_INT,
+                    dialect.MAVLINK_MSG_ID_MISSION_ITEM,
+                    dialect.MAVLINK_MSG_ID_MISSION_ITEM_INT,
+                    dialect.MAVLINK_MSG_ID_MISSION_WRITE_PARTIAL_LIST,
+                ),
+                self._plan_list,
+            ),
+        }
+        self._queries: dict[int, Callable[[Inbound, Command], int]] = {
+            dialect.MAV_CMD_REQUEST_MESSAGE: self._request_message,
+            dialect.MAV_CMD_SET_MESSAGE_INTERVAL: self._set_message_interval,
+            dialect.MAV_CMD_GET_MESSAGE_INTERVAL: self._get_message_interval,
+            dialect.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: self._legacy_request(
+                dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION
+            ),
+            dialect.MAV_CMD_REQUEST_PROTOCOL_VERSION: self._legacy_request(dialect.MAVLINK_MSG_ID_PROTOCOL_VERSION),
+            dialect.MAV_CMD_GET_HOME_POSITION: self._legacy_request(dialect.MAVLINK_MSG_ID_HOME_POSITION),
+        }
+
+    # Link up, link down.
+
+    def link_up(self) -> None:
+        """The drone is connected and has sent all its states: the system appears."""
+        self.active = True
+        self._undo = self.drone.subscribe(self._on_event)
+        self._node.own(self.sysid)
+        self.vehicle.on_flying_state()
+        self.vehicle.on_position()
+        self._last_state = None
+        self._changed()
+        self._next_heartbeat = self._clock.monotonic() + HEARTBEAT_EVERY
+        self._ticker = asyncio.get_running_loop().create_task(self._tick())
+        product = self.drone.identity
+        self.text(Severity.INFO, f"{product.model.title} {product.serial} firmware {product.firmware}")
+
+    def link_down(self) -> None:
+        """The link is gone: whoever waits is told, then the system is silent."""
+        if not self.active:
+            return
+        if self._undo is not None:
+            self._undo()
+            self._undo = None
+        if self._ticker is not None:
+            self._ticker.cancel()
+        for answer in tuple(self._actions.values()):
+            if answer is not None:
+                self._finish(*answer, dialect.MAV_RESULT_FAILED)
+        for task in tuple(self._tasks):
+            task.cancel()
+        self.vehicle.link_down()
+        self._desk.forget()
+        self.active = False
+        self._node.disown(self.sysid)
+
+    # Sending.
+
+    def text(self, severity: Severity, text: str) -> None:
+        """A STATUSTEXT to everybody, and a line in the log."""
+        logger.log(logging.WARNING if severity <= Severity.WARNING else logging.INFO, "%s: %s", self.sysid, text)
+        if self.active:
+            for message in self._texts.messages(severity, text):
+                self._send(message)
+
+    def _send(self, message: dialect.MAVLink_message, to: Channel | list[Channel] | None = None) -> None:
+        if self.active:
+            self._node.send(message, sysid=self.sysid, compid=AUTOPILOT, to=to)
+
+    def _times(self) -> telemetry.Times:
+        return telemetry.Times(round((self._clock.monotonic() - self._started) * 1000))
+
+    def _build(self, id: int) -> dialect.MAVLink_message | None:
+        return telemetry.STREAMS[id].build(self.vehicle, self._times())
+
+    def _stream(self, id: int, now: float) -> None:
+        """Send a stream message to each channel on which it is due."""
+        due = [channel for channel in self._node.channels if self._streams.due(channel, id, now)]
+        if not due:
+            return
+        message = self._build(id)
+        if message is None:
+            return
+        self._send(message, due)
+
+    def _heartbeat(self) -> None:
+        vehicle = self.vehicle
+        base = dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+        if vehicle.armed:
+            base |= dialect.MAV_MODE_FLAG_SAFETY_ARMED
+        self._send(
+            dialect.MAVLink_heartbeat_message(
+                dialect.MAV_TYPE_QUADROTOR,
+                dialect.MAV_AUTOPILOT_PX4,
+                base,
+                px4_custom_mode(vehicle.mode),
+                vehicle.health.value,
+                3,
+            )
+        )
+
+    async def _tick(self) -> None:
+        periodic = [id for id, stream in telemetry.STREAMS.items() if not stream.news]
+        while True:
+            now = self._clock.monotonic()
+            if now >= self._next_heartbeat:
+                self._next_heartbeat = max(self._next_heartbeat + HEARTBEAT_EVERY, now + HEARTBEAT_EVERY / 2)
+                self._heartbeat()
+            for id in periodic:
+                self._stream(id, now)
+            await asyncio.sleep(TICK)
+
+    # What the drone reports.
+
+    def _on_event(self, message: Message, now: float) -> None:
+        kind = type(message)
+        if kind is events.FlyingStateChanged:
+            self.vehicle.on_flying_state()
+        elif kind is events.GpsLocationChanged or kind is events.FlightId:
+            self.vehicle.on_position()
+        elif kind is events.AttitudeChanged:
+            self.vehicle.on_attitude()
+        elif kind is events.ReturnStateChanged:
+            self.vehicle.on_return()
+        for id in telemetry.BY_NEWS.get(kind, ()):
+            self._stream(id, now)
+        if kind in telemetry.CHANGES:
+            self._changed(force=True)
+
+    def _changed(self, *, force: bool = False) -> None:
+        """Mode, armed state or health may have changed: clients wait for it, so tell them at once."""
+        if not self.active:
+            return
+        vehicle = self.vehicle
+        state = (vehicle.mode, vehicle.armed, vehicle.health, vehicle.landed)
+        if state != self._last_state:
+            self._last_state = state
+            self._heartbeat()
+        elif not force:
+            return
+        for id, stream in telemetry.STREAMS.items():
+            if stream.on_change and (message := self._build(id)) is not None:
+                self._send(message)
+
+    # What clients send.
+
+    def receive(self, inbound: Inbound) -> None:
+        """A message from a client. Not addressed to our autopilot: not for us, and never answered."""
+        if not self.active:
+            return
+        message = inbound.message
+        handler = self._handlers.get(message.get_msgId())
+        if handler is None or getattr(message, "target_system", 0) not in (0, self.sysid):
+            return
+        if getattr(message, "target_component", 0) not in (0, AUTOPILOT):
+            return
+        handler(inbound)
+
+    def _command(self, inbound: Inbound, command: Command) -> None:
+        query = self._queries.get(command.id)
+        if query is not None:
+            self._acknowledge(inbound, command.id, query(inbound, command))
+            return
+        if command.id not in ACTIONS:
+            self._acknowledge(inbound, command.id, dialect.MAV_RESULT_UNSUPPORTED)
+            return
+        client = (inbound.channel, inbound.sysid, inbound.compid)
+        now = self._clock.monotonic()
+        repeated = self._desk.retransmission(client, command, now)
+        if repeated is not None:
+            self._acknowledge(inbound, command.id, repeated.result)
+            return
+        execution = self._desk.begin(client, command, now)
+        self._spawn_action(self._execute(inbound, execution), (inbound, execution))
+
+    async def _execute(self, inbound: Inbound, execution: Execution) -> None:
+        command = execution.command
+        progress = self._spawn(self._report_progress(inbound, command.id))
+        result = dialect.MAV_RESULT_FAILED
+        try:
+            await ACTIONS[command.id](self.vehicle, command)
+            result = dialect.MAV_RESULT_ACCEPTED
+        except AnafiMavError as error:
+            result = self._explain(error)
+        except asyncio.CancelledError:
+            result = dialect.MAV_RESULT_CANCELLED
+            raise
+        except Exception:
+            logger.exception("command %d of system %d", command.id, self.sysid)
+        finally:
+            progress.cancel()
+            self._finish(inbound, execution, result)
+
+    def _finish(self, inbound: Inbound, execution: Execution, result: int) -> None:
+        """The one final acknowledgement of an action."""
+        if execution.result == dialect.MAV_RESULT_IN_PROGRESS:
+            execution.result = result
+            self._acknowledge(inbound, execution.command.id, result)
+
+    def _end_other_actions(self) -> list[asyncio.Task[None]]:
+        """What begins now replaces what was under way; whoever waits for that learns that it was cancelled."""
+        current = asyncio.current_task()
+        others = [task for task in self._actions if task is not current]
+        for task in others:
+            task.cancel()
+        return others
+
+    def _spawn_action(self, work: Any, answer: tuple[Inbound, Execution] | None) -> None:
+        task = self._spawn(work)
+        self._actions[task] = answer
+        task.add_done_callback(lambda done: self._actions.pop(done, None))
+
+    def _explain(self, error: AnafiMavError) -> int:
+        """Tell everybody why something was refused; the MAV_RESULT that says so."""
+        critical = isinstance(error, Refused) and error.critical
+        self.text(Severity.CRITICAL if critical else Severity.WARNING, str(error))
+        for kind, result in _RESULT_BY_ERROR:
+            if isinstance(error, kind):
+                return result
+        if isinstance(error, Refused):
+            return dialect.MAV_RESULT_DENIED if error.lasting else dialect.MAV_RESULT_TEMPORARILY_REJECTED
+        return dialect.MAV_RESULT_FAILED
+
+    async def _report_progress(self, inbound: Inbound, command: int) -> None:
+        await asyncio.sleep(PROGRESS_AFTER)
+        while True:
+            self._acknowledge(inbound, command, dialect.MAV_RESULT_IN_PROGRESS)
+            await asyncio.sleep(PROGRESS_EVERY)
+
+    def _acknowledge(self, inbound: Inbound, command: int, result: int) -> None:
+        self._send(
+            dialect.MAVLink_command_ack_message(
+                command, result, 255, 0, target_system=inbound.sysid, target_component=inbound.compid
+            ),
+            inbound.channel,
+        )
+
+    def _spawn(self, work: Any) -> asyncio.Task[None]:
+        task: asyncio.Task[None] = asyncio.get_running_loop().create_task(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+        return task
+
+    def _set_mode(self, inbound: Inbound) -> None:
+        """SET_MODE has no acknowledgement: the heartbeat shows the mode, a text the refusal."""
+        self._desk.forget()
+        self._spawn_action(self._change_mode(from_px4_custom_mode(inbound.message.custom_mode)), None)
+
+    async def _change_mode(self, mode: FlightMode | None) -> None:
+        try:
+            await change_mode(self.vehicle, mode)
+        except AnafiMavError as error:
+            self._explain(error)
+
+    def _set_attitude_target(self, inbound: Inbound) -> None:
+        setpoint = attitude_setpoint(inbound.message)
+        if isinstance(setpoint, str):
+            self._complain(f"Setpoint refused: {setpoint}")
+        else:
+            self.vehicle.setpoint(setpoint)
+
+    def _complain(self, text: str) -> None:
+        """A text about something that arrives many times a second."""
+        now = self._clock.monotonic()
+        if now - self._complained.get(text, -math.inf) >= STATUS_EVERY:
+            self._complained[text] = now
+            self.text(Severity.WARNING, text)
+
+    # Queries: answered at once, every time.
+
+    def _request_message(self, inbound: Inbound, command: Command) -> int:
+        message = self._requested(command.params[0])
+        if isinstance(message, int):
+            return message
+        self._send(message, inbound.channel)
+        return dialect.MAV_RESULT_ACCEPTED
+
+    def _requested(self, id: float) -> dialect.MAVLink_message | int:
+        """The message that a client asks for, or the MAV_RESULT that says why not."""
+        if id == dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION:
+            return identity.autopilot_version(self.drone, allow_kill=self._allow_kill)
+        if id == dialect.MAVLINK_MSG_ID_PROTOCOL_VERSION:
+            return identity.protocol_version()
+        if id in telemetry.STREAMS:
+            message = self._build(int(id))
+            return dialect.MAV_RESULT_TEMPORARILY_REJECTED if message is None else message
+        return dialect.MAV_RESULT_UNSUPPORTED
+
+    def _legacy_request(self, id: int) -> Callable[[Inbound, Command], int]:
+        def request(inbound: Inbound, command: Command) -> int:
+            message = self._requested(id)
+            if isinstance(message, int):
+                return message
+            self._send(message, inbound.channel)
+            return dialect.MAV_RESULT_ACCEPTED
+
+        return request
+
+    def _set_message_interval(self, inbound: Inbound, command: Command) -> int:
+        id, interval = command.params[0], command.params[1]
+        if id not in telemetry.STREAMS:
+            return dialect.MAV_RESULT_UNSUPPORTED
+        if math.isinf(interval) or interval < -1:
+            return dialect.MAV_RESULT_DENIED
+        if math.isnan(interval) or interval == 0:
+            self._streams.reset(inbound.channel, int(id))
+        else:
+            self._streams.set(inbound.channel, int(id), None if interval < 0 else interval / 1e6)
+        return dialect.MAV_RESULT_ACCEPTED
+
+    def _get_message_interval(self, inbound: Inbound, command: Command) -> int:
+        id = command.params[0]
+        if not 0 <= id <= 0xFFFF:
+            return dialect.MAV_RESULT_DENIED
+        microseconds = 0
+        if id in telemetry.STREAMS:
+            interval = self._streams.interval(inbound.channel, int(id))
+            microseconds = -1 if interval is None else round(interval * 1e6)
+        self._send(dialect.MAVLink_message_interval_message(int(id), microseconds), inbound.channel)
+        return dialect.MAV_RESULT_ACCEPTED
+
+    def _param_list(self, inbound: Inbound) -> None:
+        for message in self._parameters.all_values():
+            self._send(message, inbound.channel)
+
+    def _param_read(self, inbound: Inbound) -> None:
+        self._send(self._parameters.read(inbound.message, inbound.sysid, inbound.compid), inbound.channel)
+
+    def _param_set(self, inbound: Inbound) -> None:
+        self._spawn(self._write_param(inbound))
+
+    async def _write_param(self, inbound: Inbound) -> None:
+        answers, changed = await self._parameters.write(inbound.message, inbound.sysid, inbound.compid)
+        for message in answers:
+            self._send(message, None if changed else inbound.channel)
+
+    def _plan_list(self, inbound: Inbound) -> None:
+        for message in plan_lists.answer(inbound.message, inbound.sysid, inbound.compid):
+            self._send(message, inbound.channel)
+
+    def _ping(self, inbound: Inbound) -> None:
+        ping = inbound.message
+        if ping.target_system == 0 and ping.target_component == 0:  # otherwise it is somebody's answer
+            self._send(
+                dialect.MAVLink_ping_message(ping.time_usec, ping.seq, inbound.sysid, inbound.compid), inbound.channel
+            )
+
+    def _timesync(self, inbound: Inbound) -> None:
+        if inbound.message.tc1 == 0:
+            now = round((self._clock.monotonic() - self._started) * 1e9)
+            self._send(
+                dialect.MAVLink_timesync_message(now, inbound.message.ts1, inbound.sysid, inbound.compid),
+                inbound.channel,
+            )

@@ -1,0 +1,594 @@
+"""The flight core: one drone as the vehicle that MAVLink's clients think they fly. No flavour, no message.
+
+It knows what MAVLink has and an ANAFI has not (an armed state on the ground, a chosen mode, a take-off to a height)
+and keeps it honest: mode and armed state follow the drone, a verb returns when the drone confirmed.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import enum
+import logging
+import math
+from collections.abc import Callable, Coroutine
+from dataclasses import dataclass
+from typing import Any
+
+from anafi_mav import geo, units
+from anafi_mav.clock import Clock
+from anafi_mav.drone import Drone, PilotingCommand
+from anafi_mav.drone.events import AlertLevel, FlyingState, FlyingStateChanged, ForcedLandingReason
+from anafi_mav.errors import AnafiMavError, CommandRejected
+from anafi_mav.services.height import HeightReference
+from anafi_mav.services.modes import FlightMode
+from anafi_mav.services.offboard import AttitudeSetpoint, OffboardStream, State, yaw_rate_towards
+from anafi_mav.services.statustext import Severity
+
+logger = logging.getLogger(__name__)
+
+AUTO_DISARM = 10.0
+"""s that an armed vehicle waits for a take-off (as PX4's COM_DISARM_PRFLT)."""
+
+ARM_WAIT = 10.0
+"""s that a take-off waits for somebody to arm: QGroundControl sends take-off first and arms on its acceptance."""
+
+CLIMB_WAIT = 15.0
+"""s for the drone to hover after it took off, before the climb to the asked height is given up."""
+
+LOWEST = 1.0
+"""m above take-off: where an ANAFI hovers by itself after take-off. Lower targets are refused, never clamped."""
+
+_ON_GROUND = (FlyingState.LANDED, FlyingState.EMERGENCY)
+_TAKING_OFF = (FlyingState.MOTOR_RAMPING, FlyingState.TAKINGOFF, FlyingState.USERTAKEOFF)
+_LANDING = (FlyingState.LANDING, FlyingState.EMERGENCY_LANDING)
+_AIRBORNE = (FlyingState.HOVERING, FlyingState.FLYING)
+
+
+class Landed(enum.Enum):
+    """Where the vehicle is between ground and air."""
+
+    UNKNOWN = 0
+    ON_GROUND = 1
+    IN_AIR = 2
+    TAKEOFF = 3
+    LANDING = 4
+
+
+class Health(enum.Enum):
+    """How the vehicle as a whole is."""
+
+    STANDBY = 3
+    ACTIVE = 4
+    CRITICAL = 5
+    EMERGENCY = 6
+
+
+class Refused(AnafiMavError):
+    """We do not do this. `lasting` tells a request that is wrong in itself from one that comes at a bad moment."""
+
+    def __init__(self, reason: str, *, lasting: bool = False, critical: bool = False) -> None:
+        super().__init__(reason)
+        self.reason = reason
+        self.lasting = lasting
+        self.critical = critical
+
+
+@dataclass(frozen=True)
+class Place:
+    """A point on the map."""
+
+    latitude: float
+    longitude: float
+
+
+class Vehicle:
+    """One drone, flown. All methods run on the event loop's thread."""
+
+    def __init__(
+        self,
+        drone: Drone,
+        clock: Clock,
+        *,
+        allow_kill: bool,
+        text: Callable[[Severity, str], None],
+        changed: Callable[[], None],
+        end_others: Callable[[], list[asyncio.Task[None]]],
+    ) -> None:
+        self.drone = drone
+        self.height = HeightReference()
+        self.offboard = OffboardStream()
+        self.takeoff_height = 2.5
+        """m above take-off for a take-off that names no height (PX4's default of MIS_TAKEOFF_ALT)."""
+        self.origin: Place | None = None
+        """Origin of the local frame: where the drone last took off, or first stood with a fix."""
+        self._clock = clock
+        self._allow_kill = allow_kill
+        self._text = text
+        self._changed = changed
+        self._end_others = end_others
+        self._selected = FlightMode.HOLD
+        self._armed = False
+        self._climbing = False
+        self._pending_takeoff: float | None = None
+        self._last_flying: FlyingState | None = None
+        self._disarm_timer: asyncio.TimerHandle | None = None
+        self._pending_timer: asyncio.TimerHandle | None = None
+        self._offboard_timer: asyncio.TimerHandle | None = None
+        self._background: asyncio.Task[None] | None = None
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    # What the vehicle is.
+
+    @property
+    def flying_state(self) -> FlyingState | None:
+        """Parrot's word for it; None until reported."""
+        return self.drone.piloting.state.flying
+
+    @property
+    def on_ground(self) -> bool:
+        return self.flying_state in _ON_GROUND
+
+    @property
+    def in_air(self) -> bool:
+        """Flying, and not on its way down or up by itself."""
+        return self.flying_state in _AIRBORNE
+
+    @property
+    def armed(self) -> bool:
+        """Motors may turn: the drone is off the ground, or arming was accepted and has not lapsed."""
+        return self._armed or (self.flying_state is not None and not self.on_ground)
+
+    @property
+    def landed(self) -> Landed:
+        state = self.flying_state
+        if state == FlyingState.LANDED:
+            return Landed.ON_GROUND
+        if state in _TAKING_OFF:
+            return Landed.TAKEOFF
+        if state in _LANDING:
+            return Landed.LANDING
+        return Landed.IN_AIR if state in _AIRBORNE else Landed.UNKNOWN
+
+    @property
+    def returning(self) -> bool:
+        """The drone flies home, whoever began it."""
+        return self.drone.home.state.returning and not self.on_ground
+
+    @property
+    def returning_by_itself(self) -> bool:
+        """Nobody asked for this return: battery, lost link, ... It is not ours to stop."""
+        return self.drone.home.state.returning_by_itself and not self.on_ground
+
+    @property
+    def mode(self) -> FlightMode:
+        """What the drone does now."""
+        state = self.flying_state
+        if state == FlyingState.EMERGENCY:
+            return FlightMode.TERMINATED
+        if state in _LANDING:
+            return FlightMode.LAND
+        if self.returning:
+            return FlightMode.RETURN
+        if state in _TAKING_OFF or (self._climbing and not self.on_ground):
+            return FlightMode.TAKEOFF
+        return self._selected
+
+    @property
+    def health(self) -> Health:
+        state = self.flying_state
+        if state == FlyingState.EMERGENCY:
+            return Health.EMERGENCY
+        forced = self.drone.alerts.state.forced_landing
+        if (
+            state == FlyingState.EMERGENCY_LANDING
+            or forced not in (None, ForcedLandingReason.NONE)
+            or self.drone.battery.state.worst_alert() == AlertLevel.CRITICAL
+        ):
+            return Health.CRITICAL
+        return Health.ACTIVE if self.armed else Health.STANDBY
+
+    @property
+    def place(self) -> Place | None:
+        """Where the drone is by its newest GPS location; None without a fix."""
+        gps = self.drone.gps.state
+        if not gps.fixed or gps.location is None:
+            return None
+        return Place(gps.location.latitude, gps.location.longitude)
+
+    @property
+    def home(self) -> Place | None:
+        """Where a return ends: what the drone reports, before its first take-off where it stands."""
+        home = self.drone.home.state.location
+        if home is not None:
+            return Place(home.latitude, home.longitude)
+        return self.place if self.on_ground else None
+
+    def prearm_problems(self) -> list[str]:
+        """Why the drone would not take off, in sentences; empty when it would."""
+        problems: list[str] = []
+        if self.flying_state is None:
+            problems.append("the drone has not said whether it flies")
+        if self.flying_state == FlyingState.EMERGENCY:
+            problems.append("emergency stop")
+        problems += self.drone.takeoff_blockers()
+        return problems
+
+    # What it can be told to do. Each returns when the drone confirmed, or raises.
+
+    async def arm(self) -> None:
+        """Accept arming. An ANAFI has no such state: nothing turns until a take-off; it lapses after `AUTO_DISARM`."""
+        if self.armed and not self.on_ground:
+            return
+        if problems := self.prearm_problems():
+            raise Refused("PreArm: " + "; ".join(problems))
+        self._armed = True
+        self._rearm_disarm_timer()
+        self._changed()
+        if self._pending_takeoff is not None:
+            height, self._pending_takeoff = self._pending_takeoff, None
+            self._start_background(self._take_off_and_report(height))
+
+    async def disarm(self, *, force: bool) -> None:
+        """Disarm on the ground. In the air only `force` with `allow_kill` does it: the motors stop, the drone falls."""
+        if self.on_ground:
+            self._forget_takeoff()
+            self._armed = False
+            self._changed()
+            return
+        if not force:
+            raise Refused("Disarm refused: the drone is in the air")
+        await self.terminate()
+
+    async def terminate(self) -> None:
+        """Cut the motors, if the configuration allows it at all."""
+        if not self._allow_kill:
+            raise Refused(
+                "Motor cut refused: the drone would fall. Set allow_kill: true to permit it",
+                lasting=True,
+                critical=True,
+            )
+        await self._take_over()
+        await self.drone.piloting.emergency()
+
+    def check_height(self, ato: float) -> None:
+        """Raise `Refused` unless a target height (m above take-off) is one the drone may go to."""
+        ceiling = self.drone.piloting.state.max_altitude
+        if not math.isfinite(ato):
+            raise Refused("Refused: the height is not a number", lasting=True)
+        if ato < LOWEST:
+            raise Refused(f"Refused: {ato:.1f} m above take-off is below {LOWEST:g} m", lasting=True)
+        if ceiling is not None and ato > ceiling.current:
+            raise Refused(
+                f"Refused: {ato:.1f} m above take-off is above the drone's ceiling of {ceiling.current:g} m",
+                lasting=True,
+            )
+
+    def amsl_to_ato(self, amsl: float) -> float:
+        """Height above take-off (m) of an AMSL height; raises `Refused` when no bridge is known."""
+        ato = self.height.ato(amsl)
+        if ato is None:
+            raise Refused(
+                "Refused: no GPS fix on the ground, so the take-off point's height above sea level is unknown"
+            )
+        return ato
+
+    async def take_off(self, ato: float | None) -> None:
+        """Take off to `ato` m (None: `takeoff_height`). Returns when the drone confirmed that it takes off.
+
+        Disarmed, it returns at once and the take-off waits `ARM_WAIT` for arming.
+        """
+        height = self.takeoff_height if ato is None else ato
+        self.check_height(height)
+        if not self.on_ground:
+            raise Refused("Takeoff refused: the drone is in the air")
+        if problems := self.prearm_problems():
+            raise Refused("PreArm: " + "; ".join(problems))
+        if not self._armed:
+            self._pending_takeoff = height
+            self._set_timer("_pending_timer", ARM_WAIT, self._forget_takeoff)
+            return
+        await self._take_over()
+        await self._begin_takeoff(height)
+
+    async def land(self) -> None:
+        """Land here. On the ground there is nothing to do."""
+        await self._take_over()
+        if self.on_ground:
+            return
+        await self.drone.piloting.land()
+
+    async def return_home(self) -> None:
+        """Fly home by the drone's own return."""
+        if self.on_ground:
+            raise Refused("Return refused: the drone is on the ground")
+        if self.flying_state in _LANDING:
+            raise Refused("Return refused: the drone is landing")
+        await self._take_over()
+        await self.drone.piloting.return_home()
+
+    async def hold(self, mode: FlightMode = FlightMode.HOLD) -> None:
+        """Stop and hover, in mode Hold or Position."""
+        if self.flying_state in _LANDING:
+            raise Refused(f"{mode.value} refused: the drone is landing")
+        if self.returning_by_itself:
+            raise Refused(f"{mode.value} refused: the drone returns home by itself")
+        await self._take_over()
+        if not self.on_ground:
+            await self.drone.piloting.stop()
+            if self.returning:  # asked for through somebody else, or before the link was lost
+                await self.drone.piloting.cancel_return_home()
+        self._select(mode)
+
+    async def reposition(
+        self, place: Place | None, ato: float | None, yaw: float | None, speed: float | None = None
+    ) -> None:
+        """Go to a place, height (m above take-off) and heading (rad); None keeps what is. Returns when it moves."""
+        if place is None and ato is None and yaw is None and speed is None:
+            await self.hold()
+            return
+        if not self.in_air:
+            raise Refused("Goto refused: the drone is not in the air")
+        here = self.place
+        if here is None:
+            raise Refused("Goto refused: no GPS fix")
+        present = self.drone.piloting.state.altitude
+        if ato is None:
+            if present is None:
+                raise Refused("Goto refused: the drone's height is not known")
+            ato = present
+        else:
+            self.check_height(ato)
+        if place is not None:
+            self._check_place(place)
+        if self.returning_by_itself:
+            raise Refused("Goto refused: the drone returns home by itself")
+        await self._take_over()
+        if self.returning:
+            await self.drone.piloting.cancel_return_home()
+        self._select(FlightMode.HOLD)
+        target = place or here
+        await self.drone.piloting.move_to(
+            target.latitude,
+            target.longitude,
+            ato,
+            heading_deg=None if yaw is None else units.wrap_360(yaw * units.DEG_PER_RAD),
+            horizontal_speed=speed,
+        )
+
+    def _check_place(self, place: Place) -> None:
+        if not (abs(place.latitude) <= 90.0 and abs(place.longitude) <= 180.0):
+            raise Refused("Goto refused: that is no place on earth", lasting=True)
+        if place.latitude == 0.0 and place.longitude == 0.0:
+            raise Refused("Goto refused: latitude and longitude are both 0", lasting=True)
+        state, centre = self.drone.piloting.state, self.home
+        if state.geofence and state.max_distance is not None and centre is not None:
+            distance = geo.distance(centre.latitude, centre.longitude, place.latitude, place.longitude)
+            if distance > state.max_distance.current:
+                raise Refused(
+                    f"Goto refused: {distance:.0f} m from home is beyond the drone's limit of "
+                    f"{state.max_distance.current:g} m",
+                    lasting=True,
+                )
+
+    async def set_mode(self, mode: FlightMode) -> None:
+        """Whatever doing this mode means."""
+        match mode:
+            case FlightMode.HOLD | FlightMode.POSITION:
+                await self.hold(mode)
+            case FlightMode.LAND:
+                await self.land()
+            case FlightMode.RETURN:
+                await self.return_home()
+            case FlightMode.TAKEOFF:
+                await self.take_off(None)
+            case FlightMode.OFFBOARD:
+                await self._engage_offboard()
+            case FlightMode.MISSION:
+                raise Refused("Mission refused: there is no mission")
+            case FlightMode.TERMINATED:
+                await self.terminate()
+
+    # Offboard.
+
+    def setpoint(self, setpoint: AttitudeSetpoint) -> None:
+        """A program's newest setpoint; flies the drone at once when mode Offboard is engaged."""
+        self.offboard.receive(setpoint, self._clock.monotonic())
+        if self._offboard_timer is None:
+            self._offboard_timer = asyncio.get_running_loop().call_at(
+                self.offboard.deadline() or 0.0, self._offboard_expired
+            )
+        if self.offboard.state is State.ENGAGED:
+            self._fly_setpoint()
+
+    async def _engage_offboard(self) -> None:
+        if not self.in_air:
+            raise Refused("Offboard refused: take off first, setpoints do not lift an ANAFI off the ground")
+        if self.returning:
+            raise Refused("Offboard refused: the drone returns home")
+        if not self.offboard.fresh(self._clock.monotonic()):
+            raise Refused("Offboard refused: no setpoints arrive")
+        await self._take_over()
+        self.offboard.engage()
+        self.drone.piloting.hover()  # ends a moveTo or moveBy of ours, which would ignore sticks
+        self._select(FlightMode.OFFBOARD)
+        self._fly_setpoint()
+
+    def _fly_setpoint(self) -> None:
+        setpoint, attitude = self.offboard.setpoint, self.drone.piloting.state.attitude
+        limits = self.drone.piloting.state
+        if setpoint is None or attitude is None or limits.max_vertical_speed is None:
+            return
+        self.drone.piloting.pilot(
+            PilotingCommand(
+                roll_deg=setpoint.roll * units.DEG_PER_RAD,
+                pitch_deg=setpoint.pitch * units.DEG_PER_RAD,
+                yaw_rate_dps=yaw_rate_towards(setpoint, attitude.yaw) * units.DEG_PER_RAD,
+                climb_mps=setpoint.climb * limits.max_vertical_speed.current,
+            )
+        )
+
+    def _offboard_expired(self) -> None:
+        self._offboard_timer = None
+        now = self._clock.monotonic()
+        if self.offboard.expire(now):
+            self.drone.piloting.hover()
+            self._select(FlightMode.HOLD)
+            self._text(Severity.WARNING, "Offboard setpoints stopped: hovering")
+        deadline = self.offboard.deadline()
+        if deadline is not None:
+            self._offboard_timer = asyncio.get_running_loop().call_at(deadline, self._offboard_expired)
+
+    # What the drone reports.
+
+    def on_flying_state(self) -> None:
+        """The drone's flying state changed."""
+        state, before = self.flying_state, self._last_flying
+        self._last_flying = state
+        if state == before:
+            return
+        if state in _ON_GROUND and before is not None:
+            self._armed = False
+            self._forget_takeoff()
+            self._end_offboard()
+            self._selected = FlightMode.HOLD
+        elif state in _LANDING:
+            self._end_offboard()
+        elif state in _TAKING_OFF and before in _ON_GROUND and (place := self.place) is not None:
+            self.origin = place
+        if not self.on_ground:
+            self._cancel_timer("_disarm_timer")
+        self._changed()
+
+    def on_position(self) -> None:
+        """A new GPS location, altitude or flight id."""
+        gps = self.drone.gps.state
+        if self.flying_state == FlyingState.LANDED:
+            self.height.on_ground(
+                gps.location.altitude if gps.fixed and gps.location is not None else None,
+                self.drone.piloting.state.altitude,
+            )
+            if self.origin is None:
+                self.origin = self.place
+        elif self.flying_state is not None:
+            self.height.in_flight(self.drone.product.state.flight_id)
+
+    def on_attitude(self) -> None:
+        """A new attitude: the heading loop of an engaged offboard session closes on it."""
+        if self.offboard.state is State.ENGAGED:
+            self._fly_setpoint()
+
+    def on_return(self) -> None:
+        """The drone's return began, ended or changed: setpoints never fight it."""
+        if self.returning:
+            self._end_offboard()
+        self._changed()
+
+    def link_down(self) -> None:
+        """The link is lost: nothing that was asked for outlives it."""
+        self.height.link_down(flying=not self.on_ground)
+        self._let_go()
+        self._armed = False
+        self._selected = FlightMode.HOLD
+        self._last_flying = None
+        self._cancel_timer("_offboard_timer")
+        self.offboard = OffboardStream()
+        for task in tuple(self._tasks):
+            task.cancel()
+
+    # Machinery.
+
+    def _select(self, mode: FlightMode) -> None:
+        if mode is not FlightMode.OFFBOARD:
+            self.offboard.disengage()
+        self._selected = mode
+        self._changed()
+
+    def _end_offboard(self) -> None:
+        if self.offboard.state is State.ENGAGED:
+            self.offboard.disengage()
+            self._selected = FlightMode.HOLD
+
+    async def _take_over(self) -> None:
+        """A new intention replaces whatever was going on, and waits until that has let go of the drone.
+
+        Without the wait a move that is given up could cancel the one that follows it.
+        """
+        ended = [*self._end_others(), *self._let_go()]
+        if ended:
+            await asyncio.wait(ended)
+
+    def _let_go(self) -> list[asyncio.Task[None]]:
+        """End what this vehicle does by itself; the tasks that are still about to end."""
+        self._forget_takeoff()
+        self._end_offboard()
+        return self._cancel_background()
+
+    def _forget_takeoff(self) -> None:
+        self._pending_takeoff = None
+        self._cancel_timer("_pending_timer")
+
+    def _cancel_background(self) -> list[asyncio.Task[None]]:
+        task, self._background, self._climbing = self._background, None, False
+        if task is None:
+            return []
+        task.cancel()
+        return [task]
+
+    def _start_background(self, work: Coroutine[Any, Any, None]) -> None:
+        self._cancel_background()
+        task = asyncio.get_running_loop().create_task(work)
+        self._background = task
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    async def _begin_takeoff(self, height: float) -> None:
+        await self.drone.piloting.take_off()
+        self._selected = FlightMode.HOLD
+        self._start_background(self._climb(height))
+
+    async def _take_off_and_report(self, height: float) -> None:
+        """The take-off that waited for arming: its command was answered long ago, so failures are texts."""
+        try:
+            await self.drone.piloting.take_off()
+        except AnafiMavError as error:
+            self._text(Severity.ERROR, f"Takeoff failed: {error}")
+            return
+        await self._climb(height)
+
+    async def _climb(self, height: float) -> None:
+        """From the drone's own hover height to the asked one."""
+        self._climbing = True
+        self._changed()
+        try:
+            if not self.in_air:
+                await self.drone.expect(FlyingStateChanged, lambda m: m.state in _AIRBORNE, CLIMB_WAIT)
+            present = self.drone.piloting.state.altitude
+            if present is None:
+                raise CommandRejected("the drone does not report its height")
+            if abs(height - present) > 0.1:
+                await self.drone.piloting.move_by(0.0, 0.0, present - height, 0.0)
+        except AnafiMavError as error:
+            self._text(Severity.ERROR, f"Climb to {height:g} m given up: {error}")
+        finally:
+            if self._background is asyncio.current_task():
+                self._climbing, self._background = False, None
+                self._changed()
+
+    def _rearm_disarm_timer(self) -> None:
+        self._set_timer("_disarm_timer", AUTO_DISARM, self._auto_disarm)
+
+    def _auto_disarm(self) -> None:
+        if self._armed and self.on_ground:
+            self._armed = False
+            self._text(Severity.INFO, "Disarmed: no take-off followed")
+            self._changed()
+
+    def _set_timer(self, name: str, delay: float, callback: Callable[[], None]) -> None:
+        self._cancel_timer(name)
+        setattr(self, name, asyncio.get_running_loop().call_later(delay, callback))
+
+    def _cancel_timer(self, name: str) -> None:
+        timer: asyncio.TimerHandle | None = getattr(self, name)
+        if timer is not None:
+            timer.cancel()
+            setattr(self, name, None)

@@ -1,0 +1,143 @@
+"""A MAVLink client with nothing of ours between it and the wire: asyncio sockets and pymavlink's own parser.
+
+It uses pymavlink's stock dialect where that knows the message, so that a mistake in our generated one shows.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import time
+from collections.abc import Callable
+from typing import Any
+
+from anafi_mav.mavlink import dialect
+
+NAN = math.nan
+
+
+class Client:
+    """A ground station: keeps every frame it received, sends what a test tells it to."""
+
+    def __init__(self, sysid: int = 255, compid: int = 190) -> None:
+        self.sysid, self.compid = sysid, compid
+        self.received: list[tuple[float, Any]] = []
+        """(monotonic time, message), oldest first; messages carry their raw bytes in get_msgbuf()."""
+        self.bad = 0
+        self._parser = dialect.MAVLink(None, sysid, compid)
+        self._parser.robust_parsing = True
+        self._out = dialect.MAVLink(None, sysid, compid)
+        self._news = asyncio.Event()
+        self._writer: asyncio.StreamWriter | None = None
+        self._task: asyncio.Task[None] | None = None
+
+    async def connect(self, port: int, host: str = "127.0.0.1") -> Client:
+        reader, self._writer = await asyncio.open_connection(host, port)
+        self._task = asyncio.get_running_loop().create_task(self._read(reader))
+        return self
+
+    async def _read(self, reader: asyncio.StreamReader) -> None:
+        while data := await reader.read(65536):
+            self.feed(data)
+
+    def feed(self, data: bytes) -> None:
+        """Bytes from the gateway."""
+        now = time.monotonic()
+        for message in self._parser.parse_buffer(data) or ():
+            if message.get_type() == "BAD_DATA":
+                self.bad += 1
+            else:
+                self.received.append((now, message))
+        self._news.set()
+        self._news = asyncio.Event()
+
+    async def close(self) -> None:
+        if self._task is not None:
+            self._task.cancel()
+        if self._writer is not None:
+            self._writer.close()
+
+    def send_raw(self, data: bytes) -> None:
+        assert self._writer is not None
+        self._writer.write(data)
+
+    def send(self, message: Any) -> None:
+        """One frame of MAVLink 2."""
+        self.send_raw(message.pack(self._out))
+        self._out.seq = (self._out.seq + 1) % 256
+
+    def mark(self) -> int:
+        """Now, as a place in what was received."""
+        return len(self.received)
+
+    def since(self, mark: int, kind: str) -> list[tuple[float, Any]]:
+        """What was received of one kind from a mark on."""
+        return [(at, message) for at, message in self.received[mark:] if message.get_type() == kind]
+
+    async def wait(
+        self,
+        kind: str,
+        accept: Callable[[Any], bool] = lambda message: True,
+        *,
+        since: int | None = None,
+        timeout: float = 5.0,
+    ) -> Any:
+        """The first message of a kind from a mark (default: from now) on that `accept` likes."""
+        position = self.mark() if since is None else since
+        start = position
+        deadline = time.monotonic() + timeout
+        while True:
+            while position < len(self.received):
+                message = self.received[position][1]
+                position += 1
+                if message.get_type() == kind and accept(message):
+                    return message
+            left = deadline - time.monotonic()
+            news = self._news
+            try:
+                await asyncio.wait_for(news.wait(), max(left, 0.0))
+            except asyncio.TimeoutError:
+                seen = [str(m) for _, m in self.received[start:] if m.get_type() in (kind, "STATUSTEXT", "COMMAND_ACK")]
+                raise AssertionError(f"no such {kind} within {timeout} s; seen: {seen[-8:]}") from None
+
+    async def command(
+        self,
+        id: int,
+        *params: float,
+        frame: int | None = None,
+        x: float = NAN,
+        y: float = NAN,
+        z: float = NAN,
+        target: tuple[int, int] = (1, 1),
+        timeout: float = 8.0,
+    ) -> Any:
+        """Send a command (COMMAND_INT when a frame is given) and return its final COMMAND_ACK."""
+        mark = self.mark()
+        self.send_command(id, *params, frame=frame, x=x, y=y, z=z, target=target)
+        return await self.wait(
+            "COMMAND_ACK",
+            lambda ack: ack.command == id and ack.result != dialect.MAV_RESULT_IN_PROGRESS,
+            since=mark,
+            timeout=timeout,
+        )
+
+    def send_command(
+        self,
+        id: int,
+        *params: float,
+        frame: int | None = None,
+        x: float = NAN,
+        y: float = NAN,
+        z: float = NAN,
+        target: tuple[int, int] = (1, 1),
+    ) -> None:
+        p = [*params, *([NAN] * (4 - len(params)))]
+        if frame is None:
+            self.send(dialect.MAVLink_command_long_message(*target, id, 0, *p, x, y, z))
+        else:
+            places = [2**31 - 1 if math.isnan(v) else round(v * 1e7) for v in (x, y)]
+            self.send(dialect.MAVLink_command_int_message(*target, frame, id, 0, 0, *p, *places, z))
+
+    async def heartbeat(self, accept: Callable[[Any], bool], *, since: int | None = None, timeout: float = 5.0) -> Any:
+        """The vehicle's next heartbeat that `accept` likes."""
+        return await self.wait("HEARTBEAT", accept, since=since, timeout=timeout)

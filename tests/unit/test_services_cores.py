@@ -1,0 +1,242 @@
+"""The I/O-free cores of services/: modes, texts, heights, the command desk, the offboard session."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from anafi_mav.mavlink import dialect
+from anafi_mav.services import commands, modes, offboard, plan_lists
+from anafi_mav.services.height import HeightReference
+from anafi_mav.services.modes import FlightMode
+from anafi_mav.services.offboard import SILENCE, Event, OffboardStream, State
+from anafi_mav.services.parameters import INT32, REAL32, decode, encode
+from anafi_mav.services.statustext import Severity, TextNumbers
+
+NAN = math.nan
+
+# Numbers of conformance A3, as QGroundControl's table has them.
+PACKED = {
+    FlightMode.POSITION: 0x00030000,
+    FlightMode.TAKEOFF: 0x02040000,
+    FlightMode.HOLD: 0x03040000,
+    FlightMode.MISSION: 0x04040000,
+    FlightMode.RETURN: 0x05040000,
+    FlightMode.LAND: 0x06040000,
+    FlightMode.OFFBOARD: 0x00060000,
+    FlightMode.TERMINATED: 0x000A0000,
+}
+
+
+@pytest.mark.parametrize(("mode", "number"), PACKED.items())
+def test_px4_numbers(mode: FlightMode, number: int) -> None:
+    assert modes.px4_custom_mode(mode) == number
+    assert modes.from_px4_custom_mode(number) is mode
+    assert modes.from_px4_parameters(float(number), NAN) is mode
+
+
+@pytest.mark.parametrize(
+    ("main", "sub", "mode"),
+    [
+        (4.0, 3.0, FlightMode.HOLD),
+        (6.0, NAN, FlightMode.OFFBOARD),
+        (3.0, 0.0, FlightMode.POSITION),
+        (5.0, 0.0, None),  # ACRO
+        (4.0, 99.0, None),
+        (4.5, 3.0, None),
+        (NAN, NAN, None),
+        (math.inf, 0.0, None),
+        (-1.0, 0.0, None),
+        (4.0, math.inf, None),
+    ],
+)
+def test_modes_by_parameters(main: float, sub: float, mode: FlightMode | None) -> None:
+    assert modes.from_px4_parameters(main, sub) is mode
+
+
+def texts(text: str) -> list[tuple[int, int, bytes]]:
+    return [(m.id, m.chunk_seq, bytes(m._text_raw)) for m in TextNumbers().messages(Severity.WARNING, text)]
+
+
+def test_a_short_text_is_one_message() -> None:
+    assert texts("x" * 50) == [(0, 0, b"x" * 50)]
+
+
+def test_a_long_text_is_chunked() -> None:
+    assert texts("a" * 50 + "b" * 20) == [(1, 0, b"a" * 50), (1, 1, b"b" * 20)]
+
+
+def test_a_text_of_full_chunks_ends_in_an_empty_one() -> None:
+    assert [chunk for _, _, chunk in texts("a" * 100)] == [b"a" * 50, b"a" * 50, b""]
+
+
+def test_height_is_latched_on_the_ground() -> None:
+    height = HeightReference()
+    assert height.ato(100.0) is None
+    height.on_ground(35.5, 0.5)
+    assert height.takeoff_amsl == 35.0
+    assert height.ato(65.0) == 30.0
+    assert height.amsl(30.0) == 65.0
+
+
+def test_the_latch_belongs_to_one_flight() -> None:
+    height = HeightReference()
+    height.on_ground(35.0, 0.0)
+    height.in_flight("")
+    height.in_flight("flight 1")
+    height.link_down(flying=True)
+    height.in_flight("flight 1")
+    assert height.takeoff_amsl == 35.0
+    height.in_flight("flight 2")
+    assert height.takeoff_amsl is None
+
+
+def test_a_silence_on_the_ground_ends_the_latch() -> None:
+    height = HeightReference()
+    height.on_ground(35.0, 0.0)
+    height.link_down(flying=False)
+    assert height.takeoff_amsl is None
+
+
+def command(id: int = 400, p1: float = 1.0) -> commands.Command:
+    return commands.Command(id, (p1, NAN, NAN, NAN), NAN, NAN, NAN, None)
+
+
+def test_a_resent_command_is_known_while_it_runs_and_two_seconds_on() -> None:
+    desk = commands.CommandDesk()
+    assert desk.retransmission("a", command(), 0.0) is None
+    execution = desk.begin("a", command(), 0.0)
+    assert desk.retransmission("a", command(), 60.0) is execution
+    execution.result = dialect.MAV_RESULT_ACCEPTED
+    assert desk.retransmission("a", command(), 1.9) is execution
+    assert desk.retransmission("a", command(), 2.0) is None
+
+
+def test_what_is_another_command() -> None:
+    desk = commands.CommandDesk()
+    desk.begin("a", command(), 0.0)
+    assert desk.retransmission("b", command(), 0.1) is None
+    assert desk.retransmission("a", command(p1=0.0), 0.1) is None
+    assert desk.retransmission("a", command(id=22), 0.1) is None
+    # arm, disarm, arm: the third is no repetition of the first
+    desk.begin("a", command(p1=0.0), 0.2)
+    assert desk.retransmission("a", command(), 0.3) is None
+
+
+def test_command_int_scales_places_only() -> None:
+    def message(id: int, x: int, y: int) -> commands.Command:
+        return commands.from_int(dialect.MAVLink_command_int_message(1, 1, 5, id, 0, 0, 1, 2, 3, 4, x, y, 7))
+
+    goto = message(192, 488789000, -23677000)
+    assert (goto.x, goto.y, goto.z, goto.frame) == (48.8789, -2.3677, 7, 5)
+    unset = message(192, 2**31 - 1, -(2**31))
+    assert math.isnan(unset.x)
+    assert math.isnan(unset.y)
+    assert message(1000, 12, 0).x == 12
+
+
+def test_every_offboard_state_knows_its_events() -> None:
+    impossible = {(State.IDLE, Event.ENGAGE), (State.IDLE, Event.SILENCE)}
+    for state in State:
+        for event in Event:
+            assert ((state, event) in impossible) is (event not in offboard.TRANSITIONS[state])
+
+
+def attitude_target(mask: int, q: tuple[float, ...], thrust: float, yaw_rate: float = 0.0) -> object:
+    return dialect.MAVLink_set_attitude_target_message(0, 1, 1, mask, list(q), 0.0, 0.0, yaw_rate, thrust)
+
+
+def test_offboard_attitude() -> None:
+    # yaw 90 degrees, nothing else: q = (cos 45, 0, 0, sin 45)
+    half = math.sqrt(0.5)
+    setpoint = offboard.attitude_setpoint(attitude_target(7, (half, 0, 0, half), 0.75))
+    assert isinstance(setpoint, offboard.AttitudeSetpoint)
+    assert setpoint.yaw == pytest.approx(math.pi / 2)
+    assert setpoint.climb == pytest.approx(0.5)
+    # heading west of north by 170, target east by 90: the short way is counter-clockwise, -100 degrees
+    assert offboard.yaw_rate_towards(setpoint, math.radians(-170)) == pytest.approx(1.5 * math.radians(-100))
+
+
+@pytest.mark.parametrize(
+    ("mask", "thrust", "climb"), [(7, 0.5, 0.0), (7, 0.0, -1.0), (7, 1.0, 1.0), (7, NAN, 0.0), (7 | 64, 1.0, 0.0)]
+)
+def test_thrust_is_vertical_speed(mask: int, thrust: float, climb: float) -> None:
+    setpoint = offboard.attitude_setpoint(attitude_target(mask, (1, 0, 0, 0), thrust))
+    assert isinstance(setpoint, offboard.AttitudeSetpoint)
+    assert setpoint.climb == climb
+
+
+@pytest.mark.parametrize(
+    ("mask", "q", "reason"),
+    [
+        (128, (1, 0, 0, 0), "body rates alone"),
+        (7, (0, 0, 0, 0), "no rotation"),
+        (7, (NAN, 0, 0, 0), "no rotation"),
+        (7, (0, 1, 0, 0), "upside down"),
+    ],
+)
+def test_setpoints_that_cannot_be_flown(mask: int, q: tuple[float, ...], reason: str) -> None:
+    refusal = offboard.attitude_setpoint(attitude_target(mask, q, 0.5))
+    assert isinstance(refusal, str)
+    assert reason in refusal
+
+
+def test_an_offboard_session_ends_with_its_setpoints() -> None:
+    setpoint = offboard.attitude_setpoint(attitude_target(7, (1, 0, 0, 0), 0.5))
+    assert isinstance(setpoint, offboard.AttitudeSetpoint)
+    stream = OffboardStream()
+    assert not stream.fresh(0.0)
+    stream.receive(setpoint, 10.0)
+    assert stream.fresh(10.4)
+    assert not stream.fresh(10.0 + SILENCE)
+    stream.engage()
+    stream.receive(setpoint, 10.4)
+    assert not stream.expire(10.4 + SILENCE - 0.01)
+    assert stream.expire(10.4 + SILENCE)
+    assert stream.state is State.IDLE
+    assert stream.setpoint is None
+    assert not stream.expire(99.0)
+
+
+def test_silence_of_a_stream_that_flies_nothing_changes_nothing() -> None:
+    stream = OffboardStream()
+    stream.receive(offboard.AttitudeSetpoint(0, 0, 0, 0, 0), 0.0)
+    assert not stream.expire(5.0)
+    assert stream.state is State.IDLE
+
+
+@pytest.mark.parametrize("value", [0, 1, -1, 4001, 2**31 - 1, -(2**31)])
+def test_integers_travel_as_bits(value: int) -> None:
+    carrier = encode(float(value), INT32)
+    packed = dialect.MAVLink_param_value_message(b"X", carrier, INT32, 1, 0).pack(dialect.MAVLink(None, 1, 1))
+    # header 10 bytes, then param_value as the first four of the payload
+    assert int.from_bytes(packed[10:14], "little", signed=True) == value
+    assert decode(carrier, INT32) == value
+
+
+def test_reals_travel_as_they_are() -> None:
+    assert encode(2.5, REAL32) == decode(2.5, REAL32) == 2.5
+
+
+@pytest.mark.parametrize("kind", [0, 1, 2])
+def test_lists_are_empty(kind: int) -> None:
+    (count,) = plan_lists.answer(dialect.MAVLink_mission_request_list_message(1, 1, kind), 255, 190)
+    assert (count.get_type(), count.count, count.mission_type) == ("MISSION_COUNT", 0, kind)
+    assert (count.target_system, count.target_component) == (255, 190)
+
+
+@pytest.mark.parametrize(
+    ("message", "result"),
+    [
+        (dialect.MAVLink_mission_clear_all_message(1, 1, 255), "MAV_MISSION_ACCEPTED"),
+        (dialect.MAVLink_mission_count_message(1, 1, 0, 0), "MAV_MISSION_ACCEPTED"),
+        (dialect.MAVLink_mission_count_message(1, 1, 3, 0), "MAV_MISSION_UNSUPPORTED"),
+        (dialect.MAVLink_mission_request_int_message(1, 1, 0, 0), "MAV_MISSION_INVALID_SEQUENCE"),
+        (dialect.MAVLink_mission_request_list_message(1, 1, 7), "MAV_MISSION_UNSUPPORTED"),
+    ],
+)
+def test_what_needs_a_mission_is_refused(message: object, result: str) -> None:
+    (ack,) = plan_lists.answer(message, 255, 0)
+    assert ack.get_type() == "MISSION_ACK"
+    assert ack.type == getattr(dialect, result)
