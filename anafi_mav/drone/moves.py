@@ -123,8 +123,8 @@ class Moves:
         self.by: deque[Move] = deque()
         """Oldest first: the drone ends them in this order."""
         self.returning: Move | None = None
-        self._replaced: Move | None = None
-        """The moveTo before `to`; a late event may still speak of it."""
+        self._older: Move | None = None
+        """The moveTo that still runs while `to` waits for its answer: a refused newer one leaves it alone."""
         self._cancelling: Move | None = None
         """The moveTo that we cancelled and whose CANCELED has not come yet."""
         self._stray_until = 0.0
@@ -136,23 +136,33 @@ class Moves:
     # -- what we do
 
     def begin_to(self, move: Move) -> Move | None:
-        """A moveTo is about to be sent. Returns the one whose place it takes."""
-        self._replaced, self.to = self.to, move
-        if self._replaced is not None:
-            self._replaced.end(MoveEnd.REPLACED)
-            self._replaced.answer.fail(CommandRejected("replaced by a newer moveTo"))
-        return self._replaced
+        """A moveTo is about to be sent. Returns one that nobody waits for any more, it was not under way yet."""
+        before, self.to = self.to, move
+        if before is None:
+            return None
+        if before.running:
+            self._older = before
+            return None
+        before.end(MoveEnd.REPLACED)
+        before.answer.fail(CommandRejected("replaced by a newer moveTo"))
+        return before
 
     def cancel_to(self, why: str) -> Move | None:
-        """The moveTo is about to be cancelled; returns it. It ends when the drone says so, if it was under way."""
-        move, self.to = self.to, None
-        if move is not None:
+        """Whatever moveTo there is, is about to be cancelled. Returns the newest.
+
+        One that was under way ends when the drone says so.
+        """
+        newest, older = self.to, self._older
+        self.to = self._older = None
+        for move in (newest, older):
+            if move is None:
+                continue
             move.answer.fail(CommandRejected(why))
             if move.running:
                 self._cancelling = move
             else:
                 move.end(MoveEnd.CANCELED)
-        return move
+        return newest
 
     def cancel_by(self, why: str, now: float) -> list[Move]:
         """The moveBys are about to be cancelled; returns them. They end here: the drone's event names none of them."""
@@ -173,11 +183,11 @@ class Moves:
 
     def clear(self, how: MoveEnd) -> None:
         """All have ended, as far as we are concerned."""
-        for move in (*self.started(), self._cancelling):
+        for move in (*self.started(), self._older, self._cancelling):
             if move is not None:
                 move.end(how)
                 move.answer.fail(CommandRejected(how.value))
-        self.to = self.returning = self._replaced = self._cancelling = None
+        self.to = self.returning = self._older = self._cancelling = None
         self.by.clear()
         self._stray_until = 0.0
 
@@ -196,25 +206,37 @@ class Moves:
         move = self.to
         if message.status == MoveToStatus.RUNNING:
             if move is not None and move.is_to(message):
-                move.running = True
-                move.answer.succeed(move)
-                if self._cancelling is not None:
-                    # Acknowledged commands are carried out in order: that one is over, whatever became of its event.
-                    self._cancelling.end(MoveEnd.CANCELED)
-                    self._cancelling = None
+                self._under_way(move)
             return
         how = _MOVE_TO_ENDS.get(message.status)
         if how is None:
             return
-        if self._cancelling is not None and self._cancelling.is_to(message) and (move is None or not move.running):
-            self._cancelling.end(how)
-            self._cancelling = None
+        if move is None or not move.running:
+            # Commands are carried out in their order, so this may still speak of what was before.
+            if self._cancelling is not None and self._cancelling.is_to(message):
+                self._cancelling.end(how)
+                self._cancelling = None
+                return
+            if self._older is not None and self._older.is_to(message):
+                self._older.end(how)
+                self._older = None
+                return
+        if move is None or (not move.is_to(message) and (move.running or how is MoveEnd.DONE)):
             return
-        if move is None or (not move.is_to(message) and self._replaced is not None and self._replaced.is_to(message)):
-            return
-        self.to = None
+        self.to, self._older = self._older, None
         move.end(how)
         move.answer.fail(CommandRejected(f"the drone answered the moveTo with {how.value}"))
+
+    def _under_way(self, move: Move) -> None:
+        """The newest moveTo is being flown, so that all before it are over."""
+        if self._older is not None:
+            self._older.end(MoveEnd.REPLACED)
+            self._older = None
+        if self._cancelling is not None:
+            self._cancelling.end(MoveEnd.CANCELED)
+            self._cancelling = None
+        move.running = True
+        move.answer.succeed(move)
 
     def _on_move_by_end(self, message: ardrone3.MoveByEnd, now: float) -> None:
         if not self.by or self._is_stray(message, now):

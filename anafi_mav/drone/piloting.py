@@ -224,9 +224,9 @@ class Piloting(Element[PilotingState]):
         command = self._move_to_command(Position(latitude, longitude, altitude), heading_deg, horizontal_speed)
         move = Move(self._commander.expect((), _decided_elsewhere), Position(latitude, longitude, altitude))
         self._silence_sticks()
-        replaced = self._moves.begin_to(move)
-        if replaced is not None and replaced.answer.token is not None:
-            self._commander.cancel(replaced.answer.token)
+        obsolete = self._moves.begin_to(move)
+        if obsolete is not None and obsolete.answer.token is not None:
+            self._commander.cancel(obsolete.answer.token)
         try:
             self._commander.dispatch(move.answer, command, timeout)
             await move.answer.wait()

@@ -483,6 +483,30 @@ async def test_a_newer_move_to_replaces_the_older(drone: Drone, device: Scripted
     assert await newer.result() is MoveEnd.DONE
 
 
+async def test_a_refused_newer_move_to_leaves_the_older_one_ours(drone: Drone, device: ScriptedDevice) -> None:
+    await flying(drone, device)
+    device.script[ardrone3.MoveTo] = lambda command: [running(command)]
+    older = await drone.piloting.move_to(48.0, 2.0, 15.0)
+    device.script[ardrone3.MoveTo] = lambda command: [running(command, MoveToStatus.ERROR)]
+    with pytest.raises(CommandRejected):
+        await drone.piloting.move_to(49.0, 2.0, 15.0)
+    assert drone.moves_started == (older,)
+    assert not older.ended.done()
+    drone.piloting.hover()
+    await device.until(ardrone3.CancelMoveTo)
+    device.say(running(device.got(ardrone3.MoveTo)[0], MoveToStatus.CANCELED))
+    assert await asyncio.wait_for(older.result(), 3.0) is MoveEnd.CANCELED
+
+
+async def test_an_older_move_to_may_arrive_while_the_newer_waits(drone: Drone, device: ScriptedDevice) -> None:
+    device.script[ardrone3.MoveTo] = lambda command: [running(command)]
+    older = await drone.piloting.move_to(48.0, 2.0, 15.0)
+    device.script[ardrone3.MoveTo] = lambda command: [running(command, MoveToStatus.DONE), running(command)]
+    newer = await drone.piloting.move_to(48.0, 2.0, 15.0)
+    assert await older.result() is MoveEnd.DONE
+    assert drone.moves_started == (newer,)
+
+
 async def test_a_move_to_replaced_while_it_waits_is_rejected_and_taken_back(
     drone: Drone, device: ScriptedDevice
 ) -> None:
