@@ -1,0 +1,183 @@
+"""`anafi-mav sim`: simulated drones alone, one process for all of them."""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import contextlib
+import ipaddress
+import os
+import signal
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import msgspec
+
+from anafi_mav.cli.terminal import say
+from anafi_mav.errors import ConfigError
+from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
+
+MAX_COUNT = 254
+"""Drones of one process: the hosts of one /24, where their addresses live."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of `anafi-mav sim`. Their values are checked by `run`, for one clear line each."""
+    default = DroneSpec()
+    parser.add_argument("--model", default=default.model, help="which ANAFI: 4k")
+    parser.add_argument("--address", default=default.address, help="of the first drone (%(default)s)")
+    parser.add_argument("--count", default="1", metavar="N", help="drones, on consecutive addresses (%(default)s)")
+    parser.add_argument(
+        "--home",
+        default=",".join(f"{number:g}" for number in default.home),
+        metavar="LAT,LON,ALT",
+        help="where they stand: degrees, degrees, metres above sea level (%(default)s)",
+    )
+    parser.add_argument("--speed", default="1.0", metavar="FACTOR", help="simulated seconds per second (%(default)s)")
+    parser.add_argument("--seed", metavar="N", help="start of the random numbers; same seed, same ids")
+    parser.add_argument(
+        "--telemetry-rate", default="5", metavar="HZ", help="attitude, speed, altitude per second (%(default)s)"
+    )
+    parser.add_argument("--protocol", metavar="1|2|3", help="offer only this version of Parrot's transport")
+    parser.add_argument("--http-port", default="80", metavar="PORT", help="of each drone's web server (%(default)s)")
+    parser.add_argument("--log", type=Path, metavar="FILE", help="write what happens to FILE, one JSON object a line")
+    parser.add_argument("--stdin-watch", action="store_true", help="end when stdin closes")
+    # For `anafi-mav run`: a JSON object {speed, seed, drones: [{model, address, …}]}, one line on stdin for "-".
+    parser.add_argument("--fleet", metavar="FILE", help=argparse.SUPPRESS)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Simulate until SIGINT or SIGTERM. Raises `ConfigError` before anything is started."""
+    fleet = _from_fleet(arguments.fleet) if arguments.fleet is not None else _from_options(arguments)
+    asyncio.run(_run(fleet, arguments.log, arguments.stdin_watch))
+    return 0
+
+
+class Fleet(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What is to be simulated; also the JSON of `--fleet`."""
+
+    drones: list[DroneSpec]
+    speed: float = 1.0
+    seed: int | None = None
+
+
+def _from_options(arguments: argparse.Namespace) -> Fleet:
+    count = _integer("--count", arguments.count, f"a number from 1 to {MAX_COUNT}")
+    if not 1 <= count <= MAX_COUNT:
+        raise ConfigError("--count", f"expected a number from 1 to {MAX_COUNT}, got {count}")
+    speed = _number("--speed", arguments.speed, "a number from 0.1 to 20")
+    if not 0.1 <= speed <= 20.0:
+        raise ConfigError("--speed", f"expected a number from 0.1 to 20, got {arguments.speed}")
+    versions = (1, 3)
+    if arguments.protocol is not None:
+        version = _integer("--protocol", arguments.protocol, "1, 2 or 3")
+        if version not in (1, 2, 3):
+            raise ConfigError("--protocol", f"expected 1, 2 or 3, got {version}")
+        versions = (version, version)
+    seed = None if arguments.seed is None else _integer("--seed", arguments.seed, "a whole number")
+    try:
+        first = DroneSpec(
+            model=arguments.model,
+            address=arguments.address,
+            home=_home(arguments.home),
+            http_port=_integer("--http-port", arguments.http_port, "a port from 0 to 65535"),
+            versions=versions,
+            telemetry_rate=_number("--telemetry-rate", arguments.telemetry_rate, "events per second"),
+        )
+    except ConfigError as error:
+        raise ConfigError(_flag(error.key_path), error.problem) from None
+    try:
+        addresses = [str(ipaddress.IPv4Address(first.address) + index) for index in range(count)]
+    except ValueError:
+        raise ConfigError("--count", f"expected room for {count} addresses from {first.address} on") from None
+    return Fleet([replace(first, address=address) for address in addresses], speed, seed)
+
+
+def _flag(key_path: str) -> str:
+    """The option that a key of `DroneSpec` comes from."""
+    return key_path if key_path.startswith("--") else "--" + key_path.replace("_", "-")
+
+
+def _from_fleet(source: str) -> Fleet:
+    try:
+        text = sys.stdin.readline() if source == "-" else Path(source).read_text(encoding="utf-8")
+        return msgspec.json.decode(text, type=Fleet)
+    except (OSError, msgspec.DecodeError) as error:
+        raise ConfigError("--fleet", f"expected a JSON object with drones in {source}: {error}") from error
+
+
+def _home(text: str) -> tuple[float, float, float]:
+    try:
+        latitude, longitude, altitude = (float(part) for part in text.split(","))
+    except ValueError:
+        raise ConfigError("--home", f"expected LAT,LON,ALT like 48.8789,2.3677,35, got {text!r}") from None
+    return latitude, longitude, altitude
+
+
+def _integer(flag: str, text: str, wanted: str) -> int:
+    try:
+        return int(text)
+    except ValueError:
+        raise ConfigError(flag, f"expected {wanted}, got {text!r}") from None
+
+
+def _number(flag: str, text: str, wanted: str) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        number = float("nan")
+    if number != number or abs(number) == float("inf"):
+        raise ConfigError(flag, f"expected {wanted}, got {text!r}")
+    return number
+
+
+async def _run(fleet: Fleet, log: Path | None, stdin_watch: bool) -> None:
+    stop = asyncio.Event()
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, stop.set)
+    if stdin_watch:
+        _watch_stdin(stop)
+    try:
+        simulator = Simulator(fleet.drones, speed=fleet.speed, seed=fleet.seed, log=log, remember=False)
+    except OSError as error:
+        raise ConfigError("--log", f"expected a file that can be written, got {log}: {error.strerror}") from error
+    async with simulator:
+        for drone in simulator.drones:
+            say(_line(drone))
+        say("ready, Ctrl-C ends", "green")
+        ended = asyncio.create_task(simulator.wait())
+        stopped = asyncio.create_task(stop.wait())
+        await asyncio.wait({ended, stopped}, return_when=asyncio.FIRST_COMPLETED)
+        for task in (ended, stopped):
+            task.cancel()
+        if not stopped.done():
+            ended.result()  # raises what went wrong
+
+
+def _line(drone: SimulatedDrone) -> str:
+    """What is known of a drone before anybody talks to it."""
+    low, high = drone.spec.versions
+    protocol = f"protocol {low}" if low == high else f"protocol {low} to {high}"
+    web = drone.http_problem or ("no HTTP" if drone.http_port is None else f"HTTP {drone.http_port}")
+    name = f"{drone.identity.name} ({drone.spec.model}, {drone.identity.serial})"
+    return f"{name} at {drone.address}: discovery {drone.discovery_port}, {protocol}, {web}"
+
+
+def _watch_stdin(stop: asyncio.Event) -> None:
+    """Set `stop` when stdin ends, so that a parent that dies leaves no simulator behind."""
+    loop = asyncio.get_running_loop()
+    stdin = sys.stdin.fileno()
+
+    def readable() -> None:
+        with contextlib.suppress(BlockingIOError):
+            if not os.read(stdin, 4096):
+                loop.remove_reader(stdin)
+                stop.set()
+
+    try:
+        loop.add_reader(stdin, readable)
+    except PermissionError:
+        # A regular file or the like, which epoll does not take: it has no end to wait for.
+        raise ConfigError("--stdin-watch", "expected stdin to be a pipe or a terminal") from None

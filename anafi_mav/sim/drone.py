@@ -1,0 +1,267 @@
+"""One simulated drone: its firmware behind the real sockets of an ANAFI."""
+
+from __future__ import annotations
+
+import ipaddress
+import math
+import os
+import random
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from anafi_mav.arsdk import handshake
+from anafi_mav.arsdk.device import DeviceServer, DeviceSession
+from anafi_mav.arsdk.handshake import DeviceInfo
+from anafi_mav.arsdk.messages import common
+from anafi_mav.arsdk.messages.ardrone3 import FlyingState
+from anafi_mav.arsdk.session import OnMessage
+from anafi_mav.arsdk.wire import Buffer, Message, UnknownMessage
+from anafi_mav.errors import ConfigError
+from anafi_mav.sim.firmware import Faults, Firmware, Identity
+from anafi_mav.sim.http import WebServer
+from anafi_mav.sim.log import Log, LogEntry
+from anafi_mav.sim.model import KNOWN_MODELS, MODELS
+from anafi_mav.sim.motion import Body, Pose
+from anafi_mav.sim.place import Origin
+from anafi_mav.sim.states import all_settings, all_states
+from anafi_mav.sim.telemetry import RATE, Telemetry
+
+POSE_PERIOD = 0.1
+"""s between two poses in the log."""
+
+MAX_RATE = 200.0
+"""Hz; the motion itself is not computed more often."""
+
+
+@dataclass(frozen=True)
+class DroneSpec:
+    """What a simulated drone is to be. Raises `ConfigError` for values it cannot be."""
+
+    model: str = "4k"
+    address: str = "127.0.42.1"
+    home: tuple[float, float, float] = (48.8789, 2.3677, 35.0)
+    """deg, deg, and the height of the ground in m above mean sea level; the drone stands there."""
+    serial: str | None = None
+    """18 characters; None makes one of the address."""
+    name: str | None = None
+    """None makes one of the serial number, as Parrot does."""
+    discovery_port: int = handshake.DISCOVERY_PORT
+    handshake_port: int = handshake.HANDSHAKE_PORT
+    c2d_port: int = handshake.C2D_PORT
+    http_port: int | None = 80
+    """None: no web server."""
+    versions: tuple[int, int] = (1, 3)
+    """Lowest and highest ARSDK protocol version offered."""
+    telemetry_rate: float = RATE
+    """Hz of attitude, speed and height."""
+
+    def __post_init__(self) -> None:
+        if self.model not in MODELS:
+            known = " (not simulated yet)" if self.model in KNOWN_MODELS else ""
+            raise ConfigError("model", f"expected one of {', '.join(MODELS)}, got {self.model!r}{known}")
+        try:
+            ipaddress.IPv4Address(self.address)
+        except ValueError:
+            raise ConfigError("address", f"expected an IPv4 address, got {self.address!r}") from None
+        latitude, longitude, altitude = self.home
+        if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0 and math.isfinite(altitude)):
+            raise ConfigError("home", f"expected latitude, longitude (deg) and altitude (m), got {self.home}")
+        if self.http_port is not None and not 0 <= self.http_port < 65536:
+            raise ConfigError("http_port", f"expected a port from 0 to 65535, got {self.http_port}")
+        if not 0.0 < self.telemetry_rate <= MAX_RATE:
+            raise ConfigError("telemetry_rate", f"expected up to {MAX_RATE:g} Hz, got {self.telemetry_rate:g}")
+        if self.serial is not None and not 5 <= len(self.serial) <= 32:
+            raise ConfigError("serial", f"expected 5 to 32 characters, got {self.serial!r}")
+
+
+class SimulatedDrone:
+    """A drone on the network. `log` says what it went through, `faults` is where to break it."""
+
+    def __init__(
+        self, spec: DroneSpec, body: Body, log: Log, clock: Callable[[], float], chance: random.Random, phase: float
+    ) -> None:
+        model = MODELS[spec.model]
+        serial = spec.serial or _serial(model.serial_prefix, spec.address)
+        identity = Identity(
+            serial=serial,
+            name=spec.name or f"{model.title}-{serial[-7:]}",
+            boot_id=f"{chance.getrandbits(128):032X}",
+            run_id=f"{chance.getrandbits(128):032X}",
+        )
+        self.spec = spec
+        self.identity = identity
+        self.log = log
+        self.faults = Faults()
+        self.http_problem = ""
+        """Why there is no web server although one was asked for; empty: there is one, or nobody asked."""
+        self._clock = clock
+        self._body = body
+        self.firmware = Firmware(model, identity, body, Origin(*spec.home), self._emit, self._note, self.faults, chance)
+        self._telemetry = Telemetry(self.firmware, spec.telemetry_rate, phase)
+        self._info = DeviceInfo(model.product_id, serial, spec.handshake_port, identity.name)
+        self._server: DeviceServer | None = None
+        self._web: WebServer | None = None
+        self._session: DeviceSession | None = None
+        self._next_pose = 0.0
+        self._closing = False
+
+    # -- what tests and scenarios use
+
+    @property
+    def address(self) -> str:
+        return self.spec.address
+
+    @property
+    def pose(self) -> Pose:
+        """The true pose."""
+        return self.firmware.pose
+
+    @property
+    def flying_state(self) -> FlyingState:
+        return self.firmware.state
+
+    @property
+    def session(self) -> DeviceSession | None:
+        """The controller's session while its link is up."""
+        return self._session
+
+    @property
+    def discovery_port(self) -> int:
+        return 0 if self._server is None else self._server.discovery_port
+
+    @property
+    def handshake_port(self) -> int:
+        return 0 if self._server is None else self._server.handshake_port
+
+    @property
+    def http_port(self) -> int | None:
+        """Where the web server listens; None: there is none."""
+        return None if self._web is None else self._web.port
+
+    def throw(self) -> None:
+        """Hand launch: counts after UserTakeOff."""
+        self.firmware.throw()
+
+    def place(self, north: float, east: float, heading: float = 0.0) -> None:
+        """Carry the drone to another spot (m from home, rad). It must be on the ground."""
+        self._body.place(north, east, heading)
+
+    async def wait_log(
+        self, predicate: Callable[[LogEntry], bool], timeout: float = 5.0, *, since: float = float("-inf")
+    ) -> LogEntry:
+        """See `Log.wait`."""
+        return await self.log.wait(predicate, timeout, since=since)
+
+    # -- life
+
+    async def start(self) -> None:
+        """Open the sockets. Raises `OSError` when a port but the web server's is taken."""
+        spec = self.spec
+        self._server = await DeviceServer.start(
+            spec.address,
+            discovery_port=spec.discovery_port,
+            handshake_port=spec.handshake_port,
+            c2d_port=spec.c2d_port,
+            info=self._info,
+            versions=spec.versions,
+            on_session=self._on_session,
+        )
+        if spec.http_port is None:
+            return
+        web = WebServer()
+        try:
+            await web.start(spec.address, spec.http_port)
+        except OSError as error:
+            self.http_problem = f"no HTTP on port {spec.http_port}: {os.strerror(error.errno or 0)}"
+        else:
+            self._web = web
+
+    async def close(self) -> None:
+        """Close the sockets, without a word to the controller: ARSDK has no goodbye. Idempotent."""
+        self._closing = True
+        if self._server is not None:
+            await self._server.close()
+        if self._web is not None:
+            await self._web.close()
+
+    def tick(self, now: float, elapsed: float, pose: Pose, arrived: bool, still: bool) -> None:
+        """Called by the simulation after each of its turns; see `Firmware.tick`."""
+        self.firmware.tick(now, elapsed, pose, arrived, still)
+        session = self._session
+        if session is not None:
+            session.mute = self.faults.mute
+            for message in self._telemetry.due(now):
+                session.send(message)
+        if now >= self._next_pose:
+            self._next_pose = max(self._next_pose + POSE_PERIOD, now)
+            self._log_pose(now, pose)
+
+    def _log_pose(self, now: float, pose: Pose) -> None:
+        latitude, longitude = self.firmware.place()
+        args = {
+            "north": pose.north,
+            "east": pose.east,
+            "up": pose.up,
+            "lat": latitude,
+            "lon": longitude,
+            "ato": pose.up,
+            "roll": pose.roll,
+            "pitch": pose.pitch,
+            "yaw": pose.yaw,
+            "vn": pose.vn,
+            "ve": pose.ve,
+            "vd": pose.vd,
+        }
+        self.log.add(now, "pose", "true", args)
+
+    # -- the link
+
+    def _on_session(self, session: DeviceSession) -> OnMessage:
+        now = self._clock()
+        self._session = session
+        session.mute = self.faults.mute
+        session.lost.add_done_callback(lambda lost: self._on_lost(session, lost.result()))
+        self.log.add(now, "session", "up", {"peer": session.peer, "version": session.version})
+        self.firmware.link_up()
+
+        def on_message(message: Message | UnknownMessage, now: float) -> None:
+            self._on_message(session, message, now)
+
+        return on_message
+
+    def _on_lost(self, session: DeviceSession, reason: str) -> None:
+        if self._session is not session:
+            return
+        self._session = None
+        self.log.add(self._clock(), "session", "lost", {"reason": reason})
+        if not self._closing:
+            self.firmware.link_lost()
+
+    def _on_message(self, session: DeviceSession, message: Message | UnknownMessage, now: float) -> None:
+        self.log.add_message(now, "command", message)
+        if isinstance(message, common.AllStates):
+            self._send_all(session, all_states(self.firmware), common.AllStatesChanged())
+        elif isinstance(message, common.AllSettings):
+            self._send_all(session, all_settings(self.firmware), common.AllSettingsChanged())
+        else:
+            self.firmware.receive(message, now)
+
+    def _send_all(self, session: DeviceSession, messages: list[Message], end: Message) -> None:
+        for message in messages:
+            session.send(message)
+        session.send(end)
+
+    def _emit(self, message: Message) -> None:
+        if message.BUFFER is not Buffer.NON_ACK:
+            self.log.add_message(self._clock(), "event", message)
+        if self._session is not None:
+            self._session.send(message)
+
+    def _note(self, name: str, args: dict[str, Any]) -> None:
+        self.log.add(self._clock(), "state", name, args)
+
+
+def _serial(prefix: str, address: str) -> str:
+    """A serial number that belongs to the address, so that a drone keeps it from run to run."""
+    return f"{prefix}{int(ipaddress.IPv4Address(address)) % 1_000_000:06d}"

@@ -1,0 +1,519 @@
+"""The simulated firmware: commands in, events out, with a `Body` that flies.
+
+No I/O and no clock: `receive` takes a command and the time of its arrival, `tick` lets time pass, events leave through
+`emit`. Two times are told apart: `now` is the machine's clock, which the link and its watchdogs run on; `time` is the
+simulated one, which runs `--speed` times as fast and everything about the aircraft runs on.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from anafi_mav.arsdk.messages import ardrone3, common, follow_me, move, rth
+from anafi_mav.arsdk.messages.alarms import TakeoffChecklistType, Type
+from anafi_mav.arsdk.messages.ardrone3 import AlertState, FlyingState
+from anafi_mav.arsdk.messages.rth import RthEndingBehavior, StateReason
+from anafi_mav.arsdk.wire import Message, UnknownMessage
+from anafi_mav.sim import power
+from anafi_mav.sim.camera import Camera
+from anafi_mav.sim.compass import Compass
+from anafi_mav.sim.gimbal import Gimbal
+from anafi_mav.sim.guidance import Guidance
+from anafi_mav.sim.homing import UNKNOWN, Homing
+from anafi_mav.sim.machine import AIRBORNE, GUIDED, LANDED, Event, next_state
+from anafi_mav.sim.model import Model
+from anafi_mav.sim.motion import Body, Pose
+from anafi_mav.sim.place import Origin
+from anafi_mav.sim.power import Battery
+from anafi_mav.sim.safety import Alarms, check_changed, checklist
+from anafi_mav.sim.settings import Settings
+from anafi_mav.sim.storage import Storage
+
+RAMP_TIME = 1.0
+"""s that the motors need; one or two on the aircraft."""
+SETTLE_TIME = 1.0
+"""s from the fall's end to landed. Assumed."""
+SENSOR_PERIOD = 0.05
+"""s between two looks at battery, GPS and what else does not fly."""
+SATELLITES = 14
+
+_REST = Pose(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Identity:
+    serial: str
+    name: str
+    boot_id: str
+    run_id: str
+
+
+@dataclass
+class Faults:
+    """What a test or a scenario may break. Takes effect at once."""
+
+    mute: bool = False
+    """The air is gone: nothing is heard and nothing is said, both ways."""
+    gps: bool = True
+    """False: the receiver has no fix."""
+    magneto_required: bool = False
+    """The magnetometer needs calibration; a calibration puts it back to False."""
+    battery: int | None = None
+    """Percent that the battery is held at."""
+
+
+class Firmware:
+    """One drone's brain."""
+
+    def __init__(
+        self,
+        model: Model,
+        identity: Identity,
+        body: Body,
+        origin: Origin,
+        emit: Callable[[Message], None],
+        note: Callable[[str, dict[str, Any]], None],
+        faults: Faults,
+        chance: random.Random,
+    ) -> None:
+        self.model = model
+        self.identity = identity
+        self.faults = faults
+        self.settings = Settings(model, identity.name)
+        self.battery = Battery(model)
+        self.compass = Compass()
+        self.gimbal = Gimbal(model)
+        self.camera = Camera(model)
+        self.storage = Storage()
+        self.alarms = Alarms()
+        self.homing = Homing(body, origin, self.settings, emit)
+        self.guidance = Guidance(model, body, origin, self.settings, self.homing, emit)
+        self.state = LANDED
+        self.pose = _REST
+        self.time = 0.0
+        self.fix = faults.gps
+        self.flight_id = ""
+        self.datetime = "19700101T000000+0000"
+        self.sound = ardrone3.AlertSoundState.STOPPED
+        self._body = body
+        self._origin = origin
+        self._emit = emit
+        self._note = note
+        self._chance = chance
+        self._alert = AlertState.NONE
+        self._blockers: frozenset[TakeoffChecklistType] = frozenset()
+        self._by_hand = False
+        self._timer = 0.0
+        """End of the motors' ramp, or of the pause after an emergency."""
+        self._grounded = False
+        self._return_at: float | None = None
+        self._flights, self._last_flight, self._flown = 0, 0.0, 0.0
+        self._took_off_at: float | None = None
+        self._unseen = SENSOR_PERIOD
+        """Simulated seconds since the sensors were last looked at."""
+        self.guidance.apply_limits()
+
+    # -- what others ask
+
+    @property
+    def satellites(self) -> int:
+        return SATELLITES if self.fix else 0
+
+    @property
+    def alert(self) -> AlertState:
+        return AlertState.USER if self.state is FlyingState.EMERGENCY else self.battery.alert
+
+    def sensor_ok(self, sensor: common.Sensor) -> bool:
+        if sensor is common.Sensor.GPS:
+            return self.fix
+        return sensor is not common.Sensor.MAGNETOMETER or not self.compass.required
+
+    def plan_part_ok(self, part: common.FlightPlanComponent) -> bool:
+        """Whether this does not stand in the way of a flight plan."""
+        if part is common.FlightPlanComponent.GPS:
+            return self.fix
+        return part is not common.FlightPlanComponent.CALIBRATION or not self.compass.required
+
+    @property
+    def plan_available(self) -> bool:
+        return all(self.plan_part_ok(part) for part in common.FlightPlanComponent)
+
+    def blockers(self) -> frozenset[TakeoffChecklistType]:
+        """What a take-off would be refused for."""
+        found = set()
+        if self.compass.required:
+            found.add(TakeoffChecklistType.MAGNETO_CALIBRATION)
+        if self.battery.percent <= power.CRITICAL:
+            found.add(TakeoffChecklistType.BATTERY_CRITICAL)
+        return frozenset(found)
+
+    def flights_report(self) -> Message:
+        return ardrone3.MotorFlightsStatusChanged(self._flights, round(self._last_flight), round(self._flown))
+
+    def place(self) -> tuple[float, float]:
+        """True latitude and longitude."""
+        return self._origin.place(self.pose.north, self.pose.east)
+
+    def position_report(self) -> list[Message]:
+        """Where GPS says the drone is: deg, deg, m above mean sea level."""
+        if not self.fix:
+            return [
+                ardrone3.PositionChanged(UNKNOWN, UNKNOWN, UNKNOWN),
+                ardrone3.GpsLocationChanged(UNKNOWN, UNKNOWN, UNKNOWN, -1, -1, -1),
+            ]
+        latitude, longitude = self.place()
+        altitude = self._origin.altitude + self.pose.up
+        return [
+            ardrone3.PositionChanged(latitude, longitude, altitude),
+            ardrone3.GpsLocationChanged(latitude, longitude, altitude, 1, 1, 2),
+        ]
+
+    def motion_report(self) -> list[Message]:
+        pose = self.pose
+        return [
+            ardrone3.AttitudeChanged(pose.roll, pose.pitch, pose.yaw),
+            ardrone3.SpeedChanged(pose.vn, pose.ve, pose.vd),
+            ardrone3.AltitudeChanged(pose.up),
+        ]
+
+    # -- the link
+
+    def link_lost(self) -> None:
+        """Nobody is there any more: hover, and go home after a while if there is a home."""
+        self.guidance.release_sticks()
+        if self.state in GUIDED | {FlyingState.TAKINGOFF} and not self.homing.flying:
+            self.guidance.cancel(self.pose)
+            self._return_at = self.time + self.settings.number("rth_delay")
+
+    def link_up(self) -> None:
+        """Somebody is there. A return that has begun goes on."""
+        self._return_at = None
+
+    # -- time
+
+    def tick(self, now: float, elapsed: float, pose: Pose, arrived: bool, still: bool) -> None:
+        """`elapsed` simulated seconds went by and brought the drone to `pose`.
+
+        `arrived`: the body has done what it was told; `still`: it does not move.
+        """
+        self.pose = pose
+        self.time += elapsed
+        self.guidance.watch_sticks(now)
+        self._unseen += elapsed
+        if self._unseen >= SENSOR_PERIOD:
+            self._update_sensors(self._unseen)
+            self._unseen = 0.0
+        if self.state is LANDED:
+            return
+        if self.state in GUIDED:
+            self._fly(arrived, still)
+        elif self.state is FlyingState.MOTOR_RAMPING:
+            if self.time >= self._timer:
+                self._fire(Event.IDLING if self._by_hand else Event.RAMPED_UP)
+        elif self.state is FlyingState.TAKINGOFF:
+            if arrived:
+                self._body.hover()
+                self._fire(Event.AIRBORNE)
+        elif self.state in (FlyingState.LANDING, FlyingState.EMERGENCY_LANDING):
+            if arrived:
+                self._fire(Event.TOUCHDOWN)
+        elif self.state is FlyingState.EMERGENCY:
+            if arrived and not self._grounded:
+                self._grounded, self._timer = True, self.time + SETTLE_TIME
+            elif self._grounded and self.time >= self._timer:
+                self._fire(Event.SETTLED)
+        if self.state in AIRBORNE:
+            self._watch_limits()
+
+    def _fly(self, arrived: bool, still: bool) -> None:
+        hovering = self.state is FlyingState.HOVERING
+        ending = self.guidance.tick(self.time, self.pose, arrived, hovering)
+        if ending is RthEndingBehavior.LANDING:
+            self._fire(Event.LAND)
+            return
+        if self._return_at is not None and self.time >= self._return_at:
+            self._return_at = None
+            self.homing.request(StateReason.CONNECTION_LOST, self.pose, hovering)
+        self._fire(Event.BUSY if self.guidance.busy or not still else Event.AT_REST)
+
+    def _update_sensors(self, elapsed: float) -> None:
+        for message in self.battery.drain(elapsed, self.state in AIRBORNE, self.faults.battery):
+            self._emit(message)
+        for message in self.compass.require(self.faults.magneto_required):
+            self._emit(message)
+        for messages in (self.compass.tick(self.time), self.gimbal.tick(self.time), self.storage.tick(self.time)):
+            for message in messages:
+                self._emit(message)
+        self.faults.magneto_required = self.compass.required
+        if self.fix != self.faults.gps:
+            self._set_fix(self.faults.gps)
+        self.homing.sensors(self.fix, not self.compass.required)
+        if self.alert is not self._alert:
+            self._alert = self.alert
+            self._emit(ardrone3.AlertStateChanged(self._alert))
+        blockers = self.blockers()
+        for check in sorted(blockers ^ self._blockers):
+            self._emit(check_changed(check, check in blockers))
+        self._blockers = blockers
+        if self.battery.percent <= power.EMPTY and self._fire(Event.FORCED_LANDING):
+            self._emit(ardrone3.ForcedLandingAutoTrigger(ardrone3.ForcedLandingReason.BATTERY_CRITICAL_SOON, 0))
+
+    def _set_fix(self, fix: bool) -> None:
+        self.fix = fix
+        self._emit(ardrone3.GPSFixStateChanged(int(fix)))
+        self._emit(ardrone3.NumberOfSatelliteChanged(self.satellites))
+        self._emit(common.SensorsStatesListChanged(common.Sensor.GPS, int(fix)))
+        self._emit(common.ComponentStateListChanged(common.FlightPlanComponent.GPS, int(fix)))
+        self._emit(common.AvailabilityStateChanged(int(self.plan_available)))
+        if not fix:
+            self.guidance.gps_lost(self.pose)
+        if fix and self.state in AIRBORNE and self.homing.takeoff is None:
+            self.homing.took_off(self.pose, fix, in_flight=True)
+
+    def _watch_limits(self) -> None:
+        at_fence = self.guidance.fence_margin(self.pose.north, self.pose.east) < 1.0
+        high = self.pose.up > self.settings.number("max_altitude") - 0.5
+        for message in (
+            *self.alarms.set(Type.HORIZONTAL_GEOFENCE_REACHED, at_fence),
+            *self.alarms.set(Type.VERTICAL_GEOFENCE_REACHED, high),
+        ):
+            self._emit(message)
+
+    # -- the state machine
+
+    def _fire(self, event: Event) -> bool:
+        """Let something happen; False when it does not count in the present state."""
+        state = next_state(self.state, event)
+        if state is None:
+            return False
+        before, self.state = self.state, state
+        self._note("flying", {"from": before.name.lower(), "to": state.name.lower(), "event": event.name.lower()})
+        match event:
+            case Event.TAKE_OFF | Event.USER_TAKE_OFF:
+                self._by_hand, self._timer = event is Event.USER_TAKE_OFF, self.time + RAMP_TIME
+            case Event.LAND | Event.FORCED_LANDING:
+                self._stop_guidance()
+                self._body.land()
+            case Event.EMERGENCY:
+                self._stop_guidance()
+                self._grounded = False
+                if before in AIRBORNE:
+                    self._body.fall()
+            case Event.CLIMB:
+                self._body.hover()
+            case Event.RAMPED_UP | Event.THROWN:
+                self._body.take_off()
+            case _:
+                pass
+        self._emit(ardrone3.FlyingStateChanged(state))
+        if state is FlyingState.TAKINGOFF:
+            self._begin_flight()
+        elif state is LANDED:
+            self._end_flight()
+        return True
+
+    def _begin_flight(self) -> None:
+        self._took_off_at = self.time
+        self.guidance.take_off_place = (self.pose.north, self.pose.east)
+        self.guidance.apply_limits()
+        self.flight_id = f"{self._chance.getrandbits(128):032X}"
+        self._emit(common.FlightId(self.flight_id))
+        self.homing.took_off(self.pose, self.fix)
+
+    def _end_flight(self) -> None:
+        self._body.off()
+        self.guidance.release_sticks()
+        self._return_at = None
+        for type in (Type.HORIZONTAL_GEOFENCE_REACHED, Type.VERTICAL_GEOFENCE_REACHED):
+            for message in self.alarms.set(type, False):
+                self._emit(message)
+        if self._took_off_at is None:
+            return
+        self._flights += 1
+        self._last_flight = self.time - self._took_off_at
+        self._flown += self._last_flight
+        self._took_off_at = None
+        self.flight_id = ""
+        self._emit(common.FlightId(""))
+        self._emit(self.flights_report())
+        self.homing.landed()
+
+    def _stop_guidance(self) -> None:
+        """End a move and a return, and say so."""
+        self.guidance.cancel(self.pose)
+        self.homing.abort()
+
+    # -- commands
+
+    def receive(self, message: Message | UnknownMessage, now: float) -> bool:
+        """Take a command; False when this firmware has no idea of it, which it keeps to itself."""
+        if isinstance(message, UnknownMessage):
+            return False
+        if isinstance(message, ardrone3.PCMD):
+            self._pilot(message, now)
+            return True
+        handler = _HANDLERS.get(type(message))
+        if handler is not None:
+            handler(self, message)
+            return True
+        answer = self.settings.handle(message)
+        if answer is not None:
+            self.guidance.apply_limits()
+        for part in (self.compass, self.storage):
+            answer = part.handle(message, self.time) if answer is None else answer
+        if answer is None:
+            answer = self.gimbal.handle(message, self.pose, self.time)
+        if answer is None:
+            answer = self.camera.handle(message)
+        if answer is None:
+            return False
+        for event in answer:
+            self._emit(event)
+        if isinstance(message, rth.SetPreferredHomeType | ardrone3.HomeType):
+            self.homing.preference_changed()
+        return True
+
+    def _pilot(self, sticks: ardrone3.PCMD, now: float) -> None:
+        if self.state not in AIRBORNE or self.state is FlyingState.TAKINGOFF:
+            return
+        if sticks.gaz > 0 and self.state is FlyingState.LANDING:
+            self._fire(Event.CLIMB)
+        self.guidance.pilot(sticks, now)
+
+    def throw(self) -> None:
+        """Somebody throws the drone, as after UserTakeOff."""
+        self._fire(Event.THROWN)
+
+    def _take_off(self, message: Message) -> None:
+        if self.state is not LANDED:
+            return
+        if self.blockers():
+            for event in checklist(self.blockers()):
+                self._emit(event)
+            return
+        self._fire(Event.TAKE_OFF)
+
+    def _user_take_off(self, message: ardrone3.UserTakeOff) -> None:
+        if not message.state:
+            self._fire(Event.USER_TAKE_OFF_CANCEL)
+        elif self.state is LANDED and self.blockers():
+            self._take_off(message)
+        else:
+            self._fire(Event.USER_TAKE_OFF)
+
+    def _smart(self, message: Message) -> None:
+        if self.state is LANDED:
+            self._take_off(message)
+        else:
+            self._land(message)
+
+    def _land(self, message: Message) -> None:
+        self._fire(Event.LAND)
+
+    def _emergency(self, message: Message) -> None:
+        self._fire(Event.EMERGENCY)
+
+    def _navigate_home(self, message: ardrone3.NavigateHome) -> None:
+        if message.start:
+            self._return_home(message)
+        else:
+            self.homing.abort()
+
+    def _return_home(self, message: Message) -> None:
+        if self.state not in GUIDED:
+            return
+        hovering = self.state is FlyingState.HOVERING
+        if self.homing.home is not None and not self.homing.flying:
+            self.guidance.cancel(self.pose)
+        self.homing.request(StateReason.USER_REQUEST, self.pose, hovering)
+
+    def _abort(self, message: Message) -> None:
+        self.homing.abort()
+
+    def _custom_location(self, message: rth.SetCustomLocation) -> None:
+        self.homing.set_custom(message.latitude, message.longitude, message.altitude, self.pose)
+
+    def _controller_gps(self, message: ardrone3.SendControllerGPS) -> None:
+        self.homing.set_pilot(message.latitude, message.longitude, message.altitude)
+
+    def _cancel_auto_trigger(self, message: Message) -> None:
+        self._emit(rth.RthAutoTrigger(rth.AutoTriggerReason.NONE, 0))
+
+    def _move_by(self, message: ardrone3.MoveBy | move.ExtendedMoveBy) -> None:
+        self.guidance.move_by(message, self.pose, self.state in GUIDED)
+
+    def _move_to(self, message: ardrone3.MoveTo | move.ExtendedMoveTo) -> None:
+        ready = self.state in GUIDED and self.fix and not self.compass.required
+        self.guidance.move_to(message, self.pose, ready)
+
+    def _cancel_move_to(self, message: Message) -> None:
+        self.guidance.cancel_move_to(self.pose)
+
+    # -- the rest
+
+    def _set_datetime(self, message: common.CurrentDateTime) -> None:
+        self.datetime = message.datetime
+        self._emit(common.CurrentDateTimeChanged(message.datetime))
+
+    def _set_date(self, message: common.CurrentDate) -> None:
+        self._emit(common.CurrentDateChanged(message.date))
+
+    def _set_time(self, message: common.CurrentTime) -> None:
+        self._emit(common.CurrentTimeChanged(message.time))
+
+    def _reset(self, message: Message) -> None:
+        self.settings.reset()
+        self.guidance.apply_limits()
+        for event in self.settings.report():
+            self._emit(event)
+        self._emit(common.ResetChanged())
+
+    def _sound(self, message: Message) -> None:
+        playing = isinstance(message, ardrone3.StartAlertSound)
+        self.sound = ardrone3.AlertSoundState.PLAYING if playing else ardrone3.AlertSoundState.STOPPED
+        self._emit(ardrone3.AlertSound(self.sound))
+
+    def _start_plan(self, message: common.Start) -> None:
+        # Nothing can be uploaded yet, so every plan is an unknown file.
+        self._emit(common.ComponentStateListChanged(common.FlightPlanComponent.MAVLINK_FILE, 0))
+        self._emit(common.StartingErrorEvent())
+
+    def _stop_plan(self, message: Message) -> None:
+        self._emit(
+            common.MavlinkFilePlayingStateChanged(common.PlayingState.STOPPED, "", common.MavlinkType.FLIGHT_PLAN)
+        )
+
+    def _stop_follow_me(self, message: Message) -> None:
+        self._emit(follow_me.State(follow_me.Mode.NONE, follow_me.Behavior.IDLE, follow_me.Animation.NONE, 0))
+
+
+_HANDLERS: dict[type[Message], Callable[[Firmware, Any], None]] = {
+    ardrone3.TakeOff: Firmware._take_off,
+    ardrone3.Landing: Firmware._land,
+    ardrone3.Emergency: Firmware._emergency,
+    ardrone3.UserTakeOff: Firmware._user_take_off,
+    ardrone3.SmartTakeOffLand: Firmware._smart,
+    ardrone3.MoveBy: Firmware._move_by,
+    move.ExtendedMoveBy: Firmware._move_by,
+    ardrone3.MoveTo: Firmware._move_to,
+    move.ExtendedMoveTo: Firmware._move_to,
+    ardrone3.CancelMoveTo: Firmware._cancel_move_to,
+    ardrone3.NavigateHome: Firmware._navigate_home,
+    rth.ReturnToHome: Firmware._return_home,
+    rth.Abort: Firmware._abort,
+    rth.SetCustomLocation: Firmware._custom_location,
+    rth.CancelAutoTrigger: Firmware._cancel_auto_trigger,
+    ardrone3.SendControllerGPS: Firmware._controller_gps,
+    ardrone3.StartAlertSound: Firmware._sound,
+    ardrone3.StopAlertSound: Firmware._sound,
+    common.CurrentDateTime: Firmware._set_datetime,
+    common.CurrentDate: Firmware._set_date,
+    common.CurrentTime: Firmware._set_time,
+    common.Reset: Firmware._reset,
+    common.Start: Firmware._start_plan,
+    common.Stop: Firmware._stop_plan,
+    follow_me.Stop: Firmware._stop_follow_me,
+}

@@ -1,0 +1,141 @@
+"""Any number of simulated drones in one process: one array of motion, one task that turns the world."""
+
+from __future__ import annotations
+
+import asyncio
+import random
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+
+from anafi_mav.errors import ConfigError
+from anafi_mav.sim.drone import DroneSpec, SimulatedDrone
+from anafi_mav.sim.log import Log, LogFile
+from anafi_mav.sim.model import MODELS
+from anafi_mav.sim.motion import STEP, Body, Motion
+
+TURN, FAST_TURN = 0.01, STEP
+"""s of the machine's clock between two turns of the world; the second when telemetry is wanted that fast."""
+
+MAX_CATCH_UP = 0.25
+"""s of the machine's clock that one turn makes up for; what is beyond (a stopped process, a machine too slow for
+the fleet) is lost to the simulated world, whose drones must not leap."""
+
+LOG_CAPACITY = 40_000
+"""Log entries kept in memory for the whole fleet (about 50 MB): an hour of one drone, poses ten times a second."""
+
+MIN_CAPACITY = 1000
+"""Log entries kept in memory for each drone, however many there are."""
+
+
+class Simulator:
+    """The world. `async with Simulator([DroneSpec()]) as simulator:` opens and closes it."""
+
+    def __init__(
+        self,
+        specs: Sequence[DroneSpec],
+        *,
+        speed: float = 1.0,
+        seed: int | None = None,
+        log: Path | None = None,
+        remember: bool = True,
+    ) -> None:
+        """`speed` runs the world faster than the clock, `seed` makes ids the same in every run, `log` is a file of
+        JSON lines, `remember` keeps the log in memory too.
+
+        Raises `ConfigError` for specs that cannot live together, `OSError` when the log cannot be written.
+        """
+        if not specs:
+            raise ConfigError("drones", "expected at least one")
+        if not 0.0 < speed <= 100.0:
+            raise ConfigError("speed", f"expected more than 0 and at most 100, got {speed:g}")
+        self._speed = speed
+        self._period = TURN if all(spec.telemetry_rate <= 0.5 / TURN for spec in specs) else FAST_TURN
+        self._motion = Motion([MODELS[spec.model].airframe for spec in specs])
+        self._file = None if log is None else LogFile(log)
+        self._task: asyncio.Task[None] | None = None
+        self.lost_time = 0.0
+        """Simulated seconds that were skipped because the process did not get to run."""
+        chance = random.Random(seed)
+        capacity = max(MIN_CAPACITY, LOG_CAPACITY // len(specs)) if remember else 0
+        self.drones = [
+            SimulatedDrone(
+                spec,
+                Body(self._motion, index),
+                Log(spec.address, capacity, self._file),
+                _clock,
+                random.Random(chance.getrandbits(64)),
+                phase=index / len(specs),
+            )
+            for index, spec in enumerate(specs)
+        ]
+
+    async def __aenter__(self) -> Simulator:
+        await self.start()
+        return self
+
+    async def __aexit__(
+        self, type: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        await self.close()
+
+    async def start(self) -> None:
+        """Open every drone's sockets and let time run. Raises `ConfigError` naming the drone that cannot listen."""
+        self._turn(_clock(), 0)
+        try:
+            for index, drone in enumerate(self.drones):
+                try:
+                    await drone.start()
+                except OSError as error:
+                    raise ConfigError(
+                        f"drones[{index}].address", f"cannot listen on {drone.address}: {error}"
+                    ) from error
+        except BaseException:
+            await self.close()
+            raise
+        self._task = asyncio.create_task(self._run(), name="simulated world")
+
+    async def close(self) -> None:
+        """Stop time and close all sockets. Idempotent."""
+        if self._task is not None:
+            self._task.cancel()
+            await asyncio.wait([self._task])
+        for drone in self.drones:
+            await drone.close()
+        if self._file is not None:
+            self._file.close()
+
+    async def wait(self) -> None:
+        """Return never; raise what stopped the world, if anything does."""
+        if self._task is not None:
+            await asyncio.shield(self._task)
+
+    async def _run(self) -> None:
+        last = _clock()
+        debt = 0.0
+        while True:
+            await asyncio.sleep(max(0.0, last + self._period - _clock()))
+            now = _clock()
+            debt += (now - last) * self._speed
+            last = now
+            if debt > MAX_CATCH_UP * self._speed:
+                self.lost_time += debt - MAX_CATCH_UP * self._speed
+                debt = MAX_CATCH_UP * self._speed
+            steps = int(debt / STEP)
+            debt -= steps * STEP
+            self._turn(now, steps)
+
+    def _turn(self, now: float, steps: int) -> None:
+        motion = self._motion
+        for _ in range(steps):
+            motion.step()
+        elapsed = steps * STEP
+        turns = zip(self.drones, motion.poses(), motion.arrived(), motion.still(), strict=True)
+        for drone, pose, arrived, still in turns:
+            drone.tick(now, elapsed, pose, arrived, still)
+        if self._file is not None:
+            self._file.flush()
+
+
+def _clock() -> float:
+    return asyncio.get_running_loop().time()

@@ -1,0 +1,415 @@
+"""How the drones move: one array per quantity, one column per drone, fixed steps of 5 ms.
+
+The model is small on purpose and fitted to the measurements in section IV of the anafi_ros paper:
+
+- tilt follows its command as a second-order system (10 rad/s, damping 0.9) no faster than MaxPitchRollRotationSpeed;
+- horizontal acceleration is g tan(tilt) minus a quadratic drag that makes full tilt end at the model's top speed;
+- a stick at 0 % is a wish to stop: the axis is braked with up to 3 m/s2;
+- yaw rate and climb rate follow first-order after a pure delay (0.1 s each for yaw, 0.15 s and 0.12 s for climb),
+  which gives 360 degrees in 2.0 s and 6.9 m in the first 2 s at 4 m/s.
+
+Frames: position and velocity are north, east, down in metres from the place the simulator was given as home; attitude
+is roll (right wing down), pitch (nose up), yaw (clockwise from north) in rad. The ground is a plane at down = 0.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from anafi_mav.sim.model import Airframe
+from anafi_mav.units import RAD_PER_DEG, wrap_pi
+
+Array = NDArray[np.float64]
+
+STEP = 0.005
+"""s; 200 steps a second."""
+
+G = 9.81
+FULL_TILT = 40.0 * RAD_PER_DEG
+"""The largest tilt the family flies; MaxTilt cannot be set higher."""
+
+_TILT_OMEGA, _TILT_DAMPING = 10.0, 0.9
+_YAW_TAU, _CLIMB_TAU = 0.1, 0.12
+_BRAKING = 3.0
+"""m/s2 at most when stopping; the measured range is 2 to 4."""
+_APPROACH = 1.8
+"""m/s2 that an approach to a point is planned with, below `_BRAKING` so that it does not overshoot."""
+_SPEED_GAIN = 2.5
+"""1/s from a velocity error to an acceleration."""
+_PLACE_GAIN = 0.9
+"""1/s from a position error to a velocity, for the last metre."""
+_CLIMB_GAIN = 1.2
+_YAW_GAIN = 2.0
+_ALIGNED = 3.0 * RAD_PER_DEG
+"""A turn that has to come first is done when this close."""
+
+TAKE_OFF_HEIGHT = 1.0
+"""m above ground at which a take-off ends."""
+FLOOR = 0.3
+"""m above ground that neither sticks nor moves go below; only a landing does. Assumed."""
+_REACHED = 0.1
+"""m from its target: a move is over when it is this close and still."""
+_STILL = 0.15
+"""m/s: slower than this is no motion to speak of."""
+_NO_FENCE = 1e9
+
+
+class Mode(enum.IntEnum):
+    """Who flies."""
+
+    OFF = 0
+    """Motors off or idle, on the ground."""
+    STICKS = 1
+    """`sticks` say where to; all zero is a hover."""
+    MOVE = 2
+    """To `target`, then stay there."""
+    TAKE_OFF = 3
+    """Up to `TAKE_OFF_HEIGHT`, sticks ignored."""
+    LAND = 4
+    """Down to the ground; the sticks still steer sideways."""
+    FALL = 5
+    """Motors cut in the air."""
+
+
+class Turn(enum.IntEnum):
+    """What the nose does in a MOVE."""
+
+    STICK = 0
+    """As the yaw stick says."""
+    FIRST = 1
+    """To the wanted heading before the move begins."""
+    DURING = 2
+    """To the wanted heading on the way."""
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Where a drone truly is: metres, m/s, rad. `up` is the height above the take-off plane."""
+
+    north: float
+    east: float
+    up: float
+    roll: float
+    pitch: float
+    yaw: float
+    vn: float
+    ve: float
+    vd: float
+
+    @property
+    def ground_speed(self) -> float:
+        return math.hypot(self.vn, self.ve)
+
+    def bearing(self, north: float, east: float) -> tuple[float, float]:
+        """(direction in rad, distance in m) of a point."""
+        north, east = north - self.north, east - self.east
+        return math.atan2(east, north), math.hypot(north, east)
+
+
+class Motion:
+    """The fleet's motion. `step()` advances all of it; a `Body` is the handle of one drone."""
+
+    def __init__(self, airframes: Sequence[Airframe]) -> None:
+        count = len(airframes)
+        self.count = count
+        self.mode: NDArray[np.int8] = np.zeros(count, np.int8)
+        self.position: Array = np.zeros((3, count))
+        self.velocity: Array = np.zeros((3, count))
+        self.tilt: Array = np.zeros((2, count))
+        """roll, pitch"""
+        self.tilt_rate: Array = np.zeros((2, count))
+        self.yaw: Array = np.zeros(count)
+        """Not wrapped: two turns clockwise are 4 pi, so that a moveBy of two turns makes two."""
+        self.yaw_rate: Array = np.zeros(count)
+        self.stick_push: Array = np.zeros((2, count))
+        """Acceleration (forward, right) that the roll and pitch sticks ask for; 0 asks to stop."""
+        self.stick_yaw: Array = np.zeros(count)
+        """rad/s clockwise"""
+        self.stick_climb: Array = np.zeros(count)
+        """m/s up"""
+        self.target: Array = np.zeros((3, count))
+        self.target_yaw: Array = np.zeros(count)
+        self.turn: NDArray[np.int8] = np.zeros(count, np.int8)
+        self.move_speed: Array = np.zeros(count)
+        self.move_climb: Array = np.zeros(count)
+        self.move_yaw: Array = np.zeros(count)
+        self.land_speed: Array = np.full(count, 2.0)
+        self.tilt_rate_limit: Array = np.full(count, 116.0 * RAD_PER_DEG)
+        self.ceiling: Array = np.full(count, 150.0)
+        self.fence_radius: Array = np.full(count, _NO_FENCE)
+        self.fence_centre: Array = np.zeros((2, count))
+        self.drag: Array = np.array([G * math.tan(FULL_TILT) / frame.max_speed**2 for frame in airframes])
+        self.yaw_line = _DelayLine([frame.yaw_delay for frame in airframes])
+        self.climb_line = _DelayLine([frame.climb_delay for frame in airframes])
+
+    def step(self) -> None:
+        """Advance every drone by `STEP`. A fleet that stands on the ground costs nothing."""
+        if not self.mode.any():
+            return
+        mode, velocity = self.mode, self.velocity
+        horizontal = velocity[:2]
+        moving = mode == Mode.MOVE
+        steered = (mode == Mode.STICKS) | (mode == Mode.LAND)
+        up = -self.position[2]
+
+        wanted: Array = np.zeros((2, self.count))
+        climb = np.where(mode == Mode.STICKS, self.stick_climb, 0.0)
+        turn = np.where(steered, self.stick_yaw, 0.0)
+        if moving.any():
+            wanted, climb, turn = self._follow(moving, up, climb, turn)
+        climb = np.where(mode == Mode.TAKE_OFF, np.clip(1.5 * (TAKE_OFF_HEIGHT - up), 0.2, 1.0), climb)
+        climb = np.where(mode == Mode.LAND, -np.minimum(self.land_speed, 0.5 + 0.3 * up), climb)
+        climb = np.minimum(climb, np.maximum(_CLIMB_GAIN * (self.ceiling - up), 0.0))
+        floored = moving | (mode == Mode.STICKS)
+        climb = np.where(floored, np.maximum(climb, np.minimum(_CLIMB_GAIN * (FLOOR - up), 0.0)), climb)
+
+        self._tilt_and_push(wanted, horizontal, steered, mode)
+        self.yaw_rate += (self.yaw_line.push(turn) - self.yaw_rate) * (STEP / _YAW_TAU)
+        self.yaw += self.yaw_rate * STEP
+        velocity[2] += (-self.climb_line.push(climb) - velocity[2]) * (STEP / _CLIMB_TAU)
+        self.position += velocity * STEP
+        self._touch_ground()
+
+    def _follow(self, moving: Any, up: Array, climb: Array, turn: Array) -> tuple[Array, Array, Array]:
+        """Velocity, climb and yaw rate that bring the moving drones to their targets."""
+        way = self.target[:2] - self.position[:2]
+        distance = np.hypot(way[0], way[1])
+        heading_error = self.target_yaw - self.yaw
+        waiting = (self.turn == Turn.FIRST) & (np.abs(heading_error) > _ALIGNED)
+        self.turn[(self.turn == Turn.FIRST) & ~waiting] = Turn.DURING
+        going = moving & ~waiting
+        speed = np.minimum(self.move_speed, np.minimum(_PLACE_GAIN * distance, np.sqrt(2.0 * _APPROACH * distance)))
+        wanted = np.where(going, way / np.maximum(distance, 1e-9) * speed, 0.0)
+        rise = np.clip(_CLIMB_GAIN * (-self.target[2] - up), -self.move_climb, self.move_climb)
+        climb = np.where(going, rise, climb)
+        turning = np.clip(_YAW_GAIN * heading_error, -self.move_yaw, self.move_yaw)
+        turn = np.where(moving, np.where(self.turn == Turn.STICK, self.stick_yaw, turning), turn)
+        return wanted, climb, turn
+
+    def _tilt_and_push(self, wanted: Array, horizontal: Array, steered: Any, mode: Any) -> None:
+        """Turn wishes into a tilt command, let the tilt follow it, and accelerate by the tilt reached."""
+        speed = np.hypot(horizontal[0], horizontal[1])
+        resistance = self.drag * speed * horizontal
+        push = _limit(_SPEED_GAIN * (wanted - horizontal), _BRAKING) + resistance
+        # Braking never needs to push onwards: at high speed the drag alone stops faster than `_BRAKING`.
+        stopping = (wanted[0] == 0.0) & (wanted[1] == 0.0)
+        onwards = (push * horizontal).sum(axis=0) > 0.0
+        push = np.where(stopping & onwards, 0.0, push)
+        cos, sin = np.cos(self.yaw), np.sin(self.yaw)
+        forward, right = push[0] * cos + push[1] * sin, push[1] * cos - push[0] * sin
+        forward = np.where(steered & (self.stick_push[0] != 0.0), self.stick_push[0], forward)
+        right = np.where(steered & (self.stick_push[1] != 0.0), self.stick_push[1], right)
+        if (self.fence_radius < _NO_FENCE).any():
+            forward, right = self._fenced(forward, right, cos, sin, horizontal, resistance)
+
+        command = np.stack((np.arctan(right / G), -np.arctan(forward / G)))
+        np.clip(command, -FULL_TILT, FULL_TILT, out=command)
+        falling = mode == Mode.FALL
+        airborne = (mode != Mode.OFF) & ~falling
+        command = np.where(airborne, command, 0.0)
+        spin = _TILT_OMEGA**2 * (command - self.tilt) - 2.0 * _TILT_DAMPING * _TILT_OMEGA * self.tilt_rate
+        self.tilt_rate += spin * STEP
+        np.clip(self.tilt_rate, -self.tilt_rate_limit, self.tilt_rate_limit, out=self.tilt_rate)
+        self.tilt += self.tilt_rate * STEP
+
+        right_push, forward_push = G * np.tan(self.tilt[0]), -G * np.tan(self.tilt[1])
+        thrust = np.where(airborne, 1.0, 0.0)
+        horizontal[0] += (thrust * (forward_push * cos - right_push * sin) - resistance[0]) * STEP
+        horizontal[1] += (thrust * (forward_push * sin + right_push * cos) - resistance[1]) * STEP
+        if falling.any():
+            # The first-order lag of the climb rate pulls back by v dt / tau; give that back and add gravity.
+            self.velocity[2] += np.where(falling, (G + self.velocity[2] / _CLIMB_TAU) * STEP, 0.0)
+
+    def _fenced(
+        self, forward: Array, right: Array, cos: Array, sin: Array, horizontal: Array, resistance: Array
+    ) -> tuple[Array, Array]:
+        """The push without what would carry a drone over its fence."""
+        out = self.position[:2] - self.fence_centre
+        distance = np.maximum(np.hypot(out[0], out[1]), 1e-9)
+        out = out / distance
+        margin = np.maximum(self.fence_radius - distance - 0.5, 0.0)
+        allowed = np.minimum(_PLACE_GAIN * margin, np.sqrt(2.0 * _APPROACH * margin))
+        speed_out = (horizontal * out).sum(axis=0)
+        most = np.clip(_SPEED_GAIN * (allowed - speed_out), -_BRAKING, G) + (resistance * out).sum(axis=0)
+        north, east = forward * cos - right * sin, forward * sin + right * cos
+        excess = np.maximum(north * out[0] + east * out[1] - most, 0.0)
+        north, east = north - excess * out[0], east - excess * out[1]
+        return north * cos + east * sin, east * cos - north * sin
+
+    def _touch_ground(self) -> None:
+        """Nothing goes through the ground; what lies on it without flying does not move."""
+        below = self.position[2] > 0.0
+        self.position[2] = np.where(below, 0.0, self.position[2])
+        resting = (self.mode == Mode.OFF) | (below & ((self.mode == Mode.LAND) | (self.mode == Mode.FALL)))
+        if resting.any():
+            self.velocity[:, resting] = 0.0
+            self.tilt[:, resting] = 0.0
+            self.tilt_rate[:, resting] = 0.0
+            self.yaw_rate[resting] = 0.0
+        sinking = below & (self.velocity[2] > 0.0)
+        self.velocity[2] = np.where(sinking, 0.0, self.velocity[2])
+
+    def still(self) -> list[bool]:
+        """Per drone: no motion to speak of (0.15 m/s)."""
+        slow: list[bool] = ((self.velocity**2).sum(axis=0) < _STILL**2).tolist()
+        return slow
+
+    def arrived(self) -> list[bool]:
+        """Per drone: the present mode has got where it wanted to (always true for OFF and STICKS)."""
+        gap = self.position - self.target
+        there = ((gap**2).sum(axis=0) < _REACHED**2) & ((self.velocity**2).sum(axis=0) < _STILL**2)
+        aligned = (self.turn == Turn.STICK) | (np.abs(self.target_yaw - self.yaw) < _ALIGNED / 2.0)
+        up = -self.position[2]
+        done = np.where(self.mode == Mode.MOVE, there & aligned & (self.turn != Turn.FIRST), True)
+        done = np.where(self.mode == Mode.TAKE_OFF, up >= TAKE_OFF_HEIGHT - 0.05, done)
+        done = np.where((self.mode == Mode.LAND) | (self.mode == Mode.FALL), up <= 0.0, done)
+        result: list[bool] = done.tolist()
+        return result
+
+    def poses(self) -> list[Pose]:
+        """Every drone's pose, in the order of the airframes."""
+        columns = np.concatenate((self.position, self.tilt, [self.yaw], self.velocity))
+        columns[2] = 0.0 - columns[2]  # not -0.0 for a drone on the ground
+        return [
+            Pose(n, e, up, roll, pitch, wrap_pi(yaw), vn, ve, vd)
+            for n, e, up, roll, pitch, yaw, vn, ve, vd in columns.T.tolist()
+        ]
+
+
+class Body:
+    """One drone's place in a `Motion`: the verbs of its autopilot. Metres, m/s, rad."""
+
+    def __init__(self, motion: Motion, index: int) -> None:
+        self._motion = motion
+        self._index = index
+
+    @property
+    def mode(self) -> Mode:
+        return Mode(int(self._motion.mode[self._index]))
+
+    @property
+    def heading(self) -> float:
+        """Yaw without wrapping, rad."""
+        return float(self._motion.yaw[self._index])
+
+    def nearest(self, heading: float) -> float:
+        """`heading` (rad) as the unwrapped yaw that takes the shortest turn to reach."""
+        return self.heading + wrap_pi(heading - self.heading)
+
+    def _enter(self, mode: Mode) -> None:
+        self._motion.mode[self._index] = mode
+        if mode is not Mode.STICKS and mode is not Mode.LAND:
+            self.sticks(0.0, 0.0, 0.0, 0.0)
+
+    def off(self) -> None:
+        """Motors off or idle. Forgets what was still on its way to them."""
+        self._enter(Mode.OFF)
+        self._motion.yaw_line.clear(self._index)
+        self._motion.climb_line.clear(self._index)
+
+    def hover(self) -> None:
+        """Stop and stay, ready for `sticks`."""
+        self._enter(Mode.STICKS)
+        self.sticks(0.0, 0.0, 0.0, 0.0)
+
+    def take_off(self) -> None:
+        self._enter(Mode.TAKE_OFF)
+
+    def land(self) -> None:
+        self._enter(Mode.LAND)
+
+    def fall(self) -> None:
+        self._enter(Mode.FALL)
+
+    def sticks(self, roll: float, pitch: float, yaw_rate: float, climb: float) -> None:
+        """Wanted tilt (rad: roll + right, pitch + nose up), yaw rate (rad/s) and climb rate (m/s up).
+
+        A zero roll or pitch asks that axis to stop. Counts in STICKS, partly in MOVE (yaw) and LAND (tilt, yaw).
+        """
+        motion, i = self._motion, self._index
+        motion.stick_push[0, i] = -G * math.tan(pitch)
+        motion.stick_push[1, i] = G * math.tan(roll)
+        motion.stick_yaw[i] = yaw_rate
+        motion.stick_climb[i] = climb
+
+    def stick_yaw(self, yaw_rate: float) -> None:
+        """The yaw stick alone (rad/s)."""
+        self._motion.stick_yaw[self._index] = yaw_rate
+
+    def move(
+        self,
+        north: float,
+        east: float,
+        up: float,
+        *,
+        yaw: float | None = None,
+        turn: Turn = Turn.DURING,
+        speed: float,
+        climb: float,
+        yaw_rate: float,
+    ) -> None:
+        """Fly to a point, no faster than `speed` and `climb` (m/s) and `yaw_rate` (rad/s).
+
+        `yaw` is an unwrapped heading (see `nearest`); None keeps the present one.
+        """
+        self._enter(Mode.MOVE)
+        motion, i = self._motion, self._index
+        motion.target[:, i] = north, east, -up
+        motion.target_yaw[i] = self.heading if yaw is None else yaw
+        motion.turn[i] = turn
+        motion.move_speed[i] = speed
+        motion.move_climb[i] = climb
+        motion.move_yaw[i] = yaw_rate
+
+    def limits(self, *, tilt_rate: float, ceiling: float) -> None:
+        """How fast it may tilt (rad/s) and how high it may go (m)."""
+        self._motion.tilt_rate_limit[self._index] = tilt_rate
+        self._motion.ceiling[self._index] = ceiling
+
+    def fence(self, radius: float | None, centre: tuple[float, float] = (0.0, 0.0)) -> None:
+        """Keep within `radius` m of `centre` (north, east); None removes the fence."""
+        self._motion.fence_radius[self._index] = _NO_FENCE if radius is None else radius
+        self._motion.fence_centre[:, self._index] = centre
+
+    def place(self, north: float, east: float, yaw: float = 0.0) -> None:
+        """Put the drone on the ground somewhere, at rest."""
+        motion, i = self._motion, self._index
+        motion.position[:, i] = north, east, 0.0
+        motion.velocity[:, i] = 0.0
+        motion.yaw[i] = yaw
+
+
+class _DelayLine:
+    """A pure delay per drone, in whole steps."""
+
+    def __init__(self, delays: Sequence[float]) -> None:
+        self._steps = np.array([max(1, round(delay / STEP)) for delay in delays])
+        self._columns = np.arange(len(delays))
+        self._ring: Array = np.zeros((int(self._steps.max(initial=1)) + 1, len(delays)))
+        self._now = 0
+
+    def clear(self, column: int) -> None:
+        """Nothing is on its way any more."""
+        self._ring[:, column] = 0.0
+
+    def push(self, values: Array) -> Array:
+        """Put in what is commanded now, take out what was commanded `delay` ago."""
+        length = len(self._ring)
+        self._ring[self._now] = values
+        out: Array = self._ring[(self._now - self._steps) % length, self._columns]
+        self._now = (self._now + 1) % length
+        return out
+
+
+def _limit(vectors: Array, length: float) -> Array:
+    """Each column shortened to at most `length`."""
+    norms = np.maximum(np.hypot(vectors[0], vectors[1]), 1e-12)
+    shortened: Array = vectors * np.minimum(1.0, length / norms)
+    return shortened

@@ -1,0 +1,103 @@
+"""What AllStates and AllSettings are answered with: everything a connecting controller may ask a 4K for.
+
+Parrot specifies no list; this is what its XML marks "at connection" for the model and what anafi_ros reads when it
+starts. The closing AllStatesChanged or AllSettingsChanged is sent by the caller, after all of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from anafi_mav.arsdk.messages import (
+    animation,
+    ardrone3,
+    common,
+    follow_me,
+    piloting_style,
+    precise_home,
+    wifi,
+)
+from anafi_mav.arsdk.wire import Message
+from anafi_mav.sim.firmware import Firmware
+from anafi_mav.sim.safety import checklist
+
+_NOWHERE = 500.0
+
+_FOLLOW_MODES = (follow_me.Mode.LOOK_AT, follow_me.Mode.GEOGRAPHIC, follow_me.Mode.RELATIVE)
+
+
+def _bits(values: Iterable[int]) -> int:
+    return sum(1 << value for value in values)
+
+
+def all_settings(firmware: Firmware) -> list[Message]:
+    """The answer to AllSettings without its closing message."""
+    identity, model = firmware.identity, firmware.model
+    return [
+        common.ProductVersionChanged(model.software, model.hardware),
+        common.ProductSerialHighChanged(identity.serial[:4]),
+        common.ProductSerialLowChanged(identity.serial[4:]),
+        common.BoardIdChanged("simulated"),
+        *firmware.settings.report(),
+        *firmware.homing.settings_report(),
+        ardrone3.GPSFixStateChanged(int(firmware.fix)),
+        *(ardrone3.ProductMotorVersionListChanged(motor, "SIM", "1.0", "1.0") for motor in range(1, 5)),
+        ardrone3.ProductGPSVersionChanged("1.0", "1.0"),
+        ardrone3.MotorErrorStateChanged(0, ardrone3.MotorError.NO_ERROR),
+        ardrone3.MotorSoftwareVersionChanged("1.0"),
+        firmware.flights_report(),
+        ardrone3.MotorErrorLastErrorChanged(ardrone3.LastMotorError.NO_ERROR),
+        wifi.SupportedCountries("FR;US;GB;DE;CH"),
+        wifi.SupportedSecurityTypes(1 << wifi.SecurityType.OPEN | 1 << wifi.SecurityType.WPA2),
+    ]
+
+
+def all_states(firmware: Firmware) -> list[Message]:
+    """The answer to AllStates without its closing message."""
+    pose = firmware.pose
+    return [
+        *firmware.battery.states_report(),
+        *(common.SensorsStatesListChanged(sensor, int(firmware.sensor_ok(sensor))) for sensor in common.Sensor),
+        common.CurrentDateTimeChanged(firmware.datetime),
+        common.LinkSignalQuality(5),
+        wifi.RssiChanged(-40),
+        common.BootId(firmware.identity.boot_id),
+        common.FlightId(firmware.flight_id),
+        common.RunIdChanged(firmware.identity.run_id),
+        *firmware.compass.states_report(),
+        common.MavlinkFilePlayingStateChanged(common.PlayingState.STOPPED, "", common.MavlinkType.FLIGHT_PLAN),
+        common.AvailabilityStateChanged(int(firmware.plan_available)),
+        *(
+            common.ComponentStateListChanged(part, int(firmware.plan_part_ok(part)))
+            for part in common.FlightPlanComponent
+        ),
+        ardrone3.FlyingStateChanged(firmware.state),
+        ardrone3.AlertStateChanged(firmware.alert),
+        *firmware.position_report(),
+        *firmware.motion_report(),
+        ardrone3.AltitudeAboveGroundChanged(pose.up),
+        ardrone3.MotionState(ardrone3.Motion.STEADY),
+        ardrone3.HoveringWarning(0, 0),
+        ardrone3.ForcedLandingAutoTrigger(ardrone3.ForcedLandingReason.NONE, 0),
+        ardrone3.WindStateChanged(ardrone3.WarningLevel.OK),
+        ardrone3.VibrationLevelChanged(ardrone3.WarningLevel.OK),
+        ardrone3.PilotedPOIV2(
+            _NOWHERE, _NOWHERE, _NOWHERE, ardrone3.PoiMode.LOCKED_GIMBAL, ardrone3.PoiStatus.UNAVAILABLE
+        ),
+        ardrone3.NumberOfSatelliteChanged(firmware.satellites),
+        ardrone3.AlertSound(firmware.sound),
+        *firmware.homing.states_report(),
+        *firmware.gimbal.states_report(pose),
+        *firmware.camera.states_report(),
+        *firmware.storage.states_report(),
+        precise_home.Capabilities(_bits(precise_home.PreciseHomeMode)),
+        precise_home.State(precise_home.PreciseHomeState.UNAVAILABLE),
+        piloting_style.Capabilities(_bits(piloting_style.PilotingStyleStyle)),
+        animation.Availability(0),
+        animation.State(animation.Type.NONE, 0),
+        follow_me.State(follow_me.Mode.NONE, follow_me.Behavior.IDLE, follow_me.Animation.NONE, 0),
+        *(follow_me.ModeInfo(mode, _bits(follow_me.Input), 0) for mode in _FOLLOW_MODES),
+        follow_me.TargetIsController(0),
+        *firmware.alarms.report(),
+        *checklist(firmware.blockers()),
+    ]

@@ -1,0 +1,58 @@
+"""What a drone tells without being asked, at the aircraft's rates.
+
+Attitude, speed and height 5 times a second (or as `--telemetry-rate` says), the gimbal and the height above ground 5
+times, position and voltage once (anafi_ros). Messages that are late are not made up for.
+"""
+
+from __future__ import annotations
+
+from anafi_mav.arsdk.messages import ardrone3
+from anafi_mav.arsdk.wire import Message
+from anafi_mav.sim.firmware import Firmware
+
+RATE = 5.0
+"""Hz of the aircraft."""
+
+
+class Telemetry:
+    """One drone's schedule. `phase` (0..1) spreads the drones of a fleet over the period."""
+
+    def __init__(self, firmware: Firmware, rate: float, phase: float) -> None:
+        self._firmware = firmware
+        self._motion = _Period(1.0 / rate, phase)
+        self._gimbal = _Period(1.0 / RATE, phase)
+        self._position = _Period(1.0, phase)
+
+    def due(self, now: float) -> list[Message]:
+        """The messages to send now."""
+        firmware = self._firmware
+        messages: list[Message] = []
+        if self._motion.due(now):
+            messages += firmware.motion_report()
+        if self._gimbal.due(now):
+            firmware.gimbal.advance(firmware.time)
+            messages.append(firmware.gimbal.attitude(firmware.pose))
+            messages.append(ardrone3.AltitudeAboveGroundChanged(firmware.pose.up))
+        if self._position.due(now):
+            messages += firmware.position_report()
+            messages.append(firmware.battery.voltage())
+        return messages
+
+
+class _Period:
+    def __init__(self, period: float, phase: float) -> None:
+        self._period = period
+        self._next = 0.0
+        self._phase = phase
+
+    def due(self, now: float) -> bool:
+        if now < self._next:
+            return False
+        if self._next == 0.0:
+            self._next = now + self._phase * self._period
+            return False
+        # One period on; after a pause the rhythm starts anew instead of catching up.
+        self._next += self._period
+        if self._next < now:
+            self._next = now + self._period
+        return True
