@@ -111,6 +111,8 @@ async def _run(config: Config) -> None:
 
 
 async def _start(gateway: Gateway, fleet: dict[str, Any] | None, stack: contextlib.AsyncExitStack) -> None:
+    await gateway.open()  # first, so that a busy port is told before a simulator has been started
+    stack.push_async_callback(_close, gateway)
     if fleet is not None:
         simulator = SimulatorProcess()
         stack.push_async_callback(simulator.close)
@@ -118,7 +120,7 @@ async def _start(gateway: Gateway, fleet: dict[str, Any] | None, stack: contextl
         names = ", ".join(drone["name"] for drone in fleet["drones"])
         death = asyncio.create_task(_tell_death(simulator, names))
         stack.callback(death.cancel)
-    stack.push_async_callback(_close, gateway)
+        stack.push_async_callback(_close, gateway)  # before the simulator: the last hover has to reach somebody
     await gateway.start()
     await gateway.ready(READY_LIMIT)
 

@@ -29,7 +29,7 @@ SIGNED = 0x01
 """The only incompatibility flag there is; a frame with another one must be discarded (serialization.md)."""
 
 MAX_FRAME = HEADER_2 + 255 + CHECKSUM + SIGNATURE
-"""What a parser may hold back while it waits for the rest of a frame."""
+"""The most that a parser holds back while it waits for what comes next."""
 
 MAX_SOURCES = 256
 """Systems and components that one channel may bring: a fleet behind a radio is tens. More are not remembered."""
@@ -132,7 +132,7 @@ class Parser:
 
     A frame that fails its checksum is given up by one byte, not by its length, so a false start mark never hides
     the real frame behind it. Ids that we do not know have no checksum to test; they pass only from a source that
-    has sent a message with a good one.
+    has sent a message with a good one, and only if another start mark, or the end of the datagram, follows.
     """
 
     def __init__(self) -> None:
@@ -145,7 +145,7 @@ class Parser:
     def receive(self, data: bytes) -> list[Received]:
         """The frames that end in `data`; the beginning of another is kept for the next call."""
         buffer = self._pending + data
-        found, end = self._scan(buffer)
+        found, end = self._scan(buffer, whole=False)
         self._pending = buffer[end:]
         return found
 
@@ -154,14 +154,14 @@ class Parser:
         self._pending = b""
         found: list[Received] = []
         while data:
-            more, end = self._scan(data)
+            more, end = self._scan(data, whole=True)
             found += more
             # What looked like a beginning is given up by one byte, too: a real frame may be in it.
             self.counters["garbage_bytes"] += end < len(data)
             data = data[end + 1 :]
         return found
 
-    def _scan(self, buffer: bytes) -> tuple[list[Received], int]:
+    def _scan(self, buffer: bytes, *, whole: bool) -> tuple[list[Received], int]:
         """The frames in `buffer`, and where the one begins that is not complete yet (its length if none does)."""
         found: list[Received] = []
         position, size = 0, len(buffer)
@@ -175,15 +175,23 @@ class Parser:
             length = self._length(buffer, position, size)
             if length is None:
                 return found, position
-            if length and position + length > size:
+            end = position + length
+            if length and end > size:
                 return found, position
-            received = self._decode(buffer[position : position + length]) if length else None
+            received = self._decode(buffer[position:end]) if length else None
+            if received is not None and received.message is None:
+                if end == size and not whole:
+                    return found, position
+                if end < size and buffer[end] not in (MAGIC_1, MAGIC_2):
+                    received = None
+                else:
+                    self.counters["unknown_frames"] += 1
             if received is None:
                 self.counters["garbage_bytes"] += 1
                 position += 1
             else:
                 found.append(received)
-                position += length
+                position = end
         return found, size
 
     def _length(self, buffer: bytes, position: int, size: int) -> int | None:
@@ -214,7 +222,6 @@ class Parser:
             sysid, compid, id = raw[5], raw[6], int.from_bytes(raw[7:10], "little")
         extra = _EXTRA.get(id)
         if extra is None:
-            self.counters["unknown_frames"] += 1
             return Received(None, id, sysid, compid, raw)
         end = len(raw) - CHECKSUM - (SIGNATURE if raw[0] == MAGIC_2 and raw[2] & SIGNED else 0)
         if _crc(raw[1:end] + extra) != int.from_bytes(raw[end : end + CHECKSUM], "little"):

@@ -51,7 +51,7 @@ class Identity:
     run_id: str
 
 
-@dataclass
+@dataclass(slots=True)
 class Faults:
     """What a test or a scenario may break. Takes effect at once."""
 

@@ -1,0 +1,155 @@
+"""A channel: contiguous sequence numbers, and a queue that is bounded and knows what to drop."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from anafi_mav.errors import LocalProtocolError
+from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.channel import FRAME_BYTES, TELEMETRY, Channel, total
+from anafi_mav.mavlink.frames import Parser, Received, frame, pack
+
+ATTITUDE = dialect.MAVLink_attitude_message(1, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5)
+ACK = dialect.MAVLink_command_ack_message(400, 0)
+
+
+class Wire:
+    """What a channel wrote."""
+
+    def __init__(self, **options: Any) -> None:
+        self.written: list[bytes] = []
+        self.channel = Channel("a wire", self.written.append, **options)
+
+    def read(self) -> list[Received]:
+        """The frames written since the last call."""
+        data = b"".join(self.written)
+        self.written.clear()
+        return Parser().receive(data)
+
+
+def sequence(frames: list[Received], source: tuple[int, int]) -> list[int]:
+    return [received.raw[4] for received in frames if (received.sysid, received.compid) == source]
+
+
+def test_sequence_numbers_are_contiguous_per_sender_and_wrap() -> None:
+    wire = Wire()
+    for _ in range(300):
+        wire.channel.send(ATTITUDE, 1, 1)
+        wire.channel.send(ACK, 1, 154)
+        wire.channel.send(ACK, 2, 1)
+    frames = wire.read()
+    expected = [n % 256 for n in range(300)]
+    for source in ((1, 1), (1, 154), (2, 1)):
+        assert sequence(frames, source) == expected
+    assert wire.channel.counters == {"sent_frames": 900}
+
+
+def test_channels_count_for_themselves() -> None:
+    one, other = Wire(), Wire()
+    packed = pack(ATTITUDE)
+    one.channel.send_packed(packed, 1, 1)
+    one.channel.send_packed(packed, 1, 1)
+    other.channel.send_packed(packed, 1, 1)
+    assert sequence(one.read(), (1, 1)) == [0, 1]
+    assert sequence(other.read(), (1, 1)) == [0]
+
+
+def test_a_full_socket_makes_it_wait_and_answers_leave_first() -> None:
+    wire = Wire()
+    wire.channel.pause()
+    wire.channel.send(ATTITUDE, 1, 1)
+    wire.channel.send(ACK, 1, 1)
+    wire.channel.forward(frame(pack(ACK), 99, 42, 1), ACK.get_msgId())
+    assert wire.written == []
+    wire.channel.resume()
+    frames = wire.read()
+    assert [(received.id, received.sysid) for received in frames] == [(77, 1), (77, 42), (30, 1)]
+    assert sequence(frames, (1, 1)) == [0, 1]
+    assert sequence(frames, (42, 1)) == [99]
+
+
+def test_the_oldest_telemetry_is_dropped_first_and_counted() -> None:
+    size = len(pack(ATTITUDE).payload) + FRAME_BYTES
+    wire = Wire(queue_bytes=10 * size)
+    wire.channel.pause()
+    wire.channel.send(ACK, 1, 1)
+    for n in range(100):
+        wire.channel.send(dialect.MAVLink_attitude_message(n, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5), 1, 1)
+    wire.channel.resume()
+    frames = wire.read()
+    assert frames[0].id == 77
+    assert [received.message.time_boot_ms for received in frames[1:]] == list(range(91, 100))
+    assert sequence(frames, (1, 1)) == list(range(10))
+    assert wire.channel.counters == {"sent_frames": 10, "dropped_frames": 91}
+
+
+def test_answers_are_dropped_only_when_nothing_else_is_left() -> None:
+    size = len(pack(ACK).payload) + FRAME_BYTES
+    wire = Wire(queue_bytes=3 * size)
+    wire.channel.pause()
+    wire.channel.send(ATTITUDE, 1, 1)
+    for command in range(400, 405):
+        wire.channel.send(dialect.MAVLink_command_ack_message(command, 0), 1, 1)
+    wire.channel.resume()
+    assert [received.message.command for received in wire.read()] == [402, 403, 404]
+    assert wire.channel.counters["dropped_frames"] == 3
+
+
+def test_a_socket_that_fills_again_while_the_queue_leaves() -> None:
+    written: list[bytes] = []
+
+    def write(raw: bytes) -> None:
+        written.append(raw)
+        channel.pause()
+
+    channel = Channel("one at a time", write)
+    channel.pause()
+    for _ in range(3):
+        channel.send(ACK, 1, 1)
+    for count in (1, 2, 3, 3):
+        channel.resume()
+        assert len(written) == count
+
+
+def test_a_closed_channel_only_counts() -> None:
+    wire = Wire()
+    wire.channel.pause()
+    wire.channel.send(ATTITUDE, 1, 1)
+    wire.channel.close()
+    wire.channel.send(ACK, 1, 1)
+    wire.channel.forward(b"whatever", 77)
+    wire.channel.resume()
+    assert wire.written == []
+    assert not wire.channel.is_open
+    assert wire.channel.counters == {"dropped_frames": 3}
+
+
+def test_a_field_that_does_not_fit_costs_no_sequence_number() -> None:
+    wire = Wire()
+    with pytest.raises(LocalProtocolError):
+        wire.channel.send(dialect.MAVLink_command_ack_message(70000, 0), 1, 1)
+    wire.channel.send(ACK, 1, 1)
+    assert sequence(wire.read(), (1, 1)) == [0]
+
+
+def test_datagrams_and_streams_treat_a_torn_frame_differently() -> None:
+    raw = frame(pack(ACK), 0, 255, 190)
+    stream, datagrams = Wire(), Wire(datagrams=True)
+    assert [len(stream.channel.receive(part)) for part in (raw[:5], raw[5:])] == [0, 1]
+    assert [len(datagrams.channel.receive(part)) for part in (raw[:5], raw[5:])] == [0, 0]
+
+
+def test_counters_are_summed() -> None:
+    wires = [Wire(), Wire()]
+    for wire in wires:
+        wire.channel.send(ACK, 1, 1)
+        wire.channel.receive(b"rubbish")
+    assert total(wire.channel for wire in wires) == {"sent_frames": 2, "garbage_bytes": 14}
+
+
+def test_telemetry_is_what_the_next_message_replaces() -> None:
+    assert {0, 30, 33, 1} <= TELEMETRY
+    # Answers, parameters, missions, texts.
+    assert TELEMETRY.isdisjoint({77, 22, 44, 47, 253, 110})
