@@ -37,13 +37,15 @@ class SimulatorProcess:
         self._complaints: collections.deque[str] = collections.deque(maxlen=MAX_COMPLAINTS)
         self._ready: asyncio.Future[None] = asyncio.get_running_loop().create_future()
 
-    async def start(self, fleet: Mapping[str, object]) -> None:
+    async def start(self, fleet: Mapping[str, object], log: Path | None = None) -> None:
         """Start it with the drones of `fleet` (the JSON of `anafi-mav sim --fleet`) and wait until it is ready.
 
+        It writes its log to `log`, an absolute path because it runs in another directory.
         Raises `ConfigError` if it refuses the fleet, `AnafiMavError` if it fails otherwise.
         """
+        logging = () if log is None else ("--log", str(log))
         self._process = process = await asyncio.create_subprocess_exec(
-            *(sys.executable, "-m", "anafi_mav", "sim", "--fleet", "-", "--stdin-watch"),
+            *(sys.executable, "-m", "anafi_mav", "sim", "--fleet", "-", "--stdin-watch", *logging),
             cwd=Path(anafi_mav.__file__).parents[1],  # -m looks here first: it has to find this very package
             stdin=asyncio.subprocess.PIPE,
             stdout=asyncio.subprocess.PIPE,

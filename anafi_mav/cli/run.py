@@ -40,6 +40,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--endpoint", action="append", metavar="URL", help="a MAVLink endpoint, instead of those of FILE; repeatable"
     )
     parser.add_argument("--allow-kill", action="store_true", help="let clients cut the motors in the air")
+    parser.add_argument(
+        "--sim-log", type=Path, metavar="FILE", help="what simulated drones go through, one JSON object a line"
+    )
     parser.add_argument("-v", "--verbose", action="count", default=0, help="tell more; twice: each message")
 
 
@@ -50,7 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
     config = configuration(arguments.config, arguments.drone, arguments.endpoint, arguments.allow_kill)
     for remark in remarks(config):
         complain(f"warning: {remark}", "yellow")
-    asyncio.run(_run(config))
+    asyncio.run(_run(config, arguments.sim_log.absolute() if arguments.sim_log else None))
     return 0
 
 
@@ -95,13 +98,13 @@ class _Interrupts:
         say("Ctrl-C once more ends the gateway all the same", "yellow")
 
 
-async def _run(config: Config) -> None:
+async def _run(config: Config, sim_log: Path | None) -> None:
     interrupts = _Interrupts()
     interrupts.install()
     async with contextlib.AsyncExitStack() as stack:
         gateway_config, fleet = place(config, stack.enter_context(Reservations()))
         gateway = Gateway(gateway_config)
-        if not await _unless(interrupts.stop, _start(gateway, fleet, stack)):
+        if not await _unless(interrupts.stop, _start(gateway, fleet, sim_log, stack)):
             return
         interrupts.flying = gateway.drones_in_air
         for line in gateway.lines():
@@ -110,13 +113,15 @@ async def _run(config: Config) -> None:
         await interrupts.stop.wait()
 
 
-async def _start(gateway: Gateway, fleet: dict[str, Any] | None, stack: contextlib.AsyncExitStack) -> None:
+async def _start(
+    gateway: Gateway, fleet: dict[str, Any] | None, sim_log: Path | None, stack: contextlib.AsyncExitStack
+) -> None:
     await gateway.open()  # first, so that a busy port is told before a simulator has been started
     stack.push_async_callback(_close, gateway)
     if fleet is not None:
         simulator = SimulatorProcess()
         stack.push_async_callback(simulator.close)
-        await simulator.start(fleet)
+        await simulator.start(fleet, sim_log)
         names = ", ".join(drone["name"] for drone in fleet["drones"])
         death = asyncio.create_task(_tell_death(simulator, names))
         stack.callback(death.cancel)

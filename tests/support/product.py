@@ -1,0 +1,153 @@
+"""The product as users run it: `anafi-mav run` as a process, with the simulator that it starts."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import signal
+import socket
+import sys
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from typing_extensions import Self
+
+START_LIMIT = 30.0
+"""s until a process has to say its first word: two of them share two busy cores."""
+
+
+def free_udp_port(address: str) -> int:
+    """A port of an address that only we use, so that nobody else takes it in the meantime."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind((address, 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+class Process:
+    """A child whose output is kept line by line as it comes."""
+
+    def __init__(self, process: asyncio.subprocess.Process) -> None:
+        self.process = process
+        self.lines: list[str] = []
+        """stdout."""
+        self.complaints: list[str] = []
+        """stderr."""
+        self._news = asyncio.Event()
+        loop = asyncio.get_running_loop()
+        self._readers = [
+            loop.create_task(self._read(process.stdout, self.lines)),
+            loop.create_task(self._read(process.stderr, self.complaints)),
+        ]
+
+    @classmethod
+    async def start(cls, *words: str, stdin: int = asyncio.subprocess.DEVNULL) -> Self:
+        pipe = asyncio.subprocess.PIPE
+        return cls(await asyncio.create_subprocess_exec(*words, stdin=stdin, stdout=pipe, stderr=pipe))
+
+    async def _read(self, stream: asyncio.StreamReader | None, lines: list[str]) -> None:
+        assert stream is not None
+        while line := await stream.readline():
+            lines.append(line.decode(errors="replace").rstrip())
+            self._tell()
+        self._tell()
+
+    def _tell(self) -> None:
+        self._news.set()
+        self._news = asyncio.Event()
+
+    async def line(self, accept: Callable[[str], bool], *, since: int = 0, timeout: float = START_LIMIT) -> str:
+        """The first line of stdout, from a place on, that `accept` likes."""
+
+        async def find() -> str:
+            position = since
+            while True:
+                for line in self.lines[position:]:
+                    position += 1
+                    if accept(line):
+                        return line
+                assert not all(reader.done() for reader in self._readers), f"it ended: {self}"
+                await self._news.wait()
+
+        try:
+            return await asyncio.wait_for(find(), timeout)
+        except asyncio.TimeoutError:
+            raise AssertionError(f"no such line within {timeout} s: {self}") from None
+
+    async def end(self, timeout: float = START_LIMIT) -> int:
+        """Its exit status, once it has ended and all that it said is read."""
+        status = await asyncio.wait_for(self.process.wait(), timeout)
+        await asyncio.wait_for(asyncio.gather(*self._readers), timeout)
+        return status
+
+    async def put_away(self) -> None:
+        """End it whatever it does."""
+        if self.process.returncode is None:
+            self.process.kill()
+        await self.process.wait()
+        for reader in self._readers:
+            reader.cancel()
+        await asyncio.gather(*self._readers, return_exceptions=True)
+
+    def __str__(self) -> str:
+        return "\n".join(["", *self.lines, "stderr:", *self.complaints])
+
+
+@asynccontextmanager
+async def program(*words: str, stdin: int = asyncio.subprocess.DEVNULL) -> AsyncIterator[Process]:
+    """Any program for the length of a block."""
+    held = await Process.start(*words, stdin=stdin)
+    try:
+        yield held
+    finally:
+        await held.put_away()
+
+
+class Product(Process):
+    """`anafi-mav run` with a configuration file."""
+
+    log: Path
+
+    def entries(self, kind: str, name: str = "") -> list[dict[str, Any]]:
+        """What its simulator noted: entries of a kind whose name ends in `name`, oldest first."""
+        whole = self.log.read_bytes().rpartition(b"\n")[0] if self.log.exists() else b""
+        found = map(json.loads, whole.splitlines())
+        return [entry for entry in found if entry["kind"] == kind and entry["name"].endswith(name)]
+
+    async def flying_state(self, wanted: str, timeout: float = 20.0) -> dict[str, Any]:
+        """Wait until the drone's own state is this; the entry that says so."""
+        deadline = asyncio.get_running_loop().time() + timeout
+        while True:
+            changes = self.entries("state", "flying")
+            if changes and changes[-1]["args"]["to"] == wanted:
+                return changes[-1]
+            assert asyncio.get_running_loop().time() < deadline, (wanted, changes)
+            await asyncio.sleep(0.05)  # another process writes the file
+
+    def child(self) -> int | None:
+        """Process id of the simulator that it started; None if it has no child."""
+        children = Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children").read_text().split()
+        assert len(children) <= 1
+        return int(children[0]) if children else None
+
+
+@asynccontextmanager
+async def product(folder: Path, config: str, *arguments: str, ready: bool = True) -> AsyncIterator[Product]:
+    """The gateway and its simulator for the length of a block; by default it begins when both are ready."""
+    path, log = folder / "fleet.yaml", folder / "sim.jsonl"
+    path.write_text(config)
+    words = (sys.executable, "-m", "anafi_mav", "run", "-c", str(path), "--sim-log", str(log), *arguments)
+    held = await Product.start(*words)
+    held.log = log
+    try:
+        if ready:
+            await held.line(lambda line: line.startswith("ready"))
+        yield held
+    finally:
+        if held.process.returncode is None:
+            held.process.send_signal(signal.SIGTERM)
+            with suppress(asyncio.TimeoutError):
+                await asyncio.wait_for(held.process.wait(), 10.0)
+        await held.put_away()
