@@ -1,0 +1,229 @@
+"""Parrot's libarsdk is the referee of our controller's wire format, message by message, both ways."""
+
+from __future__ import annotations
+
+import asyncio
+import ctypes
+import importlib.util
+import json
+import os
+import sys
+import threading
+from collections.abc import Awaitable, Callable, Iterator
+from pathlib import Path
+from subprocess import PIPE, Popen
+from typing import Any, TypeAlias
+
+import pytest
+
+import anafi_mav.arsdk.messages
+from anafi_mav.arsdk import wire
+from anafi_mav.arsdk.controller import ControllerSession, connect
+from anafi_mav.arsdk.messages import ardrone3, common
+from anafi_mav.arsdk.wire import Message, MessageId, UnknownMessage
+
+CLONE_NEWNET = 0x40000000
+SCRIPT = Path(__file__).with_name("olympe_device.py")
+
+pytestmark = [
+    pytest.mark.skipif(sys.platform != "linux", reason=f"network namespaces are Linux's, this is {sys.platform}"),
+    pytest.mark.skipif(
+        importlib.util.find_spec("olympe") is None,
+        reason="Olympe is not installed: package parrot-olympe exists for x86-64 Linux, Python < 3.12",
+    ),
+    pytest.mark.skipif(
+        not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root may make a network namespace"
+    ),
+]
+
+
+class Referee:
+    """The process with Olympe in it."""
+
+    def __init__(self) -> None:
+        self.process = Popen([sys.executable, str(SCRIPT)], stdin=PIPE, stdout=PIPE, text=True)
+        assert self.process.stdout is not None
+        if not self.process.stdout.readline():
+            if self.process.wait(10) == 77:
+                pytest.skip("this root may not make a network namespace")
+            pytest.fail("Olympe's device did not start")
+
+    def send(self, name: str, args: list[Any]) -> None:
+        assert self.process.stdin is not None
+        self.process.stdin.write(json.dumps({"send": name, "args": args}) + "\n")
+        self.process.stdin.flush()
+
+    def received(self) -> dict[str, Any]:
+        """The next message Olympe got; blocks."""
+        assert self.process.stdout is not None
+        line = self.process.stdout.readline()
+        assert line, "Olympe's device is gone"
+        result = json.loads(line)
+        assert isinstance(result, dict)
+        return result
+
+    def run(self, body: Callable[[], Awaitable[None]]) -> None:
+        """Run a coroutine in the referee's network. A namespace belongs to a thread, so it gets one."""
+        failures: list[BaseException] = []
+
+        async def bounded() -> None:
+            await asyncio.wait_for(body(), 60)
+
+        def enter() -> None:
+            try:
+                with Path(f"/proc/{self.process.pid}/ns/net").open() as namespace:
+                    assert ctypes.CDLL(None).setns(namespace.fileno(), CLONE_NEWNET) == 0
+                asyncio.run(bounded())
+            except BaseException as error:
+                failures.append(error)
+
+        thread = threading.Thread(target=enter)
+        thread.start()
+        thread.join()
+        if failures:
+            raise failures[0]
+
+    def close(self) -> None:
+        assert self.process.stdin is not None
+        self.process.stdin.close()
+        try:
+            self.process.wait(10)
+        finally:
+            self.process.kill()
+            self.process.wait()
+            if self.process.stdout is not None:
+                self.process.stdout.close()
+
+
+@pytest.fixture
+def referee() -> Iterator[Referee]:
+    referee = Referee()
+    try:
+        yield referee
+    finally:
+        referee.close()
+
+
+Queue: TypeAlias = "asyncio.Queue[Message | UnknownMessage]"
+
+
+async def join(version: int, **options: Any) -> tuple[ControllerSession, Queue]:
+    heard: Queue = asyncio.Queue()
+    session = await connect(
+        "127.0.0.1", versions=(version, version), on_message=lambda message, now: heard.put_nowait(message), **options
+    )
+    assert session.version == version
+    assert (session.device.model_id, session.device.serial) == (0x0914, "12345678")
+    return session, heard
+
+
+def sample(message: type[Message]) -> tuple[Message, list[Any]]:
+    """A message with a different value in each argument, and the same as plain values for the other side."""
+    values: list[Any] = []
+    plain: list[Any] = []
+    for number, (_, kind, python) in enumerate(wire.wire_fields(message), 1):
+        if isinstance(kind, wire.Text):
+            value: Any = f"text {number} é"
+        elif isinstance(kind, wire.Blob):
+            value = bytes([number, 0, 255])
+        elif isinstance(kind, wire.Bits):
+            value = 1 | 1 << len(kind.names) - 1
+        elif issubclass(python, wire.OpenEnum):
+            value = list(python)[-1]
+        elif kind.code in "fd":
+            value = -0.5 * number
+        else:
+            value = -number if kind.code.islower() else number
+        values.append(value)
+        plain.append({"hex": value.hex()} if isinstance(value, bytes) else value)
+    return message(*values), [int(value) if isinstance(value, wire.OpenEnum) else value for value in plain]
+
+
+def declared(direction: wire.Direction) -> list[type[Message]]:
+    home = anafi_mav.arsdk.messages.__name__
+    return [
+        message
+        for message in wire.declared_messages()
+        if message.DIRECTION is direction and message.__module__.startswith(home)
+    ]
+
+
+@pytest.mark.parametrize("version", [1, 2, 3])
+def test_olympe_understands_us_and_we_understand_olympe(referee: Referee, version: int) -> None:
+    payload = bytes(range(256)) * (10 if version == 3 else 5)  # 2560 bytes are split in version 3, 1280 never
+
+    async def body() -> None:
+        session, heard = await join(version)
+        for message in (common.AllStates(), ardrone3.MoveBy(1.0, -2.0, 0.5, 0.25)):
+            session.send(message)
+            assert await asyncio.to_thread(referee.received) == {
+                "received": message.NAME,
+                "args": [getattr(message, name) for name in message.__struct_fields__],
+            }
+        session.send(ardrone3.PCMD(1, 0, 50, 0, -20, 0))
+        assert await asyncio.to_thread(referee.received) == {
+            "received": "ardrone3.Piloting.PCMD",
+            "args": [1, 0, 50, 0, -20, 0],
+        }
+        # generic.custom_cmd(service_id, msg_num, payload), an envelope that no table of ours opens
+        packed = bytes.fromhex("3412 0100") + len(payload).to_bytes(4, "little") + payload
+        session.send(UnknownMessage(MessageId(133, 0, 1), packed))
+        got = await asyncio.to_thread(referee.received)
+        assert got["args"] == [{"hex": payload.hex()}]
+
+        referee.send("ardrone3.PilotingState.FlyingStateChanged", [2])
+        assert await heard.get() == ardrone3.FlyingStateChanged(ardrone3.FlyingState.HOVERING)
+        referee.send("ardrone3.PilotingState.AltitudeChanged", [1.5])
+        assert await heard.get() == ardrone3.AltitudeChanged(1.5)
+        referee.send("generic.custom_evt", [0x1234, 1, {"hex": payload.hex()}])
+        assert await heard.get() == UnknownMessage(MessageId(133, 0, 3), packed)
+        # all is acknowledged, nothing is unreadable, nothing was sent twice
+        assert {name for name in session.counters if name not in ("sent", "received")} <= {"ping"}
+        await session.close()
+
+    referee.run(body)
+
+
+def test_every_message_of_our_tables_passes_libarsdk(referee: Referee) -> None:
+    async def body() -> None:
+        session, heard = await join(3)
+        # All of a queue at once, for its order is kept; between queues there is none.
+        for buffer in wire.Buffer:
+            samples = [sample(message) for message in declared(wire.Direction.COMMAND) if message.BUFFER is buffer]
+            for message, _ in samples:
+                session.send(message)
+            for message, plain in samples:
+                assert await asyncio.to_thread(referee.received) == {"received": message.NAME, "args": plain}
+        for buffer in wire.Buffer:
+            samples = [sample(message) for message in declared(wire.Direction.EVENT) if message.BUFFER is buffer]
+            for message, plain in samples:
+                referee.send(message.NAME, plain)
+            for message, _ in samples:
+                assert await heard.get() == message
+        await session.close()
+
+    assert len(declared(wire.Direction.COMMAND)) > 30
+    assert len(declared(wire.Direction.EVENT)) > 100
+    referee.run(body)
+
+
+@pytest.mark.parametrize("version", [1, 3])
+def test_olympe_answers_our_pings(referee: Referee, version: int) -> None:
+    async def body() -> None:
+        session, _ = await join(version, ping_after=0.05, silence_limit=0.5)
+        while session.counters["ping"] < 10:
+            await asyncio.sleep(0.05)
+            assert not session.lost.done()
+        await session.close()
+
+    referee.run(body)
+
+
+def test_olympe_gone_is_a_lost_link(referee: Referee) -> None:
+    async def body() -> None:
+        session, _ = await join(3)
+        referee.process.kill()
+        assert await session.lost in ("the drone closed the connection", "the drone's UDP port is closed")
+        await session.close()
+
+    referee.run(body)
