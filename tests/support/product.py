@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import json
+import os
 import signal
 import socket
 import sys
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -43,9 +44,13 @@ class Process:
         ]
 
     @classmethod
-    async def start(cls, *words: str, stdin: int = asyncio.subprocess.DEVNULL) -> Self:
+    async def start(
+        cls, *words: str, stdin: int = asyncio.subprocess.DEVNULL, env: Mapping[str, str] | None = None
+    ) -> Self:
+        """`env` is added to our own environment."""
         pipe = asyncio.subprocess.PIPE
-        return cls(await asyncio.create_subprocess_exec(*words, stdin=stdin, stdout=pipe, stderr=pipe))
+        whole = {**os.environ, **(env or {})}
+        return cls(await asyncio.create_subprocess_exec(*words, stdin=stdin, stdout=pipe, stderr=pipe, env=whole))
 
     async def _read(self, stream: asyncio.StreamReader | None, lines: list[str]) -> None:
         assert stream is not None
@@ -76,6 +81,11 @@ class Process:
         except asyncio.TimeoutError:
             raise AssertionError(f"no such line within {timeout} s: {self}") from None
 
+    def say(self, line: str) -> None:
+        """A line to its stdin."""
+        assert self.process.stdin is not None
+        self.process.stdin.write(line.encode() + b"\n")
+
     async def end(self, timeout: float = START_LIMIT) -> int:
         """Its exit status, once it has ended and all that it said is read."""
         status = await asyncio.wait_for(self.process.wait(), timeout)
@@ -96,9 +106,11 @@ class Process:
 
 
 @asynccontextmanager
-async def program(*words: str, stdin: int = asyncio.subprocess.DEVNULL) -> AsyncIterator[Process]:
+async def program(
+    *words: str, stdin: int = asyncio.subprocess.DEVNULL, env: Mapping[str, str] | None = None
+) -> AsyncIterator[Process]:
     """Any program for the length of a block."""
-    held = await Process.start(*words, stdin=stdin)
+    held = await Process.start(*words, stdin=stdin, env=env)
     try:
         yield held
     finally:
@@ -116,15 +128,21 @@ class Product(Process):
         found = map(json.loads, whole.splitlines())
         return [entry for entry in found if entry["kind"] == kind and entry["name"].endswith(name)]
 
-    async def flying_state(self, wanted: str, timeout: float = 20.0) -> dict[str, Any]:
-        """Wait until the drone's own state is this; the entry that says so."""
+    async def entry(
+        self, kind: str, name: str, accept: Callable[[dict[str, Any]], bool] = lambda args: True, timeout: float = 20.0
+    ) -> dict[str, Any]:
+        """Wait until the newest such entry has arguments that `accept` likes; that entry."""
         deadline = asyncio.get_running_loop().time() + timeout
         while True:
-            changes = self.entries("state", "flying")
-            if changes and changes[-1]["args"]["to"] == wanted:
-                return changes[-1]
-            assert asyncio.get_running_loop().time() < deadline, (wanted, changes)
+            found = self.entries(kind, name)
+            if found and accept(found[-1]["args"]):
+                return found[-1]
+            assert asyncio.get_running_loop().time() < deadline, (kind, name, found[-3:], str(self))
             await asyncio.sleep(0.05)  # another process writes the file
+
+    async def flying_state(self, wanted: str, timeout: float = 20.0) -> dict[str, Any]:
+        """Wait until the drone's own state is this; the entry that says so."""
+        return await self.entry("state", "flying", lambda args: args["to"] == wanted, timeout)
 
     def child(self) -> int | None:
         """Process id of the simulator that it started; None if it has no child."""

@@ -1,0 +1,262 @@
+"""Items 19-33 of the conformance list: take-off by every client's convention, modes, goto, landing."""
+
+from __future__ import annotations
+
+import math
+import time
+
+import pytest
+from support.mav import NAN
+from support.world import ARMED, HOLD, HOME, LAND, POSITION, RETURN, TAKEOFF, World, world
+
+from anafi_mav import geo
+from anafi_mav.mavlink import dialect
+
+ACCEPTED, DENIED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_DENIED
+REJECTED = dialect.MAV_RESULT_TEMPORARILY_REJECTED
+ARM, TAKE_OFF, REPOSITION, SET_MODE = 400, 22, 192, 176
+
+
+async def at_height(w: World, height: float) -> None:
+    """Wait until the drone itself, not the gateway's word, is at a height and holds it."""
+    await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD, timeout=20.0)
+    assert w.drone.pose.up == pytest.approx(height, abs=0.5)
+
+
+async def test_conf_019_takeoff_before_arming() -> None:
+    """QGroundControl: take-off while disarmed, AMSL height, then arm."""
+    async with world() as w:
+        ack = await w.client.command(TAKE_OFF, -1, NAN, NAN, NAN, z=HOME[2] + 8.0)
+        assert ack.result == ACCEPTED
+        assert w.drone.flying_state.name == "LANDED"
+        mark = w.client.mark()
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        await w.client.heartbeat(lambda beat: beat.custom_mode == TAKEOFF, since=mark)
+        await at_height(w, 8.0)
+
+
+async def test_a_takeoff_that_nobody_arms_is_forgotten() -> None:
+    async with world() as w:
+        await w.client.command(TAKE_OFF, -1, NAN, NAN, NAN)
+        assert (await w.client.command(ARM, 0)).result == ACCEPTED  # disarming takes it back at once
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        await w.client.wait("HEARTBEAT")
+        await w.client.wait("HEARTBEAT")
+        assert w.commands("ardrone3.Piloting.TakeOff") == []
+
+
+async def test_conf_020_takeoff_to_the_parameter() -> None:
+    """MAVSDK: arm, take-off with everything NaN climbs to MIS_TAKEOFF_ALT."""
+    async with world() as w:
+        mark = w.client.mark()
+        w.client.send(dialect.MAVLink_param_set_message(1, 1, b"MIS_TAKEOFF_ALT", 7.0, 9))
+        assert (await w.client.wait("PARAM_VALUE", since=mark)).param_value == 7.0
+        await w.client.command(ARM, 1)
+        mark = w.client.mark()
+        assert (await w.client.command(TAKE_OFF)).result == ACCEPTED
+        await w.client.heartbeat(lambda beat: beat.custom_mode == TAKEOFF, since=mark)
+        await at_height(w, 7.0)
+
+
+async def test_conf_021_takeoff_relative() -> None:
+    """MAVProxy, dronekit, Mission Planner: latitude and longitude 0, height above the take-off point."""
+    async with world() as w:
+        await w.client.command(ARM, 1)
+        mark = w.client.mark()
+        assert (await w.client.command(TAKE_OFF, 0, 0, 0, 0, x=0.0, y=0.0, z=10.0)).result == ACCEPTED
+        await w.client.heartbeat(lambda beat: beat.custom_mode == TAKEOFF, since=mark)
+        await at_height(w, 10.0)
+
+
+@pytest.mark.parametrize("place", [(NAN, NAN), HOME[:2]])
+async def test_conf_022_takeoff_amsl(place: tuple[float, float]) -> None:
+    async with world() as w:
+        await w.client.command(ARM, 1)
+        mark = w.client.mark()
+        ack = await w.client.command(TAKE_OFF, NAN, NAN, NAN, NAN, x=place[0], y=place[1], z=HOME[2] + 6.0)
+        assert ack.result == ACCEPTED
+        await w.client.heartbeat(lambda beat: beat.custom_mode == TAKEOFF, since=mark)
+        await at_height(w, 6.0)
+
+
+@pytest.mark.parametrize("height", [0.5, -3.0, 151.0, math.inf])
+async def test_takeoff_heights_are_refused_not_clamped(height: float) -> None:
+    async with world() as w:
+        await w.client.command(ARM, 1)
+        mark = w.client.mark()
+        assert (await w.client.command(TAKE_OFF, 0, 0, 0, 0, x=0.0, y=0.0, z=height)).result == DENIED
+        await w.client.wait("STATUSTEXT", lambda m: m.text.startswith("Refused"), since=mark)
+        assert w.commands("ardrone3.Piloting.TakeOff") == []
+
+
+async def test_conf_023_land_by_mode() -> None:
+    async with world() as w:
+        await w.take_off()
+        mark, began = w.client.mark(), time.monotonic()
+        w.client.send(dialect.MAVLink_set_mode_message(1, 1, LAND))
+        await w.client.heartbeat(lambda beat: beat.custom_mode == LAND, since=mark)
+        assert time.monotonic() - began < 1.3
+        await w.client.heartbeat(lambda beat: not beat.base_mode & ARMED, timeout=20.0)
+        assert w.drone.flying_state.name == "LANDED"
+
+
+async def test_conf_024_land_by_command() -> None:
+    async with world() as w:
+        await w.take_off()
+        assert (await w.client.command(21)).result == ACCEPTED
+        assert w.drone.flying_state.name == "LANDING"
+        await w.client.heartbeat(lambda beat: not beat.base_mode & ARMED, timeout=20.0)
+
+
+@pytest.mark.parametrize("how", ["SET_MODE", "DO_SET_MODE", "NAV_RETURN_TO_LAUNCH"])
+async def test_conf_025_return(how: str) -> None:
+    async with world() as w:
+        await w.take_off()
+        mark = w.client.mark()
+        if how == "SET_MODE":
+            w.client.send(dialect.MAVLink_set_mode_message(1, 1, RETURN))
+        else:
+            ack = await (w.client.command(SET_MODE, 1, 4, 5) if how == "DO_SET_MODE" else w.client.command(20))
+            assert ack.result == ACCEPTED
+        await w.client.heartbeat(lambda beat: beat.custom_mode == RETURN, since=mark)
+        assert len(w.commands("rth.return_to_home")) == 1
+
+
+async def test_conf_026_pause() -> None:
+    async with world() as w:
+        await w.take_off()
+        north = geo.destination(*HOME[:2], 60.0, 0.0)
+        assert (await w.client.command(REPOSITION, -1, 1, 0, NAN, frame=6, x=north[0], y=north[1], z=5.0)).result == 0
+        await w.client.wait("LOCAL_POSITION_NED", lambda m: m.vx > 2.0, timeout=10.0)
+        mark = w.client.mark()
+        assert (await w.client.command(REPOSITION, -1, 1, 0, NAN)).result == ACCEPTED
+        await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD, since=mark)
+        await w.client.wait("LOCAL_POSITION_NED", lambda m: math.hypot(m.vx, m.vy) < 0.2, timeout=10.0)
+        assert w.drone.pose.north < 50.0
+        assert len(w.commands("ardrone3.Piloting.CancelMoveTo")) == 1
+
+
+@pytest.mark.parametrize(("main", "sub", "mode"), [(4, 3, HOLD), (4, 5, RETURN), (4, 6, LAND), (3, 0, POSITION)])
+@pytest.mark.parametrize("packed", [False, True])
+async def test_conf_027_modes(main: int, sub: int, mode: int, packed: bool) -> None:
+    async with world() as w:
+        await w.take_off()
+        if mode == HOLD:
+            await w.client.command(SET_MODE, 1, 3, 0)
+        mark = w.client.mark()
+        ack = await (w.client.command(SET_MODE, 1, mode) if packed else w.client.command(SET_MODE, 1, main, sub))
+        assert ack.result == ACCEPTED
+        await w.client.heartbeat(lambda beat: beat.custom_mode == mode, since=mark)
+
+
+async def test_conf_028_unknown_mode() -> None:
+    async with world() as w:
+        await w.take_off()
+        mark = w.client.mark()
+        assert (await w.client.command(SET_MODE, 1, 5, 0)).result == DENIED  # ACRO
+        w.client.send(dialect.MAVLink_set_mode_message(1, 1, 5 << 16))
+        for _ in range(2):
+            await w.client.wait("STATUSTEXT", lambda m: m.text.startswith("Mode refused"), since=mark)
+        for _ in range(2):
+            await w.client.wait("HEARTBEAT")
+        assert {beat.custom_mode for _, beat in w.client.since(mark, "HEARTBEAT")} == {HOLD}
+
+
+@pytest.mark.parametrize(
+    ("frame", "z"), [(0, HOME[2] + 12.0), (5, HOME[2] + 12.0), (3, 12.0), (6, 12.0), (None, HOME[2] + 12.0)]
+)
+async def test_conf_029_goto(frame: int | None, z: float) -> None:
+    """The frame decides what the height means; COMMAND_LONG is AMSL. The drone arrives at 12 m in every case."""
+    async with world() as w:
+        await w.take_off()
+        place = geo.destination(*HOME[:2], 20.0, -15.0)
+        ack = await w.client.command(REPOSITION, -1, 1, 0, NAN, frame=frame, x=place[0], y=place[1], z=z)
+        assert ack.result == ACCEPTED
+        await w.drone.wait_log(lambda entry: entry.name.endswith("moveToChanged") and entry.args["status"] == 1, 30.0)
+        pose = w.drone.pose
+        assert (pose.north, pose.east, pose.up) == pytest.approx((20.0, -15.0, 12.0), abs=1.0)
+
+
+async def test_goto_in_a_terrain_frame_is_refused() -> None:
+    async with world() as w:
+        await w.take_off()
+        ack = await w.client.command(REPOSITION, -1, 1, 0, NAN, frame=11, x=HOME[0], y=HOME[1], z=12.0)
+        assert ack.result == dialect.MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME
+
+
+async def test_conf_030_goto_without_fix() -> None:
+    async with world() as w:
+        await w.take_off()
+        w.drone.faults.gps = False
+        await w.client.wait("GPS_RAW_INT", lambda m: m.fix_type < 2)
+        ack = await w.client.command(REPOSITION, -1, 1, 0, NAN, frame=6, x=48.8790, y=2.3677, z=5.0)
+        assert ack.result == REJECTED
+        assert w.commands("ardrone3.Piloting.moveTo") == []
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "z"),
+    [(0.0, 0.0, 10.0), (91.0, 2.0, 10.0), (48.879, 2.3677, 0.5), (48.879, 2.3677, 151.0), (48.879, 2.3677, -1.0)],
+)
+async def test_goto_nonsense_is_refused(x: float, y: float, z: float) -> None:
+    async with world() as w:
+        await w.take_off()
+        assert (await w.client.command(REPOSITION, -1, 1, 0, NAN, frame=6, x=x, y=y, z=z)).result == DENIED
+        assert w.commands("ardrone3.Piloting.moveTo") == []
+
+
+async def test_goto_on_the_ground_is_refused() -> None:
+    async with world() as w:
+        ack = await w.client.command(REPOSITION, -1, 1, 0, NAN, frame=6, x=48.879, y=2.3677, z=10.0)
+        assert ack.result == REJECTED
+
+
+async def test_conf_031_change_altitude() -> None:
+    async with world() as w:
+        await w.take_off()
+        before = w.drone.pose
+        assert (await w.client.command(REPOSITION, -1, 1, 0, NAN, z=HOME[2] + 15.0)).result == ACCEPTED
+        await w.drone.wait_log(lambda entry: entry.name.endswith("moveToChanged") and entry.args["status"] == 1, 30.0)
+        pose = w.drone.pose
+        assert pose.up == pytest.approx(15.0, abs=0.5)
+        assert (pose.north, pose.east) == pytest.approx((before.north, before.east), abs=0.7)
+
+
+async def test_change_heading() -> None:
+    """QGroundControl's change of heading: DO_REPOSITION with the heading alone, in radians."""
+    async with world() as w:
+        await w.take_off()
+        assert (await w.client.command(REPOSITION, NAN, 1, NAN, math.pi / 2)).result == ACCEPTED
+        await w.drone.wait_log(lambda entry: entry.name.endswith("moveToChanged") and entry.args["status"] == 1, 30.0)
+        assert w.drone.pose.yaw == pytest.approx(math.pi / 2, abs=0.1)
+
+
+async def test_conf_032_landed_state() -> None:
+    async with world() as w:
+        mark = w.client.mark()
+        await w.take_off()
+        await w.client.command(21)
+        await w.client.wait("EXTENDED_SYS_STATE", lambda m: m.landed_state == 1, timeout=20.0)
+        states = [m.landed_state for _, m in w.client.since(mark, "EXTENDED_SYS_STATE")]
+        order = [state for index, state in enumerate(states) if index == 0 or states[index - 1] != state]
+        assert order == [1, 3, 2, 4, 1]
+
+
+async def test_conf_033_auto_disarm() -> None:
+    async with world() as w:
+        await w.take_off()
+        mark = w.client.mark()
+        await w.client.command(21)
+        await w.client.wait("EXTENDED_SYS_STATE", lambda m: m.landed_state == 1, since=mark, timeout=20.0)
+        await w.client.heartbeat(lambda beat: not beat.base_mode & ARMED, since=mark, timeout=10.0)
+
+
+async def test_a_newer_action_ends_the_older_one() -> None:
+    """Land during the climb: the drone lands, and the height asked for before is forgotten."""
+    async with world() as w:
+        await w.client.command(ARM, 1)
+        await w.client.command(TAKE_OFF, x=0.0, y=0.0, z=30.0)
+        await w.client.wait("ALTITUDE", lambda m: m.altitude_relative > 4.0, timeout=20.0)
+        assert (await w.client.command(21)).result == ACCEPTED
+        await w.client.heartbeat(lambda beat: not beat.base_mode & ARMED, timeout=30.0)
+        assert max(entry.args["up"] for entry in w.drone.log if entry.kind == "pose") < 20.0

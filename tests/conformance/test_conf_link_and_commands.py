@@ -1,0 +1,233 @@
+"""Items 1-18 of the conformance list: heartbeats, frames, addressing, the command protocol, arming."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+import time
+
+import pytest
+from support.mav import NAN
+from support.world import ARMED, HOLD, POSITION, world
+
+from anafi_mav.mavlink import dialect
+from anafi_mav.services.actions import ACTIONS
+
+ACCEPTED, UNSUPPORTED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_UNSUPPORTED
+IN_PROGRESS = dialect.MAV_RESULT_IN_PROGRESS
+ARM, TAKE_OFF, REPOSITION, SET_MODE = 400, 22, 192, 176
+
+
+async def test_conf_001_heartbeat() -> None:
+    async with world() as w:
+        await w.client.wait("HEARTBEAT")
+        mark = w.client.mark()
+        for _ in range(4):
+            await w.client.wait("HEARTBEAT", since=w.client.mark())
+        beats = w.client.since(mark, "HEARTBEAT")
+        gaps = [later[0] - earlier[0] for earlier, later in itertools.pairwise(beats)]
+        assert all(0.9 <= gap <= 1.1 for gap in gaps), gaps
+        for _, beat in beats:
+            assert (beat.get_srcSystem(), beat.get_srcComponent()) == (1, 1)
+            assert (beat.type, beat.autopilot) == (dialect.MAV_TYPE_QUADROTOR, dialect.MAV_AUTOPILOT_PX4)
+            assert beat.base_mode & dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+
+
+async def test_conf_002_heartbeat_on_change() -> None:
+    async with world() as w:
+        for _ in range(3):  # a periodic heartbeat cannot be within 100 ms three times by chance
+            for param, armed in ((1, True), (0, False)):
+                mark = w.client.mark()
+                await w.client.command(ARM, param)
+                acknowledged = time.monotonic()
+                await w.client.heartbeat(lambda beat, armed=armed: bool(beat.base_mode & ARMED) is armed, since=mark)
+                assert time.monotonic() - acknowledged < 0.1
+
+
+async def test_conf_005_frames() -> None:
+    async with world() as w:
+        await w.client.command(ARM, 1)
+        await w.client.command(ARM, 0)
+        await w.client.wait("HEARTBEAT")
+        frames = [message.get_msgbuf() for _, message in w.client.received]
+        assert len(frames) > 30
+        assert {frame[0] for frame in frames} == {0xFD}
+        sequence = [frame[4] for frame in frames]
+        assert all(b == (a + 1) % 256 for a, b in itertools.pairwise(sequence))
+        assert w.client.bad == 0
+
+
+async def test_conf_006_silence_after_link_loss() -> None:
+    async with world() as w:
+        w.drone.faults.mute = True
+        lost = time.monotonic()
+        await asyncio.sleep(3.0)  # the interval under test
+        mark = w.client.mark()
+        await asyncio.sleep(1.5)  # and one heartbeat period of silence after it
+        assert w.client.received[mark:] == []
+        w.drone.faults.mute = False
+        await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD, timeout=5.0)
+        position = await w.client.wait("GLOBAL_POSITION_INT", since=mark)
+        assert position.time_boot_ms / 1000 > lost - w.client.received[0][0]
+
+
+async def test_conf_007_acknowledgement_addresses() -> None:
+    async with world() as w:
+        for sysid, compid in ((245, 190), (255, 230), (1, 191)):
+            client = await w.connect(sysid, compid)
+            ack = await client.command(ARM, 0)
+            assert (ack.get_srcSystem(), ack.get_srcComponent()) == (1, 1)
+            assert (ack.target_system, ack.target_component) == (sysid, compid)
+
+
+@pytest.mark.parametrize("target", [(1, 0), (0, 0), (1, 1), (0, 1)])
+async def test_conf_008_one_acknowledgement(target: tuple[int, int]) -> None:
+    async with world() as w:
+        mark = w.client.mark()
+        ack = await w.client.command(ARM, 0, target=target)
+        assert ack.result == ACCEPTED
+        await w.client.wait("HEARTBEAT")
+        await w.client.wait("HEARTBEAT")
+        assert len(w.client.since(mark, "COMMAND_ACK")) == 1
+
+
+async def test_conf_009_unsupported_at_once() -> None:
+    async with world() as w:
+        for id in (31000, 211, 60000, 241):
+            began = time.monotonic()
+            ack = await w.client.command(id)
+            assert ack.result == UNSUPPORTED
+            assert time.monotonic() - began < 0.2
+
+
+async def test_conf_009_other_components_are_not_ours() -> None:
+    """Nobody answers for components that do not exist: no camera or gimbal is behind 100 and 154 yet."""
+    async with world() as w:
+        mark = w.client.mark()
+        for component in (100, 154, 190):
+            w.client.send_command(31000, target=(1, component))
+        w.client.send_command(31000, target=(2, 1))
+        assert (await w.client.command(211)).result == UNSUPPORTED
+        assert [ack.command for _, ack in w.client.since(mark, "COMMAND_ACK")] == [211]
+
+
+@pytest.mark.parametrize("id", sorted({*ACTIONS, 512, 511, 510, 520, 519, 410}))
+async def test_conf_010_nan_everywhere(id: int) -> None:
+    async with world() as w:
+        for frame in (None, 0, 5, 6):
+            ack = await w.client.command(id, NAN, NAN, NAN, NAN, frame=frame)
+            assert ack.result in (ACCEPTED, UNSUPPORTED, dialect.MAV_RESULT_DENIED, 1), ack
+        # Nothing moved: arming stayed off, so at most a take-off waits for it.
+        assert w.drone.flying_state.name == "LANDED"
+        await w.client.wait("HEARTBEAT")
+
+
+async def test_conf_011_progress() -> None:
+    async with world(speed=0.5) as w:  # half speed: the motors take two seconds to ramp up
+        await w.client.command(ARM, 1)
+        mark, began = w.client.mark(), time.monotonic()
+        ack = await w.client.command(TAKE_OFF, timeout=15.0)
+        assert ack.result == ACCEPTED
+        acks = [(at, a.result) for at, a in w.client.since(mark, "COMMAND_ACK")]
+        assert [result for _, result in acks[:-1]] == [IN_PROGRESS] * (len(acks) - 1)
+        assert len(acks) >= 2
+        times = [began, *(at for at, _ in acks)]
+        assert max(b - a for a, b in itertools.pairwise(times)) <= 1.0
+        assert w.drone.flying_state.name != "LANDED"
+
+
+async def test_conf_012_resent_command() -> None:
+    async with world() as w:
+        await w.take_off()
+        mark = w.client.mark()
+        for _ in range(4):
+            w.client.send_command(REPOSITION, -1, 1, 0, NAN, frame=6, x=48.8790, y=2.3677, z=5.0)
+            await w.client.wait("COMMAND_ACK")
+        await w.client.wait("HEARTBEAT")
+        assert {a.result for _, a in w.client.since(mark, "COMMAND_ACK")} <= {ACCEPTED, IN_PROGRESS}
+        moves = w.commands("ardrone3.Piloting.moveTo") + w.commands("move.extended_move_to")
+        assert len(moves) == 1
+
+
+@pytest.mark.parametrize("frame", [None, 0, 3])
+async def test_conf_013_long_and_int(frame: int | None) -> None:
+    async with world() as w:
+        z = 12.0 if frame == 3 else 12.0 + 35.0
+        place = {"x": 0.0, "y": 0.0, "z": 12.0} if frame is None else {"x": NAN, "y": NAN, "z": z}
+        assert (await w.client.command(ARM, 1, frame=frame)).result == ACCEPTED
+        assert (await w.client.command(TAKE_OFF, NAN, NAN, NAN, NAN, frame=frame, **place)).result == ACCEPTED
+        await w.client.wait("ALTITUDE", lambda m: abs(m.altitude_relative - 12.0) < 0.5, timeout=20.0)
+        await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD, timeout=10.0)
+        assert (await w.client.command(SET_MODE, 1, 3, 0, frame=frame)).result == ACCEPTED
+        await w.client.heartbeat(lambda beat: beat.custom_mode == POSITION)
+
+
+async def test_conf_014_autopilot_version() -> None:
+    async with world() as w:
+        mark = w.client.mark()
+        assert (await w.client.command(512, 148)).result == ACCEPTED
+        version = await w.client.wait("AUTOPILOT_VERSION", since=mark)
+        serial = bytes(version.uid2).rstrip(b"\0").decode()
+        assert serial == w.drone.identity.serial
+        mark = w.client.mark()
+        assert (await w.client.command(520, 1)).result == ACCEPTED
+        await w.client.wait("AUTOPILOT_VERSION", since=mark)
+        mark = w.client.mark()
+        assert (await w.client.command(512, 300)).result == ACCEPTED
+        assert (await w.client.wait("PROTOCOL_VERSION", since=mark)).max_version == 200
+
+
+async def test_conf_015_capabilities() -> None:
+    async with world() as w:
+        mark = w.client.mark()
+        await w.client.command(512, 148)
+        bits = (await w.client.wait("AUTOPILOT_VERSION", since=mark)).capabilities
+        # COMMAND_INT 8, PARAM_ENCODE_BYTEWISE 16, SET_ATTITUDE_TARGET 64, MAVLINK2 8192
+        assert bits == 8 | 16 | 64 | 8192
+    async with world(allow_kill=True) as w:
+        mark = w.client.mark()
+        await w.client.command(512, 148)
+        bits = (await w.client.wait("AUTOPILOT_VERSION", since=mark)).capabilities
+        assert bits == 8 | 16 | 64 | 8192 | 2048
+
+
+async def test_conf_016_version_number() -> None:
+    async with world() as w:
+        mark = w.client.mark()
+        await w.client.command(512, 148)
+        version = (await w.client.wait("AUTOPILOT_VERSION", since=mark)).flight_sw_version
+        assert version & 0xFF == 0
+        assert (version >> 24, version >> 16 & 0xFF) >= (1, 14)
+
+
+async def test_conf_017_arm() -> None:
+    async with world() as w:
+        for _ in range(2):
+            mark, began = w.client.mark(), time.monotonic()
+            assert (await w.client.command(ARM, 1)).result == ACCEPTED
+            await w.client.heartbeat(lambda beat: bool(beat.base_mode & ARMED), since=mark)
+            assert time.monotonic() - began <= 1.0
+        assert w.drone.flying_state.name == "LANDED"  # armed, and nothing turns
+
+
+async def test_conf_018_disarm() -> None:
+    async with world() as w:
+        await w.client.command(ARM, 1)
+        assert (await w.client.command(ARM, 0)).result == ACCEPTED
+        await w.client.heartbeat(lambda beat: not beat.base_mode & ARMED)
+        await w.take_off()
+        mark = w.client.mark()
+        assert (await w.client.command(ARM, 0)).result == dialect.MAV_RESULT_TEMPORARILY_REJECTED
+        assert "in the air" in (await w.client.wait("STATUSTEXT", since=mark)).text
+        assert (await w.client.command(ARM, 0, 21196)).result == dialect.MAV_RESULT_DENIED
+        critical = await w.client.wait("STATUSTEXT", lambda m: m.severity == 2, since=mark)
+        assert critical.text.startswith("Motor cut refused")
+        assert w.commands("ardrone3.Piloting.Emergency") == []
+        assert w.drone.flying_state.name in ("HOVERING", "FLYING")
+
+
+async def test_motor_cut_with_allow_kill() -> None:
+    async with world(allow_kill=True) as w:
+        await w.take_off()
+        assert (await w.client.command(ARM, 0, 21196)).result == ACCEPTED
+        assert len(w.commands("ardrone3.Piloting.Emergency")) == 1

@@ -1,0 +1,247 @@
+"""Items 34-46 of the conformance list: what the vehicle reports, and its parameters and empty lists."""
+
+from __future__ import annotations
+
+import math
+import struct
+import time
+
+import pytest
+from support.mav import NAN
+from support.world import HOME, world
+
+from anafi_mav import geo
+from anafi_mav.mavlink import dialect
+
+ACCEPTED = dialect.MAV_RESULT_ACCEPTED
+GYRO, ACCEL, MAG, GPS, PREARM = 1, 2, 4, 32, 0x10000000
+
+
+async def test_conf_034_home() -> None:
+    async with world() as w:
+        home = await w.client.wait("HOME_POSITION", since=0, timeout=2.0)
+        assert (home.latitude / 1e7, home.longitude / 1e7) == pytest.approx(HOME[:2], abs=3e-5)
+        assert home.altitude / 1000 == pytest.approx(HOME[2], abs=1.5)
+        for request in ((410,), (512, 242)):
+            mark = w.client.mark()
+            assert (await w.client.command(*request)).result == ACCEPTED
+            await w.client.wait("HOME_POSITION", since=mark)
+        mark = w.client.mark()
+        await w.client.wait("HOME_POSITION", since=mark, timeout=2.5)  # 0.5 Hz, unasked
+        await w.take_off()
+        reported = w.drone.log.find("event", "ardrone3.GPSSettingsState.HomeChanged")[-1].args
+        home = await w.client.wait("HOME_POSITION", timeout=2.5)
+        assert home.latitude / 1e7 == pytest.approx(reported["latitude"], abs=1e-7)
+        assert home.longitude / 1e7 == pytest.approx(reported["longitude"], abs=1e-7)
+
+
+async def test_conf_035_altitudes_agree() -> None:
+    async with world() as w:
+        await w.take_off(10.0)
+        mark = w.client.mark()
+        altitude = await w.client.wait("ALTITUDE", since=mark)
+        position = await w.client.wait("GLOBAL_POSITION_INT", since=mark)
+        hud = await w.client.wait("VFR_HUD", since=mark)
+        assert altitude.altitude_relative == pytest.approx(w.drone.pose.up, abs=0.5)
+        assert position.relative_alt / 1000 == pytest.approx(altitude.altitude_relative, abs=0.5)
+        assert position.alt / 1000 == pytest.approx(altitude.altitude_amsl, abs=0.5)
+        assert hud.alt == pytest.approx(altitude.altitude_amsl, abs=0.5)
+        assert altitude.altitude_amsl == pytest.approx(HOME[2] + 10.0, abs=2.0)
+
+
+async def test_conf_036_gps() -> None:
+    async with world() as w:
+        raw = await w.client.wait("GPS_RAW_INT")
+        assert raw.fix_type == 3
+        assert raw.satellites_visible == w.drone.firmware.satellites
+        assert (raw.eph, raw.epv, raw.cog) == (65535, 65535, 65535)
+        assert (raw.lat / 1e7, raw.lon / 1e7) == pytest.approx(HOME[:2], abs=3e-5)
+        w.drone.faults.gps = False
+        raw = await w.client.wait("GPS_RAW_INT", lambda m: m.fix_type < 2)
+        assert (raw.lat, raw.lon) == (0, 0)
+        mark = w.client.mark()
+        await w.client.wait("HEARTBEAT")
+        await w.client.wait("HEARTBEAT")
+        assert w.client.since(mark, "GLOBAL_POSITION_INT") == []
+
+
+async def test_conf_037_battery() -> None:
+    async with world() as w:
+        w.drone.faults.battery = 63
+        truth = w.drone.firmware.battery
+        status = await w.client.wait("BATTERY_STATUS", lambda m: m.voltages[0] == truth.millivolts)
+        assert status.battery_remaining == 63
+        assert status.voltages[1:] == [65535] * 9
+        assert (status.current_battery, status.current_consumed, status.energy_consumed) == (-1, -1, -1)
+
+
+async def test_conf_038_health_bits() -> None:
+    async with world() as w:
+        status = await w.client.wait("SYS_STATUS")
+        wanted = GYRO | ACCEL | MAG | GPS
+        assert status.onboard_control_sensors_present & wanted == wanted
+        assert status.onboard_control_sensors_enabled & wanted == wanted
+        assert status.onboard_control_sensors_health & wanted == wanted
+        w.drone.faults.gps = False
+        await w.client.wait("SYS_STATUS", lambda m: not m.onboard_control_sensors_health & GPS)
+
+
+async def test_conf_039_prearm() -> None:
+    async with world() as w:
+        status = await w.client.wait("SYS_STATUS")
+        assert status.onboard_control_sensors_present & PREARM
+        assert status.onboard_control_sensors_enabled & PREARM
+        assert status.onboard_control_sensors_health & PREARM
+        w.drone.faults.magneto_required = True
+        await w.client.wait("SYS_STATUS", lambda m: not m.onboard_control_sensors_health & (PREARM | MAG))
+        mark = w.client.mark()
+        assert (await w.client.command(400, 1)).result == dialect.MAV_RESULT_TEMPORARILY_REJECTED
+        await w.client.wait("STATUSTEXT", lambda m: m.text.startswith("PreArm: "), since=mark)
+
+
+async def test_conf_040_attitude_signs() -> None:
+    """Flying north with the nose north is nose down; turning to east is yaw +90 degrees."""
+    async with world(speed=1.0) as w:
+        await w.take_off(5.0)
+        east = geo.destination(*HOME[:2], 0.0, 40.0)
+        ack = await w.client.command(192, -1, 1, 0, math.pi / 2, frame=6, x=east[0], y=east[1], z=5.0)
+        assert ack.result == ACCEPTED
+        attitude = await w.client.wait(
+            "ATTITUDE", lambda m: m.pitch < -0.03 and abs(m.yaw - math.pi / 2) < 0.2, timeout=15
+        )
+        assert math.isnan(attitude.pitchspeed)
+        quaternion = await w.client.wait("ATTITUDE_QUATERNION", lambda m: m.q4 > 0.6, timeout=15)
+        assert quaternion.q1 == pytest.approx(quaternion.q4, abs=0.1)  # yaw 90: (cos 45, ., ., sin 45)
+        truth = w.drone.pose
+        assert truth.pitch < 0.0 or truth.east > 30.0
+
+
+async def test_conf_041_velocity_signs() -> None:
+    async with world() as w:
+        await w.take_off(5.0)
+        for north, east, up in ((25.0, 0.0, 5.0), (25.0, -25.0, 5.0), (25.0, -25.0, 25.0)):
+            place = geo.destination(*HOME[:2], north, east)
+            mark = w.client.mark()
+            await w.client.command(192, -1, 1, 0, NAN, frame=6, x=place[0], y=place[1], z=up)
+            if up > 5.0:
+                local = await w.client.wait("LOCAL_POSITION_NED", lambda m: m.vz < -0.8, since=mark, timeout=15)
+                globe = await w.client.wait("GLOBAL_POSITION_INT", lambda m: m.vz < -80, since=mark, timeout=15)
+            elif east == 0.0:
+                local = await w.client.wait("LOCAL_POSITION_NED", lambda m: m.vx > 1.0, since=mark, timeout=15)
+                globe = await w.client.wait("GLOBAL_POSITION_INT", lambda m: m.vx > 100, since=mark, timeout=15)
+                assert abs(local.vy) < 0.5
+                assert abs(globe.vy) < 50
+            else:
+                local = await w.client.wait("LOCAL_POSITION_NED", lambda m: m.vy < -1.0, since=mark, timeout=15)
+                globe = await w.client.wait("GLOBAL_POSITION_INT", lambda m: m.vy < -100, since=mark, timeout=15)
+            await w.drone.wait_log(
+                lambda entry, z=up: (
+                    entry.name.endswith("moveToChanged") and entry.args["status"] == 1 and entry.args["altitude"] == z
+                ),
+                40.0,
+            )
+            await w.client.wait("HEARTBEAT")
+        local = await w.client.wait("LOCAL_POSITION_NED", timeout=5)
+        assert (local.x, local.y, local.z) == pytest.approx((25.0, -25.0, -25.0), abs=1.5)
+
+
+async def test_conf_042_parameter_list() -> None:
+    async with world() as w:
+        mark, began = w.client.mark(), time.monotonic()
+        w.client.send(dialect.MAVLink_param_request_list_message(1, 0))
+        first = await w.client.wait("PARAM_VALUE", since=mark)
+        await w.client.wait("PARAM_VALUE", lambda m: m.param_index == first.param_count - 1, since=mark)
+        assert time.monotonic() - began < 1.0
+        values = [m for _, m in w.client.since(mark, "PARAM_VALUE")]
+        assert [m.param_index for m in values] == list(range(first.param_count))
+        assert {m.param_count for m in values} == {first.param_count}
+        assert len({m.param_id for m in values}) == first.param_count
+        assert {m.get_srcComponent() for m in values} == {1}
+        names = {m.param_id for m in values}
+        # conformance A5, "Setup complete", and what QGroundControl's indicators ask for
+        assert names >= {
+            "MIS_TAKEOFF_ALT",
+            "RTL_RETURN_ALT",
+            "SYS_AUTOSTART",
+            "CAL_GYRO0_ID",
+            "CAL_ACC0_ID",
+            "CAL_MAG0_ID",
+            "CAL_MAG1_ID",
+            "CAL_MAG2_ID",
+            "COM_RC_IN_MODE",
+            "NAV_DLL_ACT",
+            "COM_DL_LOSS_T",
+        }
+
+
+async def test_conf_043_parameter_read() -> None:
+    async with world() as w:
+        mark = w.client.mark()
+        w.client.send(dialect.MAVLink_param_request_read_message(1, 1, b"RTL_RETURN_ALT", -1))
+        by_name = await w.client.wait("PARAM_VALUE", since=mark)
+        assert (by_name.param_id, by_name.param_value) == ("RTL_RETURN_ALT", 20.0)  # the firmware's default
+        mark = w.client.mark()
+        w.client.send(dialect.MAVLink_param_request_read_message(1, 1, b"", by_name.param_index))
+        by_index = await w.client.wait("PARAM_VALUE", since=mark)
+        assert by_index.param_id == "RTL_RETURN_ALT"
+        w.client.send(dialect.MAVLink_param_request_read_message(1, 1, b"SIXTEEN_LETTERS_", -1))
+        error = await w.client.wait("PARAM_ERROR", since=mark)
+        assert (error.param_id, error.error) == ("SIXTEEN_LETTERS_", 1)
+
+
+async def test_conf_044_parameter_set() -> None:
+    async with world(clients=2) as w:
+        marks = [client.mark() for client in w.clients]
+        began = time.monotonic()
+        w.client.send(dialect.MAVLink_param_set_message(1, 1, b"RTL_RETURN_ALT", 33.0, 9))
+        for client, mark in zip(w.clients, marks, strict=True):  # every client learns it
+            value = await client.wait("PARAM_VALUE", since=mark)
+            assert (value.param_id, value.param_value, value.param_type) == ("RTL_RETURN_ALT", 33.0, 9)
+        assert time.monotonic() - began < 0.5
+        assert w.commands("rth.set_min_altitude")[-1].args == {"altitude": 33.0}
+        for name, value, kind, expected in (
+            (b"NO_SUCH_PARAM", 1.0, 9, 1),
+            (b"RTL_RETURN_ALT", 33.0, 6, 7),
+            (b"RTL_RETURN_ALT", 1000.0, 9, 2),
+            (b"SYS_AUTOSTART", 0.0, 6, 5),
+        ):
+            mark = w.client.mark()
+            w.client.send(dialect.MAVLink_param_set_message(1, 1, name, value, kind))
+            assert (await w.client.wait("PARAM_ERROR", since=mark)).error == expected
+        assert len(w.commands("rth.set_min_altitude")) == 1
+
+
+async def test_conf_045_integers_are_bytewise() -> None:
+    async with world() as w:
+        mark = w.client.mark()
+        w.client.send(dialect.MAVLink_param_request_read_message(1, 1, b"SYS_AUTOSTART", -1))
+        value = await w.client.wait("PARAM_VALUE", since=mark)
+        assert value.param_type == 6
+        assert struct.unpack("<i", value.get_msgbuf()[10:14]) == (4001,)
+
+
+@pytest.mark.parametrize("kind", [0, 1, 2])
+async def test_conf_046_empty_lists(kind: int) -> None:
+    async with world() as w:
+        mark, began = w.client.mark(), time.monotonic()
+        w.client.send(dialect.MAVLink_mission_request_list_message(1, 1, kind))
+        count = await w.client.wait("MISSION_COUNT", since=mark)
+        assert (count.count, count.mission_type) == (0, kind)
+        assert (count.target_system, count.target_component) == (255, 190)
+        assert time.monotonic() - began < 0.5
+
+
+async def test_message_intervals_are_per_client() -> None:
+    async with world(clients=2, telemetry_rate=30.0, speed=1.0) as w:
+        first, second = w.clients
+        assert (await first.command(511, 30, -1)).result == ACCEPTED
+        assert (await first.command(511, 999, 1000)).result == dialect.MAV_RESULT_UNSUPPORTED
+        marks = first.mark(), second.mark()
+        for _ in range(5):
+            await second.wait("ATTITUDE")
+        assert first.since(marks[0], "ATTITUDE") == []
+        mark = first.mark()
+        assert (await first.command(510, 30)).result == ACCEPTED
+        assert (await first.wait("MESSAGE_INTERVAL", since=mark)).interval_us == -1
+        assert (await first.command(511, 30, 0)).result == ACCEPTED
+        await first.wait("ATTITUDE")

@@ -1,0 +1,134 @@
+"""The drone's link dies in the air, in three ways; what clients see meanwhile, and what the drone hears afterwards."""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from support.mav import Client
+from support.process import simulator_process
+from support.world import ARMED, HOLD, OFFBOARD, TAKEOFF, loopback, world
+
+from anafi_mav import geo
+from anafi_mav.config import Config, DroneConfig
+from anafi_mav.gateway import Gateway
+from anafi_mav.mavlink import dialect
+
+HOME = (48.8789, 2.3677, 35.0)
+
+AT_CONNECTION = {
+    "common.Common.CurrentDateTime",
+    "common.Common.AllStates",
+    "common.Settings.AllSettings",
+}
+"""What a connection begins with: no order to do anything."""
+
+
+def gateway(drone: str, address: str) -> Gateway:
+    return Gateway(
+        Config(
+            endpoints=(f"tcpin://{address}:5760",),
+            drones=(DroneConfig(name="alpha", sysid=7, address=drone),),
+        )
+    )
+
+
+async def fly(client: Client, height: float = 5.0) -> None:
+    """Take off, then set out for a place far away."""
+    target = (7, 1)
+    assert (await client.command(400, 1, target=target)).result == 0
+    mark = client.mark()
+    assert (await client.command(22, x=0.0, y=0.0, z=height, target=target)).result == 0
+    await client.heartbeat(lambda beat: beat.custom_mode == TAKEOFF, since=mark)
+    await client.heartbeat(lambda beat: beat.custom_mode == HOLD, timeout=20.0)
+    place = geo.destination(*HOME[:2], 80.0, 0.0)
+    assert (await client.command(192, -1, 1, 0, frame=6, x=place[0], y=place[1], z=height, target=target)).result == 0
+    await client.wait("LOCAL_POSITION_NED", lambda m: m.vx > 1.0, timeout=15.0)
+
+
+async def silent_after(client: Client, lost: float) -> None:
+    """Three seconds after the loss nothing more comes; watched for two heartbeat periods."""
+    await asyncio.sleep(lost + 3.0 - time.monotonic())
+    mark = client.mark()
+    await asyncio.sleep(2.0)
+    assert client.received[mark:] == []
+
+
+async def back_within(client: Client, seconds: float, landed: Callable[[int], bool]) -> None:
+    """The system is there again: same id, in Hold, its state read anew."""
+    mark = client.mark()
+    beat = await client.heartbeat(lambda beat: True, timeout=seconds)
+    assert (beat.get_srcSystem(), beat.custom_mode) == (7, HOLD)
+    state = await client.wait("EXTENDED_SYS_STATE", since=mark)
+    assert landed(state.landed_state)
+
+
+async def test_killed(tmp_path: Path) -> None:
+    """Port unreachable; what comes back is another boot of the drone, on the ground."""
+    drone, address = loopback(), loopback()
+    async with gateway(drone, address):
+        async with simulator_process(drone, tmp_path / "first.jsonl", "--speed", "3") as sim:
+            client = await Client().connect(5760, address)
+            await client.heartbeat(lambda beat: True, timeout=10.0)
+            await fly(client)
+            await sim.kill()
+            lost = time.monotonic()
+        await silent_after(client, lost)
+        async with simulator_process(drone, tmp_path / "second.jsonl", "--speed", "3") as sim:
+            await back_within(client, 5.0, lambda landed: landed == 1)
+            await client.heartbeat(lambda beat: not beat.base_mode & ARMED)
+            assert {command["name"] for command in sim.commands()} <= AT_CONNECTION
+        await client.close()
+
+
+async def test_stopped(tmp_path: Path) -> None:
+    """SIGSTOP: the sockets stay, nobody answers. It goes on where it was, and hears no old order."""
+    drone, address = loopback(), loopback()
+    async with gateway(drone, address), simulator_process(drone, tmp_path / "sim.jsonl", "--speed", "2") as sim:
+        client = await Client().connect(5760, address)
+        await client.heartbeat(lambda beat: True, timeout=10.0)
+        await fly(client)
+        heard = len(sim.commands())
+        sim.signal(signal.SIGSTOP)
+        await silent_after(client, time.monotonic())
+        sim.signal(signal.SIGCONT)
+        await back_within(client, 5.0, lambda landed: landed == 2)
+        await client.heartbeat(lambda beat: True)
+        assert {command["name"] for command in sim.commands()[heard:]} <= AT_CONNECTION
+        await client.close()
+
+
+@pytest.mark.parametrize("engaged", [False, True])
+async def test_all_datagrams_lost(engaged: bool) -> None:
+    """Silence as over Wi-Fi. Setpoints that go on coming meanwhile do not fly the drone that comes back."""
+    async with world(speed=1.0, sysid=7) as w:
+        client = w.client
+        await fly(client)
+        setpoint = dialect.MAVLink_set_attitude_target_message(0, 7, 1, 7, [1, 0, 0, 0], 0, 0, 0, 0.8)
+
+        async def stream() -> None:
+            while True:
+                client.send(setpoint)
+                await asyncio.sleep(0.05)  # the client's setpoint rate
+
+        sender = asyncio.get_running_loop().create_task(stream())
+        try:
+            if engaged:
+                await client.wait("HEARTBEAT")
+                assert (await client.command(176, 1, 6, 0, target=(7, 1))).result == 0
+                await client.heartbeat(lambda beat: beat.custom_mode == OFFBOARD)
+                await client.wait("LOCAL_POSITION_NED", lambda m: m.vz < -0.5)
+            w.drone.faults.mute = True
+            await silent_after(client, time.monotonic())
+            heard = len(w.drone.log)
+            w.drone.faults.mute = False
+            await back_within(client, 5.0, lambda landed: landed == 2)
+            await client.heartbeat(lambda beat: True)
+            after = [entry for entry in list(w.drone.log)[heard:] if entry.kind == "command"]
+            assert {entry.name for entry in after} <= AT_CONNECTION
+        finally:
+            sender.cancel()
