@@ -1,0 +1,90 @@
+"""Unmodified MAVProxy without a terminal: its commands come through a pipe, its words are read from another.
+
+MAVProxy's own `mode` does not work with vehicles of the PX4 flavour (it packs the mode wrongly); landing is ordered by
+its `long` instead.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import re
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+from support.product import Process, Product, product, program
+from support.world import loopback
+
+from anafi_mav import geo
+
+HOME = (48.8789, 2.3677, 35.0)
+MAVPROXY = shutil.which("mavproxy.py", path=str(Path(sys.executable).parent)) or "mavproxy.py"
+
+
+async def answer(mavproxy: Process, command: str, pattern: str, timeout: float = 15.0) -> str:
+    """Type a command; the first line after it that has the pattern."""
+    since = len(mavproxy.lines)
+    mavproxy.say(command)
+    return await mavproxy.line(lambda line: re.search(pattern, line) is not None, since=since, timeout=timeout)
+
+
+async def accepted(mavproxy: Process, command: str, name: str) -> None:
+    await answer(mavproxy, command, f"Got COMMAND_ACK: {name}: ACCEPTED$")
+
+
+async def at_rest(p: Product, *place: float) -> None:
+    """The drone's true pose is at latitude, longitude and height."""
+    latitude, longitude, height = place
+    await p.entry(
+        "pose",
+        "",
+        lambda pose: (
+            geo.distance(latitude, longitude, pose["lat"], pose["lon"]) < 1.0 and abs(pose["ato"] - height) < 0.5
+        ),
+    )
+
+
+async def test_connect_look_and_fly(tmp_path: Path) -> None:
+    address = loopback()
+    config = f"""
+        endpoints: ["tcpin://{address}:5760"]
+        drones: [{{name: alpha, sysid: 1, sim: {{address: {loopback()}, home: {list(HOME)}, speed: 3}}}}]
+    """
+    # HOME: no start-up script of whoever runs the tests.
+    words = (sys.executable, "-u", MAVPROXY, f"--master=tcp:{address}:5760", f"--state-basedir={tmp_path}")
+    async with (
+        product(tmp_path, config) as p,
+        program(*words, stdin=asyncio.subprocess.PIPE, env={"HOME": str(tmp_path)}) as mavproxy,
+    ):
+        await mavproxy.line(lambda line: "online system 1" in line)
+
+        # What it shows: mode, GPS, battery.
+        await mavproxy.line(lambda line: "Mode LOITER" in line)
+        await mavproxy.line(lambda line: re.search(r"GPS lock at 35 met(er|re)s", line) is not None)
+        gps = await answer(mavproxy, "status GPS_RAW_INT", r"GPS_RAW_INT \{")
+        assert "fix_type : 3, lat : 488789000, lon : 23677000, alt : 35000," in gps
+        await answer(mavproxy, "bat", r"Flight battery: +100%")
+        battery = await answer(mavproxy, "status BATTERY_STATUS", r"BATTERY_STATUS \{")
+        assert "battery_remaining : 100," in battery
+
+        # What it can do. Each word of the gateway is held against the simulator's own log.
+        await accepted(mavproxy, "arm throttle", "COMPONENT_ARM_DISARM")
+        await accepted(mavproxy, "takeoff 5", "NAV_TAKEOFF")
+        await at_rest(p, *HOME[:2], 5.0)
+        assert len(p.entries("command", "Piloting.TakeOff")) == 1
+
+        place = geo.destination(*HOME[:2], 20.0, 10.0)
+        await accepted(mavproxy, f"guided {place[0]:.7f} {place[1]:.7f} 8", "DO_REPOSITION")
+        await at_rest(p, *place, 8.0)
+        (move,) = p.entries("command", "Piloting.moveTo")
+        assert (move["args"]["latitude"], move["args"]["longitude"]) == pytest.approx(place, abs=1e-6)
+        assert move["args"]["altitude"] == pytest.approx(8.0, abs=0.01)
+
+        since = len(mavproxy.lines)
+        await accepted(mavproxy, "long MAV_CMD_NAV_LAND", "NAV_LAND")
+        await p.flying_state("landed")
+        assert len(p.entries("command", "Piloting.Landing")) == 1
+        await mavproxy.line(lambda line: line.endswith("DISARMED"), since=since)
+
+        assert not [line for line in mavproxy.lines if "Traceback" in line or "ERROR" in line], mavproxy
