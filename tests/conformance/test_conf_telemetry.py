@@ -7,11 +7,11 @@ import struct
 import time
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.mav import NAN
 from support.world import HOME, world
 
 from anafi_mav import geo
-from anafi_mav.mavlink import dialect
 
 ACCEPTED = dialect.MAV_RESULT_ACCEPTED
 GYRO, ACCEL, MAG, GPS, PREARM = 1, 2, 4, 32, 0x10000000

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.mav import Client
 from support.process import simulator_process
 from support.world import ARMED, HOLD, OFFBOARD, TAKEOFF, loopback, world
@@ -16,7 +17,6 @@ from support.world import ARMED, HOLD, OFFBOARD, TAKEOFF, loopback, world
 from anafi_mav import geo
 from anafi_mav.config import Config, DroneConfig
 from anafi_mav.gateway import Gateway
-from anafi_mav.mavlink import dialect
 
 HOME = (48.8789, 2.3677, 35.0)
 

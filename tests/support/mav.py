@@ -1,6 +1,7 @@
 """A MAVLink client with nothing of ours between it and the wire: asyncio sockets and pymavlink's own parser.
 
-It uses pymavlink's stock dialect where that knows the message, so that a mistake in our generated one shows.
+It speaks pymavlink's stock dialect, so that a mistake in our generated one shows; ours reads only the messages that
+the stock one has never heard of.
 """
 
 from __future__ import annotations
@@ -11,7 +12,9 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from anafi_mav.mavlink import dialect
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from anafi_mav.mavlink import dialect as newer
 
 NAN = math.nan
 
@@ -26,6 +29,7 @@ class Client:
         self.bad = 0
         self._parser = dialect.MAVLink(None, sysid, compid)
         self._parser.robust_parsing = True
+        self._newer = newer.MAVLink(None, sysid, compid)
         self._out = dialect.MAVLink(None, sysid, compid)
         self._news = asyncio.Event()
         self._writer: asyncio.StreamWriter | None = None
@@ -44,6 +48,8 @@ class Client:
         """Bytes from the gateway."""
         now = time.monotonic()
         for message in self._parser.parse_buffer(data) or ():
+            if message.get_type().startswith("UNKNOWN_"):
+                message = self._newer.parse_buffer(message.get_msgbuf())[0]
             if message.get_type() == "BAD_DATA":
                 self.bad += 1
             else:

@@ -9,9 +9,10 @@ from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
 from anafi_mav.config import Config, DroneConfig
 from anafi_mav.gateway import Gateway
-from anafi_mav.mavlink import dialect
 from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
 from support.mav import Client
 
