@@ -191,7 +191,8 @@ _SENSOR_BITS: dict[Sensor, int] = {
 
 def sensor_bits(vehicle: Vehicle) -> tuple[int, int]:
     """(present, healthy) bits of MAV_SYS_STATUS_SENSOR by the drone's own sensor list; what is present is enabled."""
-    present, healthy = dialect.MAV_SYS_STATUS_PREARM_CHECK, 0
+    # We have no fence; MAVProxy calls one that is not healthy a breach, whether it is present or not.
+    present, healthy = dialect.MAV_SYS_STATUS_PREARM_CHECK, dialect.MAV_SYS_STATUS_GEOFENCE
     for sensor, works in vehicle.drone.calibration.state.sensors.items():
         bits = _SENSOR_BITS.get(sensor, 0)
         present |= bits
