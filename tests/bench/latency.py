@@ -1,0 +1,109 @@
+"""MAVLink in, ARSDK out: how long the gateway takes, for a setpoint and for a command.
+
+    .venv/bin/python tests/bench/latency.py [SETPOINTS] [COMMANDS]
+
+Client, gateway and simulator are three processes. The client notes the monotonic clock before its send; the
+simulator's log has the same clock at the moment its socket was read. So the figures hold two hops over loopback and
+the waking up of two processes besides the gateway's own work. A setpoint is SET_ATTITUDE_TARGET, which becomes PCMD;
+each leans to the other side than the one before. A command is DO_REPOSITION, which becomes moveTo, found by its height.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import msgspec
+from common import Client, loopback, machine, product, quantile
+
+WARM_UP = 40
+"""Setpoints that are not counted: a vehicle takes Offboard only while setpoints arrive."""
+
+
+def quaternion(roll: float) -> list[float]:
+    return [math.cos(roll / 2), math.sin(roll / 2), 0.0, 0.0]
+
+
+def main() -> None:
+    setpoints = int(sys.argv[1]) if len(sys.argv) > 1 else 1000
+    commands = int(sys.argv[2]) if len(sys.argv) > 2 else 100
+    drone, address = loopback(), loopback()
+    with tempfile.TemporaryDirectory() as folder:
+        log = Path(folder) / "sim.jsonl"
+        with (
+            product("sim", "--address", drone, "--log", str(log), "--http-port", "0"),
+            product("run", "--drone", drone, "--endpoint", f"udpout://{address}:14550"),
+        ):
+            client = Client(f"udpin:{address}:14550")
+            client.take_off(5.0)
+            rolls = _setpoints(client, setpoints)
+            heights = _commands(client, commands)
+        entries = [msgspec.json.decode(line) for line in log.read_bytes().splitlines()]
+    received = [entry for entry in entries if entry["kind"] == "command"]
+    print(machine())
+    _say("SET_ATTITUDE_TARGET -> PCMD", _pcmd_delays(rolls, received))
+    _say("DO_REPOSITION -> moveTo", _move_delays(heights, received))
+
+
+def _setpoints(client: Client, count: int) -> list[tuple[float, int]]:
+    """Send setpoints that lean 5 degrees to one side and to the other in turns: (when, 1 or -1)."""
+    sent = []
+    for number in range(-WARM_UP, count):
+        if number == -WARM_UP // 2:
+            client.link.mav.command_long_send(1, 1, 176, 0, 1, 6, 0, 0, 0, 0, 0)  # PX4's Offboard
+        side = 1 if number % 2 else -1
+        lean = quaternion(math.radians(5.0 * side))
+        sent.append((time.monotonic(), side))
+        client.link.mav.set_attitude_target_send(0, 1, 1, 0b00000111, lean, 0, 0, 0, 0.5)
+        client.drain()
+        time.sleep(0.03)
+    client.command(176, 1, 4, 3)  # PX4's Hold
+    return sent[WARM_UP:]
+
+
+def _pcmd_delays(sent: list[tuple[float, int]], received: list[dict]) -> list[float]:
+    """Of each setpoint the time to the first PCMD that leans to its side, if that came before the next setpoint."""
+    pcmds = [(entry["t"], entry["args"]["roll"]) for entry in received if entry["name"] == "ardrone3.Piloting.PCMD"]
+    delays = []
+    ends = [at for at, _ in sent[1:]] + [sent[-1][0] + 0.03]
+    for (at, side), end in zip(sent, ends, strict=True):
+        found = next((t for t, roll in pcmds if at <= t < end and roll * side > 0), None)
+        if found is not None:
+            delays.append(found - at)
+    print(f"{len(delays)} of {len(sent)} setpoints found in the simulator's log")
+    return delays
+
+
+def _commands(client: Client, count: int) -> list[tuple[float, float]]:
+    """Send the vehicle up in small steps, each to a height of its own: (when, height)."""
+    sent = []
+    position = client.expect("GLOBAL_POSITION_INT", 5.0)
+    for number in range(count):
+        height = 10.0 + 0.25 * number
+        sent.append((time.monotonic(), height))
+        client.link.mav.command_int_send(1, 1, 6, 192, 0, 0, -1, 1, 0, float("nan"), position.lat, position.lon, height)
+        client.expect("COMMAND_ACK", 5.0, lambda ack: ack.command == 192 and ack.result == 0)
+    return sent
+
+
+def _move_delays(sent: list[tuple[float, float]], received: list[dict]) -> list[float]:
+    moves = {
+        round(entry["args"]["altitude"], 2): entry["t"]
+        for entry in received
+        if entry["name"].endswith(("Piloting.moveTo", "move.extended_move_to"))
+    }
+    delays = [moves[height] - at for at, height in sent if height in moves]
+    print(f"{len(delays)} of {len(sent)} commands found in the simulator's log")
+    return delays
+
+
+def _say(what: str, delays: list[float]) -> None:
+    p50, p99 = (1000 * quantile(delays, share) for share in (0.5, 0.99))
+    print(f"{what}: p50 {p50:.2f} ms, p99 {p99:.2f} ms, largest {1000 * max(delays):.2f} ms")
+
+
+if __name__ == "__main__":
+    main()
