@@ -12,6 +12,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+from collections import Counter
 from types import TracebackType
 
 from typing_extensions import Self
@@ -145,6 +146,13 @@ class Gateway:
         return [s.line() for s in self._supervised] + [
             f"endpoint {endpoint.describe()}" for endpoint in self._node.endpoints
         ]
+
+    def counters(self) -> Counter[str]:
+        """Everything counted: by the MAVLink side under its own names, by each drone's wire behind the drone's name."""
+        result = self._node.counters()
+        for s in self._supervised:
+            result.update({f"{s.config.name}.{name}": count for name, count in s.drone.counters.items()})
+        return result
 
     def drones_in_air(self) -> list[str]:
         """For each flying drone one sentence on what it will do by itself when the gateway ends."""
