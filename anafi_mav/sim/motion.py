@@ -164,7 +164,7 @@ class Motion:
         turn = np.where(steered, self.stick_yaw, 0.0)
         if moving.any():
             wanted, climb, turn = self._follow(moving, up, climb, turn)
-        climb = np.where(mode == Mode.TAKE_OFF, np.clip(1.5 * (TAKE_OFF_HEIGHT - up), 0.2, 1.0), climb)
+        climb = np.where(mode == Mode.TAKE_OFF, np.clip(1.5 * (TAKE_OFF_HEIGHT - up), -0.5, 1.0), climb)
         climb = np.where(mode == Mode.LAND, -np.minimum(self.land_speed, 0.5 + 0.3 * up), climb)
         climb = np.minimum(climb, np.maximum(_CLIMB_GAIN * (self.ceiling - up), 0.0))
         floored = moving | (mode == Mode.STICKS)
@@ -264,11 +264,12 @@ class Motion:
     def arrived(self) -> list[bool]:
         """Per drone: the present mode has got where it wanted to (always true for OFF and STICKS)."""
         gap = self.position - self.target
-        there = ((gap**2).sum(axis=0) < _REACHED**2) & ((self.velocity**2).sum(axis=0) < _STILL**2)
+        slow = (self.velocity**2).sum(axis=0) < _STILL**2
+        there = ((gap**2).sum(axis=0) < _REACHED**2) & slow
         aligned = (self.turn == Turn.STICK) | (np.abs(self.target_yaw - self.yaw) < _ALIGNED / 2.0)
         up = -self.position[2]
         done = np.where(self.mode == Mode.MOVE, there & aligned & (self.turn != Turn.FIRST), True)
-        done = np.where(self.mode == Mode.TAKE_OFF, up >= TAKE_OFF_HEIGHT - 0.05, done)
+        done = np.where(self.mode == Mode.TAKE_OFF, (up >= TAKE_OFF_HEIGHT - 0.05) & slow, done)
         done = np.where((self.mode == Mode.LAND) | (self.mode == Mode.FALL), up <= 0.0, done)
         result: list[bool] = done.tolist()
         return result

@@ -1,0 +1,251 @@
+"""A flight written against Parrot's Olympe alone, as any of its users would write it: ``olympe_flight.py ADDRESS``.
+
+Knows nothing of this project. Prints one JSON object: what each step of the flight came to, when it began and ended
+(the machine's monotonic clock), and what Olympe believes of the drone. Olympe's log goes to stderr.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+OUT = os.fdopen(os.dup(1), "w")
+os.dup2(2, 1)  # Olympe logs to stdout
+
+import olympe  # noqa: E402
+from olympe.messages import (  # noqa: E402
+    battery,
+    camera,
+    common,
+    follow_me,
+    gimbal,
+    mediastore,
+    move,
+    rth,
+    user_storage,
+)
+from olympe.messages.ardrone3 import (  # noqa: E402
+    GPSSettingsState,
+    GPSState,
+    Piloting,
+    PilotingEvent,
+    PilotingSettings,
+    PilotingSettingsState,
+    PilotingState,
+    SettingsState,
+    SoundState,
+    SpeedSettings,
+    SpeedSettingsState,
+)
+
+NORTH, EAST = 9.0, 12.0
+"""m from the take-off place to the target of the moveTo: 15 m away."""
+METRES_PER_DEGREE = 111_195.0
+
+PAUSE = 0.15
+"""s between two steps, so that who watches the drone can tell where one left it."""
+
+AT_START = (
+    common.SettingsState.ProductNameChanged,
+    common.SettingsState.ProductSerialHighChanged,
+    common.SettingsState.ProductSerialLowChanged,
+    common.SettingsState.ProductVersionChanged,
+    common.CommonState.BatteryStateChanged,
+    common.CommonState.BootId,
+    common.RunState.RunIdChanged,
+    common.CalibrationState.MagnetoCalibrationStateChanged,
+    common.CalibrationState.MagnetoCalibrationRequiredState,
+    common.CalibrationState.MagnetoCalibrationAxisToCalibrateChanged,
+    common.CalibrationState.MagnetoCalibrationStartedChanged,
+    common.FlightPlanState.AvailabilityStateChanged,
+    common.FlightPlanState.ComponentStateListChanged,
+    SettingsState.MotorFlightsStatusChanged,
+    PilotingSettingsState.MaxTiltChanged,
+    PilotingSettingsState.MaxAltitudeChanged,
+    PilotingSettingsState.MaxDistanceChanged,
+    PilotingSettingsState.NoFlyOverMaxDistanceChanged,
+    PilotingSettingsState.BankedTurnChanged,
+    SpeedSettingsState.MaxVerticalSpeedChanged,
+    SpeedSettingsState.MaxRotationSpeedChanged,
+    SpeedSettingsState.MaxPitchRollRotationSpeedChanged,
+    PilotingState.FlyingStateChanged,
+    PilotingState.NavigateHomeStateChanged,
+    PilotingState.PilotedPOIV2,
+    GPSSettingsState.GPSFixStateChanged,
+    GPSSettingsState.HomeChanged,
+    SoundState.AlertSound,
+    battery.serial,
+    battery.cycle_count,
+    battery.health,
+    gimbal.absolute_attitude_bounds,
+    gimbal.relative_attitude_bounds,
+    gimbal.max_speed,
+    gimbal.calibration_state,
+    camera.camera_states,
+    camera.camera_capabilities,
+    camera.recording_capabilities,
+    mediastore.state,
+    user_storage.info,
+    follow_me.target_is_controller,
+)
+"""What anafi_ros asks Olympe for as soon as `connect` has returned; a state that has not come raises there."""
+
+
+def plain(value: object) -> object:
+    """Enums as their names, keyed states as a list, for JSON."""
+    if isinstance(value, dict):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, int | float | str | bool) or value is None:
+        return value
+    return getattr(value, "_name_", str(value))
+
+
+def at_rest() -> object:
+    """The drone hovers, now or soon. Expectations are used up by their success, hence one for each use."""
+    return PilotingState.FlyingStateChanged(state="hovering", _policy="check_wait", _timeout=15)
+
+
+def moved(status: str) -> object:
+    return PilotingState.moveToChanged(status=status, _timeout=30)
+
+
+class Flight:
+    def __init__(self, address: str) -> None:
+        self.drone = olympe.Drone(address)
+        self.steps: dict[str, dict[str, object]] = {}
+
+    @contextmanager
+    def step(self, name: str) -> Iterator[dict[str, object]]:
+        entry: dict[str, object] = {"ok": False, "from": time.monotonic()}
+        self.steps[name] = entry
+        yield entry
+        entry["to"] = time.monotonic()
+        time.sleep(PAUSE)
+
+    def expect(self, name: str, expectation: object) -> None:
+        """One expectation, waited for; what fails is described by Olympe."""
+        with self.step(name) as entry:
+            waited = self.drone(expectation).wait()
+            entry["ok"] = bool(waited.success())
+            if not entry["ok"]:
+                entry["explained"] = str(waited.explain())
+
+    def last(self, message: object) -> object:
+        return plain(dict(self.drone.get_last_event(message).args))
+
+    def state(self, message: object) -> object:
+        return plain(dict(self.drone.get_state(message)))
+
+    def sticks(self, name: str, roll: int, pitch: int, yaw: int, gaz: int) -> None:
+        """Hold the sticks for half a second; the drone has to fly, and to hover when they are back."""
+        with self.step(name) as entry:
+            self.drone.piloting(roll, pitch, yaw, gaz, 0.5)
+            flew = self.drone(PilotingState.FlyingStateChanged(state="flying", _policy="check_wait", _timeout=3)).wait()
+            time.sleep(0.6)
+            still = self.drone(at_rest()).wait()
+            entry["ok"] = bool(flew.success() and still.success())
+
+    def fly(self) -> dict[str, object]:
+        result: dict[str, object] = {"steps": self.steps}
+        with self.step("connect") as entry:
+            entry["ok"] = bool(self.drone.connect())
+        if not entry["ok"]:
+            return result
+        result["missing"] = [message.fullName for message in AT_START if not self.known(message)]
+        result["known"] = {
+            "name": self.state(common.SettingsState.ProductNameChanged),
+            "serial_high": self.state(common.SettingsState.ProductSerialHighChanged),
+            "serial_low": self.state(common.SettingsState.ProductSerialLowChanged),
+            "battery": self.state(common.CommonState.BatteryStateChanged),
+            "fix": self.state(GPSSettingsState.GPSFixStateChanged),
+            "satellites": self.state(GPSState.NumberOfSatelliteChanged),
+            "flying": self.state(PilotingState.FlyingStateChanged),
+            "tilt": self.state(PilotingSettingsState.MaxTiltChanged),
+            "home": self.state(GPSSettingsState.HomeChanged),
+        }
+
+        self.expect("settings", PilotingSettings.MaxTilt(20) & SpeedSettings.MaxRotationSpeed(90))
+        self.expect("the same again", PilotingSettings.MaxTilt(20))
+        self.expect("beyond the range", PilotingSettings.MaxTilt(60, _timeout=1))
+        result["clamped"] = self.state(PilotingSettingsState.MaxTiltChanged)
+        self.expect("back", PilotingSettings.MaxTilt(20))
+
+        self.expect("take off", Piloting.TakeOff() >> PilotingState.FlyingStateChanged(state="hovering", _timeout=15))
+        result["home"] = home = self.state(GPSSettingsState.HomeChanged)
+        assert isinstance(home, dict)
+        here = home["latitude"], home["longitude"]
+
+        self.expect("moveBy", Piloting.moveBy(5, 0, -1, 0, _timeout=20) >> at_rest())
+        result["moveBy"] = self.last(PilotingEvent.moveByEnd)
+
+        latitude = here[0] + NORTH / METRES_PER_DEGREE
+        longitude = here[1] + EAST / METRES_PER_DEGREE / math.cos(math.radians(here[0]))
+        result["target"] = [latitude, longitude, 6.0]
+        self.expect("moveTo", Piloting.moveTo(latitude, longitude, 6.0, "TO_TARGET", 0.0) >> moved("DONE") >> at_rest())
+        self.expect(
+            "extended_move_to",
+            move.extended_move_to(*here, 4.0, "heading_during", 90.0, 4, 2, 60) >> moved("DONE") >> at_rest(),
+        )
+        turn = math.pi / 2
+        self.expect("extended_move_by", move.extended_move_by(4, 2, -1, turn, 3, 1, 60, _timeout=20) >> at_rest())
+        result["extended_move_by"] = self.last(PilotingEvent.moveByEnd)
+        far = here[0] + 60 / METRES_PER_DEGREE
+        flying = PilotingState.FlyingStateChanged(state="flying", _policy="check_wait", _timeout=5)
+        self.expect("far", Piloting.moveTo(far, here[1], 5.0, "NONE", 0.0) >> flying)
+        time.sleep(0.3)  # a part of the way
+        self.expect("cancel", Piloting.CancelMoveTo() >> moved("CANCELED") >> at_rest())
+
+        with self.step("start_piloting") as entry:
+            entry["ok"] = bool(self.drone.start_piloting())
+        self.sticks("forward", 0, 50, 0, 0)
+        self.sticks("right", 50, 0, 0, 0)
+        self.sticks("clockwise", 0, 0, 50, 0)
+        self.sticks("up", 0, 0, 0, 50)
+        with self.step("stop_piloting") as entry:
+            self.drone.stop_piloting()  # says False whatever happens: `_stop_piloting_impl` returns nothing (8.5.0)
+            entry["ok"] = True
+
+        self.expect("ways of return", rth.set_min_altitude(25.0) & rth.set_ending_behavior("hovering"))
+        self.expect("return", rth.return_to_home())
+        self.expect(
+            "abort",
+            rth.abort()
+            >> PilotingState.NavigateHomeStateChanged("available", "stopped", _policy="check_wait")
+            >> at_rest(),
+        )
+        self.expect(
+            "NavigateHome",
+            Piloting.NavigateHome(1) >> rth.state("available", "finished", _timeout=60) >> at_rest(),
+        )
+        result["rth"] = self.state(rth.state)
+        landed = PilotingState.FlyingStateChanged(state="landed", _timeout=60)
+        counted = SettingsState.MotorFlightsStatusChanged(nbFlights=1, _policy="check_wait", _timeout=60)
+        self.expect("land", Piloting.Landing() >> (landed & counted))
+        result["flights"] = self.state(SettingsState.MotorFlightsStatusChanged)
+        with self.step("disconnect") as entry:
+            entry["ok"] = bool(self.drone.disconnect())
+        return result
+
+    def known(self, message: object) -> bool:
+        try:
+            return bool(self.drone.get_state(message))
+        except (KeyError, RuntimeError):
+            return False
+
+
+def main() -> None:
+    olympe.log.update_config({"loggers": {"olympe": {"level": "WARNING"}, "ulog": {"level": "WARNING"}}})
+    flight = Flight(sys.argv[1])
+    result = flight.fly()
+    print(json.dumps(result), file=OUT, flush=True)
+    # Olympe's own way out takes seconds.
+    os._exit(0)
+
+
+if __name__ == "__main__":
+    main()
