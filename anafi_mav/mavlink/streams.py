@@ -5,7 +5,7 @@ The defaults are intervals at most: a message leaves when there is news, and no 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Generic, TypeVar
 from weakref import WeakKeyDictionary
 
@@ -44,6 +44,9 @@ class Streams(Generic[ChannelT]):
     def __init__(self, defaults: Mapping[int, float] = DEFAULT_INTERVALS) -> None:
         self._defaults = dict(defaults)
         self._channels: WeakKeyDictionary[ChannelT, dict[int, _Stream]] = WeakKeyDictionary()
+        self._quiet: dict[int, tuple[Sequence[ChannelT], float]] = {}
+        """Message id -> the channels last asked about, and until when none of them is due: most questions of a fast
+        drone are answered by this alone."""
 
     def interval(self, channel: ChannelT, id: int) -> float | None:
         """Seconds between two messages on this channel; None: not streamed."""
@@ -55,10 +58,28 @@ class Streams(Generic[ChannelT]):
         if interval is not None and not 0.0 < interval < float("inf"):
             raise LocalProtocolError(f"an interval is a positive number of seconds or None, not {interval}")
         self._channels.setdefault(channel, {})[id] = _Stream(interval)
+        self._quiet.pop(id, None)
 
     def reset(self, channel: ChannelT, id: int) -> None:
         """Stream at the default interval again."""
         self._channels.get(channel, {}).pop(id, None)
+        self._quiet.pop(id, None)
+
+    def due_on(self, channels: Sequence[ChannelT], id: int, now: float) -> list[ChannelT]:
+        """Those channels on which a message of this kind may leave now; it counts as sent there.
+
+        A list of channels that has changed must be another object, as `Node.channels` is.
+        """
+        asked, until = self._quiet.get(id, (None, 0.0))
+        if asked is channels and now < until:
+            return []
+        due = [channel for channel in channels if self.due(channel, id, now)]
+        self._quiet[id] = (channels, min((self._next(channel, id) for channel in channels), default=now))
+        return due
+
+    def _next(self, channel: ChannelT, id: int) -> float:
+        stream = self._channels[channel][id]
+        return float("inf") if stream.interval is None else stream.next
 
     def due(self, channel: ChannelT, id: int, now: float) -> bool:
         """Whether a message of this kind may leave now; if so, it counts as sent.

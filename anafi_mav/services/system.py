@@ -179,7 +179,7 @@ class System:
 
     def _stream(self, id: int, now: float) -> None:
         """Send a stream message to each channel on which it is due."""
-        due = [channel for channel in self._node.channels if self._streams.due(channel, id, now)]
+        due = self._streams.due_on(self._node.channels, id, now)
         if not due:
             return
         message = self._build(id)

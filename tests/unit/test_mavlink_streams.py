@@ -97,3 +97,22 @@ def test_a_channel_that_is_gone_is_forgotten() -> None:
     del channel
     gc.collect()
     assert len(streams._channels) == 0
+
+
+def test_due_on_asks_each_channel_anew_when_something_changed() -> None:
+    streams, one, other = Streams[Key](), Key(), Key()
+    channels = [one]
+    assert streams.due_on(channels, ATTITUDE, 0.0) == [one]
+    assert streams.due_on(channels, ATTITUDE, 0.01) == []
+    streams.set(one, ATTITUDE, 0.5)  # begins anew, whatever was left of the old interval
+    assert streams.due_on(channels, ATTITUDE, 0.02) == [one]
+    assert streams.due_on(channels, ATTITUDE, 0.2) == []
+    channels = [one, other]
+    assert streams.due_on(channels, ATTITUDE, 0.21) == [other]
+    assert streams.due_on(channels, ATTITUDE, 0.26) == [other]  # the grid begins half an interval early
+    assert streams.due_on(channels, ATTITUDE, 0.27) == [one]
+    streams.set(other, ATTITUDE, None)
+    assert streams.due_on(channels, ATTITUDE, 9.0) == [one]
+    streams.reset(other, ATTITUDE)
+    assert streams.due_on(channels, ATTITUDE, 9.0) == [other]
+    assert streams.due_on([], ATTITUDE, 9.0) == []
