@@ -136,6 +136,7 @@ async def test_hover_stops_a_move_to_and_says_so_in_the_log(drone: Drone, real: 
     await flying(drone)
     latitude, longitude = geo.destination(HOME[0], HOME[1], 80.0, 0.0)
     journey = await drone.piloting.move_to(latitude, longitude, 5.0)
+    await real.wait_log(lambda e: e.kind == "pose" and e.args["vn"] > 2.0, 10.0)
     began = now()
     drone.piloting.hover()
     assert await asyncio.wait_for(journey.result(), 5.0) is MoveEnd.CANCELED
