@@ -30,6 +30,9 @@ RETRY_FIRST, RETRY_LAST = 0.5, 2.0
 """s between attempts to connect: doubled from the first to the last, so that a drone that comes back is a system
 again within five seconds."""
 
+HOVER_TIME = 2.0
+"""s that closing stays with a flying drone after its moves have ended: as long as hover centres the sticks."""
+
 
 class _Supervised:
     """A drone with its system and the task that keeps them connected."""
@@ -128,7 +131,11 @@ class Gateway:
         return all(s.system.active for s in self._supervised)
 
     async def close(self) -> None:
-        """Hover what flies by our doing, then close every socket. Safe to call twice."""
+        """Hover what flies by our doing, then close every socket. Safe to call twice.
+
+        Clients are not heard any more, or one of them would fly on what has just been stopped.
+        """
+        self._node.on_message = None
         await asyncio.gather(*(self._leave(s) for s in self._supervised))
         self._supervised.clear()
         await self._node.close()
@@ -137,6 +144,8 @@ class Gateway:
         if supervised.system.active and not supervised.system.vehicle.on_ground:
             with contextlib.suppress(AnafiMavError):
                 await supervised.drone.piloting.stop()
+                # Centred sticks are not acknowledged: stay while they are repeated.
+                await asyncio.wait([supervised.drone.lost], timeout=HOVER_TIME)
         if supervised.task is not None:
             supervised.task.cancel()
             await asyncio.wait([supervised.task])

@@ -17,14 +17,16 @@ from anafi_mav.cli.addresses import Reservations
 from anafi_mav.cli.child import SimulatorProcess
 from anafi_mav.cli.terminal import complain, say
 from anafi_mav.config import Config, DroneConfig, SimConfig, from_mapping, load, remarks
+from anafi_mav.errors import ConfigError
 from anafi_mav.gateway import Gateway
 
 READY_LIMIT = 15.0
 """s after which "ready" is said though a drone has not answered: its connection takes 3 s at most, its settings and
 its states 5 s each."""
 
-CLOSE_LIMIT = 5.0
-"""s for the last hover and the closing of the sockets; a drone that does not answer must not keep us here."""
+CLOSE_LIMIT = 9.0
+"""s for the last hover (5 s until the drone has confirmed it, 2 s of centred sticks) and the closing of the sockets; a
+drone that does not answer must not keep us here."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -119,6 +121,8 @@ async def _start(
     await gateway.open()  # first, so that a busy port is told before a simulator has been started
     stack.push_async_callback(_close, gateway)
     if fleet is not None:
+        if sim_log is not None:
+            _check_log(sim_log)
         simulator = SimulatorProcess()
         stack.push_async_callback(simulator.close)
         await simulator.start(fleet, sim_log)
@@ -128,6 +132,14 @@ async def _start(
         stack.push_async_callback(_close, gateway)  # before the simulator: the last hover has to reach somebody
     await gateway.start()
     await gateway.ready(READY_LIMIT)
+
+
+def _check_log(path: Path) -> None:
+    """Raises `ConfigError` for a file that the simulator could not write."""
+    try:
+        path.open("wb").close()
+    except OSError as error:
+        raise ConfigError("--sim-log", f"expected a file that can be written, got {path}: {error.strerror}") from error
 
 
 async def _unless(stop: asyncio.Event, work: Coroutine[Any, Any, None]) -> bool:

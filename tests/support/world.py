@@ -97,3 +97,4 @@ async def world(
         finally:
             for client in held.clients:
                 await client.close()
+            await simulator.close()  # before the gateway, which would stay for two seconds to hover what still flies

@@ -1,0 +1,334 @@
+"""`anafi-mav run` as users meet it: a process that is started, read, interrupted and killed."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import socket
+import sys
+import time
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from support.mav import Client
+from support.product import Product, free_udp_port, product
+from support.world import HOLD, HOME, loopback
+
+from anafi_mav import geo
+from anafi_mav.cli import main
+from anafi_mav.cli.run import configuration
+from anafi_mav.config import Config
+
+pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="processes are looked up in /proc")
+
+
+def fleet(address: str, drone: str) -> str:
+    """One simulated drone, one TCP endpoint."""
+    return f"""
+        endpoints: ["tcpin://{address}:5760"]
+        drones: [{{name: alpha, sysid: 1, sim: {{address: {drone}, home: {list(HOME)}, speed: 4}}}}]
+    """
+
+
+def runs(pid: int) -> bool:
+    try:
+        status = Path(f"/proc/{pid}/stat").read_text()
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+    return status.rpartition(")")[2].split()[0] not in "ZX"
+
+
+async def gone(pid: int, timeout: float = 10.0) -> None:
+    """Wait until this process runs no more. (Nobody may have collected its exit status: it is then a zombie.)"""
+    deadline = time.monotonic() + timeout
+    while runs(pid):
+        assert time.monotonic() < deadline, f"process {pid} still runs"
+        await asyncio.sleep(0.02)  # it is not our child: there is nothing to wait on
+
+
+def free(address: str, port: int, kind: socket.SocketKind = socket.SOCK_STREAM) -> bool:
+    with socket.socket(socket.AF_INET, kind) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # old connections may fade
+        try:
+            probe.bind((address, port))
+        except OSError:
+            return False
+        return True
+
+
+@asynccontextmanager
+async def under_way(folder: Path) -> AsyncIterator[tuple[Product, Client, str, str]]:
+    """The product with its drone on the way to a place 200 m north, 5 m high; addresses of endpoint and drone."""
+    address, drone = loopback(), loopback()
+    async with product(folder, fleet(address, drone)) as p:
+        client = await Client().connect(5760, address)
+        assert (await client.command(400, 1)).result == 0
+        assert (await client.command(22, x=0.0, y=0.0, z=5.0)).result == 0
+        await client.heartbeat(lambda beat: beat.custom_mode == HOLD, timeout=20.0)
+        place = geo.destination(*HOME[:2], 200.0, 0.0)
+        assert (await client.command(192, -1, 1, 0, frame=6, x=place[0], y=place[1], z=5.0)).result == 0
+        await p.entry("pose", "", lambda pose: pose["vn"] > 3.0)
+        yield p, client, address, drone
+        await client.close()
+
+
+def left_hovering(p: Product) -> None:
+    """Before the link ended the drone was told to stop, and it did."""
+    (end,) = (entry for entry in p.entries("session") if entry["name"] == "lost")
+    (move,) = p.entries("command", "Piloting.moveTo")
+    after = [entry for entry in p.entries("command") if entry["t"] > move["t"]]
+    assert all(entry["t"] <= end["t"] for entry in after)
+    names = {entry["name"].removeprefix("ardrone3.Piloting.") for entry in after}
+    assert "CancelMoveTo" in names or "moveBy" in names
+    assert "Landing" not in names
+    sticks = [entry["args"] for entry in after if entry["name"].endswith("PCMD")]
+    assert 30 <= len(sticks) <= 41  # 20 Hz for 2 s: none of them is acknowledged
+    assert all((s["roll"], s["pitch"], s["yaw"], s["gaz"]) == (0, 0, 0, 0) for s in sticks)
+    pose = [entry["args"] for entry in p.entries("pose") if entry["t"] <= end["t"]][-1]
+    assert abs(pose["vn"]) < 0.5
+
+
+# Start.
+
+
+def test_without_a_configuration_it_flies_the_default_fleet() -> None:
+    assert configuration(None, None, None, False) == Config()
+    assert configuration(None, ["192.168.42.1"], None, True).drones[0].sysid == 1
+
+
+async def test_a_line_for_each_drone_and_endpoint_and_then_ready(tmp_path: Path) -> None:
+    address, first, second, nobody = loopback(), loopback(), loopback(), loopback()
+    port = free_udp_port(address)
+    config = f"""
+        endpoints: ["tcpin://{address}:5760", "udpout://{address}:{port}"]
+        drones:
+          - {{name: alpha, sysid: 1, sim: {{address: {first}}}}}
+          - {{name: bravo, sysid: 245, sim: {{address: {second}}}}}
+          - {{name: charlie, sysid: 3, address: {nobody}}}
+    """
+    async with product(tmp_path, config) as p:
+        alpha, bravo, charlie, tcp, udp, ready = p.lines
+        assert alpha.startswith(f"drone alpha: system 1 at {first}: ANAFI 4K PI04")
+        assert bravo.startswith(f"drone bravo: system 245 at {second}: ANAFI 4K PI04")
+        assert charlie.startswith(f"drone charlie: system 3 at {nobody}: not connected (")
+        assert charlie.endswith("), retrying")
+        assert tcp == f"endpoint tcpin://{address}:5760: 0 clients"
+        assert udp == f"endpoint udpout://{address}:{port}"
+        assert ready.startswith("ready")
+        # 245 is MAVSDK's own: a warning, and it flies.
+        (warning,) = (line for line in p.complaints if "warning" in line)
+        assert warning.startswith("anafi-mav: warning: drones[1].sysid: 245 is what MAVSDK calls itself")
+
+
+# End.
+
+
+async def test_ctrl_c_on_the_ground(tmp_path: Path) -> None:
+    address, drone = loopback(), loopback()
+    async with product(tmp_path, fleet(address, drone)) as p:
+        child = p.child()
+        assert child is not None
+        client = await Client().connect(5760, address)
+        await client.heartbeat(lambda beat: True)
+        began = time.monotonic()
+        p.process.send_signal(signal.SIGINT)
+        assert await p.end(10.0) == 0
+        assert time.monotonic() - began < 5.0
+        await gone(child, 0.0)  # it has waited for it
+        assert free(address, 5760)
+        assert all(free(drone, port) for port in (44444, 44445))
+        assert free(drone, 2233, socket.SOCK_DGRAM)
+        assert p.complaints == []
+        assert p.lines[-1].startswith("ready")
+        assert [entry["name"] for entry in p.entries("session")] == ["up", "lost"]
+        await client.close()
+
+
+async def test_ctrl_c_in_the_air_asks_first(tmp_path: Path) -> None:
+    async with under_way(tmp_path) as (p, client, address, _):
+        child = p.child()
+        assert child is not None
+        said = len(p.lines)
+        p.process.send_signal(signal.SIGINT)
+        await p.line(lambda line: line.startswith("Ctrl-C once more"), since=said)
+        (sentence,) = (line for line in p.lines[said:] if "in the air" in line)
+        assert sentence.startswith("alpha is in the air: it will hover and fly home ")
+        # It goes on, and so does the drone.
+        for _ in range(2):
+            await client.heartbeat(lambda beat: True)
+        assert p.entries("pose")[-1]["args"]["vn"] > 3.0
+
+        p.process.send_signal(signal.SIGINT)
+        assert await p.end(15.0) == 0
+        left_hovering(p)
+        await gone(child, 0.0)
+        assert free(address, 5760)
+        assert p.complaints == []
+
+
+async def test_sigterm_does_not_ask(tmp_path: Path) -> None:
+    async with under_way(tmp_path) as (p, _, address, _):
+        child = p.child()
+        assert child is not None
+        said = len(p.lines)
+        p.process.send_signal(signal.SIGTERM)
+        assert await p.end(15.0) == 0
+        assert p.lines[said:] == []
+        left_hovering(p)
+        await gone(child, 0.0)
+        assert free(address, 5760)
+
+
+async def test_ctrl_c_before_it_is_ready(tmp_path: Path) -> None:
+    """A drone that takes the connection and says nothing keeps the start waiting, not the end."""
+    address, silent = loopback(), loopback()
+    accepted = asyncio.Event()
+    held: list[asyncio.StreamWriter] = []
+
+    def take(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        held.append(writer)
+        accepted.set()
+
+    server = await asyncio.start_server(take, silent, 44445)
+    config = f"""
+        endpoints: ["tcpin://{address}:5760"]
+        drones:
+          - {{name: alpha, sysid: 1, sim: {{address: {loopback()}}}}}
+          - {{name: bravo, sysid: 2, address: {silent}}}
+    """
+    async with product(tmp_path, config, ready=False) as p:
+        await asyncio.wait_for(accepted.wait(), 30.0)
+        child = p.child()
+        assert child is not None
+        p.process.send_signal(signal.SIGINT)
+        assert await p.end(10.0) == 0
+        await gone(child, 0.0)
+        assert p.lines == []
+        assert p.complaints == []
+    for writer in held:
+        writer.close()
+    server.close()
+
+
+async def test_a_killed_gateway_leaves_no_simulator(tmp_path: Path) -> None:
+    drone = loopback()
+    async with product(tmp_path, fleet(loopback(), drone)) as p:
+        child = p.child()
+        assert child is not None
+        p.process.kill()
+        await p.process.wait()
+        await gone(child)
+        assert free(drone, 44445)
+
+
+async def test_a_killed_simulator_is_told_and_survived(tmp_path: Path) -> None:
+    async with product(tmp_path, fleet(loopback(), loopback())) as p:
+        child = p.child()
+        assert child is not None
+        os.kill(child, signal.SIGKILL)
+        await gone(child)
+        deadline = time.monotonic() + 10.0
+        told = "anafi-mav: the simulator ended by signal 9; with it went alpha"
+        while told not in p.complaints:
+            assert time.monotonic() < deadline, p
+            await asyncio.sleep(0.02)  # stderr is read by another task
+        p.process.send_signal(signal.SIGINT)
+        assert await p.end(10.0) == 0
+
+
+# Mistakes: one line with the place and what was expected, status 2, nothing started.
+
+SIM = "sim: {address: DRONE}"
+
+
+@pytest.mark.parametrize(
+    ("config", "line"),
+    [
+        ("endpoint: []", "endpoint: unknown key; did you mean endpoints?"),
+        (
+            f"drones: [{{name: a, sysid: 1, {SIM}, colour: red}}]",
+            "drones[0].colour: unknown key; expected one of name,",
+        ),
+        (
+            f"drones: [{{name: a, sysid: one, {SIM}}}]",
+            "drones[0].sysid: expected a whole number from 1 to 250, got 'one'",
+        ),
+        ("endpoints: tcpin://HOST:5760", "endpoints: expected a list of 1 to 32 URLs, got 'tcpin://"),
+        (
+            f"drones: [{{name: a, sysid: 7, {SIM}}}, {{name: b, sysid: 7, address: 10.0.0.1}}]",
+            "drones[1].sysid: expected a sysid of its own, 7 is already at drones[0].sysid",
+        ),
+        (
+            f"drones: [{{name: a, sysid: 0, {SIM}}}]",
+            "drones[0].sysid: expected a whole number from 1 to 250, got 0",
+        ),
+        (
+            f"drones: [{{name: a, sysid: 251, {SIM}}}]",
+            "drones[0].sysid: expected a whole number from 1 to 250, got 251",
+        ),
+        (
+            f"{{endpoints: ['udp://HOST:1'], drones: [{{name: a, sysid: 1, {SIM}}}]}}",
+            "endpoints[0]: 'udp://HOST:1': expected a URL that begins with one of udpout://,",
+        ),
+        (
+            f"{{endpoints: ['tcpin://HOST:5761', 'tcpin://HOST:BUSY'], drones: [{{name: a, sysid: 1, {SIM}}}]}}",
+            "endpoints[1]: cannot open tcpin://HOST:BUSY: Address already in use",
+        ),
+        (
+            f"{{endpoints: ['udpin://HOST:UDPBUSY'], drones: [{{name: a, sysid: 1, {SIM}}}]}}",
+            "endpoints[0]: cannot open udpin://HOST:UDPBUSY: Address already in use",
+        ),
+        (
+            "{endpoints: ['tcpin://HOST:5761'], drones: [{name: a, sysid: 1, sim: {address: TAKEN}}]}",
+            "drones[0].sim.address: expected an address of this machine with free ports 44445, 44444, 2233 and 80, "
+            "got TAKEN: Address already in use",
+        ),
+        ("drones: [", "fleet.yaml, line 1, column"),
+    ],
+)
+async def test_a_mistake_is_one_line_and_nothing_is_started(tmp_path: Path, config: str, line: str) -> None:
+    host, taken = loopback(), loopback()
+    with (
+        socket.create_server((host, 0)) as busy,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as busy_too,
+        socket.create_server((taken, 44445)),
+    ):
+        busy_too.bind((host, 0))
+        words = {
+            "UDPBUSY": str(busy_too.getsockname()[1]),
+            "BUSY": str(busy.getsockname()[1]),
+            "HOST": host,
+            "DRONE": loopback(),
+            "TAKEN": taken,
+        }
+        for word, value in words.items():
+            config, line = config.replace(word, value), line.replace(word, value)
+        async with product(tmp_path, config, ready=False) as p:
+            assert await p.end() == 2
+            assert p.lines == []
+            (complaint,) = p.complaints
+            assert complaint.startswith("anafi-mav: ")
+            assert line in complaint
+            assert not p.log.exists()  # a simulator begins with its log
+            assert free(host, 5761)
+
+
+async def test_a_log_that_cannot_be_written(tmp_path: Path) -> None:
+    config = fleet(loopback(), loopback())
+    async with product(tmp_path, config, "--sim-log", str(tmp_path), ready=False) as p:
+        assert await p.end() == 2
+        assert p.lines == []
+        (complaint,) = p.complaints
+        assert complaint == f"anafi-mav: --sim-log: expected a file that can be written, got {tmp_path}: Is a directory"
+
+
+@pytest.mark.parametrize("words", [["--help"], ["run", "--help"], ["sim", "--help"], ["--version"]])
+def test_help(words: list[str], capsys: Any) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main(words)
+    assert caught.value.code == 0
+    assert "anafi-mav" in capsys.readouterr().out
