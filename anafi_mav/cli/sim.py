@@ -49,8 +49,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Simulate until SIGINT or SIGTERM. Raises `ConfigError` before anything is started."""
-    fleet = _from_fleet(arguments.fleet) if arguments.fleet is not None else _from_options(arguments)
-    asyncio.run(_run(fleet, arguments.log, arguments.stdin_watch))
+    if arguments.fleet is not None:
+        asyncio.run(_run(_from_fleet(arguments.fleet), arguments.log, arguments.stdin_watch))
+        return 0
+    fleet = _from_options(arguments)
+    try:
+        asyncio.run(_run(fleet, arguments.log, arguments.stdin_watch))
+    except ConfigError as error:
+        if error.key_path.startswith("drones"):  # the only thing about one of them that is found out so late
+            raise ConfigError("--address", error.problem) from error
+        raise
     return 0
 
 
@@ -101,7 +109,7 @@ def _flag(key_path: str) -> str:
 
 def _from_fleet(source: str) -> Fleet:
     try:
-        text = sys.stdin.readline() if source == "-" else Path(source).read_text(encoding="utf-8")
+        text = sys.stdin.buffer.readline() if source == "-" else Path(source).read_bytes()
         return msgspec.json.decode(text, type=Fleet)
     except (OSError, msgspec.DecodeError) as error:
         raise ConfigError("--fleet", f"expected a JSON object with drones in {source}: {error}") from error

@@ -67,8 +67,13 @@ class DroneSpec:
         latitude, longitude, altitude = self.home
         if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0 and math.isfinite(altitude)):
             raise ConfigError("home", f"expected latitude, longitude (deg) and altitude (m), got {self.home}")
-        if self.http_port is not None and not 0 <= self.http_port < 65536:
-            raise ConfigError("http_port", f"expected a port from 0 to 65535, got {self.http_port}")
+        for key in ("discovery_port", "handshake_port", "c2d_port", "http_port"):
+            port = getattr(self, key)
+            if port is not None and not 0 <= port < 65536:
+                raise ConfigError(key, f"expected a port from 0 to 65535, got {port}")
+        lowest, highest = self.versions
+        if not 1 <= lowest <= highest <= 3:
+            raise ConfigError("versions", f"expected the lowest and the highest of 1 to 3, got {self.versions}")
         if not 0.0 < self.telemetry_rate <= MAX_RATE:
             raise ConfigError("telemetry_rate", f"expected up to {MAX_RATE:g} Hz, got {self.telemetry_rate:g}")
         if self.serial is not None and not 5 <= len(self.serial) <= 32:

@@ -150,6 +150,11 @@ class Firmware:
             found.add(TakeoffChecklistType.BATTERY_CRITICAL)
         return frozenset(found)
 
+    def forced_landing_report(self) -> Message:
+        forced = self.state is FlyingState.EMERGENCY_LANDING
+        reasons = ardrone3.ForcedLandingReason
+        return ardrone3.ForcedLandingAutoTrigger(reasons.BATTERY_CRITICAL_SOON if forced else reasons.NONE, 0)
+
     def flights_report(self) -> Message:
         return ardrone3.MotorFlightsStatusChanged(self._flights, round(self._last_flight), round(self._flown))
 
@@ -259,7 +264,7 @@ class Firmware:
             self._emit(check_changed(check, check in blockers))
         self._blockers = blockers
         if self.battery.percent <= power.EMPTY and self._fire(Event.FORCED_LANDING):
-            self._emit(ardrone3.ForcedLandingAutoTrigger(ardrone3.ForcedLandingReason.BATTERY_CRITICAL_SOON, 0))
+            self._emit(self.forced_landing_report())
 
     def _set_fix(self, fix: bool) -> None:
         self.fix = fix
@@ -275,11 +280,11 @@ class Firmware:
 
     def _watch_limits(self) -> None:
         at_fence = self.guidance.fence_margin(self.pose.north, self.pose.east) < 1.0
-        high = self.pose.up > self.settings.number("max_altitude") - 0.5
-        for message in (
-            *self.alarms.set(Type.HORIZONTAL_GEOFENCE_REACHED, at_fence),
-            *self.alarms.set(Type.VERTICAL_GEOFENCE_REACHED, high),
-        ):
+        self._sound_alarm(Type.HORIZONTAL_GEOFENCE_REACHED, at_fence)
+        self._sound_alarm(Type.VERTICAL_GEOFENCE_REACHED, self.pose.up > self.settings.number("max_altitude") - 0.5)
+
+    def _sound_alarm(self, type: Type, on: bool) -> None:
+        for message in self.alarms.set(type, on):
             self._emit(message)
 
     # -- the state machine
@@ -302,6 +307,7 @@ class Firmware:
                 self._grounded = False
                 if before in AIRBORNE:
                     self._body.fall()
+                self._sound_alarm(Type.USER_EMERGENCY, True)
             case Event.CLIMB:
                 self._body.hover()
             case Event.RAMPED_UP | Event.THROWN:
@@ -313,6 +319,8 @@ class Firmware:
             self._begin_flight()
         elif state is LANDED:
             self._end_flight()
+        if before is FlyingState.EMERGENCY_LANDING:
+            self._emit(self.forced_landing_report())
         return True
 
     def _begin_flight(self) -> None:
@@ -327,9 +335,8 @@ class Firmware:
         self._body.off()
         self.guidance.release_sticks()
         self._return_at = None
-        for type in (Type.HORIZONTAL_GEOFENCE_REACHED, Type.VERTICAL_GEOFENCE_REACHED):
-            for message in self.alarms.set(type, False):
-                self._emit(message)
+        for type in (Type.HORIZONTAL_GEOFENCE_REACHED, Type.VERTICAL_GEOFENCE_REACHED, Type.USER_EMERGENCY):
+            self._sound_alarm(type, False)
         if self._took_off_at is None:
             return
         self._flights += 1

@@ -88,7 +88,7 @@ class Simulator:
                     await drone.start()
                 except OSError as error:
                     raise ConfigError(
-                        f"drones[{index}].address", f"cannot listen on {drone.address}: {error}"
+                        f"drones[{index}].address", f"expected free ports on {drone.address}: {error}"
                     ) from error
         except BaseException:
             await self.close()

@@ -16,7 +16,7 @@ from anafi_mav.arsdk.messages.rth import RthEndingBehavior, RthHomeReachability,
 from anafi_mav.arsdk.wire import Message
 from anafi_mav.sim.motion import Body, Pose, Turn
 from anafi_mav.sim.place import Origin
-from anafi_mav.sim.settings import Settings
+from anafi_mav.sim.settings import HOME_TYPES, Settings
 from anafi_mav.units import RAD_PER_DEG
 
 UNKNOWN = 500.0
@@ -110,11 +110,15 @@ class Homing:
         """GPSSettings.SendControllerGPS."""
         self.pilot = Location(latitude, longitude, altitude)
         self._emit(ardrone3.GPSFixStateChanged(int(self._fix)))
+        self._emit(ardrone3.HomeTypeAvailabilityChanged(ardrone3.AvailableHomeType.PILOT, 1))
+        if self.type is RthHomeType.PILOT:
+            self.preference_changed()
 
     def preference_changed(self) -> None:
-        """The preferred home type was set."""
+        """The preferred home type was set, or the place that it stands for."""
         self._emit(rth.HomeType(self.type))
         self._emit(ardrone3.HomeTypeChosenChanged(_chosen(self.type)))
+        self._emit(self._home_changed())
 
     def _here(self, pose: Pose) -> Location:
         return Location(*self._origin.place(pose.north, pose.east), pose.up)
@@ -137,7 +141,7 @@ class Homing:
 
     def states_report(self) -> list[Message]:
         """What AllStates tells of home and the return."""
-        capabilities = sum(1 << type for type in (RthHomeType.TAKEOFF, RthHomeType.CUSTOM, RthHomeType.PILOT))
+        capabilities = sum(1 << type for type in HOME_TYPES)
         available = {
             ardrone3.AvailableHomeType.TAKEOFF: self._fix,
             ardrone3.AvailableHomeType.PILOT: self.pilot is not None,

@@ -173,7 +173,8 @@ class Motion:
         self._tilt_and_push(wanted, horizontal, steered, mode)
         self.yaw_rate += (self.yaw_line.push(turn) - self.yaw_rate) * (STEP / _YAW_TAU)
         self.yaw += self.yaw_rate * STEP
-        velocity[2] += (-self.climb_line.push(climb) - velocity[2]) * (STEP / _CLIMB_TAU)
+        driven = (-self.climb_line.push(climb) - velocity[2]) * (STEP / _CLIMB_TAU)
+        velocity[2] += np.where(mode == Mode.FALL, G * STEP, driven)
         self.position += velocity * STEP
         self._touch_ground()
 
@@ -223,9 +224,6 @@ class Motion:
         thrust = np.where(airborne, 1.0, 0.0)
         horizontal[0] += (thrust * (forward_push * cos - right_push * sin) - resistance[0]) * STEP
         horizontal[1] += (thrust * (forward_push * sin + right_push * cos) - resistance[1]) * STEP
-        if falling.any():
-            # The first-order lag of the climb rate pulls back by v dt / tau; give that back and add gravity.
-            self.velocity[2] += np.where(falling, (G + self.velocity[2] / _CLIMB_TAU) * STEP, 0.0)
 
     def _fenced(
         self, forward: Array, right: Array, cos: Array, sin: Array, horizontal: Array, resistance: Array

@@ -21,10 +21,9 @@ MAX_NAME = 64
 _LEGACY_HOME = {
     HomeTypeSetting.TAKEOFF: RthHomeType.TAKEOFF,
     HomeTypeSetting.PILOT: RthHomeType.PILOT,
-    HomeTypeSetting.FOLLOWEE: RthHomeType.FOLLOWEE,
 }
-HOME_TYPES = (RthHomeType.TAKEOFF, RthHomeType.FOLLOWEE, RthHomeType.CUSTOM, RthHomeType.PILOT)
-"""What a user may prefer."""
+HOME_TYPES = (RthHomeType.TAKEOFF, RthHomeType.CUSTOM, RthHomeType.PILOT)
+"""What a user may prefer: nobody is followed here."""
 
 DEFAULTS: dict[str, Any] = {
     "geofence": 0,

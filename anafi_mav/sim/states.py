@@ -78,7 +78,7 @@ def all_states(firmware: Firmware) -> list[Message]:
         ardrone3.AltitudeAboveGroundChanged(pose.up),
         ardrone3.MotionState(ardrone3.Motion.STEADY),
         ardrone3.HoveringWarning(0, 0),
-        ardrone3.ForcedLandingAutoTrigger(ardrone3.ForcedLandingReason.NONE, 0),
+        firmware.forced_landing_report(),
         ardrone3.WindStateChanged(ardrone3.WarningLevel.OK),
         ardrone3.VibrationLevelChanged(ardrone3.WarningLevel.OK),
         ardrone3.PilotedPOIV2(
