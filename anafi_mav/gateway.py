@@ -30,6 +30,9 @@ RETRY_FIRST, RETRY_LAST = 0.5, 2.0
 """s between attempts to connect: doubled from the first to the last, so that a drone that comes back is a system
 again within five seconds."""
 
+CANCEL_WAIT = 0.1
+"""s until a task that has not ended is cancelled once more."""
+
 HOVER_TIME = 2.0
 """s that closing stays with a flying drone after its moves have ended: as long as hover centres the sticks."""
 
@@ -147,8 +150,10 @@ class Gateway:
                 # Centred sticks are not acknowledged: stay while they are repeated.
                 await asyncio.wait([supervised.drone.lost], timeout=HOVER_TIME)
         if supervised.task is not None:
-            supervised.task.cancel()
-            await asyncio.wait([supervised.task])
+            # Before Python 3.12 wait_for forgets a cancellation that comes when what it waits for is just done.
+            while not supervised.task.done():
+                supervised.task.cancel()
+                await asyncio.wait([supervised.task], timeout=CANCEL_WAIT)
 
     def lines(self) -> list[str]:
         """One line per drone and per endpoint."""

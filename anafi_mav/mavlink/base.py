@@ -30,6 +30,9 @@ MAX_PEERS = 32
 WRITE_AHEAD = 16 * 1024
 """Bytes that asyncio may hold for a full socket before the channel's own queue, which knows what to drop, begins."""
 
+CANCEL_WAIT = 0.1
+"""s until a task that has not ended is cancelled once more."""
+
 CLOSE_WAIT = 1.0
 """s that closing waits for transports to say that they are closed."""
 
@@ -178,8 +181,10 @@ class Reopening(Endpoint):
 
     async def close(self) -> None:
         if self._task is not None:
-            self._task.cancel()
-            await asyncio.wait([self._task])
+            # Before Python 3.12 wait_for forgets a cancellation that comes when what it waits for is just done.
+            while not self._task.done():
+                self._task.cancel()
+                await asyncio.wait([self._task], timeout=CANCEL_WAIT)
             self._task = None
         if self._peer is not None:
             await close_peers([self._peer])

@@ -74,8 +74,9 @@ class SerialLine(Reopening):
 
     async def close(self) -> None:
         if self._port is not None and self._port.is_open:
-            # Or else closing waits until a line that may be stuck has taken the rest.
-            with contextlib.suppress(OSError, serial.SerialException):
+            # Or else closing waits until a line that may be stuck has taken the rest. When the device has gone,
+            # pyserial lets termios.error through, which is no OSError and exists on POSIX only.
+            with contextlib.suppress(Exception):
                 self._port.reset_output_buffer()
         await super().close()
 

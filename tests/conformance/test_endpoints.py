@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import itertools
-import os
 import random
 import socket
 import sys
 import time
-import tty
 from collections import Counter
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, suppress
@@ -18,6 +16,7 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as stock
+from support.lines import SerialClient, UdpClient, pseudo_terminal
 from support.mav import Client
 from support.world import ARMED, HOLD, HOME, loopback, world
 
@@ -31,57 +30,6 @@ ACCEPTED = 0
 LINK_TIMEOUT = 3.0
 """s without a heartbeat after which MAVSDK calls a system lost; QGroundControl waits a little longer."""
 ARM, TAKE_OFF, REPOSITION, LAND = 400, 22, 192, 21
-
-
-class SerialClient(Client):
-    """A ground station at the other end of a pseudo-terminal."""
-
-    def __init__(self, master: int, sysid: int = 255) -> None:
-        super().__init__(sysid)
-        self._master = master
-        os.set_blocking(master, False)
-        asyncio.get_running_loop().add_reader(master, lambda: self.feed(os.read(master, 4096)))
-
-    def send_raw(self, data: bytes) -> None:
-        assert os.write(self._master, data) == len(data)
-
-    async def close(self) -> None:
-        asyncio.get_running_loop().remove_reader(self._master)
-
-
-class UdpClient(Client, asyncio.DatagramProtocol):
-    """A ground station with a UDP socket: `host` and `port` are its own."""
-
-    peer: tuple[str, int] | None = None
-
-    async def open(self, host: str, peer: tuple[str, int] | None = None) -> UdpClient:
-        loop = asyncio.get_running_loop()
-        self.peer = peer
-        self.transport, _ = await loop.create_datagram_endpoint(lambda: self, local_addr=(host, 0))
-        self.port: int = self.transport.get_extra_info("sockname")[1]
-        return self
-
-    def datagram_received(self, data: bytes, addr: tuple[str, int]) -> None:
-        self.peer = self.peer or addr
-        self.feed(data)
-
-    def send_raw(self, data: bytes) -> None:
-        self.transport.sendto(data, self.peer)
-
-    async def close(self) -> None:
-        self.transport.abort()
-
-
-@asynccontextmanager
-async def pseudo_terminal() -> AsyncIterator[tuple[int, str]]:
-    """One end of a line, as a file, and the name of the other."""
-    master, slave = os.openpty()
-    tty.setraw(slave)  # before the gateway opens it: what is echoed until then would come back as garbage
-    try:
-        yield master, os.ttyname(slave)
-    finally:
-        os.close(slave)
-        os.close(master)
 
 
 @asynccontextmanager

@@ -1,0 +1,338 @@
+"""The node over real sockets: who gets what, and what a bad neighbour may not do to the others."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as stock
+from support.lines import SerialClient, UdpClient, pseudo_terminal
+from support.mav import Client
+from support.world import loopback
+
+from anafi_mav.errors import ConfigError
+from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.base import MAX_PEERS
+from anafi_mav.mavlink.channel import QUEUE_BYTES, Channel
+from anafi_mav.mavlink.frames import Parser, Received
+from anafi_mav.mavlink.node import Inbound, Node
+
+ATTITUDE = dialect.MAVLink_attitude_message(1, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5)
+BEAT = stock.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
+
+
+class Desk:
+    """A node and what it told its owner."""
+
+    def __init__(self) -> None:
+        self.inbound: list[Inbound] = []
+        self.changes: list[tuple[str, bool]] = []
+        self.node = Node(on_message=self.inbound.append, on_channel=self._channel)
+
+    def _channel(self, channel: Channel, opened: bool) -> None:
+        self.changes.append((channel.name, opened))
+
+    def got(self, kind: str, sysid: int) -> list[Any]:
+        return [i.message for i in self.inbound if i.message.get_type() == kind and i.sysid == sysid]
+
+    async def until(self, ready: Callable[[], bool], timeout: float = 5.0) -> None:
+        deadline = asyncio.get_running_loop().time() + timeout
+        while not ready():
+            assert asyncio.get_running_loop().time() < deadline, (self.changes, self.node.counters())
+            await asyncio.sleep(0.005)  # what the node has seen has no event of its own
+
+
+@asynccontextmanager
+async def desk(*urls: str) -> AsyncIterator[Desk]:
+    held = Desk()
+    await held.node.start(urls)
+    try:
+        yield held
+    finally:
+        await held.node.close()
+
+
+def udp_port(host: str) -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind((host, 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+def ping(sysid: int, component: int, number: int) -> Any:
+    return stock.MAVLink_ping_message(number, number, sysid, component)
+
+
+def numbers(client: Client) -> list[int]:
+    return [message.seq for _, message in client.since(0, "PING")]
+
+
+@asynccontextmanager
+async def three(host: str) -> AsyncIterator[tuple[Desk, Client, Client, Client]]:
+    """Systems 10 and 20 by TCP, 30 by UDP; the node has heard of all of them."""
+    port = udp_port(host)
+    async with desk(f"tcpin://{host}:5760", f"udpin://{host}:{port}") as d:
+        ten, twenty = await Client(10).connect(5760, host), await Client(20).connect(5760, host)
+        thirty = await UdpClient(30).open(host, (host, port))
+        await d.until(lambda: len(d.node.channels) == 2)
+        for client in (ten, twenty, thirty):
+            client.send(BEAT)
+        await d.until(lambda: all(d.got("HEARTBEAT", sysid) for sysid in (10, 20, 30)))
+        yield d, ten, twenty, thirty
+        for client in (ten, twenty, thirty):
+            await client.close()
+
+
+async def test_everybody_hears_a_broadcast_but_its_sender() -> None:
+    async with three(loopback()) as (d, ten, twenty, thirty):
+        ten.send(ping(0, 0, 1))
+        await twenty.wait("PING", since=0)
+        await thirty.wait("PING", since=0)
+        assert [message.seq for message in d.got("PING", 10)] == [1]
+        twenty.send(ping(0, 0, 2))  # what is behind it on the same way has overtaken nothing
+        await ten.wait("PING", since=0)
+        assert numbers(ten) == [2]
+        # A frame is passed on as it is, its sender's name and number on it.
+        (_, heard) = twenty.since(0, "PING")[0]
+        assert (heard.get_srcSystem(), heard.get_srcComponent(), heard.get_seq()) == (10, 190, 1)
+
+
+async def test_a_message_with_a_target_goes_there_alone() -> None:
+    async with three(loopback()) as (d, ten, twenty, thirty):
+        ten.send(ping(30, 190, 1))
+        await thirty.wait("PING", since=0)
+        thirty.send(ping(10, 0, 2))
+        await ten.wait("PING", since=0)
+        ten.send(ping(99, 1, 3))  # nobody's
+        ten.send(ping(0, 0, 4))
+        await twenty.wait("PING", since=0)
+        await thirty.wait("PING", lambda message: message.seq == 4, since=0)
+        assert (numbers(ten), numbers(twenty), numbers(thirty)) == ([2], [4], [1, 4])
+        assert [message.seq for message in d.got("PING", 10)] == [4]
+        assert d.got("PING", 30) == []
+
+
+async def test_what_is_for_our_systems_stays_with_us() -> None:
+    async with three(loopback()) as (d, ten, twenty, thirty):
+        d.node.own(1)
+        ten.send(ping(1, 1, 1))
+        await d.until(lambda: len(d.got("PING", 10)) == 1)
+        (inbound,) = (i for i in d.inbound if i.message.get_type() == "PING")
+        assert (inbound.sysid, inbound.compid, inbound.channel in d.node.channels) == (10, 190, True)
+        d.node.send(dialect.MAVLink_ping_message(9, 9, 10, 190), sysid=1, compid=1, to=inbound.channel)
+        answer = await ten.wait("PING", since=0)
+        assert (answer.seq, answer.get_srcSystem()) == (9, 1)
+        d.node.disown(1)
+        ten.send(ping(1, 1, 2))  # its drone is away: nobody's now
+        ten.send(ping(0, 0, 3))
+        await twenty.wait("PING", since=0)
+        await thirty.wait("PING", since=0)
+        assert [message.seq for message in d.got("PING", 10)] == [1, 3]
+        assert (numbers(twenty), numbers(thirty)) == ([3], [3])
+
+
+COUNT, FRAME, ANSWER = 120_000, 40, 15
+"""4.8 MB of ATTITUDE: more than what two sockets and we ourselves hold for one peer. Bytes of each frame, and of a
+COMMAND_ACK without its trailing zeros."""
+
+
+def newest(frames: list[Received]) -> int:
+    """The time that the last frame tells."""
+    time: int = frames[-1].message.time_boot_ms
+    return time
+
+
+async def test_a_reader_that_stands_still_holds_up_nobody() -> None:
+    host = loopback()
+    async with desk(f"tcpin://{host}:5760") as d:
+        with socket.socket() as still:
+            still.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+            still.connect((host, 5760))
+            await d.until(lambda: len(d.node.channels) == 1)
+            (slow,) = d.node.channels
+            brisk, writer = await asyncio.open_connection(host, 5760)
+            await d.until(lambda: len(d.node.channels) == 2)
+            reading = asyncio.ensure_future(asyncio.wait_for(brisk.readexactly(COUNT * FRAME + ANSWER), 30.0))
+            for number in range(COUNT):
+                ATTITUDE.time_boot_ms = number
+                d.node.send(ATTITUDE, sysid=1, compid=1)
+                if number % 100 == 0:
+                    await asyncio.sleep(0)
+            d.node.send(dialect.MAVLink_command_ack_message(400, 1), sysid=1, compid=1)
+            frames = Parser().receive(await reading)
+            assert [received.raw[4] for received in frames] == [n % 256 for n in range(COUNT + 1)]
+
+            sent, dropped = slow.counters["sent_frames"], slow.counters["dropped_frames"]
+            waiting = COUNT + 1 - sent - dropped
+            assert dropped > 0
+            assert waiting > 1
+            assert (waiting - 1) * FRAME + ANSWER <= QUEUE_BYTES
+            # When it reads again it gets what the sockets held, then the answer, then the newest telemetry.
+            still.setblocking(False)
+            parser, frames = Parser(), []
+            while not frames or frames[-1].message.get_type() == "COMMAND_ACK" or newest(frames) < COUNT - 1:
+                data = await asyncio.wait_for(asyncio.get_running_loop().sock_recv(still, 65536), 10.0)
+                frames += parser.receive(data)
+            kinds = [received.message.get_type() for received in frames]
+            assert len(frames) - kinds.index("COMMAND_ACK") == waiting
+            assert newest(frames[: kinds.index("COMMAND_ACK")]) < COUNT - waiting
+            # To its reader nothing is missing: numbers are given when frames leave.
+            assert [received.raw[4] for received in frames] == [n % 256 for n in range(len(frames))]
+        writer.close()
+
+
+async def test_tcpout_comes_back() -> None:
+    host = loopback()
+    accepted: asyncio.Queue[tuple[asyncio.StreamReader, asyncio.StreamWriter]] = asyncio.Queue()
+
+    async def listen() -> asyncio.Server:
+        return await asyncio.start_server(lambda r, w: accepted.put_nowait((r, w)), host, 5760)
+
+    url = f"tcpout://{host}:5760"
+    async with desk(url) as d:
+        await d.until(lambda: "Connection refused" in d.node.endpoints[0].describe())
+        assert d.node.endpoints[0].describe() == f"{url}: not connected (Connection refused), retrying"
+        server = await listen()
+        for round in (1, 2):
+            reader, writer = await asyncio.wait_for(accepted.get(), 10.0)
+            await d.until(lambda: d.node.endpoints[0].describe() == f"{url}: connected")
+            d.node.send(ATTITUDE, sysid=1, compid=1)
+            client = Client()
+            client.feed(await asyncio.wait_for(reader.read(1000), 5.0))
+            assert [message.get_type() for _, message in client.received] == ["ATTITUDE"]
+            writer.write(BEAT.pack(stock.MAVLink(None, 10 * round, 1)))
+            await d.until(lambda round=round: bool(d.got("HEARTBEAT", 10 * round)))
+            writer.close()
+            await d.until(lambda: not d.node.channels)
+        assert d.changes == [(url, True), (url, False)] * 2
+        assert d.node.counters()["frames"] == 2  # of channels that are gone, too
+        server.close()
+
+
+async def test_closing_in_the_moment_of_connecting() -> None:
+    """The channel is open a turn of the loop before its endpoint knows that it is connected."""
+    host = loopback()
+    server = await asyncio.start_server(lambda reader, writer: None, host, 5760)
+    node = Node()
+    opened = asyncio.Event()
+    node.on_channel = lambda channel, is_open: opened.set()
+    await node.start([f"tcpout://{host}:5760"])
+    await opened.wait()
+    await asyncio.wait_for(node.close(), 2.0)
+    assert node.channels == []
+    server.close()
+
+
+async def test_udpin_learns_its_peers() -> None:
+    host, elsewhere = loopback(), loopback()
+    port = udp_port(host)
+    async with desk(f"udpin://{host}:{port}") as d:
+        one = await UdpClient(10).open(host, (host, port))
+        two = await UdpClient(20).open(elsewhere, (host, port))
+        noise = await UdpClient(30).open(host, (host, port))
+        noise.send_raw(b"hello")
+        for client in (one, two):
+            client.send(BEAT)
+        await d.until(lambda: len(d.node.channels) == 2)
+        url = f"udpin://{host}:{port}"
+        names = {f"{url} from {host}:{one.port}", f"{url} from {elsewhere}:{two.port}"}
+        assert {channel.name for channel in d.node.channels} == names
+        assert d.node.endpoints[0].describe() == f"{url}: 2 peers"
+        d.node.send(ATTITUDE, sysid=1, compid=1)
+        for client in (one, two):
+            message = await client.wait("ATTITUDE", since=0)
+            assert message.get_seq() == 0
+        assert noise.received == []
+        one.send(BEAT)
+        await two.wait("HEARTBEAT", lambda beat: beat.get_seq() == 1, since=0)
+        assert len(d.node.channels) == 2
+        assert d.node.counters()["garbage_bytes"] == 5
+        for client in (one, two, noise):
+            await client.close()
+
+
+async def test_a_full_endpoint_refuses_and_the_others_stay() -> None:
+    host = loopback()
+    async with desk(f"tcpin://{host}:5760") as d:
+        clients = [await Client(n + 1).connect(5760, host) for n in range(MAX_PEERS)]
+        await d.until(lambda: len(d.node.channels) == MAX_PEERS)
+        reader, writer = await asyncio.open_connection(host, 5760)
+        with pytest.raises((ConnectionError, asyncio.IncompleteReadError)):
+            await asyncio.wait_for(reader.readexactly(1), 5.0)
+        writer.close()
+        assert d.node.counters()["refused_peers"] == 1
+        d.node.send(ATTITUDE, sysid=1, compid=1)
+        for client in clients:
+            await client.wait("ATTITUDE", since=0)
+            await client.close()
+
+
+async def test_a_serial_line_that_comes_later(tmp_path: Path) -> None:
+    device = tmp_path / "ttyUSB0"
+    async with desk(f"serial://{device}:57600") as d:
+        expected = f"serial://{device}:57600: not connected (No such file or directory), retrying"
+        assert d.node.endpoints[0].describe() == expected
+        async with pseudo_terminal() as (master, name):
+            device.symlink_to(name)
+            await d.until(lambda: len(d.node.channels) == 1, 10.0)
+            client = SerialClient(master, 10)
+            client.send(BEAT)
+            await d.until(lambda: bool(d.got("HEARTBEAT", 10)))
+            d.node.send(ATTITUDE, sysid=1, compid=1)
+            await client.wait("ATTITUDE", since=0)
+            await client.close()
+
+
+async def test_a_failing_service_costs_no_connection() -> None:
+    host = loopback()
+    reported: list[dict[str, Any]] = []
+    asyncio.get_running_loop().set_exception_handler(lambda loop, context: reported.append(context))
+
+    def fail(inbound: Inbound) -> None:
+        raise RuntimeError("a mistake of ours")
+
+    async with desk(f"tcpin://{host}:5760") as d:
+        d.node.on_message = fail
+        client = await Client().connect(5760, host)
+        await d.until(lambda: len(d.node.channels) == 1)
+        client.send(BEAT)
+        await d.until(lambda: bool(reported))
+        d.node.on_message = d.inbound.append
+        client.send(BEAT)
+        await d.until(lambda: bool(d.inbound))
+        await client.close()
+    assert [str(context["exception"]) for context in reported] == ["a mistake of ours"]
+
+
+async def test_a_start_that_fails_leaves_nothing_open() -> None:
+    host = loopback()
+    with socket.create_server((host, 5761)):
+        node = Node()
+        with pytest.raises(ConfigError) as caught:
+            await node.start([f"tcpin://{host}:5760", f"tcpin://{host}:5761"])
+        assert str(caught.value) == f"endpoints[1]: cannot open tcpin://{host}:5761: Address already in use"
+        assert node.endpoints == []
+        with pytest.raises(ConfigError) as caught:
+            await node.start([f"tcpin://{host}:5760", "tcpin://nobody"])
+        assert caught.value.key_path == "endpoints[1]"
+        socket.create_server((host, 5760)).close()
+
+
+async def test_closing_ends_every_connection_and_frees_the_port() -> None:
+    host = loopback()
+    async with desk(f"tcpin://{host}:5760") as d:
+        reader, writer = await asyncio.open_connection(host, 5760)
+        await d.until(lambda: len(d.node.channels) == 1)
+        (channel,) = d.node.channels
+    with pytest.raises((ConnectionError, asyncio.IncompleteReadError)):
+        await asyncio.wait_for(reader.readexactly(1), 5.0)
+    writer.close()
+    assert d.node.channels == []
+    channel.send(ATTITUDE, 1, 1)
+    assert channel.counters["dropped_frames"] == 1
+    socket.create_server((host, 5760)).close()
