@@ -9,7 +9,7 @@ import ipaddress
 import os
 import signal
 import sys
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import msgspec
@@ -110,9 +110,14 @@ def _flag(key_path: str) -> str:
 def _from_fleet(source: str) -> Fleet:
     try:
         text = sys.stdin.buffer.readline() if source == "-" else Path(source).read_bytes()
-        return msgspec.json.decode(text, type=Fleet)
+        fleet = msgspec.json.decode(text)
+        result = msgspec.convert(fleet, Fleet)
     except (OSError, msgspec.DecodeError) as error:
         raise ConfigError("--fleet", f"expected a JSON object with drones in {source}: {error}") from error
+    unknown = {key for drone in fleet["drones"] for key in drone} - {field.name for field in fields(DroneSpec)}
+    if unknown:
+        raise ConfigError("--fleet", f"expected keys of DroneSpec, got {', '.join(sorted(unknown))}")
+    return result
 
 
 def _home(text: str) -> tuple[float, float, float]:
