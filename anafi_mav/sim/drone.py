@@ -98,6 +98,7 @@ class SimulatedDrone:
         self.identity = identity
         self.log = log
         self.faults = Faults()
+        self.faults.on_mute = self._mute_link
         self.http_problem = ""
         """Why there is no web server although one was asked for; empty: there is one, or nobody asked."""
         self._clock = clock
@@ -172,6 +173,7 @@ class SimulatedDrone:
             versions=spec.versions,
             on_session=self._on_session,
         )
+        self._mute_link(self.faults.mute)
         if spec.http_port is None:
             return
         web = WebServer()
@@ -195,7 +197,6 @@ class SimulatedDrone:
         self.firmware.tick(now, elapsed, pose, arrived, still)
         session = self._session
         if session is not None:
-            session.mute = self.faults.mute
             for message in self._telemetry.due(now):
                 session.send(message)
         if now >= self._next_pose:
@@ -221,6 +222,10 @@ class SimulatedDrone:
         self.log.add(now, "pose", "true", args)
 
     # -- the link
+
+    def _mute_link(self, mute: bool) -> None:
+        if self._server is not None:
+            self._server.mute = mute
 
     def _on_session(self, session: DeviceSession) -> OnMessage:
         now = self._clock()

@@ -51,18 +51,31 @@ class Identity:
     run_id: str
 
 
-@dataclass(slots=True)
 class Faults:
-    """What a test or a scenario may break. Takes effect at once."""
+    """What a test or a scenario may break. `mute` takes effect at once, the others within `SENSOR_PERIOD`."""
 
-    mute: bool = False
-    """The air is gone: nothing is heard and nothing is said, both ways."""
-    gps: bool = True
-    """False: the receiver has no fix."""
-    magneto_required: bool = False
-    """The magnetometer needs calibration; a calibration puts it back to False."""
-    battery: int | None = None
-    """Percent that the battery is held at."""
+    __slots__ = ("_mute", "battery", "gps", "magneto_required", "on_mute")
+
+    def __init__(self) -> None:
+        self._mute = False
+        self.on_mute: Callable[[bool], None] = lambda mute: None
+        """Called with each new value of `mute`; the owner of the sockets sets it."""
+        self.gps = True
+        """False: the receiver has no fix."""
+        self.magneto_required = False
+        """The magnetometer needs calibration; a calibration puts it back to False."""
+        self.battery: int | None = None
+        """Percent that the battery is held at."""
+
+    @property
+    def mute(self) -> bool:
+        """The air is gone: nothing is heard and nothing is said, both ways, and nobody connects."""
+        return self._mute
+
+    @mute.setter
+    def mute(self, mute: bool) -> None:
+        self._mute = mute
+        self.on_mute(mute)
 
 
 class Firmware:
