@@ -19,7 +19,8 @@ import pytest
 import anafi_mav.arsdk.messages
 from anafi_mav.arsdk import wire
 from anafi_mav.arsdk.controller import ControllerSession, connect
-from anafi_mav.arsdk.messages import ardrone3, common
+from anafi_mav.arsdk.messages import ardrone3, common, mission
+from anafi_mav.arsdk.messages.generic import ListFlags
 from anafi_mav.arsdk.wire import Message, MessageId, UnknownMessage
 
 CLONE_NEWNET = 0x40000000
@@ -126,6 +127,8 @@ def sample(message: type[Message]) -> tuple[Message, list[Any]]:
             value: Any = f"text {number} é"
         elif isinstance(kind, wire.Blob):
             value = bytes([number, 0, 255])
+        elif isinstance(kind, wire.Bits) and kind.names is ListFlags:
+            value = 1 << ListFlags.FIRST | 1 << ListFlags.LAST  # Olympe trips over REMOVE in a list without keys
         elif isinstance(kind, wire.Bits):
             value = 1 | 1 << len(kind.names) - 1
         elif issubclass(python, wire.OpenEnum):
@@ -193,7 +196,10 @@ def test_every_message_of_our_tables_passes_libarsdk(referee: Referee) -> None:
             for message, _ in samples:
                 session.send(message)
             for message, plain in samples:
-                assert await asyncio.to_thread(referee.received) == {"received": message.NAME, "args": plain}
+                expected = {"received": message.NAME, "args": plain}
+                if isinstance(message, mission.CustomCmd):  # Olympe opens this envelope and knows no such mission
+                    expected = {"received": "UnknownMissionMessageEvent", "args": plain[-1:]}
+                assert await asyncio.to_thread(referee.received) == expected
         for buffer in wire.Buffer:
             samples = [sample(message) for message in declared(wire.Direction.EVENT) if message.BUFFER is buffer]
             for message, plain in samples:

@@ -193,6 +193,19 @@ class AlertSoundState(OpenEnum):
     PLAYING = 1
 
 
+class CircleDirection(OpenEnum):
+    CW = 0
+    CCW = 1
+    DEFAULT = 2
+
+
+class MoveByStatus(OpenEnum):
+    RUNNING = 0
+    DONE = 1
+    CANCELED = 2
+    ERROR = 3
+
+
 @command("ardrone3.Piloting.TakeOff", 1, 0, 1)
 class TakeOff(Message, frozen=True):
     """Motors on and up to about 1 m. Confirmed by FlyingStateChanged(takingoff); refused by silence."""
@@ -718,3 +731,52 @@ class StopAlertSound(Message, frozen=True):
 @event("ardrone3.SoundState.AlertSound", 1, 36, 0)
 class AlertSound(Message, frozen=True):
     state: Annotated[AlertSoundState, ENUM]
+
+
+@command("ardrone3.Piloting.Circle", 1, 0, 9)
+class Circle(Message, frozen=True):
+    """Fixed wing only: no ANAFI does it."""
+
+    direction: Annotated[CircleDirection, ENUM]
+
+
+@command("ardrone3.Piloting.StartPilotedPOI", 1, 0, 12)
+class StartPilotedPOI(Message, frozen=True):
+    """The form without a mode, before `StartPilotedPOIV2`."""
+
+    latitude: Annotated[float, F64]
+    longitude: Annotated[float, F64]
+    altitude: Annotated[float, F64]
+
+
+@command("ardrone3.Piloting.CancelMoveBy", 1, 0, 14)
+class CancelMoveBy(Message, frozen=True):
+    """Not supported by the ANAFIs: they cancel with a move by nothing."""
+
+
+@event("ardrone3.PilotingState.AirSpeedChanged", 1, 4, 11, Buffer.NON_ACK)
+class AirSpeedChanged(Message, frozen=True):
+    """m/s."""
+
+    airSpeed: Annotated[float, F32]
+
+
+@event("ardrone3.PilotingState.PilotedPOI", 1, 4, 14)
+class PilotedPOI(Message, frozen=True):
+    latitude: Annotated[float, F64]
+    longitude: Annotated[float, F64]
+    altitude: Annotated[float, F64]
+    status: Annotated[PoiStatus, ENUM]
+
+
+@event("ardrone3.PilotingState.moveByChanged", 1, 4, 16)
+class MoveByChanged(Message, frozen=True):
+    dXAsked: Annotated[float, F32]
+    dYAsked: Annotated[float, F32]
+    dZAsked: Annotated[float, F32]
+    dPsiAsked: Annotated[float, F32]
+    dX: Annotated[float, F32]
+    dY: Annotated[float, F32]
+    dZ: Annotated[float, F32]
+    dPsi: Annotated[float, F32]
+    status: Annotated[MoveByStatus, ENUM]

@@ -6,10 +6,13 @@ from typing import Annotated
 
 from anafi_mav.arsdk.wire import (
     ENUM,
+    F64,
     I16,
     STRING,
     U8,
+    U16,
     U32,
+    U64,
     Buffer,
     Message,
     OpenEnum,
@@ -71,6 +74,24 @@ class FlightPlanComponent(OpenEnum):
     MAVLINK_STATE = 6
     MAVLINK_MEDIA = 7
     FIRST_WAYPOINT_TOO_FAR = 8
+
+
+class PeerState(OpenEnum):
+    CONNECTED = 0
+    DISCONNECTED = 1
+
+
+class PeerType(OpenEnum):
+    UNKNOWN = 0
+    NET = 1
+    MUX = 2
+
+
+class UpdateStatus(OpenEnum):
+    SUCCESS = 0
+    FAILURE_BAD_FILE = 1
+    FAILURE_BAT_LEVEL_TOO_LOW = 2
+    FAILURE = 3
 
 
 @event("common.NetworkEvent.Disconnection", 0, 1, 0)
@@ -329,3 +350,118 @@ class SpeedBridleEvent(Message, frozen=True):
 @event("common.RunState.RunIdChanged", 0, 30, 0)
 class RunIdChanged(Message, frozen=True):
     runId: Annotated[str, STRING]
+
+
+@command("common.Network.Disconnect", 0, 0, 0)
+class Disconnect(Message, frozen=True):
+    pass
+
+
+@command("common.Settings.Country", 0, 2, 3)
+class Country(Message, frozen=True):
+    code: Annotated[str, STRING]
+
+
+@command("common.Settings.AutoCountry", 0, 2, 4)
+class AutoCountry(Message, frozen=True):
+    automatic: Annotated[int, U8]
+
+
+@event("common.CommonState.MassStorageStateListChanged", 0, 5, 2)
+class MassStorageStateListChanged(Message, frozen=True):
+    mass_storage_id: Annotated[int, U8]
+    name: Annotated[str, STRING]
+
+
+@event("common.CommonState.MassStorageInfoStateListChanged", 0, 5, 3)
+class MassStorageInfoStateListChanged(Message, frozen=True):
+    mass_storage_id: Annotated[int, U8]
+    size: Annotated[int, U32]
+    used_size: Annotated[int, U32]
+    plugged: Annotated[int, U8]
+    full: Annotated[int, U8]
+    internal: Annotated[int, U8]
+
+
+@event("common.CommonState.MassStorageInfoRemainingListChanged", 0, 5, 6)
+class MassStorageInfoRemainingListChanged(Message, frozen=True):
+    free_space: Annotated[int, U32]
+    rec_time: Annotated[int, U16]
+    photo_remaining: Annotated[int, U32]
+
+
+@event("common.CommonState.CountryListKnown", 0, 5, 10)
+class CountryListKnown(Message, frozen=True):
+    listFlags: Annotated[int, U8]
+    countryCodes: Annotated[str, STRING]
+
+
+@event("common.CommonState.MassStorageContent", 0, 5, 12)
+class MassStorageContent(Message, frozen=True):
+    mass_storage_id: Annotated[int, U8]
+    nbPhotos: Annotated[int, U16]
+    nbVideos: Annotated[int, U16]
+    nbPuds: Annotated[int, U16]
+    nbCrashLogs: Annotated[int, U16]
+    nbRawPhotos: Annotated[int, U16]
+
+
+@event("common.CommonState.MassStorageContentForCurrentRun", 0, 5, 13)
+class MassStorageContentForCurrentRun(Message, frozen=True):
+    mass_storage_id: Annotated[int, U8]
+    nbPhotos: Annotated[int, U16]
+    nbVideos: Annotated[int, U16]
+    nbRawPhotos: Annotated[int, U16]
+
+
+@event("common.CommonState.VideoRecordingTimestamp", 0, 5, 14)
+class VideoRecordingTimestamp(Message, frozen=True):
+    startTimestamp: Annotated[int, U64]
+    stopTimestamp: Annotated[int, U64]
+
+
+@command("common.Controller.isPiloting", 0, 8, 0)
+class IsPiloting(Message, frozen=True):
+    piloting: Annotated[int, U8]
+
+
+@command("common.Controller.PeerStateChanged", 0, 8, 1)
+class PeerStateChanged(Message, frozen=True):
+    state: Annotated[PeerState, ENUM]
+    type: Annotated[PeerType, ENUM]
+    peerName: Annotated[str, STRING]
+    peerId: Annotated[str, STRING]
+    peerType: Annotated[str, STRING]
+
+
+@command("common.GPS.ControllerPositionForRun", 0, 16, 0)
+class ControllerPositionForRun(Message, frozen=True):
+    latitude: Annotated[float, F64]
+    longitude: Annotated[float, F64]
+
+
+@event("common.ARLibsVersionsState.ControllerLibARCommandsVersion", 0, 18, 0)
+class ControllerLibARCommandsVersion(Message, frozen=True):
+    version: Annotated[str, STRING]
+
+
+@event("common.ARLibsVersionsState.SkyControllerLibARCommandsVersion", 0, 18, 1)
+class SkyControllerLibARCommandsVersion(Message, frozen=True):
+    version: Annotated[str, STRING]
+
+
+@event("common.ARLibsVersionsState.DeviceLibARCommandsVersion", 0, 18, 2)
+class DeviceLibARCommandsVersion(Message, frozen=True):
+    version: Annotated[str, STRING]
+
+
+@command("common.Factory.Reset", 0, 31, 0)
+class FactoryReset(Message, frozen=True):
+    pass
+
+
+@event("common.UpdateState.UpdateStateChanged", 0, 34, 0)
+class UpdateStateChanged(Message, frozen=True):
+    sourceVersion: Annotated[str, STRING]
+    targetVersion: Annotated[str, STRING]
+    status: Annotated[UpdateStatus, ENUM]
