@@ -128,6 +128,10 @@ class Moves:
         self._cancelling: Move | None = None
         """The moveTo that we cancelled and whose CANCELED has not come yet."""
         self._stray_until = 0.0
+        self.inherited = True
+        """The drone was found flying: a moveBy of an earlier connection may be under way, which no event tells."""
+        self.aborting_until = 0.0
+        """A return is being aborted: until then, or until the drone answers, it is not as the drone last said."""
 
     def started(self) -> tuple[Move, ...]:
         """All of them."""
@@ -181,6 +185,11 @@ class Moves:
             self._stray_until = now + STRAY_FOR
         move.end(MoveEnd.CANCELED)
 
+    def expect_stray(self, now: float) -> None:
+        """A moveBy that is nobody's is about to be ended; its event is not about a move of ours."""
+        self.inherited = False
+        self._stray_until = now + STRAY_FOR
+
     def clear(self, how: MoveEnd) -> None:
         """All have ended, as far as we are concerned."""
         for move in (*self.started(), self._older, self._cancelling):
@@ -189,7 +198,8 @@ class Moves:
                 move.answer.fail(CommandRejected(how.value))
         self.to = self.returning = self._older = self._cancelling = None
         self.by.clear()
-        self._stray_until = 0.0
+        self._stray_until = self.aborting_until = 0.0
+        self.inherited = True
 
     # -- what the drone says
 
@@ -263,6 +273,7 @@ class Moves:
 
     def _on_flying_state(self, message: ardrone3.FlyingStateChanged, now: float) -> None:
         if message.state in MOTORS_OFF:
+            self.inherited = False
             self.cancel_to("the motors are off")
             if self._cancelling is not None:
                 self._cancelling.end(MoveEnd.CANCELED)
@@ -270,6 +281,8 @@ class Moves:
             self.cancel_by("the motors are off", now)
 
     def _on_return(self, message: rth.State, now: float) -> None:
+        if not self._home.state.returning:
+            self.aborting_until = 0.0
         move = self.returning
         if move is None:
             return

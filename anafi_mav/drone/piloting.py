@@ -8,14 +8,16 @@ body axes front, right, down; heights above the take-off point.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 import math
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
-from anafi_mav.arsdk.messages import ardrone3, rth
+from anafi_mav.arsdk.messages import ardrone3, common, rth
 from anafi_mav.arsdk.messages import move as guided
-from anafi_mav.arsdk.messages.ardrone3 import FlyingState, OrientationMode, PoiStatus
+from anafi_mav.arsdk.messages.ardrone3 import FlyingState, MoveToStatus, OrientationMode, PoiStatus
+from anafi_mav.arsdk.messages.common import PlayingState
 from anafi_mav.arsdk.messages.rth import RthState
 from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone.alerts import spoken
@@ -38,12 +40,19 @@ MOVE_BY_MARGIN = 20.0
 MOVE_BY_SLOWEST = 0.5
 """m/s and rad/s below which a relative move is given up: the speed is the drone's choice, this is far below it."""
 
+TAKE_OFF_MEMORY = 3.0
+"""s after a take-off was given up in which the drone may still carry it out: it may have had the command already."""
+
+UNSURE_TIMEOUT = 2.0
+"""s to wait for the end of something that may not have been running at all."""
+
 _STICKS_DEAD = frozenset(
     {FlyingState.LANDED, FlyingState.LANDING, FlyingState.EMERGENCY, FlyingState.EMERGENCY_LANDING}
 )
 """States in which no PCMD is sent: positive gaz cancels a landing (ardrone3.xml 1-0-3)."""
 _TAKEN_OFF = frozenset({FlyingState.TAKINGOFF, FlyingState.HOVERING, FlyingState.FLYING})
 _LANDING = frozenset({FlyingState.LANDING, FlyingState.LANDED, FlyingState.EMERGENCY_LANDING})
+_IN_FLIGHT = frozenset({FlyingState.HOVERING, FlyingState.FLYING})
 _MOTORS_CUT = frozenset({FlyingState.EMERGENCY, FlyingState.LANDED})
 
 
@@ -62,6 +71,8 @@ class Piloting(Element[PilotingState]):
         self._sticks = Sticks()
         self._timer: asyncio.TimerHandle | None = None
         self._landings_asked = 0
+        self._takeoffs_asked = 0
+        self._may_take_off_until = -math.inf
         self._setting_locks: dict[type[Message], asyncio.Lock] = {}
 
     def reset(self) -> None:
@@ -72,6 +83,7 @@ class Piloting(Element[PilotingState]):
         """Nothing of before is sent again, and what was started is nobody's any more."""
         self._silence_sticks()
         self._moves.clear(MoveEnd.LINK_LOST)
+        self._may_take_off_until = -math.inf
 
     def reactions(self) -> Mapping[type[Message], Callable[[Any, float], None]]:
         """Events to be shown to this element beyond its reducers."""
@@ -113,6 +125,13 @@ class Piloting(Element[PilotingState]):
             return None
         return Limits(tilt.current, yaw.current, climb.current)
 
+    @property
+    def about_to_fly(self) -> bool:
+        """The drone stands, but a take-off of ours is on its way to it, or was and cannot be taken back."""
+        return self.state.flying == FlyingState.LANDED and (
+            self._takeoffs_asked > 0 or self._now() < self._may_take_off_until
+        )
+
     # -- up and down
 
     async def take_off(self, timeout: float = ANSWER_TIMEOUT) -> None:
@@ -139,26 +158,38 @@ class Piloting(Element[PilotingState]):
 
         answer = self._commander.expect((ardrone3.FlyingStateChanged,), judge)
         self._commander.dispatch(answer, ardrone3.TakeOff(), timeout)
+        self._takeoffs_asked += 1
         try:
             await answer.wait()
-        except CommandTimeout:
-            reasons = self._why_on_the_ground("")
-            if reasons:
+        except CommandRejected:
+            raise
+        except BaseException as error:
+            self._may_take_off_until = self._now() + TAKE_OFF_MEMORY
+            if isinstance(error, CommandTimeout) and (reasons := self._why_on_the_ground("")):
                 raise CommandRejected(reasons) from None
             raise
+        finally:
+            self._takeoffs_asked -= 1
 
     def _why_on_the_ground(self, otherwise: str) -> str:
         return ", ".join(self._takeoff_blockers()) or otherwise
 
     async def land(self, timeout: float = ANSWER_TIMEOUT) -> None:
-        """Land here; returns when the drone is landing, at once when it is or has landed."""
+        """Land here; returns when the drone is landing, at once when it is or has landed.
+
+        A drone that stands but is `about_to_fly` is watched until it certainly stays there, or is made to land.
+        """
         self._require_link()
-        if self.state.flying in _LANDING:
+        if self.state.flying in _LANDING and not self.about_to_fly:
             return
         # From here on, not from the drone's answer on: a positive gaz would cancel the landing.
         self._silence_sticks()
         self._landings_asked += 1
         try:
+            if self.about_to_fly:
+                await self._catch_take_off()
+            if self.state.flying in _LANDING:
+                return
             await self._commander.confirm(
                 ardrone3.Landing(),
                 (ardrone3.FlyingStateChanged,),
@@ -168,15 +199,30 @@ class Piloting(Element[PilotingState]):
         finally:
             self._landings_asked -= 1
 
-    async def emergency(self, timeout: float = ANSWER_TIMEOUT) -> None:
-        """Cut the motors, wherever the drone is: in the air it falls. Returns when the drone says that they are."""
+    async def _catch_take_off(self) -> None:
+        """Wait until the drone is off the ground, or until no take-off of ours can reach it any more."""
+        left = max(self._may_take_off_until - self._now(), TAKE_OFF_MEMORY if self._takeoffs_asked else 0.0)
+        with contextlib.suppress(CommandTimeout):
+            await self._commander.confirm(
+                ardrone3.Landing(),
+                (ardrone3.FlyingStateChanged,),
+                lambda message: None if message.state == FlyingState.MOTOR_RAMPING else True,
+                left,
+            )
+
+    async def emergency(self) -> None:
+        """Cut the motors, wherever the drone is: in the air it falls. Returns when the drone says that they are.
+
+        Once sent it is not taken back, not by time and not by cancellation: it is repeated while there is a link, as
+        Parrot does (arsdk-ng: timeout policy RETRY).
+        """
+        self._require_link()
         self._silence_sticks()
-        await self._commander.confirm(
-            ardrone3.Emergency(),
-            (ardrone3.FlyingStateChanged,),
-            lambda message: True if message.state in _MOTORS_CUT else None,
-            timeout,
+        answer = self._commander.expect(
+            (ardrone3.FlyingStateChanged,), lambda message: True if message.state in _MOTORS_CUT else None
         )
+        self._commander.send(ardrone3.Emergency())
+        await answer.wait()
 
     # -- guided moves
 
@@ -193,7 +239,7 @@ class Piloting(Element[PilotingState]):
         if timeout is None:
             timeout = MOVE_BY_MARGIN + (math.hypot(front, right, down) + abs(turn)) / MOVE_BY_SLOWEST
         move = Move(self._commander.expect((), _decided_elsewhere))
-        self._silence_sticks()
+        self._centre_sticks()
         self._moves.by.append(move)
         try:
             self._commander.dispatch(move.answer, ardrone3.MoveBy(front, right, down, turn), timeout)
@@ -201,7 +247,8 @@ class Piloting(Element[PilotingState]):
         finally:
             if move in self._moves.by:  # given up: neither the drone nor hover has ended it
                 self._moves.drop_by(move, self._now())
-                self._send_if_connected(ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0))
+                if self.sticks_blocked is None:  # otherwise the drone is busy with what is not ours to disturb
+                    self._send_if_connected(ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0))
         return flown
 
     async def move_to(
@@ -223,13 +270,15 @@ class Piloting(Element[PilotingState]):
             raise LocalProtocolError("a target is not a number")
         command = self._move_to_command(Position(latitude, longitude, altitude), heading_deg, horizontal_speed)
         move = Move(self._commander.expect((), _decided_elsewhere), Position(latitude, longitude, altitude))
-        self._silence_sticks()
+        self._centre_sticks()
         obsolete = self._moves.begin_to(move)
         if obsolete is not None and obsolete.answer.token is not None:
             self._commander.cancel(obsolete.answer.token)
         try:
             self._commander.dispatch(move.answer, command, timeout)
             await move.answer.wait()
+            if self._moves.to is move:
+                self._silence_sticks()
         finally:
             if not move.running and self._moves.to is move:  # given up: it must not start later
                 self._moves.cancel_to("given up")
@@ -262,7 +311,7 @@ class Piloting(Element[PilotingState]):
     async def return_home(self, timeout: float = ANSWER_TIMEOUT) -> Move | None:
         """Fly home; returns when the drone is on its way or about to be. None: it was returning already."""
         self._require_link()
-        if self._home.state.returning:
+        if self._home.state.returning and self._now() >= self._moves.aborting_until:
             return None
         if self._home.state.rth == RthState.UNAVAILABLE:
             raise CommandRejected("return home is unavailable")
@@ -288,82 +337,124 @@ class Piloting(Element[PilotingState]):
         # After a timeout it stays ours: should the drone begin to return all the same, hover has to stop it.
         return move
 
-    async def cancel_return_home(self, timeout: float = ANSWER_TIMEOUT) -> None:
-        """Stop a return, whoever began it: unlike `hover`, this is an explicit order to do so."""
+    async def cancel_return_home(self, timeout: float = ANSWER_TIMEOUT, *, even_its_own: bool = False) -> None:
+        """Stop a return that a user asked for, through us or not, also one that has not begun yet.
+
+        One that the drone began by itself is stopped only with `even_its_own`, else `CommandRejected` is raised.
+        """
         self._require_link()
-        if not self._home.state.returning:
+        home = self._home.state
+        if home.returning_by_itself and not even_its_own:
+            raise CommandRejected("the drone returns home by itself")
+        asked = self._drop_return("the return was cancelled")
+        if not home.returning and not asked:
             return
-        await self._commander.confirm(
-            rth.Abort(),
-            (rth.State,),
-            lambda message: True if message.state in (RthState.AVAILABLE, RthState.UNAVAILABLE) else None,
-            timeout,
-        )
+        try:
+            await self._commander.confirm(
+                self._abort(), (rth.State,), _ends_return, timeout if home.returning else UNSURE_TIMEOUT
+            )
+        except CommandTimeout:
+            if self._home.state.returning:
+                raise
+
+    def _abort(self) -> rth.Abort:
+        """The command that ends a return. Until the drone answers, what it last said of a return is no longer true."""
+        self._moves.aborting_until = self._now() + UNSURE_TIMEOUT
+        return rth.Abort()
+
+    def _drop_return(self, why: str) -> bool:
+        """The return that we asked for, running or on its way, is not ours any more. False: there was none."""
+        returning, self._moves.returning = self._moves.returning, None
+        if returning is None:
+            return False
+        returning.end(MoveEnd.CANCELED)
+        returning.answer.fail(CommandRejected(why))
+        if returning.answer.token is not None:
+            self._commander.cancel(returning.answer.token)
+        return True
 
     # -- sticks
 
     def pilot(self, command: PilotingCommand | None) -> None:
-        """Hold these sticks: a PCMD leaves now and every 50 ms until another command, a move, `hover` or None.
+        """Hold these sticks: a PCMD leaves now and every 50 ms, for `sticks.HOLD_LIMIT` unless it is said again.
 
-        None lets the sticks go (centred for two seconds). A setpoint takes over from a moveTo or moveBy of ours,
-        during which the drone would ignore it. Nothing is sent and nothing kept while `sticks_blocked`.
+        None lets the sticks go (centred for two seconds), and so does silence. A setpoint takes over from a moveTo or
+        moveBy of ours, during which the drone would ignore it. Nothing is sent and nothing kept while
+        `sticks_blocked`.
         Raises `NotSupported` before the drone has reported its limits, `LinkLost` without a link.
         """
         self._require_link()
+        if command is None:
+            self._centre_sticks()
+            return
         limits = self.limits
         if limits is None:
             raise NotSupported("reported tilt and speed limits")
-        position = percent(command or PilotingCommand(), limits)
+        position = percent(command, limits)
         if self.sticks_blocked is None:
-            if command is not None:
-                self._stop_moves("taken over by the sticks")
-                self._sticks.command(position, self._now())
-            elif self._sticks.active:
-                self._sticks.centre(self._now())
+            self._stop_moves("taken over by the sticks")
+            self._sticks.command(position, self._now())
         self._pump()
 
     def hover(self) -> None:
         """Stop now, whatever we had started, and stay: takes effect before it returns.
 
-        Cancels our moveTo and moveBys, a running point of interest and a return that was asked for through us,
-        then centres the sticks for two seconds, since a PCMD alone neither stops a moveTo nor is it acknowledged.
-        A landing or a return that the drone began by itself goes on. Raises `LinkLost` without a link.
+        Cancels moveTo and moveBys (those of an earlier connection or another controller too, as far as the drone
+        tells), a running point of interest, a playing flight plan (it is paused) and a return that was asked for
+        through us, then centres the sticks for two seconds, since a PCMD alone neither stops a moveTo nor is it
+        acknowledged. A landing or a return that the drone began by itself goes on. Raises `LinkLost` without a link.
         """
         self._require_link()
-        self._stop_moves("stopped by hover")
-        if self.state.poi in (PoiStatus.RUNNING, PoiStatus.PENDING):
+        state = self.state
+        cancelled = self._stop_moves("stopped by hover")
+        if not self._home.state.returning_by_itself:
+            if state.move_to == MoveToStatus.RUNNING and not cancelled:
+                self._commander.send(ardrone3.CancelMoveTo())
+            if self._moves.inherited and state.flying in _IN_FLIGHT:
+                self._moves.expect_stray(self._now())
+                self._commander.send(ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0))
+        if state.poi in (PoiStatus.RUNNING, PoiStatus.PENDING):
             self._commander.send(ardrone3.StopPilotedPOI())
-        returning = self._moves.returning
-        if returning is not None:
-            self._moves.returning = None
-            returning.end(MoveEnd.CANCELED)
-            returning.answer.fail(CommandRejected("stopped by hover"))
-            if returning.answer.token is not None:
-                self._commander.cancel(returning.answer.token)
-            self._commander.send(rth.Abort())
+        if state.plan == PlayingState.PLAYING:
+            self._commander.send(common.Pause())
+        if self._drop_return("stopped by hover"):
+            self._commander.send(self._abort())
         self._sticks.centre(self._now())
         self._pump()
 
     async def stop(self, timeout: float = ANSWER_TIMEOUT) -> None:
         """`hover`, then wait until the drone has confirmed the end of what was running."""
-        answers = []
+        sure, unsure = [], []
         if self._moves.to is not None and self._moves.to.running:
-            answers.append(self._commander.expect((ardrone3.MoveToChanged,), _ends_move_to))
+            sure.append(self._commander.expect((ardrone3.MoveToChanged,), _ends_move_to))
+        elif self.state.move_to == MoveToStatus.RUNNING:
+            unsure.append(self._commander.expect((ardrone3.MoveToChanged,), _ends_move_to))
         if self._moves.by:
-            answers.append(self._commander.expect((ardrone3.MoveByEnd,), lambda message: True))
-        if self._moves.returning is not None and self._moves.returning.running:
-            answers.append(self._commander.expect((rth.State,), _ends_return))
+            sure.append(self._commander.expect((ardrone3.MoveByEnd,), lambda message: True))
+        if self.state.plan == PlayingState.PLAYING:
+            sure.append(self._commander.expect((common.MavlinkFilePlayingStateChanged,), _ends_playing))
+        if (returning := self._moves.returning) is not None:
+            (sure if returning.running else unsure).append(self._commander.expect((rth.State,), _ends_return))
         try:
             self.hover()
-            for answer in answers:
+            for answer in sure:
                 answer.expire_after(timeout, CommandTimeout("hover", timeout))
+            for answer in unsure:
+                answer.expire_after(UNSURE_TIMEOUT, CommandTimeout("hover", UNSURE_TIMEOUT))
+            for answer in sure:
                 await answer.wait()
+            for answer in unsure:
+                with contextlib.suppress(CommandTimeout):
+                    await answer.wait()
         finally:
-            for answer in answers:
+            for answer in (*sure, *unsure):
                 answer.close()
 
-    def _stop_moves(self, why: str) -> None:
-        """Cancel our moveTo and moveBys; in the order of the queue, so a later move is not hit."""
+    def _stop_moves(self, why: str) -> bool:
+        """Cancel our moveTo and moveBys; in the order of the queue, so a later move is not hit.
+
+        True when a moveTo was cancelled.
+        """
         move = self._moves.cancel_to(why)
         if move is not None:
             if move.answer.token is not None:
@@ -375,6 +466,7 @@ class Piloting(Element[PilotingState]):
                 self._commander.cancel(move.answer.token)
         if moves:
             self._commander.send(ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0))
+        return move is not None
 
     def _pump(self) -> None:
         """Send the PCMD that is due and come back for the next."""
@@ -390,6 +482,12 @@ class Piloting(Element[PilotingState]):
         deadline = self._sticks.deadline
         if deadline is not None:
             self._timer = asyncio.get_running_loop().call_at(deadline, self._pump)
+
+    def _centre_sticks(self) -> None:
+        """Let go of what deflection there is. What begins now may be refused; the sticks must not stay as they are."""
+        if self._sticks.active:
+            self._sticks.centre(self._now())
+            self._pump()
 
     def _silence_sticks(self) -> None:
         """No more PCMDs: something else flies the drone now."""
@@ -480,3 +578,7 @@ def _ends_move_to(message: ardrone3.MoveToChanged) -> bool | None:
 
 def _ends_return(message: rth.State) -> bool | None:
     return True if message.state in (RthState.AVAILABLE, RthState.UNAVAILABLE) else None
+
+
+def _ends_playing(message: common.MavlinkFilePlayingStateChanged) -> bool | None:
+    return True if message.state != PlayingState.PLAYING else None

@@ -8,8 +8,9 @@ from collections.abc import Mapping
 import msgspec
 from msgspec.structs import replace
 
-from anafi_mav.arsdk.messages import ardrone3, move
+from anafi_mav.arsdk.messages import ardrone3, common, move
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState, Motion, MoveToStatus, PoiStatus
+from anafi_mav.arsdk.messages.common import PlayingState
 from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone.element import Position, Range, Reducer, finite, position, setting
 
@@ -48,6 +49,8 @@ class PilotingState(msgspec.Struct, frozen=True):
     move_target: Position | None = None
     """Where that moveTo goes or went; altitude above the take-off point."""
     poi: PoiStatus | None = None
+    plan: PlayingState | None = None
+    """Whether a flight plan plays."""
     move_missing: int | None = None
     """What a guided move lacks, as bits of `move.Indicator`; 0 = available. Ai only."""
     max_tilt: Range | None = None
@@ -102,6 +105,7 @@ REDUCERS: Mapping[type[Message], Reducer] = {
     ardrone3.MotionState: lambda state, message: replace(state, steady=message.state == Motion.STEADY),
     ardrone3.MoveToChanged: _move_to,
     ardrone3.PilotedPOIV2: lambda state, message: replace(state, poi=message.status),
+    common.MavlinkFilePlayingStateChanged: lambda state, message: replace(state, plan=message.state),
     move.Info: lambda state, message: replace(state, move_missing=message.missing_inputs),
     ardrone3.MaxTiltChanged: lambda state, message: replace(state, max_tilt=setting(message)),
     ardrone3.MaxVerticalSpeedChanged: lambda state, message: replace(state, max_vertical_speed=setting(message)),

@@ -21,6 +21,14 @@ PERIOD = 0.05
 CENTRED_REPEATS = 40
 """PCMDs that centre the sticks: two seconds of them."""
 
+HOLD_LIMIT = 0.5
+"""s that a deflection holds without being said again. Whoever flies renews it; a deflection that outlives its sender is
+the worst that can happen, so the layer nearest to the drone ends it, whatever those above forgot."""
+
+MIN_SPACING = 0.02
+"""s between two PCMDs, however often the sticks move: a drone that takes them every 50 ms gains nothing from more, and
+the radio loses. The newest position waits, older ones are never sent."""
+
 
 class PilotingCommand(msgspec.Struct, frozen=True):
     """What a pilot wants, in aerospace signs (FRD body, and up for the climb). Values beyond the limits are clipped."""
@@ -78,13 +86,15 @@ def _share(value: float, limit: float) -> int:
 class Sticks:
     """When to send which stick position. `deadline` says when `due` has something, `due` hands it out once."""
 
-    __slots__ = ("_next", "_position", "_remaining", "_seq")
+    __slots__ = ("_expires", "_next", "_position", "_remaining", "_sent", "_seq")
 
     def __init__(self) -> None:
         self._position = CENTRED
         self._remaining: int | None = 0
         """PCMDs still to come; None: until further notice."""
         self._next = 0.0
+        self._expires = 0.0
+        self._sent = -math.inf
         self._seq = 0
 
     @property
@@ -98,12 +108,13 @@ class Sticks:
         return self._next if self.active else None
 
     def command(self, position: Percent, now: float) -> None:
-        """Hold this position from now on, until something else is said."""
-        self._position, self._remaining, self._next = position, None, now
+        """Hold this position, for `HOLD_LIMIT` unless it is renewed; then the sticks centre."""
+        self._position, self._remaining, self._expires = position, None, now + HOLD_LIMIT
+        self._next = max(now, self._sent + MIN_SPACING)
 
     def centre(self, now: float) -> None:
         """Let go: centred from now on, for two seconds."""
-        self._position, self._remaining, self._next = CENTRED, CENTRED_REPEATS, now
+        self._position, self._remaining, self._next = CENTRED, CENTRED_REPEATS, max(now, self._sent + MIN_SPACING)
 
     def stop(self) -> None:
         """Send nothing any more."""
@@ -117,9 +128,12 @@ class Sticks:
         """
         if not self.active or now < self._next:
             return None
+        if self._remaining is None and now >= self._expires:
+            self.centre(now)
         if self._remaining is not None:
             self._remaining -= 1
         self._next = self._next + PERIOD if now - self._next < PERIOD else now + PERIOD
+        self._sent = now
         return PCMD(1, *self._position, self._stamp(now))
 
     def released(self, now: float) -> PCMD:

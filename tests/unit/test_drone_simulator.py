@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 
 import pytest
 
@@ -165,16 +166,33 @@ async def test_stop_ends_a_move_by_and_a_return(drone: Drone, real: SimulatedDro
     assert drone.home.state.rth == RthState.AVAILABLE
 
 
+@asynccontextmanager
+async def held(drone: Drone, command: PilotingCommand) -> AsyncIterator[None]:
+    """Somebody holds the sticks: a deflection has to be renewed."""
+
+    async def renew() -> None:
+        while True:
+            drone.piloting.pilot(command)
+            await asyncio.sleep(0.1)
+
+    task = asyncio.ensure_future(renew())
+    try:
+        yield
+    finally:
+        task.cancel()
+        await asyncio.wait([task])
+
+
 async def test_sticks_move_the_drone_their_way(drone: Drone, real: SimulatedDrone) -> None:
     await flying(drone)
     start = real.pose
     # Nose down, right, and up: heading north that is north, east and up.
-    drone.piloting.pilot(PilotingCommand(roll_deg=5.0, pitch_deg=-5.0, climb_mps=1.5))
-    await real.wait_log(lambda e: e.kind == "pose" and e.args["north"] > start.north + 2.0, 10.0)
-    await real.wait_log(lambda e: e.kind == "pose" and e.args["east"] > start.east + 2.0, 10.0)
+    async with held(drone, PilotingCommand(roll_deg=5.0, pitch_deg=-5.0, climb_mps=1.5)):
+        await real.wait_log(lambda e: e.kind == "pose" and e.args["north"] > start.north + 2.0, 10.0)
+        await real.wait_log(lambda e: e.kind == "pose" and e.args["east"] > start.east + 2.0, 10.0)
     assert real.pose.up > start.up + 1.0
-    drone.piloting.pilot(PilotingCommand(yaw_rate_dps=20.0))
-    await real.wait_log(lambda e: e.kind == "pose" and e.args["yaw"] > 0.5, 10.0)
+    async with held(drone, PilotingCommand(yaw_rate_dps=20.0)):
+        await real.wait_log(lambda e: e.kind == "pose" and e.args["yaw"] > 0.5, 10.0)
     drone.piloting.pilot(None)
     await drone.expect(ardrone3.FlyingStateChanged, lambda m: m.state == FlyingState.HOVERING, 10.0)
     last = real.log.find("command", "PCMD")[-1].args
@@ -183,8 +201,8 @@ async def test_sticks_move_the_drone_their_way(drone: Drone, real: SimulatedDron
 
 async def test_no_pcmd_while_landing(drone: Drone, real: SimulatedDrone) -> None:
     await flying(drone)
-    drone.piloting.pilot(PilotingCommand(climb_mps=2.0))
-    await real.wait_log(lambda e: e.kind == "pose" and e.args["up"] > 8.0, 10.0)
+    async with held(drone, PilotingCommand(climb_mps=2.0)):
+        await real.wait_log(lambda e: e.kind == "pose" and e.args["up"] > 8.0, 10.0)
     land = asyncio.ensure_future(drone.piloting.land())
     ordered = await real.wait_log(lambda e: e.name == "ardrone3.Piloting.Landing")
     drone.piloting.pilot(PilotingCommand(climb_mps=2.0))
@@ -212,8 +230,8 @@ async def test_return_home_flies_home(drone: Drone, real: SimulatedDrone) -> Non
 
 async def test_return_home_right_after_the_sticks(drone: Drone, real: SimulatedDrone) -> None:
     await flying(drone)
-    drone.piloting.pilot(PilotingCommand(pitch_deg=-8.0))
-    await real.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 5.0, 10.0)
+    async with held(drone, PilotingCommand(pitch_deg=-8.0)):
+        await real.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 5.0, 10.0)
     home = await drone.piloting.return_home()
     assert home is not None
     if drone.home.state.rth != RthState.IN_PROGRESS:

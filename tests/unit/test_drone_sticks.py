@@ -70,8 +70,8 @@ def test_a_setpoint_leaves_at_once_and_is_repeated_at_20_hz() -> None:
     sticks = Sticks()
     sticks.command(Percent(10, -20, 30, -40), 100.0)
     assert sticks.deadline == 100.0
-    sent = run(sticks, 100.0, 100.99)
-    assert [round(t - 100.0, 6) for t, _ in sent] == [round(0.05 * n, 6) for n in range(20)]
+    sent = run(sticks, 100.0, 100.49)
+    assert [round(t - 100.0, 6) for t, _ in sent] == [round(0.05 * n, 6) for n in range(10)]
     assert all((p.flag, p.roll, p.pitch, p.yaw, p.gaz) == (1, 10, -20, 30, -40) for _, p in sent)
 
 
@@ -79,22 +79,44 @@ def test_a_newer_setpoint_does_not_wait_for_the_rhythm() -> None:
     sticks = Sticks()
     sticks.command(Percent(10, 0, 0, 0), 1.0)
     assert sticks.due(1.0) is not None
-    sticks.command(Percent(20, 0, 0, 0), 1.01)
-    pcmd = sticks.due(1.01)
+    sticks.command(Percent(20, 0, 0, 0), 1.025)
+    pcmd = sticks.due(1.025)
     assert pcmd is not None
     assert pcmd.roll == 20
-    assert sticks.deadline == pytest.approx(1.06)
+    assert sticks.deadline == pytest.approx(1.075)
+
+
+def test_setpoints_that_come_too_often_wait_and_the_newest_wins() -> None:
+    sticks = Sticks()
+    sticks.command(Percent(10, 0, 0, 0), 1.0)
+    sticks.due(1.0)
+    sticks.command(Percent(20, 0, 0, 0), 1.005)
+    sticks.command(Percent(30, 0, 0, 0), 1.010)
+    assert sticks.due(1.010) is None
+    assert sticks.deadline == pytest.approx(1.02)
+    pcmd = sticks.due(1.02)
+    assert pcmd is not None
+    assert pcmd.roll == 30
+
+
+def test_a_setpoint_that_is_not_renewed_becomes_centred_sticks() -> None:
+    sticks = Sticks()
+    sticks.command(Percent(10, 0, 0, 0), 0.0)
+    sent = run(sticks, 0.0, 60.0)
+    assert {p.roll for t, p in sent if t < 0.5} == {10}
+    assert [p.roll for t, p in sent if t > 0.5] == [0] * 40
+    assert not sticks.active
 
 
 def test_centred_sticks_are_sent_for_two_seconds() -> None:
     sticks = Sticks()
     sticks.command(Percent(50, 0, 0, 0), 5.0)
     sticks.due(5.0)
-    sticks.centre(5.02)
-    sent = run(sticks, 5.02, 60.0)
+    sticks.centre(5.03)
+    sent = run(sticks, 5.03, 60.0)
     assert len(sent) == 40
-    assert sent[0][0] == 5.02
-    assert sent[-1][0] == pytest.approx(5.02 + 1.95)
+    assert sent[0][0] == 5.03
+    assert sent[-1][0] == pytest.approx(5.03 + 1.95)
     assert all((p.flag, p.roll, p.pitch, p.yaw, p.gaz) == (1, 0, 0, 0, 0) for _, p in sent)
     assert not sticks.active
 
@@ -103,7 +125,7 @@ def test_a_command_ends_the_centring_and_stop_ends_all() -> None:
     sticks = Sticks()
     sticks.centre(0.0)
     sticks.command(Percent(1, 2, 3, 4), 0.5)
-    assert len(run(sticks, 0.5, 10.49)) == 200
+    assert len(run(sticks, 0.5, 0.99)) == 10
     sticks.stop()
     assert sticks.deadline is None
     assert sticks.due(11.0) is None

@@ -404,6 +404,7 @@ async def test_ends_of_a_cancelled_move_by_are_not_taken_for_those_of_the_next(
 
 
 async def test_a_move_by_given_up_is_stopped(drone: Drone, device: ScriptedDevice) -> None:
+    await flying(drone, device)
     with pytest.raises(CommandTimeout):
         await drone.piloting.move_by(10.0, 0.0, 0.0, 0.0, timeout=SHORT)
     assert await device.until(ardrone3.MoveBy, 2) == ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0)
@@ -597,9 +598,37 @@ async def test_cancel_return_home(drone: Drone, device: ScriptedDevice) -> None:
     await drone.piloting.cancel_return_home()
     assert device.got(rth.Abort) == []
     await reported(drone, device, rth.State(RthState.IN_PROGRESS, StateReason.CONNECTION_LOST))
+    with pytest.raises(CommandRejected, match="by itself"):
+        await drone.piloting.cancel_return_home()
+    assert device.got(rth.Abort) == []
     device.script[rth.Abort] = lambda _: [rth.State(RthState.AVAILABLE, StateReason.STOPPED)]
-    await drone.piloting.cancel_return_home()
+    await drone.piloting.cancel_return_home(even_its_own=True)
     assert len(device.got(rth.Abort)) == 1
+
+
+async def test_a_return_is_asked_for_again_while_it_is_being_cancelled(drone: Drone, device: ScriptedDevice) -> None:
+    await reported(drone, device, rth.State(RthState.IN_PROGRESS, StateReason.USER_REQUEST))
+    cancelled = asyncio.ensure_future(drone.piloting.cancel_return_home())
+    await device.until(rth.Abort)  # what the drone last said, that it returns, is not true for long
+    again = asyncio.ensure_future(drone.piloting.return_home())
+    await device.until(rth.ReturnToHome)
+    device.say(rth.State(RthState.AVAILABLE, StateReason.STOPPED))
+    await cancelled
+    device.say(rth.State(RthState.IN_PROGRESS, StateReason.USER_REQUEST))
+    assert await again is not None
+
+
+async def test_a_return_that_may_have_been_delivered_is_aborted(drone: Drone, device: ScriptedDevice) -> None:
+    await flying(drone, device)
+    home = asyncio.ensure_future(drone.piloting.return_home())
+    await device.until(rth.ReturnToHome)
+    home.cancel()  # by a newer order, before the drone has said anything
+    await asyncio.wait([home])
+    cancelled = asyncio.ensure_future(drone.piloting.cancel_return_home())
+    await device.until(rth.Abort)
+    device.say(rth.State(RthState.AVAILABLE, StateReason.STOPPED))
+    await cancelled
+    assert drone.moves_started == ()
 
 
 # -- sticks and hover
@@ -607,16 +636,22 @@ async def test_cancel_return_home(drone: Drone, device: ScriptedDevice) -> None:
 
 async def test_pilot_sends_percent_of_the_drones_own_limits_at_20_hz(drone: Drone, device: ScriptedDevice) -> None:
     await flying(drone, device)
-    drone.piloting.pilot(PilotingCommand(roll_deg=5.0, pitch_deg=2.0, yaw_rate_dps=-10.0, climb_mps=1.5))
-    await device.until(ardrone3.PCMD, 21)
+    for renewed in (5, 10, 15, 21):
+        drone.piloting.pilot(PilotingCommand(roll_deg=5.0, pitch_deg=2.0, yaw_rate_dps=-10.0, climb_mps=1.5))
+        await device.until(ardrone3.PCMD, renewed)
     pcmds = device.got(ardrone3.PCMD)
     # of 10 degrees, 40 deg/s, 3 m/s
     assert {(p.flag, p.roll, p.pitch, p.yaw, p.gaz) for p in pcmds} == {(1, 50, -20, -25, 50)}
-    times = device.times(ardrone3.PCMD)
-    assert times[20] - times[0] == pytest.approx(1.0, abs=0.1)
     drone.piloting.pilot(None)
     await device.until(ardrone3.PCMD, 23)
     assert device.got(ardrone3.PCMD)[-1].roll == 0
+
+
+async def test_sticks_that_nobody_holds_any_more_centre_by_themselves(drone: Drone, device: ScriptedDevice) -> None:
+    await flying(drone, device)
+    drone.piloting.pilot(PilotingCommand(roll_deg=5.0))
+    await device.until(ardrone3.PCMD, 50)
+    assert [p.roll for p in device.got(ardrone3.PCMD)] == [50] * 10 + [0] * 40
 
 
 async def test_every_new_setpoint_leaves_at_once(drone: Drone, device: ScriptedDevice) -> None:
@@ -624,6 +659,14 @@ async def test_every_new_setpoint_leaves_at_once(drone: Drone, device: ScriptedD
     for roll in range(1, 6):
         drone.piloting.pilot(PilotingCommand(roll_deg=float(roll)))
         assert (await device.until(ardrone3.PCMD, roll, timeout=0.04)).roll == 10 * roll
+
+
+async def test_only_the_newest_of_many_setpoints_leaves(drone: Drone, device: ScriptedDevice) -> None:
+    await flying(drone, device)
+    for tenth in range(1, 101):
+        drone.piloting.pilot(PilotingCommand(roll_deg=0.1 * tenth))
+    await device.until(ardrone3.PCMD, 3)
+    assert [p.roll for p in device.got(ardrone3.PCMD)][:3] == [1, 100, 100]
 
 
 async def test_sticks_need_the_limits_and_an_airborne_drone(drone: Drone, device: ScriptedDevice) -> None:
