@@ -17,6 +17,7 @@ import msgspec
 from anafi_mav.cli.terminal import say
 from anafi_mav.errors import ConfigError
 from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
+from anafi_mav.sim.model import MODELS
 
 MAX_COUNT = 254
 """Drones of one process: the hosts of one /24, where their addresses live."""
@@ -25,7 +26,7 @@ MAX_COUNT = 254
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `anafi-mav sim`. Their values are checked by `run`, for one clear line each."""
     default = DroneSpec()
-    parser.add_argument("--model", default=default.model, help="which ANAFI: 4k")
+    parser.add_argument("--model", default=default.model, help=f"which ANAFI: {', '.join(MODELS)} (%(default)s)")
     parser.add_argument("--address", default=default.address, help="of the first drone (%(default)s)")
     parser.add_argument("--count", default="1", metavar="N", help="drones, on consecutive addresses (%(default)s)")
     parser.add_argument(

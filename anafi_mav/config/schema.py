@@ -36,8 +36,8 @@ class SimConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     """A simulated drone. `anafi-mav run` starts it: all of them together in one process of their own."""
 
     model: Annotated[
-        Literal["4k"],
-        Meta(description="Which ANAFI is simulated.", extra=expected("4k, the one model that is simulated so far")),
+        Literal["4k", "thermal", "usa", "ai"],
+        Meta(description="Which ANAFI is simulated.", extra=expected("4k, thermal, usa or ai")),
     ] = "4k"
     home: Annotated[
         tuple[

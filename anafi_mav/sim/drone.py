@@ -21,7 +21,7 @@ from anafi_mav.errors import ConfigError
 from anafi_mav.sim.firmware import Faults, Firmware, Identity
 from anafi_mav.sim.http import WebServer
 from anafi_mav.sim.log import Log, LogEntry
-from anafi_mav.sim.model import KNOWN_MODELS, MODELS
+from anafi_mav.sim.model import MODELS
 from anafi_mav.sim.motion import Body, Pose
 from anafi_mav.sim.place import Origin
 from anafi_mav.sim.states import all_settings, all_states
@@ -58,8 +58,7 @@ class DroneSpec:
 
     def __post_init__(self) -> None:
         if self.model not in MODELS:
-            known = " (not simulated yet)" if self.model in KNOWN_MODELS else ""
-            raise ConfigError("model", f"expected one of {', '.join(MODELS)}, got {self.model!r}{known}")
+            raise ConfigError("model", f"expected one of {', '.join(MODELS)}, got {self.model!r}")
         try:
             ipaddress.IPv4Address(self.address)
         except ValueError:

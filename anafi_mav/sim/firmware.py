@@ -20,7 +20,7 @@ from anafi_mav.arsdk.wire import Message, UnknownMessage
 from anafi_mav.sim import power
 from anafi_mav.sim.camera import Camera
 from anafi_mav.sim.compass import Compass
-from anafi_mav.sim.gimbal import Gimbal
+from anafi_mav.sim.gimbal import Gimbals
 from anafi_mav.sim.guidance import Guidance
 from anafi_mav.sim.homing import UNKNOWN, Homing
 from anafi_mav.sim.machine import AIRBORNE, GUIDED, LANDED, Event, next_state
@@ -98,7 +98,7 @@ class Firmware:
         self.settings = Settings(model, identity.name)
         self.battery = Battery(model)
         self.compass = Compass()
-        self.gimbal = Gimbal(model)
+        self.gimbal = Gimbals(model)
         self.camera = Camera(model)
         self.storage = Storage()
         self.alarms = Alarms()
@@ -385,7 +385,7 @@ class Firmware:
         for part in (self.compass, self.storage):
             answer = part.handle(message, self.time) if answer is None else answer
         if answer is None:
-            answer = self.gimbal.handle(message, self.pose, self.time)
+            answer = self.gimbal.handle(message, self.pose, self.time, self.state in AIRBORNE)
         if answer is None:
             answer = self.camera.handle(message)
         if answer is None:

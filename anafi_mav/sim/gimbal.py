@@ -1,27 +1,33 @@
-"""The gimbal: pitch and roll on two axes, turning no faster than its speed setting, each in the frame last asked for.
+"""The gimbals: each axis turns no faster than the speed setting, in the frame of reference last asked for.
 
-All angles in degrees with Parrot's signs: pitch up, roll clockwise seen from behind. The picture's yaw is the drone's.
+All angles in degrees with Parrot's signs: pitch up, roll clockwise seen from behind, yaw clockwise from above; absolute
+is to the horizon and to north. An axis that cannot be turned moves with the body, or with the picture that the
+electronics keep level.
+
 A velocity target is a share (-1..1) of the speed setting and holds until the next target or the end of the range.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import Any
 
 from anafi_mav.arsdk.messages import gimbal
 from anafi_mav.arsdk.messages.gimbal import Axis, ControlMode, FrameOfReference, GimbalCalibrationState
 from anafi_mav.arsdk.wire import Message
-from anafi_mav.sim.model import Model
+from anafi_mav.sim.model import GimbalModel, Model, Range
 from anafi_mav.sim.motion import Pose
 from anafi_mav.units import DEG_PER_RAD, clip, wrap_pi
 
-ROLL_RANGE = (-38.0, 38.0)
-"""deg; assumed (what the electronic stabilisation can take)."""
 OFFSET_RANGE = (-10.0, 10.0)
 """deg; assumed."""
 CALIBRATION_TIME = 3.0
 """s; assumed."""
+
+_FIXED = (0.0, 0.0)
+_FRAMES = (FrameOfReference.RELATIVE, FrameOfReference.ABSOLUTE)
 
 
 @dataclass
@@ -33,153 +39,240 @@ class _AxisState:
     """deg in `frame`"""
     target: float = 0.0
     rate: float | None = None
-    """deg/s of a velocity target; None: towards `target`."""
+    """Share of the speed of a velocity target; None: towards `target`."""
+
+    @property
+    def fixed(self) -> bool:
+        return (self.low, self.high) == _FIXED
 
     def advance(self, seconds: float, speed: float) -> None:
         target, reach = self.target, speed * seconds
         if self.rate is not None:
-            target, reach = math.copysign(math.inf, self.rate), abs(self.rate) * seconds
+            target, reach = math.copysign(math.inf, self.rate), abs(self.rate) * speed * seconds
         self.angle = clip(clip(target, self.angle - reach, self.angle + reach), self.low, self.high)
 
-    def aim(self, mode: ControlMode, frame: FrameOfReference, value: float, speed: float, body: float) -> None:
+    def aim(self, mode: ControlMode, frame: FrameOfReference, value: float, body: float) -> None:
         """Take a target; `body` is the drone's own angle on this axis, for a change of frame."""
-        if frame not in (FrameOfReference.RELATIVE, FrameOfReference.ABSOLUTE) or not math.isfinite(value):
+        if self.fixed or frame not in _FRAMES or mode not in tuple(ControlMode) or not math.isfinite(value):
             return
         if frame is not self.frame:
             self.angle += body if frame is FrameOfReference.ABSOLUTE else -body
             self.frame = frame
         if mode is ControlMode.VELOCITY:
-            self.rate = clip(value, -1.0, 1.0) * speed
+            self.rate = clip(value, -1.0, 1.0)
         else:
             self.rate, self.target = None, clip(value, self.low, self.high)
 
     def both(self, body: float) -> tuple[float, float]:
-        """(relative to the body, relative to the horizon)."""
+        """(relative to the body, absolute)."""
         if self.frame is FrameOfReference.ABSOLUTE:
             return self.angle - body, self.angle
         return self.angle, self.angle + body
 
 
-class Gimbal:
-    """Gimbal 0 of a model with two axes."""
+def _body(pose: Pose) -> dict[Axis, float]:
+    """The drone's own angles, deg."""
+    return {Axis.YAW: pose.yaw * DEG_PER_RAD, Axis.PITCH: pose.pitch * DEG_PER_RAD, Axis.ROLL: pose.roll * DEG_PER_RAD}
 
-    def __init__(self, model: Model) -> None:
-        self._speed = model.settings["gimbal_speed"]
-        self._pitch_range = model.gimbal_pitch
-        self._speeds = {Axis.PITCH: self._speed.default, Axis.ROLL: self._speed.default}
-        self._pitch = _AxisState(*model.gimbal_pitch)
-        self._roll = _AxisState(*ROLL_RANGE)
-        self._offsets = {Axis.PITCH: 0.0, Axis.ROLL: 0.0}
+
+class Gimbal:
+    """One gimbal."""
+
+    def __init__(self, id: int, model: GimbalModel, speed: Range) -> None:
+        self.id = id
+        self._model = gimbal.Model.FSTCAM if id else gimbal.Model.MAIN
+        self._limits = speed
+        self._speed = speed.default
+        self._axes = {
+            Axis.YAW: _AxisState(*model.yaw, frame=FrameOfReference.RELATIVE),
+            Axis.PITCH: _AxisState(*model.pitch),
+            Axis.ROLL: _AxisState(*model.roll),
+        }
+        self._offsets = dict.fromkeys(Axis, 0.0)
         self._updating = gimbal.State.INACTIVE
         self._calibrating_until: float | None = None
-        self._time = 0.0
 
-    def advance(self, time: float) -> None:
-        """Turn until `time` (s)."""
-        seconds, self._time = time - self._time, time
-        self._pitch.advance(seconds, self._speeds[Axis.PITCH])
-        self._roll.advance(seconds, self._speeds[Axis.ROLL])
+    @property
+    def calibrating(self) -> bool:
+        return self._calibrating_until is not None
+
+    def advance(self, seconds: float) -> None:
+        """Turn for so long."""
+        for axis in self._axes.values():
+            if not axis.fixed:
+                axis.advance(seconds, self._speed)
 
     def tick(self, time: float) -> list[Message]:
         """What has come due by now (s)."""
         if self._calibrating_until is None or time < self._calibrating_until:
             return []
         self._calibrating_until = None
-        return [
-            self._calibration(),
-            gimbal.CalibrationResult(0, gimbal.GimbalCalibrationResult.SUCCESS),
-        ]
+        return [self._calibration(), self._result(gimbal.GimbalCalibrationResult.SUCCESS)]
 
-    def handle(self, message: Message, pose: Pose, time: float) -> list[Message] | None:
-        """The answer to a command of this feature; None when it is none."""
-        self.advance(time)
-        match message:
-            case gimbal.SetTarget():
-                self._aim(message, pose)
-                return []
-            case gimbal.SetMaxSpeed():
-                self._speeds[Axis.PITCH] = self._speed.clip(message.pitch)
-                self._speeds[Axis.ROLL] = self._speed.clip(message.roll)
-                return [self._max_speed()]
-            case gimbal.ResetOrientation():
-                for axis, body in ((self._pitch, pose.pitch), (self._roll, pose.roll)):
-                    axis.aim(ControlMode.POSITION, FrameOfReference.ABSOLUTE, 0.0, 0.0, body * DEG_PER_RAD)
-                return []
-            case gimbal.StartOffsetsUpdate():
-                self._updating = gimbal.State.ACTIVE
-                return [self._offset_report()]
-            case gimbal.StopOffsetsUpdate():
-                self._updating = gimbal.State.INACTIVE
-                return [self._offset_report()]
-            case gimbal.SetOffsets():
-                self._offsets = {
-                    Axis.PITCH: clip(message.pitch, *OFFSET_RANGE),
-                    Axis.ROLL: clip(message.roll, *OFFSET_RANGE),
-                }
-                return [self._offset_report()]
-            case gimbal.Calibrate():
-                self._calibrating_until = time + CALIBRATION_TIME
-                return [self._calibration()]
-            case gimbal.CancelCalibration():
-                self._calibrating_until = None
-                return [
-                    self._calibration(),
-                    gimbal.CalibrationResult(0, gimbal.GimbalCalibrationResult.CANCELED),
-                ]
-        return None
+    # -- commands
 
-    def _aim(self, message: gimbal.SetTarget, pose: Pose) -> None:
-        mode = message.control_mode
-        self._pitch.aim(
-            mode,
-            message.pitch_frame_of_reference,
-            message.pitch,
-            self._speeds[Axis.PITCH],
-            pose.pitch * DEG_PER_RAD,
-        )
-        self._roll.aim(
-            mode, message.roll_frame_of_reference, message.roll, self._speeds[Axis.ROLL], pose.roll * DEG_PER_RAD
-        )
+    def set_target(self, m: gimbal.SetTarget, pose: Pose, time: float, flying: bool) -> Iterable[Message]:
+        if self.calibrating:
+            return ()
+        body = _body(pose)
+        wanted = {
+            Axis.YAW: (m.yaw_frame_of_reference, m.yaw),
+            Axis.PITCH: (m.pitch_frame_of_reference, m.pitch),
+            Axis.ROLL: (m.roll_frame_of_reference, m.roll),
+        }
+        for axis, (frame, value) in wanted.items():
+            self._axes[axis].aim(m.control_mode, frame, value, body[axis])
+        return ()
+
+    def set_max_speed(self, m: gimbal.SetMaxSpeed, pose: Pose, time: float, flying: bool) -> Iterable[Message]:
+        # Parrot's gimbal.xml: yaw and roll are deprecated, the value of pitch is used for all axes.
+        if m.pitch == m.pitch:
+            self._speed = self._limits.clip(m.pitch)
+        yield self._max_speed()
+
+    def reset_orientation(self, m: Message, pose: Pose, time: float, flying: bool) -> Iterable[Message]:
+        for axis in self._axes.values():
+            axis.aim(ControlMode.POSITION, axis.frame, 0.0, 0.0)
+        return ()
+
+    def update_offsets(self, m: Message, pose: Pose, time: float, flying: bool) -> Iterable[Message]:
+        self._updating = gimbal.State.ACTIVE if isinstance(m, gimbal.StartOffsetsUpdate) else gimbal.State.INACTIVE
+        yield self._offset_report()
+
+    def set_offsets(self, m: gimbal.SetOffsets, pose: Pose, time: float, flying: bool) -> Iterable[Message]:
+        if self._updating is gimbal.State.ACTIVE:
+            for axis, value in ((Axis.YAW, m.yaw), (Axis.PITCH, m.pitch), (Axis.ROLL, m.roll)):
+                if not self._axes[axis].fixed and math.isfinite(value):
+                    self._offsets[axis] = clip(value, *OFFSET_RANGE)
+        yield self._offset_report()
+
+    def calibrate(self, m: Message, pose: Pose, time: float, flying: bool) -> Iterable[Message]:
+        if flying:
+            yield self._calibration()
+            yield self._result(gimbal.GimbalCalibrationResult.FAILURE)
+            return
+        self._calibrating_until = time + CALIBRATION_TIME
+        yield self._calibration()
+
+    def cancel_calibration(self, m: Message, pose: Pose, time: float, flying: bool) -> Iterable[Message]:
+        if not self.calibrating:
+            yield self._calibration()
+            return
+        self._calibrating_until = None
+        yield self._calibration()
+        yield self._result(gimbal.GimbalCalibrationResult.CANCELED)
+
+    # -- reports
 
     def attitude(self, pose: Pose) -> gimbal.Attitude:
-        pitch_relative, pitch_absolute = self._pitch.both(pose.pitch * DEG_PER_RAD)
-        roll_relative, roll_absolute = self._roll.both(pose.roll * DEG_PER_RAD)
+        body = _body(pose)
+        both = {axis: state.both(body[axis]) for axis, state in self._axes.items()}
+        yaw, pitch, roll = both[Axis.YAW], both[Axis.PITCH], both[Axis.ROLL]
         return gimbal.Attitude(
-            0,
-            FrameOfReference.RELATIVE,
-            self._pitch.frame,
-            self._roll.frame,
-            0.0,
-            pitch_relative,
-            roll_relative,
-            wrap_pi(pose.yaw) * DEG_PER_RAD,
-            pitch_absolute,
-            roll_absolute,
+            self.id,
+            self._axes[Axis.YAW].frame,
+            self._axes[Axis.PITCH].frame,
+            self._axes[Axis.ROLL].frame,
+            _wrap(yaw[0]),
+            pitch[0],
+            roll[0],
+            _wrap(yaw[1]),
+            pitch[1],
+            roll[1],
         )
 
+    def _per_axis(self, values: Callable[[Axis], tuple[float, ...]]) -> list[float]:
+        """Numbers of the three axes in Parrot's order; nothing but zeros for one that does not turn."""
+        numbers: list[float] = []
+        for axis, state in self._axes.items():
+            wanted = values(axis)
+            numbers += [0.0] * len(wanted) if state.fixed else wanted
+        return numbers
+
     def _max_speed(self) -> Message:
-        low, high = self._speed.low, self._speed.high
-        pitch, roll = self._speeds[Axis.PITCH], self._speeds[Axis.ROLL]
-        return gimbal.MaxSpeed(0, 0.0, 0.0, 0.0, low, high, pitch, low, high, roll)
+        low, high = self._limits.low, self._limits.high
+        return gimbal.MaxSpeed(self.id, *self._per_axis(lambda axis: (low, high, self._speed)))
 
     def _offset_report(self) -> Message:
-        pitch, roll = self._offsets[Axis.PITCH], self._offsets[Axis.ROLL]
-        return gimbal.Offsets(0, self._updating, 0.0, 0.0, 0.0, *OFFSET_RANGE, pitch, *OFFSET_RANGE, roll)
+        return gimbal.Offsets(
+            self.id, self._updating, *self._per_axis(lambda axis: (*OFFSET_RANGE, self._offsets[axis]))
+        )
 
     def _calibration(self) -> Message:
-        busy = self._calibrating_until is not None
-        return gimbal.CalibrationState(GimbalCalibrationState.IN_PROGRESS if busy else GimbalCalibrationState.OK, 0)
+        state = GimbalCalibrationState.IN_PROGRESS if self.calibrating else GimbalCalibrationState.OK
+        return gimbal.CalibrationState(state, self.id)
+
+    def _result(self, result: gimbal.GimbalCalibrationResult) -> Message:
+        return gimbal.CalibrationResult(self.id, result)
 
     def states_report(self, pose: Pose) -> list[Message]:
-        """What AllStates tells of the gimbal."""
+        """What AllStates tells of it."""
+        bounds = self._per_axis(lambda axis: (self._axes[axis].low, self._axes[axis].high))
+        turning = sum(1 << axis for axis, state in self._axes.items() if not state.fixed)
         return [
-            gimbal.GimbalCapabilities(0, gimbal.Model.MAIN, 1 << Axis.PITCH | 1 << Axis.ROLL),
-            gimbal.RelativeAttitudeBounds(0, 0.0, 0.0, *self._pitch_range, *ROLL_RANGE),
-            gimbal.AbsoluteAttitudeBounds(0, 0.0, 0.0, *self._pitch_range, *ROLL_RANGE),
+            gimbal.GimbalCapabilities(self.id, self._model, turning),
+            gimbal.RelativeAttitudeBounds(self.id, *bounds),
+            gimbal.AbsoluteAttitudeBounds(self.id, *bounds),
             self._max_speed(),
             self.attitude(pose),
-            gimbal.AxisLockState(0, 0),
+            gimbal.AxisLockState(self.id, 0),
             self._offset_report(),
             self._calibration(),
-            gimbal.Alert(0, 0),
+            gimbal.Alert(self.id, 0),
         ]
+
+
+class Gimbals:
+    """All gimbals of a model, by id."""
+
+    def __init__(self, model: Model) -> None:
+        speed = model.settings["gimbal_speed"]
+        self._gimbals = [Gimbal(id, one, speed) for id, one in enumerate(model.gimbals)]
+        self._time = 0.0
+
+    def advance(self, time: float) -> None:
+        """Turn until `time` (s)."""
+        seconds, self._time = time - self._time, time
+        for one in self._gimbals:
+            one.advance(seconds)
+
+    def tick(self, time: float) -> list[Message]:
+        """What has come due by now (s)."""
+        return [message for one in self._gimbals for message in one.tick(time)]
+
+    def handle(self, message: Message, pose: Pose, time: float, flying: bool) -> list[Message] | None:
+        """The answer to a command of this feature; None when it is none. A gimbal that is not there says nothing."""
+        handler = _HANDLERS.get(type(message))
+        if handler is None:
+            return None
+        self.advance(time)
+        id: int = message.gimbal_id  # type: ignore[attr-defined] # all of them have it
+        if id >= len(self._gimbals):
+            return []
+        return list(handler(self._gimbals[id], message, pose, time, flying))
+
+    def attitude(self, pose: Pose, id: int = 0) -> gimbal.Attitude:
+        return self._gimbals[id].attitude(pose)
+
+    def attitudes(self, pose: Pose) -> list[Message]:
+        return [one.attitude(pose) for one in self._gimbals]
+
+    def states_report(self, pose: Pose) -> list[Message]:
+        """What AllStates tells of them."""
+        return [message for one in self._gimbals for message in one.states_report(pose)]
+
+
+def _wrap(angle: float) -> float:
+    return wrap_pi(angle / DEG_PER_RAD) * DEG_PER_RAD
+
+
+_HANDLERS: dict[type[Message], Callable[[Gimbal, Any, Pose, float, bool], Iterable[Message]]] = {
+    gimbal.SetTarget: Gimbal.set_target,
+    gimbal.SetMaxSpeed: Gimbal.set_max_speed,
+    gimbal.ResetOrientation: Gimbal.reset_orientation,
+    gimbal.StartOffsetsUpdate: Gimbal.update_offsets,
+    gimbal.StopOffsetsUpdate: Gimbal.update_offsets,
+    gimbal.SetOffsets: Gimbal.set_offsets,
+    gimbal.Calibrate: Gimbal.calibrate,
+    gimbal.CancelCalibration: Gimbal.cancel_calibration,
+}

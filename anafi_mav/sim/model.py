@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from anafi_mav.sim.lenses import LENSES, Lens
+
 
 @dataclass(frozen=True)
 class Range:
@@ -49,6 +51,41 @@ class Battery:
 
 
 @dataclass(frozen=True)
+class GimbalModel:
+    """One gimbal: deg, the same relative to the body and to the horizon; (0, 0) is an axis that does not turn."""
+
+    pitch: tuple[float, float]
+    roll: tuple[float, float] = (0.0, 0.0)
+    yaw: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Card:
+    """A place to store media: what `user_storage` (or, with ids, `user_storage_v2`) tells of it."""
+
+    name: str
+    capacity: int
+    """Bytes."""
+    removable: bool = True
+
+
+@dataclass(frozen=True)
+class Envelope:
+    """What the aircraft is and what it stands (anafi_ros paper)."""
+
+    size_mm: tuple[int, int, int]
+    """Unfolded."""
+    mass_g: int
+    battery_g: int
+    wind_resistance: float
+    """m/s"""
+    ceiling: float
+    """m above sea level."""
+    temperature: tuple[float, float]
+    """degrees Celsius"""
+
+
+@dataclass(frozen=True)
 class Model:
     """One aircraft of the family."""
 
@@ -57,15 +94,29 @@ class Model:
     product_id: int
     """Parrot's id, as in the discovery answer."""
     title: str
+    """First part of the name it gives itself."""
     serial_prefix: str
     software: str
     hardware: str
     airframe: Airframe
+    envelope: Envelope
     battery: Battery
-    gimbal_pitch: tuple[float, float]
-    """deg, relative to the body and to the horizon."""
+    gimbals: tuple[GimbalModel, ...]
+    """The first carries the cameras."""
+    cards: tuple[Card, ...]
+    """Media are stored on the last."""
     zoom_max: float
+    lenses: tuple[Lens, ...] = ()
+    """Cameras of feature camera (143); none: they are protobuf ones."""
+    thermal: bool = False
+    plan_version: int = 1
+    """1 or 2: which form of flight plan file it flies."""
     settings: dict[str, Range] = field(default_factory=dict)
+
+    @property
+    def modern(self) -> bool:
+        """Whether it is of the generation that speaks protobuf."""
+        return not self.lenses
 
 
 _SETTINGS = {
@@ -81,7 +132,12 @@ _SETTINGS = {
     "gimbal_speed": Range(90.0, 1.0, 180.0),  # default assumed
     "zoom_speed": Range(0.34, 0.01, 10.0),
 }
-"""m, deg, m, m/s, deg/s, deg/s, m, m, s, deg/s, tan(deg)/s. Same for the three models without an `a` in their id."""
+"""m, deg, m, m/s, deg/s, deg/s, m, m, s, deg/s, tan(deg)/s. The same for all four."""
+
+_CARD = Card("SD", 64_000_000_000)
+"""Parrot sells them with 16 GB and takes any; the size is assumed."""
+_ROLL = (-38.0, 38.0)
+"""deg; assumed (what the electronic stabilisation can take)."""
 
 MODELS: dict[str, Model] = {
     "4k": Model(
@@ -92,13 +148,67 @@ MODELS: dict[str, Model] = {
         software="1.8.2",
         hardware="HW_03",
         airframe=Airframe(max_speed=15.0, yaw_delay=0.1, climb_delay=0.15, flight_time=25.0 * 60.0),
+        envelope=Envelope((242, 315, 65), 320, 125, 13.9, 4500.0, (-10.0, 40.0)),
         battery=Battery(cells=2, capacity_mah=2700, full_mv=8700, empty_mv=6600),
-        gimbal_pitch=(-90.0, 90.0),
+        gimbals=(GimbalModel(pitch=(-90.0, 90.0), roll=_ROLL),),
+        cards=(_CARD,),
         zoom_max=3.0,
+        lenses=LENSES["4k"],
+        settings=_SETTINGS,
+    ),
+    "thermal": Model(
+        name="thermal",
+        product_id=0x0919,
+        title="ANAFI-Thermal",
+        serial_prefix="PI040443AA9K",  # assumed, as those below
+        software="1.8.2",
+        hardware="HW_01",
+        airframe=Airframe(max_speed=15.0, yaw_delay=0.1, climb_delay=0.15, flight_time=26.0 * 60.0),
+        envelope=Envelope((242, 315, 64), 315, 125, 13.9, 4500.0, (-10.0, 40.0)),
+        battery=Battery(cells=2, capacity_mah=2700, full_mv=8700, empty_mv=6600),
+        gimbals=(GimbalModel(pitch=(-90.0, 90.0), roll=_ROLL),),
+        cards=(_CARD,),
+        zoom_max=3.0,
+        lenses=LENSES["thermal"],
+        thermal=True,
+        settings=_SETTINGS,
+    ),
+    "usa": Model(
+        name="usa",
+        product_id=0x091E,
+        title="ANAFI-USA",
+        serial_prefix="PI040456AA0L",
+        software="1.8.2",  # assumed
+        hardware="HW_01",
+        airframe=Airframe(max_speed=14.7, yaw_delay=0.1, climb_delay=0.15, flight_time=32.0 * 60.0),
+        envelope=Envelope((303, 398, 84), 499, 195, 14.7, 6000.0, (-35.0, 43.0)),
+        battery=Battery(cells=3, capacity_mah=3400, full_mv=13200, empty_mv=9900),
+        gimbals=(GimbalModel(pitch=(-90.0, 90.0), roll=_ROLL),),
+        cards=(_CARD,),
+        zoom_max=32.0,
+        lenses=LENSES["usa"],
+        thermal=True,
+        settings=_SETTINGS,
+    ),
+    "ai": Model(
+        name="ai",
+        product_id=0x091A,
+        title="ANAFI-Ai",
+        serial_prefix="PI040455BA1B",
+        software="7.7.0",
+        hardware="HW_11",
+        airframe=Airframe(max_speed=16.0, yaw_delay=0.2, climb_delay=0.15, flight_time=32.0 * 60.0),
+        envelope=Envelope((378, 498, 118), 898, 366, 12.7, 5000.0, (-10.0, 40.0)),
+        battery=Battery(cells=3, capacity_mah=6800, full_mv=13200, empty_mv=9900),
+        # Roll and yaw of the first and the whole second one (it carries the stereo sensor) are assumed.
+        gimbals=(
+            GimbalModel(pitch=(-116.0, 176.0), roll=(-36.0, 36.0), yaw=(-48.0, 48.0)),
+            GimbalModel(pitch=(-107.0, 204.0)),
+        ),
+        cards=(Card("Internal", 8_000_000_000, removable=False), _CARD),
+        zoom_max=6.0,
+        plan_version=2,
         settings=_SETTINGS,
     ),
 }
 """By name on the command line."""
-
-KNOWN_MODELS = ("4k", "thermal", "usa", "ai")
-"""The family; those without an entry in `MODELS` are refused with that reason."""

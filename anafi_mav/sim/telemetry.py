@@ -31,7 +31,7 @@ class Telemetry:
             messages += firmware.motion_report()
         if self._gimbal.due(now):
             firmware.gimbal.advance(firmware.time)
-            messages.append(firmware.gimbal.attitude(firmware.pose))
+            messages += firmware.gimbal.attitudes(firmware.pose)
             messages.append(ardrone3.AltitudeAboveGroundChanged(firmware.pose.up))
         if self._position.due(now):
             messages += firmware.position_report()

@@ -162,7 +162,7 @@ MISTAKES = {
     sim("home: [1, -180.5, 3]"): "drones[0].sim.home[1]: expected a longitude from -180 to 180 degrees, got -180.5",
     sim("home: [1, 2, 9001]"): "drones[0].sim.home[2]: expected a height of -500 to 9000 m above sea level, got 9001",
     sim("home: [.nan, 2, 3]"): "drones[0].sim.home[0]: expected a latitude from -90 to 90 degrees, got nan",
-    sim("model: ai"): "drones[0].sim.model: expected 4k, the one model that is simulated so far, got 'ai'",
+    sim("model: bebop"): "drones[0].sim.model: expected 4k, thermal, usa or ai, got 'bebop'",
     sim("protocol: 4"): "drones[0].sim.protocol: expected 1, 2 or 3, got 4",
     sim("speed: 0"): "drones[0].sim.speed: expected a number from 0.1 to 20, got 0",
     sim("speed: .inf"): "drones[0].sim.speed: expected a number from 0.1 to 20, got inf",

@@ -147,8 +147,7 @@ async def test_its_log_is_lines_of_json(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
-        (["--model", "bebop"], "--model: expected one of 4k, got 'bebop'"),
-        (["--model", "ai"], "--model: expected one of 4k, got 'ai' (not simulated yet)"),
+        (["--model", "bebop"], "--model: expected one of 4k, thermal, usa, ai, got 'bebop'"),
         (["--address", "localhost"], "--address: expected an IPv4 address, got 'localhost'"),
         (["--count", "0"], "--count: expected a number from 1 to 254, got 0"),
         (["--count", "many"], "--count: expected a number from 1 to 254, got 'many'"),
