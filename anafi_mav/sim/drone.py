@@ -18,7 +18,8 @@ from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.session import OnMessage
 from anafi_mav.arsdk.wire import Buffer, Message, UnknownMessage
 from anafi_mav.errors import ConfigError
-from anafi_mav.sim.firmware import Faults, Firmware, Identity
+from anafi_mav.sim.faults import Faults
+from anafi_mav.sim.firmware import Firmware, Identity
 from anafi_mav.sim.http import WebServer
 from anafi_mav.sim.log import Log, LogEntry
 from anafi_mav.sim.model import MODELS

@@ -20,6 +20,8 @@ from anafi_mav.arsdk.wire import Message, UnknownMessage
 from anafi_mav.sim import power
 from anafi_mav.sim.camera import Camera
 from anafi_mav.sim.compass import Compass
+from anafi_mav.sim.endurance import Endurance
+from anafi_mav.sim.faults import Faults
 from anafi_mav.sim.gimbal import Gimbals
 from anafi_mav.sim.guidance import Guidance
 from anafi_mav.sim.homing import UNKNOWN, Homing
@@ -28,7 +30,7 @@ from anafi_mav.sim.model import Model
 from anafi_mav.sim.motion import Body, Pose
 from anafi_mav.sim.place import Origin
 from anafi_mav.sim.power import Battery
-from anafi_mav.sim.safety import Alarms, check_changed, checklist
+from anafi_mav.sim.safety import Alarms, Warnings, check_changed, checklist
 from anafi_mav.sim.settings import Settings
 from anafi_mav.sim.storage import Storage
 
@@ -49,33 +51,6 @@ class Identity:
     name: str
     boot_id: str
     run_id: str
-
-
-class Faults:
-    """What a test or a scenario may break. `mute` takes effect at once, the others within `SENSOR_PERIOD`."""
-
-    __slots__ = ("_mute", "battery", "gps", "magneto_required", "on_mute")
-
-    def __init__(self) -> None:
-        self._mute = False
-        self.on_mute: Callable[[bool], None] = lambda mute: None
-        """Called with each new value of `mute`; the owner of the sockets sets it."""
-        self.gps = True
-        """False: the receiver has no fix."""
-        self.magneto_required = False
-        """The magnetometer needs calibration; a calibration puts it back to False."""
-        self.battery: int | None = None
-        """Percent that the battery is held at."""
-
-    @property
-    def mute(self) -> bool:
-        """The air is gone: nothing is heard and nothing is said, both ways, and nobody connects."""
-        return self._mute
-
-    @mute.setter
-    def mute(self, mute: bool) -> None:
-        self._mute = mute
-        self.on_mute(mute)
 
 
 class Firmware:
@@ -102,6 +77,8 @@ class Firmware:
         self.camera = Camera(model)
         self.storage = Storage()
         self.alarms = Alarms()
+        self.warnings = Warnings()
+        self.endurance = Endurance(model, self.settings)
         self.homing = Homing(body, origin, self.settings, emit)
         self.guidance = Guidance(model, body, origin, self.settings, self.homing, emit)
         self.state = LANDED
@@ -137,7 +114,9 @@ class Firmware:
 
     @property
     def alert(self) -> AlertState:
-        return AlertState.USER if self.state is FlyingState.EMERGENCY else self.battery.alert
+        if self.state is FlyingState.EMERGENCY:
+            return AlertState.USER
+        return self.battery.alert if self.warnings.motors == 0 else AlertState.CUT_OUT
 
     def sensor_ok(self, sensor: common.Sensor) -> bool:
         if sensor is common.Sensor.GPS:
@@ -156,17 +135,14 @@ class Firmware:
 
     def blockers(self) -> frozenset[TakeoffChecklistType]:
         """What a take-off would be refused for."""
-        found = set()
+        found = set(self.faults.refuse_take_off)
+        if self.warnings.motors:
+            found.add(TakeoffChecklistType.MOTOR_DOWN)
         if self.compass.required:
             found.add(TakeoffChecklistType.MAGNETO_CALIBRATION)
         if self.battery.percent <= power.CRITICAL:
             found.add(TakeoffChecklistType.BATTERY_CRITICAL)
         return frozenset(found)
-
-    def forced_landing_report(self) -> Message:
-        forced = self.state is FlyingState.EMERGENCY_LANDING
-        reasons = ardrone3.ForcedLandingReason
-        return ardrone3.ForcedLandingAutoTrigger(reasons.BATTERY_CRITICAL_SOON if forced else reasons.NONE, 0)
 
     def flights_report(self) -> Message:
         return ardrone3.MotorFlightsStatusChanged(self._flights, round(self._last_flight), round(self._flown))
@@ -221,11 +197,12 @@ class Firmware:
         self.time += elapsed
         self.guidance.watch_sticks(now)
         self._unseen += elapsed
+        before = self.state
         if self._unseen >= SENSOR_PERIOD:
             self._update_sensors(self._unseen)
             self._unseen = 0.0
-        if self.state is LANDED:
-            return
+        if self.state is LANDED or self.state is not before:
+            return  # `arrived` is about what the body was told before
         if self.state in GUIDED:
             self._fly(arrived, still)
         elif self.state is FlyingState.MOTOR_RAMPING:
@@ -254,7 +231,7 @@ class Firmware:
             return
         if self._return_at is not None and self.time >= self._return_at:
             self._return_at = None
-            self.homing.request(StateReason.CONNECTION_LOST, self.pose, hovering)
+            self._go_home(StateReason.CONNECTION_LOST)
         self._fire(Event.BUSY if self.guidance.busy or not still else Event.AT_REST)
 
     def _update_sensors(self, elapsed: float) -> None:
@@ -266,6 +243,7 @@ class Firmware:
             for message in messages:
                 self._emit(message)
         self.faults.magneto_required = self.compass.required
+        self._look_after_aircraft()
         if self.fix != self.faults.gps:
             self._set_fix(self.faults.gps)
         self.homing.sensors(self.fix, not self.compass.required)
@@ -276,8 +254,37 @@ class Firmware:
         for check in sorted(blockers ^ self._blockers):
             self._emit(check_changed(check, check in blockers))
         self._blockers = blockers
-        if self.battery.percent <= power.EMPTY and self._fire(Event.FORCED_LANDING):
-            self._emit(self.forced_landing_report())
+        self._mind_the_battery()
+
+    def _look_after_aircraft(self) -> None:
+        """Motors, vibration, and whether somebody carries it."""
+        warnings, faults = self.warnings, self.faults
+        place = (self.pose.north, self.pose.east)
+        messages = warnings.set_motors(faults.motor_error, faults.motors)
+        messages += warnings.set_vibration(faults.vibration)
+        messages += warnings.carried(place, self.time, self.state is LANDED)
+        for message in messages:
+            self._emit(message)
+        self._sound_alarm(Type.MOTOR_CUTOUT, warnings.motors != 0)
+        if warnings.motors and self.state in AIRBORNE:
+            self._fire(Event.FORCED_LANDING)
+
+    def _mind_the_battery(self) -> None:
+        """Announce and begin what a battery that runs out makes the drone do."""
+        endurance, forced = self.endurance, self.state is FlyingState.EMERGENCY_LANDING
+        flying = self.state in AIRBORNE and not forced
+        home = self.homing.home_offset if endurance.looks(self.time) else None
+        for message in endurance.tick(
+            self.time, self.battery.charge, self.pose, home, flying=flying, returning=self.homing.active
+        ):
+            self._emit(message)
+        if endurance.landing_due and self._fire(Event.FORCED_LANDING):
+            for message in endurance.forced():
+                self._emit(message)
+        elif endurance.return_due and self.state in GUIDED:
+            for message in endurance.returned():
+                self._emit(message)
+            self._go_home(StateReason.LOW_BATTERY)
 
     def _set_fix(self, fix: bool) -> None:
         self.fix = fix
@@ -332,8 +339,8 @@ class Firmware:
             self._begin_flight()
         elif state is LANDED:
             self._end_flight()
-        if before is FlyingState.EMERGENCY_LANDING:
-            self._emit(self.forced_landing_report())
+            for message in self.endurance.landed():
+                self._emit(message)
         return True
 
     def _begin_flight(self) -> None:
@@ -343,6 +350,7 @@ class Firmware:
         self.flight_id = f"{self._chance.getrandbits(128):032X}"
         self._emit(common.FlightId(self.flight_id))
         self.homing.took_off(self.pose, self.fix)
+        self.endurance.took_off()
 
     def _end_flight(self) -> None:
         self._body.off()
@@ -359,7 +367,6 @@ class Firmware:
         self.flight_id = ""
         self._emit(common.FlightId(""))
         self._emit(self.flights_report())
-        self.homing.landed()
 
     def _stop_guidance(self) -> None:
         """End a move and a return, and say so."""
@@ -440,17 +447,22 @@ class Firmware:
         if message.start:
             self._return_home(message)
         else:
-            self.homing.abort()
+            self._abort(message)
 
     def _return_home(self, message: Message) -> None:
+        self._go_home(StateReason.USER_REQUEST)
+
+    def _go_home(self, reason: StateReason) -> None:
         if self.state not in GUIDED:
             return
         hovering = self.state is FlyingState.HOVERING
         if self.homing.home is not None and not self.homing.flying:
             self.guidance.cancel(self.pose)
-        self.homing.request(StateReason.USER_REQUEST, self.pose, hovering)
+        self.homing.request(reason, self.pose, hovering)
 
     def _abort(self, message: Message) -> None:
+        if self.homing.active and self.homing.reason is StateReason.LOW_BATTERY:
+            self.endurance.aborted()
         self.homing.abort()
 
     def _custom_location(self, message: rth.SetCustomLocation) -> None:
@@ -460,7 +472,8 @@ class Firmware:
         self.homing.set_pilot(message.latitude, message.longitude, message.altitude)
 
     def _cancel_auto_trigger(self, message: Message) -> None:
-        self._emit(rth.RthAutoTrigger(rth.AutoTriggerReason.NONE, 0))
+        for event in self.endurance.cancel():
+            self._emit(event)
 
     def _move_by(self, message: ardrone3.MoveBy | move.ExtendedMoveBy) -> None:
         self.guidance.move_by(message, self.pose, self.state in GUIDED)

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from anafi_mav.arsdk.messages import ardrone3, rth
-from anafi_mav.arsdk.messages.rth import RthEndingBehavior, RthHomeReachability, RthHomeType, RthState, StateReason
+from anafi_mav.arsdk.messages.rth import RthEndingBehavior, RthHomeType, RthState, StateReason
 from anafi_mav.arsdk.wire import Message
 from anafi_mav.sim.motion import Body, Pose, Turn
 from anafi_mav.sim.place import Origin
@@ -65,7 +65,6 @@ class Homing:
         self._fix = False
         self._height = 0.0
         self._state = (RthState.UNAVAILABLE, StateReason.DISABLED)
-        self._reachability = RthHomeReachability.UNKNOWN
 
     # -- places
 
@@ -84,16 +83,18 @@ class Homing:
         places = {RthHomeType.CUSTOM: self.custom, RthHomeType.PILOT: self.pilot}
         return places.get(self.type, self.takeoff)
 
+    @property
+    def home_offset(self) -> tuple[float, float] | None:
+        """The same as (north, east) in the simulator's plane, m; None also while the drone has no fix."""
+        home = self.home
+        return None if home is None or not self._fix else self._origin.offset(home.latitude, home.longitude)
+
     def took_off(self, pose: Pose, fix: bool, *, in_flight: bool = False) -> None:
         """Home is here, if the drone knows where here is."""
         self.takeoff = self._here(pose) if fix else None
         self.fixed_before_takeoff = not in_flight
         for message in self._places():
             self._emit(message)
-        self._reach(RthHomeReachability.REACHABLE if fix else RthHomeReachability.UNKNOWN)
-
-    def landed(self) -> None:
-        self._reach(RthHomeReachability.UNKNOWN)
 
     def set_custom(self, latitude: float, longitude: float, altitude: float, pose: Pose) -> None:
         """rth.set_custom_location: taken when the drone knows its own place and the other is within MaxDistance."""
@@ -152,8 +153,6 @@ class Homing:
             rth.HomeTypeCapabilities(capabilities),
             rth.HomeType(self.type),
             rth.CustomLocation(*(self.custom or (UNKNOWN, UNKNOWN, UNKNOWN))),
-            rth.HomeReachability(self._reachability),
-            rth.RthAutoTrigger(rth.AutoTriggerReason.NONE, 0),
             *(ardrone3.HomeTypeAvailabilityChanged(type, int(there)) for type, there in available.items()),
             ardrone3.HomeTypeChosenChanged(_chosen(self.type)),
         ]
@@ -170,6 +169,11 @@ class Homing:
     def flying(self) -> bool:
         """A return has taken the sticks."""
         return self.phase not in (Phase.IDLE, Phase.PENDING)
+
+    @property
+    def reason(self) -> StateReason:
+        """Why it is in its present state."""
+        return self._state[1]
 
     def _state_messages(self) -> list[Message]:
         state, reason = self._state
@@ -204,7 +208,8 @@ class Homing:
             self._set(RthState.IN_PROGRESS, reason)
             return True
         self.phase = Phase.PENDING
-        if hovering:
+        # Nobody flies on while the battery decides.
+        if hovering or reason is StateReason.LOW_BATTERY:
             self._begin(reason, pose)
         else:
             self._set(RthState.PENDING, reason)
@@ -267,11 +272,6 @@ class Homing:
             climb=CLIMB_SPEED,
             yaw_rate=TURN_SPEED,
         )
-
-    def _reach(self, reachability: RthHomeReachability) -> None:
-        if reachability is not self._reachability:
-            self._reachability = reachability
-            self._emit(rth.HomeReachability(reachability))
 
 
 def _far(pose: Pose, north: float, east: float) -> float | None:

@@ -7,7 +7,7 @@ assumed: Parrot publishes none.
 
 from __future__ import annotations
 
-from anafi_mav.arsdk.messages import ardrone3, battery, common
+from anafi_mav.arsdk.messages import battery, common
 from anafi_mav.arsdk.messages.ardrone3 import AlertState
 from anafi_mav.arsdk.messages.battery import AlertLevel, BatteryAlert
 from anafi_mav.arsdk.messages.generic import ListFlags
@@ -85,7 +85,6 @@ class Battery:
             self.voltage(),
             battery.CycleCount(CYCLES),
             battery.Serial(f"SIM{self._model.battery.capacity_mah:07d}"),
-            ardrone3.ReturnHomeBatteryCapacity(ardrone3.BatteryCapacityStatus.OK),
         ]
 
 

@@ -43,10 +43,9 @@ def all_settings(firmware: Firmware) -> list[Message]:
         ardrone3.GPSFixStateChanged(int(firmware.fix)),
         *(ardrone3.ProductMotorVersionListChanged(motor, "SIM", "1.0", "1.0") for motor in range(1, 5)),
         ardrone3.ProductGPSVersionChanged("1.0", "1.0"),
-        ardrone3.MotorErrorStateChanged(0, ardrone3.MotorError.NO_ERROR),
         ardrone3.MotorSoftwareVersionChanged("1.0"),
         firmware.flights_report(),
-        ardrone3.MotorErrorLastErrorChanged(ardrone3.LastMotorError.NO_ERROR),
+        *firmware.warnings.settings_report(),
         wifi.SupportedCountries("FR;US;GB;DE;CH"),
         wifi.SupportedSecurityTypes(1 << wifi.SecurityType.OPEN | 1 << wifi.SecurityType.WPA2),
     ]
@@ -76,11 +75,9 @@ def all_states(firmware: Firmware) -> list[Message]:
         *firmware.position_report(),
         *firmware.motion_report(),
         ardrone3.AltitudeAboveGroundChanged(pose.up),
-        ardrone3.MotionState(ardrone3.Motion.STEADY),
         ardrone3.HoveringWarning(0, 0),
-        firmware.forced_landing_report(),
-        ardrone3.WindStateChanged(ardrone3.WarningLevel.OK),
-        ardrone3.VibrationLevelChanged(ardrone3.WarningLevel.OK),
+        *firmware.endurance.states_report(),
+        *firmware.warnings.states_report(),
         ardrone3.PilotedPOIV2(
             _NOWHERE, _NOWHERE, _NOWHERE, ardrone3.PoiMode.LOCKED_GIMBAL, ardrone3.PoiStatus.UNAVAILABLE
         ),

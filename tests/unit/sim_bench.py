@@ -9,7 +9,8 @@ from typing import Any, TypeVar
 from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.wire import Message
-from anafi_mav.sim.firmware import Faults, Firmware, Identity
+from anafi_mav.sim.faults import Faults
+from anafi_mav.sim.firmware import Firmware, Identity
 from anafi_mav.sim.model import MODELS
 from anafi_mav.sim.motion import STEP, Body, Motion, Pose
 from anafi_mav.sim.place import Origin
