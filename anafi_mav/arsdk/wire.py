@@ -16,9 +16,9 @@ from __future__ import annotations
 
 import enum
 import struct
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, ClassVar, NamedTuple, Protocol, TypeVar, get_args, get_origin, get_type_hints
 
 import msgspec
 
@@ -129,7 +129,18 @@ class UnknownMessage(msgspec.Struct, frozen=True):
 
 MessageT = TypeVar("MessageT", bound=Message)
 
-_CODECS: dict[MessageId, _Codec] = {}
+
+class Codec(Protocol):
+    """What knows the bytes of the messages of one id."""
+
+    def declared(self) -> Iterable[type[Message]]: ...
+
+    def encode(self, message: Message) -> bytes: ...
+
+    def decode(self, data: bytes) -> Message | UnknownMessage | None: ...
+
+
+_CODECS: dict[MessageId, Codec] = {}
 
 
 def command(
@@ -151,17 +162,23 @@ def _declare(
 ) -> Callable[[type[MessageT]], type[MessageT]]:
     def register(declared: type[MessageT]) -> type[MessageT]:
         if id in _CODECS:
-            raise LocalProtocolError(f"{name}: id {id} belongs to {_CODECS[id].message.NAME} already")
+            owner = next(iter(_CODECS[id].declared()), None)
+            raise LocalProtocolError(f"{name}: id {id} belongs to {owner.NAME if owner else _CODECS[id]} already")
         declared.NAME, declared.ID, declared.BUFFER, declared.DIRECTION = name, id, buffer, direction
-        _CODECS[id] = _Codec(declared)
+        carry(id, _Codec(declared))
         return declared
 
     return register
 
 
+def carry(id: MessageId, codec: Codec) -> None:
+    """Hand an id to a codec: that of its message, or one that tells apart the messages carried under this id."""
+    _CODECS[id] = codec
+
+
 def declared_messages() -> Iterator[type[Message]]:
     """Every message class declared so far (import `anafi_mav.arsdk.messages` to have all of them)."""
-    return (codec.message for codec in _CODECS.values())
+    return (message for codec in _CODECS.values() for message in codec.declared())
 
 
 def wire_fields(message: type[Message]) -> list[tuple[str, WireType, type]]:
@@ -200,6 +217,9 @@ class _Codec:
         self._converters: list[tuple[int, type[OpenEnum]]] = [
             (index, python) for index, (_, _, python) in enumerate(fields) if issubclass(python, OpenEnum)
         ]
+
+    def declared(self) -> Iterable[type[Message]]:
+        return (self.message,)
 
     def encode(self, message: Message) -> bytes:
         values = [getattr(message, name) for name in message.__struct_fields__]

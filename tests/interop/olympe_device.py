@@ -3,7 +3,8 @@
 libarsdk listens on fixed ports of all addresses, hence the namespace: nothing of the machine is in its way.
 One JSON object per line: on stdin ``{"send": name, "args": [...]}``, on stdout ``{"ready": true}``, then
 ``{"received": name, "args": [...]}`` for each message that came. Enums and bitfields travel as integers, binaries as
-``{"hex": "..."}``. Ends with stdin. Exit status 77: the system does not let us make a namespace.
+``{"hex": "..."}``; of a received protobuf message there are the names of its fields instead. What is sent comes
+back as received. Ends with stdin. Exit status 77: the system does not let us make a namespace.
 """
 
 from __future__ import annotations
@@ -58,7 +59,10 @@ def main() -> None:
         return value
 
     def heard(event: object, scheduler: object) -> None:
-        if hasattr(event, "message"):
+        if hasattr(event, "message") and hasattr(event.message, "service_proto"):
+            # A protobuf message; that it is read as what was meant is compared without a network.
+            say(received=event.message.fullName, args=sorted(event.args))
+        elif hasattr(event, "message"):
             say(received=event.message.fullName, args=[plain(value) for value in event.args.values()])
         elif hasattr(event, "payload"):
             say(received=type(event).__name__, args=[plain(event.payload)])

@@ -19,8 +19,10 @@ import pytest
 import anafi_mav.arsdk.messages
 from anafi_mav.arsdk import wire
 from anafi_mav.arsdk.controller import ControllerSession, connect
+from anafi_mav.arsdk.envelope import ProtobufMessage
 from anafi_mav.arsdk.messages import ardrone3, common, mission
 from anafi_mav.arsdk.messages.generic import ListFlags
+from anafi_mav.arsdk.messages.proto import camera2
 from anafi_mav.arsdk.wire import Message, MessageId, UnknownMessage
 
 CLONE_NEWNET = 0x40000000
@@ -147,7 +149,9 @@ def declared(direction: wire.Direction) -> list[type[Message]]:
     return [
         message
         for message in wire.declared_messages()
-        if message.DIRECTION is direction and message.__module__.startswith(home)
+        if message.DIRECTION is direction
+        and message.__module__.startswith(home)
+        and not issubclass(message, ProtobufMessage)
     ]
 
 
@@ -168,7 +172,7 @@ def test_olympe_understands_us_and_we_understand_olympe(referee: Referee, versio
             "received": "ardrone3.Piloting.PCMD",
             "args": [1, 0, 50, 0, -20, 0],
         }
-        # generic.custom_cmd(service_id, msg_num, payload), an envelope that no table of ours opens
+        # generic.custom_cmd(service_id, msg_num, payload) of a service that no table of ours has
         packed = bytes.fromhex("3412 0100") + len(payload).to_bytes(4, "little") + payload
         session.send(UnknownMessage(MessageId(133, 0, 1), packed))
         got = await asyncio.to_thread(referee.received)
@@ -210,6 +214,39 @@ def test_every_message_of_our_tables_passes_libarsdk(referee: Referee) -> None:
 
     assert len(declared(wire.Direction.COMMAND)) > 30
     assert len(declared(wire.Direction.EVENT)) > 100
+    referee.run(body)
+
+
+def test_every_protobuf_message_passes_libarsdk(referee: Referee) -> None:
+    """Commands by our names as Olympe understands them; events as Olympe's raw envelopes, which we open."""
+    messages = [message for message in wire.declared_messages() if issubclass(message, ProtobufMessage)]
+
+    async def body() -> None:
+        session, heard = await join(3)
+        for buffer in (wire.Buffer.ACK, wire.Buffer.NON_ACK):
+            commands = [
+                message()
+                for message in messages
+                if message.DIRECTION is wire.Direction.COMMAND and message.BUFFER is buffer
+            ]
+            for command in commands:
+                session.send(command)
+            for command in commands:
+                assert (await asyncio.to_thread(referee.received))["received"] == command.NAME
+        session.send(camera2.Configure(camera_id=1, config=camera2.Config(camera_mode=camera2.CameraMode.PHOTO)))
+        assert await asyncio.to_thread(referee.received) == {
+            "received": "camera2.Command.Configure",
+            "args": ["camera_id", "config"],
+        }
+        events = [message() for message in messages if message.DIRECTION is wire.Direction.EVENT]
+        for event in events:
+            payload = wire.encode(event)[12:]
+            name = "generic.custom_evt" if event.BUFFER is wire.Buffer.ACK else "generic.custom_evt_non_ack"
+            referee.send(name, [event.SERVICE.id, event.NUMBER, {"hex": payload.hex()}])
+            assert await heard.get() == event
+        await session.close()
+
+    assert len(messages) > 90
     referee.run(body)
 
 

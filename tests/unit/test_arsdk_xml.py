@@ -12,6 +12,7 @@ import pytest
 
 import anafi_mav.arsdk.messages
 from anafi_mav.arsdk import wire
+from anafi_mav.arsdk.envelope import ProtobufMessage
 from anafi_mav.arsdk.transport import RETRIED_FOR_EVER
 
 
@@ -230,7 +231,11 @@ def our_message(message: type[wire.Message]) -> Description:
 
 def declared() -> list[type[wire.Message]]:
     home = anafi_mav.arsdk.messages.__name__
-    return [message for message in wire.declared_messages() if message.__module__.startswith(home)]
+    return [
+        message
+        for message in wire.declared_messages()
+        if message.__module__.startswith(home) and not issubclass(message, ProtobufMessage)
+    ]
 
 
 @pytest.fixture(scope="module")
@@ -253,6 +258,13 @@ def test_nothing_is_missing_that_the_aircraft_stands_on() -> None:
 def test_the_transport_knows_which_commands_are_never_given_up(parrot: dict[wire.MessageId, Description]) -> None:
     commands = {id for id, message in parrot.items() if message.retried and message.direction is wire.Direction.COMMAND}
     assert commands == RETRIED_FOR_EVER
+
+
+def test_the_envelope_of_protobuf_messages_is_generics(parrot: dict[wire.MessageId, Description]) -> None:
+    fields = (Argument("service_id", "u16"), Argument("msg_num", "u16"), Argument("payload", "binary"))
+    for message in (message for message in wire.declared_messages() if issubclass(message, ProtobufMessage)):
+        theirs = parrot[message.ID]
+        assert (theirs.direction, theirs.buffer, theirs.arguments) == (message.DIRECTION, message.BUFFER, fields)
 
 
 def test_the_comparison_saw_something(parrot: dict[wire.MessageId, Description]) -> None:

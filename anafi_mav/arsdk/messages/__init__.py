@@ -2,7 +2,8 @@
 
 Importing this package declares all of them. Ids, argument names, types and enum values are facts of Parrot's own
 XML (arsdk-xml, in the parrot-olympe wheel) and are compared with it by ``tests/unit/test_arsdk_xml.py``.
-A message class is the PascalCase of Parrot's name; arguments keep Parrot's spelling.
+A message class is the PascalCase of Parrot's name; arguments keep Parrot's spelling. What the Ai says in protobuf is in
+`proto`.
 """
 
 from anafi_mav.arsdk.messages import (
@@ -25,6 +26,7 @@ from anafi_mav.arsdk.messages import (
     piloting_style,
     poi,
     precise_home,
+    proto,
     rth,
     skyctrl,
     stereo_vision_sensor,
@@ -54,6 +56,7 @@ __all__ = [
     "piloting_style",
     "poi",
     "precise_home",
+    "proto",
     "rth",
     "skyctrl",
     "stereo_vision_sensor",

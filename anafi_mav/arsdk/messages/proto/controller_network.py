@@ -1,0 +1,28 @@
+"""controllerNetwork (arsdk.controllernetwork): the links of a Skycontroller 4."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from anafi_mav.arsdk.envelope import ProtobufMessage, Service
+from anafi_mav.arsdk.messages.proto import network
+from anafi_mav.arsdk.protobuf import RECORD, Field
+
+COMMAND = Service("arsdk.controllernetwork.Command", "controllerNetwork.Command")
+EVENT = Service("arsdk.controllernetwork.Event", "controllerNetwork.Event")
+
+
+@COMMAND.message("GetState", 16)
+class GetState(ProtobufMessage, frozen=True, kw_only=True):
+    pass
+
+
+@COMMAND.message("SetEthernetIpConfig", 17)
+class SetEthernetIpConfig(ProtobufMessage, frozen=True, kw_only=True):
+    config: Annotated[network.IpConfig | None, Field(1, RECORD)] = None
+
+
+@EVENT.message("State", 16)
+class State(ProtobufMessage, frozen=True, kw_only=True):
+    links_status: Annotated[network.LinksStatus | None, Field(4, RECORD)] = None
+    ethernet_ip_config: Annotated[network.IpConfig | None, Field(5, RECORD)] = None

@@ -1,0 +1,34 @@
+"""logsync: who is who in the chain of controllers and drone, so that their logs can be matched.
+
+Both services go both ways: a drone asks the same.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from anafi_mav.arsdk.envelope import ProtobufMessage, Service
+from anafi_mav.arsdk.protobuf import ENUM, STRING, UINT32, Field
+from anafi_mav.arsdk.wire import OpenEnum
+
+COMMAND = Service("arsdk.logsync.Command", "logsync.Command")
+EVENT = Service("arsdk.logsync.Event", "logsync.Event")
+
+
+class Role(OpenEnum):
+    CONTROLLER = 0
+    SKY_CONTROLLER = 1
+    DRONE = 2
+    REMOTE_ANTENNA = 3
+
+
+@COMMAND.message("SyncRequest", 16)
+class SyncRequest(ProtobufMessage, frozen=True, kw_only=True):
+    pass
+
+
+@EVENT.message("Identifier", 16)
+class Identifier(ProtobufMessage, frozen=True, kw_only=True):
+    boot_id: Annotated[str, Field(1, STRING)] = ""
+    model: Annotated[int, Field(2, UINT32)] = 0
+    role: Annotated[Role, Field(3, ENUM)] = Role.CONTROLLER
