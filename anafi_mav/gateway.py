@@ -54,24 +54,27 @@ class _Supervised:
         while True:
             try:
                 await self.drone.connect()
-            except AnafiMavError as error:
-                if str(error) != self.problem:
-                    logger.warning("%s: %s", self.config.name, error)
-                self.problem = str(error)
+                self.problem, pause = "", RETRY_FIRST
+                try:
+                    self.system.link_up()
+                    self.first_attempt.set()
+                    reason = await asyncio.shield(self.drone.lost)
+                    logger.warning("%s: link lost: %s", self.config.name, reason)
+                    self.problem = f"link lost: {reason}"
+                finally:
+                    self.system.link_down()
+                    await self.drone.close()
+            except Exception as error:
+                # Whatever it is, the drone must not be out of reach until somebody restarts the gateway.
+                problem = str(error) or repr(error)
+                if not isinstance(error, AnafiMavError):
+                    logger.exception("%s: a mistake of ours", self.config.name)
+                elif problem != self.problem:
+                    logger.warning("%s: %s", self.config.name, problem)
+                self.problem = problem
                 self.first_attempt.set()
                 await asyncio.sleep(pause)
                 pause = min(2.0 * pause, RETRY_LAST)
-                continue
-            self.problem, pause = "", RETRY_FIRST
-            self.system.link_up()
-            self.first_attempt.set()
-            try:
-                reason = await asyncio.shield(self.drone.lost)
-                logger.warning("%s: link lost: %s", self.config.name, reason)
-                self.problem = f"link lost: {reason}"
-            finally:
-                self.system.link_down()
-                await self.drone.close()
 
     def line(self) -> str:
         """One line for people: who, where, and how it stands."""
@@ -144,11 +147,12 @@ class Gateway:
         await self._node.close()
 
     async def _leave(self, supervised: _Supervised) -> None:
-        if supervised.system.active and not supervised.system.vehicle.on_ground:
+        if supervised.system.active:
             with contextlib.suppress(AnafiMavError):
-                await supervised.drone.piloting.stop()
-                # Centred sticks are not acknowledged: stay while they are repeated.
-                await asyncio.wait([supervised.drone.lost], timeout=HOVER_TIME)
+                await supervised.system.let_go()
+        if supervised.system.active and not supervised.system.vehicle.on_ground:
+            # Centred sticks are not acknowledged: stay while they are repeated.
+            await asyncio.wait([supervised.drone.lost], timeout=HOVER_TIME)
         if supervised.task is not None:
             # Before Python 3.12 wait_for forgets a cancellation that comes when what it waits for is just done.
             while not supervised.task.done():
@@ -182,4 +186,9 @@ class Gateway:
 
     def _receive(self, inbound: Inbound) -> None:
         for supervised in self._supervised:
-            supervised.system.receive(inbound)
+            try:
+                supervised.system.receive(inbound)
+            except AnafiMavError as error:  # this drone's link may just have died; the others hear it all the same
+                logger.debug("%s: %s not handled: %s", supervised.config.name, inbound.message.get_type(), error)
+            except Exception:
+                logger.exception("%s: %s not handled", supervised.config.name, inbound.message.get_type())

@@ -81,6 +81,8 @@ async def connect(
         return await asyncio.wait_for(opening, timeout)
     except asyncio.TimeoutError:
         raise LinkLost(f"no answer from {host} within {timeout:g} s") from None
+    except OSError as error:  # the network went away between two steps
+        raise LinkLost(f"cannot connect to {host}: {reason_of(error)}") from error
 
 
 async def _connect(
@@ -96,7 +98,10 @@ async def _connect(
     reader, writer = await _open(host, discovery_port, local_address)
     try:
         device = await _read(reader, handshake.parse_discovery, f"{host}:{discovery_port}")
-        here, there = writer.get_extra_info("sockname")[0], writer.get_extra_info("peername")[0]
+        names = writer.get_extra_info("sockname"), writer.get_extra_info("peername")
+        if None in names:
+            raise LinkLost(f"{host}:{discovery_port} closed the connection")
+        here, there = (name[0] for name in names)
         sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             sock.bind((here, 0))

@@ -21,6 +21,8 @@ from anafi_mav.arsdk.messages.battery import Alert as BatteryAlertChanged
 from anafi_mav.arsdk.messages.battery import AlertLevel as AlertLevel
 from anafi_mav.arsdk.messages.common import FlightId as FlightId
 from anafi_mav.arsdk.messages.common import MagnetoCalibrationRequiredState as MagnetoCalibrationRequiredState
+from anafi_mav.arsdk.messages.common import MavlinkFilePlayingStateChanged as MavlinkFilePlayingStateChanged
+from anafi_mav.arsdk.messages.common import PlayingState as PlayingState
 from anafi_mav.arsdk.messages.common import Sensor as Sensor
 from anafi_mav.arsdk.messages.common import SensorsStatesListChanged as SensorsStatesListChanged
 from anafi_mav.arsdk.messages.rth import RthEndingBehavior as RthEndingBehavior
@@ -43,9 +45,11 @@ __all__ = [
     "GpsLocationChanged",
     "HomeChanged",
     "MagnetoCalibrationRequiredState",
+    "MavlinkFilePlayingStateChanged",
     "Message",
     "MoveToChanged",
     "NumberOfSatelliteChanged",
+    "PlayingState",
     "ReturnStateChanged",
     "RthEndingBehavior",
     "Sensor",

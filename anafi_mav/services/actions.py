@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Hashable
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.commands import Command
@@ -14,6 +14,8 @@ Handler = Callable[[Vehicle, Command], Awaitable[None]]
 
 FORCE = 21196
 """param2 of an arm or disarm that overrides checks (MAVLink common.xml MAV_CMD_COMPONENT_ARM_DISARM)."""
+
+RELATIVE_YAW = dialect.MAV_DO_REPOSITION_FLAGS_RELATIVE_YAW
 
 _AMSL_FRAMES = (None, dialect.MAV_FRAME_GLOBAL, dialect.MAV_FRAME_GLOBAL_INT)
 _RELATIVE_FRAMES = (dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT, dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
@@ -84,30 +86,38 @@ async def return_to_launch(vehicle: Vehicle, command: Command) -> None:
 async def reposition(vehicle: Vehicle, command: Command) -> None:
     """MAV_CMD_DO_REPOSITION: param1 speed in m/s (unset or <= 0: the drone's own), param4 heading in rad, x, y, z.
 
-    z obeys the frame: 0 and 5 AMSL, 3 and 6 above take-off. All unset is pause.
+    param2 bit 1 (MAV_DO_REPOSITION_FLAGS_RELATIVE_YAW): the heading counts from the present one. z obeys the frame: 0
+    and 5 AMSL, 3 and 6 above take-off. All unset is pause; a speed alone is refused, for it would not stop anything.
     """
-    speed, yaw = command.params[0], command.params[3]
+    speed, flags, yaw = command.params[0], command.params[1], command.params[3]
     if math.isinf(yaw) or math.isinf(speed):
         raise Refused("Refused: speed and heading must be numbers", lasting=True)
     place, height = _place(command), _height(vehicle, command)
     heading = None if math.isnan(yaw) else yaw
     if place is None and height is None and heading is None:
+        if speed > 0.0:
+            raise Refused("Refused: a speed needs a place, a height or a heading to go to", lasting=True)
         await vehicle.hold()
         return
+    if heading is not None and math.isfinite(flags) and int(flags) & RELATIVE_YAW:
+        attitude = vehicle.drone.piloting.state.attitude
+        if attitude is None:
+            raise Refused("Refused: the present heading is not known")
+        heading += attitude.yaw
     await vehicle.reposition(place, height, heading, speed if speed > 0.0 else None)
 
 
 async def set_mode(vehicle: Vehicle, command: Command) -> None:
     """MAV_CMD_DO_SET_MODE in PX4's numbers."""
     mode = from_px4_parameters(command.params[1], command.params[2])
-    await change_mode(vehicle, mode)
+    await change_mode(vehicle, mode, command.client)
 
 
-async def change_mode(vehicle: Vehicle, mode: FlightMode | None) -> None:
+async def change_mode(vehicle: Vehicle, mode: FlightMode | None, client: Hashable) -> None:
     """Enter a mode that some message named; None is one that we do not have."""
     if mode is None:
         raise Refused("Mode refused: an ANAFI has no such mode", lasting=True)
-    await vehicle.set_mode(mode)
+    await vehicle.set_mode(mode, client)
 
 
 async def terminate(vehicle: Vehicle, command: Command) -> None:

@@ -12,9 +12,15 @@ from dataclasses import dataclass
 
 from anafi_mav.mavlink import dialect
 
-RESEND_WINDOW = 2.0
-"""s. The same action from the same client within this time is a retransmission: clients resend every 0.5-2 s and
-cannot know that only the acknowledgement was lost (conformance R10)."""
+RESEND_WINDOW = 3.5
+"""s after an action succeeded in which the same one from the same client is a retransmission: MAVSDK resends 3 s after
+the last IN_PROGRESS, QGroundControl after 1.2 s, and neither can know that only the acknowledgement was lost (R10)."""
+
+REFUSAL_WINDOW = 1.0
+"""s after an action did not succeed in which the same one gets the same answer. Short: the reason may be gone."""
+
+MAX_CLIENTS = 64
+"""Clients whose newest action is remembered; there are a handful, and an address is easily made up."""
 
 PROGRESS_AFTER, PROGRESS_EVERY = 0.3, 0.8
 """s until the first IN_PROGRESS and between them: MAVSDK resends at 0.5 s, every client gives up after 1-3 s (R9)."""
@@ -38,6 +44,15 @@ class Command:
     """param7: height in m for a command with a location."""
     frame: int | None
     """MAV_FRAME of a COMMAND_INT; None for COMMAND_LONG."""
+    client: Hashable = None
+    """Who sent it: (channel, system id, component id)."""
+
+    @property
+    def stops(self) -> bool:
+        """It asks for nothing but to stop and hover: DO_REPOSITION to nowhere, or PX4's Hold."""
+        if self.id == dialect.MAV_CMD_DO_REPOSITION:
+            return all(math.isnan(value) for value in (self.params[3], self.x, self.y, self.z))
+        return self.id == dialect.MAV_CMD_DO_SET_MODE and self.params[1:3] == (4.0, 3.0)
 
     def same_as(self, other: Command) -> bool:
         """Equal, with NaN equal to NaN."""
@@ -64,7 +79,7 @@ LOCATION_COMMANDS = frozenset(
 """Commands whose x and y of a COMMAND_INT are degrees times 1e7."""
 
 
-def from_long(message: dialect.MAVLink_command_long_message) -> Command:
+def from_long(message: dialect.MAVLink_command_long_message, client: Hashable = None) -> Command:
     """The command of a COMMAND_LONG."""
     return Command(
         message.command,
@@ -73,10 +88,11 @@ def from_long(message: dialect.MAVLink_command_long_message) -> Command:
         message.param6,
         message.param7,
         None,
+        client,
     )
 
 
-def from_int(message: dialect.MAVLink_command_int_message) -> Command:
+def from_int(message: dialect.MAVLink_command_int_message, client: Hashable = None) -> Command:
     """The command of a COMMAND_INT."""
     scale = 1e7 if message.command in LOCATION_COMMANDS else 1.0
     x, y = (math.nan if value in _UNSET_INT else value / scale for value in (message.x, message.y))
@@ -87,6 +103,7 @@ def from_int(message: dialect.MAVLink_command_int_message) -> Command:
         y,
         message.z,
         message.frame,
+        client,
     )
 
 
@@ -96,34 +113,58 @@ class Execution:
 
     client: Hashable
     command: Command
-    received: float
     result: int = dialect.MAV_RESULT_IN_PROGRESS
     """MAV_RESULT; IN_PROGRESS until it ended."""
+    ended: float = math.inf
+    superseded: bool = False
+    """Another client's action has taken the vehicle over since."""
 
 
 class CommandDesk:
     """Tells a new action from the retransmission of one.
 
-    Only the newest action counts: arm, disarm, arm within two seconds are three actions, although the third
+    Of each client the newest action counts: arm, disarm, arm within two seconds are three actions, although the third
     equals the first.
     """
 
     def __init__(self) -> None:
-        self._newest: Execution | None = None
+        self._newest: dict[Hashable, Execution] = {}
 
-    def retransmission(self, client: Hashable, command: Command, now: float) -> Execution | None:
-        """The execution that this command repeats, or None when it is to be executed."""
-        newest = self._newest
-        if newest is None or newest.client != client or not newest.command.same_as(command):
+    def retransmission(self, client: Hashable, command: Command, now: float) -> int | None:
+        """The MAV_RESULT to answer a command with that this client sends once more; None: it is to be executed.
+
+        Once another client has taken over, a repetition is not carried out over its head, nor is it confirmed: it is
+        answered with CANCELLED. An order to stop is never a mere repetition then.
+        """
+        newest = self._newest.get(client)
+        if newest is None or not newest.command.same_as(command):
             return None
-        under_way = newest.result == dialect.MAV_RESULT_IN_PROGRESS
-        return newest if under_way or now - newest.received < RESEND_WINDOW else None
+        if newest.result == dialect.MAV_RESULT_IN_PROGRESS:
+            return newest.result
+        succeeded = newest.result in (dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_CANCELLED)
+        if now - newest.ended >= (RESEND_WINDOW if succeeded else REFUSAL_WINDOW):
+            return None
+        if not newest.superseded:
+            return newest.result
+        return None if command.stops else dialect.MAV_RESULT_CANCELLED
 
-    def begin(self, client: Hashable, command: Command, now: float) -> Execution:
-        """Note that an action begins; every later one is compared with it."""
-        self._newest = Execution(client, command, now)
-        return self._newest
+    def begin(self, client: Hashable, command: Command) -> Execution:
+        """Note that an action begins; this client's next one is compared with it."""
+        self._newest.pop(client, None)  # so that the dictionary is in the order of use
+        execution = self._newest[client] = Execution(client, command)
+        if len(self._newest) > MAX_CLIENTS:
+            del self._newest[next(iter(self._newest))]
+        return execution
 
-    def forget(self) -> None:
-        """What was done before no longer counts: the link was lost, or something else moved the vehicle."""
-        self._newest = None
+    def supersede(self, client: Hashable) -> None:
+        """An action of this client has taken the vehicle over from all others."""
+        for other, execution in self._newest.items():
+            if other != client:
+                execution.superseded = True
+
+    def forget(self, client: Hashable | None = None) -> None:
+        """What was done before no longer counts: for one client, which moved the vehicle by other means, or for all."""
+        if client is None:
+            self._newest.clear()
+        else:
+            self._newest.pop(client, None)

@@ -7,12 +7,15 @@ vector u = [vz, roll, pitch, yaw rate] of the anafi_ros paper, the only thing AR
 - yaw of the quaternion: held by a proportional loop on the yaw rate; a body yaw rate that is not ignored is added
   as feed-forward;
 - thrust: 0.5 holds height, 0 and 1 are full descent and climb, in between linear; ignored or NaN is 0.5.
+
+A session has one pilot: whoever engages it. Setpoints of others change nothing while it lasts.
 """
 
 from __future__ import annotations
 
 import enum
 import math
+from collections.abc import Hashable
 from dataclasses import dataclass
 
 from anafi_mav import units
@@ -23,6 +26,16 @@ SILENCE = 0.45
 
 YAW_GAIN = 1.5
 """1/s: turn rate per heading error. Attitude comes at 5 Hz and answers after 0.1-0.2 s, which stays well damped."""
+
+
+UNIT_TOLERANCE = 0.1
+"""How far a quaternion's length may be from 1: single precision and sloppy sums, not garbage."""
+
+THRUST_TOLERANCE = 1e-3
+"""How far thrust may be outside of 0..1: rounding, not another unit."""
+
+MAX_PILOTS = 8
+"""Programs whose setpoints are listened to at once."""
 
 
 class State(enum.Enum):
@@ -36,7 +49,7 @@ class State(enum.Enum):
 class Event(enum.Enum):
     """What can happen to it."""
 
-    SETPOINT = "a usable setpoint arrived"
+    SETPOINT = "a usable setpoint of the pilot arrived"
     ENGAGE = "mode Offboard asked for"
     DISENGAGE = "another mode took over"
     SILENCE = "no setpoint for too long"
@@ -85,6 +98,8 @@ def attitude_setpoint(message: dialect.MAVLink_set_attitude_target_message) -> A
         roll, pitch, yaw = units.euler_from_quaternion(*message.q)
     except ValueError:
         return "the attitude quaternion is no rotation"
+    if not abs(math.hypot(*message.q) - 1.0) <= UNIT_TOLERANCE:
+        return "the attitude quaternion is not of length 1"
     if abs(roll) > math.pi / 2:
         return "the attitude quaternion is upside down"
     yaw_rate = 0.0
@@ -92,6 +107,8 @@ def attitude_setpoint(message: dialect.MAVLink_set_attitude_target_message) -> A
         yaw_rate = message.body_yaw_rate
     thrust = 0.5
     if not mask & dialect.ATTITUDE_TARGET_TYPEMASK_THROTTLE_IGNORE and math.isfinite(message.thrust):
+        if not -THRUST_TOLERANCE <= message.thrust <= 1.0 + THRUST_TOLERANCE:
+            return "thrust is not between 0 and 1"
         thrust = units.clip(message.thrust, 0.0, 1.0)
     return AttitudeSetpoint(roll, pitch, yaw, yaw_rate, 2.0 * thrust - 1.0)
 
@@ -102,34 +119,57 @@ def yaw_rate_towards(setpoint: AttitudeSetpoint, yaw: float) -> float:
 
 
 class OffboardStream:
-    """The newest setpoint, its age, and whether it flies the drone."""
+    """The newest setpoints, their age, and whose of them fly the drone."""
 
     def __init__(self) -> None:
         self.state = State.IDLE
-        self.setpoint: AttitudeSetpoint | None = None
-        self._received = -math.inf
+        self.pilot: Hashable = None
+        """Whose setpoints fly the drone while the session is engaged."""
+        self._heard: dict[Hashable, tuple[AttitudeSetpoint, float]] = {}
 
-    def receive(self, setpoint: AttitudeSetpoint, now: float) -> None:
-        """A usable setpoint arrived."""
-        self.setpoint, self._received = setpoint, now
+    @property
+    def setpoint(self) -> AttitudeSetpoint | None:
+        """The pilot's newest setpoint; None while no session is engaged."""
+        heard = self._heard.get(self.pilot) if self.state is State.ENGAGED else None
+        return None if heard is None else heard[0]
+
+    def receive(self, sender: Hashable, setpoint: AttitudeSetpoint, now: float) -> bool:
+        """A usable setpoint arrived. False: somebody else flies, or too many want to."""
+        if sender not in self._heard and len(self._heard) >= MAX_PILOTS:
+            self._heard = {other: heard for other, heard in self._heard.items() if self._is_fresh(heard, now)}
+            if len(self._heard) >= MAX_PILOTS:
+                return False
+        self._heard[sender] = (setpoint, now)
+        if self.state is State.ENGAGED and sender != self.pilot:
+            return False
         self.state = TRANSITIONS[self.state][Event.SETPOINT]
+        return True
 
-    def fresh(self, now: float) -> bool:
-        """Setpoints arrive: mode Offboard may be engaged."""
-        deadline = self.deadline()
-        return deadline is not None and now < deadline
+    def candidate(self, client: Hashable, now: float) -> Hashable | None:
+        """Whose setpoints mode Offboard would fly if this client asked for it: its own, else the newest of all.
 
-    def engage(self) -> None:
-        """Mode Offboard begins; only while setpoints are `fresh`."""
-        self.state = TRANSITIONS[self.state][Event.ENGAGE]
+        None: nobody's are fresh, mode Offboard is to be refused.
+        """
+        fresh = {sender: heard for sender, heard in self._heard.items() if self._is_fresh(heard, now)}
+        if client in fresh:
+            return client
+        return max(fresh, key=lambda sender: fresh[sender][1], default=None)
+
+    def engage(self, pilot: Hashable) -> None:
+        """Mode Offboard begins, flown by a `candidate`."""
+        self.state, self.pilot = TRANSITIONS[self.state][Event.ENGAGE], pilot
 
     def disengage(self) -> None:
         """Another mode takes over; setpoints may go on coming."""
-        self.state = TRANSITIONS[self.state][Event.DISENGAGE]
+        self.state, self.pilot = TRANSITIONS[self.state][Event.DISENGAGE], None
 
     def deadline(self) -> float | None:
         """When silence will have lasted too long; None while there is nothing to wait for."""
-        return None if self.state is State.IDLE else self._received + SILENCE
+        if self.state is State.IDLE:
+            return None
+        if self.state is State.ENGAGED:
+            return self._heard[self.pilot][1] + SILENCE
+        return max(at for _, at in self._heard.values()) + SILENCE
 
     def expire(self, now: float) -> bool:
         """True when silence just ended an engaged session: the drone must hover now."""
@@ -137,5 +177,13 @@ class OffboardStream:
         if deadline is None or now < deadline:
             return False
         engaged = self.state is State.ENGAGED
-        self.state, self.setpoint = TRANSITIONS[self.state][Event.SILENCE], None
+        self._heard = {sender: heard for sender, heard in self._heard.items() if self._is_fresh(heard, now)}
+        self.pilot = None
+        self.state = TRANSITIONS[self.state][Event.SILENCE]
+        if self._heard:  # others stream on; none of them flies
+            self.state = TRANSITIONS[self.state][Event.SETPOINT]
         return engaged
+
+    @staticmethod
+    def _is_fresh(heard: tuple[AttitudeSetpoint, float], now: float) -> bool:
+        return now < heard[1] + SILENCE

@@ -7,9 +7,11 @@ every channel at its own rate. While the drone's link is down the system does no
 from __future__ import annotations
 
 import asyncio
+import itertools
 import logging
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass
 from typing import Any
 
 from anafi_mav.clock import Clock
@@ -50,12 +52,32 @@ TICK = 0.05
 STATUS_EVERY = 5.0
 """s before the same complaint about a setpoint is repeated as text."""
 
+MAX_COMPLAINTS = 100
+"""Different complaints whose age is remembered."""
+
+MAX_WRITES = 16
+"""PARAM_SETs under way at once: a client writes one after the other, several clients a few."""
+
 _RESULT_BY_ERROR: tuple[tuple[type[AnafiMavError], int], ...] = (
     (UnsupportedFrame, dialect.MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME),
     (NotSupported, dialect.MAV_RESULT_UNSUPPORTED),
     (CommandRejected, dialect.MAV_RESULT_TEMPORARILY_REJECTED),
     (CommandTimeout, dialect.MAV_RESULT_FAILED),
 )
+
+
+@dataclass(frozen=True)
+class _Action:
+    """Something that changes what the vehicle does, under way."""
+
+    client: Hashable
+    answer: tuple[Inbound, Execution] | None
+    """Whom to answer; None for SET_MODE, which has no answer."""
+
+
+def _client(inbound: Inbound) -> Hashable:
+    """Who sent this, told apart from everybody else."""
+    return (inbound.channel, inbound.sysid, inbound.compid)
 
 
 class System:
@@ -84,13 +106,19 @@ class System:
         self._undo: Callable[[], None] | None = None
         self._ticker: asyncio.Task[None] | None = None
         self._tasks: set[asyncio.Task[Any]] = set()
-        self._actions: dict[asyncio.Task[None], tuple[Inbound, Execution] | None] = {}
+        self._actions: dict[asyncio.Task[None], _Action] = {}
+        """Under way, oldest first."""
         self._last_state: tuple[FlightMode, bool, Health, Landed] | None = None
         self._next_heartbeat = 0.0
         self._complained: dict[str, float] = {}
+        self._writes = 0
         self._handlers: dict[int, Callable[[Inbound], None]] = {
-            dialect.MAVLINK_MSG_ID_COMMAND_LONG: lambda inbound: self._command(inbound, from_long(inbound.message)),
-            dialect.MAVLINK_MSG_ID_COMMAND_INT: lambda inbound: self._command(inbound, from_int(inbound.message)),
+            dialect.MAVLINK_MSG_ID_COMMAND_LONG: lambda inbound: self._command(
+                inbound, from_long(inbound.message, _client(inbound))
+            ),
+            dialect.MAVLINK_MSG_ID_COMMAND_INT: lambda inbound: self._command(
+                inbound, from_int(inbound.message, _client(inbound))
+            ),
             dialect.MAVLINK_MSG_ID_SET_MODE: self._set_mode,
             dialect.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET: self._set_attitude_target,
             dialect.MAVLINK_MSG_ID_PARAM_REQUEST_LIST: self._param_list,
@@ -148,15 +176,25 @@ class System:
             self._undo = None
         if self._ticker is not None:
             self._ticker.cancel()
-        for answer in tuple(self._actions.values()):
-            if answer is not None:
-                self._finish(*answer, dialect.MAV_RESULT_FAILED)
+        for action in tuple(self._actions.values()):
+            if action.answer is not None:
+                self._finish(*action.answer, dialect.MAV_RESULT_FAILED)
         for task in tuple(self._tasks):
             task.cancel()
         self.vehicle.link_down()
         self._desk.forget()
         self.active = False
         self._node.disown(self.sysid)
+
+    async def let_go(self) -> None:
+        """The gateway ends: nothing of ours goes on, a flying drone is left hovering. Clients must not be heard."""
+        if not self.active:
+            return
+        for task in tuple(self._actions):
+            task.cancel()
+        if self._actions:
+            await asyncio.wait(tuple(self._actions))
+        await self.vehicle.let_go()
 
     # Sending.
 
@@ -172,7 +210,8 @@ class System:
             self._node.send(message, sysid=self.sysid, compid=AUTOPILOT, to=to)
 
     def _times(self) -> telemetry.Times:
-        return telemetry.Times(round((self._clock.monotonic() - self._started) * 1000))
+        # An uint32 that wraps after 49.7 days, as on every autopilot.
+        return telemetry.Times(round((self._clock.monotonic() - self._started) * 1000) & 0xFFFFFFFF)
 
     def _build(self, id: int) -> dialect.MAVLink_message | None:
         return telemetry.STREAMS[id].build(self.vehicle, self._times())
@@ -182,10 +221,13 @@ class System:
         due = self._streams.due_on(self._node.channels, id, now)
         if not due:
             return
-        message = self._build(id)
-        if message is None:
-            return
-        self._send(message, due)
+        try:
+            message = self._build(id)
+            if message is not None:
+                self._send(message, due)
+        except Exception as error:
+            # A value of the drone's that nobody foresaw. The other messages, and the heartbeat, go on without it.
+            self._log_rarely(f"message {id} of system {self.sysid} cannot be made: {error!r}")
 
     def _heartbeat(self) -> None:
         vehicle = self.vehicle
@@ -243,8 +285,13 @@ class System:
         elif not force:
             return
         for id, stream in telemetry.STREAMS.items():
-            if stream.on_change and (message := self._build(id)) is not None:
-                self._send(message)
+            if stream.on_change:
+                try:
+                    message = self._build(id)
+                    if message is not None:
+                        self._send(message)
+                except Exception as error:
+                    self._log_rarely(f"message {id} of system {self.sysid} cannot be made: {error!r}")
 
     # What clients send.
 
@@ -263,19 +310,21 @@ class System:
     def _command(self, inbound: Inbound, command: Command) -> None:
         query = self._queries.get(command.id)
         if query is not None:
-            self._acknowledge(inbound, command.id, query(inbound, command))
+            result = dialect.MAV_RESULT_FAILED
+            try:
+                result = query(inbound, command)
+            finally:  # whatever went wrong, the client learns that it did
+                self._acknowledge(inbound, command.id, result)
             return
         if command.id not in ACTIONS:
             self._acknowledge(inbound, command.id, dialect.MAV_RESULT_UNSUPPORTED)
             return
-        client = (inbound.channel, inbound.sysid, inbound.compid)
-        now = self._clock.monotonic()
-        repeated = self._desk.retransmission(client, command, now)
+        repeated = self._desk.retransmission(command.client, command, self._clock.monotonic())
         if repeated is not None:
-            self._acknowledge(inbound, command.id, repeated.result)
+            self._acknowledge(inbound, command.id, repeated)
             return
-        execution = self._desk.begin(client, command, now)
-        self._spawn_action(self._execute(inbound, execution), (inbound, execution))
+        execution = self._desk.begin(command.client, command)
+        self._spawn_action(self._execute(inbound, execution), _Action(command.client, (inbound, execution)))
 
     async def _execute(self, inbound: Inbound, execution: Execution) -> None:
         command = execution.command
@@ -298,21 +347,32 @@ class System:
     def _finish(self, inbound: Inbound, execution: Execution, result: int) -> None:
         """The one final acknowledgement of an action."""
         if execution.result == dialect.MAV_RESULT_IN_PROGRESS:
-            execution.result = result
+            execution.result, execution.ended = result, self._clock.monotonic()
             self._acknowledge(inbound, execution.command.id, result)
 
     def _end_other_actions(self) -> list[asyncio.Task[None]]:
-        """What begins now replaces what was under way; whoever waits for that learns that it was cancelled."""
+        """What begins now replaces what was under way; whoever waits for that learns that it was cancelled.
+
+        A newer action than this one goes on: it has come to replace this one.
+        """
         current = asyncio.current_task()
-        others = [task for task in self._actions if task is not current]
+        others = list(itertools.takewhile(lambda task: task is not current, self._actions))
         for task in others:
             task.cancel()
+        action = None if current is None else self._actions.get(current)
+        self._desk.supersede(None if action is None else action.client)
         return others
 
-    def _spawn_action(self, work: Any, answer: tuple[Inbound, Execution] | None) -> None:
+    def _spawn_action(self, work: Any, action: _Action) -> None:
         task = self._spawn(work)
-        self._actions[task] = answer
-        task.add_done_callback(lambda done: self._actions.pop(done, None))
+        self._actions[task] = action
+        task.add_done_callback(self._action_done)
+
+    def _action_done(self, task: asyncio.Task[None]) -> None:
+        action = self._actions.pop(task, None)
+        if action is not None and action.answer is not None:
+            # It has answered by itself, unless it was cancelled before it began.
+            self._finish(*action.answer, dialect.MAV_RESULT_CANCELLED)
 
     def _explain(self, error: AnafiMavError) -> int:
         """Tell everybody why something was refused; the MAV_RESULT that says so."""
@@ -347,12 +407,14 @@ class System:
 
     def _set_mode(self, inbound: Inbound) -> None:
         """SET_MODE has no acknowledgement: the heartbeat shows the mode, a text the refusal."""
-        self._desk.forget()
-        self._spawn_action(self._change_mode(from_px4_custom_mode(inbound.message.custom_mode)), None)
+        client = _client(inbound)
+        self._desk.forget(client)
+        mode = from_px4_custom_mode(inbound.message.custom_mode)
+        self._spawn_action(self._change_mode(mode, client), _Action(client, None))
 
-    async def _change_mode(self, mode: FlightMode | None) -> None:
+    async def _change_mode(self, mode: FlightMode | None, client: Hashable) -> None:
         try:
-            await change_mode(self.vehicle, mode)
+            await change_mode(self.vehicle, mode, client)
         except AnafiMavError as error:
             self._explain(error)
 
@@ -360,15 +422,27 @@ class System:
         setpoint = attitude_setpoint(inbound.message)
         if isinstance(setpoint, str):
             self._complain(f"Setpoint refused: {setpoint}")
-        else:
-            self.vehicle.setpoint(setpoint)
+        elif not self.vehicle.setpoint(_client(inbound), setpoint):
+            self._complain("Setpoints refused: another program flies")
 
     def _complain(self, text: str) -> None:
         """A text about something that arrives many times a second."""
-        now = self._clock.monotonic()
-        if now - self._complained.get(text, -math.inf) >= STATUS_EVERY:
-            self._complained[text] = now
+        if self._is_news(text):
             self.text(Severity.WARNING, text)
+
+    def _log_rarely(self, text: str) -> None:
+        if self._is_news(text):
+            logger.error("%s", text)
+
+    def _is_news(self, text: str) -> bool:
+        """It was not said within the last `STATUS_EVERY` seconds."""
+        now = self._clock.monotonic()
+        if now - self._complained.get(text, -math.inf) < STATUS_EVERY:
+            return False
+        if len(self._complained) >= MAX_COMPLAINTS:
+            self._complained.clear()
+        self._complained[text] = now
+        return True
 
     # Queries: answered at once, every time.
 
@@ -409,7 +483,8 @@ class System:
         if math.isnan(interval) or interval == 0:
             self._streams.reset(inbound.channel, int(id))
         else:
-            self._streams.set(inbound.channel, int(id), None if interval < 0 else interval / 1e6)
+            # An interval is told as an INT32 of microseconds: a longer one is as long as that can say.
+            self._streams.set(inbound.channel, int(id), None if interval < 0 else min(interval, 2**31 - 1) / 1e6)
         return dialect.MAV_RESULT_ACCEPTED
 
     def _get_message_interval(self, inbound: Inbound, command: Command) -> int:
@@ -431,10 +506,15 @@ class System:
         self._send(self._parameters.read(inbound.message, inbound.sysid, inbound.compid), inbound.channel)
 
     def _param_set(self, inbound: Inbound) -> None:
-        self._spawn(self._write_param(inbound))
+        if self._writes < MAX_WRITES:  # otherwise the client says it again
+            self._writes += 1
+            self._spawn(self._write_param(inbound))
 
     async def _write_param(self, inbound: Inbound) -> None:
-        answers, changed = await self._parameters.write(inbound.message, inbound.sysid, inbound.compid)
+        try:
+            answers, changed = await self._parameters.write(inbound.message, inbound.sysid, inbound.compid)
+        finally:
+            self._writes -= 1
         for message in answers:
             self._send(message, None if changed else inbound.channel)
 

@@ -155,6 +155,11 @@ def gps_raw_int(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | Non
     )
 
 
+def _percent(percent: int | None) -> int:
+    """Charge left; -1 for what the drone has not said, or cannot mean."""
+    return percent if percent is not None and 0 <= percent <= 100 else -1
+
+
 def battery_status(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
     """BATTERY_STATUS: the pack's voltage stands in the first cell, as where cells are not known one by one."""
     state = vehicle.drone.battery.state
@@ -170,7 +175,7 @@ def battery_status(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | 
         -1,
         -1,
         -1,
-        state.percent,
+        _percent(state.percent),
         charge_state={
             AlertLevel.NONE: dialect.MAV_BATTERY_CHARGE_STATE_OK,
             AlertLevel.WARNING: dialect.MAV_BATTERY_CHARGE_STATE_LOW,
@@ -221,7 +226,7 @@ def sys_status(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None
         0,
         UNKNOWN_U16 if state.voltage_mv is None else state.voltage_mv,
         -1,
-        -1 if state.percent is None else state.percent,
+        _percent(state.percent),
         0,
         0,
         0,
@@ -303,6 +308,7 @@ CHANGES: frozenset[type[Message]] = frozenset(
     {
         *_HOME,
         events.ReturnStateChanged,
+        events.MavlinkFilePlayingStateChanged,
         events.BatteryAlertChanged,
         events.GPSFixStateChanged,
         events.ForcedLandingAutoTrigger,

@@ -7,18 +7,19 @@ and keeps it honest: mode and armed state follow the drone, a verb returns when 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import enum
 import logging
 import math
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Hashable
 from dataclasses import dataclass
 from typing import Any
 
 from anafi_mav import geo, units
 from anafi_mav.clock import Clock
 from anafi_mav.drone import Drone, PilotingCommand
-from anafi_mav.drone.events import AlertLevel, FlyingState, FlyingStateChanged, ForcedLandingReason
-from anafi_mav.errors import AnafiMavError, CommandRejected
+from anafi_mav.drone.events import AlertLevel, FlyingState, FlyingStateChanged, ForcedLandingReason, PlayingState
+from anafi_mav.errors import AnafiMavError, CommandRejected, LinkLost
 from anafi_mav.services.height import HeightReference
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.offboard import AttitudeSetpoint, OffboardStream, State, yaw_rate_towards
@@ -34,6 +35,10 @@ ARM_WAIT = 10.0
 
 CLIMB_WAIT = 15.0
 """s for the drone to hover after it took off, before the climb to the asked height is given up."""
+
+HEADING_AGE = 1.0
+"""s after which the drone's heading is not known any more: it comes five times a second. A heading loop that closes on
+an older one turns for ever."""
 
 LOWEST = 1.0
 """m above take-off: where an ANAFI hovers by itself after take-off. Lower targets are refused, never clamped."""
@@ -110,6 +115,8 @@ class Vehicle:
         self._armed = False
         self._climbing = False
         self._pending_takeoff: float | None = None
+        self._terminating = False
+        self._attitude_at = -math.inf
         self._last_flying: FlyingState | None = None
         self._disarm_timer: asyncio.TimerHandle | None = None
         self._pending_timer: asyncio.TimerHandle | None = None
@@ -171,6 +178,8 @@ class Vehicle:
             return FlightMode.RETURN
         if state in _TAKING_OFF or (self._climbing and not self.on_ground):
             return FlightMode.TAKEOFF
+        if state in _AIRBORNE and self.drone.piloting.state.plan == PlayingState.PLAYING:
+            return FlightMode.MISSION
         return self._selected
 
     @property
@@ -231,7 +240,10 @@ class Vehicle:
     async def disarm(self, *, force: bool) -> None:
         """Disarm on the ground. In the air only `force` with `allow_kill` does it: the motors stop, the drone falls."""
         if self.on_ground:
-            self._forget_takeoff()
+            await self._take_over()
+            await self.drone.piloting.land()  # a take-off that is on its way to the drone must not follow
+            if not self.on_ground:
+                raise Refused("Disarm refused: the drone had just taken off, it lands")
             self._armed = False
             self._changed()
             return
@@ -248,7 +260,11 @@ class Vehicle:
                 critical=True,
             )
         await self._take_over()
-        await self.drone.piloting.emergency()
+        self._terminating = True
+        try:
+            await self.drone.piloting.emergency()
+        finally:
+            self._terminating = False
 
     def check_height(self, ato: float) -> None:
         """Raise `Refused` unless a target height (m above take-off) is one the drone may go to."""
@@ -293,8 +309,6 @@ class Vehicle:
     async def land(self) -> None:
         """Land here. On the ground there is nothing to do."""
         await self._take_over()
-        if self.on_ground:
-            return
         await self.drone.piloting.land()
 
     async def return_home(self) -> None:
@@ -315,8 +329,8 @@ class Vehicle:
         await self._take_over()
         if not self.on_ground:
             await self.drone.piloting.stop()
-            if self.returning:  # asked for through somebody else, or before the link was lost
-                await self.drone.piloting.cancel_return_home()
+            # One asked for through somebody else, or before the link was lost. Raises when it is the drone's own.
+            await self.drone.piloting.cancel_return_home()
         self._select(mode)
 
     async def reposition(
@@ -343,8 +357,9 @@ class Vehicle:
         if self.returning_by_itself:
             raise Refused("Goto refused: the drone returns home by itself")
         await self._take_over()
-        if self.returning:
-            await self.drone.piloting.cancel_return_home()
+        await self.drone.piloting.cancel_return_home()
+        if not self.in_air:
+            raise Refused("Goto refused: the drone is not in the air")
         self._select(FlightMode.HOLD)
         target = place or here
         await self.drone.piloting.move_to(
@@ -370,8 +385,8 @@ class Vehicle:
                     lasting=True,
                 )
 
-    async def set_mode(self, mode: FlightMode) -> None:
-        """Whatever doing this mode means."""
+    async def set_mode(self, mode: FlightMode, client: Hashable = None) -> None:
+        """Whatever doing this mode means. `client` is who asks, for Offboard flies its setpoints."""
         match mode:
             case FlightMode.HOLD | FlightMode.POSITION:
                 await self.hold(mode)
@@ -382,7 +397,7 @@ class Vehicle:
             case FlightMode.TAKEOFF:
                 await self.take_off(None)
             case FlightMode.OFFBOARD:
-                await self._engage_offboard()
+                await self._engage_offboard(client)
             case FlightMode.MISSION:
                 raise Refused("Mission refused: there is no mission")
             case FlightMode.TERMINATED:
@@ -390,40 +405,54 @@ class Vehicle:
 
     # Offboard.
 
-    def setpoint(self, setpoint: AttitudeSetpoint) -> None:
-        """A program's newest setpoint; flies the drone at once when mode Offboard is engaged."""
-        self.offboard.receive(setpoint, self._clock.monotonic())
+    def setpoint(self, sender: Hashable, setpoint: AttitudeSetpoint) -> bool:
+        """A program's newest setpoint; flies the drone at once when mode Offboard is engaged and it is the pilot.
+
+        False: it is not listened to, another program flies.
+        """
+        if not self.offboard.receive(sender, setpoint, self._clock.monotonic()):
+            return False
         if self._offboard_timer is None:
             self._offboard_timer = asyncio.get_running_loop().call_at(
                 self.offboard.deadline() or 0.0, self._offboard_expired
             )
         if self.offboard.state is State.ENGAGED:
             self._fly_setpoint()
+        return True
 
-    async def _engage_offboard(self) -> None:
+    async def _engage_offboard(self, client: Hashable) -> None:
         if not self.in_air:
             raise Refused("Offboard refused: take off first, setpoints do not lift an ANAFI off the ground")
         if self.returning:
             raise Refused("Offboard refused: the drone returns home")
-        if not self.offboard.fresh(self._clock.monotonic()):
+        if self.drone.piloting.limits is None:
+            raise Refused("Offboard refused: the drone has not reported what full tilt and speed are")
+        if self.offboard.candidate(client, self._clock.monotonic()) is None:
             raise Refused("Offboard refused: no setpoints arrive")
         await self._take_over()
-        self.offboard.engage()
+        await self.drone.piloting.cancel_return_home()
+        pilot = self.offboard.candidate(client, self._clock.monotonic())
+        if pilot is None or not self.in_air or self.returning:
+            raise Refused("Offboard refused: the setpoints stopped, or the drone is not free to fly them")
+        self.offboard.engage(pilot)
         self.drone.piloting.hover()  # ends a moveTo or moveBy of ours, which would ignore sticks
         self._select(FlightMode.OFFBOARD)
         self._fly_setpoint()
 
     def _fly_setpoint(self) -> None:
-        setpoint, attitude = self.offboard.setpoint, self.drone.piloting.state.attitude
-        limits = self.drone.piloting.state
-        if setpoint is None or attitude is None or limits.max_vertical_speed is None:
+        setpoint, limits = self.offboard.setpoint, self.drone.piloting.limits
+        if setpoint is None or limits is None:
             return
+        attitude = self.drone.piloting.state.attitude
+        turn = setpoint.yaw_rate
+        if attitude is not None and self._clock.monotonic() - self._attitude_at < HEADING_AGE:
+            turn = yaw_rate_towards(setpoint, attitude.yaw)
         self.drone.piloting.pilot(
             PilotingCommand(
                 roll_deg=setpoint.roll * units.DEG_PER_RAD,
                 pitch_deg=setpoint.pitch * units.DEG_PER_RAD,
-                yaw_rate_dps=yaw_rate_towards(setpoint, attitude.yaw) * units.DEG_PER_RAD,
-                climb_mps=setpoint.climb * limits.max_vertical_speed.current,
+                yaw_rate_dps=turn * units.DEG_PER_RAD,
+                climb_mps=setpoint.climb * limits.climb_mps,
             )
         )
 
@@ -450,11 +479,15 @@ class Vehicle:
             self._armed = False
             self._forget_takeoff()
             self._end_offboard()
+            self._end_climb()
             self._selected = FlightMode.HOLD
         elif state in _LANDING:
             self._end_offboard()
-        elif state in _TAKING_OFF and before in _ON_GROUND and (place := self.place) is not None:
-            self.origin = place
+            self._end_climb()
+        elif state in _TAKING_OFF and before in _ON_GROUND:
+            self.height.take_off()
+            if (place := self.place) is not None:
+                self.origin = place
         if not self.on_ground:
             self._cancel_timer("_disarm_timer")
         self._changed()
@@ -474,13 +507,15 @@ class Vehicle:
 
     def on_attitude(self) -> None:
         """A new attitude: the heading loop of an engaged offboard session closes on it."""
+        self._attitude_at = self._clock.monotonic()
         if self.offboard.state is State.ENGAGED:
             self._fly_setpoint()
 
     def on_return(self) -> None:
-        """The drone's return began, ended or changed: setpoints never fight it."""
+        """The drone's return began, ended or changed: setpoints and the climb after a take-off never fight it."""
         if self.returning:
             self._end_offboard()
+            self._end_climb()
         self._changed()
 
     def link_down(self) -> None:
@@ -492,27 +527,47 @@ class Vehicle:
         self._last_flying = None
         self._cancel_timer("_offboard_timer")
         self.offboard = OffboardStream()
+        self._terminating = False
+        self._attitude_at = -math.inf
         for task in tuple(self._tasks):
             task.cancel()
+
+    async def let_go(self) -> None:
+        """The gateway ends: give up whatever is under way and leave a flying drone hovering on its own."""
+        await self._take_over()
+        if self.drone.piloting.about_to_fly:
+            await self.drone.piloting.land()
+        if not self.on_ground:
+            await self.drone.piloting.stop()
 
     # Machinery.
 
     def _select(self, mode: FlightMode) -> None:
         if mode is not FlightMode.OFFBOARD:
-            self.offboard.disengage()
+            self._end_offboard()
         self._selected = mode
         self._changed()
 
     def _end_offboard(self) -> None:
+        """Whoever flew by setpoints flies no more, and the last one does not fly on."""
         if self.offboard.state is State.ENGAGED:
             self.offboard.disengage()
             self._selected = FlightMode.HOLD
+            with contextlib.suppress(LinkLost):
+                self.drone.piloting.pilot(None)
+
+    def _end_climb(self) -> None:
+        if self._climbing:
+            self._cancel_background()
 
     async def _take_over(self) -> None:
         """A new intention replaces whatever was going on, and waits until that has let go of the drone.
 
-        Without the wait a move that is given up could cancel the one that follows it.
+        Without the wait a move that is given up could cancel the one that follows it. Raises `Refused` while the
+        motors are being cut.
         """
+        if self._terminating:
+            raise Refused("Refused: the motors are being cut")
         ended = [*self._end_others(), *self._let_go()]
         if ended:
             await asyncio.wait(ended)
@@ -565,6 +620,8 @@ class Vehicle:
             present = self.drone.piloting.state.altitude
             if present is None:
                 raise CommandRejected("the drone does not report its height")
+            if not self.in_air or self.returning:
+                raise CommandRejected("the drone does something else now")
             if abs(height - present) > 0.1:
                 await self.drone.piloting.move_by(0.0, 0.0, present - height, 0.0)
         except AnafiMavError as error:

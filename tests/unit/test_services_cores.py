@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import pytest
 
@@ -74,10 +75,26 @@ def test_a_text_of_full_chunks_ends_in_an_empty_one() -> None:
 def test_height_is_latched_on_the_ground() -> None:
     height = HeightReference()
     assert height.ato(100.0) is None
-    height.on_ground(35.5, 0.5)
+    height.on_ground(35.0, 0.0)
+    height.take_off()
     assert height.takeoff_amsl == 35.0
     assert height.ato(65.0) == 30.0
     assert height.amsl(30.0) == 65.0
+
+
+def test_after_a_landing_elsewhere_the_next_flight_counts_from_there() -> None:
+    """It took off at 45 m and stands 10 m lower: what it says now is -10, and counts from 0 again when it flies."""
+    height = HeightReference()
+    height.on_ground(45.0, 0.0)
+    height.take_off()
+    height.in_flight("first")
+    height.on_ground(35.0, -10.0)
+    assert height.amsl(-10.0) == 35.0  # where it stands
+    assert height.ato(55.0) == 20.0  # of a target for the next flight
+    height.take_off()
+    height.in_flight("second")
+    assert height.amsl(0.0) == 35.0
+    assert height.ato(55.0) == 20.0
 
 
 def test_the_latch_belongs_to_one_flight() -> None:
@@ -103,25 +120,70 @@ def command(id: int = 400, p1: float = 1.0) -> commands.Command:
     return commands.Command(id, (p1, NAN, NAN, NAN), NAN, NAN, NAN, None)
 
 
-def test_a_resent_command_is_known_while_it_runs_and_two_seconds_on() -> None:
+def test_a_resent_command_is_known_while_it_runs_and_for_a_while_after_its_success() -> None:
     desk = commands.CommandDesk()
     assert desk.retransmission("a", command(), 0.0) is None
-    execution = desk.begin("a", command(), 0.0)
-    assert desk.retransmission("a", command(), 60.0) is execution
-    execution.result = dialect.MAV_RESULT_ACCEPTED
-    assert desk.retransmission("a", command(), 1.9) is execution
-    assert desk.retransmission("a", command(), 2.0) is None
+    execution = desk.begin("a", command())
+    assert desk.retransmission("a", command(), 60.0) == dialect.MAV_RESULT_IN_PROGRESS
+    execution.result, execution.ended = dialect.MAV_RESULT_ACCEPTED, 60.0
+    assert desk.retransmission("a", command(), 63.4) == dialect.MAV_RESULT_ACCEPTED
+    assert desk.retransmission("a", command(), 63.5) is None
+
+
+def test_a_refusal_is_soon_forgotten() -> None:
+    desk = commands.CommandDesk()
+    execution = desk.begin("a", command())
+    execution.result, execution.ended = dialect.MAV_RESULT_TEMPORARILY_REJECTED, 10.0
+    assert desk.retransmission("a", command(), 10.9) == dialect.MAV_RESULT_TEMPORARILY_REJECTED
+    assert desk.retransmission("a", command(), 11.0) is None
+
+
+def test_what_another_client_has_replaced_is_neither_flown_nor_confirmed_again() -> None:
+    desk = commands.CommandDesk()
+    for client in ("a", "b"):
+        execution = desk.begin(client, command())
+        execution.result, execution.ended = dialect.MAV_RESULT_ACCEPTED, 0.0
+    stop = commands.Command(192, (NAN, NAN, NAN, NAN), NAN, NAN, NAN, None)
+    stopped = desk.begin("c", stop)
+    stopped.result, stopped.ended = dialect.MAV_RESULT_ACCEPTED, 0.0
+    desk.supersede("b")
+    assert desk.retransmission("a", command(), 1.0) == dialect.MAV_RESULT_CANCELLED
+    assert desk.retransmission("b", command(), 1.0) == dialect.MAV_RESULT_ACCEPTED
+    assert desk.retransmission("c", stop, 1.0) is None  # an order to stop is always carried out
 
 
 def test_what_is_another_command() -> None:
     desk = commands.CommandDesk()
-    desk.begin("a", command(), 0.0)
+    desk.begin("a", command())
     assert desk.retransmission("b", command(), 0.1) is None
     assert desk.retransmission("a", command(p1=0.0), 0.1) is None
     assert desk.retransmission("a", command(id=22), 0.1) is None
     # arm, disarm, arm: the third is no repetition of the first
-    desk.begin("a", command(p1=0.0), 0.2)
+    desk.begin("a", command(p1=0.0))
     assert desk.retransmission("a", command(), 0.3) is None
+
+
+def test_the_desk_remembers_a_bounded_number_of_clients() -> None:
+    desk = commands.CommandDesk()
+    for client in range(commands.MAX_CLIENTS + 1):
+        desk.begin(client, command())
+    assert desk.retransmission(0, command(), 0.0) is None
+    assert desk.retransmission(1, command(), 0.0) == dialect.MAV_RESULT_IN_PROGRESS
+
+
+@pytest.mark.parametrize(
+    ("id", "params", "place", "stops"),
+    [
+        (192, (-1.0, 1.0, 0.0, NAN), (NAN, NAN, NAN), True),
+        (192, (-1.0, 1.0, 0.0, NAN), (NAN, NAN, 10.0), False),
+        (192, (-1.0, 1.0, 0.0, 0.0), (NAN, NAN, NAN), False),
+        (176, (1.0, 4.0, 3.0, NAN), (NAN, NAN, NAN), True),
+        (176, (1.0, 4.0, 5.0, NAN), (NAN, NAN, NAN), False),
+        (20, (NAN, NAN, NAN, NAN), (NAN, NAN, NAN), False),
+    ],
+)
+def test_orders_to_stop(id: int, params: Any, place: tuple[float, float, float], stops: bool) -> None:
+    assert commands.Command(id, params, *place, None).stops is stops
 
 
 def test_command_int_scales_places_only() -> None:
@@ -174,6 +236,8 @@ def test_thrust_is_vertical_speed(mask: int, thrust: float, climb: float) -> Non
         (7, (0, 0, 0, 0), "no rotation"),
         (7, (NAN, 0, 0, 0), "no rotation"),
         (7, (0, 1, 0, 0), "upside down"),
+        (7, (1.2, 0, 0, 0), "length 1"),
+        (7, (1e30, 0, 1e30, 0), "length 1"),
     ],
 )
 def test_setpoints_that_cannot_be_flown(mask: int, q: tuple[float, ...], reason: str) -> None:
@@ -182,16 +246,23 @@ def test_setpoints_that_cannot_be_flown(mask: int, q: tuple[float, ...], reason:
     assert reason in refusal
 
 
+@pytest.mark.parametrize("thrust", [-5.0, -0.01, 1.01, 100.0])
+def test_thrust_of_another_unit_is_not_full_thrust(thrust: float) -> None:
+    assert offboard.attitude_setpoint(attitude_target(7, (1, 0, 0, 0), thrust)) == "thrust is not between 0 and 1"
+
+
+LEVEL = offboard.AttitudeSetpoint(0, 0, 0, 0, 0)
+NOSE_DOWN = offboard.AttitudeSetpoint(0, -0.1, 0, 0, 0)
+
+
 def test_an_offboard_session_ends_with_its_setpoints() -> None:
-    setpoint = offboard.attitude_setpoint(attitude_target(7, (1, 0, 0, 0), 0.5))
-    assert isinstance(setpoint, offboard.AttitudeSetpoint)
     stream = OffboardStream()
-    assert not stream.fresh(0.0)
-    stream.receive(setpoint, 10.0)
-    assert stream.fresh(10.4)
-    assert not stream.fresh(10.0 + SILENCE)
-    stream.engage()
-    stream.receive(setpoint, 10.4)
+    assert stream.candidate("a", 0.0) is None
+    assert stream.receive("a", LEVEL, 10.0)
+    assert stream.candidate("a", 10.4) == "a"
+    assert stream.candidate("a", 10.0 + SILENCE) is None
+    stream.engage("a")
+    assert stream.receive("a", LEVEL, 10.4)
     assert not stream.expire(10.4 + SILENCE - 0.01)
     assert stream.expire(10.4 + SILENCE)
     assert stream.state is State.IDLE
@@ -201,9 +272,35 @@ def test_an_offboard_session_ends_with_its_setpoints() -> None:
 
 def test_silence_of_a_stream_that_flies_nothing_changes_nothing() -> None:
     stream = OffboardStream()
-    stream.receive(offboard.AttitudeSetpoint(0, 0, 0, 0, 0), 0.0)
+    stream.receive("a", LEVEL, 0.0)
     assert not stream.expire(5.0)
     assert stream.state is State.IDLE
+
+
+def test_a_session_has_one_pilot_and_ends_with_him() -> None:
+    stream = OffboardStream()
+    stream.receive("a", LEVEL, 0.0)
+    stream.receive("b", NOSE_DOWN, 0.1)
+    assert stream.candidate("a", 0.2) == "a"  # who asks flies, not who sent last
+    assert stream.candidate("c", 0.2) == "b"
+    stream.engage("a")
+    assert stream.setpoint == LEVEL
+    assert not stream.receive("b", NOSE_DOWN, 0.3)
+    assert stream.setpoint == LEVEL
+    assert stream.deadline() == SILENCE
+    assert stream.expire(SILENCE)
+    assert stream.state is State.STREAMING  # b streams on, and flies nothing
+    assert stream.setpoint is None
+    assert not stream.expire(0.3 + SILENCE)
+    assert stream.state is State.IDLE
+
+
+def test_a_crowd_of_senders_is_bounded() -> None:
+    stream = OffboardStream()
+    for number in range(offboard.MAX_PILOTS):
+        assert stream.receive(number, LEVEL, 0.0)
+    assert not stream.receive("one more", LEVEL, 0.1)
+    assert stream.receive("one more", LEVEL, SILENCE)  # the others have fallen silent
 
 
 @pytest.mark.parametrize("value", [0, 1, -1, 4001, 2**31 - 1, -(2**31)])

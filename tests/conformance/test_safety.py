@@ -1,0 +1,486 @@
+"""What must never happen over people: old setpoints that fly on, acknowledgements that lie, orders that overtake each
+other, and our hand in what the drone does by itself. Judged by what the simulated drone heard and did."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.mav import NAN, Client
+from support.world import HOLD, HOME, LAND, OFFBOARD, RETURN, World, world
+
+from anafi_mav import geo
+from anafi_mav.arsdk.messages import ardrone3, common, rth
+from anafi_mav.arsdk.messages.rth import StateReason
+from anafi_mav.units import quaternion_from_euler
+
+ACCEPTED, REJECTED, DENIED, FAILED, IN_PROGRESS, CANCELLED = 0, 1, 2, 4, 5, 6
+
+ARM, TAKEOFF_CMD, LAND_CMD, RTL, GOTO, SET_MODE = 400, 22, 21, 20, 192, 176
+PX4_HOLD = (1, 4, 3)
+PX4_OFFBOARD = (1, 6, 0)
+
+FORWARD = -0.17
+"""rad of pitch: more than the 10 degrees that are full tilt."""
+
+
+def results(client: Client, mark: int) -> list[tuple[int, int]]:
+    """(command, final result) of every acknowledgement since a mark, in order."""
+    acks = [message for _, message in client.since(mark, "COMMAND_ACK")]
+    return [(ack.command, ack.result) for ack in acks if ack.result != IN_PROGRESS]
+
+
+async def until(client: Client, mark: int, count: int, timeout: float = 10.0) -> list[tuple[int, int]]:
+    """The first `count` final acknowledgements since a mark."""
+    while len(results(client, mark)) < count:
+        await client.wait("COMMAND_ACK", since=client.mark(), timeout=timeout)
+    return results(client, mark)[:count]
+
+
+def at_once(client: Client, *commands: tuple[int, tuple[float, ...]]) -> None:
+    """Several COMMAND_LONG in one segment."""
+    data = b""
+    for id, params in commands:
+        seven = [*params, *[NAN] * (7 - len(params))]
+        data += dialect.MAVLink_command_long_message(1, 1, id, 0, *seven).pack(client._out)
+        client._out.seq = (client._out.seq + 1) % 256
+    client.send_raw(data)
+
+
+def attitude(client: Client, *, pitch: float = 0.0, yaw: float = 0.0, q: Any = None, thrust: float = 0.5) -> None:
+    rotation = list(quaternion_from_euler(0.0, pitch, yaw)) if q is None else q
+    client.send(dialect.MAVLink_set_attitude_target_message(0, 1, 1, 0b111, rotation, 0.0, 0.0, 0.0, thrust))
+
+
+@asynccontextmanager
+async def streaming(client: Client, **setpoint: Any) -> AsyncIterator[None]:
+    """A program that sends the same setpoint twenty times a second, and dies at the end of the block."""
+
+    async def stream() -> None:
+        while True:
+            attitude(client, **setpoint)
+            await asyncio.sleep(0.05)
+
+    task = asyncio.ensure_future(stream())
+    try:
+        await asyncio.sleep(0.2)
+        yield
+    finally:
+        task.cancel()
+        await asyncio.wait([task])
+
+
+async def engage(client: Client) -> None:
+    assert (await client.command(SET_MODE, *PX4_OFFBOARD)).result == ACCEPTED
+
+
+def pitches(w: World, since: int = 0) -> list[int]:
+    """What the sticks said, nose down +."""
+    return [entry.args["pitch"] for entry in w.commands("ardrone3.Piloting.PCMD")][since:]
+
+
+def now_mute(w: World, command: str, seconds: float) -> asyncio.Future[Any]:
+    """From the moment the drone hears this command, the air is gone for a while: its answer comes late."""
+    loop = asyncio.get_running_loop()
+
+    def heard(entry: Any) -> bool:
+        if (entry.kind, entry.name) != ("command", command):
+            return False
+        w.drone.faults.mute = True
+        loop.call_later(seconds, setattr, w.drone.faults, "mute", False)
+        return True
+
+    return asyncio.ensure_future(w.drone.wait_log(heard, 10.0))
+
+
+def on_command(w: World, command: str, do: Callable[[], Any]) -> asyncio.Future[Any]:
+    """Do something in the moment in which the drone hears this command."""
+
+    def heard(entry: Any) -> bool:
+        if (entry.kind, entry.name) != ("command", command):
+            return False
+        do()
+        return True
+
+    return asyncio.ensure_future(w.drone.wait_log(heard, 10.0))
+
+
+def return_by_itself(w: World) -> None:
+    """The battery sends the drone home."""
+    firmware = w.drone.firmware
+    assert firmware.homing.request(StateReason.LOW_BATTERY, firmware.pose, False)
+
+
+def somebody_else(w: World, message: Any) -> None:
+    """Another controller, a Skycontroller's keys for instance, tells the drone something."""
+    w.drone.firmware.receive(message, asyncio.get_running_loop().time())
+
+
+def heard(w: World, *names: str) -> list[str]:
+    """Which of these commands the drone heard, by the last part of their names, in order."""
+    all_names = [e.name.rpartition(".")[2] for e in w.drone.log if e.kind == "command"]
+    return [name for name in all_names if name in names]
+
+
+async def goto(w: World, north: float, height: float) -> int:
+    place = geo.destination(*HOME[:2], north, 0.0)
+    ack = await w.client.command(GOTO, -1, 1, 0, NAN, frame=6, x=place[0], y=place[1], z=height)
+    return int(ack.result)
+
+
+# Orders that overtake each other.
+
+
+async def test_of_two_orders_in_one_segment_the_newer_is_flown_and_both_are_answered() -> None:
+    async with world() as w:
+        await w.take_off()
+        mark = w.client.mark()
+        at_once(w.client, (RTL, ()), (LAND_CMD, ()))
+        assert set(await until(w.client, mark, 2)) == {(RTL, CANCELLED), (LAND_CMD, ACCEPTED)}
+        await w.client.heartbeat(lambda beat: beat.custom_mode == LAND)
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landed", 20.0)
+
+
+async def test_the_older_of_two_orders_does_not_cancel_the_newer() -> None:
+    """The newer one is refused: the older one goes on, and is answered."""
+    async with world() as w:
+        await w.take_off()
+        mark = w.client.mark()
+        at_once(w.client, (RTL, ()), (TAKEOFF_CMD, ()))
+        assert set(await until(w.client, mark, 2)) == {(RTL, ACCEPTED), (TAKEOFF_CMD, REJECTED)}
+        await w.client.heartbeat(lambda beat: beat.custom_mode == RETURN)
+
+
+async def test_a_late_repetition_is_not_flown_over_the_head_of_another_client() -> None:
+    async with world(clients=1) as w:
+        other = await w.connect(sysid=250)
+        await w.take_off()
+        assert await goto(w, 40.0, 10.0) == ACCEPTED
+        assert (await w.client.command(RTL)).result == ACCEPTED
+        assert (await other.command(SET_MODE, *PX4_HOLD)).result == ACCEPTED
+        assert (await w.client.command(RTL)).result == CANCELLED
+        assert heard(w, "return_to_home") == ["return_to_home"]
+        # An order to stop is carried out, repetition or not.
+        assert (await w.client.command(SET_MODE, *PX4_HOLD)).result == ACCEPTED
+        place = geo.destination(*HOME[:2], 60.0, 0.0)
+        assert (await other.command(GOTO, -1, 1, 0, NAN, frame=6, x=place[0], y=place[1], z=10.0)).result == ACCEPTED
+        before = heard(w, "CancelMoveTo")
+        assert (await w.client.command(SET_MODE, *PX4_HOLD)).result == ACCEPTED
+        assert len(heard(w, "CancelMoveTo")) == len(before) + 1
+
+
+async def test_a_take_off_that_succeeded_is_not_refused_when_it_is_sent_again() -> None:
+    async with world(speed=1.0) as w:
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        assert (await w.client.command(TAKEOFF_CMD, x=0.0, y=0.0, z=3.0)).result == ACCEPTED
+        await asyncio.sleep(2.5)  # within what MAVSDK waits for an acknowledgement that was lost
+        assert (await w.client.command(TAKEOFF_CMD, x=0.0, y=0.0, z=3.0)).result == ACCEPTED
+        assert heard(w, "TakeOff") == ["TakeOff"]
+
+
+async def test_disarm_right_after_a_take_off_that_waited_for_arming() -> None:
+    async with world() as w:
+        assert (await w.client.command(TAKEOFF_CMD, x=0.0, y=0.0, z=5.0)).result == ACCEPTED
+        mark = w.client.mark()
+        at_once(w.client, (ARM, (1.0,)), (ARM, (0.0,)))
+        await until(w.client, mark, 2)
+        await asyncio.sleep(1.0)
+        assert w.drone.flying_state.name in ("LANDED", "LANDING")
+        assert w.drone.pose.up < 2.0  # certainly not on its way to five metres
+
+
+async def test_disarm_while_the_take_off_is_in_bad_air() -> None:
+    """What is accepted is what happens: disarmed means that it does not take off."""
+    async with world() as w:
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        w.drone.faults.mute = True
+        mark = w.client.mark()
+        w.client.send_command(TAKEOFF_CMD, x=0.0, y=0.0, z=5.0)
+        await asyncio.sleep(0.2)
+        w.client.send_command(ARM, 0.0)
+        await asyncio.sleep(0.3)
+        w.drone.faults.mute = False
+        assert set(await until(w.client, mark, 2)) == {(TAKEOFF_CMD, CANCELLED), (ARM, ACCEPTED)}
+        await asyncio.sleep(1.0)
+        assert w.drone.flying_state.name == "LANDED"
+
+
+async def test_land_while_the_drone_takes_off_and_could_not_say_so() -> None:
+    async with world(speed=1.0) as w:
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        muted = now_mute(w, "ardrone3.Piloting.TakeOff", 0.7)
+        mark = w.client.mark()
+        w.client.send_command(TAKEOFF_CMD, x=0.0, y=0.0, z=5.0)
+        await muted
+        w.client.send_command(LAND_CMD)
+        assert set(await until(w.client, mark, 2)) == {(TAKEOFF_CMD, CANCELLED), (LAND_CMD, ACCEPTED)}
+        await asyncio.sleep(6.0)
+        assert w.drone.flying_state.name == "LANDED"
+
+
+async def test_goto_while_the_return_has_begun_and_could_not_say_so() -> None:
+    async with world(speed=1.0) as w:
+        await w.take_off()
+        muted = now_mute(w, "rth.return_to_home", 0.5)
+        mark = w.client.mark()
+        w.client.send_command(RTL)
+        await muted
+        assert await goto(w, 30.0, 8.0) == ACCEPTED
+        assert (RTL, CANCELLED) in results(w.client, mark)
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 5.0, 15.0)
+        assert heard(w, "return_to_home", "abort", "moveTo") == ["return_to_home", "abort", "moveTo"]
+
+
+async def test_return_again_while_the_hold_before_it_is_under_way() -> None:
+    async with world(speed=1.0) as w:
+        await w.take_off()
+        assert await goto(w, 40.0, 10.0) == ACCEPTED
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 5.0, 15.0)
+        assert (await w.client.command(RTL)).result == ACCEPTED
+        aborted = now_mute(w, "rth.abort", 0.4)
+        mark = w.client.mark()
+        w.client.send_command(SET_MODE, *PX4_HOLD)
+        await aborted
+        w.client.send_command(RTL)
+        assert set(await until(w.client, mark, 2)) == {(SET_MODE, CANCELLED), (RTL, ACCEPTED)}
+        assert len(heard(w, "return_to_home")) == 2
+        await w.client.heartbeat(lambda beat: beat.custom_mode == RETURN)
+
+
+# Setpoints.
+
+
+async def test_a_refused_return_leaves_no_stick_deflected() -> None:
+    async with world() as w:
+        await w.take_off()
+        async with streaming(w.client, pitch=FORWARD):
+            await engage(w.client)
+            w.drone.faults.gps = False
+            await w.drone.wait_log(lambda e: e.name == "rth.state" and e.args["state"] == rth.RthState.UNAVAILABLE)
+            assert (await w.client.command(RTL)).result == REJECTED
+        flown = len(pitches(w))
+        await asyncio.sleep(1.0)
+        assert set(pitches(w, flown)) <= {0}
+
+
+async def test_setpoints_end_when_somebody_else_sends_the_drone_home() -> None:
+    async with world() as w:
+        await w.take_off()
+        async with streaming(w.client, pitch=FORWARD):
+            await engage(w.client)
+            somebody_else(w, rth.ReturnToHome())
+            await w.client.heartbeat(lambda beat: beat.custom_mode == RETURN)
+            flown = len(pitches(w))
+            await asyncio.sleep(0.5)  # the program goes on, to no effect
+        assert set(pitches(w, flown)) <= {0}
+
+
+async def test_offboard_has_one_pilot() -> None:
+    async with world(speed=1.0) as w:
+        other = await w.connect(sysid=250)
+        await w.take_off()
+        async with streaming(other, pitch=FORWARD):
+            async with streaming(w.client):
+                await engage(w.client)
+                flown = len(pitches(w))
+                await asyncio.sleep(0.3)
+            # The pilot dies. The other one never asked for Offboard.
+            await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD)
+            await asyncio.sleep(0.3)
+        assert set(pitches(w, flown)) == {0}
+        assert any("another program" in m.text for _, m in other.since(0, "STATUSTEXT"))
+
+
+@pytest.mark.parametrize("q", [[NAN] * 4, [0.0] * 4, [math.inf, 0.0, 0.0, 0.0], [1e30, 0.0, 1e30, 0.0]])
+async def test_setpoints_that_make_no_sense_move_nothing(q: list[float]) -> None:
+    async with world() as w:
+        await w.take_off()
+        async with streaming(w.client):
+            await engage(w.client)
+            flown = len(pitches(w))
+            for thrust in (NAN, math.inf, -math.inf, -5.0, 5.0):
+                attitude(w.client, q=q, thrust=thrust)
+                attitude(w.client, thrust=5.0 if math.isfinite(thrust) else thrust)
+            await asyncio.sleep(0.2)
+        sticks = [e.args for e in w.commands("ardrone3.Piloting.PCMD")[flown:]]
+        assert {(s["roll"], s["pitch"], s["gaz"]) for s in sticks} == {(0, 0, 0)}
+
+
+async def test_without_a_heading_the_other_axes_still_obey() -> None:
+    async with world(speed=1.0) as w:
+        await w.take_off()
+        async with streaming(w.client, pitch=FORWARD, yaw=1.0):
+            await engage(w.client)
+        w.drone.firmware.motion_report = lambda: [ardrone3.AttitudeChanged(NAN, NAN, NAN)]  # type: ignore[method-assign]
+        async with streaming(w.client, pitch=FORWARD, yaw=1.0):
+            assert (await w.client.command(SET_MODE, *PX4_OFFBOARD)).result == ACCEPTED
+        async with streaming(w.client, yaw=1.0):
+            await asyncio.sleep(0.5)
+            last = w.commands("ardrone3.Piloting.PCMD")[-1].args
+        assert (last["pitch"], last["yaw"]) == (0, 0)
+
+
+async def test_many_setpoints_are_not_as_many_datagrams() -> None:
+    async with world(speed=1.0) as w:
+        await w.take_off()
+        async with streaming(w.client):
+            await engage(w.client)
+            flown = len(pitches(w))
+            for _ in range(400):
+                attitude(w.client)
+                await asyncio.sleep(0.002)
+        assert len(pitches(w, flown)) < 90  # at most one in 20 ms, in a little more than 0.8 s
+
+
+# What the drone does by itself.
+
+
+async def test_hold_does_not_abort_a_return_that_begins_meanwhile() -> None:
+    async with world(speed=1.0) as w:
+        await w.take_off()
+        assert await goto(w, 60.0, 10.0) == ACCEPTED
+        await asyncio.sleep(1.0)
+        began = on_command(w, "ardrone3.Piloting.CancelMoveTo", lambda: return_by_itself(w))
+        ack = await w.client.command(SET_MODE, *PX4_HOLD)
+        await began
+        assert ack.result == REJECTED
+        assert heard(w, "abort") == []
+        await w.client.heartbeat(lambda beat: beat.custom_mode == RETURN)
+
+
+async def test_the_climb_after_a_take_off_yields_to_the_drones_own_return() -> None:
+    async with world(speed=1.0) as w:
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        assert (await w.client.command(TAKEOFF_CMD, x=0.0, y=0.0, z=20.0)).result == ACCEPTED
+        return_by_itself(w)
+        await w.client.heartbeat(lambda beat: beat.custom_mode == RETURN)
+        await asyncio.sleep(3.0)
+        assert heard(w, "moveBy", "abort") == []
+
+
+async def test_the_climb_belongs_to_its_own_take_off() -> None:
+    async with world() as w:
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        assert (await w.client.command(TAKEOFF_CMD, x=0.0, y=0.0, z=20.0)).result == ACCEPTED
+        somebody_else(w, ardrone3.Landing())
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landed", 20.0)
+        somebody_else(w, ardrone3.TakeOff())
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "hovering", 20.0)
+        await asyncio.sleep(1.0)
+        assert heard(w, "moveBy") == []
+        assert w.drone.pose.up < 2.0
+
+
+async def test_hold_ends_a_move_that_somebody_else_began() -> None:
+    async with world(speed=1.0) as w:
+        await w.take_off()
+        place = geo.destination(*HOME[:2], 80.0, 0.0)
+        somebody_else(w, ardrone3.MoveTo(*place, 10.0, ardrone3.OrientationMode.NONE, 0.0))
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 3.0, 15.0)
+        assert (await w.client.command(SET_MODE, *PX4_HOLD)).result == ACCEPTED
+        assert heard(w, "CancelMoveTo") == ["CancelMoveTo"]
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "hovering", 10.0)
+
+
+def plan(state: common.PlayingState) -> common.MavlinkFilePlayingStateChanged:
+    return common.MavlinkFilePlayingStateChanged(state, "uid", common.MavlinkType.FLIGHT_PLAN)
+
+
+async def test_hold_pauses_a_flight_plan() -> None:
+    async with world() as w:
+        await w.take_off()
+        w.drone._emit(plan(common.PlayingState.PLAYING))
+        await w.client.heartbeat(lambda beat: beat.custom_mode == 0x04040000)  # Mission
+        answered = on_command(w, "common.Mavlink.Pause", lambda: w.drone._emit(plan(common.PlayingState.PAUSED)))
+        assert (await w.client.command(SET_MODE, *PX4_HOLD)).result == ACCEPTED
+        await answered
+
+
+# The motors.
+
+
+async def test_an_accepted_cut_cannot_be_called_off() -> None:
+    async with world(allow_kill=True) as w:
+        other = await w.connect(sysid=250)
+        await w.take_off()
+        w.drone.faults.mute = True
+        mark = w.client.mark()
+        w.client.send_command(ARM, 0.0, 21196.0)
+        await asyncio.sleep(0.2)
+        assert (await other.command(SET_MODE, *PX4_HOLD)).result == REJECTED
+        w.drone.faults.mute = False
+        assert (ARM, ACCEPTED) in await until(w.client, mark, 1)
+        assert w.drone.flying_state.name in ("EMERGENCY", "LANDED")
+
+
+# The end of the gateway.
+
+
+async def test_the_gateway_ends_with_level_sticks_under_a_living_sender() -> None:
+    async with world(speed=1.0) as w:
+        await w.take_off()
+        async with streaming(w.client, pitch=FORWARD):
+            await engage(w.client)
+            await asyncio.sleep(0.3)
+            flown = len(pitches(w))
+            await w.gateway.close()
+        assert len(pitches(w, flown)) > 30
+        assert set(pitches(w, flown + 2)) == {0}  # what was on its way when the closing began aside
+
+
+async def test_the_gateway_does_not_climb_while_it_ends() -> None:
+    async with world(speed=1.0) as w:
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        assert (await w.client.command(TAKEOFF_CMD, x=0.0, y=0.0, z=20.0)).result == ACCEPTED
+        await w.gateway.close()
+        assert [e.args for e in w.commands("ardrone3.Piloting.moveBy") if e.args["dZ"] != 0.0] == []
+
+
+# Values that nobody foresaw.
+
+
+async def test_an_impossible_value_of_the_drone_silences_nothing() -> None:
+    async with world() as w:
+        w.drone._emit(common.BatteryStateChanged(200))
+        await w.client.wait("BATTERY_STATUS", lambda m: m.battery_remaining == -1)
+        for _ in range(2):
+            await w.client.wait("HEARTBEAT", timeout=2.0)
+        w.drone._emit(ardrone3.AltitudeChanged(1e300))
+        for _ in range(2):
+            await w.client.wait("HEARTBEAT", timeout=2.0)
+        await w.client.wait("ATTITUDE")
+        assert (await w.client.command(SET_MODE, *PX4_HOLD)).result == ACCEPTED
+
+
+async def test_a_relative_heading_counts_from_the_present_one() -> None:
+    async with world() as w:
+        await w.take_off()
+        w.client.send_command(GOTO, -1, 1, 0, math.pi / 2, frame=6, x=HOME[0], y=HOME[1], z=5.0)
+        await w.drone.wait_log(lambda e: e.kind == "pose" and abs(e.args["yaw"] - math.pi / 2) < 0.05, 15.0)
+        await w.client.wait("ATTITUDE", lambda m: abs(m.yaw - math.pi / 2) < 0.05)
+        ack = await w.client.command(GOTO, -1, 1 | 2, 0, math.pi / 2, frame=6, x=HOME[0], y=HOME[1], z=6.0)
+        assert ack.result == ACCEPTED
+        assert w.commands("ardrone3.Piloting.moveTo")[-1].args["heading"] == pytest.approx(180.0, abs=5.0)
+
+
+async def test_a_speed_alone_is_refused() -> None:
+    async with world() as w:
+        await w.take_off()
+        assert (await w.client.command(GOTO, 5.0, 1, 0, NAN)).result == DENIED
+
+
+async def test_an_interval_beyond_what_can_be_said_is_still_answered() -> None:
+    async with world() as w:
+        assert (await w.client.command(511, 30, 1e12)).result == ACCEPTED
+        mark = w.client.mark()
+        assert (await w.client.command(510, 30)).result == ACCEPTED
+        assert (await w.client.wait("MESSAGE_INTERVAL", since=mark)).interval_us == 2**31 - 1
+
+
+def test_the_names_above_are_px4s() -> None:
+    assert PX4_OFFBOARD[1] << 16 == OFFBOARD
