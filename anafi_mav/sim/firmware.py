@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from anafi_mav.arsdk.messages import ardrone3, common, follow_me, move, rth
+from anafi_mav.arsdk.messages import ardrone3, common, follow_me, gimbal, move, rth
 from anafi_mav.arsdk.messages.alarms import TakeoffChecklistType, Type
 from anafi_mav.arsdk.messages.ardrone3 import AlertState, FlyingState
 from anafi_mav.arsdk.messages.rth import RthEndingBehavior, StateReason
@@ -29,6 +29,7 @@ from anafi_mav.sim.machine import AIRBORNE, GUIDED, LANDED, Event, next_state
 from anafi_mav.sim.model import Model
 from anafi_mav.sim.motion import Body, Pose
 from anafi_mav.sim.place import Origin
+from anafi_mav.sim.poi import Poi
 from anafi_mav.sim.power import Battery
 from anafi_mav.sim.safety import Alarms, Warnings, check_changed, checklist
 from anafi_mav.sim.settings import Settings
@@ -81,6 +82,7 @@ class Firmware:
         self.endurance = Endurance(model, self.settings)
         self.homing = Homing(body, origin, self.settings, emit)
         self.guidance = Guidance(model, body, origin, self.settings, self.homing, emit)
+        self.poi = Poi(origin, emit, self.aim, lambda: self.settings.yaw_rate, model.modern)
         self.state = LANDED
         self.pose = _REST
         self.time = 0.0
@@ -178,6 +180,7 @@ class Firmware:
     def link_lost(self) -> None:
         """Nobody is there any more: hover, and go home after a while if there is a home."""
         self.guidance.release_sticks()
+        self._leave_poi()
         if self.state in GUIDED | {FlyingState.TAKINGOFF} and not self.homing.flying:
             self.guidance.cancel(self.pose)
             self._return_at = self.time + self.settings.number("rth_delay")
@@ -232,6 +235,7 @@ class Firmware:
         if self._return_at is not None and self.time >= self._return_at:
             self._return_at = None
             self._go_home(StateReason.CONNECTION_LOST)
+        self.guidance.stare(self.poi.tick(self.time, self.pose, hovering))
         self._fire(Event.BUSY if self.guidance.busy or not still else Event.AT_REST)
 
     def _update_sensors(self, elapsed: float) -> None:
@@ -247,6 +251,7 @@ class Firmware:
         if self.fix != self.faults.gps:
             self._set_fix(self.faults.gps)
         self.homing.sensors(self.fix, not self.compass.required)
+        self.poi.sensors(self.fix, not self.compass.required, self.state in GUIDED)
         if self.alert is not self._alert:
             self._alert = self.alert
             self._emit(ardrone3.AlertStateChanged(self._alert))
@@ -371,6 +376,7 @@ class Firmware:
     def _stop_guidance(self) -> None:
         """End a move and a return, and say so."""
         self.guidance.cancel(self.pose)
+        self.poi.stop()
         self.homing.abort()
 
     # -- commands
@@ -385,6 +391,8 @@ class Firmware:
         handler = _HANDLERS.get(type(message))
         if handler is not None:
             handler(self, message)
+            return True
+        if isinstance(message, gimbal.SetTarget) and self.poi.holds_gimbal and message.gimbal_id == 0:
             return True
         answer = self.settings.handle(message)
         if answer is not None:
@@ -458,6 +466,7 @@ class Firmware:
         hovering = self.state is FlyingState.HOVERING
         if self.homing.home is not None and not self.homing.flying:
             self.guidance.cancel(self.pose)
+            self.poi.stop()
         self.homing.request(reason, self.pose, hovering)
 
     def _abort(self, message: Message) -> None:
@@ -476,14 +485,40 @@ class Firmware:
             self._emit(event)
 
     def _move_by(self, message: ardrone3.MoveBy | move.ExtendedMoveBy) -> None:
+        self._leave_poi()
         self.guidance.move_by(message, self.pose, self.state in GUIDED)
 
     def _move_to(self, message: ardrone3.MoveTo | move.ExtendedMoveTo) -> None:
+        self._leave_poi()
         ready = self.state in GUIDED and self.fix and not self.compass.required
         self.guidance.move_to(message, self.pose, ready)
 
     def _cancel_move_to(self, message: Message) -> None:
         self.guidance.cancel_move_to(self.pose)
+
+    def _leave_poi(self) -> None:
+        """A move takes over."""
+        self.poi.stop()
+        self.guidance.stare(None)
+
+    def _start_poi(self, message: ardrone3.StartPilotedPOI | ardrone3.StartPilotedPOIV2) -> None:
+        if self.homing.flying:
+            return
+        if self.poi.start(message, self.state is FlyingState.HOVERING, self.time):
+            self.guidance.cancel(self.pose)
+
+    def _stop_poi(self, message: Message) -> None:
+        self._leave_poi()
+
+    def aim(self, elevation: float) -> None:
+        """Point the camera so far above the horizon (deg); the other axes stay as they are."""
+        position, none, absolute = (
+            gimbal.ControlMode.POSITION,
+            gimbal.FrameOfReference.NONE,
+            gimbal.FrameOfReference.ABSOLUTE,
+        )
+        target = gimbal.SetTarget(0, position, none, 0.0, absolute, elevation, none, 0.0)
+        self.gimbal.handle(target, self.pose, self.time, True)
 
     # -- the rest
 
@@ -534,6 +569,9 @@ _HANDLERS: dict[type[Message], Callable[[Firmware, Any], None]] = {
     ardrone3.MoveTo: Firmware._move_to,
     move.ExtendedMoveTo: Firmware._move_to,
     ardrone3.CancelMoveTo: Firmware._cancel_move_to,
+    ardrone3.StartPilotedPOI: Firmware._start_poi,
+    ardrone3.StartPilotedPOIV2: Firmware._start_poi,
+    ardrone3.StopPilotedPOI: Firmware._stop_poi,
     ardrone3.NavigateHome: Firmware._navigate_home,
     rth.ReturnToHome: Firmware._return_home,
     rth.Abort: Firmware._abort,

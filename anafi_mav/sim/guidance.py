@@ -49,6 +49,7 @@ class Guidance:
         self._move: MoveBy | MoveTo | None = None
         self._sticks_until = 0.0
         self._sticks_used = False
+        self._stare: float | None = None
         self._progress: tuple[float, Pose, float] | None = None
         """When, where and with which heading a move was last seen to get on."""
         self.take_off_place = (0.0, 0.0)
@@ -117,6 +118,8 @@ class Guidance:
         tilt = settings.number("max_tilt") * RAD_PER_DEG if sticks.flag & 1 else 0.0
         yaw_rate = _share(sticks.yaw) * settings.number("max_rotation_speed") * RAD_PER_DEG
         self._sticks_until = now + STICK_TIMEOUT
+        if self._stare is not None:
+            yaw_rate = self._stare
         if self._move is not None:
             if isinstance(self._move, MoveTo) and self._move.takes_yaw:
                 self._body.stick_yaw(yaw_rate)
@@ -128,8 +131,14 @@ class Guidance:
             yaw_rate,
             _share(sticks.gaz) * settings.number("max_vertical_speed"),
         )
-        self._sticks_used = any(wanted)
+        self._sticks_used = any(wanted) if self._stare is None else bool(wanted[0] or wanted[1] or wanted[3])
         self._body.sticks(*wanted)
+
+    def stare(self, yaw_rate: float | None) -> None:
+        """A point of interest turns the drone (rad/s) in place of the yaw stick; None gives it back."""
+        if yaw_rate is not None or self._stare is not None:
+            self._stare = yaw_rate
+            self._body.stick_yaw(yaw_rate or 0.0)
 
     def release_sticks(self) -> None:
         self._sticks_used = False

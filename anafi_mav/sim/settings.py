@@ -14,6 +14,7 @@ from anafi_mav.arsdk.messages.ardrone3 import HomeTypeSetting
 from anafi_mav.arsdk.messages.rth import RthHomeType
 from anafi_mav.arsdk.wire import Message
 from anafi_mav.sim.model import Model, Range
+from anafi_mav.units import RAD_PER_DEG
 
 MAX_NAME = 64
 """Characters of a product name that are kept; longer ones are cut."""
@@ -60,6 +61,11 @@ class Settings:
 
     def number(self, key: str) -> float:
         return float(self._values[key])
+
+    @property
+    def yaw_rate(self) -> float:
+        """The fastest turn that is allowed now, rad/s."""
+        return self.number("max_rotation_speed") * RAD_PER_DEG
 
     def limits(self, key: str) -> tuple[float, float, float]:
         """(current, lowest, highest) as most events carry it."""

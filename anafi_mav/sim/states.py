@@ -21,8 +21,6 @@ from anafi_mav.arsdk.wire import Message
 from anafi_mav.sim.firmware import Firmware
 from anafi_mav.sim.safety import checklist
 
-_NOWHERE = 500.0
-
 _FOLLOW_MODES = (follow_me.Mode.LOOK_AT, follow_me.Mode.GEOGRAPHIC, follow_me.Mode.RELATIVE)
 
 
@@ -78,9 +76,7 @@ def all_states(firmware: Firmware) -> list[Message]:
         ardrone3.HoveringWarning(0, 0),
         *firmware.endurance.states_report(),
         *firmware.warnings.states_report(),
-        ardrone3.PilotedPOIV2(
-            _NOWHERE, _NOWHERE, _NOWHERE, ardrone3.PoiMode.LOCKED_GIMBAL, ardrone3.PoiStatus.UNAVAILABLE
-        ),
+        *firmware.poi.states_report(),
         ardrone3.NumberOfSatelliteChanged(firmware.satellites),
         ardrone3.AlertSound(firmware.sound),
         *firmware.homing.states_report(),
