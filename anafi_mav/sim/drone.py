@@ -176,13 +176,25 @@ class SimulatedDrone:
         self._mute_link(self.faults.mute)
         if spec.http_port is None:
             return
-        web = WebServer()
+        web = self._make_web()
         try:
             await web.start(spec.address, spec.http_port)
         except OSError as error:
             self.http_problem = f"no HTTP on port {spec.http_port}: {os.strerror(error.errno or 0)}"
         else:
             self._web = web
+
+    def _make_web(self) -> WebServer:
+        firmware, model = self.firmware, self.firmware.model
+        properties = {
+            "model": model.name,
+            "serial": self.identity.serial,
+            "name": self.identity.name,
+            "software": model.software,
+            "hardware": model.hardware,
+        }
+        calendar = firmware.payload.calendar
+        return WebServer(firmware.payload.media, firmware.plans, properties, lambda: calendar.date(firmware.time))
 
     async def close(self) -> None:
         """Close the sockets, without a word to the controller: ARSDK has no goodbye. Idempotent."""

@@ -18,7 +18,6 @@ from anafi_mav.arsdk.messages.ardrone3 import AlertState, FlyingState
 from anafi_mav.arsdk.messages.rth import RthEndingBehavior, StateReason
 from anafi_mav.arsdk.wire import Message, UnknownMessage
 from anafi_mav.sim import power
-from anafi_mav.sim.camera import Camera
 from anafi_mav.sim.compass import Compass
 from anafi_mav.sim.endurance import Endurance
 from anafi_mav.sim.faults import Faults
@@ -28,12 +27,14 @@ from anafi_mav.sim.homing import UNKNOWN, Homing
 from anafi_mav.sim.machine import AIRBORNE, GUIDED, LANDED, Event, next_state
 from anafi_mav.sim.model import Model
 from anafi_mav.sim.motion import Body, Pose
+from anafi_mav.sim.payload import Payload
+from anafi_mav.sim.picture import Scene
 from anafi_mav.sim.place import Origin
+from anafi_mav.sim.plan_store import FlightPlanStore
 from anafi_mav.sim.poi import Poi
 from anafi_mav.sim.power import Battery
 from anafi_mav.sim.safety import Alarms, Warnings, check_changed, checklist
 from anafi_mav.sim.settings import Settings
-from anafi_mav.sim.storage import Storage
 
 RAMP_TIME = 1.0
 """s that the motors need; one or two on the aircraft."""
@@ -75,8 +76,8 @@ class Firmware:
         self.battery = Battery(model)
         self.compass = Compass()
         self.gimbal = Gimbals(model)
-        self.camera = Camera(model)
-        self.storage = Storage()
+        self.payload = Payload(model, identity.run_id, emit, self._scene)
+        self.plans = FlightPlanStore()
         self.alarms = Alarms()
         self.warnings = Warnings()
         self.endurance = Endurance(model, self.settings)
@@ -152,6 +153,13 @@ class Firmware:
     def place(self) -> tuple[float, float]:
         """True latitude and longitude."""
         return self._origin.place(self.pose.north, self.pose.east)
+
+    def _scene(self) -> Scene:
+        """What the first gimbal's camera sees."""
+        self.gimbal.advance(self.time)
+        looks = self.gimbal.attitude(self.pose)
+        place = (*self.place(), self._origin.altitude + self.pose.up) if self.fix else (UNKNOWN, UNKNOWN, UNKNOWN)
+        return Scene(*place, looks.pitch_absolute, looks.roll_absolute, self.pose.north, self.pose.east)
 
     def position_report(self) -> list[Message]:
         """Where GPS says the drone is: deg, deg, m above mean sea level."""
@@ -243,7 +251,10 @@ class Firmware:
             self._emit(message)
         for message in self.compass.require(self.faults.magneto_required):
             self._emit(message)
-        for messages in (self.compass.tick(self.time), self.gimbal.tick(self.time), self.storage.tick(self.time)):
+        self.payload.storage.place.full = self.faults.storage_full
+        payload = self.payload.tick(self.time, self.state in AIRBORNE)
+        self.faults.storage_full = self.payload.storage.place.full
+        for messages in (self.compass.tick(self.time), self.gimbal.tick(self.time), payload):
             for message in messages:
                 self._emit(message)
         self.faults.magneto_required = self.compass.required
@@ -397,12 +408,10 @@ class Firmware:
         answer = self.settings.handle(message)
         if answer is not None:
             self.guidance.apply_limits()
-        for part in (self.compass, self.storage):
+        for part in (self.compass, self.payload):
             answer = part.handle(message, self.time) if answer is None else answer
         if answer is None:
             answer = self.gimbal.handle(message, self.pose, self.time, self.state in AIRBORNE)
-        if answer is None:
-            answer = self.camera.handle(message)
         if answer is None:
             return False
         for event in answer:
@@ -524,6 +533,7 @@ class Firmware:
 
     def _set_datetime(self, message: common.CurrentDateTime) -> None:
         self.datetime = message.datetime
+        self.payload.calendar.set(message.datetime, self.time)
         self._emit(common.CurrentDateTimeChanged(message.datetime))
 
     def _set_date(self, message: common.CurrentDate) -> None:

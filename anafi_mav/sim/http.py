@@ -1,30 +1,73 @@
-"""The drone's web server, as far as a connecting controller needs it: an empty media index and its notifications.
+"""The drone's web server: its media, their notifications, and the upload of flight plans.
 
-Parrot's REST API (developer.parrot.com, ANAFI media): ``GET /api/v1/media/medias`` and the websocket
-``/api/v1/media/notifications``. Everything else is 404 until it exists.
+Parrot's REST API as developer.parrot.com and Olympe have it (ANAFI media, ``/api/v1/media``; ``/api/v1/upload``).
+Parrot publishes no answers to mistakes but 541; ours are the plain ones of HTTP with ``{"error": "…"}``.
 """
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
+import json
+from collections.abc import Callable, Mapping
+from typing import Any
 
 from aiohttp import WSCloseCode, web
+
+from anafi_mav.sim.media import Kind, MediaStore
+from anafi_mav.sim.plan_store import FlightPlanStore
 
 MAX_BODY = 1 << 20
 """Bytes of a request body that are read; a flight plan of a thousand items is a tenth of it."""
 
+MAX_UNREAD = 1000
+"""Notifications that wait for a client that does not read; then its socket is closed."""
+
+MAX_WORD = 4096
+"""Bytes of a websocket message from a client: they mean nothing here."""
+
 SHUTDOWN = 1.0
 """s that open requests get when the server closes."""
 
+NOT_INDEXED = 541
+"""Parrot's status for a question about media while there is no index."""
+
+_TYPES = {Kind.JPG: "image/jpeg", Kind.DNG: "image/x-adobe-dng", Kind.MP4: "video/mp4"}
+
+_ORDERS = {"oldest": False, "newest": True}
+
 
 class WebServer:
-    """One drone's HTTP server."""
+    """One drone's HTTP server. `properties` are what it says of itself, `date` the time on its clock."""
 
-    def __init__(self) -> None:
-        self._sockets: set[web.WebSocketResponse] = set()
+    def __init__(
+        self, media: MediaStore, plans: FlightPlanStore, properties: Mapping[str, str], date: Callable[[], str]
+    ) -> None:
+        self._media = media
+        self._plans = plans
+        self._properties = dict(properties)
+        self._date = date
+        self._listeners: dict[web.WebSocketResponse, asyncio.Queue[str]] = {}
         app = web.Application(client_max_size=MAX_BODY)
-        app.router.add_get("/api/v1/media/medias", self._medias)
-        app.router.add_get("/api/v1/media/notifications", self._notifications)
+        api = "/api/v1"
+        app.add_routes(
+            [
+                web.get(f"{api}/info/properties", self._info),
+                web.get(f"{api}/media/medias", self._medias),
+                web.delete(f"{api}/media/medias", self._delete_all),
+                web.get(f"{api}/media/medias/{{id}}", self._one),
+                web.delete(f"{api}/media/medias/{{id}}", self._delete),
+                web.delete(f"{api}/media/resources/{{id}}", self._delete_resource),
+                web.get(f"{api}/media/md5/{{id}}", self._md5),
+                web.get(f"{api}/media/notifications", self._notifications),
+                web.get("/data/media/{id}", self._file),
+                web.get("/data/thumb/{id}", self._thumbnail),
+                web.put(f"{api}/upload/flightplan", self._upload),
+                web.get(f"{api}/upload/flightplans", self._list_plans),
+                web.get(f"{api}/upload/flightplan/{{id}}", self._plan),
+                web.delete(f"{api}/upload/flightplan/{{id}}", self._delete_plan),
+            ]
+        )
         app.on_shutdown.append(self._close_sockets)
         self._runner = web.AppRunner(app, access_log=None, shutdown_timeout=SHUTDOWN)
         self.port = 0
@@ -38,26 +81,161 @@ class WebServer:
             await self._runner.cleanup()
             raise
         self.port = self._runner.addresses[0][1]
+        self._media.notify = self._notify
 
     async def close(self) -> None:
         """Stop. Idempotent."""
+        self._media.notify = _deaf
         await self._runner.cleanup()
 
+    # -- media
+
+    async def _info(self, request: web.Request) -> web.Response:
+        return web.json_response(self._properties)
+
     async def _medias(self, request: web.Request) -> web.Response:
-        return web.json_response([])
+        if not self._media.indexed:
+            return _not_indexed()
+        query = request.query
+        order = query.get("sort_order", "oldest")
+        if order not in _ORDERS:
+            return _refuse(400, f"sort_order: expected oldest or newest, got {order!r}")
+        told = [media.describe() for media in self._media]
+        if "run_id" in query:
+            told = [media for media in told if media["run_id"] == query["run_id"]]
+        if "media_type" in query:
+            told = [media for media in told if media["type"] == query["media_type"].upper()]
+        if "storage" in query:
+            told = [media for media in told if media["resources"][0]["storage"] == query["storage"]]
+        if "custom_id" in query:
+            told = []  # nothing here has one
+        return web.json_response(told[::-1] if _ORDERS[order] else told)
+
+    async def _one(self, request: web.Request) -> web.Response:
+        if not self._media.indexed:
+            return _not_indexed()
+        media = self._media.media(request.match_info["id"])
+        return _unknown("media") if media is None else web.json_response(media.describe())
+
+    async def _delete(self, request: web.Request) -> web.Response:
+        if not self._media.indexed:
+            return _not_indexed()
+        return web.Response() if self._media.remove(request.match_info["id"]) else _unknown("media")
+
+    async def _delete_all(self, request: web.Request) -> web.Response:
+        if not self._media.indexed:
+            return _not_indexed()
+        self._media.remove_all()
+        return web.Response()
+
+    async def _delete_resource(self, request: web.Request) -> web.Response:
+        if not self._media.indexed:
+            return _not_indexed()
+        return web.Response() if self._media.remove_resource(request.match_info["id"]) else _unknown("resource")
+
+    async def _md5(self, request: web.Request) -> web.Response:
+        if not self._media.indexed:
+            return _not_indexed()
+        resource = self._media.resource(request.match_info["id"])
+        if resource is None:
+            return _unknown("resource")
+        told = {"resource_id": resource.id, "media_id": resource.media_id, "md5": resource.md5()}
+        return web.json_response(told)
+
+    async def _file(self, request: web.Request) -> web.Response:
+        resource = self._media.resource(request.match_info["id"]) if self._media.indexed else None
+        if resource is None:
+            return _unknown("file")
+        return web.Response(body=resource.content(), content_type=_TYPES[resource.kind])
+
+    async def _thumbnail(self, request: web.Request) -> web.Response:
+        resource = self._media.by_thumbnail(request.match_info["id"]) if self._media.indexed else None
+        if resource is None:
+            return _unknown("file")
+        return web.Response(body=resource.thumbnail(), content_type="image/jpeg")
+
+    # -- notifications
+
+    def _notify(self, name: str, data: dict[str, Any]) -> None:
+        if not self._listeners:
+            return
+        text = json.dumps({"name": name, "data": data})
+        for socket, queue in list(self._listeners.items()):
+            try:
+                queue.put_nowait(text)
+            except asyncio.QueueFull:
+                # Who does not read is cut off, and reads everything anew when it comes back.
+                del self._listeners[socket]
+                transport = socket.get_extra_info("transport")
+                if transport is not None:
+                    transport.abort()
 
     async def _notifications(self, request: web.Request) -> web.WebSocketResponse:
-        socket = web.WebSocketResponse(heartbeat=30.0)
+        socket = web.WebSocketResponse(heartbeat=30.0, max_msg_size=MAX_WORD)
         await socket.prepare(request)
-        self._sockets.add(socket)
+        queue: asyncio.Queue[str] = asyncio.Queue(MAX_UNREAD)
+        self._listeners[socket] = queue
+        writer = asyncio.create_task(_write(socket, queue))
         try:
             async for _ in socket:
                 pass  # What a client says here means nothing.
         finally:
-            self._sockets.discard(socket)
+            self._listeners.pop(socket, None)
+            writer.cancel()
         return socket
 
     async def _close_sockets(self, app: web.Application) -> None:
-        for socket in list(self._sockets):
+        for socket in list(self._listeners):
             with contextlib.suppress(ConnectionError):
                 await socket.close(code=WSCloseCode.GOING_AWAY)
+
+    # -- flight plans
+
+    async def _upload(self, request: web.Request) -> web.Response:
+        if request.content_length is not None and request.content_length > MAX_BODY:
+            return _refuse(413, f"expected at most {MAX_BODY} bytes, got {request.content_length}")
+        data = await request.read()  # answers 413 by itself when more comes than was announced
+        if not data.strip():
+            return _refuse(400, "expected a flight plan, got an empty body")
+        try:
+            text = data.decode()
+        except UnicodeDecodeError as error:
+            return _refuse(400, f"expected text: {error}")
+        if "\0" in text:
+            return _refuse(400, "expected text, got a NUL byte")
+        # Whether it can be flown is looked at when it is started, as on the aircraft.
+        return web.json_response(self._plans.put(data, self._date()))
+
+    async def _list_plans(self, request: web.Request) -> web.Response:
+        return web.json_response([{"uid": plan.uid, "date": plan.date} for plan in self._plans.list()])
+
+    async def _plan(self, request: web.Request) -> web.Response:
+        plan = self._plans.find(request.match_info["id"])
+        if plan is None:
+            return _unknown("flight plan")
+        return web.json_response({"uid": plan.uid, "date": plan.date, "size": len(plan.data)})
+
+    async def _delete_plan(self, request: web.Request) -> web.Response:
+        return web.Response() if self._plans.remove(request.match_info["id"]) else _unknown("flight plan")
+
+
+async def _write(socket: web.WebSocketResponse, queue: asyncio.Queue[str]) -> None:
+    with contextlib.suppress(ConnectionError):
+        while True:
+            await socket.send_str(await queue.get())
+
+
+def _deaf(name: str, data: dict[str, Any]) -> None:
+    """Nobody listens."""
+
+
+def _refuse(status: int, error: str) -> web.Response:
+    return web.json_response({"error": error}, status=status)
+
+
+def _unknown(what: str) -> web.Response:
+    return _refuse(404, f"no such {what}")
+
+
+def _not_indexed() -> web.Response:
+    return web.json_response({"error": "media are not indexed"}, status=NOT_INDEXED, reason="Not Indexed")

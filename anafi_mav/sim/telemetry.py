@@ -1,7 +1,7 @@
 """What a drone tells without being asked, at the aircraft's rates.
 
-Attitude, speed and height 5 times a second (or as `--telemetry-rate` says), the gimbal and the height above ground 5
-times, position and voltage once (anafi_ros). Messages that are late are not made up for.
+Attitude, speed and height 5 times a second (or as `--telemetry-rate` says), the gimbal, the zoom and the height above
+ground 5 times, position and voltage once (anafi_ros). Messages that are late are not made up for.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ class Telemetry:
         if self._gimbal.due(now):
             firmware.gimbal.advance(firmware.time)
             messages += firmware.gimbal.attitudes(firmware.pose)
+            messages += firmware.payload.telemetry()
             messages.append(ardrone3.AltitudeAboveGroundChanged(firmware.pose.up))
         if self._position.due(now):
             messages += firmware.position_report()

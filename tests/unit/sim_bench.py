@@ -21,10 +21,10 @@ M = TypeVar("M", bound=Message)
 
 
 class Bench:
-    """One 4K at HOME, heading north. `now` is the machine's clock and the simulated one at once."""
+    """One drone at HOME, heading north. `now` is the machine's clock and the simulated one at once."""
 
-    def __init__(self) -> None:
-        model = MODELS["4k"]
+    def __init__(self, model_name: str = "4k") -> None:
+        model = MODELS[model_name]
         self.motion = Motion([model.airframe])
         self.body = Body(self.motion, 0)
         self.events: list[Message] = []

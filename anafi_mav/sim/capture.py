@@ -1,0 +1,393 @@
+"""What one camera is doing: photos in all their modes, and recordings, from the command to the file on the card.
+
+The order of the events is that of Parrot's camera.xml: a photo's state becomes active, its progress is told, and the
+state becomes inactive when the media is on the card (a lapse: when it is stopped).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+
+from anafi_mav.arsdk.messages import camera
+from anafi_mav.arsdk.messages.camera import (
+    Availability,
+    BracketingPreset,
+    BurstValue,
+    CameraCameraMode,
+    CameraPhotoMode,
+    CameraRecordingMode,
+    Framerate,
+    HyperlapseValue,
+    PhotoFileFormat,
+    PhotoResult,
+    RecordingResult,
+    State,
+)
+from anafi_mav.arsdk.wire import Message
+from anafi_mav.sim import picture
+from anafi_mav.sim.calendar import Calendar
+from anafi_mav.sim.camera import Camera
+from anafi_mav.sim.media import MAX_RESOURCES, Kind, Media, MediaStore, Resource
+from anafi_mav.sim.picture import Scene
+from anafi_mav.sim.storage import Place
+
+SHOT_TIME = 0.1
+"""s from the button to the shot, and between the shots of a bracketing. Assumed."""
+SAVE_TIME = 0.3
+"""s from the last shot to the file on the card. Assumed."""
+BURST_REPORT = 0.1
+"""s between two reports of a burst at least (Parrot's camera.xml)."""
+LAPSE_REPORT = 0.5
+"""s between two reports of what is left to the next shot of a lapse (Parrot's camera.xml)."""
+LEAST_ROOM = 1024
+"""Bytes: with less than this on the card nothing is begun."""
+
+_BURSTS = {
+    BurstValue.BURST_14_OVER_4S: (14, 4.0),
+    BurstValue.BURST_14_OVER_2S: (14, 2.0),
+    BurstValue.BURST_14_OVER_1S: (14, 1.0),
+    BurstValue.BURST_10_OVER_4S: (10, 4.0),
+    BurstValue.BURST_10_OVER_2S: (10, 2.0),
+    BurstValue.BURST_10_OVER_1S: (10, 1.0),
+    BurstValue.BURST_4_OVER_4S: (4, 4.0),
+    BurstValue.BURST_4_OVER_2S: (4, 2.0),
+    BurstValue.BURST_4_OVER_1S: (4, 1.0),
+}
+_BRACKETS = {
+    BracketingPreset.PRESET_1EV: 3,
+    BracketingPreset.PRESET_2EV: 3,
+    BracketingPreset.PRESET_3EV: 3,
+    BracketingPreset.PRESET_1EV_2EV: 5,
+    BracketingPreset.PRESET_1EV_3EV: 5,
+    BracketingPreset.PRESET_2EV_3EV: 5,
+    BracketingPreset.PRESET_1EV_2EV_3EV: 7,
+}
+_RATIOS = {
+    HyperlapseValue.RATIO_15: 15,
+    HyperlapseValue.RATIO_30: 30,
+    HyperlapseValue.RATIO_60: 60,
+    HyperlapseValue.RATIO_120: 120,
+    HyperlapseValue.RATIO_240: 240,
+}
+_RATES = {
+    Framerate.FPS_48: 48,
+    Framerate.FPS_50: 50,
+    Framerate.FPS_60: 60,
+    Framerate.FPS_96: 96,
+    Framerate.FPS_100: 100,
+    Framerate.FPS_120: 120,
+}
+_PLAYED_AT = 30
+"""Frames per second of a slow motion when it is played."""
+
+_KINDS = {
+    PhotoFileFormat.JPEG: (Kind.JPG,),
+    PhotoFileFormat.DNG: (Kind.DNG,),
+    PhotoFileFormat.DNG_JPEG: (Kind.JPG, Kind.DNG),
+}
+_PHOTO_MODES = {
+    CameraPhotoMode.SINGLE: "SINGLE",
+    CameraPhotoMode.BRACKETING: "BRACKETING",
+    CameraPhotoMode.BURST: "BURST",
+    CameraPhotoMode.TIME_LAPSE: "TIMELAPSE",
+    CameraPhotoMode.GPS_LAPSE: "GPSLAPSE",
+}
+"""In the words of the web server."""
+
+
+@dataclass(frozen=True)
+class Studio:
+    """What every camera of a drone works with."""
+
+    media: MediaStore
+    place: Place
+    calendar: Calendar
+    scene: Callable[[], Scene]
+
+
+@dataclass
+class _Shoot:
+    """Photos that are being taken."""
+
+    mode: CameraPhotoMode
+    media: Media
+    shots: list[float]
+    """When the next ones are due; a lapse knows only one ahead."""
+    kinds: tuple[Kind, ...]
+    interval: float = 0.0
+    taken: list[tuple[int, Scene, str]] = field(default_factory=list)
+    """Shots that are not on the card yet: number, scene, date."""
+    count: int = 0
+    saved_at: float = math.inf
+    last: tuple[float, float] | None = None
+    """Where a GPS lapse took its last shot: m north, east."""
+    next_report: float = 0.0
+    told_at: float = -math.inf
+    result: Message | None = None
+    """The last thing told of its progress."""
+
+    @property
+    def lapse(self) -> bool:
+        return self.mode in (CameraPhotoMode.TIME_LAPSE, CameraPhotoMode.GPS_LAPSE)
+
+
+@dataclass
+class _Take:
+    """A recording that is going on."""
+
+    media: Media
+    scene: Scene
+    began: float
+    milliseconds: int
+    scale: float
+    """s of video per s of recording."""
+
+
+class Capture:
+    """One camera at work."""
+
+    def __init__(self, camera: Camera, studio: Studio) -> None:
+        self.camera = camera
+        self._id = camera.id
+        self._studio = studio
+        self._shoot: _Shoot | None = None
+        self._take: _Take | None = None
+
+    @property
+    def shooting(self) -> bool:
+        return self._shoot is not None
+
+    @property
+    def recording(self) -> bool:
+        return self._take is not None
+
+    @property
+    def busy(self) -> bool:
+        return self.shooting or self.recording
+
+    # -- photos
+
+    def take_photo(self, time: float) -> Iterable[Message]:
+        if not self._ready(CameraCameraMode.PHOTO) or self.busy:
+            yield self._photo(PhotoResult.ERROR_BAD_STATE)
+            yield self.photo_state()
+            return
+        if self._studio.place.free < LEAST_ROOM:
+            yield self._photo(PhotoResult.ERROR_NO_STORAGE_SPACE)
+            yield self.photo_state()
+            return
+        settings = self.camera
+        mode, first = settings.photo_mode, time + SHOT_TIME
+        shots = [first]
+        if mode is CameraPhotoMode.BURST:
+            count, seconds = _BURSTS[settings.burst]
+            shots = [time + seconds * number / count for number in range(1, count + 1)]
+        elif mode is CameraPhotoMode.BRACKETING:
+            shots = [first + SHOT_TIME * number for number in range(_BRACKETS[settings.bracketing])]
+        media = self._studio.media.begin(
+            video=False, mode=_PHOTO_MODES[mode], date=self._date(time), thermal=settings.id > 0
+        )
+        self._shoot = _Shoot(mode, media, shots, _KINDS[settings.photo_file], settings.interval)
+        self._shoot.next_report = time + LAPSE_REPORT
+        yield self.photo_state()
+        yield self._tell(self._shoot, PhotoResult.TAKING_PHOTO, time)
+
+    def stop_photo(self, time: float) -> Iterable[Message]:
+        shoot = self._shoot
+        if shoot is None or not shoot.lapse:
+            yield self._photo(PhotoResult.ERROR_BAD_STATE)
+            yield self.photo_state()
+            return
+        if shoot.count == 0:
+            yield from self._press(shoot, time)
+        if shoot.taken:
+            yield from self._save(shoot, time)
+        elif shoot.result is not None:
+            yield shoot.result
+        if self._shoot is not None:
+            self._shoot = None
+            yield self.photo_state()
+
+    def _advance_photo(self, shoot: _Shoot, time: float) -> Iterable[Message]:
+        if shoot.mode is CameraPhotoMode.GPS_LAPSE and not shoot.shots and self._way(shoot) >= shoot.interval:
+            shoot.shots.append(time)
+        while shoot.shots and time >= shoot.shots[0]:
+            yield from self._press(shoot, shoot.shots.pop(0))
+        if time >= shoot.saved_at:
+            yield from self._save(shoot, time)
+        if self._shoot is shoot and shoot.lapse and time >= shoot.next_report:
+            shoot.next_report = max(shoot.next_report + LAPSE_REPORT, time)
+            yield camera.NextPhotoDelay(shoot.mode, self._left(shoot, time))
+
+    def _press(self, shoot: _Shoot, time: float) -> Iterable[Message]:
+        """A shot."""
+        shoot.count += 1
+        scene = self._studio.scene()
+        shoot.taken.append((shoot.count, scene, self._date(time)))
+        shoot.last = (scene.north, scene.east)
+        if shoot.mode is CameraPhotoMode.TIME_LAPSE and not shoot.shots:
+            shoot.shots.append(time + shoot.interval)
+        last = not shoot.shots or shoot.lapse
+        if last:
+            shoot.saved_at = time + SAVE_TIME
+        told = shoot.mode is CameraPhotoMode.BURST and time >= shoot.told_at + BURST_REPORT - 1e-9
+        if last or told:
+            yield self._tell(shoot, PhotoResult.PHOTO_TAKEN, time)
+
+    def _save(self, shoot: _Shoot, time: float) -> Iterable[Message]:
+        """Write what was taken."""
+        shoot.saved_at = math.inf
+        media, room = self._studio.media, self._studio.place.free
+        written: list[Resource] = []
+        full = shoot.count >= MAX_RESOURCES
+        for number, scene, date in shoot.taken:
+            files = [media.develop(shoot.media, kind, number, scene, date) for kind in shoot.kinds]
+            size = sum(file.size for file in files)
+            if size > room:
+                full = True
+                break
+            room -= size
+            written += files
+        shoot.taken.clear()
+        if written:
+            media.add(shoot.media, written)
+        if full:
+            self._shoot = None
+            yield self._photo(PhotoResult.ERROR_NO_STORAGE_SPACE)
+            yield self.photo_state()
+            return
+        yield self._tell(shoot, PhotoResult.PHOTO_SAVED, time)
+        if not shoot.lapse:
+            self._shoot = None
+            yield self.photo_state()
+
+    def _way(self, shoot: _Shoot) -> float:
+        """m since the last shot."""
+        if shoot.last is None:
+            return 0.0
+        scene = self._studio.scene()
+        return math.hypot(scene.north - shoot.last[0], scene.east - shoot.last[1])
+
+    def _left(self, shoot: _Shoot, time: float) -> float:
+        """s or m to the next shot."""
+        if shoot.mode is CameraPhotoMode.GPS_LAPSE:
+            return max(0.0, shoot.interval - self._way(shoot))
+        return max(0.0, shoot.shots[0] - time)
+
+    def _tell(self, shoot: _Shoot, result: PhotoResult, time: float) -> Message:
+        shoot.told_at = time
+        shoot.result = self._photo(
+            result,
+            shoot.count & 0xFF if result is PhotoResult.PHOTO_TAKEN else 0,
+            shoot.media.id if result is PhotoResult.PHOTO_SAVED else "",
+        )
+        return shoot.result
+
+    # -- recordings
+
+    def start_recording(self, time: float) -> Iterable[Message]:
+        if self._take is not None or not self._ready(CameraCameraMode.RECORDING) or not self.camera.lens.recordings:
+            yield self._recording(RecordingResult.ERROR_BAD_STATE)
+            yield self.recording_state()
+            return
+        if self._studio.place.free < LEAST_ROOM:
+            yield self._recording(RecordingResult.STOPPED_NO_STORAGE_SPACE)
+            yield self.recording_state()
+            return
+        settings, studio = self.camera, self._studio
+        scale = 1.0
+        if settings.recording_mode is CameraRecordingMode.HYPERLAPSE:
+            scale = 1.0 / _RATIOS[settings.hyperlapse]
+        elif settings.recording_mode is CameraRecordingMode.SLOW_MOTION:
+            scale = _RATES.get(settings.framerate, _PLAYED_AT) / _PLAYED_AT
+        media = studio.media.begin(
+            video=True, mode=settings.recording_mode.name, date=self._date(time), thermal=settings.id > 0
+        )
+        self._take = _Take(media, studio.scene(), time, studio.calendar.milliseconds(time), scale)
+        yield self._recording(RecordingResult.STARTED)
+        yield self.recording_state()
+
+    def stop_recording(self, time: float, result: RecordingResult = RecordingResult.STOPPED) -> Iterable[Message]:
+        take = self._take
+        if take is None:
+            yield self._recording(RecordingResult.ERROR_BAD_STATE)
+            yield self.recording_state()
+            return
+        self._take = None
+        studio = self._studio
+        studio.place.reserved = 0
+        seconds = (time - take.began) * take.scale
+        if picture.mp4_size(take.scene, seconds) > studio.place.free:
+            seconds, result = self._fitting(take), RecordingResult.STOPPED_NO_STORAGE_SPACE
+        name = ""
+        if seconds >= 0.0:
+            file = studio.media.develop(take.media, Kind.MP4, 1, take.scene, take.media.date, seconds)
+            studio.media.add(take.media, [file])
+            name = take.media.id
+        yield self._recording(result, name)
+        yield self.recording_state()
+
+    def _advance_recording(self, take: _Take, time: float) -> Iterable[Message]:
+        place = self._studio.place
+        place.reserved = 0
+        size = picture.mp4_size(take.scene, (time - take.began) * take.scale)
+        if size > place.free:
+            yield from self.stop_recording(time, RecordingResult.STOPPED_NO_STORAGE_SPACE)
+        else:
+            place.reserved = size
+
+    def _fitting(self, take: _Take) -> float:
+        """Seconds of video for which there is room; less than 0 if there is none at all."""
+        one = picture.mp4_size(take.scene, picture.FRAME_TIME)
+        frame = picture.mp4_size(take.scene, 2 * picture.FRAME_TIME) - one
+        return picture.FRAME_TIME * (1 + (self._studio.place.free - one) // frame)
+
+    # -- both
+
+    def tick(self, time: float) -> Iterable[Message]:
+        """What has come due by now (s)."""
+        if self._shoot is not None:
+            yield from self._advance_photo(self._shoot, time)
+        if self._take is not None:
+            yield from self._advance_recording(self._take, time)
+
+    def interrupt(self, time: float) -> Iterable[Message]:
+        """Something else is set up: a recording ends, photos that are not saved are lost."""
+        if self._take is not None:
+            yield from self.stop_recording(time, RecordingResult.STOPPED_RECONFIGURED)
+        if self._shoot is not None:
+            self._shoot = None
+            yield self._photo(PhotoResult.ERROR)
+            yield self.photo_state()
+
+    def states(self) -> list[Message]:
+        return [self.photo_state(), self.recording_state()]
+
+    def photo_state(self) -> Message:
+        state = State.ACTIVE if self.shooting else State.INACTIVE
+        return camera.PhotoState(self._id, self._available(CameraCameraMode.PHOTO), state)
+
+    def recording_state(self) -> Message:
+        take = self._take
+        available = self._available(CameraCameraMode.RECORDING)
+        if take is None:
+            return camera.RecordingState(self._id, available, State.INACTIVE, 0)
+        return camera.RecordingState(self._id, available, State.ACTIVE, take.milliseconds)
+
+    def _available(self, mode: CameraCameraMode) -> Availability:
+        return Availability.AVAILABLE if self._ready(mode) else Availability.NOT_AVAILABLE
+
+    def _ready(self, mode: CameraCameraMode) -> bool:
+        settings = self.camera
+        return settings.active and settings.mode is mode and not self._studio.place.formatting
+
+    def _photo(self, result: PhotoResult, count: int = 0, media_id: str = "") -> Message:
+        return camera.PhotoProgress(self._id, result, count, media_id)
+
+    def _recording(self, result: RecordingResult, media_id: str = "") -> Message:
+        return camera.RecordingProgress(self._id, result, media_id)
+
+    def _date(self, time: float) -> str:
+        return self._studio.calendar.date(time)

@@ -1,0 +1,69 @@
+"""What the drone carries: cameras, thermal settings, the card and what is on it, the calendar that dates it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from anafi_mav.arsdk.messages.thermal import ThermalMode
+from anafi_mav.arsdk.wire import Message
+from anafi_mav.sim.calendar import Calendar
+from anafi_mav.sim.cameras import Cameras
+from anafi_mav.sim.capture import Studio
+from anafi_mav.sim.media import MediaStore
+from anafi_mav.sim.model import Model
+from anafi_mav.sim.picture import Scene
+from anafi_mav.sim.storage import Storage
+from anafi_mav.sim.thermal import Thermal
+
+
+class Payload:
+    """One drone's. `scene` says what its camera sees."""
+
+    def __init__(self, model: Model, run_id: str, emit: Callable[[Message], None], scene: Callable[[], Scene]) -> None:
+        self.calendar = Calendar()
+        self.media = MediaStore(run_id, model.title, len(model.cards) - 1, emit)
+        self.storage = Storage(model, self.media)
+        self.cameras = Cameras(model, Studio(self.media, self.storage.place, self.calendar, scene))
+        self.storage.place.busy = lambda: self.cameras.busy
+        self.thermal = Thermal(self._on_thermal_mode) if model.thermal else None
+        self._time = 0.0
+
+    def handle(self, message: Message, time: float) -> list[Message] | None:
+        """The answer to a command; None when it is not for the payload."""
+        self._time = time
+        answer = self.cameras.handle(message, time)
+        if answer is None and self.thermal is not None:
+            answer = self.thermal.handle(message)
+        if answer is None:
+            formatting = self.storage.place.formatting
+            answer = self.storage.handle(message, time)
+            if answer is not None and self.storage.place.formatting != formatting:
+                answer += self.cameras.states_changed()
+        return answer
+
+    def tick(self, time: float, flying: bool) -> list[Message]:
+        """What has come due by now (s)."""
+        self._time = time
+        formatting = self.storage.place.formatting
+        messages = self.cameras.tick(time, flying)
+        messages += self.storage.tick(time)
+        self.media.tick(time)
+        if self.storage.place.formatting != formatting:
+            messages += self.cameras.states_changed()
+        return messages
+
+    def telemetry(self) -> list[Message]:
+        """What is told five times a second."""
+        return self.cameras.telemetry()
+
+    def states_report(self) -> list[Message]:
+        """What AllStates tells of all of it."""
+        return [
+            *self.cameras.states_report(),
+            *(() if self.thermal is None else self.thermal.states_report()),
+            *self.storage.states_report(),
+            *self.media.states_report(),
+        ]
+
+    def _on_thermal_mode(self, mode: ThermalMode) -> list[Message]:
+        return list(self.cameras.activate(mode, self._time))
