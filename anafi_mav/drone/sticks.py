@@ -26,8 +26,9 @@ HOLD_LIMIT = 0.5
 the worst that can happen, so the layer nearest to the drone ends it, whatever those above forgot."""
 
 MIN_SPACING = 0.02
-"""s between two PCMDs, however often the sticks move: a drone that takes them every 50 ms gains nothing from more, and
-the radio loses. The newest position waits, older ones are never sent."""
+"""s between two PCMDs on average, however often the sticks move: a drone that takes them every 50 ms gains nothing from
+more, and the radio loses. Two may follow each other closely, so that a setpoint need not wait because a correction of
+the heading has just left; then the newest position waits, older ones are never sent."""
 
 
 class PilotingCommand(msgspec.Struct, frozen=True):
@@ -86,7 +87,7 @@ def _share(value: float, limit: float) -> int:
 class Sticks:
     """When to send which stick position. `deadline` says when `due` has something, `due` hands it out once."""
 
-    __slots__ = ("_expires", "_next", "_position", "_remaining", "_sent", "_seq")
+    __slots__ = ("_expires", "_next", "_paid_until", "_position", "_remaining", "_seq")
 
     def __init__(self) -> None:
         self._position = CENTRED
@@ -94,7 +95,8 @@ class Sticks:
         """PCMDs still to come; None: until further notice."""
         self._next = 0.0
         self._expires = 0.0
-        self._sent = -math.inf
+        self._paid_until = -math.inf
+        """When the PCMDs sent so far would all have had their `MIN_SPACING`."""
         self._seq = 0
 
     @property
@@ -110,11 +112,12 @@ class Sticks:
     def command(self, position: Percent, now: float) -> None:
         """Hold this position, for `HOLD_LIMIT` unless it is renewed; then the sticks centre."""
         self._position, self._remaining, self._expires = position, None, now + HOLD_LIMIT
-        self._next = max(now, self._sent + MIN_SPACING)
+        self._next = max(now, self._paid_until - MIN_SPACING)
 
     def centre(self, now: float) -> None:
         """Let go: centred from now on, for two seconds."""
-        self._position, self._remaining, self._next = CENTRED, CENTRED_REPEATS, max(now, self._sent + MIN_SPACING)
+        self._position, self._remaining = CENTRED, CENTRED_REPEATS
+        self._next = max(now, self._paid_until - MIN_SPACING)
 
     def stop(self) -> None:
         """Send nothing any more."""
@@ -133,7 +136,7 @@ class Sticks:
         if self._remaining is not None:
             self._remaining -= 1
         self._next = self._next + PERIOD if now - self._next < PERIOD else now + PERIOD
-        self._sent = now
+        self._paid_until = max(self._paid_until, now) + MIN_SPACING
         return PCMD(1, *self._position, self._stamp(now))
 
     def released(self, now: float) -> PCMD:
