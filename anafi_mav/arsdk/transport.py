@@ -7,8 +7,11 @@ Rules (arsdk-ng libarsdk/src/cmd_itf/arsdk_cmd_itf{1,2,3}.c and arsdk_transport.
 
 - an acknowledged queue is stop-and-wait: one frame is in flight and is repeated with its sequence number until it
   is acknowledged; versions 2 and 3 repeat for ever, in version 1 a controller gives up after five repetitions;
-- a receiver takes a frame when its sequence number is above the last one, or more than ten below it (a wrap, or a
-  peer that began anew); it acknowledges duplicates too, since it is the acknowledgement that got lost;
+- a receiver takes an unacknowledged frame when its sequence number is above the last one, or more than ten below it (a
+  wrap, or a peer that began anew). DEVIATION: libarsdk has the same rule for acknowledged frames, and so takes a copy
+  that is eleven frames late, or from before a wrap, for a new one; here the numbers of acknowledged frames, of which
+  one is in flight, are compared around the wrap and what is behind is a copy. A copy is acknowledged too, since it is
+  the acknowledgement that got lost;
 - a side that has received nothing for a while pings; three pings without any answer end the link.
 """
 
@@ -194,7 +197,7 @@ class Transport:
             if id in self._received_ids and type != _ACK:
                 if type == _WITHACK:
                     self._acknowledge(id, seq)
-                if -10 <= seq - self._last_seq[id] <= 0:
+                if self._is_copy(type, seq, self._last_seq[id]):
                     self.counters["duplicate"] += 1
                     continue
                 self._last_seq[id] = seq
@@ -212,6 +215,11 @@ class Transport:
         if garbage is not None:
             self._garbage(garbage, events)
         return events
+
+    def _is_copy(self, type: int, seq: int, last: int) -> bool:
+        if type == _WITHACK:
+            return (last - seq) & self._seq_mask <= self._seq_mask >> 1
+        return -10 <= seq - last <= 0
 
     def _command(self, data: bytes, events: list[Event]) -> None:
         message = wire.decode(data)

@@ -139,28 +139,37 @@ def test_emergency_does_not_cut_a_split_command() -> None:
 
 
 @pytest.mark.parametrize(
-    ("version", "last", "seq", "taken"),
+    ("type", "version", "earlier", "seq", "taken"),
     [
-        (3, 0xFFFF, 0, True),  # the first frame
-        (3, 20, 21, True),
-        (3, 20, 25, True),  # frames were lost
-        (3, 20, 20, False),  # a repetition
-        (3, 20, 10, False),  # ten below: late
-        (3, 20, 9, True),  # eleven below: the peer began anew
-        (3, 65530, 2, True),  # wrapped
-        (1, 0xFF, 0, True),
-        (1, 250, 3, True),
-        (1, 250, 245, False),
-        (1, 250, 239, True),
+        (FrameType.NOACK, 3, [], 0, True),  # the first frame
+        (FrameType.NOACK, 3, [20], 21, True),
+        (FrameType.NOACK, 3, [20], 25, True),  # frames were lost
+        (FrameType.NOACK, 3, [20], 20, False),  # a repetition
+        (FrameType.NOACK, 3, [20], 10, False),  # ten below: late
+        (FrameType.NOACK, 3, [20], 9, True),  # eleven below: the peer began anew
+        (FrameType.NOACK, 3, [100, 65530], 2, True),  # wrapped
+        (FrameType.NOACK, 1, [], 0, True),
+        (FrameType.NOACK, 1, [100, 250], 3, True),
+        (FrameType.NOACK, 1, [100, 250], 245, False),
+        (FrameType.NOACK, 1, [100, 250], 239, True),
+        (FrameType.WITHACK, 3, [], 0, True),
+        (FrameType.WITHACK, 3, [20], 21, True),
+        (FrameType.WITHACK, 3, [20], 25, True),  # a peer that speaks version 1 gives some up
+        (FrameType.WITHACK, 3, [20], 20, False),
+        (FrameType.WITHACK, 3, [2000], 9, False),  # however late, it is a copy
+        (FrameType.WITHACK, 3, [20000, 40000, 65530], 2, True),
+        (FrameType.WITHACK, 3, [20000, 40000, 65530, 2], 65530, False),  # a copy from before the wrap
+        (FrameType.WITHACK, 1, [], 0, True),
+        (FrameType.WITHACK, 1, [100, 200, 250], 3, True),
+        (FrameType.WITHACK, 1, [100, 200, 250, 3], 250, False),
+        (FrameType.WITHACK, 1, [100, 200], 80, False),
     ],
 )
-@pytest.mark.parametrize("type", [FrameType.WITHACK, FrameType.NOACK])
-def test_sequence_window(version: int, last: int, seq: int, taken: bool, type: FrameType) -> None:
+def test_sequence_window(type: FrameType, version: int, earlier: list[int], seq: int, taken: bool) -> None:
     transport = Transport(Role.CONTROLLER, version, 0.0)
-    if seq != 0:
-        for earlier in (100, last):
-            assert messages(transport.receive(data_frame(version, 126, earlier, HOVERING, type), 0.0)) == [HOVERING]
-        transport.outgoing(0.0)
+    for number in earlier:
+        assert messages(transport.receive(data_frame(version, 126, number, HOVERING, type), 0.0)) == [HOVERING]
+    transport.outgoing(0.0)
     got = messages(transport.receive(data_frame(version, 126, seq, HOVERING, type), 0.0))
     assert got == ([HOVERING] if taken else [])
     assert transport.counters["duplicate"] == (not taken)
