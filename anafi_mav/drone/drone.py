@@ -70,7 +70,7 @@ class Drone:
         self.battery = Battery()
         self.calibration = Calibration()
         self.gps = Gps()
-        self.home = Home()
+        self.home = Home(self._commander)
         self.link = Link()
         self.product = Product()
         self.piloting = Piloting(self._commander, self.home, self.takeoff_blockers)

@@ -7,6 +7,7 @@ field names say which; they are converted where they meet MAVLink.
 
 from __future__ import annotations
 
+import enum
 import math
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, Generic, TypeAlias, TypeVar
@@ -19,6 +20,7 @@ from anafi_mav.arsdk.wire import Message
 StateT = TypeVar("StateT")
 KeyT = TypeVar("KeyT")
 ValueT = TypeVar("ValueT")
+EnumT = TypeVar("EnumT", bound=enum.IntEnum)
 
 MAX_ITEMS = 64
 """Items kept of a map that the drone reports. The longest we declare has 25 keys; more is a confused peer."""
@@ -82,6 +84,11 @@ def position(latitude: float, longitude: float, altitude: float) -> Position | N
     if not (-90.0 <= latitude <= 90.0 and -180.0 <= longitude <= 180.0 and math.isfinite(altitude)):
         return None
     return Position(latitude, longitude, altitude)
+
+
+def members(bits: int, names: type[EnumT]) -> frozenset[EnumT]:
+    """The values whose bit is set; bits that we have no name for are left out."""
+    return frozenset(value for value in names if bits >> value & 1)
 
 
 def with_item(items: Mapping[KeyT, ValueT] | None, key: KeyT, value: ValueT, flags: int) -> dict[KeyT, ValueT]:

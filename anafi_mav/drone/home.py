@@ -1,16 +1,23 @@
-"""Element home: where home is, and how and why the drone flies there."""
+"""Element home: where home is, and how and why the drone flies there.
+
+The verbs that fly home are in `piloting`; those here change what a return does. Each returns what the drone confirms.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import ClassVar
 
 import msgspec
 from msgspec.structs import replace
 
-from anafi_mav.arsdk.messages import ardrone3, rth
+from anafi_mav.arsdk.messages import ardrone3, precise_home, rth
+from anafi_mav.arsdk.messages.precise_home import PreciseHomeMode, PreciseHomeState
 from anafi_mav.arsdk.messages.rth import (
     AutoTriggerReason,
+    Indicator,
+    RthAutoTriggerMode,
     RthEndingBehavior,
     RthHomeReachability,
     RthHomeType,
@@ -18,7 +25,13 @@ from anafi_mav.arsdk.messages.rth import (
     StateReason,
 )
 from anafi_mav.arsdk.wire import Message
-from anafi_mav.drone.element import Element, Position, Range, Reducer, position, setting
+from anafi_mav.drone.element import Position, Range, Reducer, members, position, setting
+from anafi_mav.drone.expectation import ANSWER_TIMEOUT
+from anafi_mav.drone.settings import Commanding
+from anafi_mav.errors import LocalProtocolError, NotSupported
+
+_SAME_PLACE_DEG = 1e-7
+"""About a centimetre: an echo that went through single precision is further off than that."""
 
 _RETURNING = (RthState.IN_PROGRESS, RthState.PENDING)
 _ASKED_FOR = (StateReason.USER_REQUEST, StateReason.FLIGHTPLAN)
@@ -54,6 +67,18 @@ class HomeState(msgspec.Struct, frozen=True):
     """Height at which a return that ends in hovering stays, m above ground."""
     delay_s: int | None = None
     """Seconds between the loss of the link and the return."""
+    delay_range_s: tuple[int, int] | None = None
+    """The shortest and the longest it can be."""
+    types: frozenset[RthHomeType] | None = None
+    """The kinds that can be preferred."""
+    by_itself: bool | None = None
+    """May the drone return by itself when its battery runs low?"""
+    missing: frozenset[Indicator] | None = None
+    """What a return lacks; empty = available. Ai only."""
+    precise_mode: PreciseHomeMode | None = None
+    """Does a return look for the picture of the take-off place?"""
+    precise: PreciseHomeState | None = None
+    precise_modes: frozenset[PreciseHomeMode] | None = None
 
     @property
     def returning(self) -> bool:
@@ -74,7 +99,7 @@ def _auto_trigger(state: HomeState, message: rth.RthAutoTrigger) -> HomeState:
     return replace(state, auto_trigger=message.reason, auto_trigger_delay_s=message.delay if planned else None)
 
 
-class Home(Element[HomeState]):
+class Home(Commanding[HomeState]):
     NOTHING = HomeState()
     REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = {
         ardrone3.HomeChanged: lambda state, message: replace(
@@ -98,5 +123,94 @@ class Home(Element[HomeState]):
         rth.MinAltitude: lambda state, message: replace(state, min_altitude=setting(message)),
         rth.EndingBehavior: lambda state, message: replace(state, ending=message.ending_behavior),
         rth.EndingHoveringAltitude: lambda state, message: replace(state, ending_altitude=setting(message)),
-        rth.Delay: lambda state, message: replace(state, delay_s=message.delay),
+        rth.Delay: lambda state, message: replace(
+            state, delay_s=message.delay, delay_range_s=(message.min, message.max)
+        ),
+        rth.HomeTypeCapabilities: lambda state, message: replace(state, types=members(message.values, RthHomeType)),
+        rth.AutoTriggerMode: lambda state, message: replace(state, by_itself=message.mode == RthAutoTriggerMode.ON),
+        rth.Info: lambda state, message: replace(state, missing=members(message.missing_inputs, Indicator)),
+        precise_home.Mode: lambda state, message: replace(state, precise_mode=message.mode),
+        precise_home.State: lambda state, message: replace(state, precise=message.state),
+        precise_home.Capabilities: lambda state, message: replace(
+            state, precise_modes=members(message.modes, PreciseHomeMode)
+        ),
     }
+
+    async def set_min_altitude(self, metres: float) -> float:
+        """Height above take-off that a return climbs to first."""
+        return await self._set(rth.SetMinAltitude(metres), rth.MinAltitude, self.state.min_altitude)
+
+    async def set_ending(self, ending: RthEndingBehavior) -> RthEndingBehavior:
+        """Whether a return ends in landing or in hovering."""
+        self._require(self.state.ending, rth.SetEndingBehavior.NAME)
+        return await self._change(
+            rth.SetEndingBehavior(ending),
+            rth.EndingBehavior,
+            lambda message: RthEndingBehavior(message.ending_behavior),
+        )
+
+    async def set_ending_altitude(self, metres: float) -> float:
+        """Height above ground at which a return that ends in hovering stays."""
+        return await self._set(
+            rth.SetEndingHoveringAltitude(metres), rth.EndingHoveringAltitude, self.state.ending_altitude
+        )
+
+    async def set_delay(self, seconds: int) -> int:
+        """Seconds between the loss of the link and the return."""
+        self._require(self.state.delay_s, rth.SetDelay.NAME)
+        return await self._change(rth.SetDelay(seconds), rth.Delay, lambda message: int(message.delay))
+
+    async def set_by_itself(self, allowed: bool) -> bool:
+        """Whether the drone returns by itself when its battery runs low."""
+        self._require(self.state.by_itself, rth.SetAutoTriggerMode.NAME)
+        return await self._change(
+            rth.SetAutoTriggerMode(RthAutoTriggerMode.ON if allowed else RthAutoTriggerMode.OFF),
+            rth.AutoTriggerMode,
+            lambda message: message.mode == RthAutoTriggerMode.ON,
+        )
+
+    async def set_preferred_type(self, kind: RthHomeType) -> RthHomeType:
+        """Which kind of home to fly to when it is known; `HomeState.type` is the one the drone would use now.
+
+        Raises `NotSupported` for a kind that this drone does not have.
+        """
+        self._require(self.state.preferred_type, rth.SetPreferredHomeType.NAME)
+        if self.state.types is not None and kind not in self.state.types:
+            raise NotSupported(f"home of type {kind.name.lower()}")
+        return await self._change(
+            rth.SetPreferredHomeType(kind), rth.PreferredHomeType, lambda message: RthHomeType(message.type)
+        )
+
+    async def set_custom_location(
+        self, latitude: float, longitude: float, altitude: float, timeout: float = ANSWER_TIMEOUT
+    ) -> Position:
+        """Choose a place (deg, deg, m above take-off) for homes of type custom.
+
+        The drone flies there only while `preferred_type` is CUSTOM. One that does not accept the place (it is too far
+        away, or the drone does not know where it is itself) says nothing: `CommandTimeout`.
+        """
+        wanted = position(latitude, longitude, altitude)
+        if wanted is None:
+            raise LocalProtocolError(f"no place on earth: {latitude}, {longitude}, {altitude}")
+        self._require(self.state.types, rth.SetCustomLocation.NAME)
+        if self.state.types is not None and RthHomeType.CUSTOM not in self.state.types:
+            raise NotSupported("home of type custom")
+
+        def judge(message: rth.CustomLocation) -> Position | None:
+            same = math.isclose(message.latitude, latitude, rel_tol=0.0, abs_tol=_SAME_PLACE_DEG) and math.isclose(
+                message.longitude, longitude, rel_tol=0.0, abs_tol=_SAME_PLACE_DEG
+            )
+            return position(message.latitude, message.longitude, message.altitude) if same else None
+
+        return await self._change(
+            rth.SetCustomLocation(latitude, longitude, altitude), rth.CustomLocation, judge, timeout
+        )
+
+    async def set_precise(self, on: bool) -> bool:
+        """Whether a return looks for the picture of the take-off place."""
+        self._require(self.state.precise_mode, precise_home.SetMode.NAME)
+        return await self._change(
+            precise_home.SetMode(PreciseHomeMode.STANDARD if on else PreciseHomeMode.DISABLED),
+            precise_home.Mode,
+            lambda message: message.mode == PreciseHomeMode.STANDARD,
+        )

@@ -21,11 +21,12 @@ from anafi_mav.arsdk.messages.common import PlayingState
 from anafi_mav.arsdk.messages.rth import RthState
 from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone.alerts import spoken
-from anafi_mav.drone.element import Element, Position, Range, Reducer
+from anafi_mav.drone.element import Position, Reducer
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander
 from anafi_mav.drone.home import Home
 from anafi_mav.drone.moves import Displacement, Move, MoveEnd, Moves
-from anafi_mav.drone.piloting_state import REDUCERS, PilotingState
+from anafi_mav.drone.piloting_settings import PilotingSettings
+from anafi_mav.drone.piloting_state import MOTORS_OFF, REDUCERS, PilotingState
 from anafi_mav.drone.sticks import Limits, PilotingCommand, Sticks, percent
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost, LocalProtocolError, NotSupported
 from anafi_mav.units import wrap_360
@@ -56,15 +57,14 @@ _IN_FLIGHT = frozenset({FlyingState.HOVERING, FlyingState.FLYING})
 _MOTORS_CUT = frozenset({FlyingState.EMERGENCY, FlyingState.LANDED})
 
 
-class Piloting(Element[PilotingState]):
+class Piloting(PilotingSettings):
     """Takes off, lands, moves, returns, hovers. `pilot` and `hover` act at once; all others are coroutines."""
 
     NOTHING = PilotingState()
     REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = REDUCERS
 
     def __init__(self, commander: Commander, home: Home, takeoff_blockers: Callable[[], list[str]]) -> None:
-        super().__init__()
-        self._commander = commander
+        super().__init__(commander)
         self._home = home
         self._takeoff_blockers = takeoff_blockers
         self._moves = Moves(home)
@@ -73,7 +73,6 @@ class Piloting(Element[PilotingState]):
         self._landings_asked = 0
         self._takeoffs_asked = 0
         self._may_take_off_until = -math.inf
-        self._setting_locks: dict[type[Message], asyncio.Lock] = {}
 
     def reset(self) -> None:
         super().reset()
@@ -170,6 +169,53 @@ class Piloting(Element[PilotingState]):
             raise
         finally:
             self._takeoffs_asked -= 1
+
+    async def hand_launch(self, timeout: float = ANSWER_TIMEOUT) -> None:
+        """Motors idle, for a drone that is thrown or let go by a hand; returns when it waits for that.
+
+        Refused as a take-off is. It flies as soon as it leaves the hand; `cancel_hand_launch` ends the wait.
+        """
+        self._require_link()
+        flying = self.state.flying
+        if flying == FlyingState.USERTAKEOFF:
+            return
+        if flying != FlyingState.LANDED:
+            raise CommandRejected(f"the drone is in the state {spoken(flying)}" if flying is not None else "no state")
+        self._silence_sticks()
+
+        def judge(message: ardrone3.FlyingStateChanged) -> bool | AnafiMavError | None:
+            if message.state == FlyingState.USERTAKEOFF or message.state in _TAKEN_OFF:
+                return True
+            if message.state == FlyingState.MOTOR_RAMPING:
+                answer.expire_after(RAMPING_TIMEOUT, CommandTimeout(ardrone3.UserTakeOff.NAME, RAMPING_TIMEOUT))
+            elif message.state in _MOTORS_CUT:
+                return CommandRejected(self._why_on_the_ground("the motors stopped again"))
+            return None
+
+        answer = self._commander.expect((ardrone3.FlyingStateChanged,), judge)
+        self._commander.dispatch(answer, ardrone3.UserTakeOff(1), timeout)
+        try:
+            await answer.wait()
+        except BaseException as error:
+            # Given up: the motors of a drone that somebody holds must not start a moment later.
+            self._send_if_connected(ardrone3.UserTakeOff(0))
+            if isinstance(error, CommandTimeout) and (reasons := self._why_on_the_ground("")):
+                raise CommandRejected(reasons) from None
+            raise
+
+    async def cancel_hand_launch(self, timeout: float = ANSWER_TIMEOUT) -> None:
+        """Stop the idling motors; returns when they stand, at once when they do already."""
+        self._require_link()
+        if self.state.flying in MOTORS_OFF:
+            return
+        if self.state.in_air:
+            raise CommandRejected("the drone flies")
+        await self._commander.confirm(
+            ardrone3.UserTakeOff(0),
+            (ardrone3.FlyingStateChanged,),
+            lambda message: True if message.state in MOTORS_OFF else None,
+            timeout,
+        )
 
     def _why_on_the_ground(self, otherwise: str) -> str:
         return ", ".join(self._takeoff_blockers()) or otherwise
@@ -505,49 +551,8 @@ class Piloting(Element[PilotingState]):
     # -- settings
 
     async def set_min_altitude(self, metres: float) -> float:
-        """Height above take-off that a return climbs to first. Returns what the drone made of it, like all `set_`."""
-        return await self._set(rth.SetMinAltitude(metres), rth.MinAltitude, self._home.state.min_altitude)
-
-    async def set_max_tilt(self, degrees: float) -> float:
-        return await self._set(ardrone3.MaxTilt(degrees), ardrone3.MaxTiltChanged, self.state.max_tilt)
-
-    async def set_max_altitude(self, metres: float) -> float:
-        """Ceiling above take-off."""
-        return await self._set(ardrone3.MaxAltitude(metres), ardrone3.MaxAltitudeChanged, self.state.max_altitude)
-
-    async def set_max_distance(self, metres: float) -> float:
-        """Radius of the geofence."""
-        return await self._set(ardrone3.MaxDistance(metres), ardrone3.MaxDistanceChanged, self.state.max_distance)
-
-    async def set_max_vertical_speed(self, metres_per_second: float) -> float:
-        return await self._set(
-            ardrone3.MaxVerticalSpeed(metres_per_second),
-            ardrone3.MaxVerticalSpeedChanged,
-            self.state.max_vertical_speed,
-        )
-
-    async def set_max_rotation_speed(self, degrees_per_second: float) -> float:
-        return await self._set(
-            ardrone3.MaxRotationSpeed(degrees_per_second),
-            ardrone3.MaxRotationSpeedChanged,
-            self.state.max_rotation_speed,
-        )
-
-    async def _set(self, command: Message, answer: type[Message], reported: Range | None) -> float:
-        """Change a setting and return the value the drone confirms, which it may have clamped to its range.
-
-        A setting that the drone did not report when it connected does not exist: `NotSupported`.
-        """
-        (value,) = (getattr(command, name) for name in command.__struct_fields__)
-        if not math.isfinite(value):
-            raise LocalProtocolError(f"{command.NAME}: the value is not a number")
-        if reported is None:
-            raise NotSupported(command.NAME)
-        # One at a time: the answers of two could not be told apart.
-        async with self._setting_locks.setdefault(answer, asyncio.Lock()):
-            return await self._commander.confirm(
-                command, (answer,), lambda message: float(message.current) if math.isfinite(message.current) else None
-            )
+        """See `Home.set_min_altitude`."""
+        return await self._home.set_min_altitude(metres)
 
     # -- small change
 

@@ -8,11 +8,12 @@ from collections.abc import Mapping
 import msgspec
 from msgspec.structs import replace
 
-from anafi_mav.arsdk.messages import ardrone3, common, move
+from anafi_mav.arsdk.messages import ardrone3, common, move, obstacle_avoidance, piloting_style
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState, Motion, MoveToStatus, PoiStatus
 from anafi_mav.arsdk.messages.common import PlayingState
+from anafi_mav.arsdk.messages.piloting_style import PilotingStyleStyle
 from anafi_mav.arsdk.wire import Message
-from anafi_mav.drone.element import Position, Range, Reducer, finite, position, setting
+from anafi_mav.drone.element import Position, Range, Reducer, finite, members, position, setting
 
 MOTORS_OFF = frozenset({FlyingState.LANDED, FlyingState.EMERGENCY})
 ON_THE_GROUND = MOTORS_OFF | {FlyingState.MOTOR_RAMPING, FlyingState.USERTAKEOFF}
@@ -32,6 +33,14 @@ class Velocity(msgspec.Struct, frozen=True):
     north: float
     east: float
     down: float
+
+
+class Avoidance(msgspec.Struct, frozen=True):
+    """Obstacle avoidance: what was asked for, what it does, what it could do."""
+
+    mode: obstacle_avoidance.Mode
+    state: obstacle_avoidance.State
+    availability: obstacle_avoidance.Availability
 
 
 class PilotingState(msgspec.Struct, frozen=True):
@@ -67,6 +76,15 @@ class PilotingState(msgspec.Struct, frozen=True):
     """m from home; enforced when `geofence` is on."""
     geofence: bool | None = None
     banked_turn: bool | None = None
+    max_horizontal_speed: Range | None = None
+    """m/s; reported by later generations only."""
+    style: PilotingStyleStyle | None = None
+    """What the sticks are relative to."""
+    styles: frozenset[PilotingStyleStyle] | None = None
+    avoidance: Avoidance | None = None
+    """Ai only."""
+    ready_for_hand_launch: bool = False
+    """The motors idle and the drone waits to be thrown or let go."""
 
     @property
     def motors_on(self) -> bool | None:
@@ -97,7 +115,12 @@ def _move_to(state: PilotingState, message: ardrone3.MoveToChanged) -> PilotingS
 
 
 REDUCERS: Mapping[type[Message], Reducer] = {
-    ardrone3.FlyingStateChanged: lambda state, message: replace(state, flying=message.state),
+    ardrone3.FlyingStateChanged: lambda state, message: replace(
+        state,
+        flying=message.state,
+        ready_for_hand_launch=state.ready_for_hand_launch and message.state == FlyingState.USERTAKEOFF,
+    ),
+    ardrone3.UserTakeoffReady: lambda state, message: replace(state, ready_for_hand_launch=True),
     ardrone3.AttitudeChanged: _attitude,
     ardrone3.SpeedChanged: _velocity,
     ardrone3.AltitudeChanged: lambda state, message: replace(state, altitude=finite(message.altitude)),
@@ -115,4 +138,12 @@ REDUCERS: Mapping[type[Message], Reducer] = {
     ardrone3.MaxDistanceChanged: lambda state, message: replace(state, max_distance=setting(message)),
     ardrone3.NoFlyOverMaxDistanceChanged: lambda state, message: replace(state, geofence=message.shouldNotFlyOver != 0),
     ardrone3.BankedTurnChanged: lambda state, message: replace(state, banked_turn=message.state != 0),
+    ardrone3.MaxHorizontalSpeedChanged: lambda state, message: replace(state, max_horizontal_speed=setting(message)),
+    piloting_style.Style: lambda state, message: replace(state, style=message.style),
+    piloting_style.Capabilities: lambda state, message: replace(
+        state, styles=members(message.styles, PilotingStyleStyle)
+    ),
+    obstacle_avoidance.Status: lambda state, message: replace(
+        state, avoidance=Avoidance(message.mode, message.state, message.availability)
+    ),
 }
