@@ -22,6 +22,8 @@ from anafi_mav.sim.model import MODELS
 MAX_COUNT = 254
 """Drones of one process: the hosts of one /24, where their addresses live."""
 
+_UNITS = {"k": 1000, "M": 1000**2, "G": 1000**3}
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `anafi-mav sim`. Their values are checked by `run`, for one clear line each."""
@@ -42,6 +44,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--protocol", metavar="1|2|3", help="offer only this version of Parrot's transport")
     parser.add_argument("--http-port", default="80", metavar="PORT", help="of each drone's web server (%(default)s)")
+    parser.add_argument(
+        "--storage", metavar="SIZE", help="bytes of the memory card, also with k, M or G behind: small ones fill soon"
+    )
     parser.add_argument("--log", type=Path, metavar="FILE", help="write what happens to FILE, one JSON object a line")
     parser.add_argument("--stdin-watch", action="store_true", help="end when stdin closes")
     # For `anafi-mav run`: a JSON object {speed, seed, drones: [{model, address, …}]}, one line on stdin for "-".
@@ -93,6 +98,7 @@ def _from_options(arguments: argparse.Namespace) -> Fleet:
             http_port=_integer("--http-port", arguments.http_port, "a port from 0 to 65535"),
             versions=versions,
             telemetry_rate=_number("--telemetry-rate", arguments.telemetry_rate, "events per second"),
+            storage=None if arguments.storage is None else _size("--storage", arguments.storage),
         )
     except ConfigError as error:
         raise ConfigError(_flag(error.key_path), error.problem) from None
@@ -127,6 +133,11 @@ def _home(text: str) -> tuple[float, float, float]:
     except ValueError:
         raise ConfigError("--home", f"expected LAT,LON,ALT like 48.8789,2.3677,35, got {text!r}") from None
     return latitude, longitude, altitude
+
+
+def _size(flag: str, text: str) -> int:
+    factor = _UNITS.get(text[-1:], 1)
+    return _integer(flag, text if factor == 1 else text[:-1], "a number of bytes like 500k or 16G") * factor
 
 
 def _integer(flag: str, text: str, wanted: str) -> int:

@@ -16,6 +16,10 @@ class Calendar:
         self._base = unix_time
         self._zone = timezone.utc
 
+    def begin(self, unix_time: float) -> None:
+        """It was then at simulated time 0, in UTC: what GPS tells a drone that nobody has told the time."""
+        self._base, self._zone = unix_time, timezone.utc
+
     def set(self, text: str, time: float) -> bool:
         """It is `text` at simulated time `time`. False, and nothing is changed, when that is no date."""
         shape = _SHAPE.fullmatch(text)
@@ -24,10 +28,11 @@ class Calendar:
         stamp, sign, hours, minutes = shape.groups()
         offset = timedelta(hours=int(hours), minutes=int(minutes))
         try:
-            self._zone = timezone(-offset if sign == "-" else offset)
-            moment = datetime.strptime(stamp, "%Y%m%dT%H%M%S").replace(tzinfo=self._zone)
+            zone = timezone(-offset if sign == "-" else offset)
+            moment = datetime.strptime(stamp, "%Y%m%dT%H%M%S").replace(tzinfo=zone)
         except ValueError:
             return False
+        self._zone = zone
         self._base = moment.timestamp() - time
         return True
 

@@ -6,6 +6,7 @@ import ipaddress
 import math
 import os
 import random
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -56,6 +57,8 @@ class DroneSpec:
     """Lowest and highest ARSDK protocol version offered."""
     telemetry_rate: float = RATE
     """Hz of attitude, speed and height."""
+    storage: int | None = None
+    """Bytes of its memory card; None: as large as the model's."""
 
     def __post_init__(self) -> None:
         if self.model not in MODELS:
@@ -76,6 +79,8 @@ class DroneSpec:
             raise ConfigError("versions", f"expected the lowest and the highest of 1 to 3, got {self.versions}")
         if not 0.0 < self.telemetry_rate <= MAX_RATE:
             raise ConfigError("telemetry_rate", f"expected up to {MAX_RATE:g} Hz, got {self.telemetry_rate:g}")
+        if self.storage is not None and not 0 <= self.storage < 1 << 63:
+            raise ConfigError("storage", f"expected a number of bytes, got {self.storage}")
         if self.serial is not None and not 5 <= len(self.serial) <= 32:
             raise ConfigError("serial", f"expected 5 to 32 characters, got {self.serial!r}")
 
@@ -104,6 +109,9 @@ class SimulatedDrone:
         self._clock = clock
         self._body = body
         self.firmware = Firmware(model, identity, body, Origin(*spec.home), self._emit, self._note, self.faults, chance)
+        self.firmware.payload.calendar.begin(time.time())
+        if spec.storage is not None:
+            self.firmware.payload.storage.place.capacity = spec.storage
         self._telemetry = Telemetry(self.firmware, spec.telemetry_rate, phase)
         self._info = DeviceInfo(model.product_id, serial, spec.handshake_port, identity.name)
         self._server: DeviceServer | None = None

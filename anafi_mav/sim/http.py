@@ -47,7 +47,7 @@ class WebServer:
         self._plans = plans
         self._properties = dict(properties)
         self._date = date
-        self._listeners: dict[web.WebSocketResponse, asyncio.Queue[str]] = {}
+        self._listeners: dict[web.WebSocketResponse, tuple[asyncio.Queue[str], asyncio.Transport | None]] = {}
         app = web.Application(client_max_size=MAX_BODY)
         api = "/api/v1"
         app.add_routes(
@@ -160,13 +160,12 @@ class WebServer:
         if not self._listeners:
             return
         text = json.dumps({"name": name, "data": data})
-        for socket, queue in list(self._listeners.items()):
+        for socket, (queue, transport) in list(self._listeners.items()):
             try:
                 queue.put_nowait(text)
             except asyncio.QueueFull:
                 # Who does not read is cut off, and reads everything anew when it comes back.
                 del self._listeners[socket]
-                transport = socket.get_extra_info("transport")
                 if transport is not None:
                     transport.abort()
 
@@ -174,7 +173,7 @@ class WebServer:
         socket = web.WebSocketResponse(heartbeat=30.0, max_msg_size=MAX_WORD)
         await socket.prepare(request)
         queue: asyncio.Queue[str] = asyncio.Queue(MAX_UNREAD)
-        self._listeners[socket] = queue
+        self._listeners[socket] = (queue, request.transport)
         writer = asyncio.create_task(_write(socket, queue))
         try:
             async for _ in socket:

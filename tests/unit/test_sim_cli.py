@@ -147,6 +147,8 @@ async def test_its_log_is_lines_of_json(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
+        (["--storage", "16 gigs"], "--storage: expected a number of bytes like 500k or 16G, got '16 gigs'"),
+        (["--storage", "-1"], "--storage: expected a number of bytes, got -1"),
         (["--model", "bebop"], "--model: expected one of 4k, thermal, usa, ai, got 'bebop'"),
         (["--address", "localhost"], "--address: expected an IPv4 address, got 'localhost'"),
         (["--count", "0"], "--count: expected a number from 1 to 254, got 0"),
