@@ -11,7 +11,7 @@ import anafi_mav.arsdk.messages as tables
 from anafi_mav.arsdk import wire
 from anafi_mav.arsdk.frame import FrameType, encode_frame
 from anafi_mav.arsdk.messages import ardrone3
-from anafi_mav.arsdk.transport import Delivered, Event, Garbage, Received, Role, Transport, Undelivered
+from anafi_mav.arsdk.transport import MAX_QUEUED, Delivered, Event, Garbage, Received, Role, Transport, Undelivered
 from anafi_mav.arsdk.wire import Bits, Blob, Buffer, Message, MessageId, Scalar, Text, UnknownMessage
 
 WARM_UP = 4000
@@ -38,6 +38,8 @@ def throw(role: Role, version: int, count: int, seed: int) -> Outcome:
     rng = random.Random(seed)
     victim = Transport(role, version, 0.0)
     corpus = list(_corpus(role, version, rng))
+    for _ in range(MAX_QUEUED + 1):  # as full as it gets, or what we send ourselves would look like a leak
+        victim.send(ardrone3.MaxTilt(0.0), 0.0)
     messages, base = 0, 0
     garbage = 0
     tracemalloc.start()
