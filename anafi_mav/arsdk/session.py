@@ -26,6 +26,9 @@ raw_log = logging.getLogger("anafi_mav.raw")
 OnMessage: TypeAlias = Callable[[Message | UnknownMessage, float], None]
 """Called with each message and the loop time of its arrival."""
 
+Air: TypeAlias = Callable[[bytes, bool, Callable[[bytes], None]], None]
+"""Called with each datagram, whether it came in, and what hands it on, which may be called later, twice or never."""
+
 SOCKET_BUFFER = 1 << 18
 """Bytes the kernel may hold for us while the loop is busy: some seconds of a drone's telemetry."""
 
@@ -49,6 +52,8 @@ class Session(asyncio.DatagramProtocol):
         self.on_message = on_message
         self.mute = False
         """True: everything is dropped, both ways, as if the air were gone (faults of the simulator)."""
+        self.air: Air | None = None
+        """What happens to datagrams on their way (faults of the simulator); None: nothing."""
         self.lost: asyncio.Future[str] = self._loop.create_future()
         """Done when the link is down or closed; its result says why."""
         self._peer = peer
@@ -131,6 +136,14 @@ class Session(asyncio.DatagramProtocol):
             return
         if raw_log.isEnabledFor(logging.DEBUG):
             raw_log.debug("%s > %s", addr, data.hex())
+        if self.air is None:
+            self._take(data)
+        else:
+            self.air(data, True, self._take)
+
+    def _take(self, data: bytes) -> None:
+        if self.mute or self.lost.done():
+            return
         now = self._loop.time()
         # Whatever the receivers send leaves in the flush below.
         self._flush_due = True
@@ -190,14 +203,20 @@ class Session(asyncio.DatagramProtocol):
         for datagram in self._transport.outgoing(self._loop.time()):
             if self._congested:
                 self.counters["dropped.congested"] += 1
-            elif not self.mute:
-                endpoint.sendto(datagram, self._peer)
+            elif self.air is None:
+                self._give(datagram)
+            else:
+                self.air(datagram, False, self._give)
         deadline = self._transport.deadline()
         if deadline is not None and deadline < self._timer_at:
             if self._timer is not None:
                 self._timer.cancel()
             self._timer_at = deadline
             self._timer = self._loop.call_at(deadline, self._expire)
+
+    def _give(self, datagram: bytes) -> None:
+        if not self.mute and self._endpoint is not None and not self.lost.done():
+            self._endpoint.sendto(datagram, self._peer)
 
     def _expire(self) -> None:
         self._timer = None

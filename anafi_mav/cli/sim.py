@@ -16,8 +16,10 @@ import msgspec
 
 from anafi_mav.cli.terminal import say
 from anafi_mav.errors import ConfigError
-from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
+from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator, scenario
 from anafi_mav.sim.model import MODELS
+from anafi_mav.sim.scenario import Scenario
+from anafi_mav.sim.wind import CALM, WindSpec
 
 MAX_COUNT = 254
 """Drones of one process: the hosts of one /24, where their addresses live."""
@@ -47,6 +49,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--storage", metavar="SIZE", help="bytes of the memory card, also with k, M or G behind: small ones fill soon"
     )
+    parser.add_argument(
+        "--wind",
+        metavar="SPEED,DIRECTION",
+        help="m/s and degrees where it comes from; a third number is the gusts' share",
+    )
+    parser.add_argument("--scenario", type=Path, metavar="FILE", help="YAML: what goes wrong, and when")
     parser.add_argument("--log", type=Path, metavar="FILE", help="write what happens to FILE, one JSON object a line")
     parser.add_argument("--stdin-watch", action="store_true", help="end when stdin closes")
     # For `anafi-mav run`: a JSON object {speed, seed, drones: [{model, address, …}]}, one line on stdin for "-".
@@ -59,8 +67,10 @@ def run(arguments: argparse.Namespace) -> int:
         asyncio.run(_run(_from_fleet(arguments.fleet), arguments.log, arguments.stdin_watch))
         return 0
     fleet = _from_options(arguments)
+    wind = CALM if arguments.wind is None else _wind(arguments.wind)
+    events = None if arguments.scenario is None else _scenario(arguments.scenario, fleet)
     try:
-        asyncio.run(_run(fleet, arguments.log, arguments.stdin_watch))
+        asyncio.run(_run(fleet, arguments.log, arguments.stdin_watch, wind, events))
     except ConfigError as error:
         if error.key_path.startswith("drones"):  # the only thing about one of them that is found out so late
             raise ConfigError("--address", error.problem) from error
@@ -157,7 +167,29 @@ def _number(flag: str, text: str, wanted: str) -> float:
     return number
 
 
-async def _run(fleet: Fleet, log: Path | None, stdin_watch: bool) -> None:
+def _wind(text: str) -> WindSpec:
+    wanted = "SPEED,DIRECTION or SPEED,DIRECTION,GUSTS like 8,270,0.15"
+    parts = text.split(",")
+    if len(parts) not in (2, 3):
+        raise ConfigError("--wind", f"expected {wanted}, got {text!r}")
+    try:
+        return WindSpec(*(_number("--wind", part, wanted) for part in parts))
+    except ConfigError as error:
+        raise ConfigError("--wind", error.problem) from None
+
+
+def _scenario(path: Path, fleet: Fleet) -> Scenario:
+    try:
+        found = scenario.load(path)
+        found.check_drones({drone.address for drone in fleet.drones})
+    except ConfigError as error:
+        raise ConfigError("--scenario", str(error)) from error
+    return found
+
+
+async def _run(
+    fleet: Fleet, log: Path | None, stdin_watch: bool, wind: WindSpec = CALM, events: Scenario | None = None
+) -> None:
     stop = asyncio.Event()
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -165,7 +197,9 @@ async def _run(fleet: Fleet, log: Path | None, stdin_watch: bool) -> None:
     if stdin_watch:
         _watch_stdin(stop)
     try:
-        simulator = Simulator(fleet.drones, speed=fleet.speed, seed=fleet.seed, log=log, remember=False)
+        simulator = Simulator(
+            fleet.drones, speed=fleet.speed, seed=fleet.seed, log=log, remember=False, wind=wind, scenario=events
+        )
     except OSError as error:
         raise ConfigError("--log", f"expected a file that can be written, got {log}: {error.strerror}") from error
     async with simulator:

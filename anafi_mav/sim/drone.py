@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import ipaddress
 import math
 import os
@@ -19,6 +20,7 @@ from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.session import OnMessage
 from anafi_mav.arsdk.wire import Buffer, Message, UnknownMessage
 from anafi_mav.errors import ConfigError
+from anafi_mav.sim.air import Air
 from anafi_mav.sim.faults import Faults
 from anafi_mav.sim.firmware import Firmware, Identity
 from anafi_mav.sim.http import WebServer
@@ -26,8 +28,10 @@ from anafi_mav.sim.log import Log, LogEntry
 from anafi_mav.sim.model import MODELS
 from anafi_mav.sim.motion import Body, Pose
 from anafi_mav.sim.place import Origin
+from anafi_mav.sim.power import Battery
 from anafi_mav.sim.states import all_settings, all_states
 from anafi_mav.sim.telemetry import RATE, Telemetry
+from anafi_mav.sim.wind import CALM, Wind
 
 POSE_PERIOD = 0.1
 """s between two poses in the log."""
@@ -104,6 +108,9 @@ class SimulatedDrone:
         self.log = log
         self.faults = Faults()
         self.faults.on_mute = self._mute_link
+        self.wind = Wind(CALM, random.Random(chance.getrandbits(64)))
+        """Set its `spec` to let it blow."""
+        self._air = Air(self.faults, random.Random(chance.getrandbits(64)), _later)
         self.http_problem = ""
         """Why there is no web server although one was asked for; empty: there is one, or nobody asked."""
         self._clock = clock
@@ -125,6 +132,15 @@ class SimulatedDrone:
     @property
     def address(self) -> str:
         return self.spec.address
+
+    @property
+    def time(self) -> float:
+        """Simulated seconds since the world began."""
+        return self.firmware.time
+
+    @property
+    def battery(self) -> Battery:
+        return self.firmware.battery
 
     @property
     def pose(self) -> Pose:
@@ -156,6 +172,10 @@ class SimulatedDrone:
     def throw(self) -> None:
         """Hand launch: counts after UserTakeOff."""
         self.firmware.throw()
+
+    def note(self, name: str, args: dict[str, Any]) -> None:
+        """Leave a line of kind "scenario" in the log."""
+        self.log.add(self._clock(), "scenario", name, args)
 
     def place(self, north: float, east: float, heading: float = 0.0) -> None:
         """Carry the drone to another spot (m from home, rad). It must be on the ground."""
@@ -215,6 +235,8 @@ class SimulatedDrone:
     def tick(self, now: float, elapsed: float, pose: Pose, arrived: bool, still: bool) -> None:
         """Called by the simulation after each of its turns; see `Firmware.tick`."""
         self.firmware.tick(now, elapsed, pose, arrived, still)
+        if elapsed:
+            self._body.blow(*self.wind.advance(elapsed))
         session = self._session
         if session is not None:
             for message in self._telemetry.due(now):
@@ -251,6 +273,7 @@ class SimulatedDrone:
         now = self._clock()
         self._session = session
         session.mute = self.faults.mute
+        session.air = self._air
         session.lost.add_done_callback(lambda lost: self._on_lost(session, lost.result()))
         self.log.add(now, "session", "up", {"peer": session.peer, "version": session.version})
         self.firmware.link_up()
@@ -290,6 +313,10 @@ class SimulatedDrone:
 
     def _note(self, name: str, args: dict[str, Any]) -> None:
         self.log.add(self._clock(), "state", name, args)
+
+
+def _later(seconds: float, function: Callable[[], None]) -> None:
+    asyncio.get_running_loop().call_later(seconds, function)
 
 
 def _serial(prefix: str, address: str) -> str:

@@ -7,6 +7,7 @@ simulated one, which runs `--speed` times as fast and everything about the aircr
 
 from __future__ import annotations
 
+import math
 import random
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -35,6 +36,7 @@ from anafi_mav.sim.poi import Poi
 from anafi_mav.sim.power import Battery
 from anafi_mav.sim.safety import Alarms, Warnings, check_changed, checklist
 from anafi_mav.sim.settings import Settings
+from anafi_mav.sim.wind import WindWatch
 
 RAMP_TIME = 1.0
 """s that the motors need; one or two on the aircraft."""
@@ -42,6 +44,8 @@ SETTLE_TIME = 1.0
 """s from the fall's end to landed. Assumed."""
 SENSOR_PERIOD = 0.05
 """s between two looks at battery, GPS and what else does not fly."""
+STRAY = 1.0
+"""m/s from which a hovering drone counts as flying although nobody steers it."""
 SATELLITES = 14
 
 _REST = Pose(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -91,6 +95,7 @@ class Firmware:
         self.flight_id = ""
         self.datetime = "19700101T000000+0000"
         self.sound = ardrone3.AlertSoundState.STOPPED
+        self._wind = WindWatch(model.envelope.wind_resistance)
         self._body = body
         self._origin = origin
         self._emit = emit
@@ -244,7 +249,9 @@ class Firmware:
             self._return_at = None
             self._go_home(StateReason.CONNECTION_LOST)
         self.guidance.stare(self.poi.tick(self.time, self.pose, hovering))
-        self._fire(Event.BUSY if self.guidance.busy or not still else Event.AT_REST)
+        # A drone that hovers stays HOVERING while a gust shakes it, but not while it is carried off.
+        moving = math.hypot(self.pose.ground_speed, self.pose.vd) > STRAY if hovering else not still
+        self._fire(Event.BUSY if self.guidance.busy or moving else Event.AT_REST)
 
     def _update_sensors(self, elapsed: float) -> None:
         for message in self.battery.drain(elapsed, self.state in AIRBORNE, self.faults.battery):
@@ -258,7 +265,7 @@ class Firmware:
             for message in messages:
                 self._emit(message)
         self.faults.magneto_required = self.compass.required
-        self._look_after_aircraft()
+        self._look_after_aircraft(elapsed)
         if self.fix != self.faults.gps:
             self._set_fix(self.faults.gps)
         self.homing.sensors(self.fix, not self.compass.required)
@@ -272,12 +279,14 @@ class Firmware:
         self._blockers = blockers
         self._mind_the_battery()
 
-    def _look_after_aircraft(self) -> None:
-        """Motors, vibration, and whether somebody carries it."""
+    def _look_after_aircraft(self, elapsed: float) -> None:
+        """Motors, vibration, wind, and whether somebody carries it."""
         warnings, faults = self.warnings, self.faults
         place = (self.pose.north, self.pose.east)
         messages = warnings.set_motors(faults.motor_error, faults.motors)
         messages += warnings.set_vibration(faults.vibration)
+        wind = self._body.wind if self.state in AIRBORNE else 0.0
+        messages += warnings.set_wind(self._wind.feel(wind, elapsed))
         messages += warnings.carried(place, self.time, self.state is LANDED)
         for message in messages:
             self._emit(message)

@@ -13,6 +13,8 @@ from anafi_mav.sim.drone import DroneSpec, SimulatedDrone
 from anafi_mav.sim.log import Log, LogFile
 from anafi_mav.sim.model import MODELS
 from anafi_mav.sim.motion import STEP, Body, Motion
+from anafi_mav.sim.scenario import Scenario
+from anafi_mav.sim.wind import CALM, WindSpec
 
 TURN, FAST_TURN = 0.01, STEP
 """s of the machine's clock between two turns of the world; the second when telemetry is wanted that fast."""
@@ -39,9 +41,12 @@ class Simulator:
         seed: int | None = None,
         log: Path | None = None,
         remember: bool = True,
+        wind: WindSpec = CALM,
+        scenario: Scenario | None = None,
     ) -> None:
         """`speed` runs the world faster than the clock, `seed` makes ids the same in every run, `log` is a file of
-        JSON lines, `remember` keeps the log in memory too.
+        JSON lines, `remember` keeps the log in memory too, `wind` blows from the start, `scenario` says what else
+        happens.
 
         Raises `ConfigError` for specs that cannot live together, `OSError` when the log cannot be written.
         """
@@ -69,6 +74,11 @@ class Simulator:
             )
             for index, spec in enumerate(specs)
         ]
+        for drone in self.drones:
+            drone.wind.spec = wind
+        self._scenario = scenario
+        if scenario is not None:
+            scenario.check_drones({spec.address for spec in specs})
 
     async def __aenter__(self) -> Simulator:
         await self.start()
@@ -125,6 +135,13 @@ class Simulator:
             debt -= steps * STEP
             self._turn(now, steps)
 
+    def advance(self, seconds: float) -> None:
+        """Let the world turn by hand, as long as it has not been started; needs a running loop for its clock."""
+        now = _clock()
+        for _ in range(round(seconds / (2 * STEP))):
+            now += 2 * STEP
+            self._turn(now, 2)
+
     def _turn(self, now: float, steps: int) -> None:
         motion = self._motion
         for _ in range(steps):
@@ -133,6 +150,8 @@ class Simulator:
         turns = zip(self.drones, motion.poses(), motion.arrived(), motion.still(), strict=True)
         for drone, pose, arrived, still in turns:
             drone.tick(now, elapsed, pose, arrived, still)
+            if self._scenario is not None:
+                self._scenario.tick(drone)
         if self._file is not None:
             self._file.flush()
 

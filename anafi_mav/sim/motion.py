@@ -5,6 +5,8 @@ The model is small on purpose and fitted to the measurements in section IV of th
 - tilt follows its command as a second-order system (10 rad/s, damping 0.9) no faster than MaxPitchRollRotationSpeed;
 - horizontal acceleration is g tan(tilt) minus a quadratic drag that makes full tilt end at the model's top speed;
 - a stick at 0 % is a wish to stop: the axis is braked with up to 3 m/s2;
+- all that is relative to the air, so that wind carries the drone away unless it tilts against it; a hover keeps its
+  place against the wind as far as `FULL_TILT` allows;
 - yaw rate and climb rate follow first-order after a pure delay (0.1 s each for yaw, 0.15 s and 0.12 s for climb),
   which gives 360 degrees in 2.0 s and 6.9 m in the first 2 s at 4 m/s.
 
@@ -59,6 +61,14 @@ _REACHED = 0.1
 _STILL = 0.15
 """m/s: slower than this is no motion to speak of."""
 _NO_FENCE = 1e9
+_RUSH = 3.0
+"""m/s over ground above which the drag may brake alone; below it a drone may need to push into the wind."""
+_HOLD_BELOW = 0.3
+"""m/s over ground below which a hover in wind takes its place to keep."""
+_HOLD_SPEED = 2.0
+"""m/s at most back to a place that a gust has blown the drone from."""
+_UNREST = 0.06
+"""Share of the wind's speed that counts as no motion: gusts shake a drone that keeps its place."""
 
 
 class Mode(enum.IntEnum):
@@ -145,6 +155,13 @@ class Motion:
         self.ceiling: Array = np.full(count, 150.0)
         self.fence_radius: Array = np.full(count, _NO_FENCE)
         self.fence_centre: Array = np.zeros((2, count))
+        self.wind: Array = np.zeros((2, count))
+        """Velocity of the air towards north and east."""
+        self.windy = False
+        """Somewhere the air moves. A calm fleet is spared the arithmetic."""
+        self.hold: Array = np.zeros((2, count))
+        self.holding: NDArray[np.bool_] = np.zeros(count, np.bool_)
+        """A hover in wind keeps the place `hold`."""
         self.drag: Array = np.array([G * math.tan(FULL_TILT) / frame.max_speed**2 for frame in airframes])
         self.yaw_line = _DelayLine([frame.yaw_delay for frame in airframes])
         self.climb_line = _DelayLine([frame.climb_delay for frame in airframes])
@@ -164,6 +181,8 @@ class Motion:
         turn = np.where(steered, self.stick_yaw, 0.0)
         if moving.any():
             wanted, climb, turn = self._follow(moving, up, climb, turn)
+        if self.windy:
+            wanted = self._keep_place(wanted, mode)
         climb = np.where(mode == Mode.TAKE_OFF, np.clip(1.5 * (TAKE_OFF_HEIGHT - up), -0.5, 1.0), climb)
         climb = np.where(mode == Mode.LAND, -np.minimum(self.land_speed, 0.5 + 0.3 * up), climb)
         climb = np.minimum(climb, np.maximum(_CLIMB_GAIN * (self.ceiling - up), 0.0))
@@ -194,14 +213,31 @@ class Motion:
         turn = np.where(moving, np.where(self.turn == Turn.STICK, self.stick_yaw, turning), turn)
         return wanted, climb, turn
 
+    def _keep_place(self, wanted: Array, mode: Any) -> Array:
+        """Velocity that brings hovering drones back to where they began to hover."""
+        hovering = (mode == Mode.TAKE_OFF) | (
+            ((mode == Mode.STICKS) | (mode == Mode.LAND)) & (self.stick_push == 0.0).all(axis=0)
+        )
+        slow = (self.velocity[:2] ** 2).sum(axis=0) < _HOLD_BELOW**2
+        fresh = hovering & slow & ~self.holding
+        self.hold = np.where(fresh, self.position[:2], self.hold)
+        self.holding = hovering & (self.holding | slow)
+        back = _limit(_PLACE_GAIN * (self.hold - self.position[:2]), _HOLD_SPEED)
+        return np.where(self.holding, back, wanted)
+
     def _tilt_and_push(self, wanted: Array, horizontal: Array, steered: Any, mode: Any) -> None:
         """Turn wishes into a tilt command, let the tilt follow it, and accelerate by the tilt reached."""
-        speed = np.hypot(horizontal[0], horizontal[1])
-        resistance = self.drag * speed * horizontal
+        through_air = horizontal
+        if self.windy:
+            through_air = horizontal - np.where(self.position[2] < 0.0, self.wind, 0.0)
+        speed = np.hypot(through_air[0], through_air[1])
+        resistance = self.drag * speed * through_air
         push = _limit(_SPEED_GAIN * (wanted - horizontal), _BRAKING) + resistance
         # Braking never needs to push onwards: at high speed the drag alone stops faster than `_BRAKING`.
         stopping = (wanted[0] == 0.0) & (wanted[1] == 0.0)
         onwards = (push * horizontal).sum(axis=0) > 0.0
+        if self.windy:
+            onwards &= (horizontal**2).sum(axis=0) > _RUSH**2
         push = np.where(stopping & onwards, 0.0, push)
         cos, sin = np.cos(self.yaw), np.sin(self.yaw)
         forward, right = push[0] * cos + push[1] * sin, push[1] * cos - push[0] * sin
@@ -255,15 +291,21 @@ class Motion:
         self.velocity[2] = np.where(sinking, 0.0, self.velocity[2])
 
     def still(self) -> list[bool]:
-        """Per drone: no motion to speak of (0.15 m/s)."""
-        slow: list[bool] = ((self.velocity**2).sum(axis=0) < _STILL**2).tolist()
+        """Per drone: no motion to speak of (0.15 m/s, more in wind)."""
+        slow: list[bool] = self._slow().tolist()
         return slow
+
+    def _slow(self) -> Any:
+        return (self.velocity**2).sum(axis=0) < (_STILL + self._unrest()) ** 2
+
+    def _unrest(self) -> Any:
+        return _UNREST * np.hypot(self.wind[0], self.wind[1]) if self.windy else 0.0
 
     def arrived(self) -> list[bool]:
         """Per drone: the present mode has got where it wanted to (always true for OFF and STICKS)."""
         gap = self.position - self.target
-        slow = (self.velocity**2).sum(axis=0) < _STILL**2
-        there = ((gap**2).sum(axis=0) < _REACHED**2) & slow
+        slow = self._slow()
+        there = ((gap**2).sum(axis=0) < (_REACHED + self._unrest()) ** 2) & slow
         aligned = (self.turn == Turn.STICK) | (np.abs(self.target_yaw - self.yaw) < _ALIGNED / 2.0)
         up = -self.position[2]
         done = np.where(self.mode == Mode.MOVE, there & aligned & (self.turn != Turn.FIRST), True)
@@ -376,6 +418,17 @@ class Body:
         """Keep within `radius` m of `centre` (north, east); None removes the fence."""
         self._motion.fence_radius[self._index] = _NO_FENCE if radius is None else radius
         self._motion.fence_centre[:, self._index] = centre
+
+    def blow(self, north: float, east: float) -> None:
+        """Wind: the air moves with this velocity (m/s) where the drone is."""
+        motion = self._motion
+        motion.wind[:, self._index] = north, east
+        motion.windy = motion.windy or north != 0.0 or east != 0.0
+
+    @property
+    def wind(self) -> float:
+        """m/s of the air over ground."""
+        return math.hypot(*self._motion.wind[:, self._index].tolist())
 
     def place(self, north: float, east: float, yaw: float = 0.0) -> None:
         """Put the drone on the ground somewhere, at rest."""

@@ -1,0 +1,319 @@
+"""What is to go wrong, and when: a YAML file of steps, each with a trigger and with what changes then.
+
+    steps:
+      - at: 20                  # simulated seconds after the start
+        gps: false
+        for: 15                 # then as it was before
+      - when: {state: flying, height_above: 10}
+        after: 3
+        drone: 127.0.42.1       # without it: every drone, each in its own time
+        link: {both: {loss: 0.2, delay: 0.05}}
+
+A step happens once for each of its drones. docs/simulator.md lists all keys. Whatever is wrong with a file is one
+`ConfigError` with the key's path, like "steps[1].link.up.loss: expected `float` <= 1.0".
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Collection, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Protocol
+
+import msgspec
+import yaml
+from msgspec import UNSET, Meta, UnsetType
+
+from anafi_mav.arsdk.messages.alarms import TakeoffChecklistType
+from anafi_mav.arsdk.messages.ardrone3 import FlyingState, MotorError, WarningLevel
+from anafi_mav.errors import ConfigError
+from anafi_mav.sim.faults import Faults, Impairment
+from anafi_mav.sim.motion import Pose
+from anafi_mav.sim.power import Battery
+from anafi_mav.sim.wind import GUSTS, Wind, WindSpec
+
+MAX_FILE_BYTES = 1 << 20
+"""A thousand steps are a tenth of it."""
+
+MAX_STEPS = 1000
+"""Steps are looked at every turn of the world."""
+
+Share = Annotated[float, Meta(ge=0.0, le=1.0)]
+Seconds = Annotated[float, Meta(ge=0.0, le=1e6)]
+Percent = Annotated[int, Meta(ge=0, le=100)]
+Motor = Annotated[int, Meta(ge=1, le=4)]
+
+
+class When(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """All of it must be true."""
+
+    state: str | None = None
+    height_above: float | None = None
+    """m above take-off"""
+    distance_beyond: Annotated[float, Meta(ge=0.0)] | None = None
+    """m from where the simulated world has its origin, which is where the drone stood first"""
+    battery_below: Percent | None = None
+
+
+class Direction(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    loss: Share = 0.0
+    delay: Annotated[float, Meta(ge=0.0, le=10.0)] = 0.0
+    jitter: Annotated[float, Meta(ge=0.0, le=10.0)] = 0.0
+    duplicate: Share = 0.0
+    reorder: Share = 0.0
+
+    def impairment(self) -> Impairment:
+        return Impairment(self.loss, self.delay, self.jitter, self.duplicate, self.reorder)
+
+
+class Link(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    up: Direction | None = None
+    """From the controller to the drone."""
+    down: Direction | None = None
+    both: Direction | None = None
+
+
+class Blow(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    speed: Annotated[float, Meta(ge=0.0, le=40.0)]
+    direction: Annotated[float, Meta(ge=0.0, le=360.0)] = 0.0
+    gusts: Share = GUSTS
+
+
+class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True, rename={"for_": "for"}):
+    at: Seconds | None = None
+    when: str | When | None = None
+    after: Seconds = 0.0
+    for_: Seconds | None = None
+    drone: str | None = None
+    gps: bool | UnsetType = UNSET
+    silence: bool | UnsetType = UNSET
+    link: Link | UnsetType = UNSET
+    battery: Percent | UnsetType | None = UNSET
+    motor_error: str | UnsetType = UNSET
+    motors: list[Motor] | UnsetType = UNSET
+    vibration: str | UnsetType = UNSET
+    calibration_required: bool | UnsetType = UNSET
+    refuse_take_off: list[str] | UnsetType = UNSET
+    storage_full: bool | UnsetType = UNSET
+    wind: Blow | UnsetType = UNSET
+    throw: bool | UnsetType = UNSET
+
+
+class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    steps: Annotated[list[Step], Meta(min_length=1, max_length=MAX_STEPS)]
+
+
+class Actor(Protocol):
+    """What a scenario sees of a simulated drone, and does to it."""
+
+    faults: Faults
+    wind: Wind
+
+    @property
+    def address(self) -> str: ...
+
+    @property
+    def time(self) -> float: ...
+
+    @property
+    def flying_state(self) -> FlyingState: ...
+
+    @property
+    def pose(self) -> Pose: ...
+
+    @property
+    def battery(self) -> Battery: ...
+
+    def throw(self) -> None: ...
+
+    def note(self, name: str, args: dict[str, Any]) -> None: ...
+
+
+@dataclass
+class _Cue:
+    """One step for one drone."""
+
+    index: int
+    step: Step
+    due: float | None = None
+    """When it happens, once its trigger is met."""
+    undo: list[Callable[[], None]] | None = None
+    undo_at: float = 0.0
+    done: bool = False
+
+
+class Scenario:
+    """The steps, and how far each drone has come in them."""
+
+    def __init__(self, steps: Iterable[Step]) -> None:
+        """Raises `ConfigError` for steps that make no sense."""
+        self.steps = tuple(steps)
+        for index, step in enumerate(self.steps):
+            _check(f"steps[{index}]", step)
+        self._cues: dict[str, list[_Cue]] = {}
+
+    def check_drones(self, addresses: Collection[str]) -> None:
+        """Raises `ConfigError` when a step names a drone that is not there."""
+        for index, step in enumerate(self.steps):
+            if step.drone is not None and step.drone not in addresses:
+                known = ", ".join(sorted(addresses)[:5])
+                raise ConfigError(
+                    f"steps[{index}].drone", f"expected the address of a drone ({known}), got {step.drone!r}"
+                )
+
+    def tick(self, drone: Actor) -> None:
+        """Let happen what is due for this drone."""
+        cues = self._cues.get(drone.address)
+        if cues is None:
+            cues = [_Cue(i, step) for i, step in enumerate(self.steps) if step.drone in (None, drone.address)]
+            self._cues[drone.address] = cues
+        if not cues:
+            return
+        for cue in cues:
+            self._advance(cue, drone)
+        if any(cue.done for cue in cues):
+            self._cues[drone.address] = [cue for cue in cues if not cue.done]
+
+    def _advance(self, cue: _Cue, drone: Actor) -> None:
+        step = cue.step
+        if cue.undo is not None:
+            if drone.time >= cue.undo_at:
+                drone.note("step", {"step": cue.index, "ends": True})
+                for back in cue.undo:
+                    back()
+                cue.done = True
+            return
+        if cue.due is None and _triggered(step, drone):
+            cue.due = drone.time + step.after if step.at is None else step.at
+        if cue.due is None or drone.time < cue.due:
+            return
+        drone.note("step", {"step": cue.index, "ends": False})
+        undo = _apply(step, drone)
+        if step.for_ is None:
+            cue.done = True
+        else:
+            cue.undo, cue.undo_at = undo, drone.time + step.for_
+
+
+def _triggered(step: Step, drone: Actor) -> bool:
+    if step.at is not None:
+        return drone.time >= step.at
+    when = When(state=step.when) if isinstance(step.when, str) else step.when
+    assert when is not None, "checked"
+    pose = drone.pose
+    return (
+        (when.state is None or drone.flying_state is _STATES[when.state])
+        and (when.height_above is None or pose.up > when.height_above)
+        and (when.distance_beyond is None or (pose.north**2 + pose.east**2) ** 0.5 > when.distance_beyond)
+        and (when.battery_below is None or drone.battery.percent < when.battery_below)
+    )
+
+
+def _apply(step: Step, drone: Actor) -> list[Callable[[], None]]:
+    """Do it; how to undo it."""
+    undo: list[Callable[[], None]] = []
+
+    def put(owner: Any, name: str, value: Any) -> None:
+        before = getattr(owner, name)
+        undo.append(lambda: setattr(owner, name, before))
+        setattr(owner, name, value)
+
+    for name, value in _changes(step):
+        put(drone.faults, name, value)
+    if step.wind is not UNSET:
+        put(drone.wind, "spec", WindSpec(step.wind.speed, step.wind.direction, step.wind.gusts))
+    if step.throw is True:
+        drone.throw()
+    return undo
+
+
+def _changes(step: Step) -> Iterable[tuple[str, Any]]:
+    """The attributes of `Faults` that a step sets."""
+    plain = {
+        "gps": step.gps,
+        "mute": step.silence,
+        "battery": step.battery,
+        "magneto_required": step.calibration_required,
+        "storage_full": step.storage_full,
+    }
+    yield from ((name, value) for name, value in plain.items() if value is not UNSET)
+    if step.motors is not UNSET:
+        yield "motors", sum(1 << (motor - 1) for motor in set(step.motors))
+    if step.motor_error is not UNSET:
+        yield "motor_error", _MOTOR_ERRORS[step.motor_error]
+    if step.vibration is not UNSET:
+        yield "vibration", _LEVELS[step.vibration]
+    if step.refuse_take_off is not UNSET:
+        yield "refuse_take_off", frozenset(_CHECKS[name] for name in step.refuse_take_off)
+    if step.link is not UNSET:
+        for name, direction in (("up", step.link.up), ("down", step.link.down)):
+            chosen = direction or step.link.both
+            if chosen is not None:
+                yield name, chosen.impairment()
+
+
+_STATES = {state.name.lower(): state for state in FlyingState}
+_MOTOR_ERRORS = {error.name.lower().removeprefix("error_"): error for error in MotorError}
+_LEVELS = {level.name.lower(): level for level in WarningLevel}
+_CHECKS = {check.name.lower(): check for check in TakeoffChecklistType}
+_TRIGGERS = ("at", "when", "after", "for_", "drone")
+
+
+def _check(path: str, step: Step) -> None:
+    if (step.at is None) == (step.when is None):
+        raise ConfigError(path, "expected one trigger, at or when")
+    if step.at is not None and step.after:
+        raise ConfigError(f"{path}.after", "expected only with when")
+    state = step.when.state if isinstance(step.when, When) else step.when
+    _one_of(f"{path}.when" + ("" if isinstance(step.when, str) else ".state"), state, _STATES)
+    if isinstance(step.when, When) and step.when == When():
+        raise ConfigError(f"{path}.when", "expected a condition")
+    actions = [name for name in step.__struct_fields__ if name not in _TRIGGERS]
+    if all(getattr(step, name) is UNSET for name in actions):
+        raise ConfigError(path, f"expected something to happen: {', '.join(actions)}")
+    for name, known in (("motor_error", _MOTOR_ERRORS), ("vibration", _LEVELS)):
+        value = getattr(step, name)
+        _one_of(f"{path}.{name}", None if value is UNSET else value, known)
+    if step.refuse_take_off is not UNSET:
+        for index, name in enumerate(step.refuse_take_off):
+            _one_of(f"{path}.refuse_take_off[{index}]", name, _CHECKS)
+
+
+def _one_of(path: str, value: str | None, known: Collection[str]) -> None:
+    if value is not None and value not in known:
+        raise ConfigError(path, f"expected one of {', '.join(known)}, got {value[:60]!r}")
+
+
+def load(path: Path) -> Scenario:
+    """The scenario in a file. Raises `ConfigError`."""
+    try:
+        with path.open("rb") as file:
+            content = file.read(MAX_FILE_BYTES + 1)
+    except OSError as error:
+        raise ConfigError("", f"cannot read {path}: {error.strerror or error}") from error
+    if len(content) > MAX_FILE_BYTES:
+        raise ConfigError("", f"{path}: expected a file of at most {MAX_FILE_BYTES} bytes")
+    return from_text(content, str(path))
+
+
+def from_text(text: str | bytes, source: str) -> Scenario:
+    """The scenario in YAML `text`; `source` names it in messages. Raises `ConfigError`."""
+    try:
+        document = yaml.safe_load(text)
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        where = f"{source}, line {mark.line + 1}, column {mark.column + 1}" if mark else source
+        raise ConfigError("", f"{where}: {_one_line(error.problem or error.context or 'not YAML')}") from error
+    except (yaml.YAMLError, ValueError, RecursionError) as error:  # no YAML characters, no date, lists without end
+        raise ConfigError("", f"{source}: {_one_line(str(error))}") from error
+    try:
+        return Scenario(msgspec.convert(document, _File).steps)
+    except msgspec.ValidationError as error:
+        problem, _, place = str(error).partition(" - at `$")
+        place = re.sub(r"^\.|`$", "", place)
+        raise ConfigError(place or source, _one_line(problem[:1].lower() + problem[1:])) from error
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())[:300]
