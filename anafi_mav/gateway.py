@@ -78,7 +78,8 @@ class _Supervised:
 
     def line(self) -> str:
         """One line for people: who, where, and how it stands."""
-        head = f"drone {self.config.name}: system {self.config.sysid} at {self.config.address}"
+        where = f" on {self.config.interface}" if self.config.interface else ""
+        head = f"drone {self.config.name}: system {self.config.sysid} at {self.config.address}{where}"
         if not self.system.active:
             return f"{head}: not connected ({self.problem or 'no answer yet'}), retrying"
         identity = self.drone.identity
@@ -120,7 +121,12 @@ class Gateway:
         started = self._clock.monotonic()
         for config in self.config.drones:
             assert config.address is not None
-            drone = Drone(config.address, discovery_port=config.discovery_port, name=config.name)
+            drone = Drone(
+                config.address,
+                discovery_port=config.discovery_port,
+                interface=config.interface,
+                name=config.name,
+            )
             allow_kill = self.config.allow_kill if config.allow_kill is None else config.allow_kill
             system = System(self._node, drone, config.sysid, self._clock, started, allow_kill=allow_kill)
             supervised = _Supervised(config, drone, system)

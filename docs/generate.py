@@ -35,7 +35,20 @@ anafi-mav: drones[1].sysid: expected a sysid of its own, 1 is already at drones[
 ```
 
 Two options of the command line stand in for a list of the file, or of the defaults: `--drone ADDRESS` (repeatable;
-the drones get the system ids 1, 2, …) and `--endpoint URL` (repeatable). `--allow-kill` is `allow_kill: true`.
+the drones get the system ids 1, 2, …; `192.168.42.1%wlan1` names the interface too) and `--endpoint URL` (repeatable).
+`--allow-kill` is `allow_kill: true`.
+
+Every ANAFI has the same address in its own Wi-Fi, and so has every Skycontroller. With a Wi-Fi adapter for each and the
+adapter's name as `interface` they fly together, without address translation:
+
+```yaml
+drones:
+  - {name: left, sysid: 1, address: 192.168.42.1, interface: wlan1}
+  - {name: right, sysid: 2, address: 192.168.42.1, interface: wlan2}
+```
+
+Linux only. `net.ipv4.conf.*.rp_filter` has to be 0 or 2 (`sysctl -a | grep rp_filter`): with 1 the kernel drops the
+answers of all but one of them.
 """
 
 ENDPOINTS = """

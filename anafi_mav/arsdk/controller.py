@@ -10,6 +10,7 @@ from typing import TypeVar
 
 from anafi_mav.arsdk import handshake
 from anafi_mav.arsdk.handshake import ConnectReply, ConnectRequest, DeviceInfo
+from anafi_mav.arsdk.interface import bind_to_interface, open_connection
 from anafi_mav.arsdk.session import OnMessage, Session, reason_of
 from anafi_mav.arsdk.transport import Role, Transport
 from anafi_mav.errors import LinkLost, RemoteProtocolError
@@ -61,6 +62,7 @@ async def connect(
     handshake_port: int | None = None,
     versions: tuple[int, int] = (1, 3),
     local_address: str | None = None,
+    interface: str | None = None,
     on_message: OnMessage,
     ping_after: float = 0.5,
     silence_limit: float | None = 2.5,
@@ -69,13 +71,13 @@ async def connect(
     """Connect to the drone at `host`.
 
     `handshake_port` None means the one that discovery tells. `versions` is the (lowest, highest) ARSDK protocol
-    version offered. `local_address` binds all our sockets; None: whatever routes to the drone. `on_message` may be
-    called before this returns. Raises `LinkLost` when nobody answers within `timeout` seconds or the drone refuses,
-    `RemoteProtocolError` when what answers is no drone.
+    version offered. `local_address` and `interface` bind all our sockets; None: whatever routes to the drone.
+    `on_message` may be called before this returns. Raises `LinkLost` when nobody answers within `timeout` seconds or
+    the drone refuses, `RemoteProtocolError` when what answers is no drone.
     """
     handshake.check_versions(versions)
     opening = _connect(
-        host, discovery_port, handshake_port, versions, local_address, on_message, ping_after, silence_limit
+        host, discovery_port, handshake_port, versions, local_address, interface, on_message, ping_after, silence_limit
     )
     try:
         return await asyncio.wait_for(opening, timeout)
@@ -91,11 +93,12 @@ async def _connect(
     handshake_port: int | None,
     versions: tuple[int, int],
     local_address: str | None,
+    interface: str | None,
     on_message: OnMessage,
     ping_after: float,
     silence_limit: float | None,
 ) -> ControllerSession:
-    reader, writer = await _open(host, discovery_port, local_address)
+    reader, writer = await _open(host, discovery_port, local_address, interface)
     try:
         device = await _read(reader, handshake.parse_discovery, f"{host}:{discovery_port}")
         names = writer.get_extra_info("sockname"), writer.get_extra_info("peername")
@@ -104,6 +107,7 @@ async def _connect(
         here, there = (name[0] for name in names)
         sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
+            bind_to_interface(sock, interface)
             sock.bind((here, 0))
             request = ConnectRequest(
                 CONTROLLER_NAME,
@@ -113,7 +117,7 @@ async def _connect(
                 proto_v_min=versions[0],
                 proto_v_max=versions[1],
             )
-            reply = await _shake_hands(there, handshake_port or device.port, here, request)
+            reply = await _shake_hands(there, handshake_port or device.port, here, interface, request)
             # Connected, the socket hears that drone only, and hears at once when nobody listens there.
             sock.connect((there, reply.c2d_port))
         except BaseException:
@@ -139,8 +143,10 @@ async def _connect(
     return session
 
 
-async def _shake_hands(host: str, port: int, local_address: str, request: ConnectRequest) -> ConnectReply:
-    reader, writer = await _open(host, port, local_address)
+async def _shake_hands(
+    host: str, port: int, local_address: str, interface: str | None, request: ConnectRequest
+) -> ConnectReply:
+    reader, writer = await _open(host, port, local_address, interface)
     try:
         writer.write(handshake.format_request(request))
         reply = await _read(reader, handshake.parse_reply, f"{host}:{port}")
@@ -156,11 +162,11 @@ async def _shake_hands(host: str, port: int, local_address: str, request: Connec
     return reply
 
 
-async def _open(host: str, port: int, local_address: str | None) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
-    local = None if local_address is None else (local_address, 0)
+async def _open(
+    host: str, port: int, local_address: str | None, interface: str | None
+) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
     try:
-        # ARSDK is IPv4 only.
-        return await asyncio.open_connection(host, port, family=socket.AF_INET, local_addr=local)
+        return await open_connection(host, port, local_address=local_address, interface=interface)
     except OSError as error:
         raise LinkLost(f"cannot connect to {host}:{port}: {reason_of(error)}") from error
 

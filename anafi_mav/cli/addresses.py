@@ -18,6 +18,12 @@ CANDIDATES = [f"127.0.42.{host}" for host in range(1, 255)] + ["127.0.0.1"]
 """Where simulated drones live. The last is for systems whose loopback is that one address (macOS)."""
 
 
+def spot(text: str) -> dict[str, str]:
+    """An address as people write it on the command line, "192.168.42.1" or "192.168.42.1%wlan1", as keys of a drone."""
+    address, percent, interface = text.partition("%")
+    return {"address": address, "interface": interface} if percent else {"address": address}
+
+
 class Reservations(contextlib.ExitStack):
     """Addresses that no other `anafi-mav run` on this machine will choose until this is closed.
 

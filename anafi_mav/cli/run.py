@@ -13,7 +13,7 @@ from typing import Any
 
 import msgspec
 
-from anafi_mav.cli.addresses import Reservations
+from anafi_mav.cli.addresses import Reservations, spot
 from anafi_mav.cli.child import SimulatorProcess
 from anafi_mav.cli.terminal import complain, say
 from anafi_mav.config import Config, DroneConfig, SimConfig, from_mapping, load, remarks
@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--drone",
         action="append",
         metavar="ADDRESS",
-        help="a drone, instead of those of FILE; repeatable",
+        help="a drone, instead of those of FILE; 192.168.42.1%%wlan1 names the network interface too; repeatable",
     )
     parser.add_argument(
         "--endpoint", action="append", metavar="URL", help="a MAVLink endpoint, instead of those of FILE; repeatable"
@@ -65,9 +65,7 @@ def configuration(
     """The file at `path`, or the defaults, with what the command line says instead. Raises `ConfigError`."""
     config = load(path) if path is not None else Config()
     if drones:
-        entries = [
-            {"name": f"drone{sysid}", "sysid": sysid, "address": address} for sysid, address in enumerate(drones, 1)
-        ]
+        entries = [{"name": f"drone{sysid}", "sysid": sysid, **spot(text)} for sysid, text in enumerate(drones, 1)]
         config = msgspec.structs.replace(config, drones=from_mapping({"drones": entries}).drones)
     if endpoints:
         config = msgspec.structs.replace(config, endpoints=from_mapping({"endpoints": endpoints}).endpoints)

@@ -214,7 +214,7 @@ def _contradictions(config: Config) -> Iterator[tuple[str, str]]:
     simulated = {f"{path}.sim": drone.sim for path, drone in drones.items() if drone.sim is not None}
     bound = {f"{path}.address": sim.address for path, sim in simulated.items() if sim.address is not None}
     met = {
-        (f"{path}.sim.address" if drone.sim else f"{path}.address"): f"{address}:{drone.discovery_port}"
+        (f"{path}.sim.address" if drone.sim else f"{path}.address"): _place(address, drone)
         for path, drone in drones.items()
         if (address := drone.sim.address if drone.sim else drone.address) is not None
     }
@@ -222,6 +222,11 @@ def _contradictions(config: Config) -> Iterator[tuple[str, str]]:
     yield from _twice("an address and discovery_port", met)
     yield from _agree("speed", {path: sim.speed for path, sim in simulated.items()})
     yield from _agree("seed", {path: sim.seed for path, sim in simulated.items() if sim.seed is not None})
+
+
+def _place(address: str, drone: DroneConfig) -> str:
+    """Where a drone is met. The same address on another interface is another place."""
+    return f"{address}:{drone.discovery_port}" + (f" on {drone.interface}" if drone.interface else "")
 
 
 def _agree(key: str, values: Mapping[str, float]) -> Iterator[tuple[str, str]]:
@@ -238,6 +243,8 @@ def _of_one_drone(key_path: str, drone: DroneConfig) -> Iterator[tuple[str, str]
         yield key_path, f"expected either address or sim, got {got}"
     if drone.address is not None and not _is_host(drone.address):
         yield f"{key_path}.address", _wrong(DroneConfig, "address", drone.address)
+    if drone.sim is not None and drone.interface is not None:
+        yield f"{key_path}.interface", "expected none for a simulated drone, which lives on this machine"
     if drone.sim is not None and drone.sim.address is not None and not _is_ipv4(drone.sim.address):
         yield f"{key_path}.sim.address", _wrong(SimConfig, "address", drone.sim.address)
 

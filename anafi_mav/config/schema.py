@@ -129,6 +129,15 @@ class DroneConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
             extra=expected("an IPv4 address or a host name, like 192.168.42.1"),
         ),
     ] = None
+    interface: Annotated[
+        Annotated[str, Meta(pattern=r"\A[^\s/\0]{1,15}\Z")] | None,
+        Meta(
+            description="The network interface through which this drone is reached, and no other: every socket for it "
+            "is bound there. So several drones, each in its own Wi-Fi, may have the same address. Linux only. Left "
+            "out: as the routes of the machine say.",
+            extra=expected("the name of a network interface, like wlan1"),
+        ),
+    ] = None
     sim: Annotated[
         SimConfig | None,
         Meta(

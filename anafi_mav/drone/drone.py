@@ -54,15 +54,18 @@ class Drone:
         discovery_port: int = DISCOVERY_PORT,
         handshake_port: int | None = None,
         local_address: str | None = None,
+        interface: str | None = None,
         name: str = "",
         clock: Clock | None = None,
     ) -> None:
-        """`handshake_port` None: the one that discovery tells. `name` is ours, for the log."""
+        """`handshake_port` None: the one that discovery tells. `interface` binds every socket to that network
+        interface. `name` is ours, for the log."""
         self.address = address
         self.name = name or address
         self._discovery_port = discovery_port
         self._handshake_port = handshake_port
         self._local_address = local_address
+        self._interface = interface
         self._clock = clock or SystemClock()
 
         self._commander = Commander()
@@ -118,6 +121,7 @@ class Drone:
                 discovery_port=self._discovery_port,
                 handshake_port=self._handshake_port,
                 local_address=self._local_address,
+                interface=self._interface,
                 on_message=self._receive,
             )
             self._begin(session)

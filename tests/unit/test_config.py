@@ -19,7 +19,7 @@ REPOSITORY = Path(__file__).parents[2]
 HOST = "expected an IPv4 address or a host name, like 192.168.42.1, got"
 NAME = "expected 1 to 32 letters, digits, '-', '_' or '.', beginning with a letter or digit, got"
 SYSID = "expected a whole number from 1 to 250"
-KEYS_OF_A_DRONE = "name, sysid, address, sim, discovery_port, allow_kill"
+KEYS_OF_A_DRONE = "name, sysid, address, interface, sim, discovery_port, allow_kill"
 
 
 def problem(text: str | bytes) -> str:
@@ -51,6 +51,12 @@ def test_the_example_of_the_manual(tmp_path: Path) -> None:
 def test_a_hundred_drones_are_a_longer_list() -> None:
     text = "drones:\n" + "".join(f"  - {{name: d{n}, sysid: {n}, sim: {{}}}}\n" for n in range(1, 101))
     assert [drone.sysid for drone in from_text(text, "fleet.yaml").drones] == list(range(1, 101))
+
+
+def test_one_address_on_two_interfaces_is_two_drones() -> None:
+    drones = [f"  - {{name: d{n}, sysid: {n}, address: 192.168.42.1, interface: wlan{n}}}" for n in (1, 2)]
+    config = from_text("\n".join(["drones:", *drones]), "fleet.yaml")
+    assert [drone.interface for drone in config.drones] == ["wlan1", "wlan2"]
 
 
 def test_every_value_survives() -> None:
@@ -179,6 +185,10 @@ MISTAKES = {
     two("name: a, sysid: 7, sim: {}", "name: b, sysid: 7, sim: {}"): "drones[1].sysid: expected a sysid of its own, 7 is already at drones[0].sysid",
     two("name: a, sysid: 1, sim: {}", "name: a, sysid: 2, sim: {}"): "drones[1].name: expected a name of its own, 'a' is already at drones[0].name",
     two("name: a, sysid: 1, address: h", "name: b, sysid: 2, address: h"): "drones[1].address: expected an address and discovery_port of its own, 'h:44445' is already at drones[0].address",
+    two("name: a, sysid: 1, address: h, interface: w", "name: b, sysid: 2, address: h, interface: w"): "drones[1].address: expected an address and discovery_port of its own, 'h:44445 on w' is already at drones[0].address",
+    "drones: [{name: a, sysid: 1, address: h, interface: 'wlan 1'}]": "drones[0].interface: expected the name of a network interface, like wlan1, got 'wlan 1'",
+    "drones: [{name: a, sysid: 1, address: h, interface: longer_than_linux}]": "drones[0].interface: expected the name of a network interface, like wlan1, got 'longer_than_linux'",
+    "drones: [{name: a, sysid: 1, sim: {}, interface: wlan1}]": "drones[0].interface: expected none for a simulated drone, which lives on this machine",
     two("name: a, sysid: 1, address: 127.0.42.1", "name: b, sysid: 2, sim: {address: 127.0.42.1}"): "drones[1].sim.address: expected an address and discovery_port of its own, '127.0.42.1:44445' is already at drones[0].address",
     two("name: a, sysid: 1, sim: {address: 127.0.42.1}", "name: b, sysid: 2, discovery_port: 5, sim: {address: 127.0.42.1}"): "drones[1].sim.address: expected an address of its own, '127.0.42.1' is already at drones[0].sim.address",
     two("name: a, sysid: 1, sim: {speed: 2}", "name: b, sysid: 2, sim: {}"): "drones[1].sim.speed: expected 2 as at drones[0].sim.speed, got 1",

@@ -1,0 +1,60 @@
+"""Sockets that use one network interface only.
+
+Every ANAFI is 192.168.42.1 in its own Wi-Fi, every Skycontroller 192.168.53.1. A host with two radios therefore has
+two routes to the same address, and the kernel takes the first for everybody. A socket bound to an interface
+(SO_BINDTODEVICE, Linux socket(7)) sends and receives there whatever the routes say, so that two aircraft with one
+address are two. Linux allows it to every user since 5.7. The kernel must not check the way back against its routes:
+net.ipv4.conf.*.rp_filter has to be 0 or 2.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import socket
+
+from anafi_mav.errors import LinkLost
+
+SO_BINDTODEVICE = getattr(socket, "SO_BINDTODEVICE", None)
+"""None: this system has no such option (macOS, Windows)."""
+
+
+def bind_to_interface(sock: socket.socket, interface: str | None) -> None:
+    """Let `sock` use this interface only; None: whatever the routes say. Raises `LinkLost` when that cannot be: a radio
+    may be plugged in later."""
+    if interface is None:
+        return
+    if SO_BINDTODEVICE is None:
+        raise LinkLost(f"interface {interface}: this system cannot bind a socket to an interface")
+    try:
+        sock.setsockopt(socket.SOL_SOCKET, SO_BINDTODEVICE, interface.encode() + b"\0")
+    except OSError as error:
+        raise LinkLost(f"interface {interface}: {os.strerror(error.errno or 0)}") from error
+
+
+async def open_connection(
+    host: str, port: int, *, local_address: str | None = None, interface: str | None = None
+) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
+    """A TCP connection over IPv4, which is all that ARSDK knows. Raises `OSError`, of which
+    `LinkLost` is one."""
+    if interface is None:
+        local = None if local_address is None else (local_address, 0)
+        return await asyncio.open_connection(host, port, family=socket.AF_INET, local_addr=local)
+    loop = asyncio.get_running_loop()
+    found = await loop.getaddrinfo(host, port, family=socket.AF_INET, type=socket.SOCK_STREAM)
+    sock = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    try:
+        sock.setblocking(False)
+        bind_to_interface(sock, interface)
+        if local_address is not None:
+            sock.bind((local_address, 0))
+        await loop.sock_connect(sock, found[0][4])
+        return await asyncio.open_connection(sock=sock)
+    except BaseException:
+        sock.close()
+        raise
+
+
+def interfaces() -> list[str]:
+    """The names of this machine's network interfaces, loopback among them."""
+    return [name for _, name in socket.if_nameindex()]
