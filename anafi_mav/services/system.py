@@ -47,7 +47,10 @@ HEARTBEAT_EVERY = 1.0
 """s (MAVLink heartbeat.md)."""
 
 TICK = 0.05
-"""s between looks at the periodic messages."""
+"""s between looks at the heartbeat, which may be late by no more than a tenth of its second."""
+
+LOOK_EVERY = 0.1
+"""s between looks at the other periodic messages; none of them is wanted more often."""
 
 STATUS_EVERY = 5.0
 """s before the same complaint about a setpoint is repeated as text."""
@@ -247,13 +250,16 @@ class System:
 
     async def _tick(self) -> None:
         periodic = [id for id, stream in telemetry.STREAMS.items() if not stream.news]
+        next_look = -math.inf
         while True:
             now = self._clock.monotonic()
             if now >= self._next_heartbeat:
                 self._next_heartbeat = max(self._next_heartbeat + HEARTBEAT_EVERY, now + HEARTBEAT_EVERY / 2)
                 self._heartbeat()
-            for id in periodic:
-                self._stream(id, now)
+            if now >= next_look:
+                next_look = now + LOOK_EVERY
+                for id in periodic:
+                    self._stream(id, now)
             await asyncio.sleep(TICK)
 
     # What the drone reports.
