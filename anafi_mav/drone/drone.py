@@ -24,12 +24,15 @@ from anafi_mav.drone.battery import Battery
 from anafi_mav.drone.calibration import Calibration
 from anafi_mav.drone.element import Element, Reducer
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander
+from anafi_mav.drone.gimbal import Gimbal
 from anafi_mav.drone.gps import Gps
 from anafi_mav.drone.home import Home
 from anafi_mav.drone.link import Link
 from anafi_mav.drone.moves import Move
 from anafi_mav.drone.piloting import Piloting
 from anafi_mav.drone.product import MODELS, Identity, Model, Product
+from anafi_mav.drone.storage import Storage
+from anafi_mav.drone.thermal import Thermal
 from anafi_mav.errors import CommandTimeout, LinkLost, LocalProtocolError
 
 log = logging.getLogger("anafi_mav")
@@ -39,6 +42,9 @@ MessageT = TypeVar("MessageT", bound=Message)
 
 Callback: TypeAlias = Callable[[Message, float], None]
 """(message, loop time of its arrival)."""
+
+HTTP_PORT = 80
+"""Of the drone's web server when nothing stands between."""
 
 STATES_TIMEOUT = 5.0
 """s that a drone may take to send all its states, and all its settings: a few hundred messages."""
@@ -55,6 +61,7 @@ class Drone:
         handshake_port: int | None = None,
         local_address: str | None = None,
         interface: str | None = None,
+        http_port: int = HTTP_PORT,
         name: str = "",
         clock: Clock | None = None,
     ) -> None:
@@ -65,6 +72,7 @@ class Drone:
         self._discovery_port = discovery_port
         self._handshake_port = handshake_port
         self._local_address = local_address
+        self._http_port = http_port
         self._interface = interface
         self._clock = clock or SystemClock()
 
@@ -72,19 +80,25 @@ class Drone:
         self.alerts = Alerts()
         self.battery = Battery()
         self.calibration = Calibration()
+        self.gimbal = Gimbal(self._commander)
         self.gps = Gps()
         self.home = Home(self._commander)
         self.link = Link()
         self.product = Product()
+        self.storage = Storage(self._commander)
+        self.thermal = Thermal(self._commander)
         self.piloting = Piloting(self._commander, self.home, self.takeoff_blockers)
         self._elements: tuple[Element[Any], ...] = (
             self.alerts,
             self.battery,
             self.calibration,
+            self.gimbal,
             self.gps,
             self.home,
             self.link,
             self.product,
+            self.storage,
+            self.thermal,
             self.piloting,
         )
         self._routes: dict[type[Message], list[tuple[Element[Any], Reducer]]] = {}

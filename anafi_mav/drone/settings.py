@@ -9,15 +9,27 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Hashable
 from typing import Any, TypeVar
 
 from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone.element import Element, StateT
-from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander
-from anafi_mav.errors import AnafiMavError, LinkLost, LocalProtocolError, NotSupported
+from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, Expectation
+from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost, LocalProtocolError, NotSupported
 
 T = TypeVar("T")
+
+REPEAT = 0.5
+"""s after which an unacknowledged target is said again while nothing shows it: attitude and zoom are told five times a
+second."""
+
+
+def number(value: float, what: str) -> float:
+    """The value. Raises `LocalProtocolError` for NaN and infinities, which ask a drone for nothing."""
+    if not math.isfinite(value):
+        raise LocalProtocolError(f"{what}: {value} is not a number")
+    return value
 
 
 class Commanding(Element[StateT]):
@@ -27,6 +39,8 @@ class Commanding(Element[StateT]):
         super().__init__()
         self._commander = commander
         self._setting_locks: dict[type[Message], asyncio.Lock] = {}
+        self._orders: Counter[Hashable] = Counter()
+        """Targets given so far, by what they are for: a verb that repeats its own sees that there is a newer one."""
 
     def _require(self, reported: object, feature: str) -> None:
         """Raise `LinkLost` without a link, `NotSupported` when what the drone should have reported is None or empty."""
@@ -47,11 +61,32 @@ class Commanding(Element[StateT]):
         async with self._setting_locks.setdefault(answer, asyncio.Lock()):
             return await self._commander.confirm(command, (answer,), judge, timeout)
 
+    def _order(self, subject: Hashable, command: Message) -> int:
+        """Send a target that is not acknowledged; every older one for the same subject is over."""
+        self._commander.send(command)
+        self._orders[subject] += 1
+        return self._orders[subject]
+
+    async def _insist(self, subject: Hashable, command: Message, answer: Expectation[T], timeout: float) -> T:
+        """Send a target that is not acknowledged and repeat it until the answer has come.
+
+        Raises `CommandRejected` when somebody gives the subject another target meanwhile.
+        """
+        answer.expire_after(timeout, CommandTimeout(command.NAME, timeout))
+        try:
+            order = self._order(subject, command)
+            while not (await asyncio.wait({answer.future}, timeout=REPEAT))[0]:
+                if self._orders[subject] != order:
+                    raise CommandRejected("replaced by a newer target")
+                self._commander.send(command)
+            return await answer.wait()
+        finally:
+            answer.close()
+
     async def _set(self, command: Message, answer: type[Message], reported: object) -> float:
         """Change a setting with a range (one argument, answered with `current`) and return what it is then."""
         (value,) = (getattr(command, name) for name in command.__struct_fields__)
-        if not math.isfinite(value):
-            raise LocalProtocolError(f"{command.NAME}: the value is not a number")
+        number(value, command.NAME)
         self._require(reported, command.NAME)
         return await self._change(
             command, answer, lambda message: float(message.current) if math.isfinite(message.current) else None
