@@ -312,7 +312,7 @@ class SimulatedDrone:
             self._session.send(message)
 
     def _note(self, name: str, args: dict[str, Any]) -> None:
-        self.log.add(self._clock(), "state", name, args)
+        self.log.add(self._clock(), "state" if name == "flying" else "plan", name, args)
 
 
 def _later(seconds: float, function: Callable[[], None]) -> None:

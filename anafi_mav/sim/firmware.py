@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from anafi_mav.arsdk.messages import ardrone3, common, follow_me, gimbal, move, rth
+from anafi_mav.arsdk.messages import ardrone3, common, flight_plan, follow_me, gimbal, move, rth
 from anafi_mav.arsdk.messages.alarms import TakeoffChecklistType, Type
 from anafi_mav.arsdk.messages.ardrone3 import AlertState, FlyingState
 from anafi_mav.arsdk.messages.rth import RthEndingBehavior, StateReason
@@ -22,6 +22,7 @@ from anafi_mav.sim import power
 from anafi_mav.sim.compass import Compass
 from anafi_mav.sim.endurance import Endurance
 from anafi_mav.sim.faults import Faults
+from anafi_mav.sim.flight_plan import FlightPlan
 from anafi_mav.sim.gimbal import Gimbals
 from anafi_mav.sim.guidance import Guidance
 from anafi_mav.sim.homing import UNKNOWN, Homing
@@ -87,6 +88,7 @@ class Firmware:
         self.endurance = Endurance(model, self.settings)
         self.homing = Homing(body, origin, self.settings, emit)
         self.guidance = Guidance(model, body, origin, self.settings, self.homing, emit)
+        self.flight_plan = FlightPlan(model, body, origin, self.settings, self, emit, note)
         self.poi = Poi(origin, emit, self.aim, lambda: self.settings.yaw_rate, model.modern)
         self.state = LANDED
         self.pose = _REST
@@ -108,6 +110,8 @@ class Firmware:
         """End of the motors' ramp, or of the pause after an emergency."""
         self._grounded = False
         self._return_at: float | None = None
+        self._alone = False
+        """Nobody is there, and a flight plan plays on."""
         self._flights, self._last_flight, self._flown = 0, 0.0, 0.0
         self._took_off_at: float | None = None
         self._unseen = SENSOR_PERIOD
@@ -130,16 +134,6 @@ class Firmware:
         if sensor is common.Sensor.GPS:
             return self.fix
         return sensor is not common.Sensor.MAGNETOMETER or not self.compass.required
-
-    def plan_part_ok(self, part: common.FlightPlanComponent) -> bool:
-        """Whether this does not stand in the way of a flight plan."""
-        if part is common.FlightPlanComponent.GPS:
-            return self.fix
-        return part is not common.FlightPlanComponent.CALIBRATION or not self.compass.required
-
-    @property
-    def plan_available(self) -> bool:
-        return all(self.plan_part_ok(part) for part in common.FlightPlanComponent)
 
     def blockers(self) -> frozenset[TakeoffChecklistType]:
         """What a take-off would be refused for."""
@@ -191,7 +185,14 @@ class Firmware:
     # -- the link
 
     def link_lost(self) -> None:
-        """Nobody is there any more: hover, and go home after a while if there is a home."""
+        """Nobody is there any more: hover, and go home after a while if there is a home.
+
+        A flight plan that is to survive it plays on first.
+        """
+        if self.flight_plan.survives_disconnection:
+            self._alone = True
+            return
+        self.flight_plan.stop(hover=True)
         self.guidance.release_sticks()
         self._leave_poi()
         if self.state in GUIDED | {FlyingState.TAKINGOFF} and not self.homing.flying:
@@ -201,6 +202,7 @@ class Firmware:
     def link_up(self) -> None:
         """Somebody is there. A return that has begun goes on."""
         self._return_at = None
+        self._alone = False
 
     # -- time
 
@@ -241,7 +243,16 @@ class Firmware:
 
     def _fly(self, arrived: bool, still: bool) -> None:
         hovering = self.state is FlyingState.HOVERING
-        ending = self.guidance.tick(self.time, self.pose, arrived, hovering)
+        ending = None
+        if self.flight_plan.playing:
+            self.flight_plan.tick(self.time, self.pose, arrived)
+            if self.state not in GUIDED:
+                return
+        else:
+            ending = self.guidance.tick(self.time, self.pose, arrived, hovering)
+            if self._alone:
+                self.link_lost()
+                self._alone = False
         if ending is RthEndingBehavior.LANDING:
             self._fire(Event.LAND)
             return
@@ -251,7 +262,8 @@ class Firmware:
         self.guidance.stare(self.poi.tick(self.time, self.pose, hovering))
         # A drone that hovers stays HOVERING while a gust shakes it, but not while it is carried off.
         moving = math.hypot(self.pose.ground_speed, self.pose.vd) > STRAY if hovering else not still
-        self._fire(Event.BUSY if self.guidance.busy or moving else Event.AT_REST)
+        busy = self.guidance.busy or self.flight_plan.playing
+        self._fire(Event.BUSY if busy or moving else Event.AT_REST)
 
     def _update_sensors(self, elapsed: float) -> None:
         for message in self.battery.drain(elapsed, self.state in AIRBORNE, self.faults.battery):
@@ -269,6 +281,9 @@ class Firmware:
         if self.fix != self.faults.gps:
             self._set_fix(self.faults.gps)
         self.homing.sensors(self.fix, not self.compass.required)
+        rising = (FlyingState.MOTOR_RAMPING, FlyingState.TAKINGOFF)
+        can_fly = self.state in GUIDED or self.state in rising or (self.state is LANDED and not self.blockers())
+        self.flight_plan.sensors(self.fix, not self.compass.required, can_fly)
         self.poi.sensors(self.fix, not self.compass.required, self.state in GUIDED)
         if self.alert is not self._alert:
             self._alert = self.alert
@@ -316,8 +331,6 @@ class Firmware:
         self._emit(ardrone3.GPSFixStateChanged(int(fix)))
         self._emit(ardrone3.NumberOfSatelliteChanged(self.satellites))
         self._emit(common.SensorsStatesListChanged(common.Sensor.GPS, int(fix)))
-        self._emit(common.ComponentStateListChanged(common.FlightPlanComponent.GPS, int(fix)))
-        self._emit(common.AvailabilityStateChanged(int(self.plan_available)))
         if not fix:
             self.guidance.gps_lost(self.pose)
         if fix and self.state in AIRBORNE and self.homing.takeoff is None:
@@ -395,6 +408,7 @@ class Firmware:
 
     def _stop_guidance(self) -> None:
         """End a move and a return, and say so."""
+        self.flight_plan.stop(hover=False)
         self.guidance.cancel(self.pose)
         self.poi.stop()
         self.homing.abort()
@@ -430,7 +444,7 @@ class Firmware:
         return True
 
     def _pilot(self, sticks: ardrone3.PCMD, now: float) -> None:
-        if self.state not in AIRBORNE or self.state is FlyingState.TAKINGOFF:
+        if self.state not in AIRBORNE or self.state is FlyingState.TAKINGOFF or self.flight_plan.playing:
             return
         if sticks.gaz > 0 and self.state is FlyingState.LANDING:
             self._fire(Event.CLIMB)
@@ -483,6 +497,7 @@ class Firmware:
             return
         hovering = self.state is FlyingState.HOVERING
         if self.homing.home is not None and not self.homing.flying:
+            self.flight_plan.stop(hover=True)
             self.guidance.cancel(self.pose)
             self.poi.stop()
         self.homing.request(reason, self.pose, hovering)
@@ -504,11 +519,13 @@ class Firmware:
 
     def _move_by(self, message: ardrone3.MoveBy | move.ExtendedMoveBy) -> None:
         self._leave_poi()
+        self.guidance.taken = self.flight_plan.playing
         self.guidance.move_by(message, self.pose, self.state in GUIDED)
 
     def _move_to(self, message: ardrone3.MoveTo | move.ExtendedMoveTo) -> None:
         self._leave_poi()
         ready = self.state in GUIDED and self.fix and not self.compass.required
+        self.guidance.taken = self.flight_plan.playing
         self.guidance.move_to(message, self.pose, ready)
 
     def _cancel_move_to(self, message: Message) -> None:
@@ -520,7 +537,7 @@ class Firmware:
         self.guidance.stare(None)
 
     def _start_poi(self, message: ardrone3.StartPilotedPOI | ardrone3.StartPilotedPOIV2) -> None:
-        if self.homing.flying:
+        if self.homing.flying or self.flight_plan.playing:
             return
         if self.poi.start(message, self.state is FlyingState.HOVERING, self.time):
             self.guidance.cancel(self.pose)
@@ -563,15 +580,61 @@ class Firmware:
         self.sound = ardrone3.AlertSoundState.PLAYING if playing else ardrone3.AlertSoundState.STOPPED
         self._emit(ardrone3.AlertSound(self.sound))
 
+    # -- flight plans
+
+    @property
+    def airborne(self) -> bool:
+        """In the air and ready to be told where to go."""
+        return self.state in GUIDED
+
+    @property
+    def camera_busy(self) -> bool:
+        return self.payload.cameras.busy
+
+    def plan_take_off(self) -> None:
+        self._fire(Event.TAKE_OFF)
+
+    def plan_land(self) -> None:
+        self._fire(Event.LAND)
+
+    def plan_return(self) -> None:
+        self._body.hover()
+        self._go_home(StateReason.FLIGHTPLAN)
+
+    def operate(self, message: Message) -> None:
+        """Let the payload take a command of the flight plan."""
+        self._note("payload", {"command": message.NAME})
+        for event in self.payload.handle(message, self.time) or ():
+            self._emit(event)
+
     def _start_plan(self, message: common.Start) -> None:
-        # Nothing can be uploaded yet, so every plan is an unknown file.
-        self._emit(common.ComponentStateListChanged(common.FlightPlanComponent.MAVLINK_FILE, 0))
-        self._emit(common.StartingErrorEvent())
+        self._play(message.filepath, message.type)
+
+    def _start_plan_at(self, message: flight_plan.StartAt | flight_plan.StartAtV2) -> None:
+        goes_on = bool(message.continue_on_disconnect) if isinstance(message, flight_plan.StartAtV2) else None
+        type = common.MavlinkType(int(message.type))
+        self._play(message.flightplan_id, type, name=message.custom_id, item=message.item, goes_on=goes_on)
+
+    def _play(
+        self, uid: str, type: common.MavlinkType, *, name: str = "", item: int = 0, goes_on: bool | None = None
+    ) -> None:
+        data = self.plans.get(uid)
+        if self.flight_plan.start(uid, type, data, self.pose, self.time, name=name, item=item, goes_on=goes_on):
+            self.guidance.cancel(self.pose)
+            self.poi.stop()
+            self.homing.abort()
+
+    def _pause_plan(self, message: Message) -> None:
+        self.flight_plan.pause()
 
     def _stop_plan(self, message: Message) -> None:
-        self._emit(
-            common.MavlinkFilePlayingStateChanged(common.PlayingState.STOPPED, "", common.MavlinkType.FLIGHT_PLAN)
-        )
+        if self.flight_plan.state is common.PlayingState.STOPPED:
+            self.flight_plan.report_stopped()
+        else:
+            self.flight_plan.stop(hover=True)
+
+    def _clear_recovery(self, message: Message) -> None:
+        self.flight_plan.clear_recovery()
 
     def _stop_follow_me(self, message: Message) -> None:
         self._emit(follow_me.State(follow_me.Mode.NONE, follow_me.Behavior.IDLE, follow_me.Animation.NONE, 0))
@@ -604,6 +667,10 @@ _HANDLERS: dict[type[Message], Callable[[Firmware, Any], None]] = {
     common.CurrentTime: Firmware._set_time,
     common.Reset: Firmware._reset,
     common.Start: Firmware._start_plan,
+    common.Pause: Firmware._pause_plan,
     common.Stop: Firmware._stop_plan,
+    flight_plan.StartAt: Firmware._start_plan_at,
+    flight_plan.StartAtV2: Firmware._start_plan_at,
+    flight_plan.ClearRecoveryInfo: Firmware._clear_recovery,
     follow_me.Stop: Firmware._stop_follow_me,
 }

@@ -50,6 +50,8 @@ class Guidance:
         self._sticks_until = 0.0
         self._sticks_used = False
         self._stare: float | None = None
+        self.taken = False
+        """Somebody else flies: moves are refused."""
         self._progress: tuple[float, Pose, float] | None = None
         """When, where and with which heading a move was last seen to get on."""
         self.take_off_place = (0.0, 0.0)
@@ -155,7 +157,7 @@ class Guidance:
             wanted = MoveBy(message.d_x, message.d_y, message.d_z, message.d_psi, speeds)
         if not guided:
             error = MoveByError.NOT_AVAILABLE
-        elif self._homing.active:
+        elif self._homing.active or self.taken:
             error = MoveByError.BUSY
         elif wanted.cancels:
             self.cancel(pose)
@@ -175,7 +177,7 @@ class Guidance:
             wanted = MoveTo(message, own_speeds(self._settings))
         else:
             wanted = MoveTo(message, asked_speeds(message, self._model.airframe, self._settings))
-        if not ready or self._homing.active or not wanted.possible:
+        if not ready or self._homing.active or self.taken or not wanted.possible:
             self._emit(wanted.changed(MoveToStatus.ERROR))
             return
         latitude, longitude, altitude = wanted.place

@@ -62,12 +62,7 @@ def all_states(firmware: Firmware) -> list[Message]:
         common.FlightId(firmware.flight_id),
         common.RunIdChanged(firmware.identity.run_id),
         *firmware.compass.states_report(),
-        common.MavlinkFilePlayingStateChanged(common.PlayingState.STOPPED, "", common.MavlinkType.FLIGHT_PLAN),
-        common.AvailabilityStateChanged(int(firmware.plan_available)),
-        *(
-            common.ComponentStateListChanged(part, int(firmware.plan_part_ok(part)))
-            for part in common.FlightPlanComponent
-        ),
+        *firmware.flight_plan.states_report(),
         ardrone3.FlyingStateChanged(firmware.state),
         ardrone3.AlertStateChanged(firmware.alert),
         *firmware.position_report(),
