@@ -50,6 +50,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--storage", metavar="SIZE", help="bytes of the memory card, also with k, M or G behind: small ones fill soon"
     )
     parser.add_argument(
+        "--skycontroller", metavar="3", help="a Skycontroller in front of each drone, which has the address instead"
+    )
+    parser.add_argument(
         "--wind",
         metavar="SPEED,DIRECTION",
         help="m/s and degrees where it comes from; a third number is the gusts' share",
@@ -108,6 +111,9 @@ def _from_options(arguments: argparse.Namespace) -> Fleet:
             http_port=_integer("--http-port", arguments.http_port, "a port from 0 to 65535"),
             versions=versions,
             telemetry_rate=_number("--telemetry-rate", arguments.telemetry_rate, "events per second"),
+            skycontroller=None
+            if arguments.skycontroller is None
+            else _integer("--skycontroller", arguments.skycontroller, "the generation of a Skycontroller, 3"),
             storage=None if arguments.storage is None else _size("--storage", arguments.storage),
         )
     except ConfigError as error:
@@ -221,6 +227,8 @@ def _line(drone: SimulatedDrone) -> str:
     protocol = f"protocol {low}" if low == high else f"protocol {low} to {high}"
     web = drone.http_problem or ("no HTTP" if drone.http_port is None else f"HTTP {drone.http_port}")
     name = f"{drone.identity.name} ({drone.spec.model}, {drone.identity.serial})"
+    if drone.spec.skycontroller is not None:
+        name += f" behind a Skycontroller {drone.spec.skycontroller}"
     return f"{name} at {drone.address}: discovery {drone.discovery_port}, {protocol}, {web}"
 
 

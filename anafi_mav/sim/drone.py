@@ -29,12 +29,17 @@ from anafi_mav.sim.model import MODELS
 from anafi_mav.sim.motion import Body, Pose
 from anafi_mav.sim.place import Origin
 from anafi_mav.sim.power import Battery
+from anafi_mav.sim.skycontroller import MODELS as SKYCONTROLLERS
+from anafi_mav.sim.skycontroller import Skycontroller
 from anafi_mav.sim.states import all_settings, all_states
 from anafi_mav.sim.telemetry import RATE, Telemetry
 from anafi_mav.sim.wind import CALM, Wind
 
 POSE_PERIOD = 0.1
 """s between two poses in the log."""
+
+SKYCONTROLLER_PORTS = 100
+"""A Skycontroller offers the TCP ports of its drone this much higher: HTTP at 180."""
 
 MAX_RATE = 200.0
 """Hz; the motion itself is not computed more often."""
@@ -63,6 +68,8 @@ class DroneSpec:
     """Hz of attitude, speed and height."""
     storage: int | None = None
     """Bytes of its memory card; None: as large as the model's."""
+    skycontroller: int | None = None
+    """The generation of the Skycontroller in front of it, whose address `address` then is; None: there is none."""
 
     def __post_init__(self) -> None:
         if self.model not in MODELS:
@@ -85,6 +92,12 @@ class DroneSpec:
             raise ConfigError("telemetry_rate", f"expected up to {MAX_RATE:g} Hz, got {self.telemetry_rate:g}")
         if self.storage is not None and not 0 <= self.storage < 1 << 63:
             raise ConfigError("storage", f"expected a number of bytes, got {self.storage}")
+        if self.skycontroller is not None:
+            if self.skycontroller not in SKYCONTROLLERS:
+                expected = " or ".join(map(str, SKYCONTROLLERS))
+                raise ConfigError("skycontroller", f"expected {expected}, got {self.skycontroller}")
+            if self.model == "ai" and self.skycontroller == 3:
+                raise ConfigError("skycontroller", "expected another model than ai, which a Skycontroller 3 cannot fly")
         if self.serial is not None and not 5 <= len(self.serial) <= 32:
             raise ConfigError("serial", f"expected 5 to 32 characters, got {self.serial!r}")
 
@@ -121,6 +134,13 @@ class SimulatedDrone:
             self.firmware.payload.storage.place.capacity = spec.storage
         self._telemetry = Telemetry(self.firmware, spec.telemetry_rate, phase)
         self._info = DeviceInfo(model.product_id, serial, spec.handshake_port, identity.name)
+        self.skycontroller: Skycontroller | None = None
+        """The controller in front of it, if there is one."""
+        if spec.skycontroller is not None:
+            self.skycontroller = Skycontroller(
+                spec.skycontroller, self._info, self._on_command, self._note, self._radio_changed
+            )
+            self._info = self.skycontroller.info
         self._server: DeviceServer | None = None
         self._web: WebServer | None = None
         self._session: DeviceSession | None = None
@@ -192,6 +212,8 @@ class SimulatedDrone:
     async def start(self) -> None:
         """Open the sockets. Raises `OSError` when a port but the web server's is taken."""
         spec = self.spec
+        if self.skycontroller is not None:
+            self.firmware.link_up()
         self._server = await DeviceServer.start(
             spec.address,
             discovery_port=spec.discovery_port,
@@ -205,10 +227,13 @@ class SimulatedDrone:
         if spec.http_port is None:
             return
         web = self._make_web()
+        port = spec.http_port
+        if self.skycontroller is not None and port:
+            port += SKYCONTROLLER_PORTS
         try:
-            await web.start(spec.address, spec.http_port)
+            await web.start(spec.address, port)
         except OSError as error:
-            self.http_problem = f"no HTTP on port {spec.http_port}: {os.strerror(error.errno or 0)}"
+            self.http_problem = f"no HTTP on port {port}: {os.strerror(error.errno or 0)}"
         else:
             self._web = web
 
@@ -238,7 +263,9 @@ class SimulatedDrone:
         if elapsed:
             self._body.blow(*self.wind.advance(elapsed))
         session = self._session
-        if session is not None:
+        if self.skycontroller is not None:
+            self.skycontroller.tick(now)
+        if session is not None and self._in_reach:
             for message in self._telemetry.due(now):
                 session.send(message)
         if now >= self._next_pose:
@@ -276,7 +303,10 @@ class SimulatedDrone:
         session.air = self._air
         session.lost.add_done_callback(lambda lost: self._on_lost(session, lost.result()))
         self.log.add(now, "session", "up", {"peer": session.peer, "version": session.version})
-        self.firmware.link_up()
+        if self.skycontroller is None:
+            self.firmware.link_up()
+        else:
+            self.skycontroller.link_up(session.send)
 
         def on_message(message: Message | UnknownMessage, now: float) -> None:
             self._on_message(session, message, now)
@@ -288,16 +318,38 @@ class SimulatedDrone:
             return
         self._session = None
         self.log.add(self._clock(), "session", "lost", {"reason": reason})
-        if not self._closing:
+        if self.skycontroller is not None:
+            self.skycontroller.link_lost()
+        elif not self._closing:
+            self.firmware.link_lost()
+
+    @property
+    def _in_reach(self) -> bool:
+        return self.skycontroller is None or self.skycontroller.radio
+
+    def _radio_changed(self, up: bool) -> None:
+        """The Skycontroller is in reach again, or not any more."""
+        if up:
+            self.firmware.link_up()
+        else:
             self.firmware.link_lost()
 
     def _on_message(self, session: DeviceSession, message: Message | UnknownMessage, now: float) -> None:
+        if self.skycontroller is not None and self.skycontroller.receive(message, now):
+            self.log.add_message(now, "controller", message)
+            return
         self.log.add_message(now, "command", message)
         if isinstance(message, common.AllStates):
             self._send_all(session, all_states(self.firmware), common.AllStatesChanged())
         elif isinstance(message, common.AllSettings):
             self._send_all(session, all_settings(self.firmware), common.AllSettingsChanged())
         else:
+            self.firmware.receive(message, now)
+
+    def _on_command(self, message: Message | UnknownMessage, now: float) -> None:
+        """A command of the Skycontroller's own."""
+        if self._in_reach:
+            self.log.add_message(now, "command", message)
             self.firmware.receive(message, now)
 
     def _send_all(self, session: DeviceSession, messages: list[Message], end: Message) -> None:
@@ -308,7 +360,9 @@ class SimulatedDrone:
     def _emit(self, message: Message) -> None:
         if message.BUFFER is not Buffer.NON_ACK:
             self.log.add_message(self._clock(), "event", message)
-        if self._session is not None:
+        if self.skycontroller is not None:
+            self.skycontroller.heard_from_drone(message)
+        if self._session is not None and self._in_reach:
             self._session.send(message)
 
     def _note(self, name: str, args: dict[str, Any]) -> None:
