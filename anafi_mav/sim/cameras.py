@@ -58,8 +58,6 @@ class Cameras:
 
     def _autorecord(self, flying: bool, time: float) -> Iterable[Message]:
         """Recording begins with a take-off and ends with a landing, in recording mode and if that is wanted."""
-        if not self._captures:
-            return ()
         active = self._active
         wanted = active.camera.autorecord is State.ACTIVE and active.camera.mode is CameraCameraMode.RECORDING
         if not wanted or flying == active.recording:
@@ -78,8 +76,6 @@ class Cameras:
 
     def handle(self, message: Message, time: float) -> list[Message] | None:
         """The answer to a command of this feature; None when it is none. A camera that is not there says nothing."""
-        if not self._captures:
-            return None
         if isinstance(message, camera.SetAntiflickerMode):
             if message.mode in tuple(CameraAntiflickerMode):
                 self._antiflicker = message.mode
@@ -150,7 +146,7 @@ class Cameras:
 
     def states_changed(self) -> list[Message]:
         """Whether the active camera can take photos and record may have changed for another reason."""
-        return self._active.states() if self._captures else []
+        return self._active.states()
 
     # -- reports
 
@@ -165,8 +161,6 @@ class Cameras:
 
     def states_report(self) -> list[Message]:
         """What AllStates tells of the cameras."""
-        if not self._captures:
-            return []
         captures = list(self._captures.values())
         messages = [capture.camera.capabilities() for capture in captures]
         messages += self._lists()

@@ -344,6 +344,10 @@ class Capture:
         frame = picture.mp4_size(take.scene, 2 * picture.FRAME_TIME) - one
         return picture.FRAME_TIME * (1 + (self._studio.place.free - one) // frame)
 
+    def recorded(self, time: float) -> float:
+        """s that the recording lasts already; 0 if there is none."""
+        return 0.0 if self._take is None else time - self._take.began
+
     # -- both
 
     def tick(self, time: float) -> Iterable[Message]:

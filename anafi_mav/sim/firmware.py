@@ -81,7 +81,7 @@ class Firmware:
         self.battery = Battery(model)
         self.compass = Compass()
         self.gimbal = Gimbals(model)
-        self.payload = Payload(model, identity.run_id, emit, self._scene)
+        self.payload = Payload(model, identity.name, identity.run_id, emit, self._scene)
         self.plans = FlightPlanStore()
         self.alarms = Alarms()
         self.warnings = Warnings()
@@ -285,6 +285,8 @@ class Firmware:
         can_fly = self.state in GUIDED or self.state in rising or (self.state is LANDED and not self.blockers())
         self.flight_plan.sensors(self.fix, not self.compass.required, can_fly)
         self.poi.sensors(self.fix, not self.compass.required, self.state in GUIDED)
+        for message in self.payload.lacks(self.fix, not self.compass.required, self.state in GUIDED):
+            self._emit(message)
         if self.alert is not self._alert:
             self._alert = self.alert
             self._emit(ardrone3.AlertStateChanged(self._alert))
@@ -604,7 +606,7 @@ class Firmware:
     def operate(self, message: Message) -> None:
         """Let the payload take a command of the flight plan."""
         self._note("payload", {"command": message.NAME})
-        for event in self.payload.handle(message, self.time) or ():
+        for event in self.payload.operate(message, self.time):
             self._emit(event)
 
     def _start_plan(self, message: common.Start) -> None:

@@ -194,6 +194,17 @@ _USA_BLENDED = replace(
 )
 
 
+AI = replace(
+    _THERMAL,
+    recordings=(Recording(_STANDARD[:1], Resolution.RES_UHD_4K, _CINEMA),),
+    width=8000,
+    zoom_max=6.0,
+    hfov=68.0,
+    adjustable=False,
+)
+"""What the Ai's camera does when it is at work; how it is spoken to is `camera2`'s."""
+
+
 def _bare(blended: Lens) -> Lens:
     """The thermal sensor alone: seen, never recorded by itself."""
     return replace(blended, id=1, model=Model.THERMAL, recordings=())

@@ -1,4 +1,4 @@
-"""What the drone carries: cameras, thermal settings, the card and what is on it, the calendar that dates it."""
+"""What the drone carries: cameras, the card and what is on it, its calendar, and what an Ai answers besides."""
 
 from __future__ import annotations
 
@@ -7,11 +7,13 @@ from collections.abc import Callable
 from anafi_mav.arsdk.messages.thermal import ThermalMode
 from anafi_mav.arsdk.wire import Message
 from anafi_mav.sim.calendar import Calendar
+from anafi_mav.sim.camera2 import Camera2
 from anafi_mav.sim.cameras import Cameras
 from anafi_mav.sim.capture import Studio
 from anafi_mav.sim.media import MediaStore
 from anafi_mav.sim.model import Model
 from anafi_mav.sim.picture import Scene
+from anafi_mav.sim.services import Services
 from anafi_mav.sim.storage import Storage
 from anafi_mav.sim.thermal import Thermal
 
@@ -19,13 +21,17 @@ from anafi_mav.sim.thermal import Thermal
 class Payload:
     """One drone's. `scene` says what its camera sees."""
 
-    def __init__(self, model: Model, run_id: str, emit: Callable[[Message], None], scene: Callable[[], Scene]) -> None:
+    def __init__(
+        self, model: Model, name: str, run_id: str, emit: Callable[[Message], None], scene: Callable[[], Scene]
+    ) -> None:
         self.calendar = Calendar()
         self.media = MediaStore(run_id, model.title, len(model.cards) - 1, emit)
         self.storage = Storage(model, self.media)
-        self.cameras = Cameras(model, Studio(self.media, self.storage.place, self.calendar, scene))
+        studio = Studio(self.media, self.storage.place, self.calendar, scene)
+        self.cameras: Cameras | Camera2 = Camera2(model, studio) if model.modern else Cameras(model, studio)
         self.storage.place.busy = lambda: self.cameras.busy
         self.thermal = Thermal(self._on_thermal_mode) if model.thermal else None
+        self.services = Services(name) if model.modern else None
         self._time = 0.0
 
     def handle(self, message: Message, time: float) -> list[Message] | None:
@@ -34,12 +40,24 @@ class Payload:
         answer = self.cameras.handle(message, time)
         if answer is None and self.thermal is not None:
             answer = self.thermal.handle(message)
+        if answer is None and self.services is not None:
+            answer = self.services.handle(message)
         if answer is None:
             formatting = self.storage.place.formatting
             answer = self.storage.handle(message, time)
             if answer is not None and self.storage.place.formatting != formatting:
                 answer += self.cameras.states_changed()
         return answer
+
+    def operate(self, message: Message, time: float) -> list[Message]:
+        """What the autopilot itself has done, in the older camera's words whatever the model's own are."""
+        if isinstance(self.cameras, Camera2):
+            return self.cameras.operate(message, time)
+        return self.handle(message, time) or []
+
+    def lacks(self, fix: bool, calibrated: bool, flying: bool) -> list[Message]:
+        """What a move or a flight plan still lacks, on models that tell it and if it has changed."""
+        return [] if self.services is None else self.services.lacks(fix, calibrated, flying)
 
     def tick(self, time: float, flying: bool) -> list[Message]:
         """What has come due by now (s)."""
@@ -63,7 +81,9 @@ class Payload:
             *(() if self.thermal is None else self.thermal.states_report()),
             *self.storage.states_report(),
             *self.media.states_report(),
+            *(() if self.services is None else self.services.states_report()),
         ]
 
     def _on_thermal_mode(self, mode: ThermalMode) -> list[Message]:
+        assert isinstance(self.cameras, Cameras)  # no other model has a thermal mode
         return list(self.cameras.activate(mode, self._time))

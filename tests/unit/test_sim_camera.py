@@ -38,6 +38,7 @@ from anafi_mav.arsdk.messages.camera import (
 )
 from anafi_mav.arsdk.messages.generic import ListFlags
 from anafi_mav.arsdk.wire import Message
+from anafi_mav.sim.cameras import Cameras
 
 PHOTO, RECORDING = CameraCameraMode.PHOTO, CameraCameraMode.RECORDING
 
@@ -45,6 +46,11 @@ PHOTO, RECORDING = CameraCameraMode.PHOTO, CameraCameraMode.RECORDING
 @pytest.fixture
 def bench() -> Bench:
     return Bench()
+
+
+def cameras(bench: Bench) -> Cameras:
+    assert isinstance(bench.firmware.payload.cameras, Cameras)
+    return bench.firmware.payload.cameras
 
 
 def photo_mode(
@@ -317,7 +323,7 @@ def test_zoom_to_a_level(bench: Bench) -> None:
 
 def test_zoom_at_a_speed(bench: Bench) -> None:
     def zoom() -> float:
-        return bench.firmware.payload.cameras[0].zoom
+        return cameras(bench)[0].zoom
 
     bench.send(camera.SetMaxZoomSpeed(0, 0.4))
     bench.send(camera.SetZoomTarget(0, ZoomControlMode.VELOCITY, 0.5))
@@ -632,7 +638,7 @@ def test_blending_makes_the_blended_camera_the_active_one() -> None:
     bench.send(camera.StopRecording(2))
     media = list(bench.firmware.payload.media)[-1]
     assert media.describe()["thermal"] is True
-    mode = bench.firmware.payload.cameras[2].recording_report()
+    mode = cameras(bench)[2].recording_report()
     assert isinstance(mode, camera.RecordingMode)
     assert (mode.resolution, mode.framerate) == (Resolution.RES_720P_SD, Framerate.FPS_9)
 

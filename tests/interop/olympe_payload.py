@@ -1,0 +1,247 @@
+"""Camera, gimbal, card and media, against Parrot's Olympe alone: ``olympe_payload.py ADDRESS PORT FOLDER MODEL``.
+
+Knows nothing of this project. Prints one JSON object: what each step came to and what Olympe believes. Downloads go
+to FOLDER; MODEL (4k, thermal, usa, ai) only says what is worth asking for. Olympe's log goes to stderr.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+OUT = os.fdopen(os.dup(1), "w")
+os.dup2(2, 1)  # Olympe logs to stdout
+
+import olympe  # noqa: E402
+from olympe.features.media import (  # noqa: E402
+    delete_all_media,
+    delete_media,
+    download_media,
+    download_media_thumbnail,
+    indexing_state,
+    media_created,
+    resource_created,
+)
+from olympe.messages import camera, gimbal, mediastore, thermal, user_storage, user_storage_v2  # noqa: E402
+
+LIMIT = 10.0
+"""s for anything."""
+
+
+def plain(value: object) -> object:
+    """Enums as their names, for JSON."""
+    if isinstance(value, dict):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, int | float | str | bool) or value is None:
+        return value
+    return getattr(value, "_name_", str(value))
+
+
+class Visit:
+    def __init__(self, address: str, port: str, folder: Path, model: str) -> None:
+        self.drone = olympe.Drone(address, http_port=int(port))
+        self.folder = folder
+        self.model = model
+        self.zoom_max = 32.0 if model == "usa" else 3.0
+        self.steps: dict[str, dict[str, object]] = {}
+        self.result: dict[str, object] = {"steps": self.steps}
+
+    def expect(self, name: str, expectation: object) -> bool:
+        """One expectation of the drone, waited for; what fails is described by Olympe."""
+        return self._wait(name, self.drone(expectation))
+
+    def ask(self, name: str, expectation: object) -> bool:
+        """One expectation of its media."""
+        return self._wait(name, self.drone.media(expectation))
+
+    def _wait(self, name: str, scheduled: object) -> bool:
+        waited = scheduled.wait(_timeout=LIMIT)  # type: ignore[attr-defined]
+        ok = bool(waited.success())
+        self.steps[name] = {"ok": ok} if ok else {"ok": ok, "explained": str(waited.explain())}
+        return ok
+
+    def state(self, message: object) -> object:
+        return plain(dict(self.drone.get_state(message)))
+
+    def until(self, name: str, happened: Callable[[], bool]) -> None:
+        end = time.monotonic() + LIMIT
+        while not happened() and time.monotonic() < end:
+            time.sleep(0.05)
+        self.steps[name] = {"ok": happened()}
+
+    # -- the older cameras
+
+    def set_camera(self) -> None:
+        self.expect("ev", camera.set_ev_compensation(0, "ev_1_00"))
+        self.expect("white balance", camera.set_white_balance(0, "custom", "t_5500"))
+        self.expect("antiflicker", camera.set_antiflicker_mode("mode_60hz"))
+        self.expect("hdr", camera.set_hdr_setting(0, "active"))
+        self.expect("style", camera.set_style(0, "standard"))
+        self.expect("style parameters", camera.set_style_params(0, 1, -1, 2))
+        self.expect("zoom speed", camera.set_max_zoom_speed(0, 2.0))
+        self.expect("zoom quality", camera.set_zoom_velocity_quality_degradation(0, 1))
+        self.expect("zoom", camera.set_zoom_target(0, "level", 2.0) & camera.zoom_level(cam_id=0, level=2.0))
+        self.expect(
+            "zoom in", camera.set_zoom_target(0, "velocity", 1.0) & camera.zoom_level(cam_id=0, level=self.zoom_max)
+        )
+        self.expect("zoom back", camera.reset_zoom(0) & camera.zoom_level(cam_id=0, level=1.0))
+        self.expect("streaming", camera.set_streaming_mode(0, "high_reliability"))
+        self.expect("autorecord", camera.set_autorecord(0, "inactive"))
+        if self.model == "4k":
+            wanted = ("automatic", "shutter_1_over_60", "iso_100", "iso_800", "standard")
+        else:
+            wanted = ("manual", "shutter_1_over_500", "iso_400", "iso_3200", "standard")
+        self.expect("exposure", camera.set_exposure_settings(0, *wanted))
+        self.result["exposure"] = plain(dict(self.drone.get_state(camera.exposure_settings)[0]))
+
+    def take_photos(self) -> None:
+        self.expect("photo mode", camera.set_camera_mode(0, "photo"))
+        single = ("single", "rectilinear", "jpeg", "burst_14_over_1s", "preset_1ev", 0.0)
+        self.expect("single", camera.set_photo_mode(0, *single))
+        self.photo("photo")
+        self.expect("burst", camera.set_photo_mode(0, "burst", *single[1:]))
+        self.photo("photos of a burst")
+        lapse = ("time_lapse", *single[1:5], 2.0)
+        self.expect("time lapse", camera.set_photo_mode(0, *lapse))
+        saved = camera.photo_progress(result="photo_saved", _policy="wait")
+        self.expect("start a lapse", camera.take_photo(0) & saved)
+        self.expect("stop the lapse", camera.stop_photo(0))
+        self.expect("too early a photo", camera.set_camera_mode(0, "recording"))
+        bad = camera.photo_progress(result="error_bad_state", _policy="wait", _timeout=3)
+        self.expect("no photo while recording is set", camera.take_photo(0, _no_expect=True) & bad)
+
+    def photo(self, name: str) -> None:
+        """From the button to the file, on the drone's link and on its websocket."""
+        told = self.drone.media(media_created(_timeout=LIMIT))
+        files = self.drone.media(resource_created(_timeout=LIMIT))
+        saved = self.drone(camera.photo_progress(result="photo_saved", _policy="wait", _timeout=LIMIT))
+        idle = camera.photo_state(cam_id=0, state="inactive", _policy="wait", _timeout=LIMIT)
+        self.expect(name, camera.take_photo(0) >> idle)
+        ok = all(bool(one.wait(_timeout=LIMIT).success()) for one in (saved, told, files))
+        self.steps[f"{name}, told"] = {"ok": ok}
+        self.result[name] = saved.received_events().last().args["media_id"] if ok else None
+
+    def record(self) -> None:
+        standard = ("standard", "res_1080p", "fps_30", "ratio_15")
+        self.expect("recording mode", camera.set_recording_mode(0, *standard))
+        self.expect("start recording", camera.start_recording(0))
+        self.result["recording"] = self.state_of(camera.recording_state)
+        time.sleep(2.0)
+        self.expect("stop recording", camera.stop_recording(0))
+
+    def state_of(self, message: object) -> object:
+        return plain(dict(self.drone.get_state(message)[0]))
+
+    def look_around(self) -> None:
+        slow = gimbal.set_max_speed(0, 30.0, 90.0, 30.0)
+        self.expect("gimbal speed", slow)
+
+        def to(pitch: float) -> object:
+            return gimbal.set_target(0, "position", "none", 0.0, "absolute", pitch, "none", 0.0)
+
+        def at(pitch: float) -> object:
+            return gimbal.attitude(gimbal_id=0, pitch_absolute=pitch, _policy="wait")
+
+        self.expect("gimbal down", to(-45.0) & at(-45.0))
+        turn = gimbal.set_target(0, "velocity", "none", 0.0, "absolute", 0.5, "none", 0.0)
+        self.expect("gimbal up at a speed", turn & at(90.0 if self.model != "ai" else 176.0))
+        self.expect("gimbal reset", gimbal.reset_orientation(0) & at(0.0))
+        self.expect("offsets", gimbal.start_offsets_update(0))
+        self.expect("an offset", gimbal.set_offsets(0, 0.0, 1.5, -1.5))
+        self.expect("offsets end", gimbal.stop_offsets_update(0))
+        done = gimbal.calibration_result(gimbal_id=0, result="success", _policy="wait", _timeout=LIMIT)
+        self.expect("calibrate", gimbal.calibrate(0) >> done)
+        self.result["offsets"] = self.state_of(gimbal.offsets)
+        self.result["axes"] = str(self.drone.get_state(gimbal.gimbal_capabilities)[0]["axes"])
+
+    def see_warmth(self) -> None:
+        self.expect("blended", thermal.set_mode("blended"))
+        self.expect("rendering", thermal.set_rendering("blended", 0.25))
+        self.expect("emissivity", thermal.set_emissivity(0.5))
+        self.expect("background", thermal.set_background_temperature(300.0))
+        self.expect("sensitivity", thermal.set_sensitivity("high"))
+        self.expect("shutter", thermal.set_shutter_mode("manual"))
+        palette = ("absolute", 280.0, 310.0, "limited", "locked", "hot", 0.5)
+        self.expect("palette", thermal.set_palette_settings(*palette))
+        self.expect("start a thermal film", camera.start_recording(2))
+        time.sleep(0.5)
+        self.expect("stop the thermal film", camera.stop_recording(2))
+        self.expect("visible again", thermal.set_mode("disabled"))
+        self.expect("the first camera again", camera.camera_states(active_cameras=1, _policy="check_wait"))
+
+    # -- media
+
+    def fetch(self) -> None:
+        media = self.drone.media
+        media.download_dir = str(self.folder)
+        media.integrity_check = True
+        self.ask("index", indexing_state("indexed"))
+        listed = media.list_media()
+        self.result["media"] = {id: plain(media.media_info(id)._asdict()) for id in listed}
+        for id in listed:
+            self.ask(f"download {id}", download_media(id, integrity_check=True))
+            self.ask(f"thumbnails {id}", download_media_thumbnail(id))
+        files = [file for file in sorted(self.folder.iterdir()) if file.suffix in (".JPG", ".DNG", ".MP4")]
+        self.result["files"] = {file.name: hashlib.md5(file.read_bytes()).hexdigest() for file in files}
+        self.result["thumbnails"] = sorted(file.name for file in (self.folder / "thumbnails").glob("*.JPG"))
+        self.result["counters"] = self.state(mediastore.counters)
+        if listed:
+            self.ask("delete one", delete_media(listed[0]))
+            self.until("it is gone", lambda: listed[0] not in media.list_media())
+        self.ask("delete all", delete_all_media())
+        self.until("all are gone", lambda: media.list_media() == [])
+        gone = mediastore.counters(photo_media_count=0, video_media_count=0, _policy="check_wait", _timeout=LIMIT)
+        self.expect("and not counted", gone)
+
+    def format(self) -> None:
+        if self.model == "ai":
+            self.expect("monitor", user_storage_v2.start_monitoring(1, 1))
+            self.expect("format", user_storage_v2.format_with_type(1, "films", "quick"))
+        else:
+            self.expect("monitor", user_storage.start_monitoring(1))
+            self.expect("format", user_storage.format_with_type("films", "full"))
+            self.result["card"] = self.state(user_storage.info)
+            self.result["free"] = self.state(user_storage.monitor)
+        self.ask("index again", indexing_state("indexed"))
+
+    def plans(self) -> None:
+        # Olympe 8.5 cannot read its own list back: `_get_flightplan_tuple` calls a function that it does not import.
+        file = b"QGC WPL 120\n0\t0\t3\t22\t0\t0\t0\t0\t48.88\t2.36\t10\t1\n"
+        self.result["plan"] = self.drone.flightplan.upload(file)
+
+    def visit(self) -> dict[str, object]:
+        ok = bool(self.drone.connect())
+        self.steps["connect"] = {"ok": ok}
+        if not ok:
+            return self.result
+        if self.model != "ai":
+            self.set_camera()
+            self.take_photos()
+            self.record()
+        if self.model in ("thermal", "usa"):
+            self.see_warmth()
+        self.look_around()
+        self.fetch()
+        self.format()
+        self.plans()
+        self.steps["disconnect"] = {"ok": bool(self.drone.disconnect())}
+        return self.result
+
+
+def main() -> None:
+    olympe.log.update_config({"loggers": {"olympe": {"level": "WARNING"}, "ulog": {"level": "WARNING"}}})
+    result = Visit(sys.argv[1], sys.argv[2], Path(sys.argv[3]), sys.argv[4]).visit()
+    print(json.dumps(result), file=OUT, flush=True)
+    # Olympe's own way out takes seconds.
+    os._exit(0)
+
+
+if __name__ == "__main__":
+    main()
