@@ -14,6 +14,7 @@ from pathlib import Path
 
 import msgspec
 
+from anafi_mav.cli import sim_validate
 from anafi_mav.cli.terminal import say
 from anafi_mav.errors import ConfigError
 from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator, scenario
@@ -29,6 +30,9 @@ _UNITS = {"k": 1000, "M": 1000**2, "G": 1000**3}
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `anafi-mav sim`. Their values are checked by `run`, for one clear line each."""
+    actions = parser.add_subparsers(dest="action", metavar="ACTION", title="instead of simulating")
+    purpose = "fly the tests of the anafi_ros paper and print measured beside published"
+    sim_validate.add_arguments(actions.add_parser("validate", help=purpose, description=purpose))
     default = DroneSpec()
     parser.add_argument("--model", default=default.model, help=f"which ANAFI: {', '.join(MODELS)} (%(default)s)")
     parser.add_argument("--address", default=default.address, help="of the first drone (%(default)s)")
@@ -66,6 +70,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Simulate until SIGINT or SIGTERM. Raises `ConfigError` before anything is started."""
+    if arguments.action == "validate":
+        return sim_validate.run(arguments)
     if arguments.fleet is not None:
         asyncio.run(_run(_from_fleet(arguments.fleet), arguments.log, arguments.stdin_watch))
         return 0

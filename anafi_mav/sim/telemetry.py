@@ -1,7 +1,8 @@
 """What a drone tells without being asked, at the aircraft's rates.
 
 Attitude, speed and height 5 times a second (or as `--telemetry-rate` says), the gimbal, the zoom and the height above
-ground 5 times, position and voltage once (anafi_ros). Messages that are late are not made up for.
+ground as often but not below 5 times, position and voltage once (anafi_ros). Messages that are late are not made up
+for.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ class Telemetry:
     def __init__(self, firmware: Firmware, rate: float, phase: float) -> None:
         self._firmware = firmware
         self._motion = _Period(1.0 / rate, phase)
-        self._gimbal = _Period(1.0 / RATE, phase)
+        self._gimbal = _Period(1.0 / max(rate, RATE), phase)
         self._position = _Period(1.0, phase)
 
     def due(self, now: float) -> list[Message]:

@@ -1,0 +1,143 @@
+"""The validation report: what it reads off a flight, worked out by hand; and the command as a process."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import sys
+from pathlib import Path
+
+import pytest
+
+from anafi_mav.sim.validation import (
+    Result,
+    Track,
+    at,
+    climb_results,
+    derivative,
+    gimbal_results,
+    passes,
+    tilt_results,
+    yaw_results,
+)
+
+RAMP = [(n / 10, n * 2.0) for n in range(-5, 91)]  # 20 a second
+
+
+def by_name(results: object) -> dict[str, Result]:
+    return {result.what: result for result in results}  # type: ignore[attr-defined]
+
+
+def test_when_a_value_is_passed() -> None:
+    assert passes(RAMP, 3.0) == pytest.approx(0.15)  # half way between 0.1 s and 0.2 s
+    assert passes([(t, -v) for t, v in RAMP], -3.0) == pytest.approx(0.15)
+    assert passes(RAMP, 1000.0) == math.inf
+    assert passes([(0.3, 5.0)], 3.0) == 0.3
+
+
+def test_the_value_at_a_time() -> None:
+    assert at(RAMP, 1.05) == pytest.approx(21.0)
+    assert at(RAMP, 100.0) == 180.0
+    assert math.isnan(at([], 1.0))
+
+
+def test_the_rate_over_a_window() -> None:
+    rates = derivative(RAMP, 0.35)
+    assert [rate for _, rate in rates] == pytest.approx([20.0] * len(rates))
+    assert rates[-1][0] == pytest.approx(8.85)
+
+
+def test_a_turn_is_counted_through() -> None:
+    track = Track()
+    track.attitude = [(n * 0.5, 0.0, 0.0, (n * math.pi / 2 + math.pi) % (2 * math.pi) - math.pi) for n in range(9)]
+    assert [angle for _, angle in track.turned()] == pytest.approx([90.0 * n for n in range(9)])
+    results = by_name(yaw_results(track, "4k"))
+    assert results["yaw: one turn"].measured == pytest.approx(2.0)
+    assert results["yaw: rate"].measured == pytest.approx(180.0)
+    assert not results["yaw: rate"].agrees  # 200 were asked for
+
+
+def flight(speed: float, angle: float) -> Track:
+    """A tilt to both sides, with this top speed."""
+    track = Track()
+    for n in range(91):
+        t = n / 10
+        sign = 1 if 0.5 < t < 2.2 else -1 if 2.7 < t < 4.2 else 0
+        track.attitude.append((t, 0.0, -sign * math.radians(angle), 0.0))
+        track.speed.append((t, 0.6 * speed * abs(sign), 0.8 * speed * abs(sign), -4.0 * sign))
+        track.height.append((t, 30.0 + min(t, 2.0) * 3.5))
+    return track
+
+
+def test_a_flight_that_agrees_and_one_that_does_not() -> None:
+    good = flight(8.5, 40.0)
+    results = by_name(tilt_results("pitch", good.pitch(), good, 8.0))
+    assert results["pitch: top speed"].measured == pytest.approx(8.5)
+    assert all(result.agrees for result in results.values())
+    slow = flight(7.9, 35.0)
+    results = by_name(tilt_results("pitch", slow.pitch(), slow, 8.0))
+    assert [name for name, result in results.items() if not result.agrees] == [
+        "pitch reached",
+        "pitch reached the other way",
+        "pitch: top speed",
+    ]
+
+
+def test_a_climb() -> None:
+    results = by_name(climb_results(flight(0.0, 0.0)))
+    assert results["climb: height in 2 s"].measured == pytest.approx(7.0)
+    # Nothing at 0.5 s, 4 m/s at 0.6 s: 0.1 m/s is passed after 0.5025 s, which is too late.
+    assert results["climb: delay"].measured == pytest.approx(0.5025)
+    assert not results["climb: delay"].agrees
+    assert results["climb: speed up"].agrees
+
+
+def test_a_gimbal() -> None:
+    # 180 deg at 180 deg/s: a second.
+    turn = [(n / 100, min(-90.0 + 1.8 * n, 90.0)) for n in range(200)]
+    results = by_name(gimbal_results("pitch", turn, turn, (-90.0, 90.0), 180.0))
+    assert results["gimbal pitch: position reached"].measured == 90.0
+    assert results["gimbal pitch: limit to limit"].measured == pytest.approx(0.99)
+    assert results["gimbal pitch: velocity"].measured == pytest.approx(180.0)
+    assert all(result.agrees for result in results.values())
+
+
+def test_nothing_heard_does_not_agree() -> None:
+    results = [*tilt_results("roll", [], Track(), 10.0), *climb_results(Track()), *yaw_results(Track(), "ai")]
+    assert not any(result.agrees for result in results)
+
+
+async def validate(*words: str, limit: float = 30.0) -> tuple[int | None, str, str]:
+    process = await asyncio.create_subprocess_exec(
+        *(sys.executable, "-m", "anafi_mav", "sim", "validate", *words),
+        stdout=asyncio.subprocess.PIPE,
+        stderr=asyncio.subprocess.PIPE,
+    )
+    try:
+        out, err = await asyncio.wait_for(process.communicate(), limit)
+    finally:
+        if process.returncode is None:
+            process.kill()
+            await process.wait()
+    return process.returncode, out.decode(), err.decode()
+
+
+async def test_bad_options(tmp_path: Path) -> None:
+    status, out, err = await validate("--model", "bebop")
+    assert (status, out) == (2, "")
+    assert "--model: expected one of 4k, thermal, usa, ai or all, got 'bebop'" in err
+    (tmp_path / "file").write_text("")
+    status, _, err = await validate("--model", "4k", "--plots", str(tmp_path / "file"))
+    assert status == 2
+    assert "--plots: expected " in err
+
+
+@pytest.mark.timeout(240)
+async def test_a_4k_flies_as_the_paper_says() -> None:
+    """On a machine that has time for it; one that has not says so, and then its numbers mean nothing."""
+    status, out, err = await validate("--model", "4k", limit=200.0)
+    if "too slow" in out:
+        pytest.skip("the machine was too slow for a flight in real time")
+    assert "DIFFERS" not in out
+    assert (status, err) == (0, "")
+    assert out.count("agrees") == 23
