@@ -22,6 +22,7 @@ from anafi_mav.clock import Clock, SystemClock
 from anafi_mav.drone.alerts import Alerts, takeoff_blockers
 from anafi_mav.drone.battery import Battery
 from anafi_mav.drone.calibration import Calibration
+from anafi_mav.drone.camera import Camera
 from anafi_mav.drone.element import Element, Reducer
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander
 from anafi_mav.drone.gimbal import Gimbal
@@ -31,6 +32,7 @@ from anafi_mav.drone.link import Link
 from anafi_mav.drone.moves import Move
 from anafi_mav.drone.piloting import Piloting
 from anafi_mav.drone.product import MODELS, Identity, Model, Product
+from anafi_mav.drone.settings import Question
 from anafi_mav.drone.storage import Storage
 from anafi_mav.drone.thermal import Thermal
 from anafi_mav.errors import CommandTimeout, LinkLost, LocalProtocolError
@@ -45,6 +47,9 @@ Callback: TypeAlias = Callable[[Message, float], None]
 
 HTTP_PORT = 80
 """Of the drone's web server when nothing stands between."""
+
+DETAILS_TIMEOUT = 3.0
+"""s to wait for what may never come; as Olympe (arsdkng/drone: optional, at most 3 s)."""
 
 STATES_TIMEOUT = 5.0
 """s that a drone may take to send all its states, and all its settings: a few hundred messages."""
@@ -80,6 +85,7 @@ class Drone:
         self.alerts = Alerts()
         self.battery = Battery()
         self.calibration = Calibration()
+        self.camera = Camera(self._commander)
         self.gimbal = Gimbal(self._commander)
         self.gps = Gps()
         self.home = Home(self._commander)
@@ -92,6 +98,7 @@ class Drone:
             self.alerts,
             self.battery,
             self.calibration,
+            self.camera,
             self.gimbal,
             self.gps,
             self.home,
@@ -141,6 +148,9 @@ class Drone:
             self._begin(session)
             try:
                 await self._read_states()
+                if self._model.protobuf:
+                    await self._ask([*self.camera.questions(), *self.storage.questions()])
+                    await self._ask([*self.camera.details(), *self.storage.details()])
             except BaseException:
                 await self.close()
                 raise
@@ -158,7 +168,9 @@ class Drone:
 
     def _begin(self, session: ControllerSession) -> None:
         device = session.device
-        self._model = MODELS.get(device.model_id) or Model(device.model_id, f"0x{device.model_id:04x}", "unknown model")
+        self._model = MODELS.get(device.model_id) or Model(
+            device.model_id, f"0x{device.model_id:04x}", "unknown model", protobuf=True
+        )
         self._announced_serial, self._announced_name = device.serial, device.name
         self._session = session
         self._counters = session.counters
@@ -184,6 +196,22 @@ class Drone:
                     await wait.wait()
                 except CommandTimeout:
                     raise LinkLost(f"the drone did not send all its {name} within {STATES_TIMEOUT:g} s") from None
+        finally:
+            for _, wait in waits:
+                wait.close()
+
+    async def _ask(self, questions: list[Question]) -> None:
+        """Ask what is told only on demand. An answer that does not come is a feature that this drone does not have."""
+        waits = [(command, self._commander.expect((answer,), judge)) for command, answer, judge in questions]
+        try:
+            for command, wait in waits:
+                wait.token = self._commander.send(command)
+                wait.expire_after(DETAILS_TIMEOUT, CommandTimeout(command.NAME, DETAILS_TIMEOUT))
+            for command, wait in waits:
+                try:
+                    await wait.wait()
+                except CommandTimeout:
+                    log.info("%s: no answer to %s", self.name, command.NAME)
         finally:
             for _, wait in waits:
                 wait.close()

@@ -20,6 +20,8 @@ class Model(msgspec.Struct, frozen=True):
     key: str
     """Short name as used in configurations: "4k"."""
     title: str
+    protobuf: bool = False
+    """It speaks protobuf too, and tells some of its states only when it is asked in it."""
 
 
 MODELS: Mapping[int, Model] = {
@@ -27,7 +29,7 @@ MODELS: Mapping[int, Model] = {
     for model in (
         Model(0x0914, "4k", "ANAFI 4K"),
         Model(0x0919, "thermal", "ANAFI Thermal"),
-        Model(0x091A, "ai", "ANAFI Ai"),
+        Model(0x091A, "ai", "ANAFI Ai", protobuf=True),
         Model(0x091B, "ua", "ANAFI UA"),
         Model(0x091E, "usa", "ANAFI USA"),
     )

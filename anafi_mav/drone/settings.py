@@ -11,7 +11,7 @@ import asyncio
 import math
 from collections import Counter
 from collections.abc import Callable, Hashable
-from typing import Any, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone.element import Element, StateT
@@ -19,6 +19,9 @@ from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, Expectation
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost, LocalProtocolError, NotSupported
 
 T = TypeVar("T")
+
+Question: TypeAlias = tuple[Message, type[Message], Callable[[Any], bool | None]]
+"""Something to ask after connecting: the question, the kind of event that answers it, and its judge."""
 
 REPEAT = 0.5
 """s after which an unacknowledged target is said again while nothing shows it: attitude and zoom are told five times a

@@ -29,7 +29,7 @@ from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone.alerts import spoken
 from anafi_mav.drone.element import EMPTY, REMOVE, Reducer, members, with_item
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT
-from anafi_mav.drone.settings import Commanding
+from anafi_mav.drone.settings import Commanding, Question
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LocalProtocolError, NotSupported
 
 FORMAT_TIMEOUT = 120.0
@@ -245,6 +245,19 @@ class Storage(Commanding[Storages]):
         """Id of the storage where media go: the card if there is one, else the first."""
         ids = [id for id, one in self.state.items() if one.removable]
         return min(ids or self.state or [0])
+
+    def questions(self) -> list[Question]:
+        """What to ask a drone that speaks protobuf and has reported no storage."""
+        return [] if self.state else [(v3.ListStorages(), v3.StorageList, lambda message: True)]
+
+    def details(self) -> list[Question]:
+        """What to ask once those storages are known."""
+
+        def about(id: int) -> Question:
+            command = v3.GetState(id=id, include_default_capabilities=True)
+            return command, v3.State, lambda message: True if _id(message) == id else None
+
+        return [about(id) for id, one in self.state.items() if one.feature is None]
 
     async def start_monitoring(self, period_s: int = 1, id: int | None = None) -> int:
         """Let the drone report the free space every so many seconds; returns the bytes that are free now."""
