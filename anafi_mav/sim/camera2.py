@@ -10,6 +10,8 @@ import math
 from collections.abc import Callable, Iterable
 from typing import Any
 
+from msgspec.structs import replace
+
 from anafi_mav.arsdk.messages import camera
 from anafi_mav.arsdk.messages.camera import CameraCameraMode, CameraPhotoMode, PhotoResult, RecordingResult
 from anafi_mav.arsdk.messages.proto import camera2
@@ -33,6 +35,7 @@ _MODES = {
 _RESOLUTIONS = {
     camera2.VideoResolution._2160P: camera.Resolution.RES_UHD_4K,
     camera2.VideoResolution._1080P: camera.Resolution.RES_1080P,
+    camera2.VideoResolution._720P: camera.Resolution.RES_720P,
 }
 
 _PHOTO_STOPS = {
@@ -168,6 +171,8 @@ class Camera2:
         elif changes and self._capture.recording:
             yield from self._translate(self._capture.interrupt(time))
         self._config |= taken
+        if self._config["photo_mode"] is camera2.PhotoMode.BURST:
+            self._config["photo_file_format"] = camera2.PhotoFileFormat.JPEG
         self._apply()
         yield camera2.State(
             camera_id=CAMERA,
@@ -383,10 +388,13 @@ def _rule(index: int, mode: camera2.CameraMode, names: Iterable[str]) -> camera2
     return camera2.CapabilitiesRule(**fields)
 
 
+_BURST = camera2.PhotoMode.BURST
+_STILLS = _rule(0, camera2.CameraMode.PHOTO, (*PHOTO, *COMMON))
 _CAPABILITIES = camera2.Capabilities(
     rules=(
-        _rule(0, camera2.CameraMode.PHOTO, (*PHOTO, *COMMON)),
-        _rule(1, camera2.CameraMode.RECORDING, (*RECORDING, *COMMON)),
+        replace(_STILLS, photo_modes=tuple(mode for mode in camera2.PhotoMode if mode is not _BURST)),
+        replace(_STILLS, index=1, photo_modes=(_BURST,), photo_file_formats=(camera2.PhotoFileFormat.JPEG,)),
+        _rule(2, camera2.CameraMode.RECORDING, (*RECORDING, *COMMON)),
     )
 )
 

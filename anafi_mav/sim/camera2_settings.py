@@ -1,7 +1,7 @@
 """What the Ai's camera can be set to, by the field of `camera2.Config`.
 
 From the table of the anafi_ros paper (48 megapixels, ISO 50 to 6400, 1/10000 to 1/15 s, 4K and 1080p at 24 to 120
-frames a second, H.265); what it leaves open is assumed.
+frames a second, H.265) and Olympe's examples for it (720p; bursts are JPEG); what these leave open is assumed.
 """
 
 from __future__ import annotations
@@ -40,7 +40,11 @@ CHOICES: dict[str, tuple[Any, ...]] = {
     "video_recording_mode": tuple(camera2.VideoRecordingMode),
     "video_recording_dynamic_range": tuple(camera2.DynamicRange),
     "video_recording_codec": tuple(camera2.VideoCodec),
-    "video_recording_resolution": (camera2.VideoResolution._2160P, camera2.VideoResolution._1080P),
+    "video_recording_resolution": (
+        camera2.VideoResolution._2160P,
+        camera2.VideoResolution._1080P,
+        camera2.VideoResolution._720P,
+    ),
     "video_recording_framerate": tuple(rate for rate in camera2.Framerate if rate <= camera2.Framerate._120),
     "video_recording_bitrate": (_BITRATE,),
     "audio_recording_mode": (camera2.AudioRecordingMode.MUTE,),

@@ -197,17 +197,28 @@ class MediaStore:
         return Resource(media.id, kind, number, scene, date, self._camera, self._storage, seconds)
 
     def add(self, media: Media, resources: list[Resource]) -> None:
-        """Write files, and tell of them."""
+        """Write files, and tell of them.
+
+        A new media is told of with the files of its first shot, those of the others follow one by one, as Parrot says
+        of a burst (Olympe 8.5, examples/media_ai.py).
+        """
         new = media.id not in self._media
         self._media[media.id] = media
+        first = resources[0].number if new else None
         for resource in resources:
-            media.resources.append(resource)
-            self._resources[resource.id] = resource
-            self.used += resource.size
+            if resource.number == first:
+                self._write(media, resource)
         self.notify("media_created" if new else "media_updated", {"media_id": media.id, "media": media.describe()})
         for resource in resources:
-            self.notify("resource_created", {"resource": resource.describe()})
+            if resource.number != first:
+                self._write(media, resource)
+                self.notify("resource_created", {"resource": resource.describe()})
         self._emit(self._counters())
+
+    def _write(self, media: Media, resource: Resource) -> None:
+        media.resources.append(resource)
+        self._resources[resource.id] = resource
+        self.used += resource.size
 
     def remove_resource(self, id: str) -> bool:
         """Delete a file, and its media with the last one. False when there is none."""

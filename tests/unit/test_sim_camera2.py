@@ -48,10 +48,14 @@ def test_its_state_survives_the_wire(bench: Bench) -> None:
     assert (state.camera_id, state.active) == (0, True)
     assert state.default_capabilities is not None
     assert state.default_capabilities == state.current_capabilities
-    photo, recording = state.default_capabilities.rules
+    photo, burst, recording = state.default_capabilities.rules
     assert (photo.camera_modes, recording.camera_modes) == ((PHOTO,), (RECORDING,))
     assert (photo.video_recording_codecs, recording.photo_modes) == (None, None)
-    assert photo.photo_modes == tuple(camera2.PhotoMode)
+    assert photo.photo_modes == tuple(mode for mode in camera2.PhotoMode if mode.name != "BURST")
+    assert (burst.photo_modes, burst.photo_file_formats) == (
+        (camera2.PhotoMode.BURST,),
+        (camera2.PhotoFileFormat.JPEG,),
+    )
     assert recording.video_recording_codecs == (camera2.VideoCodec.H264, camera2.VideoCodec.H265)
     # 50 to 6400, in both modes.
     for rule in (photo, recording):
@@ -92,6 +96,14 @@ def test_settings(bench: Bench) -> None:
     (empty,) = bench.send(camera2.Configure(camera_id=0))
     assert isinstance(empty, camera2.State)
     assert empty.config == after
+
+
+def test_a_burst_is_jpeg(bench: Bench) -> None:
+    raw = camera2.PhotoFileFormat.DNG_JPEG
+    single = configure(bench, photo_file_format=raw)
+    assert single.photo_file_format is raw
+    burst = configure(bench, photo_mode=camera2.PhotoMode.BURST, photo_file_format=raw)
+    assert burst.photo_file_format is camera2.PhotoFileFormat.JPEG
 
 
 def test_a_photo(bench: Bench) -> None:

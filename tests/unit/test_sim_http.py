@@ -160,13 +160,16 @@ async def test_changes_are_told_to_every_listener(site: Site) -> None:
         site.client.ws_connect(f"{API}/media/notifications") as two,
     ):
         await one.send_str("what a client says means nothing")
-        photo = site.photo()
+        burst = site.media.begin(video=False, mode="BURST", date=DATE)
+        files = [site.media.develop(burst, Kind.JPG, number, Scene(), DATE) for number in (1, 2)]
+        site.media.add(burst, files)
         await site.ask("DELETE", f"{API}/media/medias")
         for listener in (one, two):
             told = [await listener.receive_json(timeout=5.0) for _ in range(3)]
             assert [event["name"] for event in told] == ["media_created", "resource_created", "all_media_removed"]
-            assert told[0]["data"]["media"]["media_id"] == photo.id
-            assert told[1]["data"]["resource"]["resource_id"] == photo.resources[0].id
+            assert told[0]["data"]["media"]["media_id"] == burst.id
+            assert [file["resource_id"] for file in told[0]["data"]["media"]["resources"]] == [files[0].id]
+            assert told[1]["data"]["resource"]["resource_id"] == files[1].id
             assert told[2]["data"] == {}
 
 
