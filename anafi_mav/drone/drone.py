@@ -6,9 +6,10 @@ A value flows: session -> `Drone._receive` -> reducers (new frozen states) -> wa
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from datetime import datetime
 from functools import partial
 from typing import Any, TypeAlias, TypeVar
@@ -16,13 +17,18 @@ from typing import Any, TypeAlias, TypeVar
 from anafi_mav.arsdk import controller
 from anafi_mav.arsdk.controller import ControllerSession
 from anafi_mav.arsdk.handshake import DISCOVERY_PORT
-from anafi_mav.arsdk.messages import common
+from anafi_mav.arsdk.messages import common, drone_manager, skyctrl
+from anafi_mav.arsdk.messages.ardrone3 import PoiStatus
+from anafi_mav.arsdk.messages.common import PlayingState
+from anafi_mav.arsdk.messages.drone_manager import DroneManagerConnectionState as Connection
 from anafi_mav.arsdk.wire import Message, UnknownMessage
 from anafi_mav.clock import Clock, SystemClock
-from anafi_mav.drone.alerts import Alerts, takeoff_blockers
+from anafi_mav.drone.alerts import Alerts, spoken, takeoff_blockers
 from anafi_mav.drone.battery import Battery
 from anafi_mav.drone.calibration import Calibration
 from anafi_mav.drone.camera import Camera
+from anafi_mav.drone.controller import MODELS as CONTROLLERS
+from anafi_mav.drone.controller import Controller
 from anafi_mav.drone.element import Element, Reducer
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander
 from anafi_mav.drone.gimbal import Gimbal
@@ -50,6 +56,9 @@ HTTP_PORT = 80
 
 DETAILS_TIMEOUT = 3.0
 """s to wait for what may never come; as Olympe (arsdkng/drone: optional, at most 3 s)."""
+
+CONTROLLER_TIMEOUT = 5.0
+"""s that a Skycontroller may take to find its drone; then it is asked anew, so that its own state is fresh."""
 
 STATES_TIMEOUT = 5.0
 """s that a drone may take to send all its states, and all its settings: a few hundred messages."""
@@ -94,11 +103,14 @@ class Drone:
         self.storage = Storage(self._commander)
         self.thermal = Thermal(self._commander)
         self.piloting = Piloting(self._commander, self.home, self.takeoff_blockers)
+        self.controller = Controller(self._commander, self._user_moves, self._pilot_takes_over)
+        self._commander.gate = self.controller.allows
         self._elements: tuple[Element[Any], ...] = (
             self.alerts,
             self.battery,
             self.calibration,
             self.camera,
+            self.controller,
             self.gimbal,
             self.gps,
             self.home,
@@ -112,7 +124,11 @@ class Drone:
         for element in self._elements:
             for message, reducer in element.REDUCERS.items():
                 self._routes.setdefault(message, []).append((element, reducer))
-        self._reactions = self.piloting.reactions()
+        self._reactions: dict[type[Message], Callable[[Any, float], None]] = {
+            **self.piloting.reactions(),
+            **self.controller.reactions(),
+            drone_manager.ConnectionState: self._controller_says,
+        }
         self._subscribers: tuple[Callback, ...] = ()
 
         self._session: ControllerSession | None = None
@@ -168,9 +184,8 @@ class Drone:
 
     def _begin(self, session: ControllerSession) -> None:
         device = session.device
-        self._model = MODELS.get(device.model_id) or Model(
-            device.model_id, f"0x{device.model_id:04x}", "unknown model", protobuf=True
-        )
+        self.controller.present = device.model_id in CONTROLLERS
+        self._model = _model(device.model_id)
         self._announced_serial, self._announced_name = device.serial, device.name
         self._session = session
         self._counters = session.counters
@@ -178,24 +193,37 @@ class Drone:
         session.lost.add_done_callback(partial(self._on_lost, session))
 
     async def _read_states(self) -> None:
-        """What Parrot's own SDK does first (olympe arsdkng/drone): set the clock, ask for all states and settings."""
-        send = self._commander.send
+        """What Parrot's own SDK does first (olympe arsdkng/drone): set the clock, ask for all states and settings; of
+        the Skycontroller first, if there is one, then of the drone behind it."""
+        date = datetime.fromtimestamp(self._clock.time()).astimezone().strftime("%Y%m%dT%H%M%S%z")
+        if self.controller.present:
+            await self._read(
+                "Skycontroller",
+                (skyctrl.CurrentDateTime(date), skyctrl.AllStates(), skyctrl.AllSettings()),
+                (skyctrl.AllStatesChanged, skyctrl.AllSettingsChanged),
+            )
+            await self._find_drone()
+        await self._read(
+            "drone",
+            (common.CurrentDateTime(date), common.AllStates(), common.AllSettings()),
+            (common.AllStatesChanged, common.AllSettingsChanged),
+        )
+
+    async def _read(self, who: str, questions: Sequence[Message], markers: Sequence[type[Message]]) -> None:
         waits = [
             (name, self._commander.expect((marker,), lambda message: True))
-            for name, marker in (("states", common.AllStatesChanged), ("settings", common.AllSettingsChanged))
+            for name, marker in zip(("states", "settings"), markers, strict=True)
         ]
         try:
-            now = datetime.fromtimestamp(self._clock.time()).astimezone()
-            send(common.CurrentDateTime(now.strftime("%Y%m%dT%H%M%S%z")))
-            send(common.AllStates())
-            send(common.AllSettings())
+            for question in questions:
+                self._commander.send(question)
             for name, wait in waits:
                 wait.expire_after(STATES_TIMEOUT, CommandTimeout(f"all {name}", STATES_TIMEOUT))
             for name, wait in waits:
                 try:
                     await wait.wait()
                 except CommandTimeout:
-                    raise LinkLost(f"the drone did not send all its {name} within {STATES_TIMEOUT:g} s") from None
+                    raise LinkLost(f"the {who} did not send all its {name} within {STATES_TIMEOUT:g} s") from None
         finally:
             for _, wait in waits:
                 wait.close()
@@ -216,6 +244,40 @@ class Drone:
             for _, wait in waits:
                 wait.close()
 
+    async def _find_drone(self) -> None:
+        """Wait until the Skycontroller is connected to its drone."""
+        state = self.controller.state
+        if state.link != Connection.CONNECTED:
+            try:
+                await self.expect(
+                    drone_manager.ConnectionState, lambda m: m.state == Connection.CONNECTED, CONTROLLER_TIMEOUT
+                )
+            except CommandTimeout:
+                what = "says nothing of a drone" if state.link is None else f"has no drone: {spoken(state.link)}"
+                raise LinkLost(f"the Skycontroller {what}") from None
+        state = self.controller.state
+        self._model = _model(state.drone_model or 0)
+        self._announced_serial, self._announced_name = state.drone_serial or "", state.drone_name or ""
+
+    def _controller_says(self, message: drone_manager.ConnectionState, now: float) -> None:
+        """The drone is gone from behind the Skycontroller: as if our own link to it were."""
+        if self._complete and message.state != Connection.CONNECTED and self._session is not None:
+            self._session.end(f"the Skycontroller lost the drone: {spoken(message.state)}")
+
+    def _user_moves(self) -> bool:
+        """Does something fly the drone that a user of ours ordered?"""
+        piloting = self.piloting
+        return (
+            (bool(piloting.moves_started) and not self.home.state.returning)
+            or piloting.state.plan == PlayingState.PLAYING
+            or piloting.state.poi in (PoiStatus.RUNNING, PoiStatus.PENDING)
+        )
+
+    def _pilot_takes_over(self) -> None:
+        """The pilot at the Skycontroller moved a stick: what our user ordered ends here."""
+        with contextlib.suppress(LinkLost):
+            self.piloting.hover()
+
     def _on_lost(self, session: ControllerSession, reason: asyncio.Future[str]) -> None:
         if session is not self._session:
             return
@@ -225,6 +287,7 @@ class Drone:
         self._complete = False
         self._commander.detach(why)
         self.piloting.link_lost()
+        self.controller.link_lost()
         if not self._lost.done():
             self._lost.set_result(why)
 
@@ -232,6 +295,7 @@ class Drone:
         """End the connection. What was sent just before still leaves. Idempotent."""
         session = self._session
         if session is not None:
+            self.controller.give_back()
             await asyncio.sleep(0)  # a session sends at the end of a turn of the loop
             await session.close()
             self._on_lost(session, session.lost)
@@ -324,3 +388,7 @@ class Drone:
                 log.exception("%s: a subscriber failed on %s", self.name, message.NAME)
         if message_log.isEnabledFor(logging.DEBUG):
             message_log.debug("%s: %r", self.name, message)
+
+
+def _model(id: int) -> Model:
+    return MODELS.get(id) or Model(id, f"0x{id:04x}", "unknown model", protobuf=True)

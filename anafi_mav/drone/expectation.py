@@ -16,6 +16,9 @@ from anafi_mav.errors import AnafiMavError, CommandTimeout, LinkLost
 
 T = TypeVar("T")
 
+WITHHELD = 0
+"""The token of a command that the gate kept back; the transport's begin at 1."""
+
 ANSWER_TIMEOUT = 5.0
 """s. A drone answers within tens of milliseconds, over a bad link within a few retransmissions of 150 ms; Parrot's
 own SDK waits 10 s, too long for a ground station that repeats its command every second."""
@@ -104,6 +107,8 @@ class Commander:
 
     def __init__(self) -> None:
         self._wire: Wire | None = None
+        self.gate: Callable[[Message], bool] | None = None
+        """Asked before each command; False: it is not sent, as if it were lost on the way. May raise."""
         self._open: set[Expectation[Any]] = set()
         self._waiting: dict[type[Message], list[Expectation[Any]]] = {}
 
@@ -122,9 +127,11 @@ class Commander:
             expectation.fail(LinkLost(reason))
 
     def send(self, message: Message) -> int:
-        """Hand a command to the transport. Raises `LinkLost` when there is no link."""
+        """Hand a command to the transport. Raises `LinkLost` when there is no link, or what the gate raises."""
         if self._wire is None:
             raise LinkLost("not connected")
+        if self.gate is not None and not self.gate(message):
+            return WITHHELD
         return self._wire.send(message)
 
     def cancel(self, token: int) -> None:

@@ -89,6 +89,8 @@ class Skycontroller:
         self.flying_state = FlyingState.LANDED
         """What the drone said last; it decides what the take-off button means."""
         self.returning = False
+        self.knows_drone = True
+        """It would connect to the drone again by itself."""
         self.dropped = 0
         """PCMDs that did not reach the drone because the sticks fly it."""
         self._pressed = 0
@@ -238,6 +240,10 @@ class Skycontroller:
             case drone_manager.Connect(serial, _):
                 if serial == self.drone.serial:
                     self._tell(self._connection())
+            case drone_manager.Forget(serial):
+                if serial == self.drone.serial:
+                    self.knows_drone = False
+                self._tell(self._known_item())
             case mapper.Grab(buttons, axes):
                 self._grab(buttons & 0xFFFF, axes & 0x3F)
                 self._tell(self._grab_state())
@@ -281,12 +287,16 @@ class Skycontroller:
             drone.serial, drone.model_id, drone.name, 1, 1, visible, drone_manager.Security.WPA2, 1, -40, _ONLY
         )
 
+    def _known_item(self) -> Message:
+        drone, secret = self.drone, drone_manager.Security.WPA2
+        if not self.knows_drone:
+            return drone_manager.KnownDroneItem("", 0, "", secret, 0, _EMPTY)
+        return drone_manager.KnownDroneItem(drone.serial, drone.model_id, drone.name, secret, 1, _ONLY)
+
     def _states(self) -> list[Message]:
         drone = self.drone
         return [
-            drone_manager.KnownDroneItem(
-                drone.serial, drone.model_id, drone.name, drone_manager.Security.WPA2, 1, _ONLY
-            ),
+            self._known_item(),
             self._list_item(),
             self._connection(),
             mapper.ActiveProduct(drone.model_id if self._radio else 0),

@@ -1,0 +1,410 @@
+"""Element controller: the Skycontroller between us and the drone, and who of its pilot and our user flies.
+
+The sticks have the drone. When a user commands motion, the piloting source is taken and the four axes of the sticks are
+grabbed, so that the pilot is seen; when the motion is over, both go back. A pilot who moves a stick has the drone at
+once and keeps it until the user has been quiet for a while. The return-home and the take-off/land button are never
+grabbed: they are the pilot's. A Skycontroller takes both back by itself when the connection ends (skyctrl.xml 4-20-0).
+
+Without a Skycontroller the state is empty, its verbs raise `NotSupported`, and nothing stands in the way of motion.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import math
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar
+
+import msgspec
+from msgspec.structs import replace
+
+from anafi_mav.arsdk.messages import animation, ardrone3, common, drone_manager, follow_me, mapper, move, skyctrl
+from anafi_mav.arsdk.messages.drone_manager import DroneManagerConnectionState as Connection
+from anafi_mav.arsdk.messages.generic import ListFlags
+from anafi_mav.arsdk.messages.mapper import ButtonEvent
+from anafi_mav.arsdk.messages.skyctrl import BatteryStatus, CalibrationStatus, Source
+from anafi_mav.arsdk.wire import Message
+from anafi_mav.drone.element import Element, Position, Reducer, position, with_item
+from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander
+from anafi_mav.errors import AnafiMavError, CommandRejected, LinkLost, LocalProtocolError, NotSupported
+
+log = logging.getLogger("anafi_mav")
+
+MODELS: Mapping[int, str] = {
+    0x0918: "Skycontroller 3",
+    0x091C: "Skycontroller UA",
+    0x091D: "Skycontroller 4",
+    0x0921: "Skycontroller 4 Black",
+}
+"""Controllers by the number they announce themselves with; what is not here is a drone."""
+
+YAW, THROTTLE, ROLL, PITCH, TILT, ZOOM = range(6)
+"""Axes."""
+STICKS = 1 << YAW | 1 << THROTTLE | 1 << ROLL | 1 << PITCH
+"""The axes that are grabbed while a user flies. The wheels of camera and zoom stay the pilot's."""
+RETURN_HOME, TAKEOFF_LAND, RESET_CAMERA, RESET_ZOOM = range(4)
+"""Buttons; 4 to 15 are the ends of the axes."""
+ALWAYS_THE_PILOTS = 1 << RETURN_HOME | 1 << TAKEOFF_LAND
+"""Buttons that are never grabbed."""
+
+DEFLECTION = 10
+"""Percent beyond which a stick is meant, and not just touched."""
+
+QUIET = 0.5
+"""s without a command of motion, and without a move under way, after which sticks and source go back. The setpoints of
+a user who flies come every few hundredths of a second."""
+
+PILOT_KEEPS = 2.0
+"""s that a pilot who moved a stick keeps the drone. A user who goes on commanding without a pause does not get it
+back: the time begins anew with every command, for a joystick that somebody forgot about must not win."""
+
+MAX_AXIS = 5
+"""Highest number of an axis."""
+
+
+class Attitude(msgspec.Struct, frozen=True):
+    """A unit quaternion from the controller's axes (forward, right, down) to North-East-Down."""
+
+    w: float
+    x: float
+    y: float
+    z: float
+
+
+class KnownDrone(msgspec.Struct, frozen=True):
+    """A drone that the controller has seen or been paired with."""
+
+    serial: str
+    model: int
+    name: str
+    has_key: bool
+    """The controller knows the passphrase of its Wi-Fi, or needs none."""
+    active: bool = False
+    """The controller is connected to it."""
+    rssi_dbm: int | None = None
+    """How well it is received; None: it is not in sight."""
+
+
+class ControllerState(msgspec.Struct, frozen=True):
+    serial: str | None = None
+    firmware: str | None = None
+    hardware: str | None = None
+    battery_percent: int | None = None
+    """None while it is charging, too."""
+    battery: BatteryStatus | None = None
+    attitude: Attitude | None = None
+    position: Position | None = None
+    """Where the controller is; altitude above mean sea level."""
+    magnetometer: CalibrationStatus | None = None
+    link: Connection | None = None
+    """To the drone."""
+    drone_serial: str | None = None
+    drone_name: str | None = None
+    drone_model: int | None = None
+    """Parrot's product number; 0 while there is no drone."""
+    source: Source | None = None
+    """Whose sticks fly."""
+    grabbed_axes: int | None = None
+    grabbed_buttons: int | None = None
+    axes: Mapping[int, int] = {}
+    """Grabbed axis -> percent, -100..100."""
+    pressed: frozenset[int] = frozenset()
+    """Grabbed buttons that are held down."""
+    visible: Mapping[str, KnownDrone] = {}
+    """By serial number, drones that the controller saw when it was last asked."""
+    known: Mapping[str, KnownDrone] = {}
+    """By serial number, drones that it will connect to."""
+
+
+def _attitude(state: ControllerState, message: skyctrl.AttitudeChanged) -> ControllerState:
+    norm = math.sqrt(message.q0**2 + message.q1**2 + message.q2**2 + message.q3**2)
+    if not math.isfinite(norm) or norm < 0.5:
+        return state
+    parts = (message.q0, message.q1, message.q2, message.q3)
+    return replace(state, attitude=Attitude(*(part / norm for part in parts)))
+
+
+def _battery(state: ControllerState, message: skyctrl.BatteryChanged) -> ControllerState:
+    return replace(state, battery_percent=message.percent if message.percent <= 100 else None)
+
+
+def _place(state: ControllerState, message: skyctrl.GpsPositionChanged) -> ControllerState:
+    return replace(state, position=position(message.latitude, message.longitude, message.altitude))
+
+
+def _connection(state: ControllerState, message: drone_manager.ConnectionState) -> ControllerState:
+    return replace(
+        state, link=message.state, drone_serial=message.serial, drone_name=message.name, drone_model=message.model
+    )
+
+
+def _grabbed(state: ControllerState, message: mapper.GrabState) -> ControllerState:
+    pressed = frozenset(button for button in range(32) if message.buttons_state >> button & 1)
+    axes = {axis: value for axis, value in state.axes.items() if message.axes >> axis & 1}
+    return replace(state, grabbed_axes=message.axes, grabbed_buttons=message.buttons, pressed=pressed, axes=axes)
+
+
+def _axis(state: ControllerState, message: mapper.GrabAxisEvent) -> ControllerState:
+    if message.axis > MAX_AXIS:
+        return state
+    return replace(state, axes={**state.axes, message.axis: message.value})
+
+
+def _button(state: ControllerState, message: mapper.GrabButtonEvent) -> ControllerState:
+    if message.button >= 32:
+        return state
+    held = {message.button}
+    return replace(state, pressed=state.pressed | held if message.event == ButtonEvent.PRESS else state.pressed - held)
+
+
+def _seen(state: ControllerState, message: drone_manager.DroneListItem) -> ControllerState:
+    in_sight = message.visible & 1 << drone_manager.VisibleState.WIFI_VISIBLE
+    drone = KnownDrone(
+        message.serial,
+        message.model,
+        message.name,
+        bool(message.has_saved_key) or message.security == drone_manager.Security.NONE,
+        bool(message.active),
+        message.rssi if in_sight else None,
+    )
+    return replace(state, visible=with_item(state.visible, message.serial, drone, message.list_flags))
+
+
+def _known(state: ControllerState, message: drone_manager.KnownDroneItem) -> ControllerState:
+    open_to_all = message.security == drone_manager.Security.NONE
+    drone = KnownDrone(message.serial, message.model, message.name, bool(message.has_saved_key) or open_to_all)
+    return replace(state, known=with_item(state.known, message.serial, drone, message.list_flags))
+
+
+class Controller(Element[ControllerState]):
+    """The Skycontroller, if there is one. `take_over` is called when its pilot has taken the drone."""
+
+    NOTHING = ControllerState()
+    REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = {
+        skyctrl.ProductSerialChanged: lambda state, message: replace(state, serial=message.serialNumber),
+        skyctrl.ProductVersionChanged: lambda state, message: replace(
+            state, firmware=message.software, hardware=message.hardware
+        ),
+        skyctrl.BatteryChanged: _battery,
+        skyctrl.BatteryState: lambda state, message: replace(state, battery=message.state),
+        skyctrl.AttitudeChanged: _attitude,
+        skyctrl.GpsPositionChanged: _place,
+        skyctrl.MagnetoCalibrationState: lambda state, message: replace(state, magnetometer=message.status),
+        skyctrl.PilotingSource: lambda state, message: replace(state, source=message.source),
+        drone_manager.ConnectionState: _connection,
+        drone_manager.DroneListItem: _seen,
+        drone_manager.KnownDroneItem: _known,
+        mapper.ActiveProduct: lambda state, message: replace(state, drone_model=message.product),
+        mapper.GrabState: _grabbed,
+        mapper.GrabAxisEvent: _axis,
+        mapper.GrabButtonEvent: _button,
+    }
+
+    def __init__(
+        self, commander: Commander, moving: Callable[[], bool], take_over: Callable[[], None] | None = None
+    ) -> None:
+        """`moving` says whether a move that a user ordered is under way; `take_over` ends what the user ordered."""
+        super().__init__()
+        self.present = False
+        """There is a Skycontroller between us and the drone."""
+        self.taken = False
+        """The user of ours flies: source and axes are taken, or about to be."""
+        self._commander = commander
+        self._moving = moving
+        self._take_over = take_over
+        self._last_motion = -math.inf
+        self._pilot_keeps_until = -math.inf
+        self._extra_axes = 0
+        self._extra_buttons = 0
+        self._timer: asyncio.TimerHandle | None = None
+
+    # -- the connection
+
+    def reset(self) -> None:
+        super().reset()
+        self.link_lost()
+
+    def link_lost(self) -> None:
+        """The controller has taken everything back by itself."""
+        self.present = self.taken = False
+        self._extra_axes = self._extra_buttons = 0
+        self._pilot_keeps_until = -math.inf
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
+    # -- who flies
+
+    @property
+    def pilot_flies(self) -> bool:
+        """The pilot has taken the drone from our user, whose commands of motion are refused for the time being."""
+        return self.present and self._now() < self._pilot_keeps_until
+
+    def allows(self, message: Message) -> bool:
+        """Shown every command before it is sent. A command of motion takes sticks and source for our user.
+
+        False: a stick position that must not be sent, since the pilot flies. Raises `CommandRejected` for any other
+        motion then.
+        """
+        if not self.present or not is_motion(message):
+            return True
+        now = self._now()
+        if now < self._pilot_keeps_until:
+            if isinstance(message, ardrone3.PCMD):
+                self._pilot_keeps_until = now + PILOT_KEEPS
+                return False
+            raise CommandRejected("the pilot at the Skycontroller flies")
+        self._last_motion = now
+        if not self.taken:
+            self.taken = True
+            log.info("the source of piloting is ours, the axes of the Skycontroller are grabbed")
+            self._commander.send(self._grab_message())
+            self._commander.send(skyctrl.SetPilotingSource(Source.CONTROLLER))
+        if self._timer is None:
+            self._watch(QUIET)
+        return True
+
+    def give_back(self) -> None:
+        """Sticks and source go back to the pilot now; what is grabbed by `grab` stays so."""
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        if not self.taken:
+            return
+        self.taken = False
+        try:
+            self._commander.send(skyctrl.SetPilotingSource(Source.SKY_CONTROLLER))
+            self._commander.send(self._grab_message())
+        except LinkLost:
+            pass  # then the controller has done it by itself
+        log.info("sticks and source of piloting are given back to the pilot")
+
+    def reactions(self) -> Mapping[type[Message], Callable[[Any, float], None]]:
+        """Events to be shown to this element beyond its reducers."""
+        return {mapper.GrabAxisEvent: self._on_axis}
+
+    def _on_axis(self, message: mapper.GrabAxisEvent, now: float) -> None:
+        if self.taken and STICKS >> message.axis & 1 and abs(message.value) > DEFLECTION:
+            log.warning("the pilot moved a stick of the Skycontroller and flies now")
+            self.give_back()
+            if self._take_over is not None:
+                self._take_over()
+            self._pilot_keeps_until = self._now() + PILOT_KEEPS
+
+    def _watch(self, delay: float) -> None:
+        self._timer = asyncio.get_running_loop().call_later(delay, self._look)
+
+    def _look(self) -> None:
+        """Is the motion over?"""
+        self._timer = None
+        rest = self._last_motion + QUIET - self._now()
+        if rest > 0.0:
+            self._watch(rest)
+        elif self._moving():
+            self._watch(QUIET)
+        else:
+            self.give_back()
+
+    def _grab_message(self) -> mapper.Grab:
+        return mapper.Grab(self._extra_buttons, self._extra_axes | (STICKS if self.taken else 0))
+
+    @staticmethod
+    def _now() -> float:
+        return asyncio.get_running_loop().time()
+
+    # -- verbs
+
+    async def grab(self, axes: int = 0, buttons: int = 0, timeout: float = ANSWER_TIMEOUT) -> None:
+        """Have these axes and buttons (masks, bit n = number n) reported in the state instead of acting; zeros give
+        them back. What a motion grabs is not touched.
+
+        Raises `LocalProtocolError` for the sticks, which are grabbed by motion alone, and for the buttons that stay
+        the pilot's.
+        """
+        self._require()
+        if axes & ~(1 << TILT | 1 << ZOOM):
+            raise LocalProtocolError("the sticks are grabbed while a user flies and not otherwise")
+        if buttons & ALWAYS_THE_PILOTS or not 0 <= buttons <= 0xFFFF:
+            raise LocalProtocolError("return home and take-off/land are the pilot's buttons")
+        self._extra_axes, self._extra_buttons = axes, buttons
+        wanted = self._grab_message()
+        await self._commander.confirm(
+            wanted,
+            (mapper.GrabState,),
+            lambda message: True if (message.buttons, message.axes) == (wanted.buttons, wanted.axes) else None,
+            timeout,
+        )
+
+    async def discover_drones(self, timeout: float = ANSWER_TIMEOUT) -> Mapping[str, KnownDrone]:
+        """Let the controller look for drones; what it sees, by serial number."""
+        self._require()
+        last = 1 << ListFlags.LAST | 1 << ListFlags.EMPTY
+        await self._commander.confirm(
+            drone_manager.DiscoverDrones(),
+            (drone_manager.DroneListItem,),
+            lambda message: True if message.list_flags & last else None,
+            timeout,
+        )
+        return self.state.visible
+
+    async def connect_drone(self, serial: str, key: str = "", timeout: float = 30.0) -> None:
+        """Let the controller change to this drone. The connection to us ends and has to be made anew, when it has."""
+        self._require()
+
+        def judge(message: Any) -> bool | AnafiMavError | None:
+            if message.serial != serial:
+                return None
+            if isinstance(message, drone_manager.AuthenticationFailed):
+                return CommandRejected("the passphrase is wrong")
+            if isinstance(message, drone_manager.ConnectionRefused):
+                return CommandRejected("the drone refuses the controller")
+            return True if message.state == Connection.CONNECTED else None
+
+        answers = (
+            drone_manager.ConnectionState,
+            drone_manager.AuthenticationFailed,
+            drone_manager.ConnectionRefused,
+        )
+        await self._commander.confirm(drone_manager.Connect(serial, key), answers, judge, timeout)
+
+    async def forget_drone(self, serial: str, timeout: float = ANSWER_TIMEOUT) -> None:
+        """Let the controller forget a drone that it knows."""
+        self._require()
+        if serial not in self.state.known:
+            raise CommandRejected(f"the Skycontroller knows no drone {serial}")
+        await self._commander.confirm(
+            drone_manager.Forget(serial),
+            (drone_manager.KnownDroneItem,),
+            lambda message: True if serial not in self.state.known else None,
+            timeout,
+        )
+
+    def _require(self) -> None:
+        if not self.present:
+            raise NotSupported("Skycontroller")
+
+
+_ANIMATIONS = animation.Cancel.ID.project
+
+_MOVES = (
+    ardrone3.MoveTo,
+    move.ExtendedMoveTo,
+    ardrone3.StartPilotedPOI,
+    ardrone3.StartPilotedPOIV2,
+    common.Start,
+    follow_me.Start,
+    move.ExtendedMoveBy,
+)
+
+
+def is_motion(message: Message) -> bool:
+    """Does this command fly the drone somewhere? Letting the sticks go does not, and neither does what stops, lands,
+    takes off or returns: for these nobody's sticks are in the way."""
+    if isinstance(message, ardrone3.PCMD):
+        return bool(message.roll or message.pitch or message.yaw or message.gaz)
+    if isinstance(message, ardrone3.MoveBy):
+        return bool(message.dX or message.dY or message.dZ or message.dPsi)
+    if message.ID.project == _ANIMATIONS:
+        return not isinstance(message, animation.Cancel)
+    return isinstance(message, _MOVES)
