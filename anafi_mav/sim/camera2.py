@@ -79,6 +79,9 @@ class Camera2:
         self._stopped = False
         """The user has asked for the end of the photos that are being taken."""
         self._time = 0.0
+        """Of the last tick."""
+        self._now = 0.0
+        """Of the last tick or command."""
         self._flying = False
         self._apply()
 
@@ -92,6 +95,7 @@ class Camera2:
     def tick(self, time: float, flying: bool) -> list[Message]:
         """What has come due by now (s)."""
         seconds, self._time = time - self._time, time
+        self._now = time
         messages = self._translate(self._capture.tick(time)) if self._capture.busy else []
         if self._camera.zooming:
             self._camera.advance_zoom(seconds)
@@ -117,10 +121,12 @@ class Camera2:
             return None
         if getattr(message, "camera_id", CAMERA) != CAMERA:
             return []
+        self._now = time
         return list(handler(self, message, time))
 
     def operate(self, message: Message, time: float) -> list[Message]:
         """An order of the autopilot in the words of the older cameras, which flight plans are flown in."""
+        self._now = time
         match message:
             case camera.SetCameraMode():
                 photo = message.value is CameraCameraMode.PHOTO
@@ -349,7 +355,7 @@ class Camera2:
         if told.available is not camera.Availability.AVAILABLE:
             return camera2.StateRecording(video_bitrate=bitrate, storage=storage)
         if told.state is camera.State.ACTIVE:
-            duration = round(self._capture.recorded(self._time) * 1000.0)
+            duration = round(self._capture.recorded(self._now) * 1000.0)
             state = camera2.RecordingState.ACTIVE
             return camera2.StateRecording(state=state, video_bitrate=bitrate, storage=storage, duration=duration)
         state = camera2.RecordingState.INACTIVE

@@ -27,7 +27,7 @@ from olympe.features.media import (  # noqa: E402
     media_created,
     resource_created,
 )
-from olympe.messages import camera, gimbal, mediastore, thermal, user_storage, user_storage_v2  # noqa: E402
+from olympe.messages import camera, camera2, gimbal, mediastore, thermal, user_storage, user_storage_v2  # noqa: E402
 
 LIMIT = 10.0
 """s for anything."""
@@ -137,6 +137,39 @@ class Visit:
         time.sleep(2.0)
         self.expect("stop recording", camera.stop_recording(0))
 
+    # -- the Ai's camera
+
+    def use_camera2(self) -> None:
+        command, event = camera2.Command, camera2.Event
+
+        def configure(name: str, **config: object) -> None:
+            self.expect(name, command.Configure(camera_id=0, config=camera2.Config(**config)))
+
+        configure("photo mode", camera_mode="photo", photo_mode="single", photo_file_format="jpeg")
+        configure("settings", ev_compensation="1_00", white_balance_mode="sunny", image_style="plog")
+        done = event.Photo(type="stop", stop_reason="capture_done", _policy="wait", _timeout=LIMIT)
+        told = self.drone.media(media_created(_timeout=LIMIT))
+        self.expect("photo", command.StartPhoto(camera_id=0) & done)
+        self.steps["photo, told"] = {"ok": bool(told.wait(_timeout=LIMIT).success())}
+        configure("burst", photo_mode="burst", photo_burst_value="14_over_1s")
+        done = event.Photo(type="stop", stop_reason="capture_done", _policy="wait", _timeout=LIMIT)
+        self.expect("photos of a burst", command.StartPhoto(camera_id=0) & done)
+        configure("time lapse", photo_mode="time_lapse", photo_time_lapse_interval=1.0)
+        next_one = event.NextPhotoInterval(camera_id=0, _policy="wait", _timeout=LIMIT)
+        self.expect("start a lapse", command.StartPhoto(camera_id=0) & next_one)
+        stopped = event.Photo(type="stop", stop_reason="user_request", _policy="wait", _timeout=LIMIT)
+        self.expect("stop the lapse", command.StopPhoto(camera_id=0) & stopped)
+        configure("recording mode", camera_mode="recording", video_recording_resolution="1080p")
+        began = event.Recording(type="start", _policy="wait", _timeout=LIMIT)
+        self.expect("start recording", command.StartRecording(camera_id=0) & began)
+        time.sleep(2.0)
+        ended = event.Recording(type="stop", stop_reason="user_request", _policy="wait", _timeout=LIMIT)
+        self.expect("stop recording", command.StopRecording(camera_id=0) & ended)
+        level = event.ZoomLevel(camera_id=0, level=2.0, _policy="wait", _timeout=LIMIT)
+        self.expect("zoom", command.SetZoomTarget(camera_id=0, control_mode="level", target=2.0) & level)
+        state = self.drone.get_state(event.State)[0]
+        self.result["config"] = {name: plain(state["config"][name]) for name in ("camera_mode", "ev_compensation")}
+
     def state_of(self, message: object) -> object:
         return plain(dict(self.drone.get_state(message)[0]))
 
@@ -222,7 +255,9 @@ class Visit:
         self.steps["connect"] = {"ok": ok}
         if not ok:
             return self.result
-        if self.model != "ai":
+        if self.model == "ai":
+            self.use_camera2()
+        else:
             self.set_camera()
             self.take_photos()
             self.record()

@@ -68,10 +68,11 @@ async def test_olympe_uses_the_payload(model: str, tmp_path: Path) -> None:
     assert report["axes"] == ("yaw|pitch|roll" if model == "ai" else "pitch|roll")
     offsets = report["offsets"]
     assert (offsets["current_pitch"], offsets["current_roll"], offsets["update_state"]) == (1.5, -1.5, "inactive")
+    check_media(report, tmp_path / "downloads", thermal=model in ("thermal", "usa"))
     if model == "ai":
+        assert report["config"] == {"camera_mode": "recording", "ev_compensation": "1_00"}
         return
-
-    check_media(report, tmp_path / "downloads", thermal=model != "4k")
+    assert (report["photo"], report["photos of a burst"]) == ("10000001", "10000002")
     assert report["recording"]["state"] == "active"
     assert report["card"] == {"name": "films", "capacity": 64_000_000_000}
     assert report["free"] == {"available_bytes": 64_000_000_000}
@@ -84,8 +85,6 @@ async def test_olympe_uses_the_payload(model: str, tmp_path: Path) -> None:
 def check_media(report: dict[str, Any], folder: Path, *, thermal: bool) -> None:
     """A photo, a burst, a lapse, a film and perhaps a thermal one: listed, fetched, the same bytes."""
     media = report["media"]
-    assert report["photo"] == "10000001"
-    assert report["photos of a burst"] == "10000002"
     assert [one["photo_mode"] for one in media.values()][:3] == ["single", "burst", "timelapse"]
     videos = [one for one in media.values() if one["type"] == "video"]
     assert [one["thermal"] for one in videos] == [False, True][: 1 + thermal]

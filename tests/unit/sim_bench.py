@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
-from anafi_mav.arsdk.wire import Message
+from anafi_mav.arsdk.wire import Message, encode
 from anafi_mav.sim.faults import Faults
 from anafi_mav.sim.firmware import Firmware, Identity
 from anafi_mav.sim.model import MODELS
@@ -36,12 +36,16 @@ class Bench:
             Identity("PI040416DA9H000001", "ANAFI-H000001", "boot", "run"),
             self.body,
             Origin(*HOME),
-            self.events.append,
+            self._hear,
             lambda name, args: self.notes.append(args),
             self.faults,
             random.Random(1),
         )
         self.run(0.1)
+
+    def _hear(self, event: Message) -> None:
+        encode(event)  # raises when it does not fit the wire
+        self.events.append(event)
 
     @property
     def pose(self) -> Pose:
