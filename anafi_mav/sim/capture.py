@@ -317,10 +317,10 @@ class Capture:
             return
         self._take = None
         studio = self._studio
-        studio.place.reserved = 0
+        room = self._release()
         seconds = (time - take.began) * take.scale
-        if picture.mp4_size(take.scene, seconds) > studio.place.free:
-            seconds, result = self._fitting(take), RecordingResult.STOPPED_NO_STORAGE_SPACE
+        if picture.mp4_size(take.scene, seconds) > room:
+            seconds, result = _fitting(take, room), RecordingResult.STOPPED_NO_STORAGE_SPACE
         name = ""
         if seconds >= 0.0:
             file = studio.media.develop(take.media, Kind.MP4, 1, take.scene, take.media.date, seconds)
@@ -331,18 +331,18 @@ class Capture:
 
     def _advance_recording(self, take: _Take, time: float) -> Iterable[Message]:
         place = self._studio.place
-        place.reserved = 0
+        written = place.reserved
+        room = self._release()
         size = picture.mp4_size(take.scene, (time - take.began) * take.scale)
-        if size > place.free:
+        place.reserved = size if size <= room else written
+        if size > room:
             yield from self.stop_recording(time, RecordingResult.STOPPED_NO_STORAGE_SPACE)
-        else:
-            place.reserved = size
 
-    def _fitting(self, take: _Take) -> float:
-        """Seconds of video for which there is room; less than 0 if there is none at all."""
-        one = picture.mp4_size(take.scene, picture.FRAME_TIME)
-        frame = picture.mp4_size(take.scene, 2 * picture.FRAME_TIME) - one
-        return picture.FRAME_TIME * (1 + (self._studio.place.free - one) // frame)
+    def _release(self) -> int:
+        """Give back what a recording has reserved: the bytes there are for it, what is written already included."""
+        place = self._studio.place
+        written, place.reserved = place.reserved, 0
+        return max(place.free, written)
 
     def recorded(self, time: float) -> float:
         """s that the recording lasts already; 0 if there is none."""
@@ -395,3 +395,10 @@ class Capture:
 
     def _date(self, time: float) -> str:
         return self._studio.calendar.date(time)
+
+
+def _fitting(take: _Take, room: int) -> float:
+    """Seconds of video for which there is room (bytes); less than 0 if there is none at all."""
+    one = picture.mp4_size(take.scene, picture.FRAME_TIME)
+    frame = picture.mp4_size(take.scene, 2 * picture.FRAME_TIME) - one
+    return picture.FRAME_TIME * (1 + (room - one) // frame)

@@ -244,11 +244,15 @@ class MediaStore:
             del self._resources[resource.id]
             self.used -= resource.size
             self.notify("resource_removed", {"resource_id": resource.id})
+        media.resources.clear()  # a lapse may go on writing to it
         self.notify("media_removed", {"media_id": id})
         self._emit(self._counters())
         return True
 
     def remove_all(self) -> None:
+        """Delete everything."""
+        for media in self._media.values():
+            media.resources.clear()
         self._media.clear()
         self._resources.clear()
         self.used = 0

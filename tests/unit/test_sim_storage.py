@@ -107,6 +107,40 @@ def test_a_fault_fills_it(bench: Bench) -> None:
     assert shoot(bench) is PhotoResult.PHOTO_SAVED
 
 
+def test_a_fault_ends_a_recording_which_keeps_what_it_has(bench: Bench) -> None:
+    bench.send(camera.SetCameraMode(0, CameraCameraMode.RECORDING))
+    bench.send(camera.StartRecording(0))
+    bench.run(2.5)
+    bench.faults.storage_full = True
+    bench.run(1.0)
+    progress = bench.of(camera.RecordingProgress)[-1]
+    assert progress == camera.RecordingProgress(0, RecordingResult.STOPPED_NO_STORAGE_SPACE, "10000001")
+    (media,) = bench.firmware.payload.media
+    assert media.describe()["duration"] == 3000  # the third second was begun
+
+
+def test_a_lapse_outlives_its_deleted_photos(bench: Bench) -> None:
+    lapse = camera.SetPhotoMode(
+        0,
+        camera.CameraPhotoMode.TIME_LAPSE,
+        camera.PhotoFormat.RECTILINEAR,
+        camera.PhotoFileFormat.JPEG,
+        camera.BurstValue.BURST_14_OVER_1S,
+        camera.BracketingPreset.PRESET_1EV,
+        2.0,
+    )
+    bench.send(lapse)
+    bench.send(camera.TakePhoto(0))
+    bench.run(3.0)
+    media = bench.firmware.payload.media
+    assert media.remove("10000001")
+    bench.run(2.0)
+    bench.send(camera.StopPhoto(0))
+    (left,) = media
+    assert [resource.id for resource in left.resources] == ["100000010003.JPG"]
+    assert media.used == left.size
+
+
 def test_monitoring(bench: Bench) -> None:
     state = user_storage.State(PhyState.AVAILABLE, FsState.READY, 0, 1, 2)
     assert bench.send(user_storage.StartMonitoring(2)) == [state, user_storage.Monitor(64_000_000_000)]
