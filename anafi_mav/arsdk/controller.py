@@ -55,6 +55,24 @@ class ControllerSession(Session):
         await asyncio.wait([self._watch])
 
 
+async def look(
+    host: str, *, discovery_port: int = handshake.DISCOVERY_PORT, interface: str | None = None, timeout: float = 2.0
+) -> DeviceInfo:
+    """What the device at `host` says of itself. Nobody who is connected to it notices. Raises as `connect` does."""
+    try:
+        return await asyncio.wait_for(_look(host, discovery_port, interface), timeout)
+    except asyncio.TimeoutError:
+        raise LinkLost(f"no answer from {host} within {timeout:g} s") from None
+
+
+async def _look(host: str, port: int, interface: str | None) -> DeviceInfo:
+    reader, writer = await _open(host, port, None, interface)
+    try:
+        return await _read(reader, handshake.parse_discovery, f"{host}:{port}")
+    finally:
+        writer.close()
+
+
 async def connect(
     host: str,
     *,
@@ -83,6 +101,8 @@ async def connect(
         return await asyncio.wait_for(opening, timeout)
     except asyncio.TimeoutError:
         raise LinkLost(f"no answer from {host} within {timeout:g} s") from None
+    except LinkLost:
+        raise
     except OSError as error:  # the network went away between two steps
         raise LinkLost(f"cannot connect to {host}: {reason_of(error)}") from error
 

@@ -10,10 +10,16 @@ net.ipv4.conf.*.rp_filter has to be 0 or 2.
 from __future__ import annotations
 
 import asyncio
+import ipaddress
 import os
 import socket
+import sys
+from pathlib import Path
 
 from anafi_mav.errors import LinkLost
+
+ROUTES = Path("/proc/net/route")
+_ROUTE_UP = 1
 
 SO_BINDTODEVICE = getattr(socket, "SO_BINDTODEVICE", None)
 """None: this system has no such option (macOS, Windows)."""
@@ -55,6 +61,24 @@ async def open_connection(
         raise
 
 
-def interfaces() -> list[str]:
-    """The names of this machine's network interfaces, loopback among them."""
-    return [name for _, name in socket.if_nameindex()]
+def networks() -> list[tuple[str, ipaddress.IPv4Network]]:
+    """The networks that this machine is directly in, with the interface to each; empty where the system is not Linux.
+
+    Loopback and what lies behind routers is not among them.
+    """
+    try:
+        lines = ROUTES.read_text().splitlines()[1:]
+    except OSError:
+        return []
+    found = []
+    for line in lines:
+        interface, destination, gateway, flags, _, _, _, mask, *_ = line.split()
+        if int(flags, 16) & _ROUTE_UP and int(gateway, 16) == 0 and int(mask, 16) != 0:
+            network = ipaddress.IPv4Network((_address(destination), str(_address(mask))), strict=False)
+            found.append((interface, network))
+    return found
+
+
+def _address(text: str) -> ipaddress.IPv4Address:
+    """An address as it lies in memory, printed as one number (Linux net/ipv4/fib_trie.c)."""
+    return ipaddress.IPv4Address(int(text, 16).to_bytes(4, sys.byteorder))

@@ -26,6 +26,8 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.mav import Client
 from support.product import Process
 
+from anafi_mav.config import from_text
+
 AIRCRAFT = "192.168.42.1"
 OURS = "192.168.42.23"
 """What the aircraft's DHCP gave both of our radios: the worst case."""
@@ -87,6 +89,17 @@ async def inside(space: str, *words: str) -> AsyncIterator[Process]:
         await held.put_away()
 
 
+@asynccontextmanager
+async def found(space: str, *words: str) -> AsyncIterator[list[str]]:
+    """What a command prints in a namespace."""
+    held = await Process.start("ip", "netns", "exec", space, sys.executable, "-m", "anafi_mav", *words)
+    try:
+        assert await held.end() == 0, str(held)
+        yield held.lines
+    finally:
+        await held.put_away()
+
+
 def connected(space: str, address: tuple[str, int]) -> socket.socket:
     """A TCP connection made inside a namespace: a socket stays where it was made, a thread can go there."""
     result: list[socket.socket | BaseException] = []
@@ -141,8 +154,12 @@ async def test_two_aircraft_with_one_address_fly_at_once(spaces: tuple[str, str,
     async with (
         inside(left, *options, "--model", "4k", "--log", str(logs[0])),
         inside(right, *options, "--model", "thermal", "--log", str(logs[1])),
+        found(home, "discover") as discovery,
+        found(home, "info", f"{AIRCRAFT}%wlan2") as info,
         inside(home, "run", "-c", str(config)) as gateway,
     ):
+        assert {drone.interface for drone in from_text("\n".join(discovery), "stdout").drones} == {"wlan1", "wlan2"}
+        assert "model: ANAFI Thermal" in info
         lines = [line for line in gateway.lines if line.startswith("drone ")]
         assert f"left: system 1 at {AIRCRAFT} on wlan1: ANAFI 4K" in lines[0]
         assert f"right: system 2 at {AIRCRAFT} on wlan2: ANAFI Thermal" in lines[1]
@@ -157,7 +174,7 @@ async def test_two_aircraft_with_one_address_fly_at_once(spaces: tuple[str, str,
     for log, height in zip(logs, (5.0, 9.0), strict=True):
         assert len([e for e in entries(log, "command") if e["name"] == "ardrone3.Piloting.TakeOff"]) == 1
         assert max(entry["args"]["up"] for entry in entries(log, "pose")) == pytest.approx(height, abs=0.7)
-        assert len([e for e in entries(log, "session") if e["name"] == "up"]) == 1
+        assert len([e for e in entries(log, "session") if e["name"] == "up"]) == (2 if log is logs[1] else 1)
 
 
 async def fly(client: Client, system: int) -> None:

@@ -1,0 +1,168 @@
+"""`anafi-mav discover`: which aircraft and controllers can be reached from here, as lines for a configuration.
+
+Looking asks a device for its introduction and nothing else, so it disturbs nobody who is connected to it. The usual
+addresses are tried on the interfaces that are in their networks, so nothing is sent to routers.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import ipaddress
+import re
+from collections import Counter
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+from anafi_mav.arsdk.controller import look
+from anafi_mav.arsdk.handshake import DeviceInfo
+from anafi_mav.arsdk.interface import networks
+from anafi_mav.cli.addresses import spot
+from anafi_mav.cli.terminal import complain, say
+from anafi_mav.drone.controller import MODELS as CONTROLLERS
+from anafi_mav.drone.product import MODELS
+from anafi_mav.errors import AnafiMavError, ConfigError
+
+USUAL = {
+    "192.168.42.1": "the Wi-Fi of an ANAFI",
+    "192.168.43.1": "an ANAFI by USB",
+    "192.168.53.1": "a Skycontroller by USB",
+    "10.202.0.1": "Parrot's own simulator",
+}
+"""Where Parrot's devices are (Olympe, olympe/connection)."""
+
+MAX_TIMEOUT = 60.0
+MAX_NAME = 32
+"""Characters of a drone's name in a configuration."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """An address to try, through one interface or as the routes say."""
+
+    address: str
+    interface: str | None = None
+
+    def __str__(self) -> str:
+        return f"{self.address} on {self.interface}" if self.interface else self.address
+
+
+@dataclass(frozen=True)
+class Find:
+    """Who answered there."""
+
+    place: Place
+    device: DeviceInfo
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of `anafi-mav discover`."""
+    usual = ", ".join(USUAL)
+    parser.add_argument(
+        "addresses",
+        nargs="*",
+        metavar="ADDRESS",
+        help=f"look here besides the usual places ({usual}); 192.168.42.1%%wlan1 names the network interface too",
+    )
+    parser.add_argument("--timeout", default="2", metavar="SECONDS", help="to wait for an answer (%(default)s)")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Look everywhere at once. 1 when nothing is there."""
+    timeout = _timeout(arguments.timeout)
+    wanted = [_place(text) for text in arguments.addresses]
+    finds = asyncio.run(discover(places(wanted, networks()), timeout))
+    if not finds:
+        complain("nothing found; is the machine in the Wi-Fi of the drone, or a Skycontroller plugged in?")
+        return 1
+    for line in configuration(finds):
+        say(line)
+    return 0
+
+
+def _timeout(text: str) -> float:
+    try:
+        timeout = float(text)
+    except ValueError:
+        timeout = 0.0
+    if not 0.0 < timeout <= MAX_TIMEOUT:
+        raise ConfigError("--timeout", f"expected seconds up to {MAX_TIMEOUT:g}, got {text!r}")
+    return timeout
+
+
+def _place(text: str) -> Place:
+    place = Place(**spot(text))
+    try:
+        ipaddress.IPv4Address(place.address)
+    except ValueError:
+        raise ConfigError("ADDRESS", f"expected an IPv4 address like 192.168.42.1, got {text!r}") from None
+    return place
+
+
+def places(wanted: Sequence[Place], here: Sequence[tuple[str, ipaddress.IPv4Network]]) -> list[Place]:
+    """Where to look: what was asked for, and every address on every interface that is in its network."""
+    result = list(wanted)
+    for address in [*USUAL, *(place.address for place in wanted if place.interface is None)]:
+        on = [interface for interface, network in here if ipaddress.IPv4Address(address) in network]
+        result += [Place(address, interface) for interface in on]
+        if address in USUAL and not here:  # not Linux: no way to know
+            result.append(Place(address))
+    return list(dict.fromkeys(result))
+
+
+async def discover(where: Collection[Place], timeout: float) -> list[Find]:
+    """Look at all of these at once; each device once, by its interface where two answer to one address."""
+    answers = await asyncio.gather(*(_look(place, timeout) for place in where))
+    finds: dict[tuple[str, int], Find] = {}
+    for find in answers:
+        if find is not None:
+            key = (find.device.serial or str(find.place), find.device.model_id)
+            # Found with and without naming the interface: the former says more.
+            if key not in finds or finds[key].place.interface is None:
+                finds[key] = find
+    return sorted(finds.values(), key=lambda find: str(find.place))
+
+
+async def _look(place: Place, timeout: float) -> Find | None:
+    try:
+        device = await look(place.address, interface=place.interface, timeout=timeout)
+    except (AnafiMavError, OSError):
+        return None
+    return Find(place, device)
+
+
+def configuration(finds: Sequence[Find]) -> list[str]:
+    """A configuration with a drone for each find, to be written to a file as it is."""
+    shared = Counter(find.place.address for find in finds)
+    names: set[str] = set()
+    lines = ["drones:"]
+    for sysid, find in enumerate(finds, 1):
+        device, place = find.device, find.place
+        lines.append(f"  # {title(device)} {_printable(device.serial)}, found at {place}")
+        keys = [f'name: "{_name(device, names)}"', f"sysid: {sysid}", f"address: {place.address}"]
+        if place.interface is not None and shared[place.address] > 1:
+            keys.append(f"interface: {place.interface}")
+        lines.append(f"  - {{{', '.join(keys)}}}")
+    return lines
+
+
+def title(device: DeviceInfo) -> str:
+    """What a device is, for people."""
+    if device.model_id in CONTROLLERS:
+        return f"{CONTROLLERS[device.model_id]} with the drone behind it,"
+    model = MODELS.get(device.model_id)
+    return f"unknown device 0x{device.model_id:04x}" if model is None else model.title
+
+
+def _printable(text: str) -> str:
+    return re.sub(r"[^\x20-\x7e]", "?", text)[:MAX_NAME]
+
+
+def _name(device: DeviceInfo, taken: set[str]) -> str:
+    """The device's own name as a configuration may say it, unlike those before."""
+    base = re.sub(r"[^A-Za-z0-9_.-]+", "-", device.name or device.serial).strip("-_.")[: MAX_NAME - 4] or "drone"
+    name, number = base, 2
+    while name in taken:
+        name, number = f"{base}-{number}", number + 1
+    taken.add(name)
+    return name
