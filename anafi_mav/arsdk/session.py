@@ -57,6 +57,8 @@ class Session(asyncio.DatagramProtocol):
         self.lost: asyncio.Future[str] = self._loop.create_future()
         """Done when the link is down or closed; its result says why."""
         self._peer = peer
+        self.on_delivered: Callable[[int, bool], None] = lambda token, arrived: None
+        """Told what became of each acknowledged command, by the token of `send`: received, or given up (version 1)."""
         self._endpoint: asyncio.DatagramTransport | None = None
         self._closed = asyncio.Event()
         self._timer: asyncio.TimerHandle | None = None
@@ -179,9 +181,12 @@ class Session(asyncio.DatagramProtocol):
                     )
                 continue
             match event:
-                case Received() | Delivered():
+                case Received():
                     pass
+                case Delivered(token):
+                    self.on_delivered(token, True)
                 case Undelivered(token, reason):
+                    self.on_delivered(token, False)
                     log.debug("message %d undelivered: %s", token, reason)
                 case Garbage(reason):
                     log.debug("unreadable bytes from the peer: %s", reason)

@@ -27,6 +27,8 @@ own SDK waits 10 s, too long for a ground station that repeats its command every
 class Wire(Protocol):
     """What is needed of a session: see `arsdk.session.Session`."""
 
+    on_delivered: Callable[[int, bool], None]
+
     def send(self, message: Message | UnknownMessage) -> int: ...
 
     def cancel(self, token: int) -> None: ...
@@ -111,6 +113,7 @@ class Commander:
         """Asked before each command; False: it is not sent, as if it were lost on the way. May raise."""
         self._open: set[Expectation[Any]] = set()
         self._waiting: dict[type[Message], list[Expectation[Any]]] = {}
+        self._deliveries: dict[int, asyncio.Future[None]] = {}
 
     @property
     def connected(self) -> bool:
@@ -119,12 +122,18 @@ class Commander:
     def attach(self, wire: Wire) -> None:
         """Commands go out here from now on."""
         self._wire = wire
+        wire.on_delivered = self._delivered
 
     def detach(self, reason: str) -> None:
         """The link is gone: every wait ends with `LinkLost`."""
         self._wire = None
         for expectation in tuple(self._open):
             expectation.fail(LinkLost(reason))
+        for delivery in self._deliveries.values():
+            if not delivery.done():
+                delivery.set_exception(LinkLost(reason))
+                delivery.exception()  # nobody may be waiting; asyncio would complain
+        self._deliveries.clear()
 
     def send(self, message: Message) -> int:
         """Hand a command to the transport. Raises `LinkLost` when there is no link, or what the gate raises."""
@@ -133,6 +142,27 @@ class Commander:
         if self.gate is not None and not self.gate(message):
             return WITHHELD
         return self._wire.send(message)
+
+    def deliver(self, message: Message) -> asyncio.Future[None]:
+        """Send an acknowledged command that is not to be taken back; the future is done when the drone has it.
+
+        It fails with `LinkLost`, or `CommandTimeout` when the transport gives up. Do not await it bare, a cancelled
+        wait would cancel it: use `asyncio.wait`.
+        """
+        token = self.send(message)
+        delivery: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self._deliveries[token] = delivery
+        return delivery
+
+    def _delivered(self, token: int, arrived: bool) -> None:
+        delivery = self._deliveries.pop(token, None)
+        if delivery is None or delivery.done():
+            return
+        if arrived:
+            delivery.set_result(None)
+        else:
+            delivery.set_exception(CommandTimeout("its receipt", 0.75))  # version 1: five retransmissions of 150 ms
+            delivery.exception()
 
     def cancel(self, token: int) -> None:
         """Take a command back if it has not been delivered."""

@@ -130,8 +130,8 @@ class Moves:
         self._stray_until = 0.0
         self.inherited = True
         """The drone was found flying: a moveBy of an earlier connection may be under way, which no event tells."""
-        self.aborting_until = 0.0
-        """A return is being aborted: until then, or until the drone answers, it is not as the drone last said."""
+        self.aborting = False
+        """A return is being aborted: until the drone has answered, what it last said of a return is not true."""
 
     def started(self) -> tuple[Move, ...]:
         """All of them."""
@@ -185,6 +185,10 @@ class Moves:
             self._stray_until = now + STRAY_FOR
         move.end(MoveEnd.CANCELED)
 
+    def aborted(self) -> None:
+        """The drone has had an abort, and had time to answer."""
+        self.aborting = False
+
     def expect_stray(self, now: float) -> None:
         """A moveBy that is nobody's is about to be ended; its event is not about a move of ours."""
         self.inherited = False
@@ -198,7 +202,8 @@ class Moves:
                 move.answer.fail(CommandRejected(how.value))
         self.to = self.returning = self._older = self._cancelling = None
         self.by.clear()
-        self._stray_until = self.aborting_until = 0.0
+        self._stray_until = 0.0
+        self.aborting = False
         self.inherited = True
 
     # -- what the drone says
@@ -282,7 +287,7 @@ class Moves:
 
     def _on_return(self, message: rth.State, now: float) -> None:
         if not self._home.state.returning:
-            self.aborting_until = 0.0
+            self.aborting = False
         move = self.returning
         if move is None:
             return

@@ -22,7 +22,7 @@ from anafi_mav.arsdk.messages.rth import RthState
 from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone.alerts import spoken
 from anafi_mav.drone.element import Position, Reducer
-from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander
+from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, Expectation
 from anafi_mav.drone.home import Home
 from anafi_mav.drone.moves import Displacement, Move, MoveEnd, Moves
 from anafi_mav.drone.piloting_settings import PilotingSettings
@@ -41,18 +41,25 @@ MOVE_BY_MARGIN = 20.0
 MOVE_BY_SLOWEST = 0.5
 """m/s and rad/s below which a relative move is given up: the speed is the drone's choice, this is far below it."""
 
-TAKE_OFF_MEMORY = 3.0
-"""s after a take-off was given up in which the drone may still carry it out: it may have had the command already."""
+TAKE_OFF_MEMORY = 10.0
+"""s after a take-off was given up in which the drone may still carry it out, or already does and could not say so."""
 
-UNSURE_TIMEOUT = 2.0
-"""s to wait for the end of something that may not have been running at all."""
+QUIET = 1.0
+"""s after the drone received a command in which it would have said what it did; silence means that there was nothing to
+do. Its acknowledgement came through, so its events do too, a few retransmissions of 150 ms later at most."""
+
+EMERGENCY_TIMEOUT = 30.0
+"""s that cutting the motors is tried for while the link seems to live but delivers nothing."""
+
+RELEASES = 3
+"""PCMDs that say that nobody holds the sticks; they are not acknowledged."""
 
 _STICKS_DEAD = frozenset(
     {FlyingState.LANDED, FlyingState.LANDING, FlyingState.EMERGENCY, FlyingState.EMERGENCY_LANDING}
 )
 """States in which no PCMD is sent: positive gaz cancels a landing (ardrone3.xml 1-0-3)."""
 _TAKEN_OFF = frozenset({FlyingState.TAKINGOFF, FlyingState.HOVERING, FlyingState.FLYING})
-_LANDING = frozenset({FlyingState.LANDING, FlyingState.LANDED, FlyingState.EMERGENCY_LANDING})
+_LANDING = frozenset({FlyingState.LANDING, FlyingState.LANDED, FlyingState.EMERGENCY_LANDING, FlyingState.EMERGENCY})
 _IN_FLIGHT = frozenset({FlyingState.HOVERING, FlyingState.FLYING})
 _MOTORS_CUT = frozenset({FlyingState.EMERGENCY, FlyingState.LANDED})
 
@@ -72,6 +79,8 @@ class Piloting(PilotingSettings):
         self._timer: asyncio.TimerHandle | None = None
         self._landings_asked = 0
         self._takeoffs_asked = 0
+        self._halting: set[asyncio.Future[None]] = set()
+        """Orders to stop something that the drone may not have received yet."""
         self._may_take_off_until = -math.inf
 
     def reset(self) -> None:
@@ -228,12 +237,14 @@ class Piloting(PilotingSettings):
         self._require_link()
         if self.state.flying in _LANDING and not self.about_to_fly:
             return
-        # From here on, not from the drone's answer on: a positive gaz would cancel the landing.
+        # Level at once, then nothing, from here on and not from the drone's answer on: a positive gaz would cancel
+        # the landing.
+        self._centre_sticks()
         self._silence_sticks()
         self._landings_asked += 1
         try:
             if self.about_to_fly:
-                await self._catch_take_off()
+                await self._catch_take_off(timeout)
             if self.state.flying in _LANDING:
                 return
             await self._commander.confirm(
@@ -245,30 +256,57 @@ class Piloting(PilotingSettings):
         finally:
             self._landings_asked -= 1
 
-    async def _catch_take_off(self) -> None:
-        """Wait until the drone is off the ground, or until no take-off of ours can reach it any more."""
-        left = max(self._may_take_off_until - self._now(), TAKE_OFF_MEMORY if self._takeoffs_asked else 0.0)
-        with contextlib.suppress(CommandTimeout):
-            await self._commander.confirm(
-                ardrone3.Landing(),
-                (ardrone3.FlyingStateChanged,),
-                lambda message: None if message.state == FlyingState.MOTOR_RAMPING else True,
-                left,
-            )
+    async def _catch_take_off(self, timeout: float) -> None:
+        """Return when the drone is off the ground, or when it certainly stays there.
+
+        That is known once it has received a Landing, behind any take-off of ours, and then says nothing. Raises
+        `CommandTimeout` while it is not known; the Landing is not taken back.
+        """
+        answer = self._commander.expect(
+            (ardrone3.FlyingStateChanged,),
+            lambda message: None if message.state in (FlyingState.MOTOR_RAMPING, FlyingState.USERTAKEOFF) else True,
+        )
+        try:
+            delivery = self._commander.deliver(ardrone3.Landing())
+            if not await self._ended(answer, delivery, ardrone3.Landing.NAME, timeout):
+                self._may_take_off_until = -math.inf
+        finally:
+            answer.close()
+
+    async def _ended(self, answer: Expectation[Any], delivery: asyncio.Future[None], what: str, timeout: float) -> bool:
+        """Wait for an answer that need not come: True when it came, False when the drone has the command and is quiet.
+
+        Raises `CommandTimeout` when neither is known in time, `LinkLost`.
+        """
+        answer.expire_after(timeout, CommandTimeout(what, timeout))
+        await asyncio.wait({answer.future, delivery}, return_when=asyncio.FIRST_COMPLETED)
+        if not answer.future.done():
+            delivery.result()  # raises LinkLost
+            await asyncio.wait({answer.future}, timeout=QUIET)
+            if not answer.future.done():
+                return False
+        answer.future.result()
+        return True
 
     async def emergency(self) -> None:
         """Cut the motors, wherever the drone is: in the air it falls. Returns when the drone says that they are.
 
-        Once sent it is not taken back, not by time and not by cancellation: it is repeated while there is a link, as
-        Parrot does (arsdk-ng: timeout policy RETRY).
+        Cancelling this does not take it back: it is repeated while there is a link, as Parrot does (arsdk-ng: timeout
+        policy RETRY).
         """
         self._require_link()
         self._silence_sticks()
+        cut = self.state.flying in _MOTORS_CUT and not self.about_to_fly
         answer = self._commander.expect(
             (ardrone3.FlyingStateChanged,), lambda message: True if message.state in _MOTORS_CUT else None
         )
-        self._commander.send(ardrone3.Emergency())
-        await answer.wait()
+        try:
+            delivery = self._commander.deliver(ardrone3.Emergency())
+            said = await self._ended(answer, delivery, ardrone3.Emergency.NAME, EMERGENCY_TIMEOUT)
+        finally:
+            answer.close()
+        if not said and not cut:
+            raise CommandTimeout(ardrone3.Emergency.NAME, QUIET)
 
     # -- guided moves
 
@@ -282,6 +320,7 @@ class Piloting(PilotingSettings):
         """
         if not math.isfinite(front + right + down + turn):
             raise LocalProtocolError("a relative move is not a number")
+        self._require_own_will()
         if timeout is None:
             timeout = MOVE_BY_MARGIN + (math.hypot(front, right, down) + abs(turn)) / MOVE_BY_SLOWEST
         move = Move(self._commander.expect((), _decided_elsewhere))
@@ -294,7 +333,7 @@ class Piloting(PilotingSettings):
             if move in self._moves.by:  # given up: neither the drone nor hover has ended it
                 self._moves.drop_by(move, self._now())
                 if self.sticks_blocked is None:  # otherwise the drone is busy with what is not ours to disturb
-                    self._send_if_connected(ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0))
+                    self._halt_if_connected(ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0))
         return flown
 
     async def move_to(
@@ -314,6 +353,7 @@ class Piloting(PilotingSettings):
         """
         if not math.isfinite(latitude + longitude + altitude + (heading_deg or 0.0) + (horizontal_speed or 0.0)):
             raise LocalProtocolError("a target is not a number")
+        self._require_own_will()
         command = self._move_to_command(Position(latitude, longitude, altitude), heading_deg, horizontal_speed)
         move = Move(self._commander.expect((), _decided_elsewhere), Position(latitude, longitude, altitude))
         self._centre_sticks()
@@ -328,7 +368,7 @@ class Piloting(PilotingSettings):
         finally:
             if not move.running and self._moves.to is move:  # given up: it must not start later
                 self._moves.cancel_to("given up")
-                self._send_if_connected(ardrone3.CancelMoveTo())
+                self._halt_if_connected(ardrone3.CancelMoveTo())
         return move
 
     def _move_to_command(self, to: Position, heading_deg: float | None, horizontal_speed: float | None) -> Message:
@@ -357,7 +397,7 @@ class Piloting(PilotingSettings):
     async def return_home(self, timeout: float = ANSWER_TIMEOUT) -> Move | None:
         """Fly home; returns when the drone is on its way or about to be. None: it was returning already."""
         self._require_link()
-        if self._home.state.returning and self._now() >= self._moves.aborting_until:
+        if self._home.state.returning and not self._moves.aborting:
             return None
         if self._home.state.rth == RthState.UNAVAILABLE:
             raise CommandRejected("return home is unavailable")
@@ -393,20 +433,26 @@ class Piloting(PilotingSettings):
         if home.returning_by_itself and not even_its_own:
             raise CommandRejected("the drone returns home by itself")
         asked = self._drop_return("the return was cancelled")
-        if not home.returning and not asked:
+        if not home.returning and not asked and not self._moves.aborting:
             return
+        answer = self._commander.expect((rth.State,), _ends_return)
         try:
-            await self._commander.confirm(
-                self._abort(), (rth.State,), _ends_return, timeout if home.returning else UNSURE_TIMEOUT
-            )
-        except CommandTimeout:
-            if self._home.state.returning:
-                raise
+            await self._ended(answer, self._abort(), rth.Abort.NAME, timeout)
+        finally:
+            answer.close()
+        if self._home.state.returning:
+            raise CommandTimeout(rth.Abort.NAME, timeout)
 
-    def _abort(self) -> rth.Abort:
-        """The command that ends a return. Until the drone answers, what it last said of a return is no longer true."""
-        self._moves.aborting_until = self._now() + UNSURE_TIMEOUT
-        return rth.Abort()
+    def _abort(self) -> asyncio.Future[None]:
+        """End a return. Until the drone has answered, what it last said of a return is no longer true."""
+        self._moves.aborting = True
+
+        def heard(delivery: asyncio.Future[None]) -> None:
+            asyncio.get_running_loop().call_later(QUIET, self._moves.aborted)
+
+        delivery = self._halt(rth.Abort())
+        delivery.add_done_callback(heard)
+        return delivery
 
     def _drop_return(self, why: str) -> bool:
         """The return that we asked for, running or on its way, is not ours any more. False: there was none."""
@@ -421,10 +467,11 @@ class Piloting(PilotingSettings):
 
     # -- sticks
 
-    def pilot(self, command: PilotingCommand | None) -> None:
+    def pilot(self, command: PilotingCommand | None, age: float = 0.0) -> None:
         """Hold these sticks: a PCMD leaves now and every 50 ms, for `sticks.HOLD_LIMIT` unless it is said again.
 
-        None lets the sticks go (centred for two seconds), and so does silence. A setpoint takes over from a moveTo or
+        `age` (s) is how long ago it was said: a setpoint that is corrected on the way is not a new one. None lets the
+        sticks go (centred for two seconds), and so does silence. A setpoint takes over from a moveTo or
         moveBy of ours, during which the drone would ignore it. Nothing is sent and nothing kept while
         `sticks_blocked`.
         Raises `NotSupported` before the drone has reported its limits, `LinkLost` without a link.
@@ -439,7 +486,8 @@ class Piloting(PilotingSettings):
         position = percent(command, limits)
         if self.sticks_blocked is None:
             self._stop_moves("taken over by the sticks")
-            self._sticks.command(position, self._now())
+            now = self._now()
+            self._sticks.command(position, now, now - age)
         self._pump()
 
     def hover(self) -> None:
@@ -455,46 +503,61 @@ class Piloting(PilotingSettings):
         cancelled = self._stop_moves("stopped by hover")
         if not self._home.state.returning_by_itself:
             if state.move_to == MoveToStatus.RUNNING and not cancelled:
-                self._commander.send(ardrone3.CancelMoveTo())
+                self._halt(ardrone3.CancelMoveTo())
             if self._moves.inherited and state.flying in _IN_FLIGHT:
                 self._moves.expect_stray(self._now())
-                self._commander.send(ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0))
+                self._halt(ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0))
         if state.poi in (PoiStatus.RUNNING, PoiStatus.PENDING):
-            self._commander.send(ardrone3.StopPilotedPOI())
+            self._halt(ardrone3.StopPilotedPOI())
         if state.plan == PlayingState.PLAYING:
-            self._commander.send(common.Pause())
+            self._halt(common.Pause())
         if self._drop_return("stopped by hover"):
-            self._commander.send(self._abort())
+            self._abort()
         self._sticks.centre(self._now())
         self._pump()
 
     async def stop(self, timeout: float = ANSWER_TIMEOUT) -> None:
         """`hover`, then wait until the drone has confirmed the end of what was running."""
-        sure, unsure = [], []
-        if self._moves.to is not None and self._moves.to.running:
-            sure.append(self._commander.expect((ardrone3.MoveToChanged,), _ends_move_to))
-        elif self.state.move_to == MoveToStatus.RUNNING:
-            unsure.append(self._commander.expect((ardrone3.MoveToChanged,), _ends_move_to))
+        answers = []
+        if (self._moves.to is not None and self._moves.to.running) or self.state.move_to == MoveToStatus.RUNNING:
+            answers.append(self._commander.expect((ardrone3.MoveToChanged,), _ends_move_to))
         if self._moves.by:
-            sure.append(self._commander.expect((ardrone3.MoveByEnd,), lambda message: True))
+            answers.append(self._commander.expect((ardrone3.MoveByEnd,), lambda message: True))
         if self.state.plan == PlayingState.PLAYING:
-            sure.append(self._commander.expect((common.MavlinkFilePlayingStateChanged,), _ends_playing))
-        if (returning := self._moves.returning) is not None:
-            (sure if returning.running else unsure).append(self._commander.expect((rth.State,), _ends_return))
+            answers.append(self._commander.expect((common.MavlinkFilePlayingStateChanged,), _ends_playing))
+        if self._moves.returning is not None and self._moves.returning.running:
+            answers.append(self._commander.expect((rth.State,), _ends_return))
+        began = self._now()
         try:
             self.hover()
-            for answer in sure:
+            for answer in answers:
                 answer.expire_after(timeout, CommandTimeout("hover", timeout))
-            for answer in unsure:
-                answer.expire_after(UNSURE_TIMEOUT, CommandTimeout("hover", UNSURE_TIMEOUT))
-            for answer in sure:
+            for answer in answers:
                 await answer.wait()
-            for answer in unsure:
-                with contextlib.suppress(CommandTimeout):
-                    await answer.wait()
+            # Of what was given up before it was confirmed no event may speak; but the order to stop has to arrive.
+            if self._halting:
+                halting = list(self._halting)
+                _, late = await asyncio.wait(halting, timeout=max(timeout - (self._now() - began), 0.0))
+                self._require_link()
+                if late:
+                    raise CommandTimeout("hover", timeout)
+                for delivery in halting:
+                    delivery.result()  # raises what became of it
         finally:
-            for answer in (*sure, *unsure):
+            for answer in answers:
                 answer.close()
+
+    def _halt(self, message: Message) -> asyncio.Future[None]:
+        """Send an order to stop something. `stop` waits until the drone has it, whoever gave it."""
+        delivery = self._commander.deliver(message)
+        self._halting.add(delivery)
+        delivery.add_done_callback(self._halting.discard)
+        return delivery
+
+    def _halt_if_connected(self, message: Message) -> None:
+        """For a verb that gives up: the loss of the link is reported elsewhere."""
+        with contextlib.suppress(LinkLost):
+            self._halt(message)
 
     def _stop_moves(self, why: str) -> bool:
         """Cancel our moveTo and moveBys; in the order of the queue, so a later move is not hit.
@@ -505,13 +568,13 @@ class Piloting(PilotingSettings):
         if move is not None:
             if move.answer.token is not None:
                 self._commander.cancel(move.answer.token)
-            self._commander.send(ardrone3.CancelMoveTo())
+            self._halt(ardrone3.CancelMoveTo())
         moves = self._moves.cancel_by(why, self._now())
         for move in moves:
             if move.answer.token is not None:
                 self._commander.cancel(move.answer.token)
         if moves:
-            self._commander.send(ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0))
+            self._halt(ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0))
         return move is not None
 
     def _pump(self) -> None:
@@ -545,7 +608,8 @@ class Piloting(PilotingSettings):
     def _release_sticks(self) -> None:
         """Take the hands off: a return waits for a PCMD with flag 0 (rth.xml 146-0-11)."""
         if self._sticks.active and self.sticks_blocked is None:
-            self._commander.send(self._sticks.released(self._now()))
+            for _ in range(RELEASES):
+                self._commander.send(self._sticks.released(self._now()))
         self._silence_sticks()
 
     # -- settings
@@ -559,6 +623,11 @@ class Piloting(PilotingSettings):
     @staticmethod
     def _now() -> float:
         return asyncio.get_running_loop().time()
+
+    def _require_own_will(self) -> None:
+        """Raise `CommandRejected` while the drone returns for reasons of its own: no move of ours gets in its way."""
+        if self._home.state.returning_by_itself:
+            raise CommandRejected("the drone returns home by itself")
 
     def _require_link(self) -> None:
         if not self._commander.connected:

@@ -87,12 +87,14 @@ def _share(value: float, limit: float) -> int:
 class Sticks:
     """When to send which stick position. `deadline` says when `due` has something, `due` hands it out once."""
 
-    __slots__ = ("_expires", "_next", "_paid_until", "_position", "_remaining", "_seq")
+    __slots__ = ("_expires", "_last", "_next", "_paid_until", "_position", "_remaining", "_seq")
 
     def __init__(self) -> None:
         self._position = CENTRED
         self._remaining: int | None = 0
         """PCMDs still to come; None: until further notice."""
+        self._last = CENTRED
+        """What was sent last."""
         self._next = 0.0
         self._expires = 0.0
         self._paid_until = -math.inf
@@ -109,15 +111,17 @@ class Sticks:
         """When the next PCMD is due; None when none is."""
         return self._next if self.active else None
 
-    def command(self, position: Percent, now: float) -> None:
-        """Hold this position, for `HOLD_LIMIT` unless it is renewed; then the sticks centre."""
-        self._position, self._remaining, self._expires = position, None, now + HOLD_LIMIT
+    def command(self, position: Percent, now: float, said: float | None = None) -> None:
+        """Hold this position until `HOLD_LIMIT` after it was `said` (None: now), then the sticks centre."""
+        self._position, self._remaining = position, None
+        self._expires = (now if said is None else said) + HOLD_LIMIT
         self._next = max(now, self._paid_until - MIN_SPACING)
 
     def centre(self, now: float) -> None:
-        """Let go: centred from now on, for two seconds."""
+        """Let go: centred from now on, for two seconds. The end of a deflection waits for nothing."""
+        deflected = self._last != CENTRED
         self._position, self._remaining = CENTRED, CENTRED_REPEATS
-        self._next = max(now, self._paid_until - MIN_SPACING)
+        self._next = now if deflected else max(now, self._paid_until - MIN_SPACING)
 
     def stop(self) -> None:
         """Send nothing any more."""
@@ -137,6 +141,7 @@ class Sticks:
             self._remaining -= 1
         self._next = self._next + PERIOD if now - self._next < PERIOD else now + PERIOD
         self._paid_until = max(self._paid_until, now) + MIN_SPACING
+        self._last = self._position
         return PCMD(1, *self._position, self._stamp(now))
 
     def released(self, now: float) -> PCMD:

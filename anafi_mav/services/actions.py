@@ -53,7 +53,7 @@ def _place(command: Command) -> Place | None:
 async def arm_disarm(vehicle: Vehicle, command: Command) -> None:
     """MAV_CMD_COMPONENT_ARM_DISARM: param1 1 arm, 0 disarm; param2 21196 disarms by force."""
     if command.params[0] == 1.0:
-        await vehicle.arm()
+        await vehicle.arm(command.client)
     elif command.params[0] == 0.0:
         await vehicle.disarm(force=command.params[1] == FORCE)
     else:
@@ -68,9 +68,9 @@ async def takeoff(vehicle: Vehicle, command: Command) -> None:
     frame says. The position is not used: an ANAFI takes off where it stands.
     """
     if command.frame is None and command.x == 0.0 and command.y == 0.0 and not math.isnan(command.z):
-        await vehicle.take_off(command.z)
+        await vehicle.take_off(command.z, command.client)
         return
-    await vehicle.take_off(_height(vehicle, command))
+    await vehicle.take_off(_height(vehicle, command), command.client)
 
 
 async def land(vehicle: Vehicle, command: Command) -> None:

@@ -25,6 +25,9 @@ MAX_CLIENTS = 64
 PROGRESS_AFTER, PROGRESS_EVERY = 0.3, 0.8
 """s until the first IN_PROGRESS and between them: MAVSDK resends at 0.5 s, every client gives up after 1-3 s (R9)."""
 
+_STOPPING_MODES = ((4.0, 3.0), (4.0, 6.0), (3.0, 0.0))
+"""(main, sub) mode of PX4's Hold, Land and Position."""
+
 _UNSET_INT = (2**31 - 1, -(2**31))
 """x and y of a COMMAND_INT that stand for "not set": the specified INT32_MAX, and what a cast NaN becomes (R8)."""
 
@@ -49,10 +52,21 @@ class Command:
 
     @property
     def stops(self) -> bool:
-        """It asks for nothing but to stop and hover: DO_REPOSITION to nowhere, or PX4's Hold."""
+        """It ends something and begins nothing: hold, land, disarm, cut the motors. It may be carried out twice."""
         if self.id == dialect.MAV_CMD_DO_REPOSITION:
             return all(math.isnan(value) for value in (self.params[3], self.x, self.y, self.z))
-        return self.id == dialect.MAV_CMD_DO_SET_MODE and self.params[1:3] == (4.0, 3.0)
+        if self.id == dialect.MAV_CMD_DO_SET_MODE:
+            return self.params[1:3] in _STOPPING_MODES
+        if self.id == dialect.MAV_CMD_COMPONENT_ARM_DISARM:
+            return self.params[0] == 0.0
+        return self.id in (dialect.MAV_CMD_NAV_LAND, dialect.MAV_CMD_DO_FLIGHTTERMINATION)
+
+    @property
+    def returns(self) -> bool:
+        """It asks for the way home: when that is flown already, asking again changes nothing."""
+        if self.id == dialect.MAV_CMD_DO_SET_MODE:
+            return self.params[1:3] == (4.0, 5.0)
+        return self.id == dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH
 
     def same_as(self, other: Command) -> bool:
         """Equal, with NaN equal to NaN."""
@@ -133,20 +147,22 @@ class CommandDesk:
     def retransmission(self, client: Hashable, command: Command, now: float) -> int | None:
         """The MAV_RESULT to answer a command with that this client sends once more; None: it is to be executed.
 
-        Once another client has taken over, a repetition is not carried out over its head, nor is it confirmed: it is
-        answered with CANCELLED. An order to stop is never a mere repetition then.
+        What may be carried out twice is: orders to stop always, a return while nobody else has taken over. What another
+        client has replaced is neither carried out over its head nor confirmed: it is answered with CANCELLED.
         """
         newest = self._newest.get(client)
         if newest is None or not newest.command.same_as(command):
             return None
         if newest.result == dialect.MAV_RESULT_IN_PROGRESS:
             return newest.result
+        if command.stops:
+            return None
         succeeded = newest.result in (dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_CANCELLED)
         if now - newest.ended >= (RESEND_WINDOW if succeeded else REFUSAL_WINDOW):
             return None
-        if not newest.superseded:
-            return newest.result
-        return None if command.stops else dialect.MAV_RESULT_CANCELLED
+        if newest.superseded:
+            return dialect.MAV_RESULT_CANCELLED
+        return None if command.returns else newest.result
 
     def begin(self, client: Hashable, command: Command) -> Execution:
         """Note that an action begins; this client's next one is compared with it."""

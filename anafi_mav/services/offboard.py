@@ -133,6 +133,10 @@ class OffboardStream:
         heard = self._heard.get(self.pilot) if self.state is State.ENGAGED else None
         return None if heard is None else heard[0]
 
+    def age(self, now: float) -> float:
+        """Seconds since the pilot's newest setpoint; 0 while no session is engaged."""
+        return now - self._heard[self.pilot][1] if self.state is State.ENGAGED else 0.0
+
     def receive(self, sender: Hashable, setpoint: AttitudeSetpoint, now: float) -> bool:
         """A usable setpoint arrived. False: somebody else flies, or too many want to."""
         if sender not in self._heard and len(self._heard) >= MAX_PILOTS:

@@ -187,7 +187,7 @@ class ParameterService:
                 return [self._value(index)], False
             return self._refuse(message, sysid, compid, dialect.MAV_PARAM_ERROR_READ_ONLY, index), False
         low, high = parameter.limits() if parameter.limits is not None else (-math.inf, math.inf)
-        if not low <= value <= high:
+        if not (math.isfinite(value) and low <= value <= high):
             return self._refuse(message, sysid, compid, dialect.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, index), False
         try:
             await parameter.write(value)

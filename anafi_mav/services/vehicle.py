@@ -114,7 +114,8 @@ class Vehicle:
         self._selected = FlightMode.HOLD
         self._armed = False
         self._climbing = False
-        self._pending_takeoff: float | None = None
+        self._pending_takeoff: tuple[float, Hashable] | None = None
+        """Height of a take-off that waits for its client to arm, and the client."""
         self._terminating = False
         self._attitude_at = -math.inf
         self._last_flying: FlyingState | None = None
@@ -224,8 +225,12 @@ class Vehicle:
 
     # What it can be told to do. Each returns when the drone confirmed, or raises.
 
-    async def arm(self) -> None:
-        """Accept arming. An ANAFI has no such state: nothing turns until a take-off; it lapses after `AUTO_DISARM`."""
+    async def arm(self, client: Hashable = None) -> None:
+        """Accept arming. An ANAFI has no such state: nothing turns until a take-off; it lapses after `AUTO_DISARM`.
+
+        A take-off that this client asked for begins now. Another client's does not: whoever arms to look at something
+        must not find propellers turning.
+        """
         if self.armed and not self.on_ground:
             return
         if problems := self.prearm_problems():
@@ -233,8 +238,9 @@ class Vehicle:
         self._armed = True
         self._rearm_disarm_timer()
         self._changed()
-        if self._pending_takeoff is not None:
-            height, self._pending_takeoff = self._pending_takeoff, None
+        if self._pending_takeoff is not None and self._pending_takeoff[1] == client:
+            height, _ = self._pending_takeoff
+            self._forget_takeoff()
             self._start_background(self._take_off_and_report(height))
 
     async def disarm(self, *, force: bool) -> None:
@@ -288,10 +294,10 @@ class Vehicle:
             )
         return ato
 
-    async def take_off(self, ato: float | None) -> None:
+    async def take_off(self, ato: float | None, client: Hashable = None) -> None:
         """Take off to `ato` m (None: `takeoff_height`). Returns when the drone confirmed that it takes off.
 
-        Disarmed, it returns at once and the take-off waits `ARM_WAIT` for arming.
+        Disarmed, it returns at once and the take-off waits `ARM_WAIT` for this client to arm.
         """
         height = self.takeoff_height if ato is None else ato
         self.check_height(height)
@@ -300,8 +306,8 @@ class Vehicle:
         if problems := self.prearm_problems():
             raise Refused("PreArm: " + "; ".join(problems))
         if not self._armed:
-            self._pending_takeoff = height
-            self._set_timer("_pending_timer", ARM_WAIT, self._forget_takeoff)
+            self._pending_takeoff = (height, client)
+            self._set_timer("_pending_timer", ARM_WAIT, self._takeoff_lapsed)
             return
         await self._take_over()
         await self._begin_takeoff(height)
@@ -326,6 +332,8 @@ class Vehicle:
             raise Refused(f"{mode.value} refused: the drone is landing")
         if self.returning_by_itself:
             raise Refused(f"{mode.value} refused: the drone returns home by itself")
+        if self.drone.piloting.about_to_fly:
+            raise Refused(f"{mode.value} refused: the drone is about to take off")
         await self._take_over()
         if not self.on_ground:
             await self.drone.piloting.stop()
@@ -358,8 +366,8 @@ class Vehicle:
             raise Refused("Goto refused: the drone returns home by itself")
         await self._take_over()
         await self.drone.piloting.cancel_return_home()
-        if not self.in_air:
-            raise Refused("Goto refused: the drone is not in the air")
+        if not self.in_air or self.returning:  # no await from here to the moveTo
+            raise Refused("Goto refused: the drone does something else now")
         self._select(FlightMode.HOLD)
         target = place or here
         await self.drone.piloting.move_to(
@@ -395,7 +403,7 @@ class Vehicle:
             case FlightMode.RETURN:
                 await self.return_home()
             case FlightMode.TAKEOFF:
-                await self.take_off(None)
+                await self.take_off(None, client)
             case FlightMode.OFFBOARD:
                 await self._engage_offboard(client)
             case FlightMode.MISSION:
@@ -413,9 +421,7 @@ class Vehicle:
         if not self.offboard.receive(sender, setpoint, self._clock.monotonic()):
             return False
         if self._offboard_timer is None:
-            self._offboard_timer = asyncio.get_running_loop().call_at(
-                self.offboard.deadline() or 0.0, self._offboard_expired
-            )
+            self._watch_setpoints()
         if self.offboard.state is State.ENGAGED:
             self._fly_setpoint()
         return True
@@ -435,17 +441,20 @@ class Vehicle:
         if pilot is None or not self.in_air or self.returning:
             raise Refused("Offboard refused: the setpoints stopped, or the drone is not free to fly them")
         self.offboard.engage(pilot)
+        self._watch_setpoints()  # the pilot's, which may be older than the newest of all
         self.drone.piloting.hover()  # ends a moveTo or moveBy of ours, which would ignore sticks
         self._select(FlightMode.OFFBOARD)
         self._fly_setpoint()
 
     def _fly_setpoint(self) -> None:
+        """Send the pilot's newest setpoint, with what the heading loop makes of it at this moment."""
+        now = self._clock.monotonic()
         setpoint, limits = self.offboard.setpoint, self.drone.piloting.limits
         if setpoint is None or limits is None:
             return
         attitude = self.drone.piloting.state.attitude
         turn = setpoint.yaw_rate
-        if attitude is not None and self._clock.monotonic() - self._attitude_at < HEADING_AGE:
+        if attitude is not None and now - self._attitude_at < HEADING_AGE:
             turn = yaw_rate_towards(setpoint, attitude.yaw)
         self.drone.piloting.pilot(
             PilotingCommand(
@@ -453,7 +462,8 @@ class Vehicle:
                 pitch_deg=setpoint.pitch * units.DEG_PER_RAD,
                 yaw_rate_dps=turn * units.DEG_PER_RAD,
                 climb_mps=setpoint.climb * limits.climb_mps,
-            )
+            ),
+            age=self.offboard.age(now),
         )
 
     def _offboard_expired(self) -> None:
@@ -463,9 +473,15 @@ class Vehicle:
             self.drone.piloting.hover()
             self._select(FlightMode.HOLD)
             self._text(Severity.WARNING, "Offboard setpoints stopped: hovering")
+        self._watch_setpoints()
+
+    def _watch_setpoints(self) -> None:
+        """Come back when those that matter have been silent for too long."""
+        self._cancel_timer("_offboard_timer")
         deadline = self.offboard.deadline()
         if deadline is not None:
-            self._offboard_timer = asyncio.get_running_loop().call_at(deadline, self._offboard_expired)
+            delay = max(deadline - self._clock.monotonic(), 0.0)
+            self._set_timer("_offboard_timer", delay, self._offboard_expired)
 
     # What the drone reports.
 
@@ -582,6 +598,10 @@ class Vehicle:
         self._pending_takeoff = None
         self._cancel_timer("_pending_timer")
 
+    def _takeoff_lapsed(self) -> None:
+        self._forget_takeoff()
+        self._text(Severity.WARNING, "Takeoff forgotten: nobody armed")
+
     def _cancel_background(self) -> list[asyncio.Task[None]]:
         task, self._background, self._climbing = self._background, None, False
         if task is None:
@@ -597,14 +617,23 @@ class Vehicle:
         task.add_done_callback(self._tasks.discard)
 
     async def _begin_takeoff(self, height: float) -> None:
-        await self.drone.piloting.take_off()
+        await self._lift_off()
         self._selected = FlightMode.HOLD
         self._start_background(self._climb(height))
+
+    async def _lift_off(self) -> None:
+        """The drone's own take-off. Until it has succeeded or failed, the armed state does not lapse."""
+        self._cancel_timer("_disarm_timer")
+        try:
+            await self.drone.piloting.take_off()
+        finally:
+            if self._armed and self.on_ground:
+                self._rearm_disarm_timer()
 
     async def _take_off_and_report(self, height: float) -> None:
         """The take-off that waited for arming: its command was answered long ago, so failures are texts."""
         try:
-            await self.drone.piloting.take_off()
+            await self._lift_off()
         except AnafiMavError as error:
             self._text(Severity.ERROR, f"Takeoff failed: {error}")
             return

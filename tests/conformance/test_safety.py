@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import asyncio
 import math
+import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from typing import Any
@@ -17,6 +18,7 @@ from support.world import HOLD, HOME, LAND, OFFBOARD, RETURN, World, world
 from anafi_mav import geo
 from anafi_mav.arsdk.messages import ardrone3, common, rth
 from anafi_mav.arsdk.messages.rth import StateReason
+from anafi_mav.sim.faults import Impairment
 from anafi_mav.units import quaternion_from_euler
 
 ACCEPTED, REJECTED, DENIED, FAILED, IN_PROGRESS, CANCELLED = 0, 1, 2, 4, 5, 6
@@ -252,7 +254,128 @@ async def test_return_again_while_the_hold_before_it_is_under_way() -> None:
         await w.client.heartbeat(lambda beat: beat.custom_mode == RETURN)
 
 
+def deaf(w: World, seconds: float) -> None:
+    """The drone hears nothing for a while, and goes on telling how it flies: the link looks alive."""
+    w.drone.faults.up = Impairment(loss=1.0)
+    asyncio.get_running_loop().call_later(seconds, setattr, w.drone.faults, "up", Impairment())
+
+
+@pytest.mark.parametrize("order", [(LAND_CMD,), (ARM, 0.0)])
+async def test_land_and_disarm_are_not_confirmed_while_the_drone_rises_unheard(order: tuple[Any, ...]) -> None:
+    async with world(speed=1.0) as w:
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        gone = on_command(w, "ardrone3.Piloting.TakeOff", lambda: deaf(w, 3.5))
+        w.client.send_command(TAKEOFF_CMD, x=0.0, y=0.0, z=5.0)
+        await gone
+        ack = await w.client.command(*order)
+        if ack.result == ACCEPTED:
+            assert w.drone.flying_state.name in ("LANDED", "LANDING")
+            await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landed", 20.0)
+        else:  # disarming comes too late, which is said
+            assert (order[0], ack.result) == (ARM, REJECTED)
+
+
+async def test_hold_is_confirmed_when_the_climb_has_ended() -> None:
+    async with world(speed=1.0) as w:
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        assert (await w.client.command(TAKEOFF_CMD, x=0.0, y=0.0, z=30.0)).result == ACCEPTED
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["up"] > 3.0, 20.0)
+        deaf(w, 2.0)
+        assert (await w.client.command(SET_MODE, *PX4_HOLD)).result == ACCEPTED
+        height = w.drone.pose.up
+        assert height > 6.0  # it was not confirmed before it was heard
+        await asyncio.sleep(2.0)
+        assert w.drone.pose.up < height + 3.0
+
+
+async def test_a_second_hold_does_not_confirm_what_the_first_one_waits_for() -> None:
+    async with world(speed=1.0) as w:
+        other = await w.connect(sysid=250)
+        await w.take_off()
+        assert await goto(w, 80.0, 10.0) == ACCEPTED
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 5.0, 20.0)
+        deaf(w, 3.0)
+        w.client.send_command(SET_MODE, *PX4_HOLD)
+        await asyncio.sleep(0.3)
+        assert (await other.command(SET_MODE, *PX4_HOLD)).result == ACCEPTED
+        assert heard(w, "CancelMoveTo") != []
+
+
+async def test_a_return_is_not_confirmed_on_account_of_one_that_is_being_aborted() -> None:
+    async with world(speed=1.0) as w:
+        await w.take_off()
+        assert await goto(w, 60.0, 10.0) == ACCEPTED
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 20.0, 20.0)
+        assert (await w.client.command(RTL)).result == ACCEPTED
+        await w.client.heartbeat(lambda beat: beat.custom_mode == RETURN)
+        deaf(w, 3.2)
+        w.client.send_command(SET_MODE, *PX4_HOLD)
+        await asyncio.sleep(2.4)
+        assert (await w.client.command(RTL)).result == ACCEPTED
+        await w.drone.wait_log(lambda e: heard(w, "return_to_home", "abort")[1:] == ["abort", "return_to_home"])
+        await asyncio.sleep(0.5)
+        await w.client.heartbeat(lambda beat: beat.custom_mode == RETURN)
+
+
+async def test_land_and_return_are_carried_out_each_time_they_are_asked_for() -> None:
+    async with world(speed=1.0) as w:
+        await w.take_off(8.0)
+        assert (await w.client.command(LAND_CMD)).result == ACCEPTED
+        somebody_else(w, ardrone3.PCMD(1, 0, 0, 0, 50, 0))  # a pilot pulls up
+        await w.client.heartbeat(lambda beat: beat.custom_mode != LAND)
+        assert (await w.client.command(LAND_CMD)).result == ACCEPTED
+        await w.client.heartbeat(lambda beat: beat.custom_mode == LAND)
+        somebody_else(w, ardrone3.PCMD(1, 0, 0, 0, 50, 0))
+        await w.client.heartbeat(lambda beat: beat.custom_mode != LAND)
+        assert (await w.client.command(RTL)).result == ACCEPTED
+        await w.client.heartbeat(lambda beat: beat.custom_mode == RETURN)
+        somebody_else(w, rth.Abort())
+        await w.client.heartbeat(lambda beat: beat.custom_mode != RETURN)
+        assert (await w.client.command(RTL)).result == ACCEPTED
+        await w.client.heartbeat(lambda beat: beat.custom_mode == RETURN)
+
+
+async def test_another_clients_arming_starts_no_take_off() -> None:
+    async with world() as w:
+        other = await w.connect(sysid=250)
+        assert (await other.command(TAKEOFF_CMD, x=0.0, y=0.0, z=5.0)).result == ACCEPTED
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        await asyncio.sleep(1.0)
+        assert heard(w, "TakeOff") == []
+        assert (await other.command(ARM, 1)).result == ACCEPTED
+        await w.drone.wait_log(lambda e: e.kind == "command" and e.name == "ardrone3.Piloting.TakeOff")
+
+
 # Setpoints.
+
+
+async def test_the_sticks_are_level_before_a_landing_begins() -> None:
+    async with world(speed=1.0) as w:
+        await w.take_off()
+        async with streaming(w.client, pitch=FORWARD):
+            await engage(w.client)
+            await asyncio.sleep(0.5)
+            assert (await w.client.command(LAND_CMD)).result == ACCEPTED
+        sent = [e for e in w.drone.log if e.kind == "command" and e.name.startswith("ardrone3.Piloting.")]
+        landing = [e.name for e in sent].index("ardrone3.Piloting.Landing")
+        assert (sent[landing - 1].name, sent[landing - 1].args["pitch"]) == ("ardrone3.Piloting.PCMD", 0)
+        assert [e for e in sent[landing:] if e.name == "ardrone3.Piloting.PCMD"] == []
+
+
+async def test_a_setpoint_ends_with_its_own_sender_not_with_the_last_of_all() -> None:
+    async with world(speed=1.0) as w:
+        other = await w.connect(sysid=250)
+        await w.take_off()
+        async with streaming(other):
+            async with streaming(w.client, pitch=FORWARD):
+                pass
+            last = time.monotonic()
+            await asyncio.sleep(0.3)
+            await engage(w.client)
+            await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD)
+        deflected = [e.t for e in w.commands("ardrone3.Piloting.PCMD") if e.args["pitch"] != 0]
+        assert deflected
+        assert deflected[-1] - last <= 0.6  # half a second, and a little for this machine
 
 
 async def test_a_refused_return_leaves_no_stick_deflected() -> None:

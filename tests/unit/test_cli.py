@@ -86,7 +86,7 @@ def left_hovering(p: Product) -> None:
     assert "CancelMoveTo" in names or "moveBy" in names
     assert "Landing" not in names
     sticks = [entry["args"] for entry in after if entry["name"].endswith("PCMD")]
-    assert 30 <= len(sticks) <= 41  # 20 Hz for 2 s: none of them is acknowledged
+    assert 25 <= len(sticks) <= 41  # 20 Hz for 2 s, less what a busy machine lets slip: none of them is acknowledged
     assert all((s["roll"], s["pitch"], s["yaw"], s["gaz"]) == (0, 0, 0, 0) for s in sticks)
     pose = [entry["args"] for entry in p.entries("pose") if entry["t"] <= end["t"]][-1]
     assert abs(pose["vn"]) < 0.5

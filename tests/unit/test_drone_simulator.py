@@ -83,9 +83,15 @@ async def test_take_off_and_land(drone: Drone, real: SimulatedDrone) -> None:
     await drone.expect(ardrone3.FlyingStateChanged, lambda m: m.state == FlyingState.HOVERING, 10.0)
     assert real.pose.up > 0.7
     assert drone.home.state.location is not None
+    said = asyncio.ensure_future(
+        drone.expect(ardrone3.FlyingStateChanged, lambda m: m.state == FlyingState.LANDING, 10.0)
+    )
+    landed = asyncio.ensure_future(
+        drone.expect(ardrone3.FlyingStateChanged, lambda m: m.state == FlyingState.LANDED, 10.0)
+    )
     await drone.piloting.land()
-    assert drone.piloting.state.flying == FlyingState.LANDING
-    await drone.expect(ardrone3.FlyingStateChanged, lambda m: m.state == FlyingState.LANDED, 10.0)
+    await said
+    await landed
     assert real.pose.up < 0.05
 
 

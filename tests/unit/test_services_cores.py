@@ -152,6 +152,15 @@ def test_what_another_client_has_replaced_is_neither_flown_nor_confirmed_again()
     assert desk.retransmission("c", stop, 1.0) is None  # an order to stop is always carried out
 
 
+def test_a_return_is_asked_for_anew_unless_another_client_has_taken_over() -> None:
+    desk = commands.CommandDesk()
+    execution = desk.begin("a", command(id=20))
+    execution.result, execution.ended = dialect.MAV_RESULT_ACCEPTED, 0.0
+    assert desk.retransmission("a", command(id=20), 1.0) is None
+    desk.supersede("b")
+    assert desk.retransmission("a", command(id=20), 1.0) == dialect.MAV_RESULT_CANCELLED
+
+
 def test_what_is_another_command() -> None:
     desk = commands.CommandDesk()
     desk.begin("a", command())
@@ -179,6 +188,10 @@ def test_the_desk_remembers_a_bounded_number_of_clients() -> None:
         (192, (-1.0, 1.0, 0.0, 0.0), (NAN, NAN, NAN), False),
         (176, (1.0, 4.0, 3.0, NAN), (NAN, NAN, NAN), True),
         (176, (1.0, 4.0, 5.0, NAN), (NAN, NAN, NAN), False),
+        (176, (1.0, 4.0, 6.0, NAN), (NAN, NAN, NAN), True),
+        (21, (NAN, NAN, NAN, NAN), (NAN, NAN, NAN), True),
+        (400, (0.0, NAN, NAN, NAN), (NAN, NAN, NAN), True),
+        (400, (1.0, NAN, NAN, NAN), (NAN, NAN, NAN), False),
         (20, (NAN, NAN, NAN, NAN), (NAN, NAN, NAN), False),
     ],
 )
