@@ -8,6 +8,7 @@ home_type). State changes leave as rth.state and as NavigateHomeStateChanged, wh
 from __future__ import annotations
 
 import enum
+import math
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -98,7 +99,7 @@ class Homing:
 
     def set_custom(self, latitude: float, longitude: float, altitude: float, pose: Pose) -> None:
         """rth.set_custom_location: taken when the drone knows its own place and the other is within MaxDistance."""
-        if self._fix and abs(latitude) <= 90.0 and abs(longitude) <= 180.0:
+        if self._fix and _somewhere(latitude, longitude, altitude):
             north, east = self._origin.offset(latitude, longitude)
             reach = self._settings.number("max_distance")
             if (north - pose.north) ** 2 + (east - pose.east) ** 2 <= reach**2:
@@ -108,7 +109,9 @@ class Homing:
         self._emit(self._home_changed())
 
     def set_pilot(self, latitude: float, longitude: float, altitude: float) -> None:
-        """GPSSettings.SendControllerGPS."""
+        """GPSSettings.SendControllerGPS. What is no place is not heard."""
+        if not _somewhere(latitude, longitude, altitude):
+            return
         self.pilot = Location(latitude, longitude, altitude)
         self._emit(ardrone3.GPSFixStateChanged(int(self._fix)))
         self._emit(ardrone3.HomeTypeAvailabilityChanged(ardrone3.AvailableHomeType.PILOT, 1))
@@ -278,6 +281,11 @@ def _far(pose: Pose, north: float, east: float) -> float | None:
     """The bearing of a point, unless it is too near to have one."""
     bearing, distance = pose.bearing(north, east)
     return bearing if distance > _TOO_NEAR_TO_TURN else None
+
+
+def _somewhere(latitude: float, longitude: float, altitude: float) -> bool:
+    """On the earth, at a height that is a number."""
+    return abs(latitude) <= 90.0 and abs(longitude) <= 180.0 and math.isfinite(altitude)
 
 
 def _chosen(type: RthHomeType) -> ardrone3.AvailableHomeType:
