@@ -260,7 +260,7 @@ class SimulatedDrone:
     def tick(self, now: float, elapsed: float, pose: Pose, arrived: bool, still: bool) -> None:
         """Called by the simulation after each of its turns; see `Firmware.tick`."""
         self.firmware.tick(now, elapsed, pose, arrived, still)
-        if elapsed:
+        if elapsed and (self.wind.spec is not CALM or self._body.windy):
             self._body.blow(*self.wind.advance(elapsed))
         session = self._session
         if self.skycontroller is not None:

@@ -105,6 +105,7 @@ class Firmware:
         self._chance = chance
         self._alert = AlertState.NONE
         self._blockers: frozenset[TakeoffChecklistType] = frozenset()
+        self._ready: tuple[bool, ...] = ()
         self._by_hand = False
         self._timer = 0.0
         """End of the motors' ramp, or of the pause after an emergency."""
@@ -281,10 +282,7 @@ class Firmware:
         if self.fix != self.faults.gps:
             self._set_fix(self.faults.gps)
         self.homing.sensors(self.fix, not self.compass.required)
-        rising = (FlyingState.MOTOR_RAMPING, FlyingState.TAKINGOFF)
-        can_fly = self.state in GUIDED or self.state in rising or (self.state is LANDED and not self.blockers())
-        self.flight_plan.sensors(self.fix, not self.compass.required, can_fly)
-        self.poi.sensors(self.fix, not self.compass.required, self.state in GUIDED)
+        self._tell_readiness()
         for message in self.payload.lacks(self.fix, not self.compass.required, self.state in GUIDED):
             self._emit(message)
         if self.alert is not self._alert:
@@ -295,6 +293,18 @@ class Firmware:
             self._emit(check_changed(check, check in blockers))
         self._blockers = blockers
         self._mind_the_battery()
+
+    def _tell_readiness(self) -> None:
+        """Whether a flight plan or a point of interest could be started now."""
+        rising = (FlyingState.MOTOR_RAMPING, FlyingState.TAKINGOFF)
+        can_fly = self.state in GUIDED or self.state in rising or (self.state is LANDED and not self.blockers())
+        ready = (self.fix, not self.compass.required, can_fly, self.state in GUIDED)
+        if ready == self._ready:
+            return
+        self._ready = ready
+        fix, calibrated, can_fly, guided = ready
+        self.flight_plan.sensors(fix, calibrated, can_fly)
+        self.poi.sensors(fix, calibrated, guided)
 
     def _look_after_aircraft(self, elapsed: float) -> None:
         """Motors, vibration, wind, and whether somebody carries it."""
@@ -381,6 +391,7 @@ class Firmware:
             self._end_flight()
             for message in self.endurance.landed():
                 self._emit(message)
+        self._tell_readiness()
         return True
 
     def _begin_flight(self) -> None:

@@ -14,7 +14,6 @@ from typing import Any, Protocol
 from anafi_mav.arsdk.messages import camera, common, flight_plan
 from anafi_mav.arsdk.messages.common import FlightPlanComponent as Part
 from anafi_mav.arsdk.messages.common import MavlinkType, PlayError, PlayingState
-from anafi_mav.arsdk.messages.flight_plan import Indicator, SupportedCapabilities
 from anafi_mav.arsdk.wire import Message
 from anafi_mav.sim.model import Model
 from anafi_mav.sim.motion import Body, Pose, Turn
@@ -99,7 +98,6 @@ class FlightPlan:
         self._items: tuple[Item, ...] = ()
         self._index = 0
         self._parts = dict.fromkeys(Part, True)
-        self._missing = 0
         self._goes_on: bool | None = None
         self._recovery: Message = flight_plan.RecoveryInfo("", "", 0, 0, "")
         self._began = 0.0
@@ -143,8 +141,7 @@ class FlightPlan:
             *(common.ComponentStateListChanged(part, int(ok)) for part, ok in self._parts.items()),
         ]
         if self._model.modern:
-            both = 1 << SupportedCapabilities.START_AT | 1 << SupportedCapabilities.START_AT_V2
-            messages += [flight_plan.Info(self._missing), flight_plan.Capabilities(both), self._recovery]
+            messages.append(self._recovery)  # what is missing is told by `services`
         return messages
 
     def _playing_report(self) -> Message:
@@ -160,12 +157,6 @@ class FlightPlan:
             self._mark(part, ok)
         if self.available is not was:
             self._emit(common.AvailabilityStateChanged(int(self.available)))
-        needs = {Indicator.DRONE_GPS: fix, Indicator.DRONE_MAGNETO: magneto, Indicator.DRONE_STATE: can_fly}
-        missing = sum(1 << need for need, met in needs.items() if not met)
-        if missing != self._missing:
-            self._missing = missing
-            if self._model.modern:
-                self._emit(flight_plan.Info(missing))
         if self.playing and not (fix and magneto):
             error = PlayError.NOT_CALIBRATED if fix else PlayError.GPS_NOT_FIXED
             self._emit(common.MavlinkPlayErrorStateChanged(error))

@@ -426,9 +426,14 @@ class Body:
         motion.windy = motion.windy or north != 0.0 or east != 0.0
 
     @property
+    def windy(self) -> bool:
+        """Somewhere in the fleet the air moves, or has moved."""
+        return self._motion.windy
+
+    @property
     def wind(self) -> float:
         """m/s of the air over ground."""
-        return math.hypot(*self._motion.wind[:, self._index].tolist())
+        return math.hypot(*self._motion.wind[:, self._index].tolist()) if self._motion.windy else 0.0
 
     def place(self, north: float, east: float, yaw: float = 0.0) -> None:
         """Put the drone on the ground somewhere, at rest."""
