@@ -31,17 +31,24 @@ from anafi_mav.drone.controller import MODELS as CONTROLLERS
 from anafi_mav.drone.controller import Controller
 from anafi_mav.drone.element import Element, Reducer
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander
+from anafi_mav.drone.flight_plan import FlightPlan
+from anafi_mav.drone.follow_me import FollowMe
 from anafi_mav.drone.gimbal import Gimbal
 from anafi_mav.drone.gps import Gps
 from anafi_mav.drone.home import Home
 from anafi_mav.drone.link import Link
+from anafi_mav.drone.media import Media
 from anafi_mav.drone.moves import Move
 from anafi_mav.drone.piloting import Piloting
+from anafi_mav.drone.piloting_state import MOTORS_OFF
+from anafi_mav.drone.poi import Poi
 from anafi_mav.drone.product import MODELS, Identity, Model, Product
+from anafi_mav.drone.rest import HTTP_PORT, Rest
 from anafi_mav.drone.settings import Question
+from anafi_mav.drone.sound import Sound
 from anafi_mav.drone.storage import Storage
 from anafi_mav.drone.thermal import Thermal
-from anafi_mav.errors import CommandTimeout, LinkLost, LocalProtocolError
+from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, LocalProtocolError
 
 log = logging.getLogger("anafi_mav")
 message_log = logging.getLogger("anafi_mav.message")
@@ -51,8 +58,8 @@ MessageT = TypeVar("MessageT", bound=Message)
 Callback: TypeAlias = Callable[[Message, float], None]
 """(message, loop time of its arrival)."""
 
-HTTP_PORT = 80
-"""Of the drone's web server when nothing stands between."""
+REBOOT_TIMEOUT = 15.0
+"""s within which the link to a drone that reboots is lost; silence is noticed after 2.5 s."""
 
 DETAILS_TIMEOUT = 3.0
 """s to wait for what may never come; as Olympe (arsdkng/drone: optional, at most 3 s)."""
@@ -86,20 +93,25 @@ class Drone:
         self._discovery_port = discovery_port
         self._handshake_port = handshake_port
         self._local_address = local_address
-        self._http_port = http_port
         self._interface = interface
         self._clock = clock or SystemClock()
 
         self._commander = Commander()
+        self._rest = Rest(address, http_port, local_address, interface)
         self.alerts = Alerts()
         self.battery = Battery()
-        self.calibration = Calibration()
+        self.calibration = Calibration(self._commander)
         self.camera = Camera(self._commander)
+        self.flight_plan = FlightPlan(self._commander, self._rest)
+        self.follow_me = FollowMe(self._commander)
         self.gimbal = Gimbal(self._commander)
         self.gps = Gps()
         self.home = Home(self._commander)
         self.link = Link()
+        self.media = Media(self._commander, self._rest)
+        self.poi = Poi(self._commander)
         self.product = Product()
+        self.sound = Sound(self._commander)
         self.storage = Storage(self._commander)
         self.thermal = Thermal(self._commander)
         self.piloting = Piloting(self._commander, self.home, self.takeoff_blockers)
@@ -111,11 +123,16 @@ class Drone:
             self.calibration,
             self.camera,
             self.controller,
+            self.flight_plan,
+            self.follow_me,
             self.gimbal,
             self.gps,
             self.home,
             self.link,
+            self.media,
+            self.poi,
             self.product,
+            self.sound,
             self.storage,
             self.thermal,
             self.piloting,
@@ -293,6 +310,7 @@ class Drone:
 
     async def close(self) -> None:
         """End the connection. What was sent just before still leaves. Idempotent."""
+        await self._rest.close()
         session = self._session
         if session is not None:
             self.controller.give_back()
@@ -329,6 +347,22 @@ class Drone:
             hardware=product.hardware,
             name=product.name or self._announced_name,
         )
+
+    async def reboot(self, timeout: float = REBOOT_TIMEOUT) -> None:
+        """Let the drone start anew; returns when the link is lost, which is all that it says to it.
+
+        Raises `CommandRejected` while its motors turn, or when it has not said whether they do.
+        """
+        if not self.connected:
+            raise LinkLost("not connected")
+        flying = self.piloting.state.flying
+        if flying not in MOTORS_OFF:
+            raise CommandRejected("a drone that does not stand with its motors off is not rebooted")
+        token = self._commander.send(common.Reboot())
+        done, _ = await asyncio.wait({self._lost}, timeout=timeout)
+        if not done:
+            self._commander.cancel(token)
+            raise CommandTimeout(common.Reboot.NAME, timeout)
 
     # -- what others may look at
 

@@ -11,7 +11,7 @@ from anafi_mav.drone import Drone
 from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
 
 HOME = (48.8789, 2.3677, 35.0)
-SPEED = 5.0
+SPEED = 2.0
 
 
 class Pair(NamedTuple):

@@ -1,0 +1,258 @@
+"""Element flight plan: plans are uploaded to the drone's web server and flown by the drone.
+
+Parrot's file format is not known here: a plan is bytes. 4K, Thermal and USA fly version 1 of it, the Ai version 2; the
+drone says which by what it reports (feature flight_plan).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar
+
+import msgspec
+from msgspec.structs import replace
+
+from anafi_mav.arsdk.messages import common
+from anafi_mav.arsdk.messages import flight_plan as modern
+from anafi_mav.arsdk.messages.common import FlightPlanComponent, MavlinkType, PlayError, PlayingState
+from anafi_mav.arsdk.messages.flight_plan import Indicator, SupportedCapabilities
+from anafi_mav.arsdk.wire import Message
+from anafi_mav.drone.alerts import spoken
+from anafi_mav.drone.element import Reducer, members, with_item
+from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander
+from anafi_mav.drone.rest import Rest
+from anafi_mav.drone.settings import Commanding
+from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost, NotSupported, RemoteProtocolError
+
+API = "/api/v1/upload"
+START_TIMEOUT = 20.0
+"""s; as Olympe (common.Mavlink.Start): the drone reads the whole file before it says anything."""
+
+_UID = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,127}")
+
+
+class PlanOnDrone(msgspec.Struct, frozen=True):
+    """A plan that was uploaded."""
+
+    uid: str
+    date: str = ""
+
+
+class Recovery(msgspec.Struct, frozen=True):
+    """Where the last plan ended before its end, so that it can be flown on from there."""
+
+    uid: str
+    custom_id: str
+    item: int
+    seconds: int
+    """Flown of it."""
+
+
+class FlightPlanState(msgspec.Struct, frozen=True):
+    playing: PlayingState | None = None
+    uid: str | None = None
+    """Of the plan that plays or is paused; empty when none does."""
+    type: MavlinkType | None = None
+    item: int | None = None
+    """Index of the item that was done last, from 0; None when none of this plan is."""
+    skipped: int | None = None
+    """Waypoint that was left out. Ai only."""
+    available: bool | None = None
+    """Can a plan be started?"""
+    components: Mapping[FlightPlanComponent, bool] = {}
+    """What a plan needs -> it is all right."""
+    missing: frozenset[Indicator] | None = None
+    """What a plan lacks. Ai only."""
+    capabilities: frozenset[SupportedCapabilities] | None = None
+    """Ai only."""
+    error: PlayError | None = None
+    returns_on_disconnect: bool | None = None
+    """A lost link ends the plan with a return home."""
+    recovery: Recovery | None = None
+
+    @property
+    def unavailable(self) -> tuple[str, ...]:
+        """What keeps a plan from being flown, in words."""
+        words = [spoken(part) for part, ok in self.components.items() if not ok]
+        words += [spoken(one) for one in sorted(self.missing or ())]
+        return tuple(words)
+
+
+def _playing(state: FlightPlanState, message: common.MavlinkFilePlayingStateChanged) -> FlightPlanState:
+    begins = message.state == PlayingState.PLAYING and (state.playing != PlayingState.PAUSED or state.item is None)
+    same = message.filepath == state.uid
+    return replace(
+        state,
+        playing=message.state,
+        uid=message.filepath,
+        type=message.type,
+        item=None if begins and not (same and state.playing == PlayingState.PLAYING) else state.item,
+        skipped=None if begins else state.skipped,
+    )
+
+
+def _recovery(state: FlightPlanState, message: modern.RecoveryInfo) -> FlightPlanState:
+    known = Recovery(message.flightplan_id, message.custom_id, message.item, message.running_time)
+    return replace(state, recovery=known if message.flightplan_id else None)
+
+
+class FlightPlan(Commanding[FlightPlanState]):
+    NOTHING = FlightPlanState()
+    REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = {
+        common.MavlinkFilePlayingStateChanged: _playing,
+        common.MissionItemExecuted: lambda state, m: replace(state, item=m.idx),
+        common.AvailabilityStateChanged: lambda state, m: replace(state, available=m.AvailabilityState != 0),
+        common.ComponentStateListChanged: lambda state, m: replace(
+            state, components=with_item(state.components, m.component, m.State != 0, 0)
+        ),
+        common.MavlinkPlayErrorStateChanged: lambda state, m: replace(state, error=m.error),
+        common.ReturnHomeOnDisconnectChanged: lambda state, m: replace(state, returns_on_disconnect=m.state != 0),
+        modern.Info: lambda state, m: replace(state, missing=members(m.missing_inputs, Indicator)),
+        modern.Capabilities: lambda state, m: replace(
+            state, capabilities=members(m.supported_capabilities, SupportedCapabilities)
+        ),
+        modern.WaypointSkipped: lambda state, m: replace(state, skipped=m.item),
+        modern.RecoveryInfo: _recovery,
+    }
+
+    def __init__(self, commander: Commander, rest: Rest) -> None:
+        super().__init__(commander)
+        self._rest = rest
+
+    @property
+    def version(self) -> int:
+        """Of the file format that this drone flies: 1, or 2 on the Ai."""
+        return 1 if self.state.missing is None and self.state.capabilities is None else 2
+
+    # -- files
+
+    async def upload(self, plan: bytes) -> str:
+        """Hand over a plan; returns the name that the drone gives it, for `start`."""
+        self._available()
+        uid = await self._rest.json("PUT", f"{API}/flightplan", plan)
+        if not isinstance(uid, str) or not _UID.fullmatch(uid):
+            raise RemoteProtocolError(f"the drone took the flight plan and gave it no name: {uid!r:.80}")
+        return uid
+
+    async def list(self) -> tuple[PlanOnDrone, ...]:
+        """The plans on the drone."""
+        self._available()
+        told = await self._rest.json("GET", f"{API}/flightplans")
+        try:
+            return msgspec.convert(told, tuple[PlanOnDrone, ...], strict=False)
+        except (msgspec.ValidationError, RecursionError) as error:
+            raise RemoteProtocolError(f"the drone's list of flight plans: {error}") from error
+
+    async def get(self, uid: str) -> dict[str, Any]:
+        """What the drone tells of one plan. Raises `CommandRejected` when it has none of this name."""
+        self._available()
+        told = await self._rest.json("GET", f"{API}/flightplan/{_checked(uid)}")
+        if not isinstance(told, dict):
+            raise RemoteProtocolError(f"the drone tells nothing of flight plan {uid}")
+        return told
+
+    async def delete(self, uid: str) -> bool:
+        """Remove a plan. Parrot documents no way to do it: False when the drone does not."""
+        self._available()
+        try:
+            await self._rest.read("DELETE", f"{API}/flightplan/{_checked(uid)}")
+        except CommandRejected:
+            return False
+        return True
+
+    # -- flying
+
+    async def start(
+        self,
+        uid: str,
+        item: int = 0,
+        type: MavlinkType | None = None,
+        *,
+        continue_on_disconnect: bool | None = None,
+        timeout: float = START_TIMEOUT,
+    ) -> None:
+        """Fly an uploaded plan, or go on with the paused one; returns when it plays.
+
+        `item` begins in the middle and `continue_on_disconnect` goes on without a link: Ai only. Raises
+        `CommandRejected` with what the drone lacks. A start that is given up is taken back.
+        """
+        self._available()
+        command = self._start(uid, item, type, continue_on_disconnect)
+        before = self.state
+
+        def judge(message: Any) -> bool | AnafiMavError | None:
+            if isinstance(message, common.StartingErrorEvent):
+                return CommandRejected(self._why())
+            return True if message.state == PlayingState.PLAYING else None
+
+        try:
+            await self._commander.confirm(
+                command, (common.MavlinkFilePlayingStateChanged, common.StartingErrorEvent), judge, timeout
+            )
+        except (CommandRejected, LinkLost):
+            raise
+        except BaseException as error:
+            if before.playing != PlayingState.PLAYING and self._commander.connected:
+                self._commander.send(common.Stop())
+            if isinstance(error, CommandTimeout) and self.state.unavailable:
+                raise CommandRejected(self._why()) from None
+            raise
+
+    def _start(self, uid: str, item: int, type: MavlinkType | None, goes_on: bool | None) -> Message:
+        kind = type
+        if kind is None:
+            kind = MavlinkType.FLIGHT_PLAN if self.version == 1 else MavlinkType.FLIGHT_PLAN_V2
+        if item == 0 and goes_on is None:
+            return common.Start(uid, kind)
+        can = self.state.capabilities or frozenset()
+        other = modern.MavlinkType(kind)
+        if SupportedCapabilities.START_AT_V2 in can:
+            return modern.StartAtV2(uid, uid, other, item, int(bool(goes_on)))
+        if SupportedCapabilities.START_AT in can and goes_on is None:
+            return modern.StartAt(uid, uid, other, item)
+        raise NotSupported("start of a flight plan in its middle" if item else "flight plans without a link")
+
+    def _why(self) -> str:
+        reasons = ", ".join(self.state.unavailable)
+        return f"the flight plan cannot be flown: {reasons}" if reasons else "the drone cannot start the flight plan"
+
+    async def pause(self, timeout: float = ANSWER_TIMEOUT) -> None:
+        """Hover; `start` with the same plan goes on. Raises `CommandRejected` when no plan plays."""
+        self._available()
+        if self.state.playing != PlayingState.PLAYING:
+            raise CommandRejected("no flight plan plays")
+        await self._end(common.Pause(), PlayingState.PAUSED, timeout)
+
+    async def stop(self, timeout: float = ANSWER_TIMEOUT) -> None:
+        """Hover, and forget the plan. Returns at once when there is none."""
+        self._available()
+        if self.state.playing == PlayingState.STOPPED:
+            return
+        await self._end(common.Stop(), PlayingState.STOPPED, timeout)
+
+    async def _end(self, command: Message, wanted: PlayingState, timeout: float) -> None:
+        ends = (wanted, PlayingState.STOPPED)
+        judge: Callable[[Any], bool | None] = lambda message: True if message.state in ends else None  # noqa: E731
+        await self._commander.confirm(command, (common.MavlinkFilePlayingStateChanged,), judge, timeout)
+        if self.state.playing != wanted:
+            raise CommandRejected("the flight plan has ended")
+
+    async def set_returns_on_disconnect(self, on: bool) -> bool:
+        """Whether a lost link ends a plan with a return home."""
+        self._require(self.state.returns_on_disconnect, common.ReturnHomeOnDisconnect.NAME)
+        return await self._change(
+            common.ReturnHomeOnDisconnect(int(on)),
+            common.ReturnHomeOnDisconnectChanged,
+            lambda message: bool(message.state),
+        )
+
+    def _available(self) -> None:
+        self._require(self.state.playing, "flight plans")
+
+
+def _checked(uid: str) -> str:
+    """A name that can stand in a path."""
+    if not _UID.fullmatch(uid):
+        raise CommandRejected(f"{uid!r} is no flight plan of the drone")
+    return uid

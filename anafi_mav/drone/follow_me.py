@@ -1,0 +1,104 @@
+"""Element follow me: the drone follows a target, or looks at it. What the target does, the controller tells."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import msgspec
+from msgspec.structs import replace
+
+from anafi_mav.arsdk.messages import follow_me
+from anafi_mav.arsdk.messages.follow_me import Behavior, Input, Mode
+from anafi_mav.arsdk.wire import Message
+from anafi_mav.drone.alerts import spoken
+from anafi_mav.drone.element import Position, Reducer, members, position, with_item
+from anafi_mav.drone.expectation import ANSWER_TIMEOUT
+from anafi_mav.drone.settings import Commanding
+from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, LocalProtocolError, NotSupported
+
+
+class Trajectory(msgspec.Struct, frozen=True):
+    """Where the drone believes its target to be, and how it moves (m/s)."""
+
+    position: Position
+    """Altitude above mean sea level."""
+    north: float
+    east: float
+    down: float
+
+
+class FollowMeState(msgspec.Struct, frozen=True):
+    mode: Mode | None = None
+    """NONE: it follows nobody."""
+    behavior: Behavior | None = None
+    missing: Mapping[Mode, frozenset[Input]] = {}
+    """By mode, what has to be there before it can begin."""
+    improvements: Mapping[Mode, frozenset[Input]] = {}
+    """By mode, what would make it better."""
+    target_is_controller: bool | None = None
+    target: Trajectory | None = None
+
+
+def _mode_info(state: FollowMeState, m: follow_me.ModeInfo) -> FollowMeState:
+    return replace(
+        state,
+        missing=with_item(state.missing, m.mode, members(m.missing_requirements, Input), 0),
+        improvements=with_item(state.improvements, m.mode, members(m.improvements, Input), 0),
+    )
+
+
+def _trajectory(state: FollowMeState, m: follow_me.TargetTrajectory) -> FollowMeState:
+    place = position(m.latitude, m.longitude, m.altitude)
+    known = None if place is None else Trajectory(place, m.north_speed, m.east_speed, m.down_speed)
+    return replace(state, target=known)
+
+
+class FollowMe(Commanding[FollowMeState]):
+    NOTHING = FollowMeState()
+    REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = {
+        follow_me.State: lambda state, m: replace(state, mode=m.mode, behavior=m.behavior),
+        follow_me.ModeInfo: _mode_info,
+        follow_me.TargetIsController: lambda state, m: replace(state, target_is_controller=m.state != 0),
+        follow_me.TargetTrajectory: _trajectory,
+    }
+
+    async def start(self, mode: Mode, timeout: float = ANSWER_TIMEOUT) -> None:
+        """Returns when the drone is in this mode. Raises `CommandRejected` with what is missing.
+
+        A start that is given up is taken back.
+        """
+        if mode == Mode.NONE:
+            raise LocalProtocolError("NONE is no way to follow")
+        self._require(self.state.mode, "follow me")
+        if mode not in self.state.missing:
+            raise NotSupported(f"follow me: {spoken(mode)}")
+        try:
+            await self._commander.confirm(
+                follow_me.Start(mode), (follow_me.State,), lambda m: True if m.mode == mode else None, timeout
+            )
+        except LinkLost:
+            raise
+        except BaseException as error:
+            if self._commander.connected:
+                self._commander.send(follow_me.Stop())
+            lacks = ", ".join(spoken(one) for one in sorted(self.state.missing.get(mode, ())))
+            if isinstance(error, CommandTimeout) and lacks:
+                raise CommandRejected(f"cannot follow: {lacks}") from None
+            raise
+
+    async def stop(self, timeout: float = ANSWER_TIMEOUT) -> None:
+        """Returns when the drone follows nobody, at once when it does not."""
+        self._require(self.state.mode, "follow me")
+        if self.state.mode == Mode.NONE:
+            return
+        await self._commander.confirm(
+            follow_me.Stop(), (follow_me.State,), lambda m: True if m.mode == Mode.NONE else None, timeout
+        )
+
+    async def set_target_is_controller(self, on: bool) -> bool:
+        """Whether the target is who flies, or somebody that `target_image_detection` tells of."""
+        self._require(self.state.target_is_controller, "follow me")
+        return await self._change(
+            follow_me.SetTargetIsController(int(on)), follow_me.TargetIsController, lambda m: bool(m.state)
+        )

@@ -1,0 +1,157 @@
+"""The drone's web server as a client sees it: media and flight plans are told there, not over ARSDK.
+
+Nothing is open while nobody asks; `close` ends what is left. A drone that refuses is a `CommandRejected` with its
+status, one that does not answer a `CommandTimeout`, one that is not there a `LinkLost`, and one that talks nonsense a
+`RemoteProtocolError`. Redirections are not followed: what the drone has is on the drone.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+from collections.abc import AsyncIterator, Mapping
+from contextlib import asynccontextmanager, suppress
+from typing import Any
+
+import aiohttp
+import msgspec
+
+from anafi_mav.arsdk.interface import bind_to_interface
+from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, RemoteProtocolError
+
+HTTP_PORT = 80
+"""Of the drone's web server when nothing stands between."""
+
+ANSWER_LIMIT = 1 << 24
+"""Bytes of an answer that is read as a whole: the list of ten thousand media is a third of it."""
+
+ANSWER_TIMEOUT = 10.0
+"""s for an answer, and between two pieces of a file: the drone reads a slow card."""
+
+NOT_INDEXED = 541
+"""Parrot's status for a question about media while there is no index yet (developer.parrot.com, media API)."""
+
+
+class Rest:
+    """One drone's web server."""
+
+    def __init__(
+        self, address: str, port: int = HTTP_PORT, local_address: str | None = None, interface: str | None = None
+    ) -> None:
+        self.address = address
+        self.port = port
+        self._local_address = local_address
+        self._interface = interface
+        self._client: aiohttp.ClientSession | None = None
+
+    @property
+    def base(self) -> str:
+        return f"http://{self.address}:{self.port}"
+
+    async def close(self) -> None:
+        """End everything that is open. Idempotent."""
+        client, self._client = self._client, None
+        if client is not None:
+            await client.close()
+
+    async def json(
+        self, method: str, path: str, data: bytes | None = None, query: Mapping[str, str] | None = None
+    ) -> Any:
+        """The answer to a question, decoded; None for an empty one."""
+        body = await self.read(method, path, data, query)
+        if not body:
+            return None
+        try:
+            return msgspec.json.decode(body)
+        except (msgspec.DecodeError, RecursionError) as error:
+            raise RemoteProtocolError(f"{method} {path}: the drone answers no JSON: {error}") from error
+
+    async def read(
+        self, method: str, path: str, data: bytes | None = None, query: Mapping[str, str] | None = None
+    ) -> bytes:
+        """The body of an answer."""
+        pieces, size = [], 0
+        async with self.open(method, path, data, query) as answer:
+            async for piece in answer:
+                size += len(piece)
+                if size > ANSWER_LIMIT:
+                    raise RemoteProtocolError(f"{method} {path}: the answer has more than {ANSWER_LIMIT} bytes")
+                pieces.append(piece)
+        return b"".join(pieces)
+
+    @asynccontextmanager
+    async def open(
+        self, method: str, path: str, data: bytes | None = None, query: Mapping[str, str] | None = None
+    ) -> AsyncIterator[AsyncIterator[bytes]]:
+        """An answer piece by piece."""
+        if not path.startswith("/") or path.startswith("//"):
+            raise RemoteProtocolError(f"{path!r} is no place on the drone")
+        what = f"{method} {path}"
+        with _Translated(what, self.base):
+            async with self._session().request(
+                method, self.base + path, data=data, params=query, allow_redirects=False
+            ) as response:
+                if response.status >= 300:
+                    raise CommandRejected(await _refusal(what, response))
+                yield response.content.iter_any()
+
+    @asynccontextmanager
+    async def websocket(self, path: str, limit: int) -> AsyncIterator[aiohttp.ClientWebSocketResponse]:
+        """Frames of at most `limit` bytes."""
+        with _Translated(f"websocket {path}", self.base):
+            connecting = self._session().ws_connect(self.base + path, max_msg_size=limit, heartbeat=ANSWER_TIMEOUT)
+            async with await asyncio.wait_for(connecting, ANSWER_TIMEOUT) as opened:
+                yield opened
+
+    def _session(self) -> aiohttp.ClientSession:
+        if self._client is None or self._client.closed:
+            options: dict[str, Any] = {"limit_per_host": 4}
+            if self._local_address is not None:
+                options["local_addr"] = (self._local_address, 0)
+            if self._interface is not None:
+                options["socket_factory"] = self._make_socket
+            timeout = aiohttp.ClientTimeout(total=None, sock_connect=ANSWER_TIMEOUT, sock_read=ANSWER_TIMEOUT)
+            self._client = aiohttp.ClientSession(connector=aiohttp.TCPConnector(**options), timeout=timeout)
+        return self._client
+
+    def _make_socket(self, address: Any) -> socket.socket:
+        family, kind, protocol, _, _ = address
+        sock = socket.socket(family, kind, protocol)
+        try:
+            sock.setblocking(False)
+            bind_to_interface(sock, self._interface)
+        except BaseException:
+            sock.close()
+            raise
+        return sock
+
+
+async def _refusal(what: str, response: aiohttp.ClientResponse) -> str:
+    if response.status == NOT_INDEXED:
+        return "the drone has not indexed its media yet"
+    told = ""
+    with suppress(aiohttp.ClientError, asyncio.TimeoutError, msgspec.DecodeError, AttributeError):
+        answer = msgspec.json.decode(await response.content.read(1 << 12))
+        told = f": {answer['error']}" if isinstance(answer, dict) and "error" in answer else ""
+    return f"{what}: HTTP {response.status} {response.reason or ''}".rstrip() + told
+
+
+class _Translated:
+    """What goes wrong with the web server, in words of ours."""
+
+    def __init__(self, what: str, base: str) -> None:
+        self._what = what
+        self._base = base
+
+    def __enter__(self) -> None:
+        return None
+
+    def __exit__(self, kind: Any, error: BaseException | None, traceback: Any) -> None:
+        if isinstance(error, CommandRejected | CommandTimeout | LinkLost | RemoteProtocolError):
+            return
+        if isinstance(error, asyncio.TimeoutError):
+            raise CommandTimeout(self._what, ANSWER_TIMEOUT) from error
+        if isinstance(error, aiohttp.ClientConnectionError):
+            raise LinkLost(f"the drone's web server {self._base}: {error}") from error
+        if isinstance(error, aiohttp.ClientError):
+            raise RemoteProtocolError(f"{self._what}: {error}") from error

@@ -1,0 +1,43 @@
+"""Element sound: the motors beep, so that a drone is found in the grass. On the ground only."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import msgspec
+
+from anafi_mav.arsdk.messages import ardrone3
+from anafi_mav.arsdk.messages.ardrone3 import AlertSoundState
+from anafi_mav.arsdk.wire import Message
+from anafi_mav.drone.element import Reducer
+from anafi_mav.drone.settings import Commanding
+
+
+class SoundState(msgspec.Struct, frozen=True):
+    playing: bool | None = None
+
+
+class Sound(Commanding[SoundState]):
+    NOTHING = SoundState()
+    REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = {
+        ardrone3.AlertSound: lambda state, message: SoundState(message.state == AlertSoundState.PLAYING)
+    }
+
+    async def start(self) -> None:
+        """Returns when it beeps."""
+        self._require(self.state.playing, "alert sound")
+        await self._change(
+            ardrone3.StartAlertSound(),
+            ardrone3.AlertSound,
+            lambda message: True if message.state == AlertSoundState.PLAYING else None,
+        )
+
+    async def stop(self) -> None:
+        """Returns when it is silent."""
+        self._require(self.state.playing, "alert sound")
+        await self._change(
+            ardrone3.StopAlertSound(),
+            ardrone3.AlertSound,
+            lambda message: True if message.state == AlertSoundState.STOPPED else None,
+        )

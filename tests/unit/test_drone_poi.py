@@ -1,0 +1,174 @@
+"""Points of interest, follow me, the beep, the magnetometer and the reboot: in the simulator, and scripted."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+
+import pytest
+from scripted_device import STATES, ScriptedDevice
+from simulated import connected, take_off
+
+from anafi_mav.arsdk.messages import ardrone3, common, follow_me
+from anafi_mav.arsdk.messages.ardrone3 import PoiMode, PoiStatus
+from anafi_mav.arsdk.messages.common import CalibrationAxis
+from anafi_mav.drone import Drone, Position
+from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, LocalProtocolError, NotSupported
+
+PLACE = (48.8795, 2.3680, 3.0)
+
+
+@pytest.fixture
+async def device() -> AsyncIterator[ScriptedDevice]:
+    async with ScriptedDevice() as device:
+        device.script[common.AllStates] = lambda _: [
+            *STATES,
+            ardrone3.PilotedPOIV2(500.0, 500.0, 500.0, PoiMode.LOCKED_GIMBAL, PoiStatus.AVAILABLE),
+            follow_me.State(follow_me.Mode.NONE, follow_me.Behavior.IDLE, follow_me.Animation.NONE, 0),
+            follow_me.ModeInfo(
+                follow_me.Mode.LOOK_AT,
+                1 << follow_me.Input.IMAGE_DETECTION | 1 << follow_me.Input.DRONE_HIGH_ENOUGH,
+                0,
+            ),
+            common.MagnetoCalibrationStartedChanged(0),
+            common.AllStatesChanged(),
+        ]
+        yield device
+
+
+@pytest.fixture
+async def drone(device: ScriptedDevice) -> AsyncIterator[Drone]:
+    drone = device.drone()
+    await drone.connect()
+    yield drone
+    await drone.close()
+
+
+@pytest.mark.parametrize("model", ["4k", "ai"])
+async def test_a_point_of_interest(model: str) -> None:
+    async with connected(model) as (drone, _):
+        with pytest.raises(CommandRejected):
+            await drone.poi.start(*PLACE)
+        assert (drone.poi.state.missing is None) == (model == "4k")
+        await take_off(drone)
+        if drone.poi.state.status != PoiStatus.AVAILABLE:
+            await drone.expect(ardrone3.PilotedPOIV2, lambda m: m.status == PoiStatus.AVAILABLE)
+        await drone.poi.start(*PLACE, PoiMode.FREE_GIMBAL)
+        assert drone.poi.state.target == Position(*PLACE)
+        assert drone.poi.state.mode == PoiMode.FREE_GIMBAL
+        await drone.poi.stop()
+        assert drone.poi.state.status == PoiStatus.AVAILABLE
+        await drone.poi.stop()
+        with pytest.raises(LocalProtocolError):
+            await drone.poi.start(500.0, 500.0, 0.0)
+
+
+async def test_a_point_without_an_answer_is_taken_back(device: ScriptedDevice, drone: Drone) -> None:
+    # An event about another point is no answer.
+    device.script[ardrone3.StartPilotedPOIV2] = lambda _: [
+        ardrone3.PilotedPOIV2(1.0, 1.0, 1.0, PoiMode.LOCKED_GIMBAL, PoiStatus.RUNNING)
+    ]
+    with pytest.raises(CommandTimeout):
+        await drone.poi.start(*PLACE, timeout=0.2)
+    await device.until(ardrone3.StopPilotedPOI)
+
+
+async def test_follow_me(device: ScriptedDevice, drone: Drone) -> None:
+    with pytest.raises(CommandRejected, match="drone high enough, image detection"):
+        await drone.follow_me.start(follow_me.Mode.LOOK_AT, timeout=0.2)
+    await device.until(follow_me.Stop)
+    with pytest.raises(NotSupported, match="leash"):
+        await drone.follow_me.start(follow_me.Mode.LEASH)
+    with pytest.raises(LocalProtocolError):
+        await drone.follow_me.start(follow_me.Mode.NONE)
+    device.script[follow_me.Start] = lambda m: [
+        follow_me.State(m.mode, follow_me.Behavior.LOOK_AT, follow_me.Animation.NONE, 0),
+        follow_me.TargetTrajectory(48.0, 2.0, 40.0, 1.0, 2.0, 0.0),
+    ]
+    await drone.follow_me.start(follow_me.Mode.LOOK_AT)
+    if drone.follow_me.state.target is None:
+        await drone.expect(follow_me.TargetTrajectory)
+    assert drone.follow_me.state.behavior == follow_me.Behavior.LOOK_AT
+    assert drone.follow_me.state.target is not None
+    assert drone.follow_me.state.target.position == Position(48.0, 2.0, 40.0)
+    device.script[follow_me.Stop] = lambda _: [
+        follow_me.State(follow_me.Mode.NONE, follow_me.Behavior.IDLE, follow_me.Animation.NONE, 0)
+    ]
+    await drone.follow_me.stop()
+    stops = len(device.got(follow_me.Stop))
+    await drone.follow_me.stop()
+    assert len(device.got(follow_me.Stop)) == stops
+
+
+async def test_the_beep() -> None:
+    async with connected("4k") as (drone, _):
+        await drone.sound.start()
+        told = [drone.sound.state.playing]
+        await drone.sound.stop()
+        told.append(drone.sound.state.playing)
+        assert told == [True, False]
+
+
+async def test_the_magnetometer() -> None:
+    async with connected("4k") as (drone, _):
+        await drone.calibration.magnetometer_done()
+        await drone.calibration.start_magnetometer()
+        assert drone.calibration.state.started
+        await drone.calibration.magnetometer_done()
+        assert drone.calibration.state.done == frozenset(CalibrationAxis) - {CalibrationAxis.NONE}
+        await drone.calibration.start_magnetometer()
+        await drone.calibration.abort_magnetometer()
+        assert not drone.calibration.state.started
+
+
+async def test_a_magnetometer_that_fails_or_is_not_turned(device: ScriptedDevice, drone: Drone) -> None:
+    device.script[common.MagnetoCalibration] = lambda _: [common.MagnetoCalibrationStartedChanged(1)]
+    await drone.calibration.start_magnetometer()
+    with pytest.raises(CommandTimeout):
+        await drone.calibration.magnetometer_done(timeout=0.2)
+    done = asyncio.ensure_future(drone.calibration.magnetometer_done())
+    await asyncio.sleep(0)
+    device.say(
+        common.MagnetoCalibrationStateChanged(1, 0, 0, 0),
+        common.MagnetoCalibrationStateChanged(1, 0, 0, 1),
+    )
+    with pytest.raises(CommandRejected, match="failed"):
+        await done
+    assert drone.calibration.state.done == frozenset({CalibrationAxis.X_AXIS})
+
+
+async def test_a_reboot_is_confirmed_by_the_lost_link(device: ScriptedDevice, drone: Drone) -> None:
+    with pytest.raises(CommandTimeout):
+        await drone.reboot(timeout=0.2)
+    rebooting = asyncio.ensure_future(drone.reboot())
+    await device.until(common.Reboot, 2)
+    await device.session.close()
+    await rebooting
+    assert not drone.connected
+    with pytest.raises(LinkLost):
+        await drone.reboot()
+
+
+async def test_no_reboot_in_the_air() -> None:
+    async with connected("4k") as (drone, real):
+        await take_off(drone)
+        with pytest.raises(CommandRejected):
+            await drone.reboot()
+        assert not real.log.find("command", "common.Common.Reboot")
+
+
+async def test_what_a_drone_never_reported() -> None:
+    async with ScriptedDevice() as device:
+        drone = device.drone()
+        await drone.connect()
+        for call in (
+            drone.poi.start(*PLACE),
+            drone.poi.stop(),
+            drone.follow_me.start(follow_me.Mode.LOOK_AT),
+            drone.follow_me.stop(),
+            drone.sound.start(),
+            drone.calibration.start_magnetometer(),
+        ):
+            with pytest.raises(NotSupported):
+                await call
+        await drone.close()
