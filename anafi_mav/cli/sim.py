@@ -54,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--storage", metavar="SIZE", help="bytes of the memory card, also with k, M or G behind: small ones fill soon"
     )
     parser.add_argument(
-        "--skycontroller", metavar="3", help="a Skycontroller in front of each drone, which has the address instead"
+        "--skycontroller", metavar="3|4", help="a Skycontroller in front of each drone, which has the address instead"
     )
     parser.add_argument(
         "--wind",
@@ -119,7 +119,7 @@ def _from_options(arguments: argparse.Namespace) -> Fleet:
             telemetry_rate=_number("--telemetry-rate", arguments.telemetry_rate, "events per second"),
             skycontroller=None
             if arguments.skycontroller is None
-            else _integer("--skycontroller", arguments.skycontroller, "the generation of a Skycontroller, 3"),
+            else _integer("--skycontroller", arguments.skycontroller, "the generation of a Skycontroller, 3 or 4"),
             storage=None if arguments.storage is None else _size("--storage", arguments.storage),
         )
     except ConfigError as error:

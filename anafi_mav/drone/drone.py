@@ -14,7 +14,7 @@ from datetime import datetime
 from functools import partial
 from typing import Any, TypeAlias, TypeVar
 
-from anafi_mav.arsdk import controller
+from anafi_mav.arsdk import mux_link
 from anafi_mav.arsdk.controller import ControllerSession
 from anafi_mav.arsdk.handshake import DISCOVERY_PORT
 from anafi_mav.arsdk.messages import common, drone_manager, skyctrl
@@ -170,7 +170,7 @@ class Drone:
         self._opening = True
         try:
             self._reset()
-            session = await controller.connect(
+            session = await mux_link.connect_either(
                 self.address,
                 discovery_port=self._discovery_port,
                 handshake_port=self._handshake_port,

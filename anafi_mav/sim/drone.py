@@ -17,6 +17,7 @@ from anafi_mav.arsdk.device import DeviceServer, DeviceSession
 from anafi_mav.arsdk.handshake import DeviceInfo
 from anafi_mav.arsdk.messages import common
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
+from anafi_mav.arsdk.mux_link import MuxServer
 from anafi_mav.arsdk.session import OnMessage
 from anafi_mav.arsdk.wire import Buffer, Message, UnknownMessage
 from anafi_mav.errors import ConfigError
@@ -141,7 +142,7 @@ class SimulatedDrone:
                 spec.skycontroller, self._info, self._on_command, self._note, self._radio_changed
             )
             self._info = self.skycontroller.info
-        self._server: DeviceServer | None = None
+        self._server: DeviceServer | MuxServer | None = None
         self._web: WebServer | None = None
         self._session: DeviceSession | None = None
         self._next_pose = 0.0
@@ -214,15 +215,20 @@ class SimulatedDrone:
         spec = self.spec
         if self.skycontroller is not None:
             self.firmware.link_up()
-        self._server = await DeviceServer.start(
-            spec.address,
-            discovery_port=spec.discovery_port,
-            handshake_port=spec.handshake_port,
-            c2d_port=spec.c2d_port,
-            info=self._info,
-            versions=spec.versions,
-            on_session=self._on_session,
-        )
+        if spec.skycontroller == 4:
+            self._server = await MuxServer.start(
+                spec.address, info=self._info, versions=spec.versions, on_session=self._on_session
+            )
+        else:
+            self._server = await DeviceServer.start(
+                spec.address,
+                discovery_port=spec.discovery_port,
+                handshake_port=spec.handshake_port,
+                c2d_port=spec.c2d_port,
+                info=self._info,
+                versions=spec.versions,
+                on_session=self._on_session,
+            )
         self._mute_link(self.faults.mute)
         if spec.http_port is None:
             return

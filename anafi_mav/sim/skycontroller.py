@@ -21,7 +21,7 @@ from anafi_mav.arsdk.messages.mapper import AxisAction, ButtonAction, ButtonEven
 from anafi_mav.arsdk.messages.skyctrl import Source
 from anafi_mav.arsdk.wire import Message, UnknownMessage
 
-MODELS = {3: 0x0918}
+MODELS = {3: 0x0918, 4: 0x091D}
 """Generation -> product number."""
 SOFTWARE, HARDWARE = "1.8.2", "SIM"
 

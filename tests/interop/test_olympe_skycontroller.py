@@ -41,7 +41,10 @@ async def olympe(address: str, kind: str) -> tuple[dict[str, Any], str]:
     return json.loads(out), err.decode()
 
 
-@pytest.mark.parametrize(("generation", "kind", "model", "product"), [(3, "SkyController3", "4k", 0x0914)])
+@pytest.mark.parametrize(
+    ("generation", "kind", "model", "product"),
+    [(3, "SkyController3", "4k", 0x0914), (4, "SkyController4", "ai", 0x091A), (4, "SkyController4", "usa", 0x091E)],
+)
 async def test_olympe_flies_through_the_skycontroller(
     generation: int, kind: str, model: str, product: int, tmp_path: Path
 ) -> None:

@@ -80,9 +80,10 @@ def now() -> float:
     return asyncio.get_running_loop().time()
 
 
-@pytest.fixture
-async def crew() -> AsyncIterator[Crew]:
-    spec = DroneSpec(model="thermal", address=loopback(), http_port=None, skycontroller=3)
+@pytest.fixture(params=[3, 4])
+async def crew(request: pytest.FixtureRequest) -> AsyncIterator[Crew]:
+    """Over UDP and over the mux."""
+    spec = DroneSpec(model="thermal", address=loopback(), http_port=None, skycontroller=request.param)
     async with Simulator([spec], speed=3.0, seed=1) as simulator:
         real = simulator.drones[0]
         assert real.skycontroller is not None

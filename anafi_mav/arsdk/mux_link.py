@@ -1,0 +1,359 @@
+"""ARSDK over the mux, both ends: discovery, connection and session on one TCP connection. See `mux`."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import logging
+from collections.abc import Callable
+from typing import Any, cast
+
+from anafi_mav.arsdk import controller, handshake, mux
+from anafi_mav.arsdk.controller import CONTROLLER_NAME, CONTROLLER_TYPE, ControllerSession
+from anafi_mav.arsdk.device import DeviceSession, OnSession
+from anafi_mav.arsdk.handshake import ConnectRequest, DeviceInfo
+from anafi_mav.arsdk.interface import open_connection
+from anafi_mav.arsdk.session import OnMessage, reason_of
+from anafi_mav.arsdk.transport import Role, Transport
+from anafi_mav.errors import LinkLost, RemoteProtocolError
+
+log = logging.getLogger("anafi_mav.arsdk")
+
+READ_SIZE = 1 << 16
+PEER = ("mux", 0)
+"""What the other end is called where a UDP session has an address."""
+
+MAX_WAITING = 1 << 18
+"""Bytes that may wait for a slow TCP connection; beyond it frames are dropped as the air drops datagrams, and the
+transport repeats those that count."""
+
+
+class Stream:
+    """A TCP connection with frames on it. Handshakes are answered here."""
+
+    def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self.reader, self.writer = reader, writer
+        self._decoder = mux.Decoder()
+        self.write_raw(mux.encode_control(mux.HANDSHAKE, 0, 0, mux.VERSION))
+
+    def write_raw(self, frame: bytes) -> None:
+        if not self.writer.is_closing() and self.writer.transport.get_write_buffer_size() < MAX_WAITING:
+            self.writer.write(frame)
+
+    def write(self, channel: int, payload: bytes) -> None:
+        """One frame."""
+        self.write_raw(mux.encode_frame(channel, payload))
+
+    async def read(self) -> list[mux.Frame] | None:
+        """Frames of channels that are not the mux's own; None at the end of the connection. Raises `OSError`."""
+        data = await self.reader.read(READ_SIZE)
+        if not data:
+            return None
+        frames = []
+        for frame in self._decoder.feed(data):
+            if frame.channel != mux.CONTROL:
+                frames.append(frame)
+                continue
+            control = mux.decode_control(frame.payload)
+            if control is not None and control.id == mux.HANDSHAKE and not control.args[0]:
+                self.write_raw(mux.encode_control(mux.HANDSHAKE, 0, 1, mux.VERSION))
+        return frames
+
+
+class _Endpoint:
+    """The transport channel, where a session has a UDP socket."""
+
+    def __init__(self, stream: Stream, closed: Callable[[Exception | None], None]) -> None:
+        self._stream = stream
+        self._closed = closed
+        self._aborted = False
+
+    def sendto(self, data: bytes, address: object) -> None:
+        self._stream.write(mux.TRANSPORT, data)
+
+    def abort(self) -> None:
+        if not self._aborted:
+            self._aborted = True
+            asyncio.get_running_loop().call_soon(self._closed, None)
+
+    def get_extra_info(self, name: str) -> Any:
+        return self._stream.writer.get_extra_info(name)
+
+
+class MuxControllerSession(ControllerSession):
+    """A connection to a Skycontroller over the mux."""
+
+    def __init__(
+        self, transport: Transport, on_message: OnMessage, device: DeviceInfo, stream: Stream, early: list[mux.Frame]
+    ) -> None:
+        self._stream = stream
+        self._early = early
+        super().__init__(transport, on_message, device, (stream.reader, stream.writer))
+
+    def begin(self) -> None:
+        """Send and receive from now on."""
+        self.connection_made(cast(asyncio.BaseTransport, _Endpoint(self._stream, self.connection_lost)))
+        self._flush()
+
+    async def _watch_discovery(self, reader: asyncio.StreamReader) -> None:
+        frames: list[mux.Frame] | None = self._early
+        with contextlib.suppress(OSError):
+            while frames is not None:
+                for frame in frames:
+                    if frame.channel == mux.TRANSPORT:
+                        self.datagram_received(frame.payload, PEER)
+                frames = await self._stream.read()
+        self.end("the Skycontroller closed the connection")
+
+
+async def connect(
+    host: str,
+    *,
+    port: int = mux.PORT,
+    versions: tuple[int, int] = (1, 3),
+    local_address: str | None = None,
+    interface: str | None = None,
+    on_message: OnMessage,
+    ping_after: float = 0.5,
+    silence_limit: float | None = 2.5,
+) -> MuxControllerSession:
+    """Connect to the device behind the mux at `host`; who calls limits the time. Otherwise as `controller.connect`."""
+    try:
+        reader, writer = await open_connection(host, port, local_address=local_address, interface=interface)
+    except OSError as error:
+        raise LinkLost(f"cannot connect to {host}:{port}: {reason_of(error)}") from error
+    try:
+        stream = Stream(reader, writer)
+        stream.write(mux.DISCOVERY, mux.encode_pomp(mux.DISCOVER))
+        (name, model_id, serial), _ = await _answer(stream, mux.DISCOVERY, mux.DEVICE_ADDED, (str, int, str))
+        request = json.dumps({"proto_v_min": versions[0], "proto_v_max": versions[1]})
+        texts = (CONTROLLER_NAME, CONTROLLER_TYPE, serial, request)
+        stream.write(mux.BACKEND, mux.encode_pomp(mux.CONN_REQ, [("%s", text) for text in texts]))
+        (status, text), early = await _answer(stream, mux.BACKEND, mux.CONN_RESP, (int, str))
+        if status != 0:
+            raise LinkLost(f"{host}:{port} refused the connection (status {status})")
+        version = _version(text)
+        if not versions[0] <= version <= versions[1]:
+            raise RemoteProtocolError(f"{host}:{port} chose protocol version {version}, offered were {versions}")
+        transport = Transport(
+            Role.CONTROLLER,
+            version,
+            asyncio.get_running_loop().time(),
+            ping_after=ping_after,
+            silence_limit=silence_limit,
+        )
+    except BaseException:
+        writer.close()
+        raise
+    session = MuxControllerSession(transport, on_message, DeviceInfo(model_id, serial, port, name), stream, early)
+    session.begin()
+    return session
+
+
+async def connect_either(
+    host: str,
+    *,
+    mux_port: int = mux.PORT,
+    local_address: str | None = None,
+    interface: str | None = None,
+    on_message: OnMessage,
+    timeout: float = 3.0,
+    **options: Any,
+) -> ControllerSession:
+    """As `controller.connect`; where nothing listens on the discovery port, a Skycontroller 4 is tried on the mux."""
+    try:
+        return await controller.connect(
+            host, local_address=local_address, interface=interface, on_message=on_message, timeout=timeout, **options
+        )
+    except LinkLost as error:
+        if not isinstance(error.__cause__, ConnectionRefusedError):
+            raise
+        refused = error
+    attempt = connect(host, port=mux_port, local_address=local_address, interface=interface, on_message=on_message)
+    try:
+        return await asyncio.wait_for(attempt, timeout)
+    except asyncio.TimeoutError:
+        raise LinkLost(f"no answer from {host}:{mux_port} within {timeout:g} s") from None
+    except LinkLost as error:
+        # Nothing there either: the first word is what most people wait for.
+        raise (refused if isinstance(error.__cause__, ConnectionRefusedError) else error) from None
+
+
+async def _answer(stream: Stream, channel: int, id: int, types: tuple[type, ...]) -> tuple[list[Any], list[mux.Frame]]:
+    """The arguments of the awaited message, and the frames behind it. Raises `LinkLost` at the connection's end."""
+    while True:
+        try:
+            frames = await stream.read()
+        except OSError as error:
+            raise LinkLost(f"mux: {reason_of(error)}") from error
+        if frames is None:
+            raise LinkLost("the mux closed the connection without an answer")
+        for index, frame in enumerate(frames):
+            message = mux.decode_pomp(frame.payload) if frame.channel == channel else None
+            if message is None or message[0] != id:
+                continue
+            arguments = message[1]
+            if len(arguments) < len(types) or not all(map(isinstance, arguments, types)):
+                raise RemoteProtocolError(f"unreadable answer on mux channel {channel}: {arguments!r}")
+            return arguments[: len(types)], frames[index + 1 :]
+
+
+def _version(text: str) -> int:
+    """proto_v of a connection's answer; one that names none means version 1."""
+    with contextlib.suppress(ValueError, RecursionError):
+        members = json.loads(text)
+        if isinstance(members, dict) and isinstance(members.get("proto_v", 1), int):
+            return int(members.get("proto_v", 1))
+    return 1
+
+
+class MuxDeviceSession(DeviceSession):
+    """A connection from a controller over the mux."""
+
+    def __init__(self, transport: Transport, request: ConnectRequest, peer: str, stream: Stream) -> None:
+        super().__init__(transport, request, peer)
+        self._peer = PEER
+        self._stream = stream
+
+    def begin(self) -> None:
+        """Send and receive from now on."""
+        self.connection_made(cast(asyncio.BaseTransport, _Endpoint(self._stream, self.connection_lost)))
+        self._flush()
+
+
+class MuxServer:
+    """A device on the mux, one connection at a time: a new one ends the one before. As `device.DeviceServer`."""
+
+    def __init__(self, info: DeviceInfo, versions: tuple[int, int], on_session: OnSession, ping_after: float) -> None:
+        self.info = info
+        self.session: DeviceSession | None = None
+        self._versions = versions
+        self._on_session = on_session
+        self._ping_after = ping_after
+        self._server: asyncio.AbstractServer | None = None
+        self._stream: Stream | None = None
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._mute = False
+
+    @classmethod
+    async def start(
+        cls,
+        address: str,
+        *,
+        port: int = mux.PORT,
+        info: DeviceInfo,
+        versions: tuple[int, int] = (1, 3),
+        on_session: OnSession,
+        ping_after: float = 2.0,
+    ) -> MuxServer:
+        """Listen on `address`; port 0 lets the system choose. Raises `OSError` when the port is taken."""
+        handshake.check_versions(versions)
+        self = cls(info, versions, on_session, ping_after)
+        self._server = await asyncio.start_server(self._serve, address, port)
+        return self
+
+    @property
+    def discovery_port(self) -> int:
+        """The one port there is."""
+        return 0 if self._server is None else int(cast(asyncio.Server, self._server).sockets[0].getsockname()[1])
+
+    handshake_port = discovery_port
+
+    @property
+    def mute(self) -> bool:
+        """True: as if the air were gone."""
+        return self._mute
+
+    @mute.setter
+    def mute(self, mute: bool) -> None:
+        self._mute = mute
+        if self.session is not None:
+            self.session.mute = mute
+
+    async def close(self) -> None:
+        """Stop listening and end the session. Idempotent."""
+        server, self._server = self._server, None
+        if server is not None:
+            server.close()
+        if self._stream is not None:
+            self._stream.writer.close()
+        if self._tasks:
+            await asyncio.wait(tuple(self._tasks))
+        if server is not None:
+            await server.wait_closed()
+
+    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        task = cast("asyncio.Task[None]", asyncio.current_task())
+        self._tasks.add(task)
+        if self._stream is not None:
+            self._stream.writer.close()
+        stream = self._stream = Stream(reader, writer)
+        session: MuxDeviceSession | None = None
+        try:
+            while (frames := await stream.read()) is not None:
+                for frame in frames:
+                    if self._mute:
+                        continue
+                    if frame.channel == mux.TRANSPORT and session is not None:
+                        session.datagram_received(frame.payload, PEER)
+                    elif frame.channel in (mux.DISCOVERY, mux.BACKEND):
+                        session = await self._hear(stream, frame, session)
+        except OSError as error:
+            log.debug("controller gone: %s", error)
+        finally:
+            writer.close()
+            if session is not None:
+                session.end("the controller closed the connection")
+            self._tasks.discard(task)
+
+    async def _hear(
+        self, stream: Stream, frame: mux.Frame, session: MuxDeviceSession | None
+    ) -> MuxDeviceSession | None:
+        """A message on one of the channels before the session."""
+        message = mux.decode_pomp(frame.payload)
+        if message is None:
+            return session
+        id, arguments = message
+        if frame.channel == mux.DISCOVERY:
+            if id == mux.DISCOVER:
+                info = self.info
+                added: list[tuple[str, mux.Argument]] = [
+                    ("%s", info.name),
+                    ("%u", info.model_id),
+                    ("%s", info.serial),
+                ]
+                stream.write(mux.DISCOVERY, mux.encode_pomp(mux.DEVICE_ADDED, added))
+            return session
+        if id != mux.CONN_REQ or len(arguments) < 4 or not all(isinstance(one, str) for one in arguments):
+            return session
+        if session is not None:
+            session.end("connected anew")
+            await session.close()
+        return self._accept(stream, cast("list[str]", arguments))
+
+    def _accept(self, stream: Stream, arguments: list[str]) -> MuxDeviceSession | None:
+        name, kind, serial, text = arguments[:4]
+        low, high = 1, 1
+        with contextlib.suppress(ValueError, RecursionError):
+            members = json.loads(text)
+            if isinstance(members, dict):
+                low, high = (
+                    value if isinstance(value := members.get(key, 1), int) else 1
+                    for key in ("proto_v_min", "proto_v_max")
+                )
+        request = ConnectRequest(name, kind, 0, serial, 0, low, high)
+        version = handshake.pick_version(request, self._versions)
+        if version is None or serial not in ("", self.info.serial):
+            refusal: list[tuple[str, mux.Argument]] = [("%d", handshake.REJECTED), ("%s", "")]
+            stream.write(mux.BACKEND, mux.encode_pomp(mux.CONN_RESP, refusal))
+            return None
+        transport = Transport(Role.DEVICE, version, asyncio.get_running_loop().time(), ping_after=self._ping_after)
+        peer = stream.writer.get_extra_info("peername")[0]
+        session = MuxDeviceSession(transport, request, peer, stream)
+        session.on_message = self._on_session(session)
+        reply: list[tuple[str, mux.Argument]] = [("%d", 0), ("%s", json.dumps({"proto_v": version}))]
+        stream.write(mux.BACKEND, mux.encode_pomp(mux.CONN_RESP, reply))
+        session.begin()
+        self.session = session
+        return session

@@ -1,0 +1,200 @@
+"""Parrot's mux: bytes by hand, streams cut anywhere, noise, and a session over it."""
+
+from __future__ import annotations
+
+import asyncio
+import random
+import tracemalloc
+from collections.abc import Callable
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from anafi_mav.arsdk import mux, mux_link
+from anafi_mav.arsdk.handshake import DeviceInfo
+from anafi_mav.arsdk.messages import ardrone3, common
+from anafi_mav.arsdk.mux import Control, Decoder, Frame, decode_control, decode_pomp, encode_frame, encode_pomp
+from anafi_mav.arsdk.session import OnMessage
+from anafi_mav.arsdk.wire import Message, UnknownMessage
+from anafi_mav.errors import LinkLost, LocalProtocolError
+
+INFO = DeviceInfo(0x091D, "PI040443AA9K754503", 0, "SC4")
+
+
+def test_frames_by_hand() -> None:
+    # libmux: magic, channel, size with the header of 12 bytes.
+    data = bytes.fromhex("4d555821 01000000 0f000000 616263")
+    assert encode_frame(1, b"abc") == data
+    assert Decoder().feed(data) == [Frame(1, b"abc")]
+
+
+def test_the_handshake_by_hand() -> None:
+    frame = mux.encode_control(mux.HANDSHAKE, 0, 1, mux.VERSION)
+    words = "7f000000 00000000 01000000 02000000 00000000 00000000 00000000 00000000"
+    assert frame == bytes.fromhex("4d555821 00000000 2c000000 " + words)
+    assert decode_control(frame[12:]) == Control(127, 0, (1, 2, 0, 0, 0, 0))
+    assert decode_control(frame[12:-1]) is None
+
+
+def test_pomp_by_hand() -> None:
+    # Strings: 09, their length with the NUL as varint; u32: 06 varint; i32: 05 zigzag varint (libpomp pomp_encoder.c).
+    # 12 bytes of header, 6 of "SC4", 3 of 0x091d = 0x12 * 128 + 0x1d, 4 of "P".
+    data = bytes.fromhex("504f4d50 02000000 19000000 09 04 53433400 06 9d12 09 02 5000")
+    assert encode_pomp(2, [("%s", "SC4"), ("%u", 0x091D), ("%s", "P")]) == data
+    assert decode_pomp(data) == (2, ["SC4", 0x091D, "P"])
+    assert encode_pomp(1) == bytes.fromhex("504f4d50 01000000 0c000000")
+    assert encode_pomp(2, [("%d", -1)])[12:] == bytes.fromhex("05 01")
+    assert decode_pomp(encode_pomp(2, [("%d", -1), ("%d", 1), ("%d", -(1 << 31))])) == (2, [-1, 1, -(1 << 31)])
+
+
+@pytest.mark.parametrize(
+    "argument", [("%u", -1), ("%u", 1 << 32), ("%s", "a\0b"), ("%s", "a" * 70000), ("%x", 1), ("%s", 1)]
+)
+def test_our_own_wrong_arguments_raise(argument: tuple[str, mux.Argument]) -> None:
+    with pytest.raises(LocalProtocolError):
+        encode_pomp(1, [argument])
+
+
+FRAMES = st.lists(st.builds(Frame, st.integers(0, 0xFFFFFFFF), st.binary(max_size=80)), max_size=8)
+
+
+@given(frames=FRAMES, cuts=st.lists(st.integers(0, 2000), max_size=12), noise=st.binary(max_size=10))
+def test_a_stream_is_read_however_it_was_cut(frames: list[Frame], cuts: list[int], noise: bytes) -> None:
+    noise = noise.replace(b"M", b"m")
+    data = noise + b"".join(encode_frame(*frame) for frame in frames)
+    decoder, found, position = Decoder(), [], 0
+    for cut in [*sorted(min(cut, len(data)) for cut in cuts), len(data)]:
+        found += decoder.feed(data[position:cut])
+        position = cut
+    assert found == frames
+    assert decoder.skipped == (len(noise) if frames else max(0, len(noise) - 3))
+
+
+def test_noise_neither_raises_nor_piles_up() -> None:
+    rng = random.Random(1)
+    decoder = Decoder()
+    whole = encode_frame(1, rng.randbytes(50)) + mux.encode_control(mux.HANDSHAKE) + encode_pomp(2, [("%s", "SC4")])
+    tracemalloc.start()
+    try:
+        for number in range(30_000):
+            data = bytearray(whole)
+            for _ in range(rng.randrange(4)):
+                data[rng.randrange(len(data))] = rng.randrange(256)
+            for frame in decoder.feed(bytes(data[: rng.randrange(len(data))])):
+                decode_control(frame.payload)
+                decode_pomp(frame.payload)
+            decode_pomp(bytes(data[44 + 62 :]))
+            if number == 3000:
+                base = tracemalloc.get_traced_memory()[0]
+        # A frame that was begun may be kept, not more.
+        assert tracemalloc.get_traced_memory()[0] - base < 2 * mux.MAX_FRAME
+    finally:
+        tracemalloc.stop()
+
+
+# -- sessions
+
+
+class Device:
+    """A device behind the mux that answers AllStates and keeps what it hears."""
+
+    def __init__(self) -> None:
+        self.heard: list[Message | UnknownMessage] = []
+        self.sessions: list[object] = []
+
+    def on_session(self, session: mux_link.DeviceSession) -> OnMessage:
+        self.sessions.append(session)
+
+        def receive(message: Message | UnknownMessage, now: float) -> None:
+            self.heard.append(message)
+            if isinstance(message, common.AllStates):
+                session.send(ardrone3.AltitudeChanged(1.5))
+                session.send(common.AllStatesChanged())
+
+        return receive
+
+
+async def until(true: Callable[[], bool]) -> None:
+    deadline = asyncio.get_running_loop().time() + 5.0
+    while not true():
+        assert asyncio.get_running_loop().time() < deadline
+        await asyncio.sleep(0.005)
+
+
+@pytest.mark.parametrize("version", [1, 2, 3])
+async def test_a_session_over_the_mux(version: int) -> None:
+    device, heard = Device(), []
+    server = await mux_link.MuxServer.start(
+        "127.0.0.1", port=0, info=INFO, versions=(1, version), on_session=device.on_session
+    )
+    try:
+        session = await mux_link.connect(
+            "127.0.0.1", port=server.discovery_port, on_message=lambda message, now: heard.append(message)
+        )
+        assert session.device == DeviceInfo(INFO.model_id, INFO.serial, server.discovery_port, INFO.name)
+        assert session.version == version
+        session.send(common.AllStates())
+        await until(lambda: common.AllStatesChanged() in heard)
+        assert ardrone3.AltitudeChanged(1.5) in heard
+        assert device.heard == [common.AllStates()]
+        # A new connection ends the one before.
+        second = await mux_link.connect("127.0.0.1", port=server.discovery_port, on_message=lambda message, now: None)
+        assert await asyncio.wait_for(asyncio.shield(session.lost), 3.0) == "the Skycontroller closed the connection"
+        await session.close()
+        await second.close()
+        await until(lambda: server.session is not None and server.session.lost.done())
+    finally:
+        await server.close()
+
+
+async def test_silence_is_noticed_on_the_mux_too() -> None:
+    device = Device()
+    server = await mux_link.MuxServer.start("127.0.0.1", port=0, info=INFO, on_session=device.on_session)
+    try:
+        session = await mux_link.connect(
+            "127.0.0.1",
+            port=server.discovery_port,
+            on_message=lambda message, now: None,
+            silence_limit=0.6,
+            ping_after=0.2,
+        )
+        server.mute = True
+        assert "nothing received" in await asyncio.wait_for(asyncio.shield(session.lost), 3.0)
+        await session.close()
+    finally:
+        await server.close()
+
+
+async def test_versions_without_a_common_one_are_refused() -> None:
+    device = Device()
+    server = await mux_link.MuxServer.start(
+        "127.0.0.1", port=0, info=INFO, versions=(3, 3), on_session=device.on_session
+    )
+    try:
+        with pytest.raises(LinkLost, match="refused the connection"):
+            await mux_link.connect(
+                "127.0.0.1", port=server.discovery_port, versions=(1, 2), on_message=lambda message, now: None
+            )
+        assert device.sessions == []
+    finally:
+        await server.close()
+
+
+async def test_garbage_at_the_port_ends_nothing() -> None:
+    device = Device()
+    server = await mux_link.MuxServer.start("127.0.0.1", port=0, info=INFO, on_session=device.on_session)
+    rng = random.Random(3)
+    try:
+        for _ in range(20):
+            _, writer = await asyncio.open_connection("127.0.0.1", server.discovery_port)
+            for channel in (0, 1, 2, 3, 9):
+                writer.write(encode_frame(channel, rng.randbytes(rng.randrange(60))))
+            texts = [("%s", rng.choice(["", "{", "[]", '{"proto_v_min": "x"}', "[" * 3000])) for _ in range(4)]
+            writer.write(encode_frame(mux.BACKEND, encode_pomp(mux.CONN_REQ, texts)))
+            await writer.drain()
+            writer.close()
+        session = await mux_link.connect("127.0.0.1", port=server.discovery_port, on_message=lambda message, now: None)
+        await session.close()
+    finally:
+        await server.close()
