@@ -9,7 +9,7 @@ import asyncio
 import contextlib
 import logging
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
 from functools import partial
 from typing import Any, TypeAlias, TypeVar
@@ -31,6 +31,7 @@ from anafi_mav.drone.controller import MODELS as CONTROLLERS
 from anafi_mav.drone.controller import Controller
 from anafi_mav.drone.element import Element, Reducer
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander
+from anafi_mav.drone.features import Feature, Support, features
 from anafi_mav.drone.flight_plan import FlightPlan
 from anafi_mav.drone.follow_me import FollowMe
 from anafi_mav.drone.gimbal import Gimbal
@@ -365,6 +366,11 @@ class Drone:
             raise CommandTimeout(common.Reboot.NAME, timeout)
 
     # -- what others may look at
+
+    @property
+    def features(self) -> Mapping[Feature, Support]:
+        """What this drone has, as it told when it connected."""
+        return features(self)
 
     @property
     def moves_started(self) -> tuple[Move, ...]:
