@@ -41,6 +41,8 @@ MAX_FRAME = 1 << 18
 _MAGIC, _POMP = b"MUX!", b"POMP"
 _HEADER = struct.Struct("<4sII")
 _CONTROL = struct.Struct("<8I")
+CONTROL_SIZE = _CONTROL.size
+"""Bytes of a control message before its payload."""
 _I32, _U32, _STR = 0x05, 0x06, 0x09
 _MAX_TEXT = 0xFFFF
 
@@ -67,9 +69,9 @@ def encode_frame(channel: int, payload: bytes) -> bytes:
     return _HEADER.pack(_MAGIC, channel, _HEADER.size + len(payload)) + payload
 
 
-def encode_control(id: int, channel: int = 0, *args: int) -> bytes:
-    """The bytes of a control message as a whole frame."""
-    return encode_frame(CONTROL, _CONTROL.pack(id, channel, *args, *[0] * (6 - len(args))))
+def encode_control(id: int, channel: int = 0, *args: int, payload: bytes = b"") -> bytes:
+    """The bytes of a control message as a whole frame; some have a `payload` behind them."""
+    return encode_frame(CONTROL, _CONTROL.pack(id, channel, *args, *[0] * (6 - len(args))) + payload)
 
 
 def decode_control(payload: bytes) -> Control | None:

@@ -9,7 +9,7 @@ import logging
 from collections.abc import Callable
 from typing import Any, cast
 
-from anafi_mav.arsdk import controller, handshake, mux
+from anafi_mav.arsdk import controller, handshake, mux, mux_proxy
 from anafi_mav.arsdk.controller import CONTROLLER_NAME, CONTROLLER_TYPE, ControllerSession
 from anafi_mav.arsdk.device import DeviceSession, OnSession
 from anafi_mav.arsdk.handshake import ConnectRequest, DeviceInfo
@@ -35,11 +35,18 @@ class Stream:
     def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self.reader, self.writer = reader, writer
         self._decoder = mux.Decoder()
+        self.proxy: mux_proxy.Master | mux_proxy.Slave | None = None
+        """Who gets the frames of TCP connections."""
         self.write_raw(mux.encode_control(mux.HANDSHAKE, 0, 0, mux.VERSION))
 
     def write_raw(self, frame: bytes) -> None:
         if not self.writer.is_closing() and self.writer.transport.get_write_buffer_size() < MAX_WAITING:
             self.writer.write(frame)
+
+    async def drained(self) -> None:
+        """Wait until there is room for more."""
+        if not self.writer.is_closing():
+            await self.writer.drain()
 
     def write(self, channel: int, payload: bytes) -> None:
         """One frame."""
@@ -52,12 +59,20 @@ class Stream:
             return None
         frames = []
         for frame in self._decoder.feed(data):
+            if frame.channel >= mux_proxy.FIRST_CHANNEL:
+                if self.proxy is not None:
+                    self.proxy.data(frame.channel, frame.payload)
+                continue
             if frame.channel != mux.CONTROL:
                 frames.append(frame)
                 continue
             control = mux.decode_control(frame.payload)
-            if control is not None and control.id == mux.HANDSHAKE and not control.args[0]:
+            if control is None:
+                continue
+            if control.id == mux.HANDSHAKE and not control.args[0]:
                 self.write_raw(mux.encode_control(mux.HANDSHAKE, 0, 1, mux.VERSION))
+            elif self.proxy is not None:
+                self.proxy.control(control, frame.payload[mux.CONTROL_SIZE :])
         return frames
 
 
@@ -89,12 +104,22 @@ class MuxControllerSession(ControllerSession):
     ) -> None:
         self._stream = stream
         self._early = early
+        self._proxy = stream.proxy = mux_proxy.Master(stream)
         super().__init__(transport, on_message, device, (stream.reader, stream.writer))
 
     def begin(self) -> None:
         """Send and receive from now on."""
         self.connection_made(cast(asyncio.BaseTransport, _Endpoint(self._stream, self.connection_lost)))
         self._flush()
+
+    async def open_tcp(self, host: str, port: int) -> tuple[str, int]:
+        """An address on this machine that leads to a port of "drone" or "skycontroller". Raises `LinkLost`."""
+        return await self._proxy.open(host, port)
+
+    async def close(self) -> None:
+        """See `Session.close`."""
+        await super().close()
+        await self._proxy.close()
 
     async def _watch_discovery(self, reader: asyncio.StreamReader) -> None:
         frames: list[mux.Frame] | None = self._early
@@ -225,8 +250,18 @@ class MuxDeviceSession(DeviceSession):
 class MuxServer:
     """A device on the mux, one connection at a time: a new one ends the one before. As `device.DeviceServer`."""
 
-    def __init__(self, info: DeviceInfo, versions: tuple[int, int], on_session: OnSession, ping_after: float) -> None:
+    def __init__(
+        self,
+        info: DeviceInfo,
+        versions: tuple[int, int],
+        on_session: OnSession,
+        ping_after: float,
+        address: str,
+        tcp_port: Callable[[int], int],
+    ) -> None:
         self.info = info
+        self._address = address
+        self._tcp_port = tcp_port
         self.session: DeviceSession | None = None
         self._versions = versions
         self._on_session = on_session
@@ -246,10 +281,12 @@ class MuxServer:
         versions: tuple[int, int] = (1, 3),
         on_session: OnSession,
         ping_after: float = 2.0,
+        tcp_port: Callable[[int], int] = int,
     ) -> MuxServer:
-        """Listen on `address`; port 0 lets the system choose. Raises `OSError` when the port is taken."""
+        """Listen on `address`; port 0 lets the system choose. `tcp_port` says which port of that address stands for a
+        port of the drone. Raises `OSError` when the port is taken."""
         handshake.check_versions(versions)
-        self = cls(info, versions, on_session, ping_after)
+        self = cls(info, versions, on_session, ping_after, address, tcp_port)
         self._server = await asyncio.start_server(self._serve, address, port)
         return self
 
@@ -289,6 +326,7 @@ class MuxServer:
         if self._stream is not None:
             self._stream.writer.close()
         stream = self._stream = Stream(reader, writer)
+        proxy = stream.proxy = mux_proxy.Slave(stream, self._resolve, self._tcp_port)
         session: MuxDeviceSession | None = None
         try:
             while (frames := await stream.read()) is not None:
@@ -305,7 +343,11 @@ class MuxServer:
             writer.close()
             if session is not None:
                 session.end("the controller closed the connection")
+            await proxy.close()
             self._tasks.discard(task)
+
+    def _resolve(self, host: str) -> str | None:
+        return self._address if host in ("drone", "skycontroller") else None
 
     async def _hear(
         self, stream: Stream, frame: mux.Frame, session: MuxDeviceSession | None

@@ -11,6 +11,7 @@ Without a Skycontroller the state is empty, its verbs raise `NotSupported`, and 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 import math
 from collections.abc import Callable, Mapping
@@ -27,7 +28,7 @@ from anafi_mav.arsdk.messages.skyctrl import BatteryStatus, CalibrationStatus, S
 from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone.element import Element, Position, Reducer, position, with_item
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander
-from anafi_mav.errors import AnafiMavError, CommandRejected, LinkLost, LocalProtocolError, NotSupported
+from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost, LocalProtocolError, NotSupported
 
 log = logging.getLogger("anafi_mav")
 
@@ -54,6 +55,9 @@ DEFLECTION = 10
 QUIET = 0.5
 """s without a command of motion, and without a move under way, after which sticks and source go back. The setpoints of
 a user who flies come every few hundredths of a second."""
+
+GOODBYE = 0.5
+"""s to wait for the controller's answer when the connection is about to be closed."""
 
 PILOT_KEEPS = 2.0
 """s that a pilot who moved a stick keeps the drone. A user who goes on commanding without a pause does not get it
@@ -252,7 +256,7 @@ class Controller(Element[ControllerState]):
         now = self._now()
         if now < self._pilot_keeps_until:
             if isinstance(message, ardrone3.PCMD):
-                self._pilot_keeps_until = now + PILOT_KEEPS
+                self._pilot_keeps_until = max(self._pilot_keeps_until, now + PILOT_KEEPS)
                 return False
             raise CommandRejected("the pilot at the Skycontroller flies")
         self._last_motion = now
@@ -279,6 +283,19 @@ class Controller(Element[ControllerState]):
         except LinkLost:
             pass  # then the controller has done it by itself
         log.info("sticks and source of piloting are given back to the pilot")
+
+    async def release(self) -> None:
+        """`give_back` for good, before the connection is closed; waits a moment for the controller to say so."""
+        if not self.taken:
+            return
+        self._pilot_keeps_until = math.inf
+        back = self._commander.expect(
+            (skyctrl.PilotingSource,), lambda message: True if message.source == Source.SKY_CONTROLLER else None
+        )
+        self.give_back()
+        back.expire_after(GOODBYE, CommandTimeout(skyctrl.SetPilotingSource.NAME, GOODBYE))
+        with contextlib.suppress(CommandTimeout, LinkLost):
+            await back.wait()
 
     def reactions(self) -> Mapping[type[Message], Callable[[Any, float], None]]:
         """Events to be shown to this element beyond its reducers."""

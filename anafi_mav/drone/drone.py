@@ -65,6 +65,9 @@ REBOOT_TIMEOUT = 15.0
 DETAILS_TIMEOUT = 3.0
 """s to wait for what may never come; as Olympe (arsdkng/drone: optional, at most 3 s)."""
 
+CONTROLLER_PORTS = 100
+"""A Skycontroller 3 has the TCP ports of its drone this much higher (Olympe, libarsdkctrl arsdk_device.c)."""
+
 CONTROLLER_TIMEOUT = 5.0
 """s that a Skycontroller may take to find its drone; then it is asked anew, so that its own state is fresh."""
 
@@ -98,6 +101,7 @@ class Drone:
         self._clock = clock or SystemClock()
 
         self._commander = Commander()
+        self._http_port = http_port
         self._rest = Rest(address, http_port, local_address, interface)
         self.alerts = Alerts()
         self.battery = Battery()
@@ -181,6 +185,7 @@ class Drone:
             )
             self._begin(session)
             try:
+                await self._find_web_server(session)
                 await self._read_states()
                 if self._model.protobuf:
                     await self._ask([*self.camera.questions(), *self.storage.questions()])
@@ -209,6 +214,19 @@ class Drone:
         self._counters = session.counters
         self._commander.attach(session)
         session.lost.add_done_callback(partial(self._on_lost, session))
+
+    async def _find_web_server(self, session: ControllerSession) -> None:
+        """The drone's own, a hundred ports up at a Skycontroller 3, or behind the mux of a Skycontroller 4."""
+        if isinstance(session, mux_link.MuxControllerSession):
+            try:
+                address, port = await session.open_tcp("drone", self._http_port)
+            except LinkLost as error:
+                log.warning("%s: no web server: %s", self.name, error)
+            else:
+                await self._rest.aim(address, port, local=True)
+        else:
+            shift = CONTROLLER_PORTS if self.controller.present else 0
+            await self._rest.aim(self.address, self._http_port + shift)
 
     async def _read_states(self) -> None:
         """What Parrot's own SDK does first (olympe arsdkng/drone): set the clock, ask for all states and settings; of
@@ -311,13 +329,15 @@ class Drone:
 
     async def close(self) -> None:
         """End the connection. What was sent just before still leaves. Idempotent."""
-        await self._rest.close()
         session = self._session
         if session is not None:
-            self.controller.give_back()
-            await asyncio.sleep(0)  # a session sends at the end of a turn of the loop
-            await session.close()
-            self._on_lost(session, session.lost)
+            try:
+                await self.controller.release()
+            finally:
+                await asyncio.sleep(0)  # a session sends at the end of a turn of the loop
+                await session.close()
+                self._on_lost(session, session.lost)
+        await self._rest.close()
 
     @property
     def connected(self) -> bool:

@@ -42,11 +42,17 @@ class Rest:
         self.port = port
         self._local_address = local_address
         self._interface = interface
+        self._local = False
         self._client: aiohttp.ClientSession | None = None
 
     @property
     def base(self) -> str:
         return f"http://{self.address}:{self.port}"
+
+    async def aim(self, address: str, port: int, *, local: bool = False) -> None:
+        """Ask there from now on. `local`: on this machine, where no interface has to be named."""
+        await self.close()
+        self.address, self.port, self._local = address, port, local
 
     async def close(self) -> None:
         """End everything that is open. Idempotent."""
@@ -106,9 +112,9 @@ class Rest:
     def _session(self) -> aiohttp.ClientSession:
         if self._client is None or self._client.closed:
             options: dict[str, Any] = {"limit_per_host": 4}
-            if self._local_address is not None:
+            if self._local_address is not None and not self._local:
                 options["local_addr"] = (self._local_address, 0)
-            if self._interface is not None:
+            if self._interface is not None and not self._local:
                 options["socket_factory"] = self._make_socket
             timeout = aiohttp.ClientTimeout(total=None, sock_connect=ANSWER_TIMEOUT, sock_read=ANSWER_TIMEOUT)
             self._client = aiohttp.ClientSession(connector=aiohttp.TCPConnector(**options), timeout=timeout)

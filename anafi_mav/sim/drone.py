@@ -217,7 +217,11 @@ class SimulatedDrone:
             self.firmware.link_up()
         if spec.skycontroller == 4:
             self._server = await MuxServer.start(
-                spec.address, info=self._info, versions=spec.versions, on_session=self._on_session
+                spec.address,
+                info=self._info,
+                versions=spec.versions,
+                on_session=self._on_session,
+                tcp_port=self._tcp_port,
             )
         else:
             self._server = await DeviceServer.start(
@@ -242,6 +246,10 @@ class SimulatedDrone:
             self.http_problem = f"no HTTP on port {port}: {os.strerror(error.errno or 0)}"
         else:
             self._web = web
+
+    def _tcp_port(self, port: int) -> int:
+        """Where a port of the drone is at the address of the Skycontroller."""
+        return (self.http_port or port) if port == self.spec.http_port else port
 
     def _make_web(self) -> WebServer:
         firmware, model = self.firmware, self.firmware.model

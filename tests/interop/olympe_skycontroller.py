@@ -9,6 +9,8 @@ from __future__ import annotations
 import json
 import os
 import sys
+import time
+import urllib.request
 
 OUT = os.fdopen(os.dup(1), "w")
 os.dup2(2, 1)  # Olympe logs to stdout
@@ -45,12 +47,24 @@ def main() -> None:
         "serial": skyctrl.SettingsState.ProductSerialChanged,
         "version": skyctrl.SettingsState.ProductVersionChanged,
         "drone name": SettingsState.ProductNameChanged,
+        "serial of the drone": SettingsState.ProductSerialHighChanged,
+        "serial of the drone low": SettingsState.ProductSerialLowChanged,
         "drone battery": CommonState.BatteryStateChanged,
     }.items():
         try:
             known[name] = state(message)
         except Exception as error:
             known[name] = repr(error)
+
+    # The drone's web server, by whatever way Olympe has to it.
+    deadline = time.monotonic() + 8.0
+    while controller.http_proxy is None and time.monotonic() < deadline:
+        time.sleep(0.05)
+    proxy = controller.http_proxy
+    if proxy is not None:
+        with urllib.request.urlopen(f"http://{proxy.address}:{proxy.port}/api/v1/info/properties", timeout=5) as answer:
+            known["web"] = json.load(answer)
+    steps["web"] = proxy is not None
 
     hovering = PilotingState.FlyingStateChanged(state="hovering", _policy="wait", _timeout=15)
     expect("take off", Piloting.TakeOff() >> hovering)

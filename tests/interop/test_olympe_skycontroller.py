@@ -18,6 +18,7 @@ SCRIPT = Path(__file__).with_name("olympe_skycontroller.py")
 
 HARMLESS = {
     r"ulog - pomp - timer \S+: missed \d+ events": "the machine is busy, so Olympe's stick timer came late",
+    r"ulog - mux - mux_channel_ip_disconnected err=2": "the web server closed what Olympe has just closed itself",
 }
 """Lines at WARNING and above that Olympe writes without the simulator's fault."""
 
@@ -64,6 +65,8 @@ async def test_olympe_flies_through_the_skycontroller(
     assert known["battery"] == {"percent": "87"}
     assert known["version"]["software"] == "1.8.2"
     assert known["drone name"]["name"].startswith("ANAFI")
+
+    assert known["web"]["serial"] == known["serial of the drone"]["high"] + known["serial of the drone low"]["low"]
 
     # The drone was not told what was the controller's business, and flew what it was told.
     commands = [entry for entry in log if entry["kind"] == "command"]

@@ -190,6 +190,10 @@ async def test_garbage_at_the_port_ends_nothing() -> None:
             _, writer = await asyncio.open_connection("127.0.0.1", server.discovery_port)
             for channel in (0, 1, 2, 3, 9):
                 writer.write(encode_frame(channel, rng.randbytes(rng.randrange(60))))
+            for _ in range(10):
+                words = [rng.choice([0, 1, 1024, rng.getrandbits(32)]) for _ in range(7)]
+                writer.write(mux.encode_control(rng.randrange(20), *words, payload=rng.randbytes(rng.randrange(9))))
+            writer.write(encode_frame(1024, b"x") + encode_frame(0x80000400, b"y"))
             texts = [("%s", rng.choice(["", "{", "[]", '{"proto_v_min": "x"}', "[" * 3000])) for _ in range(4)]
             writer.write(encode_frame(mux.BACKEND, encode_pomp(mux.CONN_REQ, texts)))
             await writer.drain()
