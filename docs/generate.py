@@ -12,6 +12,8 @@ import msgspec
 from anafi_mav.config import schema
 
 HERE = Path(__file__).parent
+TESTS = HERE.parent / "tests" / "unit"
+sys.path.insert(0, str(TESTS))
 
 CONFIGURATION = """\
 # Configuration
@@ -99,7 +101,44 @@ def configuration() -> str:
     return "".join(parts) + ENDPOINTS
 
 
-PAGES: dict[str, Callable[[], str]] = {"configuration.md": configuration}
+SEED = """\
+# The rows of the anafi_ros paper
+
+<!-- Made by docs/generate.py from tests/unit/seed_rows.py. -->
+
+The appendix of the paper lists what a program can do with an ANAFI: 5 topics to command it, 29 topics to read, 24
+services and 25 parameters. Each row is here with what reads or drives it in `anafi_mav.drone.Drone`, and with what
+`tests/unit/test_drone_seed_rows.py` shows on each model of the simulator, over its real sockets:
+
+* **yes**: the row is read or driven, and the drone confirms it;
+* **no**: this model does not have it, and the verb raises `NotSupported`;
+* **–**: not reachable through `Drone` yet, for the reason given.
+"""
+
+
+def seed() -> str:
+    """docs/seed.md."""
+    from seed_rows import MODELS, ROWS, Row
+
+    def shown(row: Row, model: str) -> str:
+        if row.drive is None:
+            return "–"
+        return "yes" if model in row.models else "no"
+
+    parts = [SEED]
+    for kind in dict.fromkeys(row.kind for row in ROWS):
+        rows = [row for row in ROWS if row.kind == kind]
+        columns = " | ".join(MODELS)
+        parts.append(f"\n## {kind.capitalize()}s ({len(rows)})\n\n| row | in `Drone` | {columns} | test |\n")
+        parts.append("|---|---|" + "---|" * (len(MODELS) + 1) + "\n")
+        for row in rows:
+            cells = " | ".join(shown(row, model) for model in MODELS)
+            test = "–" if row.drive is None else f"`test_a_row[{row.name}-…]`"
+            parts.append(f"| `{row.name}` | {row.how} | {cells} | {test} |\n")
+    return "".join(parts)
+
+
+PAGES: dict[str, Callable[[], str]] = {"configuration.md": configuration, "seed.md": seed}
 
 
 def main(arguments: list[str]) -> int:
