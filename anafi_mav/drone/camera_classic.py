@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -180,7 +181,8 @@ def _recording_mode(state: CamerasState, m: wire.RecordingMode) -> CamerasState:
 
 
 def _zoom_speed(state: CamerasState, m: wire.MaxZoomSpeed) -> CamerasState:
-    return changed(state, m.cam_id, zoom_speed=finite(m.current), zoom_speed_bounds=(m.min, m.max))
+    bounds = (m.min, m.max) if math.isfinite(m.min + m.max) else None
+    return changed(state, m.cam_id, zoom_speed=finite(m.current), zoom_speed_bounds=bounds)
 
 
 def _photo_progress(state: CamerasState, m: wire.PhotoProgress) -> CamerasState:
@@ -207,15 +209,13 @@ def _recording_state(state: CamerasState, m: wire.RecordingState) -> CamerasStat
 
 
 def _alignment(state: CamerasState, m: wire.AlignmentOffsets) -> CamerasState:
-    return changed(
-        state,
-        m.cam_id,
-        alignment={
-            "yaw": Range(m.current_yaw, m.min_bound_yaw, m.max_bound_yaw),
-            "pitch": Range(m.current_pitch, m.min_bound_pitch, m.max_bound_pitch),
-            "roll": Range(m.current_roll, m.min_bound_roll, m.max_bound_roll),
-        },
-    )
+    offsets = {
+        "yaw": (m.current_yaw, m.min_bound_yaw, m.max_bound_yaw),
+        "pitch": (m.current_pitch, m.min_bound_pitch, m.max_bound_pitch),
+        "roll": (m.current_roll, m.min_bound_roll, m.max_bound_roll),
+    }
+    known = {axis: Range(*numbers) for axis, numbers in offsets.items() if math.isfinite(sum(numbers))}
+    return changed(state, m.cam_id, alignment=known)
 
 
 REDUCERS: Mapping[type[Message], Reducer] = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import ClassVar
 
@@ -50,8 +51,9 @@ def _mode_info(state: FollowMeState, m: follow_me.ModeInfo) -> FollowMeState:
 
 def _trajectory(state: FollowMeState, m: follow_me.TargetTrajectory) -> FollowMeState:
     place = position(m.latitude, m.longitude, m.altitude)
-    known = None if place is None else Trajectory(place, m.north_speed, m.east_speed, m.down_speed)
-    return replace(state, target=known)
+    if place is None or not math.isfinite(m.north_speed + m.east_speed + m.down_speed):
+        return replace(state, target=None)
+    return replace(state, target=Trajectory(place, m.north_speed, m.east_speed, m.down_speed))
 
 
 class FollowMe(Commanding[FollowMeState]):

@@ -23,7 +23,7 @@ from anafi_mav.arsdk.messages.thermal import (
 )
 from anafi_mav.arsdk.messages.thermal import Range as Sensitivity
 from anafi_mav.arsdk.wire import Message
-from anafi_mav.drone.element import EMPTY, FIRST, LAST, Reducer, members
+from anafi_mav.drone.element import EMPTY, FIRST, LAST, Reducer, finite, members
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT
 from anafi_mav.drone.settings import Commanding, number
 from anafi_mav.errors import LocalProtocolError
@@ -97,11 +97,11 @@ class Thermal(Commanding[ThermalState]):
     REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = {
         thermal.Mode: lambda state, m: replace(state, mode=m.mode),
         thermal.Capabilities: lambda state, m: replace(state, modes=members(m.modes, ThermalMode)),
-        thermal.Rendering: lambda state, m: replace(state, rendering=m.mode, blending=m.blending_rate),
+        thermal.Rendering: lambda state, m: replace(state, rendering=m.mode, blending=finite(m.blending_rate)),
         thermal.PaletteSettings: lambda state, m: replace(state, palette=_palette(m)),
         thermal.PalettePart: _colour,
-        thermal.Emissivity: lambda state, m: replace(state, emissivity=m.emissivity),
-        thermal.BackgroundTemperature: lambda state, m: replace(state, background_k=m.background_temperature),
+        thermal.Emissivity: lambda state, m: replace(state, emissivity=finite(m.emissivity)),
+        thermal.BackgroundTemperature: lambda state, m: replace(state, background_k=finite(m.background_temperature)),
         thermal.Sensitivity: lambda state, m: replace(state, sensitivity=m.current_range),
         thermal.ShutterMode: lambda state, m: replace(state, shutter=m.current_trigger),
     }
