@@ -16,18 +16,43 @@ from anafi_mav.arsdk.messages.ardrone3 import GpsLocationChanged as GpsLocationC
 from anafi_mav.arsdk.messages.ardrone3 import HomeChanged as HomeChanged
 from anafi_mav.arsdk.messages.ardrone3 import MoveToChanged as MoveToChanged
 from anafi_mav.arsdk.messages.ardrone3 import NumberOfSatelliteChanged as NumberOfSatelliteChanged
+from anafi_mav.arsdk.messages.ardrone3 import PilotedPOIV2 as PilotedPOIV2
+from anafi_mav.arsdk.messages.ardrone3 import PoiMode as PoiMode
+from anafi_mav.arsdk.messages.ardrone3 import PoiStatus as PoiStatus
 from anafi_mav.arsdk.messages.ardrone3 import SpeedChanged as SpeedChanged
 from anafi_mav.arsdk.messages.battery import Alert as BatteryAlertChanged
 from anafi_mav.arsdk.messages.battery import AlertLevel as AlertLevel
+from anafi_mav.arsdk.messages.common import CalibrationAxis as CalibrationAxis
 from anafi_mav.arsdk.messages.common import FlightId as FlightId
+from anafi_mav.arsdk.messages.common import FlightPlanComponent as FlightPlanComponent
 from anafi_mav.arsdk.messages.common import MagnetoCalibrationRequiredState as MagnetoCalibrationRequiredState
 from anafi_mav.arsdk.messages.common import MavlinkFilePlayingStateChanged as MavlinkFilePlayingStateChanged
+from anafi_mav.arsdk.messages.common import MavlinkType as MavlinkType
+from anafi_mav.arsdk.messages.common import MissionItemExecuted as MissionItemExecuted
+from anafi_mav.arsdk.messages.common import PlayError as PlayError
 from anafi_mav.arsdk.messages.common import PlayingState as PlayingState
 from anafi_mav.arsdk.messages.common import Sensor as Sensor
 from anafi_mav.arsdk.messages.common import SensorsStatesListChanged as SensorsStatesListChanged
+from anafi_mav.arsdk.messages.follow_me import Mode as FollowMeMode
+from anafi_mav.arsdk.messages.gimbal import Attitude as GimbalAttitudeChanged
+from anafi_mav.arsdk.messages.gimbal import Axis as Axis
+from anafi_mav.arsdk.messages.gimbal import FrameOfReference as FrameOfReference
+from anafi_mav.arsdk.messages.gimbal import GimbalCalibrationState as GimbalCalibrationState
+from anafi_mav.arsdk.messages.mediastore import MediastoreState as MediastoreState
+from anafi_mav.arsdk.messages.piloting_style import PilotingStyleStyle as PilotingStyleStyle
+from anafi_mav.arsdk.messages.precise_home import PreciseHomeState as PreciseHomeState
 from anafi_mav.arsdk.messages.rth import RthEndingBehavior as RthEndingBehavior
+from anafi_mav.arsdk.messages.rth import RthHomeType as RthHomeType
 from anafi_mav.arsdk.messages.rth import State as ReturnStateChanged
 from anafi_mav.arsdk.messages.rth import TakeoffLocation as TakeoffLocation
+from anafi_mav.arsdk.messages.thermal import PaletteMode as PaletteMode
+from anafi_mav.arsdk.messages.thermal import Range as ThermalSensitivity
+from anafi_mav.arsdk.messages.thermal import RenderingMode as RenderingMode
+from anafi_mav.arsdk.messages.thermal import ShutterTrigger as ShutterTrigger
+from anafi_mav.arsdk.messages.thermal import ThermalMode as ThermalMode
+from anafi_mav.arsdk.messages.user_storage import FormattingType as FormattingType
+from anafi_mav.arsdk.messages.user_storage import FsState as FsState
+from anafi_mav.arsdk.messages.user_storage import PhyState as PhyState
 from anafi_mav.arsdk.wire import Message as Message
 
 __all__ = [
@@ -35,25 +60,50 @@ __all__ = [
     "AltitudeAboveGroundChanged",
     "AltitudeChanged",
     "AttitudeChanged",
+    "Axis",
     "BatteryAlertChanged",
+    "CalibrationAxis",
     "FlightId",
+    "FlightPlanComponent",
     "FlyingState",
     "FlyingStateChanged",
+    "FollowMeMode",
     "ForcedLandingAutoTrigger",
     "ForcedLandingReason",
+    "FormattingType",
+    "FrameOfReference",
+    "FsState",
     "GPSFixStateChanged",
+    "GimbalAttitudeChanged",
+    "GimbalCalibrationState",
     "GpsLocationChanged",
     "HomeChanged",
     "MagnetoCalibrationRequiredState",
     "MavlinkFilePlayingStateChanged",
+    "MavlinkType",
+    "MediastoreState",
     "Message",
+    "MissionItemExecuted",
     "MoveToChanged",
     "NumberOfSatelliteChanged",
+    "PaletteMode",
+    "PhyState",
+    "PilotedPOIV2",
+    "PilotingStyleStyle",
+    "PlayError",
     "PlayingState",
+    "PoiMode",
+    "PoiStatus",
+    "PreciseHomeState",
+    "RenderingMode",
     "ReturnStateChanged",
     "RthEndingBehavior",
+    "RthHomeType",
     "Sensor",
     "SensorsStatesListChanged",
+    "ShutterTrigger",
     "SpeedChanged",
     "TakeoffLocation",
+    "ThermalMode",
+    "ThermalSensitivity",
 ]
