@@ -209,4 +209,5 @@ def _entry(drone: DroneConfig, sim: SimConfig, address: str, http_port: int) -> 
         "http_port": http_port,
         "versions": (1, sim.protocol),
         "telemetry_rate": sim.telemetry_rate,
+        "skycontroller": sim.skycontroller,
     }

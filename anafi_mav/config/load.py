@@ -243,6 +243,8 @@ def _of_one_drone(key_path: str, drone: DroneConfig) -> Iterator[tuple[str, str]
         yield key_path, f"expected either address or sim, got {got}"
     if drone.address is not None and not _is_host(drone.address):
         yield f"{key_path}.address", _wrong(DroneConfig, "address", drone.address)
+    if drone.sim is not None and drone.sim.model == "ai" and drone.sim.skycontroller == 3:
+        yield f"{key_path}.sim.skycontroller", "expected 4: a Skycontroller 3 cannot fly an ai"
     if drone.sim is not None and drone.interface is not None:
         yield f"{key_path}.interface", "expected none for a simulated drone, which lives on this machine"
     if drone.sim is not None and drone.sim.address is not None and not _is_ipv4(drone.sim.address):

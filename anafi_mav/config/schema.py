@@ -91,6 +91,14 @@ class SimConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
             extra=expected("1, 2 or 3"),
         ),
     ] = 3
+    skycontroller: Annotated[
+        Literal[3, 4] | None,
+        Meta(
+            description="Put a simulated Skycontroller of this generation in front of it, whose address it then is. "
+            "Left out: the drone is reached directly.",
+            extra=expected("3 or 4"),
+        ),
+    ] = None
     http_port: Annotated[
         Port | None,
         Meta(

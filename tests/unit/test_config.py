@@ -188,6 +188,8 @@ MISTAKES = {
     two("name: a, sysid: 1, address: h, interface: w", "name: b, sysid: 2, address: h, interface: w"): "drones[1].address: expected an address and discovery_port of its own, 'h:44445 on w' is already at drones[0].address",
     "drones: [{name: a, sysid: 1, address: h, interface: 'wlan 1'}]": "drones[0].interface: expected the name of a network interface, like wlan1, got 'wlan 1'",
     "drones: [{name: a, sysid: 1, address: h, interface: longer_than_linux}]": "drones[0].interface: expected the name of a network interface, like wlan1, got 'longer_than_linux'",
+    "drones: [{name: a, sysid: 1, sim: {skycontroller: 2}}]": "drones[0].sim.skycontroller: expected 3 or 4, got 2",
+    "drones: [{name: a, sysid: 1, sim: {model: ai, skycontroller: 3}}]": "drones[0].sim.skycontroller: expected 4: a Skycontroller 3 cannot fly an ai",
     "drones: [{name: a, sysid: 1, sim: {}, interface: wlan1}]": "drones[0].interface: expected none for a simulated drone, which lives on this machine",
     two("name: a, sysid: 1, address: 127.0.42.1", "name: b, sysid: 2, sim: {address: 127.0.42.1}"): "drones[1].sim.address: expected an address and discovery_port of its own, '127.0.42.1:44445' is already at drones[0].address",
     two("name: a, sysid: 1, sim: {address: 127.0.42.1}", "name: b, sysid: 2, discovery_port: 5, sim: {address: 127.0.42.1}"): "drones[1].sim.address: expected an address of its own, '127.0.42.1' is already at drones[0].sim.address",
