@@ -112,7 +112,7 @@ services and 25 parameters. Each row is here with what reads or drives it in `an
 
 * **yes**: the row is read or driven, and the drone confirms it;
 * **no**: this model does not have it, and the verb raises `NotSupported`;
-* **–**: not reachable through `Drone` yet, for the reason given.
+* **–**: not shown there, for the reason given.
 """
 
 
