@@ -2,7 +2,8 @@
 
     .venv/bin/python tests/bench/fuzz.py [FRAMES]
 
-Prints what became of them and how much memory was kept of them, by tracemalloc.
+Prints what became of them and how much memory was kept of them, by tracemalloc. On two cores of a Xeon at 2.5 GHz a
+million took 91 s (tracemalloc included); at most 81 KiB were kept, begun split commands of version 3.
 """
 
 from __future__ import annotations
