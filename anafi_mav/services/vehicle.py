@@ -431,6 +431,8 @@ class Vehicle:
             raise Refused("Offboard refused: take off first, setpoints do not lift an ANAFI off the ground")
         if self.returning:
             raise Refused("Offboard refused: the drone returns home")
+        if self.drone.controller.pilot_flies:
+            raise Refused("Offboard refused: the pilot at the Skycontroller flies")
         if self.drone.piloting.limits is None:
             raise Refused("Offboard refused: the drone has not reported what full tilt and speed are")
         if self.offboard.candidate(client, self._clock.monotonic()) is None:
@@ -451,6 +453,11 @@ class Vehicle:
         now = self._clock.monotonic()
         setpoint, limits = self.offboard.setpoint, self.drone.piloting.limits
         if setpoint is None or limits is None:
+            return
+        if self.drone.controller.pilot_flies:
+            # He moved a stick. That he let go of it again does not give the drone back to the program.
+            self._select(FlightMode.HOLD)
+            self._text(Severity.WARNING, "Offboard ended: the pilot at the Skycontroller flies")
             return
         attitude = self.drone.piloting.state.attitude
         turn = setpoint.yaw_rate

@@ -27,6 +27,9 @@ ARM, TAKEOFF_CMD, LAND_CMD, RTL, GOTO, SET_MODE = 400, 22, 21, 20, 192, 176
 PX4_HOLD = (1, 4, 3)
 PX4_OFFBOARD = (1, 6, 0)
 
+PITCH_STICK = 3
+"""Its axis at the Skycontroller (mapper.xml)."""
+
 FORWARD = -0.17
 """rad of pitch: more than the 10 degrees that are full tilt."""
 
@@ -458,6 +461,23 @@ async def test_many_setpoints_are_not_as_many_datagrams() -> None:
                 attitude(w.client)
                 await asyncio.sleep(0.002)
         assert len(pitches(w, flown)) < 90  # at most one in 20 ms, in a little more than 0.8 s
+
+
+async def test_a_pilots_stick_ends_offboard_for_good() -> None:
+    async with world(speed=1.0, skycontroller=3) as w:
+        await w.take_off()
+        pilot = w.drone.skycontroller
+        assert pilot is not None
+        async with streaming(w.client, pitch=FORWARD):
+            await engage(w.client)
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 0.5)
+            pilot.stick(PITCH_STICK, -50)
+            await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD)
+            pilot.stick(PITCH_STICK, 0)
+            flown = len(pitches(w))
+            await asyncio.sleep(3.0)  # longer than he keeps the drone after his last touch
+            assert set(pitches(w, flown)) <= {0}
+        assert any("pilot at the Skycontroller" in m.text for _, m in w.client.since(0, "STATUSTEXT"))
 
 
 # What the drone does by itself.

@@ -75,11 +75,23 @@ class World:
 
 @asynccontextmanager
 async def world(
-    *, speed: float = 3.0, telemetry_rate: float = 5.0, allow_kill: bool = False, sysid: int = 1, clients: int = 1
+    *,
+    speed: float = 3.0,
+    telemetry_rate: float = 5.0,
+    allow_kill: bool = False,
+    sysid: int = 1,
+    clients: int = 1,
+    skycontroller: int | None = None,
 ) -> AsyncIterator[World]:
     """One simulated drone, one gateway with a TCP endpoint, and its clients, connected and ready."""
     drone_address, address = loopback(), loopback()
-    spec = DroneSpec(address=drone_address, home=HOME, http_port=None, telemetry_rate=telemetry_rate)
+    spec = DroneSpec(
+        address=drone_address,
+        home=HOME,
+        http_port=None,
+        telemetry_rate=telemetry_rate,
+        skycontroller=skycontroller,
+    )
     config = Config(
         endpoints=(f"tcpin://{address}:5760",),
         drones=(DroneConfig(name="alpha", sysid=sysid, address=drone_address),),
