@@ -15,16 +15,10 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
-import yaml
 
+from anafi_mav import documents
 from anafi_mav.config.schema import MAVSDK_SYSID, Config, DroneConfig, SimConfig
 from anafi_mav.errors import ConfigError
-
-MAX_FILE_BYTES = 1 << 20
-"""A fleet of 250 drones with every key written out is a tenth of this."""
-
-MAX_LINE = 300
-"""Characters of a YAML parser's sentence that are passed on."""
 
 _HOST_NAME = re.compile(r"(?!-)[A-Za-z0-9-]{1,63}(?<!-)(\.(?!-)[A-Za-z0-9-]{1,63}(?<!-))*\.?")
 """RFC 1123 §2.1, without the limit on the whole length: the schema has a smaller one."""
@@ -32,30 +26,15 @@ _HOST_NAME = re.compile(r"(?!-)[A-Za-z0-9-]{1,63}(?<!-)(\.(?!-)[A-Za-z0-9-]{1,63
 
 def load(path: Path) -> Config:
     """The configuration in the file at `path`. Raises `ConfigError`."""
-    try:
-        with path.open("rb") as file:
-            content = file.read(MAX_FILE_BYTES + 1)
-    except OSError as error:
-        raise ConfigError("", f"cannot read {path}: {error.strerror or error}") from error
-    if len(content) > MAX_FILE_BYTES:
-        raise ConfigError("", f"{path}: expected a file of at most {MAX_FILE_BYTES} bytes")
-    return from_text(content, str(path))
+    return _from_document(documents.read(path))
 
 
 def from_text(text: str | bytes, source: str) -> Config:
     """The configuration in YAML `text`; `source` names it in messages. Raises `ConfigError`."""
-    try:
-        document = yaml.load(text, _Loader)
-    except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
-        where = f"{source}, line {mark.line + 1}, column {mark.column + 1}" if mark else source
-        raise ConfigError("", f"{where}: {_one_line(error.problem or error.context or 'not YAML')}") from error
-    except yaml.YAMLError as error:  # characters that YAML does not have: no line, but an offset
-        raise ConfigError("", f"{source}: {_one_line(str(error))}") from error
-    except RecursionError as error:
-        raise ConfigError("", f"{source}: lists or mappings inside each other without end") from error
-    except ValueError as error:  # a date like 2026-02-31
-        raise ConfigError("", f"{source}: {_one_line(str(error))}") from error
+    return _from_document(documents.parse(text, source))
+
+
+def _from_document(document: object) -> Config:
     return from_mapping({} if document is None else document)
 
 
@@ -80,26 +59,6 @@ def remarks(config: Config) -> list[str]:
     ]
 
 
-class _Loader(yaml.SafeLoader):
-    """SafeLoader that refuses a key written twice: YAML forbids it, PyYAML keeps the last one silently."""
-
-    def compose_mapping_node(self, anchor: Any) -> yaml.MappingNode:
-        node = super().compose_mapping_node(anchor)
-        seen: set[str] = set()
-        for key, _ in node.value:
-            if isinstance(key, yaml.ScalarNode):
-                if key.value in seen:
-                    raise yaml.composer.ComposerError(
-                        None, None, f"the key {_shown(key.value)} stands twice in one mapping", key.start_mark
-                    )
-                seen.add(key.value)
-        return node
-
-
-def _one_line(text: str) -> str:
-    return " ".join(text.split())[:MAX_LINE]
-
-
 _short = reprlib.Repr()
 _short.maxstring = _short.maxother = _short.maxlong = 60
 _short.maxdict = _short.maxlist = _short.maxlevel = 3
@@ -113,7 +72,7 @@ def _shown(value: object) -> str:
         case bool():
             return "true" if value else "false"
         case _:
-            return _one_line(_short.repr(value))
+            return documents.one_line(_short.repr(value))
 
 
 def _key_path(steps: list[str | int]) -> str:

@@ -22,9 +22,9 @@ from pathlib import Path
 from typing import Annotated, Any, Protocol
 
 import msgspec
-import yaml
 from msgspec import UNSET, Meta, UnsetType
 
+from anafi_mav import documents
 from anafi_mav.arsdk.messages.alarms import TakeoffChecklistType
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState, MotorError, WarningLevel
 from anafi_mav.errors import ConfigError
@@ -32,9 +32,6 @@ from anafi_mav.sim.faults import Faults, Impairment
 from anafi_mav.sim.motion import Pose
 from anafi_mav.sim.power import Battery
 from anafi_mav.sim.wind import GUSTS, Wind, WindSpec
-
-MAX_FILE_BYTES = 1 << 20
-"""A thousand steps are a tenth of it."""
 
 MAX_STEPS = 1000
 """Steps are looked at every turn of the world."""
@@ -287,33 +284,18 @@ def _one_of(path: str, value: str | None, known: Collection[str]) -> None:
 
 def load(path: Path) -> Scenario:
     """The scenario in a file. Raises `ConfigError`."""
-    try:
-        with path.open("rb") as file:
-            content = file.read(MAX_FILE_BYTES + 1)
-    except OSError as error:
-        raise ConfigError("", f"cannot read {path}: {error.strerror or error}") from error
-    if len(content) > MAX_FILE_BYTES:
-        raise ConfigError("", f"{path}: expected a file of at most {MAX_FILE_BYTES} bytes")
-    return from_text(content, str(path))
+    return _from_document(documents.read(path), str(path))
 
 
 def from_text(text: str | bytes, source: str) -> Scenario:
     """The scenario in YAML `text`; `source` names it in messages. Raises `ConfigError`."""
-    try:
-        document = yaml.safe_load(text)
-    except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
-        where = f"{source}, line {mark.line + 1}, column {mark.column + 1}" if mark else source
-        raise ConfigError("", f"{where}: {_one_line(error.problem or error.context or 'not YAML')}") from error
-    except (yaml.YAMLError, ValueError, RecursionError) as error:  # no YAML characters, no date, lists without end
-        raise ConfigError("", f"{source}: {_one_line(str(error))}") from error
+    return _from_document(documents.parse(text, source), source)
+
+
+def _from_document(document: object, source: str) -> Scenario:
     try:
         return Scenario(msgspec.convert(document, _File).steps)
     except msgspec.ValidationError as error:
         problem, _, place = str(error).partition(" - at `$")
         place = re.sub(r"^\.|`$", "", place)
-        raise ConfigError(place or source, _one_line(problem[:1].lower() + problem[1:])) from error
-
-
-def _one_line(text: str) -> str:
-    return " ".join(text.split())[:300]
+        raise ConfigError(place or source, documents.one_line(problem[:1].lower() + problem[1:])) from error

@@ -1,0 +1,70 @@
+"""A YAML file that somebody wrote by hand: read with care, and what is wrong with it told in one line."""
+
+from __future__ import annotations
+
+import reprlib
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from anafi_mav.errors import ConfigError
+
+MAX_FILE_BYTES = 1 << 20
+"""A fleet of 250 drones with every key written out is a tenth of this, and so is a scenario of a thousand steps."""
+
+MAX_LINE = 300
+"""Characters of a parser's sentence that are passed on."""
+
+
+def read(path: Path) -> object:
+    """The document in the file at `path`, as plain values. Raises `ConfigError`."""
+    try:
+        with path.open("rb") as file:
+            content = file.read(MAX_FILE_BYTES + 1)
+    except OSError as error:
+        raise ConfigError("", f"cannot read {path}: {error.strerror or error}") from error
+    if len(content) > MAX_FILE_BYTES:
+        raise ConfigError("", f"{path}: expected a file of at most {MAX_FILE_BYTES} bytes")
+    return parse(content, str(path))
+
+
+def parse(text: str | bytes, source: str) -> object:
+    """The document in YAML `text`; `source` names it in messages. Raises `ConfigError`."""
+    try:
+        return yaml.load(text, _Loader)
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        where = f"{source}, line {mark.line + 1}, column {mark.column + 1}" if mark else source
+        raise ConfigError("", f"{where}: {one_line(error.problem or error.context or 'not YAML')}") from error
+    except yaml.YAMLError as error:  # characters that YAML does not have: no line, but an offset
+        raise ConfigError("", f"{source}: {one_line(str(error))}") from error
+    except RecursionError as error:
+        raise ConfigError("", f"{source}: lists or mappings inside each other without end") from error
+    except ValueError as error:  # a date like 2026-02-31
+        raise ConfigError("", f"{source}: {one_line(str(error))}") from error
+
+
+def one_line(text: str) -> str:
+    """`text` without line breaks, and not too much of it."""
+    return " ".join(text.split())[:MAX_LINE]
+
+
+class _Loader(yaml.SafeLoader):
+    """SafeLoader that refuses a key written twice: YAML forbids it, PyYAML keeps the last one silently."""
+
+    def compose_mapping_node(self, anchor: Any) -> yaml.MappingNode:
+        node = super().compose_mapping_node(anchor)
+        seen: set[str] = set()
+        for key, _ in node.value:
+            if isinstance(key, yaml.ScalarNode):
+                if key.value in seen:
+                    raise yaml.composer.ComposerError(
+                        None, None, f"the key {_short.repr(key.value)} stands twice in one mapping", key.start_mark
+                    )
+                seen.add(key.value)
+        return node
+
+
+_short = reprlib.Repr()
+_short.maxstring = 60
