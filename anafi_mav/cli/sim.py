@@ -14,7 +14,8 @@ from pathlib import Path
 
 import msgspec
 
-from anafi_mav.cli import sim_validate
+from anafi_mav.cli import options, sim_validate
+from anafi_mav.cli.options import integer, number
 from anafi_mav.cli.terminal import say
 from anafi_mav.errors import ConfigError
 from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator, scenario
@@ -39,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--count", default="1", metavar="N", help="drones, on consecutive addresses (%(default)s)")
     parser.add_argument(
         "--home",
-        default=",".join(f"{number:g}" for number in default.home),
+        default=",".join(f"{part:g}" for part in default.home),
         metavar="LAT,LON,ALT",
         help="where they stand: degrees, degrees, metres above sea level (%(default)s)",
     )
@@ -96,30 +97,28 @@ class Fleet(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def _from_options(arguments: argparse.Namespace) -> Fleet:
-    count = _integer("--count", arguments.count, f"a number from 1 to {MAX_COUNT}")
+    count = integer("--count", arguments.count, f"a number from 1 to {MAX_COUNT}")
     if not 1 <= count <= MAX_COUNT:
         raise ConfigError("--count", f"expected a number from 1 to {MAX_COUNT}, got {count}")
-    speed = _number("--speed", arguments.speed, "a number from 0.1 to 20")
-    if not 0.1 <= speed <= 20.0:
-        raise ConfigError("--speed", f"expected a number from 0.1 to 20, got {arguments.speed}")
+    speed = options.speed(arguments.speed)
     versions = (1, 3)
     if arguments.protocol is not None:
-        version = _integer("--protocol", arguments.protocol, "1, 2 or 3")
+        version = integer("--protocol", arguments.protocol, "1, 2 or 3")
         if version not in (1, 2, 3):
             raise ConfigError("--protocol", f"expected 1, 2 or 3, got {version}")
         versions = (version, version)
-    seed = None if arguments.seed is None else _integer("--seed", arguments.seed, "a whole number")
+    seed = None if arguments.seed is None else integer("--seed", arguments.seed, "a whole number")
     try:
         first = DroneSpec(
             model=arguments.model,
             address=arguments.address,
             home=_home(arguments.home),
-            http_port=_integer("--http-port", arguments.http_port, "a port from 0 to 65535"),
+            http_port=integer("--http-port", arguments.http_port, "a port from 0 to 65535"),
             versions=versions,
-            telemetry_rate=_number("--telemetry-rate", arguments.telemetry_rate, "events per second"),
+            telemetry_rate=number("--telemetry-rate", arguments.telemetry_rate, "events per second"),
             skycontroller=None
             if arguments.skycontroller is None
-            else _integer("--skycontroller", arguments.skycontroller, "the generation of a Skycontroller, 3 or 4"),
+            else integer("--skycontroller", arguments.skycontroller, "the generation of a Skycontroller, 3 or 4"),
             storage=None if arguments.storage is None else _size("--storage", arguments.storage),
         )
     except ConfigError as error:
@@ -159,24 +158,7 @@ def _home(text: str) -> tuple[float, float, float]:
 
 def _size(flag: str, text: str) -> int:
     factor = _UNITS.get(text[-1:], 1)
-    return _integer(flag, text if factor == 1 else text[:-1], "a number of bytes like 500k or 16G") * factor
-
-
-def _integer(flag: str, text: str, wanted: str) -> int:
-    try:
-        return int(text)
-    except ValueError:
-        raise ConfigError(flag, f"expected {wanted}, got {text!r}") from None
-
-
-def _number(flag: str, text: str, wanted: str) -> float:
-    try:
-        number = float(text)
-    except ValueError:
-        number = float("nan")
-    if number != number or abs(number) == float("inf"):
-        raise ConfigError(flag, f"expected {wanted}, got {text!r}")
-    return number
+    return integer(flag, text if factor == 1 else text[:-1], "a number of bytes like 500k or 16G") * factor
 
 
 def _wind(text: str) -> WindSpec:
@@ -185,7 +167,7 @@ def _wind(text: str) -> WindSpec:
     if len(parts) not in (2, 3):
         raise ConfigError("--wind", f"expected {wanted}, got {text!r}")
     try:
-        return WindSpec(*(_number("--wind", part, wanted) for part in parts))
+        return WindSpec(*(number("--wind", part, wanted) for part in parts))
     except ConfigError as error:
         raise ConfigError("--wind", error.problem) from None
 
@@ -204,8 +186,8 @@ async def _run(
 ) -> None:
     stop = asyncio.Event()
     loop = asyncio.get_running_loop()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, stop.set)
+    for signum in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(signum, stop.set)
     if stdin_watch:
         _watch_stdin(stop)
     try:

@@ -18,7 +18,8 @@ from anafi_mav.arsdk.messages import ardrone3, gimbal
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.messages.gimbal import ControlMode, FrameOfReference
 from anafi_mav.arsdk.wire import Message, UnknownMessage
-from anafi_mav.cli.terminal import say
+from anafi_mav.cli import options
+from anafi_mav.cli.terminal import complain, say
 from anafi_mav.errors import CommandTimeout, ConfigError
 from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
 from anafi_mav.sim.model import MODELS
@@ -41,19 +42,25 @@ RATE = 100.0
 """Hz of attitude, speed and height; an aircraft sends 5, its video carries 30."""
 
 PERIOD = 0.05
-"""s between two PCMD, as Parrot's own controllers send them."""
+"""s of the machine's clock between two PCMD, as Parrot's own controllers send them."""
 
 HEIGHT = 30.0
 """m above take-off that everything is flown at."""
 
 LIMIT = 60.0
-"""s for a take-off or a climb."""
+"""Simulated s for a take-off or a climb."""
+
+REST = 1.0
+"""Simulated s of hover before the first test."""
+
+MAX_LOST = 0.1
+"""Simulated s that may be missing from all flights together: the shortest time that the paper tells."""
 
 GIMBAL_SPEED = 180.0
 """deg/s"""
 
 GIMBAL_TIME = 2.2
-"""s that a gimbal gets from one limit to the other."""
+"""Simulated s that a gimbal gets from one limit to the other."""
 
 ADDRESS = "127.0.0.1"
 
@@ -62,22 +69,35 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `anafi-mav sim validate`."""
     parser.add_argument("--model", default="all", help=f"{', '.join(MODELS)} or all (%(default)s)")
     parser.add_argument(
+        "--speed",
+        default="1.0",
+        metavar="FACTOR",
+        help="simulated seconds per second; below 1 a busy machine disturbs less (%(default)s)",
+    )
+    parser.add_argument(
         "--plots", type=Path, metavar="DIR", help="draw the figures of the paper into DIR (needs matplotlib)"
     )
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Fly and compare; 1 when something does not agree. Raises `ConfigError`."""
+    """Fly and compare; 1 when something does not agree or the flights are invalid. Raises `ConfigError`."""
     if arguments.model != "all" and arguments.model not in MODELS:
         raise ConfigError("--model", f"expected one of {', '.join(MODELS)} or all, got {arguments.model!r}")
     models = list(MODELS) if arguments.model == "all" else [arguments.model]
+    speed = options.speed(arguments.speed)
     if arguments.plots is not None:
         _plotter()
         try:
             arguments.plots.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise ConfigError("--plots", f"expected a folder, got {arguments.plots}: {error.strerror}") from error
-    flights = asyncio.run(_fly_all(models))
+    flights, lost = asyncio.run(_fly_all(models, speed))
+    if lost > MAX_LOST:
+        complain(
+            f"the flights are invalid: this machine was too slow for them and {lost:.1f} simulated s are missing; "
+            f"a lower --speed than {speed:g} may help"
+        )
+        return 1
     agreed = True
     for flight in flights:
         say(f"{flight.model}, against section IV of the anafi_ros paper")
@@ -87,7 +107,10 @@ def run(arguments: argparse.Namespace) -> int:
             number = f"{result.measured:>9.2f} {result.unit:<6}"
             line = f"  {result.what:<34}{number} published {result.published:<24} {verdict}"
             say(line, "" if result.agrees else "red")
-    say(f"from the drone's own events at {RATE:g} Hz over the wire; the paper used 30 Hz frame metadata")
+    say(
+        f"from the drone's own events at {RATE:g} Hz over the wire, speed {speed:g}; "
+        "the paper used 30 Hz frame metadata"
+    )
     if arguments.plots is not None:
         for path in _plot(flights, arguments.plots):
             say(f"drawn {path}")
@@ -95,10 +118,11 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 class Flight:
-    """One model in the air, its controller, and what was measured."""
+    """One model in the air, its controller, and what was measured; all times are simulated seconds."""
 
-    def __init__(self, drone: SimulatedDrone) -> None:
+    def __init__(self, drone: SimulatedDrone, speed: float) -> None:
         self.drone = drone
+        self._speed = speed
         self.model = drone.spec.model
         self.results: list[Result] = []
         self.series: dict[str, tuple[Series, Series]] = {}
@@ -127,7 +151,7 @@ class Flight:
         self._session.send(message)
 
     def _hear(self, message: Message | UnknownMessage, now: float) -> None:
-        t, track = now - self._zero, self._track
+        t, track = (now - self._zero) * self._speed, self._track
         match message:
             case ardrone3.AttitudeChanged(roll, pitch, yaw):
                 track.attitude.append((t, roll, pitch, yaw))
@@ -142,11 +166,18 @@ class Flight:
                 if not future.done() and met(message):
                     future.set_result(None)
 
+    def _begin(self) -> None:
+        """Forget what was heard; time counts from now on."""
+        self._track, self._zero = Track(), asyncio.get_running_loop().time()
+
+    async def _pass(self, seconds: float) -> None:
+        await asyncio.sleep(seconds / self._speed)
+
     async def _until(self, what: str, met: Callable[[Message], bool]) -> None:
         future: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self._waiting.append((met, future))
         try:
-            await asyncio.wait_for(future, LIMIT)
+            await asyncio.wait_for(future, LIMIT / self._speed)
         except asyncio.TimeoutError:
             raise CommandTimeout(what, LIMIT) from None
         finally:
@@ -165,18 +196,18 @@ class Flight:
         await self._until("a take-off", _hovers)
         self._send(ardrone3.MoveBy(0.0, 0.0, -HEIGHT, 0.0))
         await self._until("a climb", lambda message: isinstance(message, ardrone3.MoveByEnd))
-        await asyncio.sleep(1.0)
+        await self._pass(REST)
 
     async def _test(self, *, roll: int = 0, pitch: int = 0, yaw: int = 0, gaz: int = 0) -> Track:
         """Full stick one way, the other way, nothing; what was heard meanwhile, time counted from the first PCMD."""
         loop = asyncio.get_running_loop()
-        self._track, self._zero = Track(), loop.time()
+        self._begin()
         end = 2 * HOLD + AFTER
-        while (t := loop.time() - self._zero) < end:
+        while (t := (loop.time() - self._zero) * self._speed) < end:
             sign = 1 if t < HOLD else -1 if t < 2 * HOLD else 0
             self._send(ardrone3.PCMD(1, sign * roll, sign * pitch, sign * yaw, sign * gaz, 0))
             changes = [moment for moment in (HOLD, 2 * HOLD, end) if moment > t]
-            await asyncio.sleep(max(0.0, min(PERIOD, changes[0] - t)))
+            await self._pass(max(0.0, min(PERIOD * self._speed, changes[0] - t)))
         return self._track
 
     async def _pitch_and_roll(self) -> None:
@@ -214,14 +245,14 @@ class Flight:
     async def _aim(self, axis: str, mode: ControlMode, value: float) -> Track:
         none, absolute = FrameOfReference.NONE, FrameOfReference.ABSOLUTE
         pitch, roll = (absolute, none) if axis == "pitch" else (none, absolute)
-        self._track, self._zero = Track(), asyncio.get_running_loop().time()
+        self._begin()
         self._send(gimbal.SetTarget(0, mode, none, 0.0, pitch, value, roll, value))
-        await asyncio.sleep(GIMBAL_TIME)
+        await self._pass(GIMBAL_TIME)
         return self._track
 
 
-async def _fly_all(models: list[str]) -> list[Flight]:
-    """Each model in the air at the same time."""
+async def _fly_all(models: list[str], speed: float) -> tuple[list[Flight], float]:
+    """Each model in the air at the same time; and how much simulated time the machine was too slow for."""
     specs = [
         DroneSpec(
             model=model,
@@ -234,8 +265,8 @@ async def _fly_all(models: list[str]) -> list[Flight]:
         )
         for model in models
     ]
-    async with Simulator(specs, seed=1, remember=False) as simulator:
-        flights = [Flight(drone) for drone in simulator.drones]
+    async with Simulator(specs, speed=speed, seed=1, remember=False) as simulator:
+        flights = [Flight(drone, speed) for drone in simulator.drones]
         tasks = [asyncio.create_task(flight.fly()) for flight in flights]
         try:
             await asyncio.gather(*tasks)
@@ -243,9 +274,7 @@ async def _fly_all(models: list[str]) -> list[Flight]:
             for task in tasks:
                 task.cancel()
             await asyncio.wait(tasks)
-        if simulator.lost_time > 0.1:
-            say(f"this machine was too slow: {simulator.lost_time:.1f} s of the flights are missing", "red")
-    return flights
+    return flights, simulator.lost_time
 
 
 def _hovers(message: Message) -> bool:

@@ -4,6 +4,7 @@ other, and our hand in what the drone does by itself. Judged by what the simulat
 from __future__ import annotations
 
 import asyncio
+import itertools
 import math
 import time
 from collections.abc import AsyncIterator, Callable
@@ -66,18 +67,37 @@ def attitude(client: Client, *, pitch: float = 0.0, yaw: float = 0.0, q: Any = N
 async def streaming(client: Client, **setpoint: Any) -> AsyncIterator[None]:
     """A program that sends the same setpoint twenty times a second, and dies at the end of the block."""
 
+    under_way = asyncio.Event()
+
     async def stream() -> None:
-        while True:
+        for count in itertools.count(1):
             attitude(client, **setpoint)
-            await asyncio.sleep(0.05)
+            if count == 4:
+                under_way.set()
+            await asyncio.sleep(0.05)  # the program's own rate
 
     task = asyncio.ensure_future(stream())
     try:
-        await asyncio.sleep(0.2)
+        await under_way.wait()
         yield
     finally:
         task.cancel()
         await asyncio.wait([task])
+
+
+async def watched(seconds: float) -> None:
+    """A time in which something may not happen. There is no event of what does not."""
+    await asyncio.sleep(seconds)
+
+
+async def being_tried(client: Client, mark: int, command: int) -> None:
+    """The gateway says that it is at it, and has no answer yet."""
+    await client.wait("COMMAND_ACK", lambda m: (m.command, m.result) == (command, IN_PROGRESS), since=mark)
+
+
+async def deflected(w: World) -> None:
+    """The drone hears the sticks lean."""
+    await w.drone.wait_log(lambda e: e.name == "ardrone3.Piloting.PCMD" and e.args["pitch"] != 0)
 
 
 async def engage(client: Client) -> None:
@@ -183,7 +203,7 @@ async def test_a_take_off_that_succeeded_is_not_refused_when_it_is_sent_again() 
     async with world(speed=1.0) as w:
         assert (await w.client.command(ARM, 1)).result == ACCEPTED
         assert (await w.client.command(TAKEOFF_CMD, x=0.0, y=0.0, z=3.0)).result == ACCEPTED
-        await asyncio.sleep(2.5)  # within what MAVSDK waits for an acknowledgement that was lost
+        await watched(2.5)  # MAVSDK waits up to 3 s for an acknowledgement that was lost
         assert (await w.client.command(TAKEOFF_CMD, x=0.0, y=0.0, z=3.0)).result == ACCEPTED
         assert heard(w, "TakeOff") == ["TakeOff"]
 
@@ -194,7 +214,7 @@ async def test_disarm_right_after_a_take_off_that_waited_for_arming() -> None:
         mark = w.client.mark()
         at_once(w.client, (ARM, (1.0,)), (ARM, (0.0,)))
         await until(w.client, mark, 2)
-        await asyncio.sleep(1.0)
+        await watched(1.0)
         assert w.drone.flying_state.name in ("LANDED", "LANDING")
         assert w.drone.pose.up < 2.0  # certainly not on its way to five metres
 
@@ -206,12 +226,12 @@ async def test_disarm_while_the_take_off_is_in_bad_air() -> None:
         w.drone.faults.mute = True
         mark = w.client.mark()
         w.client.send_command(TAKEOFF_CMD, x=0.0, y=0.0, z=5.0)
-        await asyncio.sleep(0.2)
+        await being_tried(w.client, mark, TAKEOFF_CMD)
         w.client.send_command(ARM, 0.0)
-        await asyncio.sleep(0.3)
+        await being_tried(w.client, mark, ARM)
         w.drone.faults.mute = False
         assert set(await until(w.client, mark, 2)) == {(TAKEOFF_CMD, CANCELLED), (ARM, ACCEPTED)}
-        await asyncio.sleep(1.0)
+        await watched(1.0)
         assert w.drone.flying_state.name == "LANDED"
 
 
@@ -224,7 +244,8 @@ async def test_land_while_the_drone_takes_off_and_could_not_say_so() -> None:
         await muted
         w.client.send_command(LAND_CMD)
         assert set(await until(w.client, mark, 2)) == {(TAKEOFF_CMD, CANCELLED), (LAND_CMD, ACCEPTED)}
-        await asyncio.sleep(6.0)
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landed", 20.0)
+        await watched(1.0)
         assert w.drone.flying_state.name == "LANDED"
 
 
@@ -287,7 +308,7 @@ async def test_hold_is_confirmed_when_the_climb_has_ended() -> None:
         assert (await w.client.command(SET_MODE, *PX4_HOLD)).result == ACCEPTED
         height = w.drone.pose.up
         assert height > 6.0  # it was not confirmed before it was heard
-        await asyncio.sleep(2.0)
+        await watched(2.0)
         assert w.drone.pose.up < height + 3.0
 
 
@@ -298,8 +319,9 @@ async def test_a_second_hold_does_not_confirm_what_the_first_one_waits_for() -> 
         assert await goto(w, 80.0, 10.0) == ACCEPTED
         await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 5.0, 20.0)
         deaf(w, 3.0)
+        mark = w.client.mark()
         w.client.send_command(SET_MODE, *PX4_HOLD)
-        await asyncio.sleep(0.3)
+        await being_tried(w.client, mark, SET_MODE)
         assert (await other.command(SET_MODE, *PX4_HOLD)).result == ACCEPTED
         assert heard(w, "CancelMoveTo") != []
 
@@ -313,11 +335,14 @@ async def test_a_return_is_not_confirmed_on_account_of_one_that_is_being_aborted
         await w.client.heartbeat(lambda beat: beat.custom_mode == RETURN)
         deaf(w, 3.2)
         w.client.send_command(SET_MODE, *PX4_HOLD)
-        await asyncio.sleep(2.4)
+        await watched(2.4)  # the abort is not forgotten after any time
         assert (await w.client.command(RTL)).result == ACCEPTED
-        await w.drone.wait_log(lambda e: heard(w, "return_to_home", "abort")[1:] == ["abort", "return_to_home"])
-        await asyncio.sleep(0.5)
-        await w.client.heartbeat(lambda beat: beat.custom_mode == RETURN)
+        again = await w.drone.wait_log(lambda e: heard(w, "return_to_home", "abort")[1:] == ["abort", "return_to_home"])
+        await w.drone.wait_log(
+            lambda e: e.name == "rth.state" and e.args["state"] == rth.RthState.IN_PROGRESS, since=again.t
+        )
+        mark = w.client.mark()
+        await w.client.heartbeat(lambda beat: beat.custom_mode == RETURN, since=mark)
 
 
 async def test_land_and_return_are_carried_out_each_time_they_are_asked_for() -> None:
@@ -343,7 +368,7 @@ async def test_another_clients_arming_starts_no_take_off() -> None:
         other = await w.connect(sysid=250)
         assert (await other.command(TAKEOFF_CMD, x=0.0, y=0.0, z=5.0)).result == ACCEPTED
         assert (await w.client.command(ARM, 1)).result == ACCEPTED
-        await asyncio.sleep(1.0)
+        await watched(1.0)
         assert heard(w, "TakeOff") == []
         assert (await other.command(ARM, 1)).result == ACCEPTED
         await w.drone.wait_log(lambda e: e.kind == "command" and e.name == "ardrone3.Piloting.TakeOff")
@@ -357,7 +382,7 @@ async def test_the_sticks_are_level_before_a_landing_begins() -> None:
         await w.take_off()
         async with streaming(w.client, pitch=FORWARD):
             await engage(w.client)
-            await asyncio.sleep(0.5)
+            await deflected(w)
             assert (await w.client.command(LAND_CMD)).result == ACCEPTED
         sent = [e for e in w.drone.log if e.kind == "command" and e.name.startswith("ardrone3.Piloting.")]
         landing = [e.name for e in sent].index("ardrone3.Piloting.Landing")
@@ -373,12 +398,12 @@ async def test_a_setpoint_ends_with_its_own_sender_not_with_the_last_of_all() ->
             async with streaming(w.client, pitch=FORWARD):
                 pass
             last = time.monotonic()
-            await asyncio.sleep(0.3)
+            await watched(0.3)  # his last setpoint grows old, and is still just fresh
             await engage(w.client)
             await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD)
-        deflected = [e.t for e in w.commands("ardrone3.Piloting.PCMD") if e.args["pitch"] != 0]
-        assert deflected
-        assert deflected[-1] - last <= 0.6  # half a second, and a little for this machine
+        leaning = [e.t for e in w.commands("ardrone3.Piloting.PCMD") if e.args["pitch"] != 0]
+        assert leaning
+        assert leaning[-1] - last <= 0.6  # half a second, and a little for this machine
 
 
 async def test_a_refused_return_leaves_no_stick_deflected() -> None:
@@ -390,7 +415,7 @@ async def test_a_refused_return_leaves_no_stick_deflected() -> None:
             await w.drone.wait_log(lambda e: e.name == "rth.state" and e.args["state"] == rth.RthState.UNAVAILABLE)
             assert (await w.client.command(RTL)).result == REJECTED
         flown = len(pitches(w))
-        await asyncio.sleep(1.0)
+        await watched(1.0)
         assert set(pitches(w, flown)) <= {0}
 
 
@@ -402,7 +427,7 @@ async def test_setpoints_end_when_somebody_else_sends_the_drone_home() -> None:
             somebody_else(w, rth.ReturnToHome())
             await w.client.heartbeat(lambda beat: beat.custom_mode == RETURN)
             flown = len(pitches(w))
-            await asyncio.sleep(0.5)  # the program goes on, to no effect
+            await watched(0.5)  # the program goes on, to no effect
         assert set(pitches(w, flown)) <= {0}
 
 
@@ -414,10 +439,10 @@ async def test_offboard_has_one_pilot() -> None:
             async with streaming(w.client):
                 await engage(w.client)
                 flown = len(pitches(w))
-                await asyncio.sleep(0.3)
+                await w.drone.wait_log(lambda e: len(pitches(w, flown)) > 5)
             # The pilot dies. The other one never asked for Offboard.
             await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD)
-            await asyncio.sleep(0.3)
+            await watched(0.3)
         assert set(pitches(w, flown)) == {0}
         assert any("another program" in m.text for _, m in other.since(0, "STATUSTEXT"))
 
@@ -432,7 +457,7 @@ async def test_setpoints_that_make_no_sense_move_nothing(q: list[float]) -> None
             for thrust in (NAN, math.inf, -math.inf, -5.0, 5.0):
                 attitude(w.client, q=q, thrust=thrust)
                 attitude(w.client, thrust=5.0 if math.isfinite(thrust) else thrust)
-            await asyncio.sleep(0.2)
+            await watched(0.2)
         sticks = [e.args for e in w.commands("ardrone3.Piloting.PCMD")[flown:]]
         assert {(s["roll"], s["pitch"], s["gaz"]) for s in sticks} == {(0, 0, 0)}
 
@@ -446,8 +471,9 @@ async def test_without_a_heading_the_other_axes_still_obey() -> None:
         async with streaming(w.client, pitch=FORWARD, yaw=1.0):
             assert (await w.client.command(SET_MODE, *PX4_OFFBOARD)).result == ACCEPTED
         async with streaming(w.client, yaw=1.0):
-            await asyncio.sleep(0.5)
-            last = w.commands("ardrone3.Piloting.PCMD")[-1].args
+            flown = len(pitches(w))
+            await w.drone.wait_log(lambda e: len(pitches(w, flown)) > 5)
+        last = w.commands("ardrone3.Piloting.PCMD")[-1].args
         assert (last["pitch"], last["yaw"]) == (0, 0)
 
 
@@ -459,7 +485,7 @@ async def test_many_setpoints_are_not_as_many_datagrams() -> None:
             flown = len(pitches(w))
             for _ in range(400):
                 attitude(w.client)
-                await asyncio.sleep(0.002)
+                await asyncio.sleep(0.002)  # the program's own rate
         assert len(pitches(w, flown)) < 90  # at most one in 20 ms, in a little more than 0.8 s
 
 
@@ -475,7 +501,7 @@ async def test_a_pilots_stick_ends_offboard_for_good() -> None:
             await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD)
             pilot.stick(PITCH_STICK, 0)
             flown = len(pitches(w))
-            await asyncio.sleep(3.0)  # longer than he keeps the drone after his last touch
+            await watched(3.0)  # longer than he keeps the drone after his last touch
             assert set(pitches(w, flown)) <= {0}
         assert any("pilot at the Skycontroller" in m.text for _, m in w.client.since(0, "STATUSTEXT"))
 
@@ -487,7 +513,7 @@ async def test_hold_does_not_abort_a_return_that_begins_meanwhile() -> None:
     async with world(speed=1.0) as w:
         await w.take_off()
         assert await goto(w, 60.0, 10.0) == ACCEPTED
-        await asyncio.sleep(1.0)
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 1.0, 15.0)
         began = on_command(w, "ardrone3.Piloting.CancelMoveTo", lambda: return_by_itself(w))
         ack = await w.client.command(SET_MODE, *PX4_HOLD)
         await began
@@ -502,7 +528,7 @@ async def test_the_climb_after_a_take_off_yields_to_the_drones_own_return() -> N
         assert (await w.client.command(TAKEOFF_CMD, x=0.0, y=0.0, z=20.0)).result == ACCEPTED
         return_by_itself(w)
         await w.client.heartbeat(lambda beat: beat.custom_mode == RETURN)
-        await asyncio.sleep(3.0)
+        await watched(3.0)
         assert heard(w, "moveBy", "abort") == []
 
 
@@ -514,7 +540,7 @@ async def test_the_climb_belongs_to_its_own_take_off() -> None:
         await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landed", 20.0)
         somebody_else(w, ardrone3.TakeOff())
         await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "hovering", 20.0)
-        await asyncio.sleep(1.0)
+        await watched(1.0)
         assert heard(w, "moveBy") == []
         assert w.drone.pose.up < 2.0
 
@@ -554,7 +580,7 @@ async def test_an_accepted_cut_cannot_be_called_off() -> None:
         w.drone.faults.mute = True
         mark = w.client.mark()
         w.client.send_command(ARM, 0.0, 21196.0)
-        await asyncio.sleep(0.2)
+        await being_tried(w.client, mark, ARM)
         assert (await other.command(SET_MODE, *PX4_HOLD)).result == REJECTED
         w.drone.faults.mute = False
         assert (ARM, ACCEPTED) in await until(w.client, mark, 1)
@@ -569,7 +595,7 @@ async def test_the_gateway_ends_with_level_sticks_under_a_living_sender() -> Non
         await w.take_off()
         async with streaming(w.client, pitch=FORWARD):
             await engage(w.client)
-            await asyncio.sleep(0.3)
+            await deflected(w)
             flown = len(pitches(w))
             await w.gateway.close()
         assert len(pitches(w, flown)) > 30

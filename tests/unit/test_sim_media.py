@@ -7,7 +7,9 @@ import io
 import struct
 from typing import Any
 
+import cv2
 import pytest
+from PIL import Image
 
 from anafi_mav.arsdk.messages import mediastore
 from anafi_mav.arsdk.messages.mediastore import MediastoreState
@@ -26,10 +28,8 @@ DATE = "20261121T101112+0100"
 
 
 def test_a_photo_is_a_jpeg_of_what_was_seen() -> None:
-    image = pytest.importorskip("PIL.Image")
-
     def pixel(scene: Scene, x: int, y: int) -> str:
-        opened = image.open(io.BytesIO(picture.jpeg(scene)))
+        opened = Image.open(io.BytesIO(picture.jpeg(scene)))
         opened.load()
         assert (opened.size, opened.mode) == ((160, 120), "RGB")
         red, _, blue = opened.getpixel((x, y))
@@ -45,11 +45,10 @@ def test_a_photo_is_a_jpeg_of_what_was_seen() -> None:
 
 
 def test_a_photo_knows_where_and_when() -> None:
-    image = pytest.importorskip("PIL.Image")
     store = MediaStore("run", "ANAFI", 0, lambda message: None)
     media = store.begin(video=False, mode="SINGLE", date=DATE)
     resource = store.develop(media, Kind.JPG, 1, PARIS, DATE)
-    exif = image.open(io.BytesIO(resource.content())).getexif()
+    exif = Image.open(io.BytesIO(resource.content())).getexif()
     assert (exif[0x010F], exif[0x0110], exif[0x0132]) == ("Parrot", "ANAFI", "2026:11:21 10:11:12")
     place = exif.get_ifd(0x8825)
     # 48.8789 degrees are 48 d 52 m 44.04 s, 2.3677 are 2 d 22 m 3.72 s.
@@ -57,9 +56,9 @@ def test_a_photo_knows_where_and_when() -> None:
     assert (place[3], place[4]) == ("E", pytest.approx((2.0, 22.0, 3.72)))
     assert (place[5], place[6]) == (b"\0", 85.5)
     nowhere = store.develop(media, Kind.JPG, 1, Scene(), DATE)
-    assert 0x8825 not in image.open(io.BytesIO(nowhere.content())).getexif()
+    assert 0x8825 not in Image.open(io.BytesIO(nowhere.content())).getexif()
     south = store.develop(media, Kind.JPG, 1, Scene(-33.5, -151.25, -2.0), DATE)
-    place = image.open(io.BytesIO(south.content())).getexif().get_ifd(0x8825)
+    place = Image.open(io.BytesIO(south.content())).getexif().get_ifd(0x8825)
     assert (place[1], place[2], place[3], place[4]) == ("S", (33.0, 30.0, 0.0), "W", (151.0, 15.0, 0.0))
     assert (place[5], place[6]) == (b"\1", 2.0)
 
@@ -98,7 +97,6 @@ def test_a_video_has_a_frame_a_second(seconds: float, frames: int) -> None:
 
 
 def test_a_video_plays(tmp_path: Any) -> None:
-    cv2 = pytest.importorskip("cv2")
     file = tmp_path / "video.mp4"
     file.write_bytes(picture.mp4(PARIS, 3.5))
     video = cv2.VideoCapture(str(file))

@@ -126,7 +126,7 @@ BAD = {
     "steps: [{at: 1, refuse_take_off: [vcam, mood]}]": "steps[0].refuse_take_off[1]: expected one of ",
     "steps: [{at: 1, motors: [5]}]": "steps[0].motors[0]: expected `int` <= 4",
     "steps: [{at: 1, battery: 101}]": "steps[0].battery: expected `int` <= 100",
-    "steps: [{at: 1, gps: false, gps: true}]": "test.yaml, line 1, column 30: the key 'gps' stands twice in one mapping",
+    "steps: [{at: 1, gps: false, gps: true}]": "test.yaml, line 1, column 29: the key 'gps' stands twice",
     "steps: [": "test.yaml, line 1, column 9: ",
     "a: \x00": "test.yaml: ",
 }

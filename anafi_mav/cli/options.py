@@ -1,0 +1,38 @@
+"""Numbers of the command line, each mistake told in one line that names the option."""
+
+from __future__ import annotations
+
+import math
+
+from anafi_mav.errors import ConfigError
+
+SLOWEST, FASTEST = 0.1, 20.0
+"""Simulated seconds per second that a world is let run at."""
+
+
+def integer(flag: str, text: str, wanted: str) -> int:
+    """Raises `ConfigError`."""
+    try:
+        return int(text)
+    except ValueError:
+        raise ConfigError(flag, f"expected {wanted}, got {text!r}") from None
+
+
+def number(flag: str, text: str, wanted: str) -> float:
+    """A finite number. Raises `ConfigError`."""
+    try:
+        found = float(text)
+    except ValueError:
+        found = math.nan
+    if not math.isfinite(found):
+        raise ConfigError(flag, f"expected {wanted}, got {text!r}")
+    return found
+
+
+def speed(text: str) -> float:
+    """Simulated seconds per second. Raises `ConfigError`."""
+    wanted = f"a number from {SLOWEST:g} to {FASTEST:g}"
+    found = number("--speed", text, wanted)
+    if not SLOWEST <= found <= FASTEST:
+        raise ConfigError("--speed", f"expected {wanted}, got {text}")
+    return found
