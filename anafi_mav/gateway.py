@@ -21,6 +21,7 @@ from anafi_mav.clock import Clock, SystemClock
 from anafi_mav.config import Config, DroneConfig
 from anafi_mav.drone import Drone
 from anafi_mav.errors import AnafiMavError, ConfigError
+from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound, Node
 from anafi_mav.services.system import System
 
@@ -101,7 +102,7 @@ class Gateway:
                 raise ConfigError(f"drones[{index}].address", "the gateway connects to addresses; expected one")
         self.config = config
         self._clock: Clock = clock or SystemClock()
-        self._node = Node(on_message=self._receive, clock=self._clock)
+        self._node = Node(on_message=self._receive, on_channel=self._on_channel, clock=self._clock)
         self._supervised: list[_Supervised] = []
 
     async def __aenter__(self) -> Self:
@@ -193,6 +194,11 @@ class Gateway:
             home = "fly home " + after if s.system.vehicle.home is not None else "stay there, for it knows no home"
             sentences.append(f"{s.config.name} is in the air: it will hover and {home}")
         return sentences
+
+    def _on_channel(self, channel: Channel, opened: bool) -> None:
+        if not opened:
+            for supervised in self._supervised:
+                supervised.system.channel_closed(channel)
 
     def _receive(self, inbound: Inbound) -> None:
         for supervised in self._supervised:

@@ -1,7 +1,7 @@
 """Endpoint URLs: their grammar, and the table of schemes from which endpoints are made and help is printed.
 
     udpout://HOST:PORT      udpin://HOST:PORT      tcpin://HOST:PORT      tcpout://HOST:PORT
-    serial://DEVICE:BAUD    each with ?flavour=px4
+    serial://DEVICE:BAUD    each with ?flavour=px4, ?flavour=ardupilot or ?flavour=standard
 
 The names are MAVSDK's. An endpoint listens on the address in its URL and no other: beyond loopback only if that says
 so.
@@ -21,7 +21,7 @@ from anafi_mav.mavlink.serial_line import SerialLine
 from anafi_mav.mavlink.tcp import TcpIn, TcpOut
 from anafi_mav.mavlink.udp import UdpIn, UdpOut
 
-FLAVOURS = ("px4",)
+FLAVOURS = ("px4", "ardupilot", "standard")
 """Autopilots that a client can be shown."""
 
 MAX_PORT = 65535

@@ -7,7 +7,7 @@ from collections.abc import Awaitable, Callable, Hashable
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.commands import Command
-from anafi_mav.services.modes import FlightMode, from_px4_parameters
+from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.vehicle import Place, Refused, Vehicle
 
 Handler = Callable[[Vehicle, Command], Awaitable[None]]
@@ -108,9 +108,8 @@ async def reposition(vehicle: Vehicle, command: Command) -> None:
 
 
 async def set_mode(vehicle: Vehicle, command: Command) -> None:
-    """MAV_CMD_DO_SET_MODE in PX4's numbers."""
-    mode = from_px4_parameters(command.params[1], command.params[2])
-    await change_mode(vehicle, mode, command.client)
+    """MAV_CMD_DO_SET_MODE, in the numbers of the sender's flavour."""
+    await change_mode(vehicle, command.mode, command.client)
 
 
 async def change_mode(vehicle: Vehicle, mode: FlightMode | None, client: Hashable) -> None:

@@ -11,6 +11,8 @@ from collections.abc import Hashable
 from dataclasses import dataclass
 
 from anafi_mav.mavlink import dialect
+from anafi_mav.services.flavours import PX4, Flavour
+from anafi_mav.services.modes import HOVERING, FlightMode
 
 RESEND_WINDOW = 3.5
 """s after an action succeeded in which the same one from the same client is a retransmission: MAVSDK resends 3 s after
@@ -25,8 +27,7 @@ MAX_CLIENTS = 64
 PROGRESS_AFTER, PROGRESS_EVERY = 0.3, 0.8
 """s until the first IN_PROGRESS and between them: MAVSDK resends at 0.5 s, every client gives up after 1-3 s (R9)."""
 
-_STOPPING_MODES = ((4.0, 3.0), (4.0, 6.0), (3.0, 0.0))
-"""(main, sub) mode of PX4's Hold, Land and Position."""
+_STOPPING_MODES = (*HOVERING, FlightMode.LAND)
 
 _UNSET_INT = (2**31 - 1, -(2**31))
 """x and y of a COMMAND_INT that stand for "not set": the specified INT32_MAX, and what a cast NaN becomes (R8)."""
@@ -49,6 +50,13 @@ class Command:
     """MAV_FRAME of a COMMAND_INT; None for COMMAND_LONG."""
     client: Hashable = None
     """Who sent it: (channel, system id, component id)."""
+    flavour: Flavour = PX4
+    """The autopilot that who sent it believes to speak to."""
+
+    @property
+    def mode(self) -> FlightMode | None:
+        """The mode that DO_SET_MODE names; None for one that we do not have."""
+        return self.flavour.mode_of_parameters(self.params[1], self.params[2])
 
     @property
     def stops(self) -> bool:
@@ -56,7 +64,7 @@ class Command:
         if self.id == dialect.MAV_CMD_DO_REPOSITION:
             return all(math.isnan(value) for value in (self.params[3], self.x, self.y, self.z))
         if self.id == dialect.MAV_CMD_DO_SET_MODE:
-            return self.params[1:3] in _STOPPING_MODES
+            return self.mode in _STOPPING_MODES
         if self.id == dialect.MAV_CMD_COMPONENT_ARM_DISARM:
             return self.params[0] == 0.0
         return self.id in (dialect.MAV_CMD_NAV_LAND, dialect.MAV_CMD_DO_FLIGHTTERMINATION)
@@ -65,7 +73,7 @@ class Command:
     def returns(self) -> bool:
         """It asks for the way home: when that is flown already, asking again changes nothing."""
         if self.id == dialect.MAV_CMD_DO_SET_MODE:
-            return self.params[1:3] == (4.0, 5.0)
+            return self.mode is FlightMode.RETURN
         return self.id == dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH
 
     def same_as(self, other: Command) -> bool:
@@ -93,7 +101,9 @@ LOCATION_COMMANDS = frozenset(
 """Commands whose x and y of a COMMAND_INT are degrees times 1e7."""
 
 
-def from_long(message: dialect.MAVLink_command_long_message, client: Hashable = None) -> Command:
+def from_long(
+    message: dialect.MAVLink_command_long_message, client: Hashable = None, flavour: Flavour = PX4
+) -> Command:
     """The command of a COMMAND_LONG."""
     return Command(
         message.command,
@@ -103,10 +113,11 @@ def from_long(message: dialect.MAVLink_command_long_message, client: Hashable = 
         message.param7,
         None,
         client,
+        flavour,
     )
 
 
-def from_int(message: dialect.MAVLink_command_int_message, client: Hashable = None) -> Command:
+def from_int(message: dialect.MAVLink_command_int_message, client: Hashable = None, flavour: Flavour = PX4) -> Command:
     """The command of a COMMAND_INT."""
     scale = 1e7 if message.command in LOCATION_COMMANDS else 1.0
     x, y = (math.nan if value in _UNSET_INT else value / scale for value in (message.x, message.y))
@@ -118,6 +129,7 @@ def from_int(message: dialect.MAVLink_command_int_message, client: Hashable = No
         message.z,
         message.frame,
         client,
+        flavour,
     )
 
 

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import hashlib
 import re
+from collections.abc import Mapping
 
 from anafi_mav import __version__
 from anafi_mav.drone import Drone
 from anafi_mav.mavlink import dialect
-
-PX4_VERSION = (1, 16, 0)
-"""The PX4 release whose behaviour the PX4 flavour follows. Its type byte is 0, a development build: QGroundControl
-nags about official releases that are older than the newest (conformance A2)."""
+from anafi_mav.mavlink.node import Inbound
+from anafi_mav.services.commands import Command
+from anafi_mav.services.flavours import Flavour, flavour_of
+from anafi_mav.services.service import Request, Service
+from anafi_mav.services.statustext import Severity
 
 CAPABILITIES = (
     dialect.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
-    | dialect.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
     | dialect.MAV_PROTOCOL_CAPABILITY_SET_ATTITUDE_TARGET
     | dialect.MAV_PROTOCOL_CAPABILITY_MAVLINK2
 )
@@ -29,19 +30,24 @@ def _version(text: str) -> int:
     return min(numbers[0], 255) << 24 | min(numbers[1], 255) << 16 | min(numbers[2], 255) << 8
 
 
-def autopilot_version(drone: Drone, *, allow_kill: bool) -> dialect.MAVLink_message:
+def autopilot_version(drone: Drone, flavour: Flavour, *, allow_kill: bool) -> dialect.MAVLink_message:
     """AUTOPILOT_VERSION. The serial number is the unique id; its hash is the older 64-bit one.
 
-    flight_sw_version is the PX4 release that the flavour follows, middleware_sw_version is anafi-mav's own,
+    flight_sw_version is the release that the flavour follows, middleware_sw_version is anafi-mav's own,
     os_sw_version the ANAFI's firmware.
     """
     identity = drone.identity
     serial = identity.serial.encode()
     firmware = identity.firmware or ""
-    major, minor, patch = PX4_VERSION
+    major, minor, patch = flavour.version
+    encoding = (
+        dialect.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
+        if flavour.bytewise
+        else dialect.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_C_CAST
+    )
     return dialect.MAVLink_autopilot_version_message(
-        CAPABILITIES | (dialect.MAV_PROTOCOL_CAPABILITY_FLIGHT_TERMINATION if allow_kill else 0),
-        major << 24 | minor << 16 | patch << 8,
+        CAPABILITIES | encoding | (dialect.MAV_PROTOCOL_CAPABILITY_FLIGHT_TERMINATION if allow_kill else 0),
+        major << 24 | minor << 16 | patch << 8 | flavour.version_type,
         _version(__version__),
         _version(firmware),
         identity.model.id,
@@ -58,3 +64,20 @@ def autopilot_version(drone: Drone, *, allow_kill: bool) -> dialect.MAVLink_mess
 def protocol_version() -> dialect.MAVLink_message:
     """PROTOCOL_VERSION: MAVLink 1 is understood, 2 is spoken."""
     return dialect.MAVLink_protocol_version_message(200, 100, 200, bytes(8), bytes(8))
+
+
+class IdentityService(Service):
+    """Says who we are, to whoever asks and once to all."""
+
+    def requests(self) -> Mapping[int, Request]:
+        return {
+            dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION: self._version,
+            dialect.MAVLINK_MSG_ID_PROTOCOL_VERSION: lambda inbound, command: protocol_version(),
+        }
+
+    def link_up(self) -> None:
+        product = self.host.drone.identity
+        self.host.text(Severity.INFO, f"{product.model.title} {product.serial} firmware {product.firmware}")
+
+    def _version(self, inbound: Inbound, command: Command) -> dialect.MAVLink_message:
+        return autopilot_version(self.host.drone, flavour_of(inbound.channel), allow_kill=self.host.vehicle.allow_kill)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,10 +17,15 @@ from anafi_mav.drone import Range
 from anafi_mav.drone.events import RthEndingBehavior
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.node import Inbound
+from anafi_mav.services.service import Host, MessageHandler, Service
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.vehicle import LOWEST, Vehicle
 
 INT32, REAL32 = dialect.MAV_PARAM_TYPE_INT32, dialect.MAV_PARAM_TYPE_REAL32
+
+MAX_WRITES = 16
+"""PARAM_SETs under way at once: a client writes one after the other, several clients a few."""
 
 TYPE_MISMATCH = 7
 """MAV_PARAM_ERROR_TYPE_MISMATCH of upstream's common.xml; pymavlink 2.4.50 stops at 5."""
@@ -147,13 +152,41 @@ def table(vehicle: Vehicle, sysid: int) -> list[Parameter]:
     return sorted(parameters, key=lambda parameter: parameter.name)
 
 
-class ParameterService:
+class ParameterService(Service):
     """Answers PARAM_REQUEST_LIST, PARAM_REQUEST_READ and PARAM_SET for one vehicle."""
 
-    def __init__(self, parameters: list[Parameter], text: Callable[[Severity, str], None]) -> None:
-        self._table = parameters
-        self._text = text
-        self._index = {parameter.name: index for index, parameter in enumerate(parameters)}
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self._table = table(host.vehicle, host.sysid)
+        self._index = {parameter.name: index for index, parameter in enumerate(self._table)}
+        self._writes = 0
+
+    def messages(self) -> Mapping[int, MessageHandler]:
+        return {
+            dialect.MAVLINK_MSG_ID_PARAM_REQUEST_LIST: self._param_list,
+            dialect.MAVLINK_MSG_ID_PARAM_REQUEST_READ: self._param_read,
+            dialect.MAVLINK_MSG_ID_PARAM_SET: self._param_set,
+        }
+
+    def _param_list(self, inbound: Inbound) -> None:
+        for message in self.all_values():
+            self.host.send(message, inbound.channel)
+
+    def _param_read(self, inbound: Inbound) -> None:
+        self.host.send(self.read(inbound.message, inbound.sysid, inbound.compid), inbound.channel)
+
+    def _param_set(self, inbound: Inbound) -> None:
+        if self._writes < MAX_WRITES:  # otherwise the client says it again
+            self._writes += 1
+            self.host.spawn(self._write_param(inbound))
+
+    async def _write_param(self, inbound: Inbound) -> None:
+        try:
+            answers, changed = await self.write(inbound.message, inbound.sysid, inbound.compid)
+        finally:
+            self._writes -= 1
+        for message in answers:
+            self.host.send(message, None if changed else inbound.channel)
 
     def all_values(self) -> list[dialect.MAVLink_message]:
         """A PARAM_VALUE for each parameter, in the order of their index."""
@@ -192,7 +225,7 @@ class ParameterService:
         try:
             await parameter.write(value)
         except AnafiMavError as error:
-            self._text(Severity.WARNING, f"{parameter.name} not set: {error}")
+            self.host.text(Severity.WARNING, f"{parameter.name} not set: {error}")
             return [self._value(index)], False
         return [self._value(index)], True
 

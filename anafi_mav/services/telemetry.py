@@ -11,13 +11,14 @@ Frames and units: ARSDK attitude is rad in FRD/NED like MAVLink's, speeds are NE
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Mapping
 
 from anafi_mav import geo, units
 from anafi_mav.drone import events
 from anafi_mav.drone.events import AlertLevel, Message, Sensor
 from anafi_mav.mavlink import dialect
+from anafi_mav.services.service import Service
+from anafi_mav.services.stream import Stream, Times
 from anafi_mav.services.vehicle import Vehicle
 
 NAN = math.nan
@@ -27,20 +28,6 @@ UNKNOWN_SATELLITES = 255
 
 MOVING = 0.5
 """m/s. Slower than this the course over ground is noise and is reported as unknown."""
-
-
-@dataclass(frozen=True)
-class Times:
-    """When the fields of a message were true: milliseconds since the gateway started."""
-
-    boot_ms: int
-
-    @property
-    def boot_us(self) -> int:
-        return self.boot_ms * 1000
-
-
-Builder = Callable[[Vehicle, Times], "dialect.MAVLink_message | None"]
 
 
 def attitude(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
@@ -265,17 +252,6 @@ def home_position(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | N
     )
 
 
-@dataclass(frozen=True)
-class Stream:
-    """One message a vehicle sends by itself."""
-
-    build: Builder
-    news: tuple[type[Message], ...] = ()
-    """The drone's events that make it new; none: a state message, repeated at its interval."""
-    on_change: bool = False
-    """A state message that also leaves at once when the vehicle's mode, armed or landed state changes."""
-
-
 _HOME = (events.HomeChanged, events.TakeoffLocation)
 
 STREAMS: dict[int, Stream] = {
@@ -298,12 +274,6 @@ STREAMS: dict[int, Stream] = {
     dialect.MAVLINK_MSG_ID_HOME_POSITION: Stream(home_position, on_change=True),
 }
 
-BY_NEWS: dict[type[Message], list[int]] = {}
-"""Which messages an event of the drone makes new."""
-for _id, _stream in STREAMS.items():
-    for _event in _stream.news:
-        BY_NEWS.setdefault(_event, []).append(_id)
-
 CHANGES: frozenset[type[Message]] = frozenset(
     {
         *_HOME,
@@ -317,3 +287,10 @@ CHANGES: frozenset[type[Message]] = frozenset(
     }
 )
 """Events after which the state messages marked `on_change` leave at once."""
+
+
+class TelemetryService(Service):
+    """The streams of this table."""
+
+    def streams(self) -> Mapping[int, Stream]:
+        return STREAMS

@@ -107,7 +107,7 @@ class Vehicle:
         self.origin: Place | None = None
         """Origin of the local frame: where the drone last took off, or first stood with a fix."""
         self._clock = clock
-        self._allow_kill = allow_kill
+        self.allow_kill = allow_kill
         self._text = text
         self._changed = changed
         self._end_others = end_others
@@ -259,7 +259,7 @@ class Vehicle:
 
     async def terminate(self) -> None:
         """Cut the motors, if the configuration allows it at all."""
-        if not self._allow_kill:
+        if not self.allow_kill:
             raise Refused(
                 "Motor cut refused: the drone would fall. Set allow_kill: true to permit it",
                 lasting=True,
@@ -396,7 +396,7 @@ class Vehicle:
     async def set_mode(self, mode: FlightMode, client: Hashable = None) -> None:
         """Whatever doing this mode means. `client` is who asks, for Offboard flies its setpoints."""
         match mode:
-            case FlightMode.HOLD | FlightMode.POSITION:
+            case FlightMode.HOLD | FlightMode.GUIDED | FlightMode.POSITION:
                 await self.hold(mode)
             case FlightMode.LAND:
                 await self.land()
@@ -410,6 +410,8 @@ class Vehicle:
                 raise Refused("Mission refused: there is no mission")
             case FlightMode.TERMINATED:
                 await self.terminate()
+            case FlightMode.FOLLOW | FlightMode.ORBIT:
+                raise Refused(f"{mode.value} refused: it is begun by a command", lasting=True)
 
     # Offboard.
 

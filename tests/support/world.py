@@ -82,10 +82,16 @@ async def world(
     sysid: int = 1,
     clients: int = 1,
     skycontroller: int | None = None,
+    flavour: str = "px4",
+    model: str = "4k",
 ) -> AsyncIterator[World]:
-    """One simulated drone, one gateway with a TCP endpoint, and its clients, connected and ready."""
+    """One simulated drone, one gateway with a TCP endpoint, and its clients, connected and ready.
+
+    With `flavour` the endpoint shows that autopilot; `World.take_off` and the mode numbers above are PX4's.
+    """
     drone_address, address = loopback(), loopback()
     spec = DroneSpec(
+        model=model,
         address=drone_address,
         home=HOME,
         http_port=None,
@@ -93,7 +99,7 @@ async def world(
         skycontroller=skycontroller,
     )
     config = Config(
-        endpoints=(f"tcpin://{address}:5760",),
+        endpoints=(f"tcpin://{address}:5760?flavour={flavour}",),
         drones=(DroneConfig(name="alpha", sysid=sysid, address=drone_address),),
         allow_kill=allow_kill,
     )

@@ -8,7 +8,8 @@ from typing import Any
 import pytest
 
 from anafi_mav.mavlink import dialect
-from anafi_mav.services import commands, modes, offboard, plan_lists
+from anafi_mav.services import commands, offboard, plan_lists
+from anafi_mav.services.flavours import ARDUPILOT, PX4
 from anafi_mav.services.height import HeightReference
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.offboard import SILENCE, Event, OffboardStream, State
@@ -32,9 +33,9 @@ PACKED = {
 
 @pytest.mark.parametrize(("mode", "number"), PACKED.items())
 def test_px4_numbers(mode: FlightMode, number: int) -> None:
-    assert modes.px4_custom_mode(mode) == number
-    assert modes.from_px4_custom_mode(number) is mode
-    assert modes.from_px4_parameters(float(number), NAN) is mode
+    assert PX4.custom_mode(mode) == number
+    assert PX4.mode_of_number(number) is mode
+    assert PX4.mode_of_parameters(float(number), NAN) is mode
 
 
 @pytest.mark.parametrize(
@@ -53,7 +54,44 @@ def test_px4_numbers(mode: FlightMode, number: int) -> None:
     ],
 )
 def test_modes_by_parameters(main: float, sub: float, mode: FlightMode | None) -> None:
-    assert modes.from_px4_parameters(main, sub) is mode
+    assert PX4.mode_of_parameters(main, sub) is mode
+
+
+# ArduCopter/mode.h by conformance A4; Brake is our Hold.
+COPTER = {
+    FlightMode.MISSION: 3,
+    FlightMode.GUIDED: 4,
+    FlightMode.POSITION: 5,
+    FlightMode.RETURN: 6,
+    FlightMode.LAND: 9,
+    FlightMode.HOLD: 17,
+    FlightMode.FOLLOW: 23,
+}
+
+
+@pytest.mark.parametrize(("mode", "number"), COPTER.items())
+def test_copter_numbers(mode: FlightMode, number: int) -> None:
+    assert ARDUPILOT.custom_mode(mode) == number
+    assert ARDUPILOT.mode_of_number(number) is mode
+    assert ARDUPILOT.mode_of_parameters(float(number), 0.0) is mode
+    assert ARDUPILOT.mode_of_parameters(float(number), NAN) is mode
+
+
+@pytest.mark.parametrize(
+    ("main", "mode"),
+    [
+        (0.0, None),  # STABILIZE
+        (1.0, None),  # ACRO
+        (7.0, None),  # CIRCLE is begun by an orbit
+        (16.0, FlightMode.POSITION),  # POSHOLD
+        (21.0, FlightMode.RETURN),  # SMART_RTL
+        (float(0x03040000), FlightMode.HOLD),  # PX4's packed number
+        (4.5, None),
+        (NAN, None),
+    ],
+)
+def test_copter_modes_by_parameter(main: float, mode: FlightMode | None) -> None:
+    assert ARDUPILOT.mode_of_parameters(main, NAN) is mode
 
 
 def texts(text: str) -> list[tuple[int, int, bytes]]:

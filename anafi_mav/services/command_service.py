@@ -1,0 +1,223 @@
+"""The command protocol's service: runs commands, keeps their senders informed, ends what a newer one replaces.
+
+What a command means is in the table of actions; whether it is a new one, `CommandDesk` knows (both without I/O).
+Rules: conformance R5-R10, C2, MAVLink command.md.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+import logging
+from collections.abc import Callable, Coroutine, Hashable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, NotSupported
+from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.node import Inbound
+from anafi_mav.services.actions import ACTIONS, UnsupportedFrame, change_mode
+from anafi_mav.services.commands import (
+    PROGRESS_AFTER,
+    PROGRESS_EVERY,
+    Command,
+    CommandDesk,
+    Execution,
+    from_int,
+    from_long,
+)
+from anafi_mav.services.flavours import flavour_of
+from anafi_mav.services.modes import FlightMode
+from anafi_mav.services.service import Action, Host, MessageHandler, Query, Service, client_of
+from anafi_mav.services.statustext import Severity
+from anafi_mav.services.vehicle import Refused
+
+logger = logging.getLogger(__name__)
+
+_RESULT_BY_ERROR: tuple[tuple[type[AnafiMavError], int], ...] = (
+    (UnsupportedFrame, dialect.MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME),
+    (NotSupported, dialect.MAV_RESULT_UNSUPPORTED),
+    (CommandRejected, dialect.MAV_RESULT_TEMPORARILY_REJECTED),
+    (CommandTimeout, dialect.MAV_RESULT_FAILED),
+)
+
+
+@dataclass(frozen=True)
+class _Running:
+    """Something that changes what the vehicle does, under way."""
+
+    client: Hashable
+    answer: tuple[Inbound, Execution] | None
+    """Whom to answer; None for messages that have no answer."""
+
+
+class CommandService(Service):
+    """COMMAND_LONG, COMMAND_INT, COMMAND_CANCEL and SET_MODE of one system."""
+
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self._desk = CommandDesk()
+        self._queries: Mapping[int, Query] = {}
+        self._actions: dict[int, Action] = {}
+        self._running: dict[asyncio.Task[None], _Running] = {}
+        """Oldest first."""
+
+    def take_tables(self, queries: Mapping[int, Query], actions: Mapping[int, Action]) -> None:
+        """What all services of the system answer and do."""
+        vehicle = self.host.vehicle
+        self._queries = queries
+        self._actions = {id: _bound(handler, vehicle) for id, handler in ACTIONS.items()}
+        self._actions.update(actions)
+
+    def messages(self) -> Mapping[int, MessageHandler]:
+        return {
+            dialect.MAVLINK_MSG_ID_COMMAND_LONG: lambda inbound: self._command(
+                inbound, from_long(inbound.message, client_of(inbound), flavour_of(inbound.channel))
+            ),
+            dialect.MAVLINK_MSG_ID_COMMAND_INT: lambda inbound: self._command(
+                inbound, from_int(inbound.message, client_of(inbound), flavour_of(inbound.channel))
+            ),
+            dialect.MAVLINK_MSG_ID_COMMAND_CANCEL: self._cancel,
+            dialect.MAVLINK_MSG_ID_SET_MODE: self._set_mode,
+        }
+
+    def link_down(self) -> None:
+        """Whoever waits is told that it failed; the tasks end with the host's."""
+        for running in tuple(self._running.values()):
+            if running.answer is not None:
+                self._finish(*running.answer, dialect.MAV_RESULT_FAILED)
+        self._desk.forget()
+
+    async def end_all(self) -> None:
+        """Cancel everything that runs, and wait for it."""
+        for task in tuple(self._running):
+            task.cancel()
+        if self._running:
+            await asyncio.wait(tuple(self._running))
+
+    def run(self, client: Hashable, work: Coroutine[Any, Any, None]) -> None:
+        """Run an action that came by a message without acknowledgement; a refusal of it becomes a text."""
+        self._desk.forget(client)  # the vehicle was moved by other means than this client's newest command
+        self._spawn(self._explained(work), _Running(client, None))
+
+    def end_others(self) -> list[asyncio.Task[None]]:
+        """What begins now replaces what was under way; whoever waits for that learns that it was cancelled.
+
+        A newer action than this one goes on: it has come to replace this one.
+        """
+        current = asyncio.current_task()
+        others = list(itertools.takewhile(lambda task: task is not current, self._running))
+        for task in others:
+            task.cancel()
+        running = None if current is None else self._running.get(current)
+        self._desk.supersede(None if running is None else running.client)
+        return others
+
+    def _command(self, inbound: Inbound, command: Command) -> None:
+        query = self._queries.get(command.id)
+        if query is not None:
+            result = dialect.MAV_RESULT_FAILED
+            try:
+                result = query(inbound, command)
+            finally:  # whatever went wrong, the client learns that it did
+                self._acknowledge(inbound, command.id, result)
+            return
+        if command.id not in self._actions:
+            self._acknowledge(inbound, command.id, dialect.MAV_RESULT_UNSUPPORTED)
+            return
+        repeated = self._desk.retransmission(command.client, command, self.host.clock.monotonic())
+        if repeated is not None:
+            self._acknowledge(inbound, command.id, repeated)
+            return
+        execution = self._desk.begin(command.client, command)
+        self._spawn(self._execute(inbound, execution), _Running(command.client, (inbound, execution)))
+
+    async def _execute(self, inbound: Inbound, execution: Execution) -> None:
+        command = execution.command
+        progress = self.host.spawn(self._report_progress(inbound, command.id))
+        result = dialect.MAV_RESULT_FAILED
+        try:
+            await self._actions[command.id](command)
+            result = dialect.MAV_RESULT_ACCEPTED
+        except AnafiMavError as error:
+            result = self._explain(error)
+        except asyncio.CancelledError:
+            result = dialect.MAV_RESULT_CANCELLED
+            raise
+        except Exception:
+            logger.exception("command %d of system %d", command.id, self.host.sysid)
+        finally:
+            progress.cancel()
+            self._finish(inbound, execution, result)
+
+    def _finish(self, inbound: Inbound, execution: Execution, result: int) -> None:
+        """The one final acknowledgement of an action."""
+        if execution.result == dialect.MAV_RESULT_IN_PROGRESS:
+            execution.result, execution.ended = result, self.host.clock.monotonic()
+            self._acknowledge(inbound, execution.command.id, result)
+
+    def _spawn(self, work: Coroutine[Any, Any, None], running: _Running) -> None:
+        task = self.host.spawn(work)
+        self._running[task] = running
+        task.add_done_callback(self._done)
+
+    def _done(self, task: asyncio.Task[None]) -> None:
+        running = self._running.pop(task, None)
+        if running is not None and running.answer is not None:
+            # It has answered by itself, unless it was cancelled before it began.
+            self._finish(*running.answer, dialect.MAV_RESULT_CANCELLED)
+
+    def _cancel(self, inbound: Inbound) -> None:
+        """COMMAND_CANCEL: end a running action of that number, whoever began it; its sender gets CANCELLED.
+
+        Without one there is nothing to say (MAVLink command.md). What has been accepted is not taken back.
+        """
+        for task, running in tuple(self._running.items()):
+            if running.answer is not None and running.answer[1].command.id == inbound.message.command:
+                task.cancel()
+
+    def _explain(self, error: AnafiMavError) -> int:
+        """Tell everybody why something was refused; the MAV_RESULT that says so."""
+        critical = isinstance(error, Refused) and error.critical
+        self.host.text(Severity.CRITICAL if critical else Severity.WARNING, str(error))
+        for kind, result in _RESULT_BY_ERROR:
+            if isinstance(error, kind):
+                return result
+        if isinstance(error, Refused):
+            return dialect.MAV_RESULT_DENIED if error.lasting else dialect.MAV_RESULT_TEMPORARILY_REJECTED
+        return dialect.MAV_RESULT_FAILED
+
+    async def _explained(self, work: Coroutine[Any, Any, None]) -> None:
+        try:
+            await work
+        except AnafiMavError as error:
+            self._explain(error)
+        finally:
+            work.close()  # cancelled before it began, it would complain that nobody awaited it
+
+    async def _report_progress(self, inbound: Inbound, command: int) -> None:
+        await asyncio.sleep(PROGRESS_AFTER)
+        while True:
+            self._acknowledge(inbound, command, dialect.MAV_RESULT_IN_PROGRESS)
+            await asyncio.sleep(PROGRESS_EVERY)
+
+    def _acknowledge(self, inbound: Inbound, command: int, result: int) -> None:
+        self.host.send(
+            dialect.MAVLink_command_ack_message(
+                command, result, 255, 0, target_system=inbound.sysid, target_component=inbound.compid
+            ),
+            inbound.channel,
+        )
+
+    def _set_mode(self, inbound: Inbound) -> None:
+        """SET_MODE has no acknowledgement: the heartbeat shows the mode, a text the refusal."""
+        mode: FlightMode | None = flavour_of(inbound.channel).mode_of_number(inbound.message.custom_mode)
+        client = client_of(inbound)
+        self.run(client, change_mode(self.host.vehicle, mode, client))
+
+
+def _bound(handler: Callable[[Any, Command], Any], vehicle: Any) -> Action:
+    def action(command: Command) -> Any:
+        return handler(vehicle, command)
+
+    return action

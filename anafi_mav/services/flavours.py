@@ -1,0 +1,177 @@
+"""Flavours: which autopilot a client is shown. The flight core is one; names and numbers differ.
+
+A channel has one flavour for as long as it lives. PX4 is what QGroundControl and MAVSDK get the most from, ArduPilot is
+what MAVProxy, dronekit and Mission Planner were written for, standard is MAVLink's own autopilot-neutral way, which few
+clients know (conformance E1, E3, E4).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.channel import Channel
+from anafi_mav.services.modes import FlightMode
+
+PX4_BITS = 1 << 16
+"""A mode number from here on is one of PX4's packed ones in whatever flavour it comes (conformance E5)."""
+
+
+def _whole(number: float) -> int | None:
+    """A parameter that stands for a number of modes; None for what is none."""
+    if not math.isfinite(number) or number != int(number) or not 0 <= number < 1 << 32:
+        return None
+    return int(number)
+
+
+def px4_number(main: int, sub: int) -> int:
+    """Main mode in bits 16..23 and sub mode in bits 24..31 (PX4-Autopilot src/modules/commander/px4_custom_mode.h)."""
+    return main << 16 | sub << 24
+
+
+@dataclass(frozen=True)
+class Flavour:
+    """How an autopilot of this family presents the neutral flight core."""
+
+    name: str
+    """As in the URL of an endpoint."""
+    autopilot: int
+    """MAV_AUTOPILOT of the heartbeat."""
+    numbers: Mapping[FlightMode, int]
+    """custom_mode of each mode."""
+    modes: Mapping[int, FlightMode]
+    """What a client may ask for by number: not every mode that is shown, and some that are shown as another."""
+    version: tuple[int, int, int]
+    """The release whose behaviour is followed: major, minor, patch."""
+    version_type: int
+    """FIRMWARE_VERSION_TYPE."""
+    bytewise: bool
+    """Parameters: an INT32 travels as the bits of the float field; otherwise as the float of equal value."""
+    zero_home: bool = False
+    """Item 0 of a mission is home."""
+    relative_takeoff: bool = False
+    """The height of a take-off command counts from the ground, whatever else the command says."""
+    zero_is_unset: bool = False
+    """Clients of this family send 0 for what they do not set; NaN elsewhere."""
+    guided_setpoints: bool = False
+    """Setpoints fly the drone in mode Guided, without a mode of their own."""
+    title: str = ""
+    """How the autopilot calls itself in its banner; empty: it does not."""
+
+    def custom_mode(self, mode: FlightMode) -> int:
+        """custom_mode of a heartbeat in this mode."""
+        return self.numbers[mode]
+
+    def mode_of_number(self, number: int) -> FlightMode | None:
+        """The mode that a custom_mode names (SET_MODE, DO_SET_MODE in one number); None when we do not have it."""
+        if number >= PX4_BITS:
+            return _PX4_MODES.get(number)
+        return self.modes.get(number)
+
+    def mode_of_parameters(self, main: float, sub: float) -> FlightMode | None:
+        """The mode that MAV_CMD_DO_SET_MODE names with param2 and param3; None when we do not have it.
+
+        PX4: below 256 param2 is the main mode and param3 the sub mode (NaN = 0). All flavours: from 65536 on param2
+        is a packed number of PX4's. ArduPilot: param2 is the mode's number (conformance E5).
+        """
+        number = _whole(main)
+        if number is None:
+            return None
+        if self is not ARDUPILOT and number < PX4_BITS:
+            part = 0 if math.isnan(sub) else _whole(sub)
+            if part is None or number > 0xFF or part > 0xFF:
+                return None
+            number = px4_number(number, part)
+        return self.mode_of_number(number)
+
+
+_PX4_NUMBERS = {
+    FlightMode.POSITION: px4_number(3, 0),
+    FlightMode.ORBIT: px4_number(3, 1),
+    FlightMode.TAKEOFF: px4_number(4, 2),
+    FlightMode.HOLD: px4_number(4, 3),
+    FlightMode.GUIDED: px4_number(4, 3),
+    FlightMode.MISSION: px4_number(4, 4),
+    FlightMode.RETURN: px4_number(4, 5),
+    FlightMode.LAND: px4_number(4, 6),
+    FlightMode.FOLLOW: px4_number(4, 8),
+    FlightMode.OFFBOARD: px4_number(6, 0),
+    FlightMode.TERMINATED: px4_number(10, 0),
+}
+_PX4_MODES = {
+    number: mode
+    for mode, number in _PX4_NUMBERS.items()
+    if mode not in (FlightMode.GUIDED, FlightMode.ORBIT)  # shown as another, and entered by a command only
+}
+
+PX4 = Flavour(
+    name="px4",
+    autopilot=dialect.MAV_AUTOPILOT_PX4,
+    numbers=_PX4_NUMBERS,
+    modes=_PX4_MODES,
+    version=(1, 16, 0),
+    # A development build: QGroundControl nags about official releases that are older than the newest (conformance A2).
+    version_type=dialect.FIRMWARE_VERSION_TYPE_DEV,
+    bytewise=True,
+)
+
+# Numbers of ArduCopter/mode.h. Its Brake is our Hold: it stops, and nobody's setpoints or sticks move the drone.
+_BRAKE, _LOITER, _POSHOLD, _GUIDED = 17, 5, 16, 4
+_COPTER_NUMBERS = {
+    FlightMode.POSITION: _LOITER,
+    FlightMode.ORBIT: 7,
+    FlightMode.TAKEOFF: _GUIDED,
+    FlightMode.HOLD: _BRAKE,
+    FlightMode.GUIDED: _GUIDED,
+    FlightMode.MISSION: 3,
+    FlightMode.RETURN: 6,
+    FlightMode.LAND: 9,
+    FlightMode.FOLLOW: 23,
+    FlightMode.OFFBOARD: _GUIDED,
+    FlightMode.TERMINATED: _BRAKE,
+}
+
+ARDUPILOT = Flavour(
+    name="ardupilot",
+    autopilot=dialect.MAV_AUTOPILOT_ARDUPILOTMEGA,
+    numbers=_COPTER_NUMBERS,
+    modes={
+        3: FlightMode.MISSION,
+        _GUIDED: FlightMode.GUIDED,
+        _LOITER: FlightMode.POSITION,
+        6: FlightMode.RETURN,
+        9: FlightMode.LAND,
+        _POSHOLD: FlightMode.POSITION,
+        _BRAKE: FlightMode.HOLD,
+        21: FlightMode.RETURN,  # SMART_RTL: an ANAFI has one way home
+        23: FlightMode.FOLLOW,
+    },
+    version=(4, 5, 7),
+    version_type=dialect.FIRMWARE_VERSION_TYPE_OFFICIAL,
+    bytewise=False,
+    zero_home=True,
+    relative_takeoff=True,
+    zero_is_unset=True,
+    guided_setpoints=True,
+    title="ArduCopter V4.5.7",
+)
+
+STANDARD = Flavour(
+    name="standard",
+    autopilot=dialect.MAV_AUTOPILOT_GENERIC,
+    numbers=_PX4_NUMBERS,
+    modes=_PX4_MODES,
+    version=PX4.version,
+    version_type=PX4.version_type,
+    bytewise=True,
+    relative_takeoff=True,  # MAVSDK's "pure" path sends the height above ground (conformance F 156)
+)
+
+FLAVOURS = {flavour.name: flavour for flavour in (PX4, ARDUPILOT, STANDARD)}
+
+
+def flavour_of(channel: Channel) -> Flavour:
+    """The flavour of a channel's endpoint; PX4 where its URL names none."""
+    return FLAVOURS[channel.flavour or PX4.name]

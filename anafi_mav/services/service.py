@@ -1,0 +1,117 @@
+"""What a MAVLink microservice is to the system that hosts it: tables of what it takes, and a host to answer through.
+
+A system is the sum of its services. Each says in tables which messages, commands and requests are its own; the host
+sorts what arrives into them, and nothing else connects the two.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable, Coroutine, Hashable, Mapping, Sequence
+from typing import Any, Protocol
+
+from anafi_mav.clock import Clock
+from anafi_mav.drone import Drone
+from anafi_mav.drone.events import Message
+from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.channel import Channel
+from anafi_mav.mavlink.node import Inbound
+from anafi_mav.services.commands import Command
+from anafi_mav.services.flavours import Flavour
+from anafi_mav.services.statustext import Severity
+from anafi_mav.services.stream import Stream, Times
+from anafi_mav.services.vehicle import Vehicle
+
+MessageHandler = Callable[[Inbound], None]
+"""Takes a message that is addressed to our autopilot, or to everybody."""
+
+Query = Callable[[Inbound, Command], int]
+"""Answers a command at once, every time it comes; returns the MAV_RESULT."""
+
+Action = Callable[[Command], Awaitable[None]]
+"""Changes what the vehicle does. Executed once however often the command comes; returns when the drone confirmed, or
+raises an `AnafiMavError` that says why not."""
+
+Answer = dialect.MAVLink_message | Sequence[dialect.MAVLink_message] | int
+Request = Callable[[Inbound, Command], Answer]
+"""Makes the message, or messages, that MAV_CMD_REQUEST_MESSAGE asks for; or the MAV_RESULT that says why not."""
+
+
+class Host(Protocol):
+    """What a system gives its services."""
+
+    sysid: int
+    drone: Drone
+    vehicle: Vehicle
+    clock: Clock
+
+    @property
+    def channels(self) -> Sequence[Channel]:
+        """The channels that are open now."""
+
+    def send(self, message: dialect.MAVLink_message, to: Channel | Sequence[Channel] | None = None) -> None:
+        """Send as the autopilot to one channel, to some, or to all. Nothing is sent while the link is down."""
+
+    def send_by_flavour(
+        self, build: Callable[[Flavour], dialect.MAVLink_message | None], to: Sequence[Channel] | None = None
+    ) -> None:
+        """Send to each of these channels (None: all) what `build` makes for its flavour; None of it is not sent."""
+
+    def text(self, severity: Severity, text: str) -> None:
+        """A STATUSTEXT to everybody, and a line in the log."""
+
+    def complain(self, text: str) -> None:
+        """A warning about something that arrives many times a second: said rarely."""
+
+    def spawn(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
+        """Run in the background; cancelled when the drone's link goes down."""
+
+    def times(self) -> Times:
+        """Now, in the clock of this system's messages."""
+
+
+def client_of(inbound: Inbound) -> Hashable:
+    """Who sent this, told apart from everybody else."""
+    return (inbound.channel, inbound.sysid, inbound.compid)
+
+
+class Service:
+    """One MAVLink microservice of one system. All tables are read once, when the system is made."""
+
+    def __init__(self, host: Host) -> None:
+        self.host = host
+
+    def messages(self) -> Mapping[int, MessageHandler]:
+        """By message id."""
+        return {}
+
+    def queries(self) -> Mapping[int, Query]:
+        """By MAV_CMD."""
+        return {}
+
+    def actions(self) -> Mapping[int, Action]:
+        """By MAV_CMD."""
+        return {}
+
+    def requests(self) -> Mapping[int, Request]:
+        """By message id. A stream can be requested without standing here."""
+        return {}
+
+    def streams(self) -> Mapping[int, Stream]:
+        """By message id."""
+        return {}
+
+    def link_up(self) -> None:
+        """The drone is connected and has sent all its states."""
+
+    def link_down(self) -> None:
+        """The drone's link is gone: nothing that was asked for outlives it."""
+
+    def on_event(self, message: Message, now: float) -> None:
+        """The drone said this; its states know it already."""
+
+    def tick(self, now: float) -> None:
+        """About ten times a second while the link is up."""
+
+    def channel_closed(self, channel: Channel) -> None:
+        """A client's channel is gone."""

@@ -1,0 +1,48 @@
+"""A stream: a message that a vehicle sends by itself. Who may have it how often is `mavlink.streams`' business."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from anafi_mav.drone.events import Message
+from anafi_mav.mavlink import dialect
+from anafi_mav.services.flavours import PX4, Flavour
+from anafi_mav.services.vehicle import Vehicle
+
+
+@dataclass(frozen=True)
+class Times:
+    """When the fields of a message were true, since the gateway started; and for whom it is made."""
+
+    boot_ns: int
+    flavour: Flavour = PX4
+
+    @property
+    def boot_ms(self) -> int:
+        """An uint32 that wraps after 49.7 days, as on every autopilot."""
+        return self.boot_ns // 1_000_000 & 0xFFFFFFFF
+
+    @property
+    def boot_us(self) -> int:
+        return self.boot_ns // 1000
+
+    def for_flavour(self, flavour: Flavour) -> Times:
+        """The same moment, told to clients of another flavour."""
+        return replace(self, flavour=flavour)
+
+
+Builder = Callable[[Vehicle, Times], "dialect.MAVLink_message | None"]
+
+
+@dataclass(frozen=True)
+class Stream:
+    """One message a vehicle sends by itself."""
+
+    build: Builder
+    news: tuple[type[Message], ...] = ()
+    """The drone's events that make it new; none: a state message, repeated at its interval."""
+    on_change: bool = False
+    """A state message that also leaves at once when the vehicle's mode, armed or landed state changes."""
+    flavoured: bool = False
+    """What it says depends on the flavour of who is told."""
