@@ -14,6 +14,7 @@ from anafi_mav.arsdk.controller import CONTROLLER_NAME, CONTROLLER_TYPE, Control
 from anafi_mav.arsdk.device import DeviceSession, OnSession
 from anafi_mav.arsdk.handshake import ConnectRequest, DeviceInfo
 from anafi_mav.arsdk.interface import open_connection
+from anafi_mav.arsdk.mux_udp import UdpTunnel
 from anafi_mav.arsdk.session import OnMessage, reason_of
 from anafi_mav.arsdk.transport import Role, Transport
 from anafi_mav.errors import LinkLost, RemoteProtocolError
@@ -115,6 +116,15 @@ class MuxControllerSession(ControllerSession):
     async def open_tcp(self, host: str, port: int) -> tuple[str, int]:
         """An address on this machine that leads to a port of "drone" or "skycontroller". Raises `LinkLost`."""
         return await self._proxy.open(host, port)
+
+    async def open_udp(self, host: str, on_datagram: Callable[[bytes], None]) -> UdpTunnel:
+        """A UDP socket at the Skycontroller's side, to talk to "skycontroller" or "drone". Raises `LinkLost`."""
+        return await self._proxy.open_udp(host, on_datagram)
+
+    def end(self, reason: str) -> None:
+        """See `Session.end`."""
+        super().end(reason)
+        self._proxy.shut()
 
     async def close(self) -> None:
         """See `Session.close`."""

@@ -1,9 +1,9 @@
-"""TCP connections through the mux: the web server of a drone behind a Skycontroller 4.
+"""TCP connections and datagrams through the mux: the web server and the video of a drone behind a Skycontroller 4.
 
 The controller ("master") asks for a host by name ("drone", "skycontroller"), gets an address, and opens a channel for
 each connection; the device ("slave") connects there and passes bytes both ways. A slave's channel has the number of
 the master's with the highest bit set (libmux mux_channel.c, mux_ip_proxy.c). After each megabyte the sender may ask for
-an acknowledgement and waits for it.
+an acknowledgement and waits for it. The ends of datagrams are in `mux_udp`.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from anafi_mav.arsdk.mux import Control, encode_control, encode_frame
+from anafi_mav.arsdk.mux_udp import REMOTE_UPDATE_ACK, UdpSocket, UdpTunnel
 from anafi_mav.errors import LinkLost
 
 log = logging.getLogger("anafi_mav.arsdk")
@@ -30,7 +31,7 @@ MASTER, SLAVE = 1, 2
 """Types of channel, the first argument of `OPEN`."""
 FIRST_CHANNEL = 1024
 _SLAVE_BIT = 1 << 31
-_TCP = 0
+_TCP, _UDP = 0, 1
 _NOBODY = 0xFFFFFFFF
 
 MAX_CHANNELS = 64
@@ -55,6 +56,10 @@ def _number(address: str) -> int:
     return int.from_bytes(ipaddress.IPv4Address(address).packed, "little")
 
 
+def _text(address: int) -> str:
+    return str(ipaddress.IPv4Address(address.to_bytes(4, "little")))
+
+
 class _Channel:
     """One connection: a TCP stream at one side, a channel at the other."""
 
@@ -69,6 +74,10 @@ class _Channel:
         """Bytes from the other side."""
         if not self.writer.is_closing():
             self.writer.write(data)
+
+    def close(self) -> None:
+        """End the connection. Idempotent."""
+        self.writer.close()
 
     async def pump(self, ask: bool) -> None:
         """Pass on what is read, to its end; `ask` for acknowledgements, which only a master may."""
@@ -93,7 +102,7 @@ class Slave:
         self._carrier = carrier
         self._resolve = resolve
         self._port = port
-        self._channels: dict[int, _Channel | None] = {}
+        self._channels: dict[int, _Channel | UdpSocket | None] = {}
         """By the master's number; None while it is being connected."""
         self._known: set[int] = set()
         """Addresses that we gave away; others are not connected to."""
@@ -119,10 +128,18 @@ class Slave:
                     self._channels[master] = None
                     self._early[master] = bytearray()
                     self._carrier.write_raw(encode_control(OPEN, master | _SLAVE_BIT, SLAVE))
-            case 13 if master in self._channels and message.args[0] == _TCP:
-                task = asyncio.create_task(self._connect(master, message.args[2], message.args[3]))
+            case 13 if self._channels.get(master, master) is None:  # IP_CONNECT, and not connected yet
+                transport, _, where, port = message.args[:4]
+                connecting = self._bind(master, where) if transport == _UDP else self._connect(master, where, port)
+                task = asyncio.create_task(connecting)
                 self._tasks.add(task)
                 task.add_done_callback(self._tasks.discard)
+            case 11 if message.args[0] in self._known:  # REMOTE_UPDATE_REQ
+                held = self._channels.get(master)
+                if isinstance(held, UdpSocket):
+                    where, port = message.args[:2]
+                    held.aim(_text(where), port & 0xFFFF)
+                    self._carrier.write_raw(encode_control(REMOTE_UPDATE_ACK, master | _SLAVE_BIT, where, port))
             case 1 | 14:  # CLOSE, IP_DISCONNECT
                 self._drop(master)
             case 17 if master in self._channels:  # IP_REQ_ACK: what came before has been taken
@@ -137,8 +154,7 @@ class Slave:
             self._early[channel] += data
 
     async def _connect(self, master: int, address: int, port: int) -> None:
-        host = str(ipaddress.IPv4Address(address.to_bytes(4, "little")))
-        slave = master | _SLAVE_BIT
+        host, slave = _text(address), master | _SLAVE_BIT
         try:
             if address not in self._known:
                 raise ConnectionRefusedError("no address of ours")
@@ -149,6 +165,9 @@ class Slave:
             self._drop(master)
             return
         channel = _Channel(self._carrier, slave, reader, writer)
+        if self._channels.get(master, channel) is not None:  # closed meanwhile, or asked for twice
+            writer.close()
+            return
         self._channels[master] = channel
         self._carrier.write_raw(encode_control(IP_CONNECTED, slave))
         channel.put(bytes(self._early.pop(master, b"")))
@@ -159,11 +178,29 @@ class Slave:
                 self._carrier.write_raw(encode_control(IP_DISCONNECTED, slave))
             writer.close()
 
+    async def _bind(self, master: int, address: int) -> None:
+        slave = master | _SLAVE_BIT
+        try:
+            if address not in self._known:
+                raise ConnectionRefusedError("no address of ours")
+            held = await UdpSocket.bind(self._carrier, slave, _text(address))
+        except OSError as error:
+            log.debug("mux: no socket: %s", error)
+            self._carrier.write_raw(encode_control(IP_DISCONNECTED, slave))
+            self._drop(master)
+            return
+        if self._channels.get(master, held) is not None:  # closed meanwhile, or asked for twice
+            held.close()
+            return
+        self._early.pop(master, None)
+        self._channels[master] = held
+        self._carrier.write_raw(encode_control(IP_CONNECTED, slave, held.local_port))
+
     def _drop(self, master: int) -> None:
         self._early.pop(master, None)
         channel = self._channels.pop(master, None)
         if channel is not None:
-            channel.writer.close()
+            channel.close()
 
     async def close(self) -> None:
         """End every connection."""
@@ -179,28 +216,24 @@ class Master:
 
     def __init__(self, carrier: Carrier) -> None:
         self._carrier = carrier
-        self._channels: dict[int, _Channel] = {}
-        self._connected: dict[int, asyncio.Future[None]] = {}
+        self._channels: dict[int, _Channel | UdpTunnel] = {}
+        self._connected: dict[int, asyncio.Future[int]] = {}
+        """Done with the port at the other side, where it has one for us."""
         self._resolving: dict[int, asyncio.Future[int]] = {}
         self._servers: list[asyncio.AbstractServer] = []
+        self._doors: dict[tuple[str, int], tuple[str, int]] = {}
+        """Where on this machine a port behind the mux is found."""
+        self._shut = False
         self._tasks: set[asyncio.Task[None]] = set()
         self._next_channel = FIRST_CHANNEL
         self._next_proxy = 1
 
     async def open(self, host: str, port: int) -> tuple[str, int]:
-        """The address on this machine that leads to a port of "drone" or "skycontroller". Raises `LinkLost`."""
-        proxy, self._next_proxy = self._next_proxy, self._next_proxy + 1
-        answer = self._resolving[proxy] = asyncio.get_running_loop().create_future()
-        payload = host.encode() + b"\0"
-        self._carrier.write_raw(encode_control(RESOLVE_REQ, 0, proxy, _TCP, 0, port, payload=payload))
-        try:
-            address = await asyncio.wait_for(answer, TIMEOUT)
-        except asyncio.TimeoutError:
-            raise LinkLost(f"the Skycontroller does not say where {host} is") from None
-        finally:
-            del self._resolving[proxy]
-        if address == _NOBODY:
-            raise LinkLost(f"the Skycontroller knows no {host}")
+        """The address on this machine that leads to a port of "drone" or "skycontroller"; the same for as long as the
+        connection lasts. Raises `LinkLost`."""
+        if (host, port) in self._doors:
+            return self._doors[host, port]
+        address = await self._resolve(host, _TCP, port)
 
         async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
             task = asyncio.current_task()
@@ -213,15 +246,64 @@ class Master:
                 writer.close()
 
         server = await asyncio.start_server(serve, "127.0.0.1", 0)
+        if self._shut:
+            server.close()
+            raise LinkLost("not connected")
         self._servers.append(server)
         name: tuple[str, int] = server.sockets[0].getsockname()
+        self._doors[host, port] = name
         return name
+
+    async def open_udp(self, host: str, on_datagram: Callable[[bytes], None]) -> UdpTunnel:
+        """A UDP socket at the Skycontroller's side, to talk to "skycontroller" or "drone". Raises `LinkLost`."""
+        address = await self._resolve(host, _UDP, 0)
+        if len(self._channels) >= MAX_CHANNELS:
+            raise LinkLost("too many connections over the mux")
+        number, self._next_channel = self._next_channel, self._next_channel + 1
+        tunnel = UdpTunnel(self._carrier, number, address, on_datagram, lambda: self._end(number))
+        self._channels[number] = tunnel
+        connected = self._connected[number] = asyncio.get_running_loop().create_future()
+        self._carrier.write_raw(encode_control(OPEN, number, MASTER))
+        self._carrier.write_raw(encode_control(IP_CONNECT, number, _UDP, 0, address, 0))
+        try:
+            tunnel.port = await asyncio.wait_for(connected, TIMEOUT)
+        except BaseException as error:
+            tunnel.close()
+            if isinstance(error, asyncio.TimeoutError):
+                raise LinkLost("the Skycontroller opens no socket") from None
+            raise
+        return tunnel
+
+    async def _resolve(self, host: str, transport: int, port: int) -> int:
+        if self._shut:
+            raise LinkLost("not connected")
+        proxy, self._next_proxy = self._next_proxy, self._next_proxy + 1
+        answer: asyncio.Future[int] = asyncio.get_running_loop().create_future()
+        self._resolving[proxy] = answer
+        payload = host.encode() + b"\0"
+        self._carrier.write_raw(encode_control(RESOLVE_REQ, 0, proxy, transport, 0, port, payload=payload))
+        try:
+            address = await asyncio.wait_for(answer, TIMEOUT)
+        except asyncio.TimeoutError:
+            raise LinkLost(f"the Skycontroller does not say where {host} is") from None
+        finally:
+            del self._resolving[proxy]
+        if address == _NOBODY:
+            raise LinkLost(f"the Skycontroller knows no {host}")
+        return address
+
+    def _end(self, number: int) -> None:
+        self._channels.pop(number, None)
+        self._connected.pop(number, None)
+        self._carrier.write_raw(encode_control(IP_DISCONNECT, number))
+        self._carrier.write_raw(encode_control(CLOSE, number, MASTER))
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, address: int, port: int) -> None:
         if len(self._channels) >= MAX_CHANNELS:
             return
         number, self._next_channel = self._next_channel, self._next_channel + 1
-        channel = self._channels[number] = _Channel(self._carrier, number, reader, writer)
+        channel = _Channel(self._carrier, number, reader, writer)
+        self._channels[number] = channel
         connected = self._connected[number] = asyncio.get_running_loop().create_future()
         self._carrier.write_raw(encode_control(OPEN, number, MASTER))
         self._carrier.write_raw(encode_control(IP_CONNECT, number, _TCP, 0, address, port))
@@ -230,14 +312,12 @@ class Master:
                 await asyncio.wait_for(connected, TIMEOUT)
                 await channel.pump(ask=True)
         finally:
-            self._channels.pop(number, None)
-            self._connected.pop(number, None)
-            self._carrier.write_raw(encode_control(IP_DISCONNECT, number))
-            self._carrier.write_raw(encode_control(CLOSE, number, MASTER))
+            self._end(number)
 
     def control(self, message: Control, payload: bytes) -> None:
         """A control message of the mux; what is not the proxy's is ignored."""
         number = message.channel & ~_SLAVE_BIT
+        held = self._channels.get(number)
         if message.id == RESOLVE_ACK:
             answer = self._resolving.get(message.args[0])
             if answer is not None and not answer.done():
@@ -245,15 +325,17 @@ class Master:
         elif message.id == IP_CONNECTED:
             connected = self._connected.get(number)
             if connected is not None and not connected.done():
-                connected.set_result(None)
+                connected.set_result(message.args[0] & 0xFFFF)
         elif message.id == IP_DISCONNECTED:
-            connected, channel = self._connected.get(number), self._channels.get(number)
+            connected = self._connected.get(number)
             if connected is not None and not connected.done():
                 connected.set_exception(LinkLost("nothing listens there"))
-            if channel is not None:
-                channel.writer.close()
-        elif message.id == IP_ACK and number in self._channels:
-            self._channels[number].acknowledged.set()
+            elif held is not None:
+                held.close()
+        elif message.id == IP_ACK and isinstance(held, _Channel):
+            held.acknowledged.set()
+        elif message.id == REMOTE_UPDATE_ACK and isinstance(held, UdpTunnel):
+            held.aimed()
 
     def data(self, channel: int, data: bytes) -> None:
         """Bytes of a channel."""
@@ -261,14 +343,19 @@ class Master:
         if held is not None:
             held.put(data)
 
-    async def close(self) -> None:
-        """Stop listening and end every connection."""
+    def shut(self) -> None:
+        """Stop listening and end every connection. Idempotent."""
+        self._shut = True
         for server in self._servers:
             server.close()
         for channel in tuple(self._channels.values()):
-            channel.writer.close()
+            channel.close()
         for task in tuple(self._tasks):
             task.cancel()
+
+    async def close(self) -> None:
+        """`shut`, and wait until all of it has ended."""
+        self.shut()
         await asyncio.gather(*self._tasks, return_exceptions=True)
         for server in self._servers:
             await server.wait_closed()

@@ -202,3 +202,84 @@ async def test_garbage_at_the_port_ends_nothing() -> None:
         await session.close()
     finally:
         await server.close()
+
+
+# -- datagrams
+
+
+class Echo(asyncio.DatagramProtocol):
+    """What a Skycontroller's video server is to a socket: sends where it was told to, hears who is aimed at it."""
+
+    def __init__(self) -> None:
+        self.heard: list[tuple[bytes, int]] = []
+
+    def connection_made(self, transport: asyncio.DatagramTransport) -> None:  # type: ignore[override]
+        self.transport = transport
+        self.port = transport.get_extra_info("sockname")[1]
+
+    def datagram_received(self, data: bytes, address: tuple[str, int]) -> None:
+        self.heard.append((data, address[1]))
+
+
+async def test_datagrams_over_the_mux() -> None:
+    device, heard = Device(), []
+    server = await mux_link.MuxServer.start("127.0.0.1", port=0, info=INFO, on_session=device.on_session)
+    loop = asyncio.get_running_loop()
+    _, video = await loop.create_datagram_endpoint(Echo, local_addr=("127.0.0.1", 0))
+    _, stranger = await loop.create_datagram_endpoint(Echo, local_addr=("127.0.0.2", 0))
+    session = await mux_link.connect("127.0.0.1", port=server.discovery_port, on_message=lambda message, now: None)
+    try:
+        tunnel = await session.open_udp("skycontroller", heard.append)
+        assert 1024 <= tunnel.port <= 65535
+        stranger.transport.sendto(b"not for us", ("127.0.0.1", tunnel.port))
+        video.transport.sendto(b"frame", ("127.0.0.1", tunnel.port))
+        await until(lambda: bool(heard))
+        tunnel.send(b"nowhere yet")
+        await tunnel.aim(video.port)
+        tunnel.send(b"report")
+        await until(lambda: bool(video.heard))
+        assert video.heard == [(b"report", tunnel.port)]
+        assert heard == [b"frame"]
+
+        tunnel.close()
+        tunnel.close()
+        tunnel.send(b"too late")
+        again = await session.open_udp("skycontroller", heard.append)  # behind the closing, so that it is through
+        video.transport.sendto(b"too late", ("127.0.0.1", tunnel.port))
+        video.transport.sendto(b"second", ("127.0.0.1", again.port))
+        await until(lambda: len(heard) > 1)
+        assert heard == [b"frame", b"second"]
+        assert len(video.heard) == 1
+        with pytest.raises(LocalProtocolError):
+            await again.aim(0)
+        with pytest.raises(LinkLost, match="knows no moon"):
+            await session.open_udp("moon", heard.append)
+    finally:
+        await session.close()
+        await server.close()
+        video.transport.close()
+        stranger.transport.close()
+    assert again.closed
+    with pytest.raises(LinkLost):
+        await session.open_udp("skycontroller", heard.append)
+
+
+async def test_what_was_opened_over_the_mux_ends_with_it() -> None:
+    device = Device()
+    server = await mux_link.MuxServer.start("127.0.0.1", port=0, info=INFO, on_session=device.on_session)
+    web = await asyncio.start_server(lambda reader, writer: writer.close(), "127.0.0.1", 0)
+    session = await mux_link.connect("127.0.0.1", port=server.discovery_port, on_message=lambda message, now: None)
+    try:
+        port = web.sockets[0].getsockname()[1]
+        door = await session.open_tcp("drone", port)
+        assert await session.open_tcp("drone", port) == door
+        tunnel = await session.open_udp("skycontroller", lambda data: None)
+        await server.close()
+        await asyncio.wait_for(asyncio.shield(session.lost), 3.0)
+        assert tunnel.closed
+        with pytest.raises(ConnectionRefusedError):
+            await asyncio.open_connection(*door)
+    finally:
+        await session.close()
+        await server.close()
+        web.close()
