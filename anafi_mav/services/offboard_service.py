@@ -20,5 +20,5 @@ class OffboardService(Service):
         setpoint = attitude_setpoint(inbound.message)
         if isinstance(setpoint, str):
             self.host.complain(f"Setpoint refused: {setpoint}")
-        elif not self.host.vehicle.setpoint(client_of(inbound), setpoint):
+        elif not self.host.vehicle.offboard.setpoint(client_of(inbound), setpoint):
             self.host.complain("Setpoints refused: another program flies")

@@ -7,7 +7,6 @@ and keeps it honest: mode and armed state follow the drone, a verb returns when 
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import enum
 import logging
 import math
@@ -17,12 +16,13 @@ from typing import Any
 
 from anafi_mav import geo, units
 from anafi_mav.clock import Clock
-from anafi_mav.drone import Drone, PilotingCommand
+from anafi_mav.drone import Drone
 from anafi_mav.drone.events import AlertLevel, FlyingState, FlyingStateChanged, ForcedLandingReason, PlayingState
-from anafi_mav.errors import AnafiMavError, CommandRejected, LinkLost
+from anafi_mav.errors import AnafiMavError, CommandRejected
 from anafi_mav.services.height import HeightReference
 from anafi_mav.services.modes import FlightMode
-from anafi_mav.services.offboard import AttitudeSetpoint, OffboardStream, State, yaw_rate_towards
+from anafi_mav.services.offboard_flight import OffboardFlight
+from anafi_mav.services.refusal import Refused as Refused
 from anafi_mav.services.statustext import Severity
 
 logger = logging.getLogger(__name__)
@@ -35,10 +35,6 @@ ARM_WAIT = 10.0
 
 CLIMB_WAIT = 15.0
 """s for the drone to hover after it took off, before the climb to the asked height is given up."""
-
-HEADING_AGE = 1.0
-"""s after which the drone's heading is not known any more: it comes five times a second. A heading loop that closes on
-an older one turns for ever."""
 
 LOWEST = 1.0
 """m above take-off: where an ANAFI hovers by itself after take-off. Lower targets are refused, never clamped."""
@@ -68,16 +64,6 @@ class Health(enum.Enum):
     EMERGENCY = 6
 
 
-class Refused(AnafiMavError):
-    """We do not do this. `lasting` tells a request that is wrong in itself from one that comes at a bad moment."""
-
-    def __init__(self, reason: str, *, lasting: bool = False, critical: bool = False) -> None:
-        super().__init__(reason)
-        self.reason = reason
-        self.lasting = lasting
-        self.critical = critical
-
-
 @dataclass(frozen=True)
 class Place:
     """A point on the map."""
@@ -101,14 +87,13 @@ class Vehicle:
     ) -> None:
         self.drone = drone
         self.height = HeightReference()
-        self.offboard = OffboardStream()
         self.takeoff_height = 2.5
         """m above take-off for a take-off that names no height (PX4's default of MIS_TAKEOFF_ALT)."""
         self.origin: Place | None = None
         """Origin of the local frame: where the drone last took off, or first stood with a fix."""
         self._clock = clock
         self.allow_kill = allow_kill
-        self._text = text
+        self.text = text
         self._changed = changed
         self._end_others = end_others
         self._selected = FlightMode.HOLD
@@ -117,13 +102,12 @@ class Vehicle:
         self._pending_takeoff: tuple[float, Hashable] | None = None
         """Height of a take-off that waits for its client to arm, and the client."""
         self._terminating = False
-        self._attitude_at = -math.inf
         self._last_flying: FlyingState | None = None
         self._disarm_timer: asyncio.TimerHandle | None = None
         self._pending_timer: asyncio.TimerHandle | None = None
-        self._offboard_timer: asyncio.TimerHandle | None = None
         self._background: asyncio.Task[None] | None = None
         self._tasks: set[asyncio.Task[None]] = set()
+        self.offboard = OffboardFlight(self, clock)
 
     # What the vehicle is.
 
@@ -246,7 +230,7 @@ class Vehicle:
     async def disarm(self, *, force: bool) -> None:
         """Disarm on the ground. In the air only `force` with `allow_kill` does it: the motors stop, the drone falls."""
         if self.on_ground:
-            await self._take_over()
+            await self.take_over()
             await self.drone.piloting.land()  # a take-off that is on its way to the drone must not follow
             if not self.on_ground:
                 raise Refused("Disarm refused: the drone had just taken off, it lands")
@@ -265,7 +249,7 @@ class Vehicle:
                 lasting=True,
                 critical=True,
             )
-        await self._take_over()
+        await self.take_over()
         self._terminating = True
         try:
             await self.drone.piloting.emergency()
@@ -309,12 +293,12 @@ class Vehicle:
             self._pending_takeoff = (height, client)
             self._set_timer("_pending_timer", ARM_WAIT, self._takeoff_lapsed)
             return
-        await self._take_over()
+        await self.take_over()
         await self._begin_takeoff(height)
 
     async def land(self) -> None:
         """Land here. On the ground there is nothing to do."""
-        await self._take_over()
+        await self.take_over()
         await self.drone.piloting.land()
 
     async def return_home(self) -> None:
@@ -323,7 +307,7 @@ class Vehicle:
             raise Refused("Return refused: the drone is on the ground")
         if self.flying_state in _LANDING:
             raise Refused("Return refused: the drone is landing")
-        await self._take_over()
+        await self.take_over()
         await self.drone.piloting.return_home()
 
     async def hold(self, mode: FlightMode = FlightMode.HOLD) -> None:
@@ -334,12 +318,12 @@ class Vehicle:
             raise Refused(f"{mode.value} refused: the drone returns home by itself")
         if self.drone.piloting.about_to_fly:
             raise Refused(f"{mode.value} refused: the drone is about to take off")
-        await self._take_over()
+        await self.take_over()
         if not self.on_ground:
             await self.drone.piloting.stop()
             # One asked for through somebody else, or before the link was lost. Raises when it is the drone's own.
             await self.drone.piloting.cancel_return_home()
-        self._select(mode)
+        self.select(mode)
 
     async def reposition(
         self, place: Place | None, ato: float | None, yaw: float | None, speed: float | None = None
@@ -364,11 +348,11 @@ class Vehicle:
             self._check_place(place)
         if self.returning_by_itself:
             raise Refused("Goto refused: the drone returns home by itself")
-        await self._take_over()
+        await self.take_over()
         await self.drone.piloting.cancel_return_home()
         if not self.in_air or self.returning:  # no await from here to the moveTo
             raise Refused("Goto refused: the drone does something else now")
-        self._select(FlightMode.HOLD)
+        self.select(FlightMode.HOLD)
         target = place or here
         await self.drone.piloting.move_to(
             target.latitude,
@@ -405,92 +389,13 @@ class Vehicle:
             case FlightMode.TAKEOFF:
                 await self.take_off(None, client)
             case FlightMode.OFFBOARD:
-                await self._engage_offboard(client)
+                await self.offboard.engage(client)
             case FlightMode.MISSION:
                 raise Refused("Mission refused: there is no mission")
             case FlightMode.TERMINATED:
                 await self.terminate()
             case FlightMode.FOLLOW | FlightMode.ORBIT:
                 raise Refused(f"{mode.value} refused: it is begun by a command", lasting=True)
-
-    # Offboard.
-
-    def setpoint(self, sender: Hashable, setpoint: AttitudeSetpoint) -> bool:
-        """A program's newest setpoint; flies the drone at once when mode Offboard is engaged and it is the pilot.
-
-        False: it is not listened to, another program flies.
-        """
-        if not self.offboard.receive(sender, setpoint, self._clock.monotonic()):
-            return False
-        if self._offboard_timer is None:
-            self._watch_setpoints()
-        if self.offboard.state is State.ENGAGED:
-            self._fly_setpoint()
-        return True
-
-    async def _engage_offboard(self, client: Hashable) -> None:
-        if not self.in_air:
-            raise Refused("Offboard refused: take off first, setpoints do not lift an ANAFI off the ground")
-        if self.returning:
-            raise Refused("Offboard refused: the drone returns home")
-        if self.drone.controller.pilot_flies:
-            raise Refused("Offboard refused: the pilot at the Skycontroller flies")
-        if self.drone.piloting.limits is None:
-            raise Refused("Offboard refused: the drone has not reported what full tilt and speed are")
-        if self.offboard.candidate(client, self._clock.monotonic()) is None:
-            raise Refused("Offboard refused: no setpoints arrive")
-        await self._take_over()
-        await self.drone.piloting.cancel_return_home()
-        pilot = self.offboard.candidate(client, self._clock.monotonic())
-        if pilot is None or not self.in_air or self.returning:
-            raise Refused("Offboard refused: the setpoints stopped, or the drone is not free to fly them")
-        self.offboard.engage(pilot)
-        self._watch_setpoints()  # the pilot's, which may be older than the newest of all
-        self.drone.piloting.hover()  # ends a moveTo or moveBy of ours, which would ignore sticks
-        self._select(FlightMode.OFFBOARD)
-        self._fly_setpoint()
-
-    def _fly_setpoint(self) -> None:
-        """Send the pilot's newest setpoint, with what the heading loop makes of it at this moment."""
-        now = self._clock.monotonic()
-        setpoint, limits = self.offboard.setpoint, self.drone.piloting.limits
-        if setpoint is None or limits is None:
-            return
-        if self.drone.controller.pilot_flies:
-            # He moved a stick. That he let go of it again does not give the drone back to the program.
-            self._select(FlightMode.HOLD)
-            self._text(Severity.WARNING, "Offboard ended: the pilot at the Skycontroller flies")
-            return
-        attitude = self.drone.piloting.state.attitude
-        turn = setpoint.yaw_rate
-        if attitude is not None and now - self._attitude_at < HEADING_AGE:
-            turn = yaw_rate_towards(setpoint, attitude.yaw)
-        self.drone.piloting.pilot(
-            PilotingCommand(
-                roll_deg=setpoint.roll * units.DEG_PER_RAD,
-                pitch_deg=setpoint.pitch * units.DEG_PER_RAD,
-                yaw_rate_dps=turn * units.DEG_PER_RAD,
-                climb_mps=setpoint.climb * limits.climb_mps,
-            ),
-            age=self.offboard.age(now),
-        )
-
-    def _offboard_expired(self) -> None:
-        self._offboard_timer = None
-        now = self._clock.monotonic()
-        if self.offboard.expire(now):
-            self.drone.piloting.hover()
-            self._select(FlightMode.HOLD)
-            self._text(Severity.WARNING, "Offboard setpoints stopped: hovering")
-        self._watch_setpoints()
-
-    def _watch_setpoints(self) -> None:
-        """Come back when those that matter have been silent for too long."""
-        self._cancel_timer("_offboard_timer")
-        deadline = self.offboard.deadline()
-        if deadline is not None:
-            delay = max(deadline - self._clock.monotonic(), 0.0)
-            self._set_timer("_offboard_timer", delay, self._offboard_expired)
 
     # What the drone reports.
 
@@ -503,11 +408,11 @@ class Vehicle:
         if state in _ON_GROUND and before is not None:
             self._armed = False
             self._forget_takeoff()
-            self._end_offboard()
+            self.offboard.end()
             self._end_climb()
             self._selected = FlightMode.HOLD
         elif state in _LANDING:
-            self._end_offboard()
+            self.offboard.end()
             self._end_climb()
         elif state in _TAKING_OFF and before in _ON_GROUND:
             self.height.take_off()
@@ -532,14 +437,12 @@ class Vehicle:
 
     def on_attitude(self) -> None:
         """A new attitude: the heading loop of an engaged offboard session closes on it."""
-        self._attitude_at = self._clock.monotonic()
-        if self.offboard.state is State.ENGAGED:
-            self._fly_setpoint()
+        self.offboard.on_attitude()
 
     def on_return(self) -> None:
         """The drone's return began, ended or changed: setpoints and the climb after a take-off never fight it."""
         if self.returning:
-            self._end_offboard()
+            self.offboard.end()
             self._end_climb()
         self._changed()
 
@@ -550,16 +453,14 @@ class Vehicle:
         self._armed = False
         self._selected = FlightMode.HOLD
         self._last_flying = None
-        self._cancel_timer("_offboard_timer")
-        self.offboard = OffboardStream()
+        self.offboard.link_down()
         self._terminating = False
-        self._attitude_at = -math.inf
         for task in tuple(self._tasks):
             task.cancel()
 
     async def let_go(self) -> None:
         """The gateway ends: give up whatever is under way and leave a flying drone hovering on its own."""
-        await self._take_over()
+        await self.take_over()
         if self.drone.piloting.about_to_fly:
             await self.drone.piloting.land()
         if not self.on_ground:
@@ -567,25 +468,21 @@ class Vehicle:
 
     # Machinery.
 
-    def _select(self, mode: FlightMode) -> None:
+    def select(self, mode: FlightMode) -> None:
         if mode is not FlightMode.OFFBOARD:
-            self._end_offboard()
+            self.offboard.end()
         self._selected = mode
         self._changed()
 
-    def _end_offboard(self) -> None:
-        """Whoever flew by setpoints flies no more, and the last one does not fly on."""
-        if self.offboard.state is State.ENGAGED:
-            self.offboard.disengage()
-            self._selected = FlightMode.HOLD
-            with contextlib.suppress(LinkLost):
-                self.drone.piloting.pilot(None)
+    def forget_mode(self) -> None:
+        """What was chosen is over: until something else is, the vehicle holds."""
+        self._selected = FlightMode.HOLD
 
     def _end_climb(self) -> None:
         if self._climbing:
             self._cancel_background()
 
-    async def _take_over(self) -> None:
+    async def take_over(self) -> None:
         """A new intention replaces whatever was going on, and waits until that has let go of the drone.
 
         Without the wait a move that is given up could cancel the one that follows it. Raises `Refused` while the
@@ -600,7 +497,7 @@ class Vehicle:
     def _let_go(self) -> list[asyncio.Task[None]]:
         """End what this vehicle does by itself; the tasks that are still about to end."""
         self._forget_takeoff()
-        self._end_offboard()
+        self.offboard.end()
         return self._cancel_background()
 
     def _forget_takeoff(self) -> None:
@@ -609,7 +506,7 @@ class Vehicle:
 
     def _takeoff_lapsed(self) -> None:
         self._forget_takeoff()
-        self._text(Severity.WARNING, "Takeoff forgotten: nobody armed")
+        self.text(Severity.WARNING, "Takeoff forgotten: nobody armed")
 
     def _cancel_background(self) -> list[asyncio.Task[None]]:
         task, self._background, self._climbing = self._background, None, False
@@ -644,7 +541,7 @@ class Vehicle:
         try:
             await self._lift_off()
         except AnafiMavError as error:
-            self._text(Severity.ERROR, f"Takeoff failed: {error}")
+            self.text(Severity.ERROR, f"Takeoff failed: {error}")
             return
         await self._climb(height)
 
@@ -663,7 +560,7 @@ class Vehicle:
             if abs(height - present) > 0.1:
                 await self.drone.piloting.move_by(0.0, 0.0, present - height, 0.0)
         except AnafiMavError as error:
-            self._text(Severity.ERROR, f"Climb to {height:g} m given up: {error}")
+            self.text(Severity.ERROR, f"Climb to {height:g} m given up: {error}")
         finally:
             if self._background is asyncio.current_task():
                 self._climbing, self._background = False, None
@@ -675,7 +572,7 @@ class Vehicle:
     def _auto_disarm(self) -> None:
         if self._armed and self.on_ground:
             self._armed = False
-            self._text(Severity.INFO, "Disarmed: no take-off followed")
+            self.text(Severity.INFO, "Disarmed: no take-off followed")
             self._changed()
 
     def _set_timer(self, name: str, delay: float, callback: Callable[[], None]) -> None:
