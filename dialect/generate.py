@@ -2,11 +2,13 @@
 
 pymavlink carries its definitions as XML inside the package and a generator, mavgen, that turns them into a Python
 module. mavgen refuses a second definition of a message, so the overlay is merged into copies of the XML files first.
-Run ``python dialect/generate.py`` to make the module in place; the build hook does the same for wheels.
+Run ``python dialect/generate.py`` to make the module in place; the build hook does the same for wheels. With
+``--c FOLDER`` it writes a set of C headers instead; ``FOLDER/anafi/mavlink.h`` is the one to include.
 """
 
 from __future__ import annotations
 
+import argparse
 import contextlib
 import copy
 import io
@@ -35,22 +37,40 @@ class OverlayError(Exception):
 def generate(output: Path = OUTPUT) -> Path:
     """Write the module and return its path. Raises `OverlayError`; the old module is then untouched."""
     with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        root = write_definitions(folder)
-        module = folder / "dialect.py"
-        options = mavgen.Opts(str(module), wire_protocol=mavparse.PROTOCOL_2_0, language="Python3", validate=True)
-        chatter = io.StringIO()
-        with contextlib.redirect_stdout(chatter), contextlib.redirect_stderr(chatter):
-            try:
-                done = mavgen.mavgen(options, [str(root)])
-            except SystemExit as refusal:  # its argument is the reason
-                done = False
-                chatter.write(str(refusal))
-        if not done or not module.is_file():
-            raise OverlayError(f"mavgen refused the definitions:\n{chatter.getvalue()}")
+        module = Path(name) / "dialect.py"
+        _run_mavgen(module, "Python3")
         text = module.read_text(encoding="utf-8")
     output.write_text(text, encoding="utf-8")
     return output
+
+
+def generate_c(folder: Path) -> Path:
+    """Write MAVLink's C headers into `folder`, which need not exist; returns the one to include.
+
+    Raises `OverlayError`.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    _run_mavgen(folder, "C")
+    return folder / Path(ROOT).stem / "mavlink.h"
+
+
+def _run_mavgen(output: Path, language: str) -> None:
+    """`output` is a file or a folder, as the language wants it."""
+    chatter = io.StringIO()
+    with (
+        tempfile.TemporaryDirectory() as name,
+        contextlib.redirect_stdout(chatter),
+        contextlib.redirect_stderr(chatter),
+    ):
+        root = write_definitions(Path(name))
+        options = mavgen.Opts(str(output), wire_protocol=mavparse.PROTOCOL_2_0, language=language, validate=True)
+        try:
+            done = mavgen.mavgen(options, [str(root)])
+        except SystemExit as refusal:  # its argument is the reason
+            done = False
+            chatter.write(str(refusal))
+    if not done or not output.exists():
+        raise OverlayError(f"mavgen refused the definitions:\n{chatter.getvalue()}")
 
 
 def write_definitions(folder: Path) -> Path:
@@ -145,5 +165,12 @@ def _child(parent: ET.Element, tag: str) -> ET.Element:
     return child
 
 
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Makes the MAVLink dialect of anafi-mav.")
+    parser.add_argument("--c", type=Path, metavar="FOLDER", help="write C headers there, not the Python module")
+    folder = parser.parse_args().c
+    sys.stdout.write(f"{generate() if folder is None else generate_c(folder)}\n")
+
+
 if __name__ == "__main__":
-    sys.stdout.write(f"{generate()}\n")
+    main()

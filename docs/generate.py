@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from anafi_mav.config import schema
 
 HERE = Path(__file__).parent
 TESTS = HERE.parent / "tests" / "unit"
+DIALECT_XML = HERE.parent / "dialect" / "anafi.xml"
 sys.path.insert(0, str(TESTS))
 
 CONFIGURATION = """\
@@ -138,7 +140,76 @@ def seed() -> str:
     return "".join(parts)
 
 
-PAGES: dict[str, Callable[[], str]] = {"configuration.md": configuration, "seed.md": seed}
+DIALECT = """\
+# The dialect
+
+<!-- Made by docs/generate.py from dialect/anafi.xml. -->
+
+The gateway speaks MAVLink's `ardupilotmega` and `development` dialects and the messages below, for what an ANAFI and
+its Skycontroller tell and MAVLink has no field for. Component 1 sends them, to a client that has asked for them:
+`MAV_CMD_REQUEST_MESSAGE` for one, `MAV_CMD_SET_MESSAGE_INTERVAL` for a stream, whose interval is an upper bound of its
+rate, for a message leaves when the drone has told something new.
+
+A value that the drone has not told is the field's "unknown". Enums keep Parrot's numbers; a number that is not listed
+is one that a later firmware has added.
+
+Python programs take the definitions from the package:
+
+```python
+from anafi_mav.mavlink import dialect
+from pymavlink import mavutil
+
+mavutil.mavlink = dialect
+connection = mavutil.mavlink_connection("udpin:127.0.0.1:14550", dialect=None)
+```
+
+C programs include the headers that `python dialect/generate.py --c FOLDER` writes: `FOLDER/anafi/mavlink.h`. Other
+languages are made by pymavlink's `mavgen` from `dialect/anafi.xml` beside pymavlink's own definitions.
+
+| id | message | what it tells |
+|---|---|---|
+"""
+
+
+def _text(element: ET.Element) -> str:
+    return " ".join((element.text or "").split())
+
+
+def _described(element: ET.Element) -> str:
+    description = element.find("description")
+    assert description is not None, f"{element.get('name')} has no description"
+    return _text(description)
+
+
+def dialect() -> str:
+    """docs/dialect.md."""
+    root = ET.parse(DIALECT_XML).getroot()
+    messages, enums = list(root.iterfind("messages/message")), list(root.iterfind("enums/enum"))
+    parts = [DIALECT]
+    for message in messages:
+        name = message.get("name") or ""
+        first = _described(message).partition(". ")[0].rstrip(".")
+        parts.append(f"| {message.get('id')} | [`{name}`](#{name.lower()}) | {first} |\n")
+    parts.append("\n## Messages\n")
+    for message in messages:
+        parts.append(f"\n### {message.get('name')}\n\nId {message.get('id')}. {_described(message)}\n\n")
+        parts.append("| field | type | unit | unknown | meaning |\n|---|---|---|---|---|\n")
+        for field in message.iterfind("field"):
+            enum = field.get("enum")
+            unit = f"[`{enum}`](#{enum.lower()})" if enum else field.get("units") or "–"
+            unknown = f"`{field.get('invalid')}`" if field.get("invalid") else "–"
+            parts.append(f"| `{field.get('name')}` | `{field.get('type')}` | {unit} | {unknown} | {_text(field)} |\n")
+    parts.append("\n## Enums\n")
+    for enum in enums:
+        bits = " Bits, which can be combined." if enum.get("bitmask") == "true" else ""
+        parts.append(f"\n### {enum.get('name')}\n\n{_described(enum)}{bits}\n\n")
+        parts.append("| value | name | meaning |\n|---|---|---|\n")
+        for entry in enum.iterfind("entry"):
+            parts.append(f"| {entry.get('value')} | `{entry.get('name')}` | {_described(entry)} |\n")
+    return "".join(parts)
+
+
+PAGES: dict[str, Callable[[], str]] = {"configuration.md": configuration, "dialect.md": dialect, "seed.md": seed}
 
 
 def main(arguments: list[str]) -> int:
