@@ -25,10 +25,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from anafi_mav.sim.columns import Array, DelayLine, bounded, limit
 from anafi_mav.sim.model import Airframe
 from anafi_mav.units import RAD_PER_DEG, wrap_pi
-
-Array = NDArray[np.float64]
 
 STEP = 0.005
 """s; 200 steps a second."""
@@ -69,6 +68,10 @@ _HOLD_SPEED = 2.0
 """m/s at most back to a place that a gust has blown the drone from."""
 _UNREST = 0.06
 """Share of the wind's speed that counts as no motion: gusts shake a drone that keeps its place."""
+
+_TILT_SIGNS: Array = np.array([[1.0], [-1.0]]) / G
+"""A push to the right needs a roll to the right, a push forward a pitch down."""
+_PUSH_SIGNS: Array = np.array([[G], [-G]])
 
 
 class Mode(enum.IntEnum):
@@ -123,6 +126,47 @@ class Pose:
         return math.atan2(east, north), math.hypot(north, east)
 
 
+_STICK, _FIRST, _DURING = int(Turn.STICK), int(Turn.FIRST), int(Turn.DURING)
+"""As numpy compares them: looking up a member of an enum costs more than the comparison, 200 times a second."""
+
+
+class _Orders:
+    """What the drones are told, worked out once and not in every step: masks over the fleet, and which are empty."""
+
+    def __init__(self, motion: Motion) -> None:
+        mode = motion.mode
+        off, sticks = mode == int(Mode.OFF), mode == int(Mode.STICKS)
+        steered = sticks | (mode == int(Mode.LAND))
+        self.moving = mode == int(Mode.MOVE)
+        self.take_off = mode == int(Mode.TAKE_OFF)
+        self.land = mode == int(Mode.LAND)
+        self.fall = mode == int(Mode.FALL)
+        self.floored = self.moving | sticks
+        airborne = ~(off | self.fall)
+        self.thrust = airborne.astype(np.float64)
+        self.resting = off
+        self.aimless = off | sticks
+        """Nowhere to arrive."""
+        self.dropping = self.land | self.fall
+        self.climb: Array = np.where(sticks, motion.stick_climb, 0.0)
+        self.turn: Array = np.where(steered, motion.stick_yaw, 0.0)
+        self.by_stick = motion.turn == _STICK
+        self.pushed = steered & (motion.stick_push != 0.0)
+        self.hovering = self.take_off | (steered & ~self.pushed.any(axis=0))
+        self.any = not off.all()
+        self.any_resting = bool(off.any())
+        self.any_moving = bool(self.moving.any())
+        self.any_first = bool((self.moving & (motion.turn == _FIRST)).any())
+        self.any_take_off = bool(self.take_off.any())
+        self.any_land = bool(self.land.any())
+        self.any_fall = bool(self.fall.any())
+        self.any_dropping = self.any_fall or self.any_land
+        self.any_pushed = bool(self.pushed.any())
+        self.any_fence = bool((motion.fence_radius < _NO_FENCE).any())
+        self.all_floored = bool(self.floored.all())
+        self.all_airborne = bool(airborne.all())
+
+
 class Motion:
     """The fleet's motion. `step()` advances all of it; a `Body` is the handle of one drone."""
 
@@ -163,125 +207,147 @@ class Motion:
         self.holding: NDArray[np.bool_] = np.zeros(count, np.bool_)
         """A hover in wind keeps the place `hold`."""
         self.drag: Array = np.array([G * math.tan(FULL_TILT) / frame.max_speed**2 for frame in airframes])
-        self.yaw_line = _DelayLine([frame.yaw_delay for frame in airframes])
-        self.climb_line = _DelayLine([frame.climb_delay for frame in airframes])
+        self._body_push: Array = np.zeros((2, count))
+        """Forward and right, while a step is worked out."""
+        self._orders = _Orders(self)
+        self.stale = False
+        """Somebody was told something: the orders must be worked out anew."""
+        self.yaw_line = DelayLine([frame.yaw_delay for frame in airframes], STEP)
+        self.climb_line = DelayLine([frame.climb_delay for frame in airframes], STEP)
+
+    def _current_orders(self) -> _Orders:
+        if self.stale:
+            self._orders, self.stale = _Orders(self), False
+        return self._orders
 
     def step(self) -> None:
         """Advance every drone by `STEP`. A fleet that stands on the ground costs nothing."""
-        if not self.mode.any():
+        orders = self._current_orders()
+        if not orders.any:
             return
-        mode, velocity = self.mode, self.velocity
+        velocity = self.velocity
         horizontal = velocity[:2]
-        moving = mode == Mode.MOVE
-        steered = (mode == Mode.STICKS) | (mode == Mode.LAND)
         up = -self.position[2]
 
-        wanted: Array = np.zeros((2, self.count))
-        climb = np.where(mode == Mode.STICKS, self.stick_climb, 0.0)
-        turn = np.where(steered, self.stick_yaw, 0.0)
-        if moving.any():
-            wanted, climb, turn = self._follow(moving, up, climb, turn)
+        wanted: Array | None = None
+        climb, turn = orders.climb, orders.turn
+        if orders.any_moving:
+            wanted, climb, turn = self._follow(orders, up)
         if self.windy:
-            wanted = self._keep_place(wanted, mode)
-        climb = np.where(mode == Mode.TAKE_OFF, np.clip(1.5 * (TAKE_OFF_HEIGHT - up), -0.5, 1.0), climb)
-        climb = np.where(mode == Mode.LAND, -np.minimum(self.land_speed, 0.5 + 0.3 * up), climb)
+            wanted = self._keep_place(orders, wanted)
+        if orders.any_take_off:
+            climb = np.where(orders.take_off, bounded(1.5 * (TAKE_OFF_HEIGHT - up), -0.5, 1.0), climb)
+        if orders.any_land:
+            climb = np.where(orders.land, -np.minimum(self.land_speed, 0.5 + 0.3 * up), climb)
         climb = np.minimum(climb, np.maximum(_CLIMB_GAIN * (self.ceiling - up), 0.0))
-        floored = moving | (mode == Mode.STICKS)
-        climb = np.where(floored, np.maximum(climb, np.minimum(_CLIMB_GAIN * (FLOOR - up), 0.0)), climb)
+        lowest = np.minimum(_CLIMB_GAIN * (FLOOR - up), 0.0)
+        climb = np.maximum(climb, lowest if orders.all_floored else np.where(orders.floored, lowest, climb))
 
-        self._tilt_and_push(wanted, horizontal, steered, mode)
+        self._tilt_and_push(orders, wanted, horizontal)
         self.yaw_rate += (self.yaw_line.push(turn) - self.yaw_rate) * (STEP / _YAW_TAU)
         self.yaw += self.yaw_rate * STEP
-        driven = (-self.climb_line.push(climb) - velocity[2]) * (STEP / _CLIMB_TAU)
-        velocity[2] += np.where(mode == Mode.FALL, G * STEP, driven)
+        driven = (self.climb_line.push(climb) + velocity[2]) * (-STEP / _CLIMB_TAU)
+        velocity[2] += np.where(orders.fall, G * STEP, driven) if orders.any_fall else driven
         self.position += velocity * STEP
-        self._touch_ground()
+        self._touch_ground(orders)
 
-    def _follow(self, moving: Any, up: Array, climb: Array, turn: Array) -> tuple[Array, Array, Array]:
-        """Velocity, climb and yaw rate that bring the moving drones to their targets."""
+    def _follow(self, orders: _Orders, up: Array) -> tuple[Array, Array, Array]:
+        """Velocity, climb and yaw rate that bring the moving drones to their targets; those of the others besides."""
+        moving = going = orders.moving
         way = self.target[:2] - self.position[:2]
         distance = np.hypot(way[0], way[1])
         heading_error = self.target_yaw - self.yaw
-        waiting = (self.turn == Turn.FIRST) & (np.abs(heading_error) > _ALIGNED)
-        self.turn[(self.turn == Turn.FIRST) & ~waiting] = Turn.DURING
-        going = moving & ~waiting
+        if orders.any_first:
+            first = self.turn == _FIRST
+            waiting = first & (np.abs(heading_error) > _ALIGNED)
+            self.turn[first & ~waiting] = _DURING
+            going = moving & ~waiting
+            orders.any_first = bool(waiting.any())
         speed = np.minimum(self.move_speed, np.minimum(_PLACE_GAIN * distance, np.sqrt(2.0 * _APPROACH * distance)))
         wanted = np.where(going, way / np.maximum(distance, 1e-9) * speed, 0.0)
-        rise = np.clip(_CLIMB_GAIN * (-self.target[2] - up), -self.move_climb, self.move_climb)
-        climb = np.where(going, rise, climb)
-        turning = np.clip(_YAW_GAIN * heading_error, -self.move_yaw, self.move_yaw)
-        turn = np.where(moving, np.where(self.turn == Turn.STICK, self.stick_yaw, turning), turn)
+        rise = bounded(_CLIMB_GAIN * (-self.target[2] - up), -self.move_climb, self.move_climb)
+        climb = np.where(going, rise, orders.climb)
+        turning = bounded(_YAW_GAIN * heading_error, -self.move_yaw, self.move_yaw)
+        turn = np.where(moving, np.where(orders.by_stick, self.stick_yaw, turning), orders.turn)
         return wanted, climb, turn
 
-    def _keep_place(self, wanted: Array, mode: Any) -> Array:
+    def _keep_place(self, orders: _Orders, wanted: Array | None) -> Array:
         """Velocity that brings hovering drones back to where they began to hover."""
-        hovering = (mode == Mode.TAKE_OFF) | (
-            ((mode == Mode.STICKS) | (mode == Mode.LAND)) & (self.stick_push == 0.0).all(axis=0)
-        )
+        hovering = orders.hovering
         slow = (self.velocity[:2] ** 2).sum(axis=0) < _HOLD_BELOW**2
         fresh = hovering & slow & ~self.holding
         self.hold = np.where(fresh, self.position[:2], self.hold)
         self.holding = hovering & (self.holding | slow)
-        back = _limit(_PLACE_GAIN * (self.hold - self.position[:2]), _HOLD_SPEED)
-        return np.where(self.holding, back, wanted)
+        back = limit(_PLACE_GAIN * (self.hold - self.position[:2]), _HOLD_SPEED)
+        return np.where(self.holding, back, 0.0 if wanted is None else wanted)
 
-    def _tilt_and_push(self, wanted: Array, horizontal: Array, steered: Any, mode: Any) -> None:
-        """Turn wishes into a tilt command, let the tilt follow it, and accelerate by the tilt reached."""
+    def _tilt_and_push(self, orders: _Orders, wanted: Array | None, horizontal: Array) -> None:
+        """Turn wishes into a tilt command, let the tilt follow it, and accelerate by the tilt reached.
+
+        `wanted` None: everybody wants to stop.
+        """
         through_air = horizontal
         if self.windy:
             through_air = horizontal - np.where(self.position[2] < 0.0, self.wind, 0.0)
-        speed = np.hypot(through_air[0], through_air[1])
-        resistance = self.drag * speed * through_air
-        push = _limit(_SPEED_GAIN * (wanted - horizontal), _BRAKING) + resistance
+        resistance = self.drag * np.hypot(through_air[0], through_air[1]) * through_air
+        wish = horizontal * -_SPEED_GAIN if wanted is None else _SPEED_GAIN * (wanted - horizontal)
+        push = limit(wish, _BRAKING) + resistance
         # Braking never needs to push onwards: at high speed the drag alone stops faster than `_BRAKING`.
-        stopping = (wanted[0] == 0.0) & (wanted[1] == 0.0)
-        onwards = (push * horizontal).sum(axis=0) > 0.0
+        onwards = push[0] * horizontal[0] + push[1] * horizontal[1] > 0.0
+        if wanted is not None:
+            onwards &= (wanted[0] == 0.0) & (wanted[1] == 0.0)
         if self.windy:
             onwards &= (horizontal**2).sum(axis=0) > _RUSH**2
-        push = np.where(stopping & onwards, 0.0, push)
+        if np.count_nonzero(onwards):
+            push = np.where(onwards, 0.0, push)
         cos, sin = np.cos(self.yaw), np.sin(self.yaw)
-        forward, right = push[0] * cos + push[1] * sin, push[1] * cos - push[0] * sin
-        forward = np.where(steered & (self.stick_push[0] != 0.0), self.stick_push[0], forward)
-        right = np.where(steered & (self.stick_push[1] != 0.0), self.stick_push[1], right)
-        if (self.fence_radius < _NO_FENCE).any():
-            forward, right = self._fenced(forward, right, cos, sin, horizontal, resistance)
+        body = self._body_push
+        body[0] = push[0] * cos + push[1] * sin
+        body[1] = push[1] * cos - push[0] * sin
+        if orders.any_pushed:
+            np.copyto(body, self.stick_push, where=orders.pushed)
+        if orders.any_fence:
+            self._fenced(body, cos, sin, horizontal, resistance)
 
-        command = np.stack((np.arctan(right / G), -np.arctan(forward / G)))
-        np.clip(command, -FULL_TILT, FULL_TILT, out=command)
-        falling = mode == Mode.FALL
-        airborne = (mode != Mode.OFF) & ~falling
-        command = np.where(airborne, command, 0.0)
+        command = np.arctan(body[::-1] * _TILT_SIGNS)
+        command = bounded(command, -FULL_TILT, FULL_TILT)
+        if not orders.all_airborne:
+            command = command * orders.thrust
         spin = _TILT_OMEGA**2 * (command - self.tilt) - 2.0 * _TILT_DAMPING * _TILT_OMEGA * self.tilt_rate
-        self.tilt_rate += spin * STEP
-        np.clip(self.tilt_rate, -self.tilt_rate_limit, self.tilt_rate_limit, out=self.tilt_rate)
+        self.tilt_rate = bounded(self.tilt_rate + spin * STEP, -self.tilt_rate_limit, self.tilt_rate_limit)
         self.tilt += self.tilt_rate * STEP
 
-        right_push, forward_push = G * np.tan(self.tilt[0]), -G * np.tan(self.tilt[1])
-        thrust = np.where(airborne, 1.0, 0.0)
-        horizontal[0] += (thrust * (forward_push * cos - right_push * sin) - resistance[0]) * STEP
-        horizontal[1] += (thrust * (forward_push * sin + right_push * cos) - resistance[1]) * STEP
+        right, forward = np.tan(self.tilt) * _PUSH_SIGNS
+        if not orders.all_airborne:
+            right, forward = right * orders.thrust, forward * orders.thrust
+        horizontal -= resistance * STEP
+        horizontal[0] += (forward * cos - right * sin) * STEP
+        horizontal[1] += (forward * sin + right * cos) * STEP
 
-    def _fenced(
-        self, forward: Array, right: Array, cos: Array, sin: Array, horizontal: Array, resistance: Array
-    ) -> tuple[Array, Array]:
-        """The push without what would carry a drone over its fence."""
+    def _fenced(self, push: Array, cos: Array, sin: Array, horizontal: Array, resistance: Array) -> None:
+        """Take from the push (forward, right) what would carry a drone over its fence."""
         out = self.position[:2] - self.fence_centre
         distance = np.maximum(np.hypot(out[0], out[1]), 1e-9)
         out = out / distance
         margin = np.maximum(self.fence_radius - distance - 0.5, 0.0)
         allowed = np.minimum(_PLACE_GAIN * margin, np.sqrt(2.0 * _APPROACH * margin))
-        speed_out = (horizontal * out).sum(axis=0)
-        most = np.clip(_SPEED_GAIN * (allowed - speed_out), -_BRAKING, G) + (resistance * out).sum(axis=0)
+        speed_out = horizontal[0] * out[0] + horizontal[1] * out[1]
+        most = bounded(_SPEED_GAIN * (allowed - speed_out), -_BRAKING, G)
+        most += resistance[0] * out[0] + resistance[1] * out[1]
+        forward, right = push
         north, east = forward * cos - right * sin, forward * sin + right * cos
         excess = np.maximum(north * out[0] + east * out[1] - most, 0.0)
         north, east = north - excess * out[0], east - excess * out[1]
-        return north * cos + east * sin, east * cos - north * sin
+        push[0] = north * cos + east * sin
+        push[1] = east * cos - north * sin
 
-    def _touch_ground(self) -> None:
+    def _touch_ground(self, orders: _Orders) -> None:
         """Nothing goes through the ground; what lies on it without flying does not move."""
         below = self.position[2] > 0.0
+        if not orders.any_resting and not np.count_nonzero(below):
+            return
         self.position[2] = np.where(below, 0.0, self.position[2])
-        resting = (self.mode == Mode.OFF) | (below & ((self.mode == Mode.LAND) | (self.mode == Mode.FALL)))
+        resting = orders.resting | (below & orders.dropping)
         if resting.any():
             self.velocity[:, resting] = 0.0
             self.tilt[:, resting] = 0.0
@@ -296,21 +362,26 @@ class Motion:
         return slow
 
     def _slow(self) -> Any:
-        return (self.velocity**2).sum(axis=0) < (_STILL + self._unrest()) ** 2
+        north, east, down = self.velocity
+        return north * north + east * east + down * down < (_STILL + self._unrest()) ** 2
 
     def _unrest(self) -> Any:
         return _UNREST * np.hypot(self.wind[0], self.wind[1]) if self.windy else 0.0
 
     def arrived(self) -> list[bool]:
         """Per drone: the present mode has got where it wanted to (always true for OFF and STICKS)."""
-        gap = self.position - self.target
-        slow = self._slow()
-        there = ((gap**2).sum(axis=0) < (_REACHED + self._unrest()) ** 2) & slow
-        aligned = (self.turn == Turn.STICK) | (np.abs(self.target_yaw - self.yaw) < _ALIGNED / 2.0)
-        up = -self.position[2]
-        done = np.where(self.mode == Mode.MOVE, there & aligned & (self.turn != Turn.FIRST), True)
-        done = np.where(self.mode == Mode.TAKE_OFF, (up >= TAKE_OFF_HEIGHT - 0.05) & slow, done)
-        done = np.where((self.mode == Mode.LAND) | (self.mode == Mode.FALL), up <= 0.0, done)
+        orders = self._current_orders()
+        done: Any = orders.aimless
+        if orders.any_moving:
+            gap = self.position - self.target
+            there = ((gap**2).sum(axis=0) < (_REACHED + self._unrest()) ** 2) & self._slow()
+            aligned = orders.by_stick | (np.abs(self.target_yaw - self.yaw) < _ALIGNED / 2.0)
+            done = np.where(orders.moving, there & aligned & (self.turn != _FIRST), done)
+        if orders.any_take_off:
+            high = self.position[2] <= 0.05 - TAKE_OFF_HEIGHT
+            done = np.where(orders.take_off, high & self._slow(), done)
+        if orders.any_dropping:
+            done = np.where(orders.dropping, self.position[2] >= 0.0, done)
         result: list[bool] = done.tolist()
         return result
 
@@ -346,6 +417,7 @@ class Body:
 
     def _enter(self, mode: Mode) -> None:
         self._motion.mode[self._index] = mode
+        self._motion.stale = True
         if mode is not Mode.STICKS and mode is not Mode.LAND:
             self.sticks(0.0, 0.0, 0.0, 0.0)
 
@@ -379,10 +451,12 @@ class Body:
         motion.stick_push[1, i] = G * math.tan(roll)
         motion.stick_yaw[i] = yaw_rate
         motion.stick_climb[i] = climb
+        motion.stale = True
 
     def stick_yaw(self, yaw_rate: float) -> None:
         """The yaw stick alone (rad/s)."""
         self._motion.stick_yaw[self._index] = yaw_rate
+        self._motion.stale = True
 
     def move(
         self,
@@ -418,6 +492,7 @@ class Body:
         """Keep within `radius` m of `centre` (north, east); None removes the fence."""
         self._motion.fence_radius[self._index] = _NO_FENCE if radius is None else radius
         self._motion.fence_centre[:, self._index] = centre
+        self._motion.stale = True
 
     def blow(self, north: float, east: float) -> None:
         """Wind: the air moves with this velocity (m/s) where the drone is."""
@@ -441,32 +516,3 @@ class Body:
         motion.position[:, i] = north, east, 0.0
         motion.velocity[:, i] = 0.0
         motion.yaw[i] = yaw
-
-
-class _DelayLine:
-    """A pure delay per drone, in whole steps."""
-
-    def __init__(self, delays: Sequence[float]) -> None:
-        self._steps = np.array([max(1, round(delay / STEP)) for delay in delays])
-        self._columns = np.arange(len(delays))
-        self._ring: Array = np.zeros((int(self._steps.max(initial=1)) + 1, len(delays)))
-        self._now = 0
-
-    def clear(self, column: int) -> None:
-        """Nothing is on its way any more."""
-        self._ring[:, column] = 0.0
-
-    def push(self, values: Array) -> Array:
-        """Put in what is commanded now, take out what was commanded `delay` ago."""
-        length = len(self._ring)
-        self._ring[self._now] = values
-        out: Array = self._ring[(self._now - self._steps) % length, self._columns]
-        self._now = (self._now + 1) % length
-        return out
-
-
-def _limit(vectors: Array, length: float) -> Array:
-    """Each column shortened to at most `length`."""
-    norms = np.maximum(np.hypot(vectors[0], vectors[1]), 1e-12)
-    shortened: Array = vectors * np.minimum(1.0, length / norms)
-    return shortened
