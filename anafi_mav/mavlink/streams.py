@@ -26,6 +26,8 @@ DEFAULT_INTERVALS: Mapping[int, float] = {
     mav.MAVLINK_MSG_ID_BATTERY_STATUS: 1.0,
     mav.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 0.5,
     mav.MAVLINK_MSG_ID_HOME_POSITION: 2.0,
+    mav.MAVLINK_MSG_ID_CURRENT_MODE: 2.0,
+    mav.MAVLINK_MSG_ID_AVAILABLE_MODES_MONITOR: 3.3,
 }
 """Seconds by message id: what ground stations need to look alive, and a 57600 baud radio can carry."""
 

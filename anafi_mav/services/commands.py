@@ -11,7 +11,7 @@ from collections.abc import Hashable
 from dataclasses import dataclass
 
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.flavours import PX4, Flavour
+from anafi_mav.services.flavours import PX4, Flavour, mode_of_standard
 from anafi_mav.services.modes import HOVERING, FlightMode
 
 RESEND_WINDOW = 3.5
@@ -27,6 +27,7 @@ MAX_CLIENTS = 64
 PROGRESS_AFTER, PROGRESS_EVERY = 0.3, 0.8
 """s until the first IN_PROGRESS and between them: MAVSDK resends at 0.5 s, every client gives up after 1-3 s (R9)."""
 
+_MODE_COMMANDS = (dialect.MAV_CMD_DO_SET_MODE, dialect.MAV_CMD_DO_SET_STANDARD_MODE)
 _STOPPING_MODES = (*HOVERING, FlightMode.LAND)
 
 _UNSET_INT = (2**31 - 1, -(2**31))
@@ -55,7 +56,9 @@ class Command:
 
     @property
     def mode(self) -> FlightMode | None:
-        """The mode that DO_SET_MODE names; None for one that we do not have."""
+        """The mode that DO_SET_MODE or DO_SET_STANDARD_MODE names; None for one that we do not have."""
+        if self.id == dialect.MAV_CMD_DO_SET_STANDARD_MODE:
+            return mode_of_standard(self.params[0])
         return self.flavour.mode_of_parameters(self.params[1], self.params[2])
 
     @property
@@ -63,7 +66,7 @@ class Command:
         """It ends something and begins nothing: hold, land, disarm, cut the motors. It may be carried out twice."""
         if self.id == dialect.MAV_CMD_DO_REPOSITION:
             return all(math.isnan(value) for value in (self.params[3], self.x, self.y, self.z))
-        if self.id == dialect.MAV_CMD_DO_SET_MODE:
+        if self.id in _MODE_COMMANDS:
             return self.mode in _STOPPING_MODES
         if self.id == dialect.MAV_CMD_COMPONENT_ARM_DISARM:
             return self.params[0] == 0.0
@@ -72,7 +75,7 @@ class Command:
     @property
     def returns(self) -> bool:
         """It asks for the way home: when that is flown already, asking again changes nothing."""
-        if self.id == dialect.MAV_CMD_DO_SET_MODE:
+        if self.id in _MODE_COMMANDS:
             return self.mode is FlightMode.RETURN
         return self.id == dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH
 

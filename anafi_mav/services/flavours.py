@@ -172,6 +172,26 @@ STANDARD = Flavour(
 FLAVOURS = {flavour.name: flavour for flavour in (PX4, ARDUPILOT, STANDARD)}
 
 
+STANDARD_MODES: dict[FlightMode, int] = {
+    FlightMode.POSITION: dialect.MAV_STANDARD_MODE_POSITION_HOLD,
+    FlightMode.ORBIT: dialect.MAV_STANDARD_MODE_ORBIT,
+    FlightMode.RETURN: dialect.MAV_STANDARD_MODE_SAFE_RECOVERY,
+    FlightMode.MISSION: dialect.MAV_STANDARD_MODE_MISSION,
+    FlightMode.LAND: dialect.MAV_STANDARD_MODE_LAND,
+    FlightMode.TAKEOFF: dialect.MAV_STANDARD_MODE_TAKEOFF,
+}
+"""MAV_STANDARD_MODE of each mode, the same in all flavours; what is missing is non-standard (conformance A3)."""
+
+_BY_STANDARD: dict[float, FlightMode] = {
+    number: mode for mode, number in STANDARD_MODES.items() if mode is not FlightMode.ORBIT
+}
+
+
+def mode_of_standard(number: float) -> FlightMode | None:
+    """The mode that MAV_CMD_DO_SET_STANDARD_MODE names; None when we do not have it, or it is begun by a command."""
+    return _BY_STANDARD.get(number)
+
+
 def flavour_of(channel: Channel) -> Flavour:
     """The flavour of a channel's endpoint; PX4 where its URL names none."""
     return FLAVOURS[channel.flavour or PX4.name]

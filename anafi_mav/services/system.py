@@ -23,6 +23,7 @@ from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.identity import IdentityService
 from anafi_mav.services.message_service import MessageService
 from anafi_mav.services.modes import FlightMode
+from anafi_mav.services.modes_service import ModesService
 from anafi_mav.services.offboard_service import OffboardService
 from anafi_mav.services.parameters import ParameterService
 from anafi_mav.services.plan_service import PlanService
@@ -37,6 +38,7 @@ logger = logging.getLogger(__name__)
 
 SERVICES: tuple[type[Service], ...] = (
     IdentityService,
+    ModesService,
     TelemetryService,
     ParameterService,
     PlanService,

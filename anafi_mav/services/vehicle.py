@@ -89,8 +89,14 @@ class Vehicle:
         self.height = HeightReference()
         self.takeoff_height = 2.5
         """m above take-off for a take-off that names no height (PX4's default of MIS_TAKEOFF_ALT)."""
+        self.hand_launch = False
+        """Arming starts the motors and waits for the drone to be thrown (a parameter; Parrot's UserTakeOff)."""
+        self.cruise_speed: float | None = None
+        """m/s over ground that moves keep to; None: the drone's own (MAV_CMD_DO_CHANGE_SPEED)."""
         self.origin: Place | None = None
         """Origin of the local frame: where the drone last took off, or first stood with a fix."""
+        self.intended: FlightMode | None = None
+        """The mode that a client last asked for by name or number."""
         self._clock = clock
         self.allow_kill = allow_kill
         self.text = text
@@ -197,6 +203,16 @@ class Vehicle:
             return Place(home.latitude, home.longitude)
         return self.place if self.on_ground else None
 
+    @property
+    def enterable_modes(self) -> frozenset[FlightMode]:
+        """Modes that a client may ask for as things stand. Hold, Land and Return are always among them: whether the
+        drone can, it says itself."""
+        modes = {FlightMode.HOLD, FlightMode.GUIDED, FlightMode.POSITION, FlightMode.TAKEOFF}
+        modes |= {FlightMode.LAND, FlightMode.RETURN, FlightMode.OFFBOARD}
+        if self.place is not None:
+            modes.add(FlightMode.FOLLOW)
+        return frozenset(modes)
+
     def prearm_problems(self) -> list[str]:
         """Why the drone would not take off, in sentences; empty when it would."""
         problems: list[str] = []
@@ -212,6 +228,8 @@ class Vehicle:
     async def arm(self, client: Hashable = None) -> None:
         """Accept arming. An ANAFI has no such state: nothing turns until a take-off; it lapses after `AUTO_DISARM`.
 
+        With `hand_launch` the motors do turn, and the drone flies as soon as it leaves the hand.
+
         A take-off that this client asked for begins now. Another client's does not: whoever arms to look at something
         must not find propellers turning.
         """
@@ -219,6 +237,10 @@ class Vehicle:
             return
         if problems := self.prearm_problems():
             raise Refused("PreArm: " + "; ".join(problems))
+        if self.hand_launch:
+            await self._take_over()
+            await self.drone.piloting.hand_launch()
+            return
         self._armed = True
         self._rearm_disarm_timer()
         self._changed()
@@ -236,6 +258,10 @@ class Vehicle:
                 raise Refused("Disarm refused: the drone had just taken off, it lands")
             self._armed = False
             self._changed()
+            return
+        if self.flying_state == FlyingState.USERTAKEOFF:
+            await self._take_over()
+            await self.drone.piloting.cancel_hand_launch()
             return
         if not force:
             raise Refused("Disarm refused: the drone is in the air")
@@ -326,11 +352,19 @@ class Vehicle:
         self.select(mode)
 
     async def reposition(
-        self, place: Place | None, ato: float | None, yaw: float | None, speed: float | None = None
+        self,
+        place: Place | None,
+        ato: float | None,
+        yaw: float | None,
+        speed: float | None = None,
+        mode: FlightMode = FlightMode.HOLD,
     ) -> None:
-        """Go to a place, height (m above take-off) and heading (rad); None keeps what is. Returns when it moves."""
+        """Go to a place, height (m above take-off) and heading (rad); None keeps what is. Returns when it moves.
+
+        `speed` (m/s over ground) counts for this move only. `mode` is Hold or Guided.
+        """
         if place is None and ato is None and yaw is None and speed is None:
-            await self.hold()
+            await self.hold(mode)
             return
         if not self.in_air:
             raise Refused("Goto refused: the drone is not in the air")
@@ -359,7 +393,7 @@ class Vehicle:
             target.longitude,
             ato,
             heading_deg=None if yaw is None else units.wrap_360(yaw * units.DEG_PER_RAD),
-            horizontal_speed=speed,
+            horizontal_speed=self.cruise_speed if speed is None else speed,
         )
 
     def _check_place(self, place: Place) -> None:
@@ -379,6 +413,7 @@ class Vehicle:
 
     async def set_mode(self, mode: FlightMode, client: Hashable = None) -> None:
         """Whatever doing this mode means. `client` is who asks, for Offboard flies its setpoints."""
+        self.intended = mode
         match mode:
             case FlightMode.HOLD | FlightMode.GUIDED | FlightMode.POSITION:
                 await self.hold(mode)
@@ -452,6 +487,7 @@ class Vehicle:
         self._let_go()
         self._armed = False
         self._selected = FlightMode.HOLD
+        self.intended = None
         self._last_flying = None
         self.offboard.link_down()
         self._terminating = False
@@ -524,7 +560,8 @@ class Vehicle:
 
     async def _begin_takeoff(self, height: float) -> None:
         await self._lift_off()
-        self._selected = FlightMode.HOLD
+        if self._selected is not FlightMode.GUIDED:
+            self._selected = FlightMode.HOLD
         self._start_background(self._climb(height))
 
     async def _lift_off(self) -> None:

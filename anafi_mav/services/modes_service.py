@@ -1,0 +1,153 @@
+"""Standard modes: which modes there are, which one holds, and one way to choose them whatever the autopilot.
+
+AVAILABLE_MODES, AVAILABLE_MODES_MONITOR, CURRENT_MODE, MAV_CMD_DO_SET_STANDARD_MODE (MAVLink standard_modes.md,
+conformance A2, A3, C10).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.node import Inbound
+from anafi_mav.services.actions import change_mode
+from anafi_mav.services.commands import Command
+from anafi_mav.services.flavours import ARDUPILOT, STANDARD_MODES, Flavour, flavour_of
+from anafi_mav.services.modes import FlightMode
+from anafi_mav.services.service import Action, Answer, Host, Request, Service
+from anafi_mav.services.stream import Stream, Times
+from anafi_mav.services.vehicle import Vehicle
+
+COPTER_NAMES = {
+    FlightMode.POSITION: "Loiter",
+    FlightMode.HOLD: "Brake",
+    FlightMode.GUIDED: "Guided",
+    FlightMode.MISSION: "Auto",
+    FlightMode.RETURN: "RTL",
+    FlightMode.LAND: "Land",
+    FlightMode.FOLLOW: "Follow",
+    FlightMode.ORBIT: "Circle",
+}
+"""The modes of the ArduPilot flavour, in the order they are listed, by ArduCopter's names."""
+
+PX4_NAMES = {
+    mode: mode.value
+    for mode in (
+        FlightMode.POSITION,
+        FlightMode.HOLD,
+        FlightMode.MISSION,
+        FlightMode.RETURN,
+        FlightMode.LAND,
+        FlightMode.TAKEOFF,
+        FlightMode.OFFBOARD,
+        FlightMode.FOLLOW,
+        FlightMode.ORBIT,
+        FlightMode.TERMINATED,
+    )
+}
+"""The modes of the other flavours, in the order they are listed."""
+
+_BY_ITSELF = (FlightMode.ORBIT, FlightMode.TERMINATED)
+"""Shown, but entered by a command only."""
+
+_ADVANCED = (FlightMode.OFFBOARD, FlightMode.GUIDED)
+_AUTOMATIC = (
+    FlightMode.MISSION,
+    FlightMode.RETURN,
+    FlightMode.LAND,
+    FlightMode.TAKEOFF,
+    FlightMode.FOLLOW,
+    FlightMode.ORBIT,
+)
+
+
+def names(flavour: Flavour) -> Mapping[FlightMode, str]:
+    """The modes that clients of a flavour are shown, in their order."""
+    return COPTER_NAMES if flavour is ARDUPILOT else PX4_NAMES
+
+
+def properties(mode: FlightMode, vehicle: Vehicle) -> int:
+    """MAV_MODE_PROPERTY bits of a mode, as things stand."""
+    bits = 0
+    if mode in _ADVANCED:
+        bits |= dialect.MAV_MODE_PROPERTY_ADVANCED
+    if mode in _BY_ITSELF or mode not in vehicle.enterable_modes:
+        bits |= dialect.MAV_MODE_PROPERTY_NOT_USER_SELECTABLE
+    if mode in _AUTOMATIC:
+        bits |= dialect.MAV_MODE_PROPERTY_AUTO_MODE
+    return bits
+
+
+def available(vehicle: Vehicle, flavour: Flavour) -> list[dialect.MAVLink_message]:
+    """AVAILABLE_MODES of every mode."""
+    listed = names(flavour)
+    return [
+        dialect.MAVLink_available_modes_message(
+            len(listed),
+            index,
+            STANDARD_MODES.get(mode, dialect.MAV_STANDARD_MODE_NON_STANDARD),
+            flavour.custom_mode(mode),
+            properties(mode, vehicle),
+            name.encode(),
+        )
+        for index, (mode, name) in enumerate(listed.items(), 1)
+    ]
+
+
+def current_mode(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message:
+    """CURRENT_MODE. The intended mode is the one last asked for by a message that names modes; 0 before that."""
+    mode, intended, flavour = vehicle.mode, vehicle.intended, times.flavour
+    return dialect.MAVLink_current_mode_message(
+        STANDARD_MODES.get(mode, dialect.MAV_STANDARD_MODE_NON_STANDARD),
+        flavour.custom_mode(mode),
+        0 if intended is None else flavour.custom_mode(intended),
+    )
+
+
+class ModesService(Service):
+    """Tells and sets modes; what they do is the vehicle's business."""
+
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self._offered: frozenset[FlightMode] | None = None
+        self._sequence = 0
+
+    def requests(self) -> Mapping[int, Request]:
+        return {dialect.MAVLINK_MSG_ID_AVAILABLE_MODES: self._available}
+
+    def actions(self) -> Mapping[int, Action]:
+        return {dialect.MAV_CMD_DO_SET_STANDARD_MODE: self._set_standard}
+
+    def streams(self) -> Mapping[int, Stream]:
+        return {
+            dialect.MAVLINK_MSG_ID_CURRENT_MODE: Stream(current_mode, on_change=True, flavoured=True),
+            dialect.MAVLINK_MSG_ID_AVAILABLE_MODES_MONITOR: Stream(self._monitor),
+        }
+
+    def link_up(self) -> None:
+        self._offered = self.host.vehicle.enterable_modes
+
+    def tick(self, now: float) -> None:
+        offered = self.host.vehicle.enterable_modes
+        if offered != self._offered:
+            self._offered = offered
+            self._sequence = (self._sequence + 1) % 256
+            self.host.send(self._monitor(self.host.vehicle, self.host.times()))
+
+    def _monitor(self, vehicle: Vehicle, times: Times) -> dialect.MAVLink_message:
+        return dialect.MAVLink_available_modes_monitor_message(self._sequence)
+
+    def _available(self, inbound: Inbound, command: Command) -> Answer:
+        """param2: which one, counted from 1; 0 or unset: all."""
+        modes = available(self.host.vehicle, flavour_of(inbound.channel))
+        index = command.params[1]
+        if math.isnan(index) or index == 0:
+            return modes
+        if index not in range(1, len(modes) + 1):
+            return dialect.MAV_RESULT_DENIED
+        return modes[int(index) - 1]
+
+    async def _set_standard(self, command: Command) -> None:
+        """MAV_CMD_DO_SET_STANDARD_MODE: param1 MAV_STANDARD_MODE."""
+        await change_mode(self.host.vehicle, command.mode, command.client)
