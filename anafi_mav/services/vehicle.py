@@ -238,7 +238,7 @@ class Vehicle:
         if problems := self.prearm_problems():
             raise Refused("PreArm: " + "; ".join(problems))
         if self.hand_launch:
-            await self._take_over()
+            await self.take_over()
             await self.drone.piloting.hand_launch()
             return
         self._armed = True
@@ -260,7 +260,7 @@ class Vehicle:
             self._changed()
             return
         if self.flying_state == FlyingState.USERTAKEOFF:
-            await self._take_over()
+            await self.take_over()
             await self.drone.piloting.cancel_hand_launch()
             return
         if not force:
