@@ -170,10 +170,14 @@ class CommandService(Service):
     def _cancel(self, inbound: Inbound) -> None:
         """COMMAND_CANCEL: end a running action of that number, whoever began it; its sender gets CANCELLED.
 
-        Without one there is nothing to say (MAVLink command.md). What has been accepted is not taken back.
+        Without one there is nothing to say (MAVLink command.md). What has been accepted is not taken back, and what
+        cannot be called off honestly goes on to its own answer.
         """
         for task, running in tuple(self._running.items()):
-            if running.answer is not None and running.answer[1].command.id == inbound.message.command:
+            if running.answer is None:
+                continue
+            command = running.answer[1].command
+            if command.id == inbound.message.command and command.revocable:
                 task.cancel()
 
     def _explain(self, error: AnafiMavError) -> int:

@@ -79,6 +79,15 @@ class Command:
             return self.mode is FlightMode.RETURN
         return self.id == dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH
 
+    @property
+    def revocable(self) -> bool:
+        """COMMAND_CANCEL may end it. Not an order to stop, which somebody else must not call off; and not what a drone
+        that has heard it does whatever we say then, so that "cancelled" would be a lie: to take off, to return."""
+        begins = self.mode if self.id == dialect.MAV_CMD_DO_SET_MODE else None
+        if self.id == dialect.MAV_CMD_NAV_TAKEOFF or begins in (FlightMode.TAKEOFF, FlightMode.TERMINATED):
+            return False
+        return not self.stops and not self.returns
+
     def same_as(self, other: Command) -> bool:
         """Equal, with NaN equal to NaN."""
         return (self.id, self.frame) == (other.id, other.frame) and all(

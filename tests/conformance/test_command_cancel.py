@@ -1,0 +1,102 @@
+"""COMMAND_CANCEL: what is called off does not happen, and what happens is not said to be called off."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from support.mav import NAN, Client
+from support.trouble import (
+    ACCEPTED,
+    ARM,
+    CANCELLED,
+    GOTO,
+    PX4_HOLD,
+    RTL,
+    SET_MODE,
+    TAKEOFF_CMD,
+    being_tried,
+    deaf,
+    goto,
+    heard,
+    now_mute,
+    until,
+    watched,
+)
+from support.world import HOME, RETURN, world
+
+from anafi_mav import geo
+from anafi_mav.mavlink import dialect
+
+MAV_CMD_DO_FLIGHTTERMINATION = 185
+
+
+def call_off(client: Client, command: int) -> None:
+    client.send(dialect.MAVLink_command_cancel_message(1, 1, command))
+
+
+async def test_a_goto_that_is_called_off_is_not_flown() -> None:
+    async with world(speed=1.0) as w:
+        await w.take_off()
+        deaf(w, 1.5)
+        mark = w.client.mark()
+        place = geo.destination(*HOME[:2], 40.0, 0.0)
+        w.client.send_command(GOTO, -1, 1, 0, NAN, frame=6, x=place[0], y=place[1], z=10.0)
+        await being_tried(w.client, mark, GOTO)
+        call_off(w.client, GOTO)
+        assert await until(w.client, mark, 1) == [(GOTO, CANCELLED)]
+        await w.drone.wait_log(lambda e: e.kind == "command" and e.name.endswith("CancelMoveTo"))
+        assert heard(w, "moveTo") == []
+
+
+@pytest.mark.parametrize("order", [(ARM, 0.0, 21196.0), (MAV_CMD_DO_FLIGHTTERMINATION, 1.0)])
+async def test_cutting_the_motors_cannot_be_called_off(order: tuple[Any, ...]) -> None:
+    async with world(allow_kill=True) as w:
+        other = await w.connect(sysid=250)
+        await w.take_off()
+        deaf(w, 1.5)
+        mark = w.client.mark()
+        w.client.send_command(*order)
+        await being_tried(w.client, mark, order[0])
+        call_off(other, order[0])
+        assert await until(w.client, mark, 1) == [(order[0], ACCEPTED)]
+        assert w.drone.flying_state.name in ("EMERGENCY", "LANDED")
+
+
+async def test_a_take_off_that_the_drone_has_heard_cannot_be_called_off() -> None:
+    async with world(speed=1.0) as w:
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        muted = now_mute(w, "ardrone3.Piloting.TakeOff", 0.7)
+        mark = w.client.mark()
+        w.client.send_command(TAKEOFF_CMD, x=0.0, y=0.0, z=5.0)
+        await muted
+        call_off(w.client, TAKEOFF_CMD)
+        assert await until(w.client, mark, 1) == [(TAKEOFF_CMD, ACCEPTED)]
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "takingoff")
+
+
+async def test_a_return_that_the_drone_has_heard_cannot_be_called_off() -> None:
+    async with world(speed=1.0) as w:
+        await w.take_off()
+        muted = now_mute(w, "rth.return_to_home", 0.5)
+        mark = w.client.mark()
+        w.client.send_command(RTL)
+        await muted
+        call_off(w.client, RTL)
+        assert await until(w.client, mark, 1) == [(RTL, ACCEPTED)]
+        await w.client.heartbeat(lambda beat: beat.custom_mode == RETURN)
+
+
+async def test_an_order_to_stop_is_not_called_off_by_somebody_else() -> None:
+    async with world(speed=1.0) as w:
+        other = await w.connect(sysid=250)
+        await w.take_off()
+        assert await goto(w, 80.0, 10.0) == ACCEPTED
+        deaf(w, 1.5)
+        mark = w.client.mark()
+        w.client.send_command(SET_MODE, *PX4_HOLD)
+        await being_tried(w.client, mark, SET_MODE)
+        call_off(other, SET_MODE)
+        assert await until(w.client, mark, 1) == [(SET_MODE, ACCEPTED)]
+        await watched(0.2)
+        assert heard(w, "CancelMoveTo") == ["CancelMoveTo"]
