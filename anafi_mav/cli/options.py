@@ -10,6 +10,9 @@ SLOWEST, FASTEST = 0.1, 20.0
 """Simulated seconds per second that a world is let run at."""
 
 
+_UNITS = {"k": 1000, "M": 1000**2, "G": 1000**3}
+
+
 def integer(flag: str, text: str, wanted: str) -> int:
     """Raises `ConfigError`."""
     try:
@@ -27,6 +30,12 @@ def number(flag: str, text: str, wanted: str) -> float:
     if not math.isfinite(found):
         raise ConfigError(flag, f"expected {wanted}, got {text!r}")
     return found
+
+
+def size(flag: str, text: str) -> int:
+    """Bytes, with k, M or G behind for a thousand, a million or a billion of them. Raises `ConfigError`."""
+    factor = _UNITS.get(text[-1:], 1)
+    return integer(flag, text if factor == 1 else text[:-1], "a number of bytes like 500k or 16G") * factor
 
 
 def speed(text: str) -> float:

@@ -7,18 +7,20 @@ import asyncio
 import contextlib
 import logging
 import signal
-from collections.abc import Callable, Coroutine, Sequence
+from collections.abc import Callable, Coroutine, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
+from anafi_mav.cli import options
 from anafi_mav.cli.addresses import Reservations, spot
 from anafi_mav.cli.child import SimulatorProcess
 from anafi_mav.cli.terminal import complain, say
 from anafi_mav.config import Config, DroneConfig, SimConfig, from_mapping, load, remarks
 from anafi_mav.errors import ConfigError
 from anafi_mav.gateway import Gateway
+from anafi_mav.sim import scenario
 
 READY_LIMIT = 15.0
 """s after which "ready" is said though a drone has not answered: its connection takes 3 s at most, its settings and
@@ -194,6 +196,7 @@ def place(config: Config, reservations: Reservations) -> tuple[Config, dict[str,
         "speed": first.speed,
         "seed": next((sim.seed for sim in simulated.values() if sim.seed is not None), None),
         "drones": [_entry(config.drones[index], sim, *places[index]) for index, sim in simulated.items()],
+        "scenarios": _scenarios(simulated, {index: address for index, (address, _) in places.items()}),
     }
     return msgspec.structs.replace(config, drones=drones), fleet
 
@@ -210,4 +213,24 @@ def _entry(drone: DroneConfig, sim: SimConfig, address: str, http_port: int) -> 
         "versions": (1, sim.protocol),
         "telemetry_rate": sim.telemetry_rate,
         "skycontroller": sim.skycontroller,
+        "storage": options.size("storage", sim.storage) if isinstance(sim.storage, str) else sim.storage,
+        "wind": {} if sim.wind is None else _without_none(msgspec.structs.asdict(sim.wind)),
     }
+
+
+def _without_none(values: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in values.items() if value is not None}
+
+
+def _scenarios(simulated: Mapping[int, SimConfig], addresses: Mapping[int, str]) -> dict[str, str]:
+    """The scenario files by address, each looked into now, so that a mistake is told before anything is started."""
+    paths: dict[str, str] = {}
+    for index, sim in simulated.items():
+        if sim.scenario is None:
+            continue
+        try:
+            scenario.load(Path(sim.scenario)).check_drones(set(addresses.values()))
+        except ConfigError as error:
+            raise ConfigError(f"drones[{index}].sim.scenario", str(error)) from error
+        paths[addresses[index]] = str(Path(sim.scenario).absolute())
+    return paths

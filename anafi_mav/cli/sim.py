@@ -26,8 +26,6 @@ from anafi_mav.sim.wind import CALM, WindSpec
 MAX_COUNT = 254
 """Drones of one process: the hosts of one /24, where their addresses live."""
 
-_UNITS = {"k": 1000, "M": 1000**2, "G": 1000**3}
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `anafi-mav sim`. Their values are checked by `run`, for one clear line each."""
@@ -77,10 +75,8 @@ def run(arguments: argparse.Namespace) -> int:
         asyncio.run(_run(_from_fleet(arguments.fleet), arguments.log, arguments.stdin_watch))
         return 0
     fleet = _from_options(arguments)
-    wind = CALM if arguments.wind is None else _wind(arguments.wind)
-    events = None if arguments.scenario is None else _scenario(arguments.scenario, fleet)
     try:
-        asyncio.run(_run(fleet, arguments.log, arguments.stdin_watch, wind, events))
+        asyncio.run(_run(fleet, arguments.log, arguments.stdin_watch))
     except ConfigError as error:
         if error.key_path.startswith("drones"):  # the only thing about one of them that is found out so late
             raise ConfigError("--address", error.problem) from error
@@ -94,6 +90,8 @@ class Fleet(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     drones: list[DroneSpec]
     speed: float = 1.0
     seed: int | None = None
+    scenarios: dict[str, str] = {}
+    """Path of a scenario file by the address of the drone that it is for."""
 
 
 def _from_options(arguments: argparse.Namespace) -> Fleet:
@@ -119,7 +117,8 @@ def _from_options(arguments: argparse.Namespace) -> Fleet:
             skycontroller=None
             if arguments.skycontroller is None
             else integer("--skycontroller", arguments.skycontroller, "the generation of a Skycontroller, 3 or 4"),
-            storage=None if arguments.storage is None else _size("--storage", arguments.storage),
+            wind=CALM if arguments.wind is None else _wind(arguments.wind),
+            storage=None if arguments.storage is None else options.size("--storage", arguments.storage),
         )
     except ConfigError as error:
         raise ConfigError(_flag(error.key_path), error.problem) from None
@@ -127,7 +126,8 @@ def _from_options(arguments: argparse.Namespace) -> Fleet:
         addresses = [str(ipaddress.IPv4Address(first.address) + index) for index in range(count)]
     except ValueError:
         raise ConfigError("--count", f"expected room for {count} addresses from {first.address} on") from None
-    return Fleet([replace(first, address=address) for address in addresses], speed, seed)
+    paths = {} if arguments.scenario is None else dict.fromkeys(addresses, str(arguments.scenario))
+    return Fleet([replace(first, address=address) for address in addresses], speed, seed, paths)
 
 
 def _flag(key_path: str) -> str:
@@ -156,11 +156,6 @@ def _home(text: str) -> tuple[float, float, float]:
     return latitude, longitude, altitude
 
 
-def _size(flag: str, text: str) -> int:
-    factor = _UNITS.get(text[-1:], 1)
-    return integer(flag, text if factor == 1 else text[:-1], "a number of bytes like 500k or 16G") * factor
-
-
 def _wind(text: str) -> WindSpec:
     wanted = "SPEED,DIRECTION or SPEED,DIRECTION,GUSTS like 8,270,0.15"
     parts = text.split(",")
@@ -172,18 +167,20 @@ def _wind(text: str) -> WindSpec:
         raise ConfigError("--wind", error.problem) from None
 
 
-def _scenario(path: Path, fleet: Fleet) -> Scenario:
+def _scenarios(fleet: Fleet) -> dict[str, Scenario]:
+    """What each drone goes through, by its address. A file that several have is read once."""
+    addresses = {drone.address for drone in fleet.drones}
     try:
-        found = scenario.load(path)
-        found.check_drones({drone.address for drone in fleet.drones})
+        read = {path: scenario.load(Path(path)) for path in dict.fromkeys(fleet.scenarios.values())}
+        for found in read.values():
+            found.check_drones(addresses)
     except ConfigError as error:
         raise ConfigError("--scenario", str(error)) from error
-    return found
+    return {address: read[path] for address, path in fleet.scenarios.items()}
 
 
-async def _run(
-    fleet: Fleet, log: Path | None, stdin_watch: bool, wind: WindSpec = CALM, events: Scenario | None = None
-) -> None:
+async def _run(fleet: Fleet, log: Path | None, stdin_watch: bool) -> None:
+    scenarios = _scenarios(fleet)
     stop = asyncio.Event()
     loop = asyncio.get_running_loop()
     for signum in (signal.SIGINT, signal.SIGTERM):
@@ -192,7 +189,7 @@ async def _run(
         _watch_stdin(stop)
     try:
         simulator = Simulator(
-            fleet.drones, speed=fleet.speed, seed=fleet.seed, log=log, remember=False, wind=wind, scenario=events
+            fleet.drones, speed=fleet.speed, seed=fleet.seed, log=log, remember=False, scenarios=scenarios
         )
     except OSError as error:
         raise ConfigError("--log", f"expected a file that can be written, got {log}: {error.strerror}") from error

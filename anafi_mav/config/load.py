@@ -25,8 +25,16 @@ _HOST_NAME = re.compile(r"(?!-)[A-Za-z0-9-]{1,63}(?<!-)(\.(?!-)[A-Za-z0-9-]{1,63
 
 
 def load(path: Path) -> Config:
-    """The configuration in the file at `path`. Raises `ConfigError`."""
-    return _from_document(documents.read(path))
+    """The configuration in the file at `path`; paths in it are made relative to its folder. Raises `ConfigError`."""
+    config = _from_document(documents.read(path))
+    return msgspec.structs.replace(config, drones=tuple(_in_folder(path.parent, drone) for drone in config.drones))
+
+
+def _in_folder(folder: Path, drone: DroneConfig) -> DroneConfig:
+    if drone.sim is None or drone.sim.scenario is None:
+        return drone
+    sim = msgspec.structs.replace(drone.sim, scenario=str(folder / drone.sim.scenario))
+    return msgspec.structs.replace(drone, sim=sim)
 
 
 def from_text(text: str | bytes, source: str) -> Config:

@@ -20,6 +20,9 @@ MAX_DRONES = 250
 MAX_TEXT = 200
 """Characters of a URL or host name; DNS ends at 253, no sensible one comes near."""
 
+MAX_PATH = 4096
+"""Bytes of a path on Linux (limits.h, PATH_MAX)."""
+
 MAVSDK_SYSID = 245
 """The system id that MAVSDK gives itself unless told otherwise (MAVSDK mavsdk.h, DEFAULT_SYSTEM_ID_GCS)."""
 
@@ -30,6 +33,32 @@ def expected(what: str) -> dict[str, Any]:
 
 
 Port = Annotated[int, Meta(ge=1, le=65535)]
+
+
+class WindConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The wind around a simulated drone, with gusts."""
+
+    speed: Annotated[
+        float,
+        Meta(ge=0, le=40, description="Metres per second.", extra=expected("a speed from 0 to 40 m/s")),
+    ]
+    direction: Annotated[
+        float,
+        Meta(
+            ge=0,
+            le=360,
+            description="Where it comes from, clockwise from north.",
+            extra=expected("degrees from 0 to 360"),
+        ),
+    ] = 0.0
+    gusts: Annotated[
+        Annotated[float, Meta(ge=0, le=1)] | None,
+        Meta(
+            description="Standard deviation of the gusts as a share of the speed. Left out: that of open country in "
+            "daytime, 0.15.",
+            extra=expected("a share from 0 to 1"),
+        ),
+    ] = None
 
 
 class SimConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -97,6 +126,28 @@ class SimConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
             description="Put a simulated Skycontroller of this generation in front of it, whose address it then is. "
             "Left out: the drone is reached directly.",
             extra=expected("3 or 4"),
+        ),
+    ] = None
+    storage: Annotated[
+        Annotated[int, Meta(ge=0, le=2**63 - 1)] | Annotated[str, Meta(pattern=r"\A[0-9]{1,9}[kMG]?\Z")] | None,
+        Meta(
+            description="Bytes of its memory card; a small one fills soon. Left out: as large as the model's.",
+            extra=expected("a number of bytes like 500k or 16G"),
+        ),
+    ] = None
+    wind: Annotated[
+        WindConfig | None,
+        Meta(
+            description="The wind that blows from the start. Left out: none.",
+            extra=expected("a mapping like {speed: 8, direction: 270}"),
+        ),
+    ] = None
+    scenario: Annotated[
+        Annotated[str, Meta(min_length=1, max_length=MAX_PATH)] | None,
+        Meta(
+            description="What goes wrong, and when: a file as docs/simulator.md describes, looked for from the folder "
+            "of this one. Of its steps those for this drone count, and those for all.",
+            extra=expected("the path of a scenario file"),
         ),
     ] = None
     http_port: Annotated[
@@ -209,5 +260,6 @@ SECTIONS: dict[str, type[msgspec.Struct]] = {
     "the file": Config,
     "drones[…]": DroneConfig,
     "drones[…].sim": SimConfig,
+    "drones[…].sim.wind": WindConfig,
 }
 """Where in the file each group of keys stands, in the order of the manual."""

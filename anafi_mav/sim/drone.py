@@ -34,7 +34,7 @@ from anafi_mav.sim.skycontroller import MODELS as SKYCONTROLLERS
 from anafi_mav.sim.skycontroller import Skycontroller
 from anafi_mav.sim.states import all_settings, all_states
 from anafi_mav.sim.telemetry import RATE, Telemetry
-from anafi_mav.sim.wind import CALM, Wind
+from anafi_mav.sim.wind import CALM, Wind, WindSpec
 
 POSE_PERIOD = 0.1
 """s between two poses in the log."""
@@ -71,6 +71,8 @@ class DroneSpec:
     """Bytes of its memory card; None: as large as the model's."""
     skycontroller: int | None = None
     """The generation of the Skycontroller in front of it, whose address `address` then is; None: there is none."""
+    wind: WindSpec = CALM
+    """What blows from the start."""
 
     def __post_init__(self) -> None:
         if self.model not in MODELS:
@@ -122,7 +124,7 @@ class SimulatedDrone:
         self.log = log
         self.faults = Faults()
         self.faults.on_mute = self._mute_link
-        self.wind = Wind(CALM, random.Random(chance.getrandbits(64)))
+        self.wind = Wind(spec.wind, random.Random(chance.getrandbits(64)))
         """Set its `spec` to let it blow."""
         self._air = Air(self.faults, random.Random(chance.getrandbits(64)), _later)
         self.http_problem = ""

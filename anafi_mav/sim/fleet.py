@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import random
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 
@@ -14,7 +14,6 @@ from anafi_mav.sim.log import Log, LogFile
 from anafi_mav.sim.model import MODELS
 from anafi_mav.sim.motion import STEP, Body, Motion
 from anafi_mav.sim.scenario import Scenario
-from anafi_mav.sim.wind import CALM, WindSpec
 
 TURN, FAST_TURN = 0.01, STEP
 """s of the machine's clock between two turns of the world; the second when telemetry is wanted that fast."""
@@ -41,12 +40,10 @@ class Simulator:
         seed: int | None = None,
         log: Path | None = None,
         remember: bool = True,
-        wind: WindSpec = CALM,
-        scenario: Scenario | None = None,
+        scenarios: Mapping[str, Scenario] | None = None,
     ) -> None:
         """`speed` runs the world faster than the clock, `seed` makes ids the same in every run, `log` is a file of
-        JSON lines, `remember` keeps the log in memory too, `wind` blows from the start, `scenario` says what else
-        happens.
+        JSON lines, `remember` keeps the log in memory too, `scenarios` says by address what happens to a drone.
 
         Raises `ConfigError` for specs that cannot live together, `OSError` when the log cannot be written.
         """
@@ -74,10 +71,8 @@ class Simulator:
             )
             for index, spec in enumerate(specs)
         ]
-        for drone in self.drones:
-            drone.wind.spec = wind
-        self._scenario = scenario
-        if scenario is not None:
+        self._scenarios = scenarios or {}
+        for scenario in self._scenarios.values():
             scenario.check_drones({spec.address for spec in specs})
 
     async def __aenter__(self) -> Simulator:
@@ -150,8 +145,8 @@ class Simulator:
         turns = zip(self.drones, motion.poses(), motion.arrived(), motion.still(), strict=True)
         for drone, pose, arrived, still in turns:
             drone.tick(now, elapsed, pose, arrived, still)
-            if self._scenario is not None:
-                self._scenario.tick(drone)
+            if (scenario := self._scenarios.get(drone.address)) is not None:
+                scenario.tick(drone)
         if self._file is not None:
             self._file.flush()
 

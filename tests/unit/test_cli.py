@@ -13,6 +13,7 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 from support.mav import Client
 from support.product import Product, free_udp_port, product
@@ -20,8 +21,11 @@ from support.world import HOLD, HOME, loopback
 
 from anafi_mav import geo
 from anafi_mav.cli import main
-from anafi_mav.cli.run import configuration
-from anafi_mav.config import Config
+from anafi_mav.cli.addresses import Reservations
+from anafi_mav.cli.run import configuration, place
+from anafi_mav.cli.sim import Fleet
+from anafi_mav.config import Config, load
+from anafi_mav.sim.wind import WindSpec
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="processes are looked up in /proc")
 
@@ -93,6 +97,39 @@ def left_hovering(p: Product) -> None:
 
 
 # Start.
+
+
+async def test_a_simulated_drone_takes_wind_card_and_scenario_from_the_configuration(tmp_path: Path) -> None:
+    address, alpha, bravo = loopback(), loopback(), loopback()
+    (tmp_path / "days").mkdir()
+    (tmp_path / "days" / "bad.yaml").write_text(
+        f"steps: [{{at: 0.5, gps: false, drone: {bravo}}}, {{at: 0.5, battery: 9}}]"
+    )
+    config = f"""
+        endpoints: ["tcpin://{address}:5760"]
+        drones:
+          - {{name: alpha, sysid: 1, sim: {{address: {alpha}, scenario: days/bad.yaml}}}}
+          - {{name: bravo, sysid: 2, sim: {{address: {bravo}, storage: 500k, wind: {{speed: 6, direction: 90}}}}}}
+    """
+    async with product(tmp_path, config) as p:
+        step = await p.entry("scenario", "step")
+        assert (step["drone"], step["args"]["step"]) == (alpha, 1)  # not the step for bravo, nor any at bravo
+        battery = await p.entry("event", "BatteryStateChanged", lambda args: args["percent"] == 9)
+        assert battery["drone"] == alpha
+        assert [entry["drone"] for entry in p.entries("scenario")] == [alpha]
+
+
+def test_what_the_simulator_is_told_of_a_drone(tmp_path: Path) -> None:
+    path = tmp_path / "fleet.yaml"
+    path.write_text(
+        f"drones: [{{name: a, sysid: 1, sim: {{address: {loopback()}, storage: 500k, skycontroller: 4,"
+        " wind: {speed: 6, direction: 90}}}]"
+    )
+    with Reservations() as reservations:
+        _, fleet = place(load(path), reservations)
+    (drone,) = msgspec.json.decode(msgspec.json.encode(fleet), type=Fleet).drones
+    assert (drone.storage, drone.skycontroller) == (500_000, 4)
+    assert drone.wind == WindSpec(6.0, 90.0)
 
 
 def test_without_a_configuration_it_flies_the_default_fleet() -> None:
@@ -288,6 +325,14 @@ SIM = "sim: {address: DRONE}"
             "got TAKEN: Address already in use",
         ),
         ("drones: [", "fleet.yaml, line 1, column"),
+        (
+            f"{{endpoints: ['tcpin://HOST:5761'], drones: [{{name: a, sysid: 1, {SIM[:-1]}, scenario: none.yaml}}}}]}}",
+            "drones[0].sim.scenario: cannot read FOLDER/none.yaml: No such file or directory",
+        ),
+        (
+            f"{{endpoints: ['tcpin://HOST:5761'], drones: [{{name: a, sysid: 1, {SIM[:-1]}, scenario: bad.yaml}}}}]}}",
+            "drones[0].sim.scenario: steps[0].gps: expected `bool`, got `str`",
+        ),
     ],
 )
 async def test_a_mistake_is_one_line_and_nothing_is_started(tmp_path: Path, config: str, line: str) -> None:
@@ -304,7 +349,9 @@ async def test_a_mistake_is_one_line_and_nothing_is_started(tmp_path: Path, conf
             "HOST": host,
             "DRONE": loopback(),
             "TAKEN": taken,
+            "FOLDER": str(tmp_path),
         }
+        (tmp_path / "bad.yaml").write_text("steps: [{at: 1, gps: maybe}]")
         for word, value in words.items():
             config, line = config.replace(word, value), line.replace(word, value)
         async with product(tmp_path, config, ready=False) as p:

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from anafi_mav.config import Config, DroneConfig, SimConfig, from_text, load, remarks
+from anafi_mav.config.schema import WindConfig
 from anafi_mav.errors import ConfigError
 
 REPOSITORY = Path(__file__).parents[2]
@@ -64,7 +65,8 @@ def test_every_value_survives() -> None:
         "endpoints: ['udpin://0.0.0.0:14550']\nallow_kill: true\ndrones:\n"
         "  - {name: a.b-c_1, sysid: 250, address: anafi.local, discovery_port: 44447, allow_kill: false}\n"
         "  - {name: b, sysid: 2, sim: {home: [-33, 151, -2], address: 127.0.42.9, speed: 4, telemetry_rate: 30,"
-        " seed: 7, protocol: 1, http_port: 8080}}\n",
+        " seed: 7, protocol: 1, http_port: 8080, skycontroller: 4, storage: 500k, scenario: bad-day.yaml,"
+        " wind: {speed: 8, direction: 270, gusts: 0.2}}}\n",
         "fleet.yaml",
     )
     assert config == Config(
@@ -83,6 +85,10 @@ def test_every_value_survives() -> None:
                     seed=7,
                     protocol=1,
                     http_port=8080,
+                    skycontroller=4,
+                    storage="500k",
+                    scenario="bad-day.yaml",
+                    wind=WindConfig(speed=8.0, direction=270.0, gusts=0.2),
                 ),
             ),
         ),
@@ -100,6 +106,15 @@ def test_anchors_and_merges_are_not_mistaken_for_keys_written_twice() -> None:
         ("b", 2, SimConfig(seed=1)),
         ("c", 3, SimConfig(seed=1)),
     ]
+
+
+def test_a_scenario_is_looked_for_beside_the_file_that_names_it(tmp_path: Path) -> None:
+    path = tmp_path / "fleet.yaml"
+    path.write_text(
+        "drones: [{name: a, sysid: 1, sim: {scenario: days/bad.yaml}}, {name: b, sysid: 2, sim: {scenario: /bad.yaml}}]"
+    )
+    found = [drone.sim.scenario for drone in load(path).drones if drone.sim is not None]
+    assert found == [str(tmp_path / "days" / "bad.yaml"), "/bad.yaml"]
 
 
 def test_system_id_245_is_legal_and_remarked_upon() -> None:
@@ -173,6 +188,16 @@ MISTAKES = {
     sim("speed: 0"): "drones[0].sim.speed: expected a number from 0.1 to 20, got 0",
     sim("speed: .inf"): "drones[0].sim.speed: expected a number from 0.1 to 20, got inf",
     sim("telemetry_rate: 0.5"): "drones[0].sim.telemetry_rate: expected a number of events per second from 1 to 200, got 0.5",
+    sim("storage: 16T"): "drones[0].sim.storage: expected a number of bytes like 500k or 16G, got '16T'",
+    sim("storage: -1"): "drones[0].sim.storage: expected a number of bytes like 500k or 16G, got -1",
+    sim("storage: 1.5"): "drones[0].sim.storage: expected a number of bytes like 500k or 16G, got 1.5",
+    sim("wind: 8"): "drones[0].sim.wind: expected a mapping like {speed: 8, direction: 270}, got 8",
+    sim("wind: {}"): "drones[0].sim.wind.speed: missing; expected a speed from 0 to 40 m/s",
+    sim("wind: {speed: 41}"): "drones[0].sim.wind.speed: expected a speed from 0 to 40 m/s, got 41",
+    sim("wind: {speed: 1, direction: -1}"): "drones[0].sim.wind.direction: expected degrees from 0 to 360, got -1",
+    sim("wind: {speed: 1, gusts: 15}"): "drones[0].sim.wind.gusts: expected a share from 0 to 1, got 15",
+    sim("wind: {speed: 1, gust: 1}"): "drones[0].sim.wind.gust: unknown key; did you mean gusts?",
+    sim("scenario: {steps: []}"): "drones[0].sim.scenario: expected the path of a scenario file, got {'steps': []}",
     sim("seed: -1"): "drones[0].sim.seed: expected a whole number from 0 to 4294967295, got -1",
     # Addresses
     one("sysid: 1, address: 192.168.42.300"): f"drones[0].address: {HOST} '192.168.42.300'",

@@ -22,7 +22,8 @@ class World:
 
     def __init__(self, text: str, drones: int = 1) -> None:
         specs = [DroneSpec(address=f"127.0.42.{n + 1}") for n in range(drones)]
-        self.simulator = Simulator(specs, seed=1, scenario=from_text(text, "test.yaml"))
+        scenario = from_text(text, "test.yaml")
+        self.simulator = Simulator(specs, seed=1, scenarios={spec.address: scenario for spec in specs})
 
     @property
     def drone(self) -> SimulatedDrone:
@@ -143,7 +144,18 @@ def test_a_bad_file_is_one_line(text: str) -> None:
 def test_a_drone_that_is_not_there() -> None:
     scenario = from_text("steps: [{at: 1, drone: 10.0.0.1, gps: false}]", "x")
     with pytest.raises(ConfigError, match=r"steps\[0\].drone: expected the address of a drone \(127.0.42.1\)"):
-        Simulator([DroneSpec()], scenario=scenario)
+        Simulator([DroneSpec()], scenarios={"127.0.42.1": scenario})
+
+
+async def test_each_drone_has_its_own_file() -> None:
+    specs = [DroneSpec(address=f"127.0.42.{n}", wind=WindSpec(float(n), 90.0, 0.0)) for n in (1, 2, 3)]
+    files = {"127.0.42.2": "steps: [{at: 1, gps: false}]", "127.0.42.3": "steps: [{at: 1, battery: 50}]"}
+    scenarios = {address: from_text(text, "x") for address, text in files.items()}
+    simulator = Simulator(specs, scenarios=scenarios)
+    simulator.advance(1.1)
+    assert [drone.faults.gps for drone in simulator.drones] == [True, False, True]
+    assert [drone.battery.percent for drone in simulator.drones] == [100, 100, 50]
+    assert [drone.wind.spec.speed for drone in simulator.drones] == [1.0, 2.0, 3.0]
 
 
 def test_a_file_that_cannot_be_read(tmp_path: Path) -> None:
