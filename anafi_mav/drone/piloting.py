@@ -29,7 +29,7 @@ from anafi_mav.drone.piloting_settings import PilotingSettings
 from anafi_mav.drone.piloting_state import MOTORS_OFF, REDUCERS, PilotingState
 from anafi_mav.drone.sticks import Limits, PilotingCommand, Sticks, percent
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost, LocalProtocolError, NotSupported
-from anafi_mav.units import wrap_360
+from anafi_mav.units import RAD_PER_DEG, wrap_360
 
 log = logging.getLogger("anafi_mav")
 
@@ -40,6 +40,10 @@ MOVE_BY_MARGIN = 20.0
 """s that a relative move may take beyond the flight itself."""
 MOVE_BY_SLOWEST = 0.5
 """m/s and rad/s below which a relative move is given up: the speed is the drone's choice, this is far below it."""
+
+FASTEST = 16.0
+"""m/s over ground, the Ai's top speed (anafi_ros paper, table I): stands for "no limit" where Parrot has no word for it
+and another limit is given."""
 
 TAKE_OFF_MEMORY = 10.0
 """s after a take-off was given up in which the drone may still carry it out, or already does and could not say so."""
@@ -311,23 +315,33 @@ class Piloting(PilotingSettings):
     # -- guided moves
 
     async def move_by(
-        self, front: float, right: float, down: float, turn: float, timeout: float | None = None
+        self,
+        front: float,
+        right: float,
+        down: float,
+        turn: float,
+        timeout: float | None = None,
+        turn_rate_dps: float | None = None,
     ) -> Displacement:
         """Fly a straight line relative to the body (m) while turning clockwise by `turn` (rad).
 
+        `turn_rate_dps` (deg/s) limits the turn; None leaves it to the drone.
         Returns at the end of the move what was flown. Without a `timeout` the time given grows with the move.
         Giving up, by time or by cancellation of this coroutine, stops the drone.
         """
         if not math.isfinite(front + right + down + turn):
             raise LocalProtocolError("a relative move is not a number")
         self._require_own_will()
+        command = self._move_by_command(front, right, down, turn, turn_rate_dps)
         if timeout is None:
             timeout = MOVE_BY_MARGIN + (math.hypot(front, right, down) + abs(turn)) / MOVE_BY_SLOWEST
+            if turn_rate_dps is not None:
+                timeout += abs(turn) / (turn_rate_dps * RAD_PER_DEG)
         move = Move(self._commander.expect((), _decided_elsewhere))
         self._centre_sticks()
         self._moves.by.append(move)
         try:
-            self._commander.dispatch(move.answer, ardrone3.MoveBy(front, right, down, turn), timeout)
+            self._commander.dispatch(move.answer, command, timeout)
             flown: Displacement = await move.answer.wait()
         finally:
             if move in self._moves.by:  # given up: neither the drone nor hover has ended it
@@ -336,6 +350,18 @@ class Piloting(PilotingSettings):
                     self._halt_if_connected(ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0))
         return flown
 
+    def _move_by_command(
+        self, front: float, right: float, down: float, turn: float, turn_rate_dps: float | None
+    ) -> Message:
+        if turn_rate_dps is None:
+            return ardrone3.MoveBy(front, right, down, turn)
+        if not (math.isfinite(turn_rate_dps) and turn_rate_dps > 0.0):
+            raise LocalProtocolError("a turn needs a rate above zero")
+        limits = self.limits
+        if limits is None:
+            raise NotSupported("reported speed limits")
+        return guided.ExtendedMoveBy(front, right, down, turn, FASTEST, limits.climb_mps, turn_rate_dps)
+
     async def move_to(
         self,
         latitude: float,
@@ -343,18 +369,23 @@ class Piloting(PilotingSettings):
         altitude: float,
         heading_deg: float | None = None,
         horizontal_speed: float | None = None,
+        vertical_speed: float | None = None,
         timeout: float = ANSWER_TIMEOUT,
     ) -> Move:
         """Fly to a place (deg, deg, m above take-off); returns when the drone is on its way.
 
         `heading_deg` (clockwise from north) is turned to on the way; None keeps the heading. `horizontal_speed`
-        (m/s) limits the speed; None leaves it to the drone. `Move.result` tells how it ends. A newer moveTo
-        replaces an older one.
+        and `vertical_speed` (m/s) limit the speed; None leaves it to the drone. `Move.result` tells how it ends. A
+        newer moveTo replaces an older one.
         """
-        if not math.isfinite(latitude + longitude + altitude + (heading_deg or 0.0) + (horizontal_speed or 0.0)):
+        if not math.isfinite(
+            latitude + longitude + altitude + (heading_deg or 0.0) + (horizontal_speed or 0.0) + (vertical_speed or 0.0)
+        ):
             raise LocalProtocolError("a target is not a number")
         self._require_own_will()
-        command = self._move_to_command(Position(latitude, longitude, altitude), heading_deg, horizontal_speed)
+        command = self._move_to_command(
+            Position(latitude, longitude, altitude), heading_deg, horizontal_speed, vertical_speed
+        )
         move = Move(self._commander.expect((), _decided_elsewhere), Position(latitude, longitude, altitude))
         self._centre_sticks()
         obsolete = self._moves.begin_to(move)
@@ -371,12 +402,18 @@ class Piloting(PilotingSettings):
                 self._halt_if_connected(ardrone3.CancelMoveTo())
         return move
 
-    def _move_to_command(self, to: Position, heading_deg: float | None, horizontal_speed: float | None) -> Message:
+    def _move_to_command(
+        self,
+        to: Position,
+        heading_deg: float | None,
+        horizontal_speed: float | None,
+        vertical_speed: float | None,
+    ) -> Message:
         mode = OrientationMode.NONE if heading_deg is None else OrientationMode.HEADING_DURING
         heading = 0.0 if heading_deg is None else wrap_360(heading_deg)
-        if horizontal_speed is None:
+        if horizontal_speed is None and vertical_speed is None:
             return ardrone3.MoveTo(to.latitude, to.longitude, to.altitude, mode, heading)
-        if horizontal_speed <= 0.0:
+        if any(speed is not None and speed <= 0.0 for speed in (horizontal_speed, vertical_speed)):
             raise LocalProtocolError("a moveTo needs a speed above zero")
         limits = self.limits
         if limits is None:
@@ -387,8 +424,8 @@ class Piloting(PilotingSettings):
             to.altitude,
             guided.OrientationMode(mode.value),
             heading,
-            horizontal_speed,
-            limits.climb_mps,
+            FASTEST if horizontal_speed is None else horizontal_speed,
+            limits.climb_mps if vertical_speed is None else vertical_speed,
             limits.yaw_rate_dps,
         )
 

@@ -7,8 +7,10 @@ from collections.abc import Awaitable, Callable, Hashable
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.commands import Command
+from anafi_mav.services.guided import guided_mode
 from anafi_mav.services.modes import FlightMode
-from anafi_mav.services.vehicle import Place, Refused, Vehicle
+from anafi_mav.services.targets import height, place
+from anafi_mav.services.vehicle import Refused, Vehicle
 
 Handler = Callable[[Vehicle, Command], Awaitable[None]]
 
@@ -16,38 +18,6 @@ FORCE = 21196
 """param2 of an arm or disarm that overrides checks (MAVLink common.xml MAV_CMD_COMPONENT_ARM_DISARM)."""
 
 RELATIVE_YAW = dialect.MAV_DO_REPOSITION_FLAGS_RELATIVE_YAW
-
-_AMSL_FRAMES = (None, dialect.MAV_FRAME_GLOBAL, dialect.MAV_FRAME_GLOBAL_INT)
-_RELATIVE_FRAMES = (dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT, dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
-
-
-class UnsupportedFrame(Refused):
-    """A place in a frame we cannot resolve."""
-
-    def __init__(self, frame: int | None) -> None:
-        super().__init__(f"Refused: positions in frame {frame} are not supported", lasting=True)
-
-
-def _height(vehicle: Vehicle, command: Command) -> float | None:
-    """Height above take-off (m) of a command's z in its frame; None when z is unset. COMMAND_LONG has AMSL."""
-    if math.isnan(command.z):
-        return None
-    if not math.isfinite(command.z):
-        raise Refused("Refused: the height is not a number", lasting=True)
-    if command.frame in _AMSL_FRAMES:
-        return vehicle.amsl_to_ato(command.z)
-    if command.frame in _RELATIVE_FRAMES:
-        return command.z
-    raise UnsupportedFrame(command.frame)
-
-
-def _place(command: Command) -> Place | None:
-    """The command's position; None when it is unset. Half a position is refused."""
-    if math.isnan(command.x) and math.isnan(command.y):
-        return None
-    if not (math.isfinite(command.x) and math.isfinite(command.y)):
-        raise Refused("Refused: latitude and longitude are not both numbers", lasting=True)
-    return Place(command.x, command.y)
 
 
 async def arm_disarm(vehicle: Vehicle, command: Command) -> None:
@@ -63,14 +33,15 @@ async def arm_disarm(vehicle: Vehicle, command: Command) -> None:
 async def takeoff(vehicle: Vehicle, command: Command) -> None:
     """MAV_CMD_NAV_TAKEOFF. What z means depends on who asks (conformance E2).
 
-    Unset: the height of MIS_TAKEOFF_ALT. COMMAND_LONG with latitude and longitude exactly 0: above the take-off
-    point (MAVProxy, dronekit, Mission Planner). Any other COMMAND_LONG: AMSL (QGroundControl). COMMAND_INT: as its
-    frame says. The position is not used: an ANAFI takes off where it stands.
+    Unset: the height of MIS_TAKEOFF_ALT. COMMAND_LONG with latitude and longitude exactly 0, or from a client whose
+    family means it so: above the take-off point (MAVProxy, dronekit, Mission Planner). Any other COMMAND_LONG: AMSL
+    (QGroundControl). COMMAND_INT: as its frame says. The position is not used: an ANAFI takes off where it stands.
     """
-    if command.frame is None and command.x == 0.0 and command.y == 0.0 and not math.isnan(command.z):
+    relative = command.flavour.relative_takeoff or (command.x == 0.0 and command.y == 0.0)
+    if command.frame is None and relative and not math.isnan(command.z):
         await vehicle.take_off(command.z, command.client)
         return
-    await vehicle.take_off(_height(vehicle, command), command.client)
+    await vehicle.take_off(height(vehicle, command), command.client)
 
 
 async def land(vehicle: Vehicle, command: Command) -> None:
@@ -87,24 +58,28 @@ async def reposition(vehicle: Vehicle, command: Command) -> None:
     """MAV_CMD_DO_REPOSITION: param1 speed in m/s (unset or <= 0: the drone's own), param4 heading in rad, x, y, z.
 
     param2 bit 1 (MAV_DO_REPOSITION_FLAGS_RELATIVE_YAW): the heading counts from the present one. z obeys the frame: 0
-    and 5 AMSL, 3 and 6 above take-off. All unset is pause; a speed alone is refused, for it would not stop anything.
+    and 5 AMSL, 3 and 6 above take-off. ArduPilot's clients send a heading of 0 for none (conformance D1). All unset is
+    pause; a speed alone is refused, for it would not stop anything.
     """
     speed, flags, yaw = command.params[0], command.params[1], command.params[3]
     if math.isinf(yaw) or math.isinf(speed):
         raise Refused("Refused: speed and heading must be numbers", lasting=True)
-    place, height = _place(command), _height(vehicle, command)
+    where, ato = place(command), height(vehicle, command)
     heading = None if math.isnan(yaw) else yaw
-    if place is None and height is None and heading is None:
+    if heading == 0.0 and command.flavour.zero_is_unset:
+        heading = None
+    mode = guided_mode(command.flavour)
+    if where is None and ato is None and heading is None:
         if speed > 0.0:
             raise Refused("Refused: a speed needs a place, a height or a heading to go to", lasting=True)
-        await vehicle.hold()
+        await vehicle.hold(mode)
         return
     if heading is not None and math.isfinite(flags) and int(flags) & RELATIVE_YAW:
         attitude = vehicle.drone.piloting.state.attitude
         if attitude is None:
             raise Refused("Refused: the present heading is not known")
         heading += attitude.yaw
-    await vehicle.reposition(place, height, heading, speed if speed > 0.0 else None)
+    await vehicle.reposition(where, ato, heading, speed if speed > 0.0 else None, mode)
 
 
 async def set_mode(vehicle: Vehicle, command: Command) -> None:

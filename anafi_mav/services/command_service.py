@@ -16,7 +16,7 @@ from typing import Any
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, NotSupported
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
-from anafi_mav.services.actions import ACTIONS, UnsupportedFrame, change_mode
+from anafi_mav.services.actions import ACTIONS, change_mode
 from anafi_mav.services.commands import (
     PROGRESS_AFTER,
     PROGRESS_EVERY,
@@ -30,6 +30,7 @@ from anafi_mav.services.flavours import flavour_of
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.service import Action, Host, MessageHandler, Query, Service, client_of
 from anafi_mav.services.statustext import Severity
+from anafi_mav.services.targets import UnsupportedFrame
 from anafi_mav.services.vehicle import Refused
 
 logger = logging.getLogger(__name__)

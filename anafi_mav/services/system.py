@@ -20,6 +20,7 @@ from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound, Node
 from anafi_mav.services.command_service import CommandService
 from anafi_mav.services.flavours import Flavour, flavour_of
+from anafi_mav.services.guided import GuidedService
 from anafi_mav.services.identity import IdentityService
 from anafi_mav.services.message_service import MessageService
 from anafi_mav.services.modes import FlightMode
@@ -39,6 +40,7 @@ logger = logging.getLogger(__name__)
 SERVICES: tuple[type[Service], ...] = (
     IdentityService,
     ModesService,
+    GuidedService,
     TelemetryService,
     ParameterService,
     PlanService,

@@ -11,7 +11,7 @@ import enum
 import logging
 import math
 from collections.abc import Callable, Coroutine, Hashable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from anafi_mav import geo, units
@@ -72,6 +72,27 @@ class Place:
     longitude: float
 
 
+@dataclass(frozen=True)
+class Goto:
+    """Where a guided move leads."""
+
+    place: Place
+    ato: float
+    """m above take-off."""
+    yaw: float | None
+    """rad, clockwise from north; None keeps the heading."""
+    speed: float | None
+    """m/s over ground, of this move only; None: the vehicle's cruise speed."""
+    mode: FlightMode
+    """The mode that the vehicle is in on the way."""
+
+    def at_height(self, ato: float) -> Goto:
+        return replace(self, ato=ato)
+
+    def with_heading(self, yaw: float) -> Goto:
+        return replace(self, yaw=yaw)
+
+
 class Vehicle:
     """One drone, flown. All methods run on the event loop's thread."""
 
@@ -93,8 +114,11 @@ class Vehicle:
         """Arming starts the motors and waits for the drone to be thrown (a parameter; Parrot's UserTakeOff)."""
         self.cruise_speed: float | None = None
         """m/s over ground that moves keep to; None: the drone's own (MAV_CMD_DO_CHANGE_SPEED)."""
+        self.climb_speed: float | None = None
+        """m/s up and down that moves keep to; None: the drone's own."""
         self.origin: Place | None = None
         """Origin of the local frame: where the drone last took off, or first stood with a fix."""
+        self._goto: Goto | None = None
         self.intended: FlightMode | None = None
         """The mode that a client last asked for by name or number."""
         self._clock = clock
@@ -366,41 +390,76 @@ class Vehicle:
         if place is None and ato is None and yaw is None and speed is None:
             await self.hold(mode)
             return
-        if not self.in_air:
-            raise Refused("Goto refused: the drone is not in the air")
-        here = self.place
+        here, present = self.place, self.drone.piloting.state.altitude
         if here is None:
             raise Refused("Goto refused: no GPS fix")
-        present = self.drone.piloting.state.altitude
         if ato is None:
             if present is None:
                 raise Refused("Goto refused: the drone's height is not known")
             ato = present
         else:
             self.check_height(ato)
-        if place is not None:
-            self._check_place(place)
+        await self.go(Goto(place or here, ato, yaw, speed, mode), checked=place is None)
+
+    @property
+    def goto(self) -> Goto | None:
+        """Where the drone is on its way to by `go`; None when it is on no such way."""
+        return self._goto if self.drone.piloting.move is not None else None
+
+    async def go(self, goto: Goto, *, checked: bool = False) -> None:
+        """Fly to a place, or change how it is being flown to. Returns when the drone is on its way.
+
+        `checked`: the place is where the drone is, which needs no leave.
+        """
+        if not self.in_air:
+            raise Refused("Goto refused: the drone is not in the air")
+        if not checked:
+            self.check_place(goto.place)
         if self.returning_by_itself:
             raise Refused("Goto refused: the drone returns home by itself")
         await self.take_over()
         await self.drone.piloting.cancel_return_home()
         if not self.in_air or self.returning:  # no await from here to the moveTo
             raise Refused("Goto refused: the drone does something else now")
-        self.select(FlightMode.HOLD)
-        target = place or here
+        self.select(goto.mode)
+        self._goto = goto
         await self.drone.piloting.move_to(
-            target.latitude,
-            target.longitude,
-            ato,
-            heading_deg=None if yaw is None else units.wrap_360(yaw * units.DEG_PER_RAD),
-            horizontal_speed=self.cruise_speed if speed is None else speed,
+            goto.place.latitude,
+            goto.place.longitude,
+            goto.ato,
+            heading_deg=None if goto.yaw is None else units.wrap_360(goto.yaw * units.DEG_PER_RAD),
+            horizontal_speed=self.cruise_speed if goto.speed is None else goto.speed,
+            vertical_speed=self.climb_speed,
         )
 
-    def _check_place(self, place: Place) -> None:
+    async def turn(self, angle: float, rate_dps: float | None, mode: FlightMode) -> None:
+        """Turn by `angle` (rad, clockwise +) where the drone hovers, at `rate_dps` (None: the drone's own).
+
+        Returns when it has turned.
+        """
+        if not self.in_air:
+            raise Refused("Turn refused: the drone is not in the air")
+        if self.returning_by_itself:
+            raise Refused("Turn refused: the drone returns home by itself")
+        await self.take_over()
+        await self.drone.piloting.stop()
+        await self.drone.piloting.cancel_return_home()
+        if not self.in_air or self.returning:
+            raise Refused("Turn refused: the drone does something else now")
+        self.select(mode)
+        await self.drone.piloting.move_by(0.0, 0.0, 0.0, angle, turn_rate_dps=rate_dps)
+
+    @staticmethod
+    def check_on_earth(place: Place, what: str) -> None:
+        """Raise `Refused` unless this is a place."""
         if not (abs(place.latitude) <= 90.0 and abs(place.longitude) <= 180.0):
-            raise Refused("Goto refused: that is no place on earth", lasting=True)
+            raise Refused(f"{what} refused: that is no place on earth", lasting=True)
         if place.latitude == 0.0 and place.longitude == 0.0:
-            raise Refused("Goto refused: latitude and longitude are both 0", lasting=True)
+            raise Refused(f"{what} refused: latitude and longitude are both 0", lasting=True)
+
+    def check_place(self, place: Place) -> None:
+        """Raise `Refused` unless the drone may fly there."""
+        self.check_on_earth(place, "Goto")
         state, centre = self.drone.piloting.state, self.home
         if state.geofence and state.max_distance is not None and centre is not None:
             distance = geo.distance(centre.latitude, centre.longitude, place.latitude, place.longitude)

@@ -303,6 +303,7 @@ class SimulatedDrone:
             "vn": pose.vn,
             "ve": pose.ve,
             "vd": pose.vd,
+            "gimbal_pitch": self.firmware.gimbal.attitude(pose).pitch_absolute,
         }
         self.log.add(now, "pose", "true", args)
 

@@ -1,0 +1,210 @@
+"""Guided flight by single commands: speed, height, heading, pause, regions of interest, home.
+
+What goes to a place is `actions.reposition`; what circles is `orbit`. A handler returns when the drone confirmed.
+Conformance A4, B1, B2, D1 and items 78-83, 143.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from anafi_mav import units
+from anafi_mav.drone.events import PoiMode, RthHomeType
+from anafi_mav.errors import AnafiMavError
+from anafi_mav.mavlink import dialect
+from anafi_mav.services.commands import Command
+from anafi_mav.services.flavours import Flavour
+from anafi_mav.services.modes import FlightMode
+from anafi_mav.services.service import Action, Host, Service
+from anafi_mav.services.statustext import Severity
+from anafi_mav.services.targets import height, height_in_frame, place
+from anafi_mav.services.vehicle import Goto, Place, Refused
+
+KEEP, DEFAULT = -1.0, -2.0
+"""What stands for "no change" and "back to the default" in speed and throttle (MAVLink common.xml DO_CHANGE_SPEED)."""
+
+_AIRSPEED, _GROUNDSPEED = 0.0, 1.0
+_UPWARDS, _DOWNWARDS = 2.0, 3.0
+"""SPEED_TYPE."""
+
+DEG_PER_TURN = 360.0
+
+
+def guided_mode(flavour: Flavour) -> FlightMode:
+    """The mode that a vehicle is in when a client of this flavour has sent it somewhere."""
+    return FlightMode.GUIDED if flavour.guided_setpoints else FlightMode.HOLD
+
+
+def heading_of(angle: float, way: float, relative: bool, now: float) -> float:
+    """How far to turn (deg, clockwise +) for a MAV_CMD_CONDITION_YAW, from a heading of `now` (deg).
+
+    `way` is 1 clockwise, -1 counter-clockwise, 0 the shorter one; a relative angle turns by `angle` that way.
+    """
+    if relative:
+        return -angle if way < 0 else angle
+    turn = units.wrap_pi((angle - now) * units.RAD_PER_DEG) * units.DEG_PER_RAD
+    if way > 0 and turn < 0:
+        return turn + DEG_PER_TURN
+    if way < 0 and turn > 0:
+        return turn - DEG_PER_TURN
+    return turn
+
+
+class GuidedService(Service):
+    """Changes what is being flown, and what the drone looks at."""
+
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self._paused: Goto | None = None
+        """Where the drone was going when it was told to pause."""
+
+    def actions(self) -> Mapping[int, Action]:
+        return {
+            dialect.MAV_CMD_DO_CHANGE_SPEED: self._change_speed,
+            dialect.MAV_CMD_DO_CHANGE_ALTITUDE: self._change_altitude,
+            dialect.MAV_CMD_CONDITION_YAW: self._turn,
+            dialect.MAV_CMD_DO_PAUSE_CONTINUE: self._pause_or_continue,
+            dialect.MAV_CMD_DO_SET_ROI_LOCATION: self._look_at,
+            dialect.MAV_CMD_DO_SET_ROI_NONE: self._look_anywhere,
+            dialect.MAV_CMD_DO_SET_ROI: self._legacy_roi,
+            dialect.MAV_CMD_DO_SET_HOME: self._set_home,
+        }
+
+    def link_down(self) -> None:
+        self._paused = None
+
+    async def _change_speed(self, command: Command) -> None:
+        """MAV_CMD_DO_CHANGE_SPEED: param1 SPEED_TYPE, param2 m/s. A move that is under way changes its speed at once.
+
+        -1 and unset change nothing, -2 gives the speed back to the drone. What is more than the drone can, it limits
+        itself. An ANAFI measures no airspeed: both horizontal types are over ground.
+        """
+        kind, speed, throttle = command.params[:3]
+        if not (math.isnan(throttle) or throttle in (0.0, KEEP, DEFAULT)):
+            raise Refused("Speed refused: an ANAFI's throttle cannot be set", lasting=True)
+        if math.isnan(kind):
+            kind = _GROUNDSPEED
+        if kind not in (_AIRSPEED, _GROUNDSPEED, _UPWARDS, _DOWNWARDS):
+            raise Refused("Speed refused: param1 is 0 to 3", lasting=True)
+        if math.isnan(speed) or speed == KEEP:
+            return
+        if speed != DEFAULT and not (math.isfinite(speed) and speed > 0.0):
+            raise Refused("Speed refused: param2 is m/s above 0, -1 or -2", lasting=True)
+        wanted = None if speed == DEFAULT else speed
+        vehicle = self.host.vehicle
+        if kind in (_AIRSPEED, _GROUNDSPEED):
+            vehicle.cruise_speed = wanted
+        else:
+            vehicle.climb_speed = wanted
+        if (goto := vehicle.goto) is not None:
+            await vehicle.go(goto)
+
+    async def _change_altitude(self, command: Command) -> None:
+        """MAV_CMD_DO_CHANGE_ALTITUDE: param1 height in m, param2 MAV_FRAME. On the way to a place, there."""
+        vehicle = self.host.vehicle
+        frame = command.params[1]
+        if not math.isfinite(frame):
+            raise Refused("Refused: param2 is a frame", lasting=True)
+        ato = height_in_frame(vehicle, command.params[0], int(frame))
+        goto = vehicle.goto
+        if goto is None:
+            await vehicle.reposition(None, ato, None, mode=guided_mode(command.flavour))
+        else:
+            vehicle.check_height(ato)
+            await vehicle.go(goto.at_height(ato))
+
+    async def _turn(self, command: Command) -> None:
+        """MAV_CMD_CONDITION_YAW: param1 deg, param2 deg/s (unset or 0: the drone's own), param3 way, param4 relative.
+
+        On the way to a place the drone turns while it flies on, the shorter way; else it turns where it hovers.
+        """
+        angle, rate, way, relative = command.params
+        if not math.isfinite(angle) or abs(angle) > DEG_PER_TURN:
+            raise Refused("Turn refused: param1 is an angle of up to 360 degrees", lasting=True)
+        if math.isinf(rate) or rate < 0.0 or math.isinf(way):
+            raise Refused("Turn refused: param2 is deg/s, param3 -1, 0 or 1", lasting=True)
+        vehicle = self.host.vehicle
+        attitude = vehicle.drone.piloting.state.attitude
+        if not vehicle.in_air or attitude is None:
+            raise Refused("Turn refused: the drone is not in the air, or does not tell its heading")
+        now = attitude.yaw * units.DEG_PER_RAD
+        turn = heading_of(angle, 0.0 if math.isnan(way) else way, relative == 1.0, now)
+        if (goto := vehicle.goto) is not None:
+            await vehicle.go(goto.with_heading((now + turn) * units.RAD_PER_DEG))
+        else:
+            await vehicle.turn(turn * units.RAD_PER_DEG, rate if rate > 0.0 else None, guided_mode(command.flavour))
+
+    async def _pause_or_continue(self, command: Command) -> None:
+        """MAV_CMD_DO_PAUSE_CONTINUE: param1 0 hovers, 1 goes on to where the pause stopped it."""
+        vehicle = self.host.vehicle
+        if command.params[0] == 0.0:
+            goto = vehicle.goto
+            await vehicle.hold(guided_mode(command.flavour))
+            self._paused = goto or self._paused
+        elif command.params[0] == 1.0:
+            if self._paused is None:
+                raise Refused("Continue refused: nothing was paused")
+            await vehicle.go(self._paused)
+            self._paused = None
+        else:
+            raise Refused("Refused: param1 is 0 to pause, 1 to continue", lasting=True)
+
+    # Regions of interest.
+
+    async def _look_at(self, command: Command) -> None:
+        """MAV_CMD_DO_SET_ROI_LOCATION: nose and camera follow the place until something else is flown (Parrot's
+        piloted POI, which needs a hovering drone and waits for it). An unset height is that of the take-off point."""
+        where = place(command)
+        if where is None:
+            raise Refused("Region of interest refused: it has no place", lasting=True)
+        await self._look(where, height(self.host.vehicle, command) or 0.0)
+
+    async def _look_anywhere(self, command: Command) -> None:
+        """MAV_CMD_DO_SET_ROI_NONE."""
+        await self.host.drone.poi.stop()
+
+    async def _legacy_roi(self, command: Command) -> None:
+        """MAV_CMD_DO_SET_ROI: param1 MAV_ROI; none or a location. At 0/0 MAVProxy means none."""
+        kind = command.params[0]
+        if kind == dialect.MAV_ROI_NONE or (command.x == 0.0 and command.y == 0.0):
+            await self._look_anywhere(command)
+        elif kind == dialect.MAV_ROI_LOCATION or math.isnan(kind):
+            await self._look_at(command)
+        else:
+            raise Refused("Region of interest refused: only a location or none", lasting=True)
+
+    async def _look(self, where: Place, ato: float) -> None:
+        vehicle = self.host.vehicle
+        vehicle.check_on_earth(where, "Region of interest")
+        if not vehicle.in_air:
+            raise Refused("Region of interest refused: the drone is not in the air")
+        await self.host.drone.poi.start(where.latitude, where.longitude, ato, PoiMode.LOCKED_GIMBAL)
+
+    # Home.
+
+    async def _set_home(self, command: Command) -> None:
+        """MAV_CMD_DO_SET_HOME: param1 1 where the drone is, else the command's place.
+
+        The drone's home becomes one of Parrot's type custom, and stays that until somebody changes it: a text says so.
+        """
+        vehicle, home = self.host.vehicle, self.host.drone.home
+        if command.params[0] == 1.0:
+            where, ato = vehicle.place, vehicle.drone.piloting.state.altitude
+            if where is None or ato is None:
+                raise Refused("Home refused: the drone does not know where it is")
+        else:
+            where = place(command)
+            if where is None:
+                raise Refused("Home refused: it has no place", lasting=True)
+            ato = height(vehicle, command) or 0.0
+        vehicle.check_on_earth(where, "Home")
+        before = home.state.preferred_type
+        await home.set_preferred_type(RthHomeType.CUSTOM)
+        try:
+            await home.set_custom_location(where.latitude, where.longitude, ato)
+        except AnafiMavError:
+            if before is not None and before != RthHomeType.CUSTOM:
+                await home.set_preferred_type(before)
+            raise
+        self.host.text(Severity.NOTICE, "Home set: the drone returns there until its home type is changed")

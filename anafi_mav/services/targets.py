@@ -1,0 +1,66 @@
+"""Where a command means: its place and height, by its frame and by who sent it.
+
+Conformance E2 (take-off), B1 "INT frame" (AMSL whatever the frame says), C2 (frames), architecture "One height".
+"""
+
+from __future__ import annotations
+
+import math
+
+from anafi_mav.mavlink import dialect
+from anafi_mav.services.commands import Command
+from anafi_mav.services.flavours import ARDUPILOT
+from anafi_mav.services.vehicle import Place, Refused, Vehicle
+
+_AMSL_FRAMES = (None, dialect.MAV_FRAME_GLOBAL, dialect.MAV_FRAME_GLOBAL_INT)
+_RELATIVE_FRAMES = (dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT, dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
+
+ALWAYS_AMSL = (
+    dialect.MAV_CMD_DO_ORBIT,
+    dialect.MAV_CMD_DO_SET_HOME,
+    dialect.MAV_CMD_DO_SET_ROI_LOCATION,
+)
+"""Commands whose z is AMSL in the frames 3 and 6 too, in all flavours but ArduPilot's: MAVSDK sends AMSL there, as PX4
+takes it (conformance B1)."""
+
+
+class UnsupportedFrame(Refused):
+    """A place in a frame we cannot resolve."""
+
+    def __init__(self, frame: int | None) -> None:
+        super().__init__(f"Refused: positions in frame {frame} are not supported", lasting=True)
+
+
+def height(vehicle: Vehicle, command: Command) -> float | None:
+    """Height above take-off (m) of a command's z; None when z is unset. COMMAND_LONG has AMSL.
+
+    Raises `Refused`, `UnsupportedFrame`.
+    """
+    if math.isnan(command.z):
+        return None
+    return height_in_frame(vehicle, command.z, command.frame, amsl=is_amsl(command))
+
+
+def is_amsl(command: Command) -> bool:
+    """z is AMSL even where the frame says that it is relative."""
+    return command.id in ALWAYS_AMSL and command.flavour is not ARDUPILOT
+
+
+def height_in_frame(vehicle: Vehicle, z: float, frame: int | None, *, amsl: bool = False) -> float:
+    """Height above take-off (m) of `z` in a MAV_FRAME (None: AMSL). Raises `Refused`, `UnsupportedFrame`."""
+    if not math.isfinite(z):
+        raise Refused("Refused: the height is not a number", lasting=True)
+    if frame in _AMSL_FRAMES or (amsl and frame in _RELATIVE_FRAMES):
+        return vehicle.amsl_to_ato(z)
+    if frame in _RELATIVE_FRAMES:
+        return z
+    raise UnsupportedFrame(frame)
+
+
+def place(command: Command) -> Place | None:
+    """The command's position; None when it is unset. Half a position is refused."""
+    if math.isnan(command.x) and math.isnan(command.y):
+        return None
+    if not (math.isfinite(command.x) and math.isfinite(command.y)):
+        raise Refused("Refused: latitude and longitude are not both numbers", lasting=True)
+    return Place(command.x, command.y)

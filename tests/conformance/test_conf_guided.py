@@ -1,0 +1,265 @@
+"""Guided flight by single commands: conformance items 29, 31, 80-83, 143 and both flavours' take-off (20-22)."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.world import HOLD, HOME, World, world
+
+from anafi_mav import geo, units
+
+ACCEPTED, DENIED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_DENIED
+REJECTED = dialect.MAV_RESULT_TEMPORARILY_REJECTED
+REPOSITION = dialect.MAV_CMD_DO_REPOSITION
+SPEED = dialect.MAV_CMD_DO_CHANGE_SPEED
+YAW = dialect.MAV_CMD_CONDITION_YAW
+PAUSE = dialect.MAV_CMD_DO_PAUSE_CONTINUE
+ALTITUDE = dialect.MAV_CMD_DO_CHANGE_ALTITUDE
+SET_HOME = dialect.MAV_CMD_DO_SET_HOME
+ROI, NO_ROI, OLD_ROI = (
+    dialect.MAV_CMD_DO_SET_ROI_LOCATION,
+    dialect.MAV_CMD_DO_SET_ROI_NONE,
+    dialect.MAV_CMD_DO_SET_ROI,
+)
+GLOBAL, RELATIVE = dialect.MAV_FRAME_GLOBAL, dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT
+NAN = math.nan
+
+NORTH_60 = geo.destination(HOME[0], HOME[1], 60.0, 0.0)
+"""60 m north of where the drone takes off."""
+
+
+def sent(w: World, name: str) -> list[Any]:
+    """The arguments of what the drone received under Parrot's name."""
+    return [e.args for e in w.drone.log if e.kind == "command" and e.name == name]
+
+
+async def go_north(w: World, frame: int = RELATIVE, z: float = 10.0) -> None:
+    ack = await w.client.command(REPOSITION, -1, 1, 0, NAN, frame=frame, x=NORTH_60[0], y=NORTH_60[1], z=z)
+    assert ack.result == ACCEPTED
+
+
+async def heading(w: World, degrees: float) -> None:
+    """The drone's true heading has come to this."""
+    wanted = degrees * units.RAD_PER_DEG
+    await w.drone.wait_log(
+        lambda e: e.kind == "pose" and abs(units.wrap_pi(e.args["yaw"] - wanted)) < 0.05,
+        20.0,
+        since=w.drone.log[-1].t,
+    )
+
+
+# -- take-off
+
+
+@pytest.mark.parametrize(
+    ("parameters", "z", "up"),
+    [
+        ({"x": 0.0, "y": 0.0}, 4.0, 4.0),  # MAVProxy, dronekit, Mission Planner
+        ({"x": NAN, "y": NAN}, 4.0, 4.0),  # MAVSDK on ArduPilot
+        ({"x": HOME[0], "y": HOME[1], "frame": RELATIVE}, 4.0, 4.0),
+        ({"x": HOME[0], "y": HOME[1], "frame": GLOBAL}, HOME[2] + 6.0, 6.0),
+    ],
+)
+async def test_conf_021_take_off_heights_of_arducopter(parameters: dict[str, Any], z: float, up: float) -> None:
+    async with world(flavour="ardupilot") as w:
+        assert (await w.client.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)).result == ACCEPTED
+        assert (await w.client.command(dialect.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, z=z, **parameters)).result == ACCEPTED
+        await w.drone.wait_log(lambda e: e.kind == "pose" and abs(e.args["up"] - up) < 0.2, 20.0)
+
+
+# -- speed, height, heading, pause
+
+
+async def test_conf_082_the_speed_of_a_move_that_is_under_way() -> None:
+    async with world() as w:
+        await w.take_off(10.0)
+        await go_north(w)
+        assert len(sent(w, "ardrone3.Piloting.moveTo")) == 1
+        assert (await w.client.command(SPEED, 1, 3.0, -1, 0)).result == ACCEPTED
+        (move,) = sent(w, "move.extended_move_to")
+        assert move["max_horizontal_speed"] == 3.0
+        assert (move["latitude"], move["longitude"]) == pytest.approx(NORTH_60, abs=1e-7)
+        await w.drone.wait_log(lambda e: e.kind == "pose" and abs(math.hypot(e.args["vn"], e.args["ve"]) - 3.0) < 0.2)
+        # Unchanged by "no change", given back by "default".
+        for nothing in (-1.0, NAN):
+            assert (await w.client.command(SPEED, 1, nothing, -1, 0)).result == ACCEPTED
+        assert len(sent(w, "move.extended_move_to")) == 1
+        assert (await w.client.command(SPEED, 0, -2.0, -1, 0)).result == ACCEPTED
+        assert len(sent(w, "ardrone3.Piloting.moveTo")) == 2
+
+
+async def test_conf_082_a_speed_counts_for_later_moves_too() -> None:
+    async with world() as w:
+        assert (await w.client.command(SPEED, 0, 4.0, 0, 0)).result == ACCEPTED
+        assert (await w.client.command(SPEED, 2, 1.5, 0, 0)).result == ACCEPTED
+        await w.take_off(5.0)
+        await go_north(w)
+        (move,) = sent(w, "move.extended_move_to")
+        assert (move["max_horizontal_speed"], move["max_vertical_speed"]) == (4.0, 1.5)
+
+
+@pytest.mark.parametrize(
+    "parameters", [(1, 0.0, -1), (1, -3.0, -1), (1, math.inf, -1), (7, 3.0, -1), (1, 3.0, 50.0), (math.inf, 3.0, -1)]
+)
+async def test_conf_082_speeds_that_make_no_sense(parameters: tuple[float, ...]) -> None:
+    async with world() as w:
+        assert (await w.client.command(SPEED, *parameters)).result == DENIED
+
+
+async def test_conf_143_change_of_altitude() -> None:
+    async with world() as w:
+        await w.take_off(5.0)
+        assert (await w.client.command(ALTITUDE, 12.0, RELATIVE)).result == ACCEPTED
+        await w.drone.wait_log(lambda e: e.kind == "pose" and abs(e.args["up"] - 12.0) < 0.3, 20.0)
+        assert (await w.client.command(ALTITUDE, HOME[2] + 8.0, GLOBAL)).result == ACCEPTED
+        await w.drone.wait_log(
+            lambda e: e.kind == "pose" and abs(e.args["up"] - 8.0) < 0.3, 20.0, since=w.drone.log[-1].t
+        )
+        for bad in ((0.5, RELATIVE), (1000.0, RELATIVE), (NAN, RELATIVE), (10.0, NAN)):
+            assert (await w.client.command(ALTITUDE, *bad)).result == DENIED
+        ack = await w.client.command(ALTITUDE, 10.0, dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT)
+        assert ack.result == 9  # COMMAND_UNSUPPORTED_MAV_FRAME
+        await go_north(w, z=8.0)
+        assert (await w.client.command(ALTITUDE, 15.0, RELATIVE)).result == ACCEPTED
+        last = sent(w, "ardrone3.Piloting.moveTo")[-1]
+        assert (last["latitude"], last["altitude"]) == (pytest.approx(NORTH_60[0], abs=1e-7), 15.0)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "ends"),
+    [((90, 0, 0, 0), 90.0), ((350, 30, 0, 0), 350.0), ((40, 0, -1, 1), 320.0), ((40, 0, 1, 1), 40.0)],
+)
+async def test_conf_143_condition_yaw(parameters: tuple[float, ...], ends: float) -> None:
+    async with world() as w:
+        await w.take_off(5.0)
+        assert (await w.client.command(YAW, *parameters, timeout=20.0)).result == ACCEPTED
+        await heading(w, ends)
+
+
+async def test_conf_143_condition_yaw_turns_the_way_that_is_asked_for() -> None:
+    async with world() as w:
+        await w.take_off(5.0)
+        assert (await w.client.command(YAW, 90, 60, -1, 0, timeout=20.0)).result == ACCEPTED
+        (move,) = sent(w, "move.extended_move_by")
+        assert move["d_psi"] == pytest.approx(-1.5 * math.pi, abs=0.05)
+        assert move["max_yaw_rotation_speed"] == 60.0
+
+
+async def test_conf_143_condition_yaw_on_the_way() -> None:
+    async with world() as w:
+        await w.take_off(10.0)
+        await go_north(w)
+        assert (await w.client.command(YAW, 90, 0, 0, 0)).result == ACCEPTED
+        last = sent(w, "ardrone3.Piloting.moveTo")[-1]
+        assert (last["latitude"], last["heading"]) == (pytest.approx(NORTH_60[0], abs=1e-7), pytest.approx(90.0))
+
+
+async def test_conf_143_pause_and_continue() -> None:
+    async with world() as w:
+        assert (await w.client.command(PAUSE, 1)).result == REJECTED  # nothing was paused
+        await w.take_off(10.0)
+        await go_north(w)
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 5.0, 20.0)
+        assert (await w.client.command(PAUSE, 0)).result == ACCEPTED
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "hovering", since=w.drone.log[-1].t - 1)
+        stopped = w.drone.pose.north
+        assert stopped < 50.0
+        assert (await w.client.command(PAUSE, 1)).result == ACCEPTED
+        await w.drone.wait_log(lambda e: e.kind == "pose" and abs(e.args["north"] - 60.0) < 1.0, 30.0)
+        assert (await w.client.command(PAUSE, 1)).result == REJECTED
+
+
+async def test_conf_081_a_heading_of_zero_means_north_to_px4_and_nothing_to_arducopter() -> None:
+    for flavour, headings in (("px4", [("HEADING_DURING", 0.0)]), ("ardupilot", [("NONE", 0.0)])):
+        async with world(flavour=flavour) as w:
+            assert (await w.client.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)).result == ACCEPTED
+            assert (await w.client.command(dialect.MAV_CMD_NAV_TAKEOFF, x=0.0, y=0.0, z=5.0)).result == ACCEPTED
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["up"] > 4.5, 20.0)
+            ack = await w.client.command(
+                REPOSITION, -1, 1, 0, 0.0, frame=RELATIVE, x=NORTH_60[0], y=NORTH_60[1], z=10.0
+            )
+            assert ack.result == ACCEPTED
+            moves = sent(w, "ardrone3.Piloting.moveTo")
+            assert [(m["orientation_mode"].name, m["heading"]) for m in moves] == headings
+
+
+# -- regions of interest
+
+
+@pytest.mark.parametrize(("frame", "z"), [(GLOBAL, HOME[2] + 2.0), (RELATIVE, HOME[2] + 2.0), (None, HOME[2] + 2.0)])
+async def test_conf_080_region_of_interest(frame: int | None, z: float) -> None:
+    """East of the drone and below it: nose to the east, camera down. z is AMSL in every frame (conformance B1)."""
+    east = geo.destination(HOME[0], HOME[1], 0.0, 20.0)
+    async with world() as w:
+        await w.take_off(22.0)
+        ack = await w.client.command(ROI, frame=frame, x=east[0], y=east[1], z=z)
+        assert ack.result == ACCEPTED
+        (poi,) = sent(w, "ardrone3.Piloting.StartPilotedPOIV2")
+        assert poi["altitude"] == pytest.approx(2.0, abs=0.01)
+        await heading(w, 90.0)
+        # 20 m away and 20 m below.
+        await w.drone.wait_log(lambda e: e.kind == "pose" and abs(e.args["gimbal_pitch"] + 45.0) < 2.0, 10.0)
+        assert (await w.client.command(NO_ROI, frame=GLOBAL, x=NAN, y=NAN, z=NAN)).result == ACCEPTED
+        assert len(sent(w, "ardrone3.Piloting.StopPilotedPOI")) == 1
+
+
+async def test_conf_080_region_of_interest_of_older_clients() -> None:
+    """Mission Planner: DO_SET_ROI as INT in frame 0; MAVProxy clears it with 0/0."""
+    east = geo.destination(HOME[0], HOME[1], 0.0, 20.0)
+    async with world(flavour="ardupilot") as w:
+        assert (await w.client.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)).result == ACCEPTED
+        assert (await w.client.command(dialect.MAV_CMD_NAV_TAKEOFF, x=0.0, y=0.0, z=5.0)).result == ACCEPTED
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["up"] > 4.8, 20.0)
+        await w.client.heartbeat(lambda beat: True)
+        location = dialect.MAV_ROI_LOCATION
+        ack = await w.client.command(OLD_ROI, location, frame=GLOBAL, x=east[0], y=east[1], z=HOME[2])
+        assert ack.result == ACCEPTED
+        await heading(w, 90.0)
+        assert (await w.client.command(OLD_ROI, location, frame=GLOBAL, x=0.0, y=0.0, z=0.0)).result == ACCEPTED
+        assert (await w.client.command(OLD_ROI, dialect.MAV_ROI_TARGET, x=1.0, y=1.0, z=0.0)).result == DENIED
+
+
+async def test_conf_080_no_region_of_interest_on_the_ground() -> None:
+    async with world() as w:
+        assert (await w.client.command(ROI, x=NORTH_60[0], y=NORTH_60[1], z=HOME[2])).result == REJECTED
+        assert (await w.client.command(ROI, x=NAN, y=NAN, z=HOME[2])).result == DENIED
+
+
+# -- home
+
+
+@pytest.mark.parametrize("frame", [GLOBAL, RELATIVE, None])
+async def test_conf_083_set_home(frame: int | None) -> None:
+    async with world() as w:
+        await w.take_off(5.0)
+        mark = w.client.mark()
+        ack = await w.client.command(SET_HOME, 0, frame=frame, x=NORTH_60[0], y=NORTH_60[1], z=HOME[2] + 3.0)
+        assert ack.result == ACCEPTED
+        near = 40 if frame is None else 1  # 1e-7 deg; a COMMAND_LONG has single precision
+        told = await w.client.wait(
+            "HOME_POSITION", lambda m: abs(m.latitude - round(NORTH_60[0] * 1e7)) <= near, since=mark, timeout=1.0
+        )
+        assert abs(told.longitude - round(NORTH_60[1] * 1e7)) <= near
+        (custom,) = sent(w, "rth.set_custom_location")
+        assert custom["altitude"] == pytest.approx(3.0, abs=0.01)
+
+
+async def test_conf_083_set_home_here_and_nowhere() -> None:
+    async with world() as w:
+        await w.take_off(5.0)
+        await go_north(w)
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 30.0, 30.0)
+        mark = w.client.mark()
+        assert (await w.client.command(SET_HOME, 1)).result == ACCEPTED
+        await w.client.wait(
+            "HOME_POSITION",
+            lambda m: geo.distance(HOME[0], HOME[1], m.latitude / 1e7, m.longitude / 1e7) > 20.0,
+            since=mark,
+            timeout=1.0,
+        )
+        assert (await w.client.command(SET_HOME, 0, x=0.0, y=0.0, z=HOME[2])).result == DENIED
+        assert (await w.client.command(SET_HOME, 0)).result == DENIED
+        assert (await w.client.heartbeat(lambda beat: True)).custom_mode == HOLD
