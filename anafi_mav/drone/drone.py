@@ -21,6 +21,7 @@ from anafi_mav.arsdk.messages import common, drone_manager, skyctrl
 from anafi_mav.arsdk.messages.ardrone3 import PoiStatus
 from anafi_mav.arsdk.messages.common import PlayingState
 from anafi_mav.arsdk.messages.drone_manager import DroneManagerConnectionState as Connection
+from anafi_mav.arsdk.rtsp import DEFAULT_PORT as RTSP_PORT
 from anafi_mav.arsdk.wire import Message, UnknownMessage
 from anafi_mav.clock import Clock, SystemClock
 from anafi_mav.drone.alerts import Alerts, spoken, takeoff_blockers
@@ -49,6 +50,8 @@ from anafi_mav.drone.settings import Question
 from anafi_mav.drone.sound import Sound
 from anafi_mav.drone.storage import Storage
 from anafi_mav.drone.thermal import Thermal
+from anafi_mav.drone.video import Video
+from anafi_mav.drone.video_route import Direct, Mux, Route
 from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, LocalProtocolError
 
 log = logging.getLogger("anafi_mav")
@@ -87,6 +90,7 @@ class Drone:
         local_address: str | None = None,
         interface: str | None = None,
         http_port: int = HTTP_PORT,
+        rtsp_port: int = RTSP_PORT,
         name: str = "",
         clock: Clock | None = None,
     ) -> None:
@@ -102,6 +106,7 @@ class Drone:
 
         self._commander = Commander()
         self._http_port = http_port
+        self._rtsp_port = rtsp_port
         self._rest = Rest(address, http_port, local_address, interface)
         self.alerts = Alerts()
         self.battery = Battery()
@@ -119,6 +124,7 @@ class Drone:
         self.sound = Sound(self._commander)
         self.storage = Storage(self._commander)
         self.thermal = Thermal(self._commander)
+        self.video = Video()
         self.piloting = Piloting(self._commander, self.home, self.takeoff_blockers)
         self.controller = Controller(self._commander, self._user_moves, self._pilot_takes_over)
         self._commander.gate = self.controller.allows
@@ -140,6 +146,7 @@ class Drone:
             self.sound,
             self.storage,
             self.thermal,
+            self.video,
             self.piloting,
         )
         self._routes: dict[type[Message], list[tuple[Element[Any], Reducer]]] = {}
@@ -194,6 +201,7 @@ class Drone:
                 await self.close()
                 raise
             self._complete = True
+            self.video.link_up(self._video_route(session))
         finally:
             self._opening = False
         log.info("%s: connected to %s, protocol %d", self.name, self.identity, session.version)
@@ -227,6 +235,12 @@ class Drone:
         else:
             shift = CONTROLLER_PORTS if self.controller.present else 0
             await self._rest.aim(self.address, self._http_port + shift)
+
+    def _video_route(self, session: ControllerSession) -> Route:
+        """The drone's own video server, or that of its Skycontroller, which hands it on."""
+        if isinstance(session, mux_link.MuxControllerSession):
+            return Mux(session, self._rtsp_port)
+        return Direct(self.address, self._rtsp_port, self._local_address, self._interface)
 
     async def _read_states(self) -> None:
         """What Parrot's own SDK does first (olympe arsdkng/drone): set the clock, ask for all states and settings; of
@@ -324,6 +338,7 @@ class Drone:
         self._commander.detach(why)
         self.piloting.link_lost()
         self.controller.link_lost()
+        self.video.link_lost()
         if not self._lost.done():
             self._lost.set_result(why)
 
@@ -334,9 +349,11 @@ class Drone:
             try:
                 await self.controller.release()
             finally:
+                await self.video.close()
                 await asyncio.sleep(0)  # a session sends at the end of a turn of the loop
                 await session.close()
                 self._on_lost(session, session.lost)
+        await self.video.close()
         await self._rest.close()
 
     @property

@@ -56,12 +56,13 @@ class ScriptedDevice:
     async def __aexit__(self, *_: object) -> None:
         await self._server.close()
 
-    def drone(self, clock: Clock | None = None, http_port: int = 80) -> Drone:
+    def drone(self, clock: Clock | None = None, http_port: int = 80, rtsp_port: int = 554) -> Drone:
         """A drone of ours that would connect here."""
         return Drone(
             "127.0.0.1",
             discovery_port=self._server.discovery_port,
             http_port=http_port,
+            rtsp_port=rtsp_port,
             name="scripted",
             clock=clock,
         )
