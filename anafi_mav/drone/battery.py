@@ -26,6 +26,10 @@ class BatteryState(msgspec.Struct, frozen=True):
     full_charge_mah: int | None = None
     remaining_mah: int | None = None
     cell_count: int | None = None
+    design_mah: int | None = None
+    """Capacity when new; Ai only, as the next two."""
+    cell_min_mv: int | None = None
+    cell_max_mv: int | None = None
     cell_voltages_mv: Mapping[int, int] = {}
     """By cell index; empty on models that do not report single cells."""
     alerts: Mapping[BatteryAlert, AlertLevel] = {}
@@ -49,7 +53,12 @@ class Battery(Element[BatteryState]):
         battery.CycleCount: lambda state, message: replace(state, cycles=message.count),
         battery.Serial: lambda state, message: replace(state, serial=message.serial),
         battery.Description: lambda state, message: replace(
-            state, serial=message.serial, cell_count=message.cell_count
+            state,
+            serial=message.serial,
+            cell_count=message.cell_count,
+            design_mah=message.design,
+            cell_min_mv=message.cell_min_voltage,
+            cell_max_mv=message.cell_max_voltage,
         ),
         battery.Capacity: lambda state, message: replace(
             state, full_charge_mah=message.full_charge, remaining_mah=message.remaining

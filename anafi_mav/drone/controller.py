@@ -212,6 +212,8 @@ class Controller(Element[ControllerState]):
         super().__init__()
         self.present = False
         """There is a Skycontroller between us and the drone."""
+        self.model = 0
+        """Its number in `MODELS`; 0 while there is none."""
         self.taken = False
         """The user of ours flies: source and axes are taken, or about to be."""
         self._commander = commander
@@ -232,6 +234,7 @@ class Controller(Element[ControllerState]):
     def link_lost(self) -> None:
         """The controller has taken everything back by itself."""
         self.present = self.taken = False
+        self.model = 0
         self._extra_axes = self._extra_buttons = 0
         self._pilot_keeps_until = -math.inf
         if self._timer is not None:

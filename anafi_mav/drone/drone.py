@@ -216,6 +216,7 @@ class Drone:
     def _begin(self, session: ControllerSession) -> None:
         device = session.device
         self.controller.present = device.model_id in CONTROLLERS
+        self.controller.model = device.model_id if self.controller.present else 0
         self._model = _model(device.model_id)
         self._announced_serial, self._announced_name = device.serial, device.name
         self._session = session

@@ -14,14 +14,23 @@ from anafi_mav.arsdk.messages.ardrone3 import ForcedLandingReason as ForcedLandi
 from anafi_mav.arsdk.messages.ardrone3 import GPSFixStateChanged as GPSFixStateChanged
 from anafi_mav.arsdk.messages.ardrone3 import GpsLocationChanged as GpsLocationChanged
 from anafi_mav.arsdk.messages.ardrone3 import HomeChanged as HomeChanged
+from anafi_mav.arsdk.messages.ardrone3 import HoveringWarning as HoveringWarning
+from anafi_mav.arsdk.messages.ardrone3 import IcingLevelChanged as IcingLevelChanged
+from anafi_mav.arsdk.messages.ardrone3 import MotorError as MotorError
+from anafi_mav.arsdk.messages.ardrone3 import MotorErrorStateChanged as MotorErrorStateChanged
 from anafi_mav.arsdk.messages.ardrone3 import MoveToChanged as MoveToChanged
+from anafi_mav.arsdk.messages.ardrone3 import MoveToStatus as MoveToStatus
 from anafi_mav.arsdk.messages.ardrone3 import NumberOfSatelliteChanged as NumberOfSatelliteChanged
 from anafi_mav.arsdk.messages.ardrone3 import PilotedPOIV2 as PilotedPOIV2
 from anafi_mav.arsdk.messages.ardrone3 import PoiMode as PoiMode
 from anafi_mav.arsdk.messages.ardrone3 import PoiStatus as PoiStatus
 from anafi_mav.arsdk.messages.ardrone3 import SpeedChanged as SpeedChanged
+from anafi_mav.arsdk.messages.ardrone3 import VibrationLevelChanged as VibrationLevelChanged
+from anafi_mav.arsdk.messages.ardrone3 import WarningLevel as WarningLevel
+from anafi_mav.arsdk.messages.ardrone3 import WindStateChanged as WindStateChanged
 from anafi_mav.arsdk.messages.battery import Alert as BatteryAlertChanged
 from anafi_mav.arsdk.messages.battery import AlertLevel as AlertLevel
+from anafi_mav.arsdk.messages.battery import BatteryAlert as BatteryAlert
 from anafi_mav.arsdk.messages.common import CalibrationAxis as CalibrationAxis
 from anafi_mav.arsdk.messages.common import FlightId as FlightId
 from anafi_mav.arsdk.messages.common import FlightPlanComponent as FlightPlanComponent
@@ -38,6 +47,9 @@ from anafi_mav.arsdk.messages.gimbal import Attitude as GimbalAttitudeChanged
 from anafi_mav.arsdk.messages.gimbal import Axis as Axis
 from anafi_mav.arsdk.messages.gimbal import FrameOfReference as FrameOfReference
 from anafi_mav.arsdk.messages.gimbal import GimbalCalibrationState as GimbalCalibrationState
+from anafi_mav.arsdk.messages.mapper import GrabAxisEvent as GrabAxisEvent
+from anafi_mav.arsdk.messages.mapper import GrabButtonEvent as GrabButtonEvent
+from anafi_mav.arsdk.messages.mapper import GrabState as GrabState
 from anafi_mav.arsdk.messages.mediastore import MediastoreState as MediastoreState
 from anafi_mav.arsdk.messages.piloting_style import PilotingStyleStyle as PilotingStyleStyle
 from anafi_mav.arsdk.messages.precise_home import PreciseHomeState as PreciseHomeState
@@ -45,6 +57,8 @@ from anafi_mav.arsdk.messages.rth import RthEndingBehavior as RthEndingBehavior
 from anafi_mav.arsdk.messages.rth import RthHomeType as RthHomeType
 from anafi_mav.arsdk.messages.rth import State as ReturnStateChanged
 from anafi_mav.arsdk.messages.rth import TakeoffLocation as TakeoffLocation
+from anafi_mav.arsdk.messages.skyctrl import AttitudeChanged as ControllerAttitudeChanged
+from anafi_mav.arsdk.messages.skyctrl import PilotingSource as PilotingSource
 from anafi_mav.arsdk.messages.thermal import PaletteMode as PaletteMode
 from anafi_mav.arsdk.messages.thermal import Range as ThermalSensitivity
 from anafi_mav.arsdk.messages.thermal import RenderingMode as RenderingMode
@@ -61,8 +75,10 @@ __all__ = [
     "AltitudeChanged",
     "AttitudeChanged",
     "Axis",
+    "BatteryAlert",
     "BatteryAlertChanged",
     "CalibrationAxis",
+    "ControllerAttitudeChanged",
     "FlightId",
     "FlightPlanComponent",
     "FlyingState",
@@ -77,18 +93,27 @@ __all__ = [
     "GimbalAttitudeChanged",
     "GimbalCalibrationState",
     "GpsLocationChanged",
+    "GrabAxisEvent",
+    "GrabButtonEvent",
+    "GrabState",
     "HomeChanged",
+    "HoveringWarning",
+    "IcingLevelChanged",
     "MagnetoCalibrationRequiredState",
     "MavlinkFilePlayingStateChanged",
     "MavlinkType",
     "MediastoreState",
     "Message",
     "MissionItemExecuted",
+    "MotorError",
+    "MotorErrorStateChanged",
     "MoveToChanged",
+    "MoveToStatus",
     "NumberOfSatelliteChanged",
     "PaletteMode",
     "PhyState",
     "PilotedPOIV2",
+    "PilotingSource",
     "PilotingStyleStyle",
     "PlayError",
     "PlayingState",
@@ -106,4 +131,7 @@ __all__ = [
     "TakeoffLocation",
     "ThermalMode",
     "ThermalSensitivity",
+    "VibrationLevelChanged",
+    "WarningLevel",
+    "WindStateChanged",
 ]

@@ -12,13 +12,13 @@ from collections.abc import Callable, Iterable
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.frames import Packed, Parser, Received, frame, pack
-from anafi_mav.mavlink.streams import DEFAULT_INTERVALS
+from anafi_mav.mavlink.streams import TELEMETRY
 
 QUEUE_BYTES = 64 * 1024
 """What waits for a slow peer: some seconds of a small fleet. A serial line, being slow by nature, gets less."""
 
-TELEMETRY = frozenset(DEFAULT_INTERVALS) | {dialect.MAVLINK_MSG_ID_HEARTBEAT}
-"""Message ids that the next one of their kind makes worthless: they give way to answers when a queue is full."""
+GIVE_WAY = TELEMETRY | {dialect.MAVLINK_MSG_ID_HEARTBEAT}
+"""Message ids that give way to answers when a queue is full."""
 
 FRAME_BYTES = 12
 """A version 2 frame has so much more than its payload (MAVLink serialization.md §mavlink2_packet_format)."""
@@ -118,7 +118,7 @@ class Channel:
         if not self.is_open:
             self.counters["dropped_frames"] += 1
             return
-        (self._telemetry if id in TELEMETRY else self._answers).append(waiting)
+        (self._telemetry if id in GIVE_WAY else self._answers).append(waiting)
         self._waiting_bytes += _size(waiting)
         while self._waiting_bytes > self._queue_bytes:
             self._waiting_bytes -= _size((self._telemetry or self._answers).popleft())

@@ -31,6 +31,24 @@ DEFAULT_INTERVALS: Mapping[int, float] = {
 }
 """Seconds by message id: what ground stations need to look alive, and a 57600 baud radio can carry."""
 
+ON_REQUEST = frozenset(
+    {
+        mav.MAVLINK_MSG_ID_ESTIMATOR_STATUS,
+        mav.MAVLINK_MSG_ID_FLIGHT_INFORMATION,
+        mav.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN,
+        mav.MAVLINK_MSG_ID_BATTERY_INFO,
+        mav.MAVLINK_MSG_ID_LINK_NODE_STATUS,
+        mav.MAVLINK_MSG_ID_ONBOARD_COMPUTER_STATUS,
+        mav.MAVLINK_MSG_ID_HIGH_LATENCY2,
+        mav.MAVLINK_MSG_ID_RANGEFINDER,
+        *(id for id in mav.mavlink_map if 61400 <= id <= 61499),
+    }
+)
+"""Messages that are streamed only to a client that asks for them. The last ones are our own dialect's."""
+
+TELEMETRY = frozenset(DEFAULT_INTERVALS) | ON_REQUEST
+"""Message ids that the next one of their kind makes worthless."""
+
 
 class _Stream:
     __slots__ = ("interval", "next")
@@ -38,6 +56,36 @@ class _Stream:
     def __init__(self, interval: float | None) -> None:
         self.interval = interval
         self.next = -float("inf")
+
+
+class Pace:
+    """How often a source has news, by the pauses between them. Exact after the second, a mean of the last few later."""
+
+    __slots__ = ("_last", "interval")
+
+    SHARE = 0.125
+    """Weight of the newest pause: about the last eight count."""
+
+    BREAK = 4.0
+    """A pause so many times longer than the mean is a break, after which the rate is learned anew."""
+
+    def __init__(self) -> None:
+        self._last: float | None = None
+        self.interval: float | None = None
+        """s; None before there are two."""
+
+    def note(self, now: float) -> None:
+        """There is news."""
+        last, self._last = self._last, now
+        if last is None or now <= last:
+            return
+        pause, mean = now - last, self.interval
+        if mean is None:
+            self.interval = pause
+        elif pause > self.BREAK * mean:
+            self.interval = None
+        else:
+            self.interval = mean + self.SHARE * (pause - mean)
 
 
 class Streams(Generic[ChannelT]):
@@ -59,8 +107,12 @@ class Streams(Generic[ChannelT]):
         """Stream at this interval (s, above 0) on this channel, or not at all (None)."""
         if interval is not None and not 0.0 < interval < float("inf"):
             raise LocalProtocolError(f"an interval is a positive number of seconds or None, not {interval}")
-        self._channels.setdefault(channel, {})[id] = _Stream(interval)
-        self._quiet.pop(id, None)
+        streams = self._channels.setdefault(channel, {})
+        known = streams.get(id)
+        # A client that says again what it has (QGroundControl does 35 times, for ArduPilot) must not get more by it.
+        if known is None or known.interval != interval:
+            streams[id] = _Stream(interval)
+            self._quiet.pop(id, None)
 
     def reset(self, channel: ChannelT, id: int) -> None:
         """Stream at the default interval again."""

@@ -5,6 +5,7 @@ Rules: conformance R7, R8, B1, C3.
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import math
 from collections.abc import Mapping, Sequence
@@ -13,11 +14,12 @@ from anafi_mav.drone.events import Message
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
-from anafi_mav.mavlink.streams import Streams
+from anafi_mav.mavlink.streams import Pace, Streams
+from anafi_mav.services import data_streams
 from anafi_mav.services.commands import Command
-from anafi_mav.services.flavours import flavour_of
-from anafi_mav.services.service import Answer, Host, Query, Request, Service
-from anafi_mav.services.stream import Stream
+from anafi_mav.services.flavours import ARDUPILOT, flavour_of
+from anafi_mav.services.service import Answer, Host, MessageHandler, Query, Request, Service
+from anafi_mav.services.stream import Stream, Times
 
 logger = logging.getLogger(__name__)
 
@@ -33,8 +35,19 @@ LOG_EVERY = 5.0
 """s before it is logged again that a message cannot be made."""
 
 
+FASTEST = 0.1
+"""s between looks at messages that are repeated without news: a shorter interval is no shorter for them."""
+
+LONGEST = 2**31 - 1
+"""us. An interval is told as an INT32; one that is longer is as long as that can say."""
+
+
 class MessageService(Service):
-    """What leaves by itself, and what leaves because somebody asked."""
+    """What leaves by itself, and what leaves because somebody asked.
+
+    What is new is gathered until the end of the loop's turn: an ANAFI tells attitude, speed and height in one datagram,
+    and a message made of all three leaves once, with all three.
+    """
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
@@ -42,8 +55,14 @@ class MessageService(Service):
         self._table: Mapping[int, Stream] = {}
         self._requests: Mapping[int, Request] = {}
         self._by_news: dict[type[Message], list[int]] = {}
-        self._periodic: list[int] = []
+        self._repeated: list[int] = []
         self._on_change: list[int] = []
+        self._fresh: dict[int, float] = {}
+        """Message id -> when one of its fields became new, for what has not left yet."""
+        self._news_at: dict[int, float] = {}
+        """Message id -> when one of its fields became new last."""
+        self._paces: dict[int, Pace] = {}
+        self._linked_at = 0.0
         self._failed: dict[int, float] = {}
         """When it was last logged that a message cannot be made."""
 
@@ -53,8 +72,8 @@ class MessageService(Service):
         for id, stream in streams.items():
             for event in stream.news:
                 self._by_news.setdefault(event, []).append(id)
-            if not stream.news:
-                self._periodic.append(id)
+            if stream.is_repeated:
+                self._repeated.append(id)
             if stream.on_change:
                 self._on_change.append(id)
 
@@ -68,29 +87,69 @@ class MessageService(Service):
             **{old: self._legacy(id) for old, id in LEGACY_REQUESTS.items()},
         }
 
+    def messages(self) -> Mapping[int, MessageHandler]:
+        return {dialect.MAVLINK_MSG_ID_REQUEST_DATA_STREAM: self._data_stream}
+
+    def requests(self) -> Mapping[int, Request]:
+        return {
+            dialect.MAVLINK_MSG_ID_MESSAGE_INTERVAL: lambda inbound, command: self._interval(inbound, command.params[1])
+        }
+
+    def link_up(self) -> None:
+        self._linked_at = self.host.clock.monotonic()
+
+    def link_down(self) -> None:
+        """A drone that comes back has told nothing yet."""
+        self._fresh.clear()
+        self._news_at.clear()
+        self._paces.clear()
+
     def on_event(self, message: Message, now: float) -> None:
-        for id in self._by_news.get(type(message), ()):
-            self._stream(id, now)
+        ids = self._by_news.get(type(message))
+        if ids is None:
+            return
+        if not self._fresh:
+            asyncio.get_running_loop().call_soon(self._tell_news)
+        for id in ids:
+            self._fresh[id] = now
 
     def tick(self, now: float) -> None:
-        for id in self._periodic:
+        for id in self._repeated:
             self._stream(id, now)
 
     def state_changed(self) -> None:
         """Mode, armed state, health or something else that clients wait for has changed: they are told at once."""
+        now = self.host.clock.monotonic()
         for id in self._on_change:
+            self._news_at[id] = now
             self._leave(id, self.host.channels)
 
     # Streams.
+
+    def _tell_news(self) -> None:
+        fresh, self._fresh = self._fresh, {}
+        for id, at in fresh.items():
+            self._news_at[id] = at
+            pace = self._paces.get(id)
+            if pace is None:
+                pace = self._paces[id] = Pace()
+            pace.note(at)
+            self._stream(id, at)
 
     def _stream(self, id: int, now: float) -> None:
         """Send a stream message to each channel on which it is due."""
         if due := self._intervals.due_on(self.host.channels, id, now):
             self._leave(id, due)
 
+    def _times(self, id: int) -> Times:
+        """When the newest of the fields of a message was true: what is old does not look new."""
+        stream = self._table[id]
+        return self.host.times(self._news_at.get(id, self._linked_at) if stream.news or stream.on_change else None)
+
     def _leave(self, id: int, to: Sequence[Channel]) -> None:
-        stream, times = self._table[id], self.host.times()
+        stream = self._table[id]
         try:
+            times = self._times(id)
             if stream.flavoured:
                 vehicle = self.host.vehicle
                 self.host.send_by_flavour(lambda flavour: stream.build(vehicle, times.for_flavour(flavour)), to)
@@ -102,6 +161,16 @@ class MessageService(Service):
             if now - self._failed.get(id, -math.inf) >= LOG_EVERY:
                 self._failed[id] = now
                 logger.error("message %d of system %d cannot be made: %r", id, self.host.sysid, error)
+
+    def _data_stream(self, inbound: Inbound) -> None:
+        """REQUEST_DATA_STREAM. PX4 ignores it, and MAVProxy would slow a PX4 down by it: only ArduPilot obeys."""
+        if flavour_of(inbound.channel) is not ARDUPILOT:
+            return
+        request = inbound.message
+        rate = request.req_message_rate if request.start_stop else 0
+        for id in data_streams.members(request.req_stream_id):
+            if id in self._table:
+                self._intervals.set(inbound.channel, id, 1.0 / rate if rate else None)
 
     # Requests: answered at once, every time.
 
@@ -122,7 +191,7 @@ class MessageService(Service):
         stream = self._table.get(int(id)) if id == int(id) else None
         if stream is None:
             return dialect.MAV_RESULT_UNSUPPORTED
-        times = self.host.times().for_flavour(flavour_of(inbound.channel))
+        times = self._times(int(id)).for_flavour(flavour_of(inbound.channel))
         message = stream.build(self.host.vehicle, times)
         return dialect.MAV_RESULT_TEMPORARILY_REJECTED if message is None else message
 
@@ -133,22 +202,39 @@ class MessageService(Service):
         id, interval = command.params[0], command.params[1]
         if id not in self._table:
             return dialect.MAV_RESULT_UNSUPPORTED
-        if math.isinf(interval) or interval < -1:
-            return dialect.MAV_RESULT_DENIED
         if math.isnan(interval) or interval == 0:
             self._intervals.reset(inbound.channel, int(id))
+        elif interval == -1:
+            self._intervals.set(inbound.channel, int(id), None)
+        elif interval > 0 and math.isfinite(interval):
+            self._intervals.set(inbound.channel, int(id), min(interval, LONGEST) / 1e6)
         else:
-            # An interval is told as an INT32 of microseconds: a longer one is as long as that can say.
-            self._intervals.set(inbound.channel, int(id), None if interval < 0 else min(interval, 2**31 - 1) / 1e6)
+            return dialect.MAV_RESULT_DENIED
         return dialect.MAV_RESULT_ACCEPTED
 
     def _get_interval(self, inbound: Inbound, command: Command) -> int:
-        id = command.params[0]
-        if not 0 <= id <= 0xFFFF:
+        answer = self._interval(inbound, command.params[0])
+        if isinstance(answer, int):
+            return answer
+        self.host.send(answer, inbound.channel)
+        return dialect.MAV_RESULT_ACCEPTED
+
+    def _interval(self, inbound: Inbound, id: float) -> dialect.MAVLink_message | int:
+        """MESSAGE_INTERVAL: what leaves on this channel, which is no more than was asked for and no more than there is.
+
+        0 for what we do not send at all, as common.xml wants it.
+        """
+        if not 0 <= id <= 0xFFFF or id != int(id):
             return dialect.MAV_RESULT_DENIED
         microseconds = 0
-        if id in self._table:
-            interval = self._intervals.interval(inbound.channel, int(id))
-            microseconds = -1 if interval is None else round(interval * 1e6)
-        self.host.send(dialect.MAVLink_message_interval_message(int(id), microseconds), inbound.channel)
-        return dialect.MAV_RESULT_ACCEPTED
+        if int(id) in self._table:
+            asked = self._intervals.interval(inbound.channel, int(id))
+            microseconds = -1 if asked is None else min(round(max(asked, self._source(int(id))) * 1e6), LONGEST)
+        return dialect.MAVLink_message_interval_message(int(id), microseconds)
+
+    def _source(self, id: int) -> float:
+        """The shortest time (s) between two of this message that what it is made of allows, as far as is known."""
+        if self._table[id].is_repeated:
+            return FASTEST
+        pace = self._paces.get(id)
+        return 0.0 if pace is None or pace.interval is None else pace.interval

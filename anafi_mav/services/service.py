@@ -47,7 +47,7 @@ class Host(Protocol):
 
     @property
     def channels(self) -> Sequence[Channel]:
-        """The channels that are open now."""
+        """The channels that are to be told what happens: those that are open, without the hushed ones."""
 
     def send(self, message: dialect.MAVLink_message, to: Channel | Sequence[Channel] | None = None) -> None:
         """Send as the autopilot to one channel, to some, or to all. Nothing is sent while the link is down."""
@@ -66,8 +66,11 @@ class Host(Protocol):
     def spawn(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
         """Run in the background; cancelled when the drone's link goes down."""
 
-    def times(self) -> Times:
-        """Now, in the clock of this system's messages."""
+    def times(self, at: float | None = None) -> Times:
+        """A moment of the monotonic clock (None: now) in the clock of this system's messages."""
+
+    def hush(self, channel: Channel, *, quiet: bool) -> None:
+        """Say nothing of our own accord on this channel: only answers go there, until it is to be told all again."""
 
 
 def client_of(inbound: Inbound) -> Hashable:

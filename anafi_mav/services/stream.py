@@ -41,8 +41,16 @@ class Stream:
 
     build: Builder
     news: tuple[type[Message], ...] = ()
-    """The drone's events that make it new; none: a state message, repeated at its interval."""
+    """The drone's events that make it new. It leaves when one of them comes, and carries that moment's time."""
+    repeated: bool = False
+    """A state message: it also leaves at its interval without news, still with the time of the last. What has no news
+    is one in any case."""
     on_change: bool = False
     """A state message that also leaves at once when the vehicle's mode, armed or landed state changes."""
     flavoured: bool = False
     """What it says depends on the flavour of who is told."""
+
+    @property
+    def is_repeated(self) -> bool:
+        """It leaves without news, too."""
+        return self.repeated or not self.news

@@ -84,6 +84,9 @@ class System:
         self._last_state: tuple[FlightMode, bool, Health, Landed] | None = None
         self._next_heartbeat = 0.0
         self._complained: dict[str, float] = {}
+        self._hushed: set[Channel] = set()
+        self._told: tuple[Sequence[Channel], Sequence[Channel]] = ([], [])
+        """The open channels when it was last looked, and those of them that are not hushed."""
         self.vehicle = Vehicle(
             drone,
             clock,
@@ -149,20 +152,34 @@ class System:
 
     @property
     def channels(self) -> Sequence[Channel]:
-        """The channels that are open now."""
-        return self._node.channels
+        """The channels that are to be told what happens: those that are open, without the hushed ones."""
+        if not self._hushed:
+            return self._node.channels
+        everybody, told = self._told
+        if everybody is not self._node.channels:  # a new list whenever they change
+            told = [channel for channel in self._node.channels if channel not in self._hushed]
+            self._told = (self._node.channels, told)
+        return told
+
+    def hush(self, channel: Channel, *, quiet: bool) -> None:
+        """Say nothing of our own accord on this channel: only answers go there, until it is to be told all again."""
+        if quiet:
+            self._hushed.add(channel)
+        else:
+            self._hushed.discard(channel)
+        self._told = ([], [])
 
     def send(self, message: dialect.MAVLink_message, to: Channel | Sequence[Channel] | None = None) -> None:
         """Send as the autopilot to one channel, to some, or to all. Nothing is sent while the link is down."""
         if self.active:
-            self._node.send(message, sysid=self.sysid, compid=AUTOPILOT, to=to)
+            self._node.send(message, sysid=self.sysid, compid=AUTOPILOT, to=self.channels if to is None else to)
 
     def send_by_flavour(
         self, build: Callable[[Flavour], dialect.MAVLink_message | None], to: Sequence[Channel] | None = None
     ) -> None:
         """Send to each of these channels (None: all) what `build` makes for its flavour; None of it is not sent."""
         groups: dict[str, tuple[Flavour, list[Channel]]] = {}
-        for channel in self._node.channels if to is None else to:
+        for channel in self.channels if to is None else to:
             flavour = flavour_of(channel)
             groups.setdefault(flavour.name, (flavour, []))[1].append(channel)
         for flavour, channels in groups.values():
@@ -194,9 +211,9 @@ class System:
         task.add_done_callback(self._tasks.discard)
         return task
 
-    def times(self) -> Times:
-        """Now, in the clock of this system's messages."""
-        return Times(round((self.clock.monotonic() - self._started) * 1e9))
+    def times(self, at: float | None = None) -> Times:
+        """A moment of the monotonic clock (None: now) in the clock of this system's messages."""
+        return Times(round(((self.clock.monotonic() if at is None else at) - self._started) * 1e9))
 
     # The heart.
 
@@ -274,6 +291,7 @@ class System:
 
     def channel_closed(self, channel: Channel) -> None:
         """A client's channel is gone."""
+        self._hushed.discard(channel)
         for service in self.services:
             service.channel_closed(channel)
 

@@ -8,7 +8,7 @@ import pytest
 
 from anafi_mav.errors import LocalProtocolError
 from anafi_mav.mavlink import dialect
-from anafi_mav.mavlink.channel import FRAME_BYTES, TELEMETRY, Channel, total
+from anafi_mav.mavlink.channel import FRAME_BYTES, GIVE_WAY, Channel, total
 from anafi_mav.mavlink.frames import Parser, Received, frame, pack
 
 ATTITUDE = dialect.MAVLink_attitude_message(1, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5)
@@ -150,6 +150,6 @@ def test_counters_are_summed() -> None:
 
 
 def test_telemetry_is_what_the_next_message_replaces() -> None:
-    assert {0, 30, 33, 1} <= TELEMETRY
+    assert {0, 30, 33, 1} <= GIVE_WAY
     # Answers, parameters, missions, texts.
-    assert TELEMETRY.isdisjoint({77, 22, 44, 47, 253, 110})
+    assert GIVE_WAY.isdisjoint({77, 22, 44, 47, 253, 110})
