@@ -18,9 +18,11 @@ from anafi_mav.arsdk import mux_link
 from anafi_mav.arsdk.controller import ControllerSession
 from anafi_mav.arsdk.handshake import DISCOVERY_PORT
 from anafi_mav.arsdk.messages import common, drone_manager, skyctrl
+from anafi_mav.arsdk.messages.animation import Type as AnimationType
 from anafi_mav.arsdk.messages.ardrone3 import PoiStatus
 from anafi_mav.arsdk.messages.common import PlayingState
 from anafi_mav.arsdk.messages.drone_manager import DroneManagerConnectionState as Connection
+from anafi_mav.arsdk.messages.follow_me import Mode as FollowMeMode
 from anafi_mav.arsdk.rtsp import DEFAULT_PORT as RTSP_PORT
 from anafi_mav.arsdk.wire import Message, UnknownMessage
 from anafi_mav.clock import Clock, SystemClock
@@ -322,6 +324,8 @@ class Drone:
             (bool(piloting.moves_started) and not self.home.state.returning)
             or piloting.state.plan == PlayingState.PLAYING
             or piloting.state.poi in (PoiStatus.RUNNING, PoiStatus.PENDING)
+            or piloting.state.following not in (None, FollowMeMode.NONE)
+            or piloting.state.animation not in (None, AnimationType.NONE)
         )
 
     def _pilot_takes_over(self) -> None:

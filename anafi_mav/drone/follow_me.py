@@ -2,21 +2,29 @@
 
 from __future__ import annotations
 
+import asyncio
 import math
 from collections.abc import Mapping
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import msgspec
 from msgspec.structs import replace
 
-from anafi_mav.arsdk.messages import follow_me
+from anafi_mav.arsdk.messages import controller_info, follow_me
 from anafi_mav.arsdk.messages.follow_me import Behavior, Input, Mode
 from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone.alerts import spoken
 from anafi_mav.drone.element import Position, Reducer, members, position, with_item
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT
-from anafi_mav.drone.settings import Commanding
-from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, LocalProtocolError, NotSupported
+from anafi_mav.drone.settings import Commanding, number
+from anafi_mav.errors import (
+    AnafiMavError,
+    CommandRejected,
+    CommandTimeout,
+    LinkLost,
+    LocalProtocolError,
+    NotSupported,
+)
 
 
 class Trajectory(msgspec.Struct, frozen=True):
@@ -44,9 +52,14 @@ class FollowMeState(msgspec.Struct, frozen=True):
 def _mode_info(state: FollowMeState, m: follow_me.ModeInfo) -> FollowMeState:
     return replace(
         state,
-        missing=with_item(state.missing, m.mode, members(m.missing_requirements, Input), 0),
-        improvements=with_item(state.improvements, m.mode, members(m.improvements, Input), 0),
+        missing=with_item(state.missing, m.mode, _lacking(m.missing_requirements), 0),
+        improvements=with_item(state.improvements, m.mode, _lacking(m.improvements), 0),
     )
+
+
+def _lacking(bits: int) -> frozenset[Input]:
+    """followme.xml mode_info: "Bit is 0 if the input is missing, 1 if the input is ok"."""
+    return frozenset(Input) - members(bits, Input)
 
 
 def _trajectory(state: FollowMeState, m: follow_me.TargetTrajectory) -> FollowMeState:
@@ -66,28 +79,35 @@ class FollowMe(Commanding[FollowMeState]):
     }
 
     async def start(self, mode: Mode, timeout: float = ANSWER_TIMEOUT) -> None:
-        """Returns when the drone is in this mode. Raises `CommandRejected` with what is missing.
+        """Returns when the drone follows or looks. Raises `CommandRejected` with what is missing.
 
-        A start that is given up is taken back.
+        A start that is given up is taken back: a drone that lacks something would begin as soon as it has it.
         """
         if mode == Mode.NONE:
             raise LocalProtocolError("NONE is no way to follow")
         self._require(self.state.mode, "follow me")
         if mode not in self.state.missing:
             raise NotSupported(f"follow me: {spoken(mode)}")
+
+        def judge(message: Any) -> bool | AnafiMavError | None:
+            if message.mode != mode:
+                return None
+            return CommandRejected(self._why(mode)) if message.behavior == Behavior.IDLE else True
+
         try:
-            await self._commander.confirm(
-                follow_me.Start(mode), (follow_me.State,), lambda m: True if m.mode == mode else None, timeout
-            )
+            await self._commander.confirm(follow_me.Start(mode), (follow_me.State,), judge, timeout)
         except LinkLost:
             raise
         except BaseException as error:
             if self._commander.connected:
                 self._commander.send(follow_me.Stop())
-            lacks = ", ".join(spoken(one) for one in sorted(self.state.missing.get(mode, ())))
-            if isinstance(error, CommandTimeout) and lacks:
-                raise CommandRejected(f"cannot follow: {lacks}") from None
+            if isinstance(error, CommandTimeout) and self.state.missing.get(mode):
+                raise CommandRejected(self._why(mode)) from None
             raise
+
+    def _why(self, mode: Mode) -> str:
+        lacks = ", ".join(spoken(one) for one in sorted(self.state.missing.get(mode, ())))
+        return f"cannot follow: it lacks {lacks}" if lacks else "cannot follow"
 
     async def stop(self, timeout: float = ANSWER_TIMEOUT) -> None:
         """Returns when the drone follows nobody, at once when it does not."""
@@ -96,6 +116,29 @@ class FollowMe(Commanding[FollowMeState]):
             return
         await self._commander.confirm(
             follow_me.Stop(), (follow_me.State,), lambda m: True if m.mode == Mode.NONE else None, timeout
+        )
+
+    def tell_target(
+        self, place: Position, velocity: tuple[float, float, float] = (0.0, 0.0, 0.0), accuracy: float = 1.0
+    ) -> None:
+        """Where who controls is (altitude above mean sea level; north, east, down in m/s; accuracy in m).
+
+        It is the target while `target_is_controller`. Say it once a second at least: it is not acknowledged.
+        """
+        self._require(self.state.mode, "follow me")
+        north, east, down = (number(speed, "speed of the target") for speed in velocity)
+        self._commander.send(
+            controller_info.Gps(
+                place.latitude,
+                place.longitude,
+                number(place.altitude, "altitude of the target"),
+                number(accuracy, "accuracy of the target"),
+                accuracy,
+                north,
+                east,
+                down,
+                asyncio.get_running_loop().time() * 1000.0,
+            )
         )
 
     async def set_target_is_controller(self, on: bool) -> bool:

@@ -14,10 +14,11 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
-from anafi_mav.arsdk.messages import ardrone3, common, rth
+from anafi_mav.arsdk.messages import animation, ardrone3, common, follow_me, rth
 from anafi_mav.arsdk.messages import move as guided
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState, MoveToStatus, OrientationMode, PoiStatus
 from anafi_mav.arsdk.messages.common import PlayingState
+from anafi_mav.arsdk.messages.follow_me import Mode as FollowMeMode
 from anafi_mav.arsdk.messages.rth import RthState
 from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone.alerts import spoken
@@ -85,6 +86,8 @@ class Piloting(PilotingSettings):
         self._takeoffs_asked = 0
         self._halting: set[asyncio.Future[None]] = set()
         """Orders to stop something that the drone may not have received yet."""
+        self._stopping: set[type[Message]] = set()
+        """Orders to stop something that the drone has not answered yet: once is enough."""
         self._may_take_off_until = -math.inf
 
     def reset(self) -> None:
@@ -95,11 +98,16 @@ class Piloting(PilotingSettings):
         """Nothing of before is sent again, and what was started is nobody's any more."""
         self._silence_sticks()
         self._moves.clear(MoveEnd.LINK_LOST)
+        self._stopping.clear()
         self._may_take_off_until = -math.inf
 
     def reactions(self) -> Mapping[type[Message], Callable[[Any, float], None]]:
         """Events to be shown to this element beyond its reducers."""
-        return self._moves.reactions()
+        return {
+            **self._moves.reactions(),
+            follow_me.State: lambda message, now: self._stopping.discard(follow_me.Stop),
+            animation.State: lambda message, now: self._stopping.discard(animation.Cancel),
+        }
 
     # -- facts about what we do
 
@@ -523,6 +531,9 @@ class Piloting(PilotingSettings):
         position = percent(command, limits)
         if self.sticks_blocked is None:
             self._stop_moves("taken over by the sticks")
+            if self.state.following != FollowMeMode.LOOK_AT:  # which leaves the flying to the sticks
+                self._stop_following()
+            self._stop_animation()
             now = self._now()
             self._sticks.command(position, now, now - age)
         self._pump()
@@ -531,9 +542,10 @@ class Piloting(PilotingSettings):
         """Stop now, whatever we had started, and stay: takes effect before it returns.
 
         Cancels moveTo and moveBys (those of an earlier connection or another controller too, as far as the drone
-        tells), a running point of interest, a playing flight plan (it is paused) and a return that was asked for
-        through us, then centres the sticks for two seconds, since a PCMD alone neither stops a moveTo nor is it
-        acknowledged. A landing or a return that the drone began by itself goes on. Raises `LinkLost` without a link.
+        tells), a running point of interest, an animation, the following of a target, a playing flight plan (it is
+        paused) and a return that was asked for through us, then centres the sticks for two seconds, since a PCMD alone
+        neither stops a moveTo nor is it acknowledged. A landing or a return that the drone began by itself goes on.
+        Raises `LinkLost` without a link.
         """
         self._require_link()
         state = self.state
@@ -546,6 +558,8 @@ class Piloting(PilotingSettings):
                 self._halt(ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0))
         if state.poi in (PoiStatus.RUNNING, PoiStatus.PENDING):
             self._halt(ardrone3.StopPilotedPOI())
+        self._stop_following()
+        self._stop_animation()
         if state.plan == PlayingState.PLAYING:
             self._halt(common.Pause())
         if self._drop_return("stopped by hover"):
@@ -564,6 +578,10 @@ class Piloting(PilotingSettings):
             answers.append(self._commander.expect((common.MavlinkFilePlayingStateChanged,), _ends_playing))
         if self._moves.returning is not None and self._moves.returning.running:
             answers.append(self._commander.expect((rth.State,), _ends_return))
+        if self.state.following not in (None, FollowMeMode.NONE):
+            answers.append(self._commander.expect((follow_me.State,), _ends_following))
+        if self.state.animation not in (None, animation.Type.NONE):
+            answers.append(self._commander.expect((animation.State,), _ends_animation))
         began = self._now()
         try:
             self.hover()
@@ -613,6 +631,16 @@ class Piloting(PilotingSettings):
         if moves:
             self._halt(ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0))
         return move is not None
+
+    def _stop_following(self) -> None:
+        if self.state.following not in (None, FollowMeMode.NONE) and follow_me.Stop not in self._stopping:
+            self._stopping.add(follow_me.Stop)
+            self._halt(follow_me.Stop())
+
+    def _stop_animation(self) -> None:
+        if self.state.animation not in (None, animation.Type.NONE) and animation.Cancel not in self._stopping:
+            self._stopping.add(animation.Cancel)
+            self._halt(animation.Cancel())
 
     def _pump(self) -> None:
         """Send the PCMD that is due and come back for the next."""
@@ -689,6 +717,14 @@ def _ends_move_to(message: ardrone3.MoveToChanged) -> bool | None:
 
 def _ends_return(message: rth.State) -> bool | None:
     return True if message.state in (RthState.AVAILABLE, RthState.UNAVAILABLE) else None
+
+
+def _ends_following(message: follow_me.State) -> bool | None:
+    return True if message.mode == FollowMeMode.NONE else None
+
+
+def _ends_animation(message: animation.State) -> bool | None:
+    return True if message.type == animation.Type.NONE else None
 
 
 def _ends_playing(message: common.MavlinkFilePlayingStateChanged) -> bool | None:

@@ -8,9 +8,10 @@ from collections.abc import Mapping
 import msgspec
 from msgspec.structs import replace
 
-from anafi_mav.arsdk.messages import ardrone3, common, move, obstacle_avoidance, piloting_style
+from anafi_mav.arsdk.messages import animation, ardrone3, common, follow_me, move, obstacle_avoidance, piloting_style
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState, Motion, MoveToStatus, PoiStatus
 from anafi_mav.arsdk.messages.common import PlayingState
+from anafi_mav.arsdk.messages.follow_me import Mode as FollowMeMode
 from anafi_mav.arsdk.messages.piloting_style import PilotingStyleStyle
 from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone.element import Position, Range, Reducer, finite, members, position, setting
@@ -60,6 +61,10 @@ class PilotingState(msgspec.Struct, frozen=True):
     poi: PoiStatus | None = None
     plan: PlayingState | None = None
     """Whether a flight plan plays."""
+    animation: animation.Type | None = None
+    """What animation flies; NONE: none does."""
+    following: FollowMeMode | None = None
+    """How it follows a target; NONE: not at all."""
     move_missing: int | None = None
     """What a guided move lacks, as bits of `move.Indicator`; 0 = available. Ai only."""
     max_tilt: Range | None = None
@@ -129,6 +134,8 @@ REDUCERS: Mapping[type[Message], Reducer] = {
     ardrone3.MoveToChanged: _move_to,
     ardrone3.PilotedPOIV2: lambda state, message: replace(state, poi=message.status),
     common.MavlinkFilePlayingStateChanged: lambda state, message: replace(state, plan=message.state),
+    animation.State: lambda state, message: replace(state, animation=message.type),
+    follow_me.State: lambda state, message: replace(state, following=message.mode),
     move.Info: lambda state, message: replace(state, move_missing=message.missing_inputs),
     ardrone3.MaxTiltChanged: lambda state, message: replace(state, max_tilt=setting(message)),
     ardrone3.MaxVerticalSpeedChanged: lambda state, message: replace(state, max_vertical_speed=setting(message)),

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+import math
 from collections.abc import AsyncIterator
 
 import pytest
 from scripted_device import STATES, ScriptedDevice
 from simulated import connected, take_off
 
-from anafi_mav.arsdk.messages import ardrone3, common, follow_me
+from anafi_mav.arsdk.messages import ardrone3, common, controller_info, follow_me
 from anafi_mav.arsdk.messages.ardrone3 import PoiMode, PoiStatus
 from anafi_mav.arsdk.messages.common import CalibrationAxis
 from anafi_mav.drone import Drone, Position
@@ -25,11 +26,8 @@ async def device() -> AsyncIterator[ScriptedDevice]:
             *STATES,
             ardrone3.PilotedPOIV2(500.0, 500.0, 500.0, PoiMode.LOCKED_GIMBAL, PoiStatus.AVAILABLE),
             follow_me.State(follow_me.Mode.NONE, follow_me.Behavior.IDLE, follow_me.Animation.NONE, 0),
-            follow_me.ModeInfo(
-                follow_me.Mode.LOOK_AT,
-                1 << follow_me.Input.IMAGE_DETECTION | 1 << follow_me.Input.DRONE_HIGH_ENOUGH,
-                0,
-            ),
+            # All but image detection (6) and drone high enough (5) are there: a bit is an input that is ok.
+            follow_me.ModeInfo(follow_me.Mode.LOOK_AT, 0b1_1001_1111, 0b1_1111_1111),
             common.MagnetoCalibrationStartedChanged(0),
             common.AllStatesChanged(),
         ]
@@ -81,6 +79,14 @@ async def test_follow_me(device: ScriptedDevice, drone: Drone) -> None:
         await drone.follow_me.start(follow_me.Mode.LEASH)
     with pytest.raises(LocalProtocolError):
         await drone.follow_me.start(follow_me.Mode.NONE)
+    assert drone.follow_me.state.improvements == {follow_me.Mode.LOOK_AT: frozenset()}
+    # It has taken the mode and waits for what it lacks: that is no success, and is taken back.
+    device.script[follow_me.Start] = lambda m: [
+        follow_me.State(m.mode, follow_me.Behavior.IDLE, follow_me.Animation.NONE, 0)
+    ]
+    with pytest.raises(CommandRejected, match="drone high enough, image detection"):
+        await drone.follow_me.start(follow_me.Mode.LOOK_AT)
+    await device.until(follow_me.Stop, 2)
     device.script[follow_me.Start] = lambda m: [
         follow_me.State(m.mode, follow_me.Behavior.LOOK_AT, follow_me.Animation.NONE, 0),
         follow_me.TargetTrajectory(48.0, 2.0, 40.0, 1.0, 2.0, 0.0),
@@ -98,6 +104,16 @@ async def test_follow_me(device: ScriptedDevice, drone: Drone) -> None:
     stops = len(device.got(follow_me.Stop))
     await drone.follow_me.stop()
     assert len(device.got(follow_me.Stop)) == stops
+
+
+async def test_the_target_is_told_of(device: ScriptedDevice, drone: Drone) -> None:
+    drone.follow_me.tell_target(Position(48.0, 2.0, 40.0), (1.0, 2.0, -0.5), 3.0)
+    told = await device.until(controller_info.Gps)
+    assert (told.latitude, told.longitude, told.altitude) == (48.0, 2.0, 40.0)
+    assert (told.north_speed, told.east_speed, told.down_speed) == (1.0, 2.0, -0.5)
+    assert (told.horizontal_accuracy, told.vertical_accuracy) == (3.0, 3.0)
+    with pytest.raises(LocalProtocolError):
+        drone.follow_me.tell_target(Position(48.0, 2.0, math.nan))
 
 
 async def test_the_beep() -> None:

@@ -10,7 +10,7 @@ from datetime import datetime
 import pytest
 from scripted_device import SETTINGS, STATES, ScriptedDevice
 
-from anafi_mav.arsdk.messages import alarms, ardrone3, common, move, rth
+from anafi_mav.arsdk.messages import alarms, animation, ardrone3, common, follow_me, move, rth
 from anafi_mav.arsdk.messages.ardrone3 import (
     FlyingState,
     MoveByError,
@@ -67,6 +67,11 @@ def running(command: ardrone3.MoveTo, status: MoveToStatus = MoveToStatus.RUNNIN
     return ardrone3.MoveToChanged(
         command.latitude, command.longitude, command.altitude, command.orientation_mode, command.heading, status
     )
+
+
+def following(mode: follow_me.Mode) -> follow_me.State:
+    behavior = follow_me.Behavior.IDLE if mode == follow_me.Mode.NONE else follow_me.Behavior.FOLLOW
+    return follow_me.State(mode, behavior, follow_me.Animation.NONE, 0)
 
 
 def zeros(device: ScriptedDevice) -> list[ardrone3.PCMD]:
@@ -735,6 +740,35 @@ async def test_hover_cancels_what_we_started(drone: Drone, device: ScriptedDevic
     await device.until(ardrone3.PCMD, 2)
     assert device.got(ardrone3.CancelMoveTo) == []
     assert device.got(rth.Abort) == []
+
+
+async def test_hover_ends_the_following_of_a_target_and_an_animation(drone: Drone, device: ScriptedDevice) -> None:
+    await flying(drone, device)
+    await reported(drone, device, following(follow_me.Mode.GEOGRAPHIC))
+    await reported(drone, device, animation.State(animation.Type.SPIRAL, 10))
+    drone.piloting.hover()
+    drone.piloting.hover()  # once is enough
+    stopping = asyncio.ensure_future(drone.piloting.stop())
+    await device.until(follow_me.Stop)
+    await device.until(animation.Cancel)
+    await reported(drone, device, following(follow_me.Mode.NONE))
+    assert not stopping.done()
+    device.say(animation.State(animation.Type.NONE, 0))
+    await stopping
+    assert (len(device.got(follow_me.Stop)), len(device.got(animation.Cancel))) == (1, 1)
+
+
+@pytest.mark.parametrize(("mode", "stops"), [(follow_me.Mode.RELATIVE, 1), (follow_me.Mode.LOOK_AT, 0)])
+async def test_a_setpoint_takes_over_from_what_flies_by_itself(
+    drone: Drone, device: ScriptedDevice, mode: follow_me.Mode, stops: int
+) -> None:
+    await flying(drone, device)
+    await reported(drone, device, following(mode))
+    await reported(drone, device, animation.State(animation.Type.DRONIE, 10))
+    for _ in range(3):
+        drone.piloting.pilot(PilotingCommand(roll_deg=5.0))
+    await device.until(ardrone3.PCMD, 3)
+    assert (len(device.got(follow_me.Stop)), len(device.got(animation.Cancel))) == (stops, 1)
 
 
 async def test_hover_rejects_a_verb_that_still_waits(drone: Drone, device: ScriptedDevice) -> None:
