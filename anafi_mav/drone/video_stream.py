@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import math
+import random
 from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
@@ -15,7 +16,9 @@ from contextlib import suppress
 import msgspec
 
 from anafi_mav.arsdk import rtsp, sdp
+from anafi_mav.arsdk.rtcp import ReceiverReport, SenderReport, decode_reports, encode_receiver_report
 from anafi_mav.arsdk.rtp_h264 import CLOCK_RATE, Picture, PictureReceiver
+from anafi_mav.arsdk.rtp_reception import Reception
 from anafi_mav.arsdk.rtsp import Response, Transport
 from anafi_mav.arsdk.sdp import MediaDescription, SessionDescription
 from anafi_mav.drone.rtsp_client import RtspClient
@@ -35,8 +38,14 @@ MIN_KEEP_ALIVE = 1.0
 MAX_MISSED = 3
 """Words without an answer after which a session is over (librtsp RTSP_CLIENT_MAX_FAILED_KEEP_ALIVE)."""
 
+REPORT_PERIOD = 1.0
+"""s between two reports of how the pictures arrive."""
+
 GOODBYE = 1.0
 """s to wait for the answer to a TEARDOWN."""
+
+NAME = "anafi-mav"
+"""What we are called in reports."""
 
 LIVE = "live"
 """The path of what the cameras see now; `replay/<resource>` is a recording."""
@@ -84,6 +93,9 @@ class Stream:
         self._loop = asyncio.get_running_loop()
         self._timer: asyncio.TimerHandle | None = None
         self._last_picture = 0.0
+        self._source = random.getrandbits(32)
+        """What we call ourselves in reports."""
+        self._reception: Reception | None = None
 
     async def run(self) -> None:
         """Show the video until it is not wanted any more. Raises `LinkLost` when it ends by itself, `CommandTimeout`
@@ -97,7 +109,7 @@ class Stream:
             url, description = _described(await client.ask("DESCRIBE", url, [("Accept", "application/sdp")]), url)
             media = _chosen(description, self._title)
             self.shown = _shown(description, media)
-            channels = await self._route.channels(client, self._receive, lambda data: None)
+            channels = await self._route.channels(client, self._receive, self._hear)
             offer = Transport(client_ports=channels.ports)
             response = await client.ask(
                 "SETUP",
@@ -110,7 +122,11 @@ class Stream:
             await client.ask("PLAY", url, [("Session", session), ("Range", rtsp.format_range(None))])
             self._last_picture = self._loop.time()
             keep = "GET_PARAMETER" if "GET_PARAMETER" in public else "OPTIONS"
-            await self._watch(client, keep, url, session, timeout)
+            reports = asyncio.create_task(self._report(channels))
+            try:
+                await self._watch(client, keep, url, session, timeout)
+            finally:
+                reports.cancel()
         finally:
             if self._timer is not None:
                 self._timer.cancel()
@@ -153,6 +169,23 @@ class Stream:
     def _receive(self, data: bytes) -> None:
         now = self._loop.time()
         self._show(self.receiver.receive(data, now), now)
+        ssrc = self.receiver.window.ssrc
+        if ssrc is not None:
+            if self._reception is None or self._reception.ssrc != ssrc:
+                self._reception = Reception(ssrc, CLOCK_RATE)
+            self._reception.receive(data, now)
+
+    def _hear(self, data: bytes) -> None:
+        for report in decode_reports(data):
+            if isinstance(report, SenderReport) and self._reception is not None:
+                self._reception.hear(report, self._loop.time())
+
+    async def _report(self, channels: Channels) -> None:
+        while True:
+            await asyncio.sleep(REPORT_PERIOD)
+            block = None if self._reception is None else self._reception.block(self._loop.time())
+            if block is not None:
+                channels.report(encode_receiver_report(ReceiverReport(self._source, (block,)), NAME))
 
     def _expire(self) -> None:
         self._timer = None

@@ -16,6 +16,7 @@ from scripted_device import ScriptedDevice
 from support.world import loopback
 from video_server import KEY, METADATA, PPS, SDP, SPS, Asked, VideoServer, ok, refused
 
+from anafi_mav.arsdk.rtcp import ReceiverReport
 from anafi_mav.arsdk.rtp_h264 import Picture
 from anafi_mav.arsdk.video_metadata import PROTO_PROFILE, V3_PROFILE, Quaternion
 from anafi_mav.drone import Drone
@@ -177,7 +178,11 @@ async def test_the_video_behind_a_skycontroller(generation: int) -> None:
         async with drone.video.watching():
             frame = await drone.video.next_frame(5.0)
             assert frame.metadata.iso_gain == 318
+            await server.until(lambda: bool(server.reports))
         await drone.close()
+    report = server.reports[0]
+    assert isinstance(report, ReceiverReport)
+    assert report.blocks[0].lost == 0
     assert server.methods()[-1] == "TEARDOWN"
     setup = server.asked[2]
     assert setup.headers.get("X-com-parrot-link-type") == ("mux" if generation == 4 else None)

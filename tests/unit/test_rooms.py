@@ -24,7 +24,7 @@ GUARDED = {"pymavlink"}
 
 CORES = ["arsdk/wire.py", "arsdk/messages", "arsdk/frame.py", "arsdk/packing.py", "arsdk/transport.py"]
 CORES += ["arsdk/video_metadata.py", "arsdk/video_metadata_proto.py", "arsdk/rtp.py", "arsdk/rtp_h264.py"]
-CORES += ["arsdk/rtcp.py", "arsdk/rtsp.py", "arsdk/sdp.py"]
+CORES += ["arsdk/rtcp.py", "arsdk/rtp_reception.py", "arsdk/rtsp.py", "arsdk/sdp.py"]
 CORES += ["arsdk/handshake.py", "mavlink/frames.py", "mavlink/router.py", "mavlink/streams.py", "plans"]
 CORES += ["services/modes.py", "services/offboard.py", "services/height.py", "units.py", "geo.py", "config/schema.py"]
 IO = {"asyncio", "socket", "time", "threading", "selectors", "subprocess"}

@@ -8,6 +8,7 @@ import random
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from anafi_mav.arsdk.rtcp import Report, decode_reports
 from anafi_mav.arsdk.rtp_h264 import PictureSender
 from anafi_mav.arsdk.video_metadata import (
     PROTO_PROFILE,
@@ -89,6 +90,8 @@ class VideoServer:
     """By method, what is answered instead of the usual; None: nothing."""
     quiet: bool = False
     """True: no pictures are sent."""
+    reports: list[Report] = field(default_factory=list)
+    """What clients told of RTP."""
     sent: int = 0
     """Pictures."""
     playing: int = 0
@@ -102,7 +105,7 @@ class VideoServer:
         self.port = self._server.sockets[0].getsockname()[1]
         loop = asyncio.get_running_loop()
         self.rtp, _ = await loop.create_datagram_endpoint(asyncio.DatagramProtocol, local_addr=(self.address, 0))
-        self.rtcp, _ = await loop.create_datagram_endpoint(asyncio.DatagramProtocol, local_addr=(self.address, 0))
+        self.rtcp, _ = await loop.create_datagram_endpoint(lambda: _Reports(self), local_addr=(self.address, 0))
         return self
 
     async def __aexit__(self, *_: object) -> None:
@@ -200,6 +203,15 @@ class VideoServer:
                 await asyncio.sleep(1 / 30)
         finally:
             self.playing -= 1
+
+
+class _Reports(asyncio.DatagramProtocol):
+    def __init__(self, server: VideoServer) -> None:
+        self._server = server
+
+    def datagram_received(self, data: bytes, address: object) -> None:
+        self._server.reports += decode_reports(data)
+        self._server._news.set()
 
 
 def ok(asked: Asked, extra: str = "", body: str = "") -> bytes:
