@@ -62,6 +62,7 @@ class _Supervised:
                     reason = await asyncio.shield(self.drone.lost)
                     logger.warning("%s: link lost: %s", self.config.name, reason)
                     self.problem = f"link lost: {reason}"
+                    await self.system.settle()
                 finally:
                     self.system.link_down()
                     await self.drone.close()

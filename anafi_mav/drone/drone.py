@@ -392,20 +392,22 @@ class Drone:
         )
 
     async def reboot(self, timeout: float = REBOOT_TIMEOUT) -> None:
-        """Let the drone start anew; returns when the link is lost, which is all that it says to it.
+        """Let the drone start anew; returns when it has the order and the link is lost, which is all that it says.
 
-        Raises `CommandRejected` while its motors turn, or when it has not said whether they do.
+        Raises `CommandRejected` while its motors turn, or when it has not said whether they do; `LinkLost` when the
+        link went before the order had arrived; `CommandTimeout` when the drone just goes on.
         """
         if not self.connected:
             raise LinkLost("not connected")
         flying = self.piloting.state.flying
         if flying not in MOTORS_OFF:
             raise CommandRejected("a drone that does not stand with its motors off is not rebooted")
-        token = self._commander.send(common.Reboot())
+        delivery = self._commander.deliver(common.Reboot())
         done, _ = await asyncio.wait({self._lost}, timeout=timeout)
         if not done:
-            self._commander.cancel(token)
+            self._commander.withdraw(delivery)
             raise CommandTimeout(common.Reboot.NAME, timeout)
+        delivery.result()
 
     # -- what others may look at
 

@@ -154,6 +154,13 @@ class Commander:
         self._deliveries[token] = delivery
         return delivery
 
+    def withdraw(self, delivery: asyncio.Future[None]) -> None:
+        """Take back what `deliver` sent, if the drone does not have it yet: it is never sent again."""
+        for token, other in tuple(self._deliveries.items()):
+            if other is delivery:
+                del self._deliveries[token]
+                self.cancel(token)
+
     def _delivered(self, token: int, arrived: bool) -> None:
         delivery = self._deliveries.pop(token, None)
         if delivery is None or delivery.done():

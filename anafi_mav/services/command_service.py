@@ -35,6 +35,9 @@ from anafi_mav.services.vehicle import Refused
 
 logger = logging.getLogger(__name__)
 
+SETTLE = 0.1
+"""s that commands get to end by themselves when the link is lost; they wait for the drone, which says so at once."""
+
 _RESULT_BY_ERROR: tuple[tuple[type[AnafiMavError], int], ...] = (
     (UnsupportedFrame, dialect.MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME),
     (NotSupported, dialect.MAV_RESULT_UNSUPPORTED),
@@ -81,6 +84,11 @@ class CommandService(Service):
             dialect.MAVLINK_MSG_ID_COMMAND_CANCEL: self._cancel,
             dialect.MAVLINK_MSG_ID_SET_MODE: self._set_mode,
         }
+
+    async def settle(self) -> None:
+        """The link is lost: let what waited for the drone say how that ended. A restart, for one, has succeeded."""
+        if self._running:
+            await asyncio.wait(tuple(self._running), timeout=SETTLE)
 
     def link_down(self) -> None:
         """Whoever waits is told that it failed; the tasks end with the host's."""

@@ -91,7 +91,12 @@ def table(vehicle: Vehicle, sysid: int) -> list[Parameter]:
         # PX4: -1 hovers at home for ever, 0 lands at once.
         return 0.0 if drone.home.state.ending == RthEndingBehavior.LANDING else -1.0
 
+    async def set_hand_launch(value: float) -> float:
+        vehicle.hand_launch = bool(value)
+        return value
+
     parameters = [
+        Parameter("ANF_HAND_LAUNCH", INT32, lambda: float(vehicle.hand_launch), set_hand_launch, lambda: (0.0, 1.0)),
         Parameter("MIS_TAKEOFF_ALT", REAL32, lambda: vehicle.takeoff_height, set_takeoff_height, takeoff_limits),
         Parameter(
             "RTL_RETURN_ALT",

@@ -22,6 +22,7 @@ from anafi_mav.services.command_service import CommandService
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.guided import GuidedService
 from anafi_mav.services.identity import IdentityService
+from anafi_mav.services.maintenance import MaintenanceService
 from anafi_mav.services.message_service import MessageService
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.modes_service import ModesService
@@ -41,6 +42,7 @@ SERVICES: tuple[type[Service], ...] = (
     IdentityService,
     ModesService,
     GuidedService,
+    MaintenanceService,
     TelemetryService,
     ParameterService,
     PlanService,
@@ -123,6 +125,10 @@ class System:
         self._changed()
         self._next_heartbeat = self.clock.monotonic() + HEARTBEAT_EVERY
         self._ticker = asyncio.get_running_loop().create_task(self._tick())
+
+    async def settle(self) -> None:
+        """The link is lost, and not yet given up here: commands that waited for the drone end."""
+        await self._commands.settle()
 
     def link_down(self) -> None:
         """The link is gone: whoever waits is told, then the system is silent."""

@@ -1,0 +1,138 @@
+"""What is done on the ground: calibration with progress texts, and a restart.
+
+Texts are PX4's own, which QGroundControl and MAVSDK read ("[cal] ...": MAVSDK plugins/calibration, conformance B2).
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import math
+from collections.abc import Awaitable, Callable, Mapping
+
+from anafi_mav.drone.events import CalibrationAxis
+from anafi_mav.errors import AnafiMavError
+from anafi_mav.mavlink import dialect
+from anafi_mav.services.commands import Command
+from anafi_mav.services.service import Action, Service
+from anafi_mav.services.statustext import Severity
+from anafi_mav.services.vehicle import Refused
+
+_MAGNETOMETER, _HORIZON = 1.0, 2.0
+"""param2 and param5 of MAV_CMD_PREFLIGHT_CALIBRATION that can be meant for an ANAFI (MAVLink common.xml)."""
+
+_RESTART = 1.0
+"""param1 of MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN."""
+
+_SIDES: dict[CalibrationAxis | None, str] = {
+    CalibrationAxis.X_AXIS: "roll: turn it about its long axis",
+    CalibrationAxis.Y_AXIS: "pitch: turn it head over heels",
+    CalibrationAxis.Z_AXIS: "yaw: turn it like a top",
+}
+"""What to do with the drone in hand, by the axis that the drone wants to be turned about (arsdk common.xml 0-14-2)."""
+
+
+Work = Callable[[], Awaitable[None]]
+
+
+class MaintenanceService(Service):
+    """Refused with turning motors, all of it."""
+
+    def actions(self) -> Mapping[int, Action]:
+        return {
+            dialect.MAV_CMD_PREFLIGHT_CALIBRATION: self._calibrate,
+            dialect.MAV_CMD_GIMBAL_REQUEST_AXIS_CALIBRATION: lambda command: self._on_ground(self._gimbal),
+            dialect.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: self._reboot,
+        }
+
+    async def _calibrate(self, command: Command) -> None:
+        """MAV_CMD_PREFLIGHT_CALIBRATION: param2 1 the magnetometer, param5 2 the horizon, which is the gimbal's; all 0
+        ends what is under way. It ends with the calibration: accepted when the drone says that it has succeeded."""
+        values = [0.0 if math.isnan(value) else value for value in (*command.params, command.x, command.y, command.z)]
+        wanted = {index: value for index, value in enumerate(values, 1) if value != 0.0}
+        if not wanted:
+            await self.host.vehicle.take_over()  # ends the one that runs
+        elif wanted == {2: _MAGNETOMETER}:
+            await self._on_ground(self._magnetometer)
+        elif wanted == {5: _HORIZON}:
+            await self._on_ground(self._gimbal)
+        else:
+            raise Refused("Calibration refused: an ANAFI has the magnetometer's and the gimbal's only", lasting=True)
+
+    async def _on_ground(self, work: Work) -> None:
+        vehicle = self.host.vehicle
+        if not vehicle.on_ground or vehicle.drone.piloting.about_to_fly:
+            raise Refused("Refused: the drone is not on the ground")
+        await vehicle.take_over()
+        await work()
+
+    async def _told(
+        self, name: str, work: Callable[[], Awaitable[None]], undo: Callable[[], Awaitable[object]]
+    ) -> None:
+        """Run a calibration, with the texts of its beginning and its end; given up, it is undone."""
+        self._say(f"calibration started: {name}")
+        try:
+            await work()
+        except asyncio.CancelledError:
+            self._say("calibration cancelled")
+            await self._undone(undo)
+            raise
+        except AnafiMavError as error:
+            self._say(f"calibration failed: {error}", Severity.ERROR)
+            await self._undone(undo)
+            raise
+        self._say(f"calibration done: {name.split()[-1]}")
+
+    @staticmethod
+    async def _undone(undo: Callable[[], Awaitable[object]]) -> None:
+        with contextlib.suppress(AnafiMavError):  # there is nobody to tell it to, and the drone says how it stands
+            await undo()
+
+    async def _magnetometer(self) -> None:
+        element = self.host.drone.calibration
+
+        async def turn() -> None:
+            await element.start_magnetometer()
+            watching = self.host.spawn(self._watch_axes())
+            try:
+                await element.magnetometer_done()
+            finally:
+                watching.cancel()
+
+        await self._told("2 mag", turn, element.abort_magnetometer)
+
+    async def _watch_axes(self) -> None:
+        """Say which way to turn the drone, and how far it has come, whenever that changes."""
+        told: tuple[CalibrationAxis | None, int] | None = None
+        news = asyncio.Event()
+        undo = self.host.drone.subscribe(lambda message, now: news.set())
+        try:
+            while True:
+                state = self.host.drone.calibration.state
+                now = (state.axis, len(state.done or ()))
+                if told is None or now[1] != told[1]:
+                    self._say(f"progress <{100 * now[1] // len(_SIDES)}>")
+                if now != told and now[0] in _SIDES:
+                    self._say(_SIDES[now[0]])
+                told = now
+                news.clear()
+                await news.wait()
+        finally:
+            undo()
+
+    async def _gimbal(self) -> None:
+        gimbal = self.host.drone.gimbal
+        await self._told("4 level", gimbal.calibrate, gimbal.cancel_calibration)
+
+    async def _reboot(self, command: Command) -> None:
+        """MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: param1 1. Accepted when the drone falls silent over it."""
+        if command.params[0] != _RESTART:
+            raise Refused("Refused: an ANAFI can only be restarted", lasting=True)
+        await self._on_ground(self._restart)
+
+    async def _restart(self) -> None:
+        self.host.text(Severity.NOTICE, "The drone restarts")
+        await self.host.drone.reboot()
+
+    def _say(self, text: str, severity: Severity = Severity.INFO) -> None:
+        self.host.text(severity, f"[cal] {text}")

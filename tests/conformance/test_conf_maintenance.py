@@ -1,0 +1,101 @@
+"""What is done on the ground: conformance items 129, 130, 148, launch by hand, and the two calibrations."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.world import ARMED, World, world
+
+from anafi_mav.mavlink import dialect as newer
+
+ACCEPTED, DENIED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_DENIED
+REJECTED, CANCELLED = dialect.MAV_RESULT_TEMPORARILY_REJECTED, 6
+IN_PROGRESS = dialect.MAV_RESULT_IN_PROGRESS
+CALIBRATE = dialect.MAV_CMD_PREFLIGHT_CALIBRATION
+REBOOT = dialect.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN
+ARM = dialect.MAV_CMD_COMPONENT_ARM_DISARM
+MAGNETOMETER = {"x": 0.0, "y": 0.0, "z": 0.0}
+
+
+def texts(w: World, mark: int) -> list[str]:
+    return [m.text for _, m in w.client.since(mark, "STATUSTEXT") if m.text.startswith("[cal]")]
+
+
+@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+async def test_conf_130_the_magnetometer(flavour: str) -> None:
+    async with world(flavour=flavour) as w:
+        mark = w.client.mark()
+        assert (await w.client.command(CALIBRATE, 0, 1, 0, 0, **MAGNETOMETER, timeout=20.0)).result == ACCEPTED
+        acks = [m.result for _, m in w.client.since(mark, "COMMAND_ACK")]
+        assert acks[:-1] == [IN_PROGRESS] * (len(acks) - 1)
+        said = texts(w, mark)
+        assert said[0] == "[cal] calibration started: 2 mag"
+        assert said[-1] == "[cal] calibration done: mag"
+        assert [t for t in said if "progress" in t] == [f"[cal] progress <{n}>" for n in (0, 33, 66, 100)]
+        assert [t[6:].split(":")[0] for t in said if "turn it" in t] == ["roll", "pitch", "yaw"]
+
+
+async def test_conf_130_the_gimbal() -> None:
+    async with world() as w:
+        mark = w.client.mark()
+        assert (await w.client.command(CALIBRATE, 0, 0, 0, 0, x=2.0, y=0.0, z=0.0, timeout=20.0)).result == ACCEPTED
+        assert texts(w, mark)[-1] == "[cal] calibration done: level"
+        assert len(w.commands("gimbal.calibrate")) == 1
+        ask = dialect.MAV_CMD_GIMBAL_REQUEST_AXIS_CALIBRATION
+        assert (await w.client.command(ask, timeout=20.0)).result == ACCEPTED
+        assert len(w.commands("gimbal.calibrate")) == 2
+
+
+@pytest.mark.parametrize("numbers", [(1, 0, 0, 0), (0, 0, 1, 0), (0, 1, 1, 0), (0, math.inf, 0, 0)])
+async def test_conf_130_sensors_that_cannot_be_calibrated(numbers: tuple[float, ...]) -> None:
+    async with world() as w:
+        assert (await w.client.command(CALIBRATE, *numbers, **MAGNETOMETER)).result == DENIED
+
+
+async def test_conf_130_not_in_flight() -> None:
+    async with world() as w:
+        await w.take_off()
+        assert (await w.client.command(CALIBRATE, 0, 1, 0, 0, **MAGNETOMETER)).result == REJECTED
+        assert (await w.client.command(REBOOT, 1)).result == REJECTED
+        assert w.commands("common.Calibration.MagnetoCalibration") == []
+        assert w.commands("common.Common.Reboot") == []
+
+
+@pytest.mark.parametrize("way", ["COMMAND_CANCEL", "zeros"])
+async def test_conf_129_a_calibration_is_cancelled(way: str) -> None:
+    async with world() as w:
+        mark = w.client.mark()
+        w.client.send_command(CALIBRATE, 0, 1, 0, 0, **MAGNETOMETER)
+        await w.client.wait("STATUSTEXT", lambda m: "turn it" in m.text, since=mark)
+        if way == "COMMAND_CANCEL":
+            w.client.send(newer.MAVLink_command_cancel_message(1, 1, CALIBRATE))
+        else:
+            w.client.send_command(CALIBRATE, 0, 0, 0, 0, **MAGNETOMETER)
+        await w.client.wait("COMMAND_ACK", lambda m: (m.command, m.result) == (CALIBRATE, CANCELLED), since=mark)
+        await w.client.wait("STATUSTEXT", lambda m: m.text == "[cal] calibration cancelled", since=mark)
+        asked = "common.Calibration.MagnetoCalibration"
+        await w.drone.wait_log(lambda e: e.kind == "command" and e.name == asked and e.args["calibrate"] == 0)
+
+
+async def test_conf_148_reboot() -> None:
+    async with world() as w:
+        for wrong in (2, 3, 0, math.nan):
+            assert (await w.client.command(REBOOT, wrong)).result == DENIED
+
+
+async def test_a_launch_by_hand() -> None:
+    async with world() as w:
+        mark = w.client.mark()
+        one = 1.401298464324817e-45  # the float whose bits are the INT32 1
+        w.client.send(dialect.MAVLink_param_set_message(1, 1, b"ANF_HAND_LAUNCH", one, dialect.MAV_PARAM_TYPE_INT32))
+        await w.client.wait("PARAM_VALUE", lambda m: m.param_id == "ANF_HAND_LAUNCH", since=mark)
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        assert w.drone.flying_state.name == "USERTAKEOFF"
+        await w.client.heartbeat(lambda beat: beat.base_mode & ARMED)
+        assert (await w.client.command(ARM, 0)).result == ACCEPTED
+        assert w.drone.flying_state.name == "LANDED"
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        w.drone.throw()
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "hovering", 20.0)
