@@ -7,6 +7,7 @@ know the wire.
 from anafi_mav.arsdk.messages.ardrone3 import AltitudeAboveGroundChanged as AltitudeAboveGroundChanged
 from anafi_mav.arsdk.messages.ardrone3 import AltitudeChanged as AltitudeChanged
 from anafi_mav.arsdk.messages.ardrone3 import AttitudeChanged as AttitudeChanged
+from anafi_mav.arsdk.messages.ardrone3 import BankedTurnChanged as BankedTurnChanged
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState as FlyingState
 from anafi_mav.arsdk.messages.ardrone3 import FlyingStateChanged as FlyingStateChanged
 from anafi_mav.arsdk.messages.ardrone3 import ForcedLandingAutoTrigger as ForcedLandingAutoTrigger
@@ -16,10 +17,19 @@ from anafi_mav.arsdk.messages.ardrone3 import GpsLocationChanged as GpsLocationC
 from anafi_mav.arsdk.messages.ardrone3 import HomeChanged as HomeChanged
 from anafi_mav.arsdk.messages.ardrone3 import HoveringWarning as HoveringWarning
 from anafi_mav.arsdk.messages.ardrone3 import IcingLevelChanged as IcingLevelChanged
+from anafi_mav.arsdk.messages.ardrone3 import MaxAltitudeChanged as MaxAltitudeChanged
+from anafi_mav.arsdk.messages.ardrone3 import MaxDistanceChanged as MaxDistanceChanged
+from anafi_mav.arsdk.messages.ardrone3 import MaxHorizontalSpeedChanged as MaxHorizontalSpeedChanged
+from anafi_mav.arsdk.messages.ardrone3 import MaxPitchRollRotationSpeedChanged as MaxPitchRollRotationSpeedChanged
+from anafi_mav.arsdk.messages.ardrone3 import MaxRotationSpeedChanged as MaxRotationSpeedChanged
+from anafi_mav.arsdk.messages.ardrone3 import MaxTiltChanged as MaxTiltChanged
+from anafi_mav.arsdk.messages.ardrone3 import MaxVerticalSpeedChanged as MaxVerticalSpeedChanged
 from anafi_mav.arsdk.messages.ardrone3 import MotorError as MotorError
 from anafi_mav.arsdk.messages.ardrone3 import MotorErrorStateChanged as MotorErrorStateChanged
+from anafi_mav.arsdk.messages.ardrone3 import MotorFlightsStatusChanged as MotorFlightsStatusChanged
 from anafi_mav.arsdk.messages.ardrone3 import MoveToChanged as MoveToChanged
 from anafi_mav.arsdk.messages.ardrone3 import MoveToStatus as MoveToStatus
+from anafi_mav.arsdk.messages.ardrone3 import NoFlyOverMaxDistanceChanged as NoFlyOverMaxDistanceChanged
 from anafi_mav.arsdk.messages.ardrone3 import NumberOfSatelliteChanged as NumberOfSatelliteChanged
 from anafi_mav.arsdk.messages.ardrone3 import PilotedPOIV2 as PilotedPOIV2
 from anafi_mav.arsdk.messages.ardrone3 import PoiMode as PoiMode
@@ -31,6 +41,7 @@ from anafi_mav.arsdk.messages.ardrone3 import WindStateChanged as WindStateChang
 from anafi_mav.arsdk.messages.battery import Alert as BatteryAlertChanged
 from anafi_mav.arsdk.messages.battery import AlertLevel as AlertLevel
 from anafi_mav.arsdk.messages.battery import BatteryAlert as BatteryAlert
+from anafi_mav.arsdk.messages.battery import Capacity as BatteryCapacity
 from anafi_mav.arsdk.messages.common import CalibrationAxis as CalibrationAxis
 from anafi_mav.arsdk.messages.common import FlightId as FlightId
 from anafi_mav.arsdk.messages.common import FlightPlanComponent as FlightPlanComponent
@@ -47,12 +58,23 @@ from anafi_mav.arsdk.messages.gimbal import Attitude as GimbalAttitudeChanged
 from anafi_mav.arsdk.messages.gimbal import Axis as Axis
 from anafi_mav.arsdk.messages.gimbal import FrameOfReference as FrameOfReference
 from anafi_mav.arsdk.messages.gimbal import GimbalCalibrationState as GimbalCalibrationState
+from anafi_mav.arsdk.messages.gimbal import MaxSpeed as GimbalMaxSpeed
 from anafi_mav.arsdk.messages.mapper import GrabAxisEvent as GrabAxisEvent
 from anafi_mav.arsdk.messages.mapper import GrabButtonEvent as GrabButtonEvent
 from anafi_mav.arsdk.messages.mapper import GrabState as GrabState
 from anafi_mav.arsdk.messages.mediastore import MediastoreState as MediastoreState
+from anafi_mav.arsdk.messages.obstacle_avoidance import Mode as ObstacleAvoidanceMode
+from anafi_mav.arsdk.messages.obstacle_avoidance import Status as ObstacleAvoidanceStatus
 from anafi_mav.arsdk.messages.piloting_style import PilotingStyleStyle as PilotingStyleStyle
+from anafi_mav.arsdk.messages.precise_home import Mode as PreciseHomeModeChanged
+from anafi_mav.arsdk.messages.precise_home import PreciseHomeMode as PreciseHomeMode
 from anafi_mav.arsdk.messages.precise_home import PreciseHomeState as PreciseHomeState
+from anafi_mav.arsdk.messages.rth import AutoTriggerMode as ReturnAutoTriggerMode
+from anafi_mav.arsdk.messages.rth import Delay as ReturnDelay
+from anafi_mav.arsdk.messages.rth import EndingBehavior as ReturnEnding
+from anafi_mav.arsdk.messages.rth import EndingHoveringAltitude as ReturnEndingAltitude
+from anafi_mav.arsdk.messages.rth import MinAltitude as ReturnMinAltitude
+from anafi_mav.arsdk.messages.rth import PreferredHomeType as PreferredHomeType
 from anafi_mav.arsdk.messages.rth import RthEndingBehavior as RthEndingBehavior
 from anafi_mav.arsdk.messages.rth import RthHomeType as RthHomeType
 from anafi_mav.arsdk.messages.rth import State as ReturnStateChanged
@@ -75,8 +97,10 @@ __all__ = [
     "AltitudeChanged",
     "AttitudeChanged",
     "Axis",
+    "BankedTurnChanged",
     "BatteryAlert",
     "BatteryAlertChanged",
+    "BatteryCapacity",
     "CalibrationAxis",
     "ControllerAttitudeChanged",
     "FlightId",
@@ -92,6 +116,7 @@ __all__ = [
     "GPSFixStateChanged",
     "GimbalAttitudeChanged",
     "GimbalCalibrationState",
+    "GimbalMaxSpeed",
     "GpsLocationChanged",
     "GrabAxisEvent",
     "GrabButtonEvent",
@@ -102,14 +127,25 @@ __all__ = [
     "MagnetoCalibrationRequiredState",
     "MavlinkFilePlayingStateChanged",
     "MavlinkType",
+    "MaxAltitudeChanged",
+    "MaxDistanceChanged",
+    "MaxHorizontalSpeedChanged",
+    "MaxPitchRollRotationSpeedChanged",
+    "MaxRotationSpeedChanged",
+    "MaxTiltChanged",
+    "MaxVerticalSpeedChanged",
     "MediastoreState",
     "Message",
     "MissionItemExecuted",
     "MotorError",
     "MotorErrorStateChanged",
+    "MotorFlightsStatusChanged",
     "MoveToChanged",
     "MoveToStatus",
+    "NoFlyOverMaxDistanceChanged",
     "NumberOfSatelliteChanged",
+    "ObstacleAvoidanceMode",
+    "ObstacleAvoidanceStatus",
     "PaletteMode",
     "PhyState",
     "PilotedPOIV2",
@@ -119,8 +155,16 @@ __all__ = [
     "PlayingState",
     "PoiMode",
     "PoiStatus",
+    "PreciseHomeMode",
+    "PreciseHomeModeChanged",
     "PreciseHomeState",
+    "PreferredHomeType",
     "RenderingMode",
+    "ReturnAutoTriggerMode",
+    "ReturnDelay",
+    "ReturnEnding",
+    "ReturnEndingAltitude",
+    "ReturnMinAltitude",
     "ReturnStateChanged",
     "RthEndingBehavior",
     "RthHomeType",

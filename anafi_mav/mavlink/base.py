@@ -106,12 +106,15 @@ class StreamPeer(asyncio.Protocol):
         *,
         write_ahead: int = WRITE_AHEAD,
         queue_bytes: int = QUEUE_BYTES,
+        bytes_per_second: float | None = None,
     ) -> None:
         self.lost: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self._sink = sink
         self._write_ahead = write_ahead
         self._transport: asyncio.Transport | None = None
-        self.channel = Channel(name, self._write, flavour=url.flavour, queue_bytes=queue_bytes)
+        self.channel = Channel(
+            name, self._write, flavour=url.flavour, queue_bytes=queue_bytes, bytes_per_second=bytes_per_second
+        )
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         # Duck-typed by pyserial-asyncio-fast's transport, too.

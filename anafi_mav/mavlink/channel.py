@@ -38,11 +38,14 @@ class Channel:
         flavour: str | None = None,
         datagrams: bool = False,
         queue_bytes: int = QUEUE_BYTES,
+        bytes_per_second: float | None = None,
     ) -> None:
         self.name = name
         """For people: the endpoint's URL and, where it has several peers, which one."""
         self.flavour = flavour
         """The autopilot that clients of this endpoint want to see; None: as configured for all."""
+        self.bytes_per_second = bytes_per_second
+        """What the line carries; None where that is no concern."""
         self.counters: Counter[str] = Counter()
         """sent_frames, dropped_frames (queue full, or sent after the channel had closed)."""
         self.is_open = True
@@ -58,6 +61,11 @@ class Channel:
 
     def __repr__(self) -> str:
         return f"<Channel {self.name}>"
+
+    @property
+    def ready(self) -> bool:
+        """The peer takes frames now. Whoever has many to send and could wait with them waits for this."""
+        return self.is_open and not self._paused
 
     def receive(self, data: bytes) -> list[Received]:
         """The frames in bytes that arrived; what is none is counted by the parser."""

@@ -99,6 +99,7 @@ class SerialLine(Reopening):
                 self._sink,
                 write_ahead=max(MIN_WRITE_AHEAD, round(bytes_per_second * WRITE_AHEAD_S)),
                 queue_bytes=max(MIN_QUEUE, round(bytes_per_second * QUEUE_S)),
+                bytes_per_second=bytes_per_second,
             )
 
         _, made = await serial_asyncio_fast.connection_for_serial(loop, peer, self._port)

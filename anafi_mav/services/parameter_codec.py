@@ -1,4 +1,4 @@
-"""How a parameter travels: the float field of PARAM_VALUE and PARAM_SET, QGroundControl's hash, ArduPilot's packed file.
+"""How parameters travel: the float field of PARAM_VALUE and PARAM_SET, QGroundControl's hash, ArduPilot's packed file.
 
 I/O-free, and without a word about what the parameters mean.
 """
@@ -97,7 +97,7 @@ def param_value(
 ) -> dialect.MAVLink_message:
     """A PARAM_VALUE."""
     bits = carrier(value, kind, bytewise=bytewise)
-    return ParamValue(name.encode(), bits, kind.mav, count, index)  # type: ignore[arg-type]  # bits, see there
+    return ParamValue(name.encode(), bits, kind.mav, count, index)
 
 
 def name_of(param_id: str | bytes) -> str:

@@ -1,256 +1,285 @@
-"""The parameter protocol over a small true table.
+"""The parameter protocol: lists, reads and writes, and a word to everybody whenever a value has changed.
 
-Every name is either a setting of the drone (written through it, answered with what it confirmed), a setting of the
-gateway, or a fact that QGroundControl wants to see before it calls a vehicle set up (conformance A5). Encoding is
-bytewise: an INT32 travels as the bits of the float field (MAVLink parameter.md).
+Which parameters there are is in `parameter_table*`; a channel sees the native ones and the twins of its flavour. The
+list of a flavour is made when the drone first connects and stays the same for as long as the vehicle exists. Rules:
+MAVLink parameter.md, conformance A5, C4, R12, R13.
 """
 
 from __future__ import annotations
 
-import math
+import asyncio
 import struct
-from collections.abc import Awaitable, Callable, Mapping
-from dataclasses import dataclass
+from collections import deque
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from anafi_mav.drone import Range
-from anafi_mav.drone.events import RthEndingBehavior
+from anafi_mav.drone.events import Message
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
-from anafi_mav.services.service import Host, MessageHandler, Service
+from anafi_mav.services.flavours import ARDUPILOT, FLAVOURS, Flavour, flavour_of
+from anafi_mav.services.parameter import Parameter
+from anafi_mav.services.parameter_codec import (
+    HASH_NAME,
+    NO_INDEX,
+    Kind,
+    carried,
+    hash_check,
+    name_of,
+    param_value,
+)
+from anafi_mav.services.parameter_table import NATIVE
+from anafi_mav.services.parameter_table_ardupilot import ARDUPILOT_NAMES
+from anafi_mav.services.parameter_table_px4 import PX4_NAMES
+from anafi_mav.services.service import Host, MessageHandler, Service, client_of
 from anafi_mav.services.statustext import Severity
-from anafi_mav.services.vehicle import LOWEST, Vehicle
+from anafi_mav.services.trickle import Trickle
 
-INT32, REAL32 = dialect.MAV_PARAM_TYPE_INT32, dialect.MAV_PARAM_TYPE_REAL32
+MAX_WRITES = 8
+"""Writes under way at once. A drone answers one within tens of milliseconds; several clients load their files."""
 
-MAX_WRITES = 16
-"""PARAM_SETs under way at once: a client writes one after the other, several clients a few."""
-
-TYPE_MISMATCH = 7
-"""MAV_PARAM_ERROR_TYPE_MISMATCH of upstream's common.xml; pymavlink 2.4.50 stops at 5."""
+MAX_WAITING = 512
+"""Writes that wait for their turn: a whole list, from two clients. What comes beyond that comes again (1 s later)."""
 
 
-@dataclass(frozen=True)
-class Parameter:
-    """One named value. `read` never fails; a value that the drone has not reported is NaN or 0."""
-
-    name: str
-    type: int
-    read: Callable[[], float]
-    write: Callable[[float], Awaitable[float]] | None = None
-    """Sets it and returns the confirmed value; None: read only."""
-    limits: Callable[[], tuple[float, float]] | None = None
-    """(min, max) that may be written."""
+def parameters_of(flavour: Flavour) -> tuple[Parameter, ...]:
+    """All that clients of a flavour can be shown, sorted by name; which of them a drone has is another matter."""
+    names = ARDUPILOT_NAMES if flavour is ARDUPILOT else PX4_NAMES
+    return tuple(sorted((*NATIVE, *names), key=lambda parameter: parameter.name))
 
 
-def encode(value: float, kind: int) -> float:
-    """The float whose bits carry `value`."""
-    if kind == INT32:
-        (carrier,) = struct.unpack("<f", struct.pack("<i", int(value)))
-        return float(carrier)
-    return value
+class ParameterList:
+    """The parameters of one vehicle as one flavour lists them."""
 
+    def __init__(self, host: Host, flavour: Flavour) -> None:
+        self._host = host
+        self._flavour = flavour
+        self.parameters = [one for one in parameters_of(flavour) if one.present(host.drone)]
+        self.index = {parameter.name: index for index, parameter in enumerate(self.parameters)}
+        self._told: list[bytes] = [self._raw(parameter) for parameter in self.parameters]
+        """The value of each as everybody was told it last."""
+        self.changes = [0] * len(self.parameters)
+        """How often everybody was told of each."""
 
-def decode(carrier: float, kind: int) -> float:
-    """The value that a float field of this type carries."""
-    if kind == INT32:
-        (value,) = struct.unpack("<i", struct.pack("<f", carrier))
-        return float(value)
-    return carrier
+    def __len__(self) -> int:
+        return len(self.parameters)
 
+    def message(self, index: int) -> dialect.MAVLink_message:
+        """PARAM_VALUE of one."""
+        parameter = self.parameters[index]
+        return param_value(
+            parameter.name,
+            parameter.value(self._host),
+            parameter.kind,
+            count=len(self),
+            index=index,
+            bytewise=self._flavour.bytewise,
+        )
 
-def _known(setting: Range | None) -> float:
-    return math.nan if setting is None else setting.current
+    def values(self) -> list[tuple[str, float, Kind]]:
+        """Name, value and type of all, in their order."""
+        return [(one.name, one.value(self._host), one.kind) for one in self.parameters]
 
+    def hash_message(self) -> dialect.MAVLink_message:
+        """PARAM_VALUE of the hash over all that do not change by themselves."""
+        lasting = [(one.name, one.value(self._host), one.kind) for one in self.parameters if not one.volatile]
+        return param_value(HASH_NAME, hash_check(lasting), Kind.UINT32, count=len(self), index=NO_INDEX, bytewise=True)
 
-def _range(setting: Range | None) -> tuple[float, float]:
-    return (math.nan, math.nan) if setting is None else (setting.min, setting.max)
+    def changed(self, candidates: Iterable[int]) -> list[int]:
+        """Those of these that have another value than everybody was told; from now on they count as told."""
+        found = []
+        for index in candidates:
+            raw = self._raw(self.parameters[index])
+            if raw != self._told[index]:
+                self._told[index] = raw
+                self.changes[index] += 1
+                found.append(index)
+        return found
 
-
-def table(vehicle: Vehicle, sysid: int) -> list[Parameter]:
-    """The parameters of a vehicle, sorted by name; the same ones for as long as the vehicle exists."""
-    drone = vehicle.drone
-    piloting = drone.piloting
-
-    async def set_takeoff_height(value: float) -> float:
-        vehicle.takeoff_height = value
-        return value
-
-    def takeoff_limits() -> tuple[float, float]:
-        ceiling = piloting.state.max_altitude
-        return LOWEST, math.inf if ceiling is None else ceiling.current
-
-    def fact(name: str, value: float, kind: int = INT32) -> Parameter:
-        return Parameter(name, kind, lambda: value)
-
-    def calibrated() -> float:
-        return 0.0 if drone.calibration.state.magneto_required else 1.0
-
-    def land_delay() -> float:
-        # PX4: -1 hovers at home for ever, 0 lands at once.
-        return 0.0 if drone.home.state.ending == RthEndingBehavior.LANDING else -1.0
-
-    async def set_hand_launch(value: float) -> float:
-        vehicle.hand_launch = bool(value)
-        return value
-
-    parameters = [
-        Parameter("ANF_HAND_LAUNCH", INT32, lambda: float(vehicle.hand_launch), set_hand_launch, lambda: (0.0, 1.0)),
-        Parameter("MIS_TAKEOFF_ALT", REAL32, lambda: vehicle.takeoff_height, set_takeoff_height, takeoff_limits),
-        Parameter(
-            "RTL_RETURN_ALT",
-            REAL32,
-            lambda: _known(drone.home.state.min_altitude),
-            piloting.set_min_altitude,
-            lambda: _range(drone.home.state.min_altitude),
-        ),
-        Parameter("RTL_DESCEND_ALT", REAL32, lambda: _known(drone.home.state.ending_altitude)),
-        Parameter("RTL_LAND_DELAY", REAL32, land_delay),
-        Parameter(
-            "MPC_TILTMAX_AIR",
-            REAL32,
-            lambda: _known(piloting.state.max_tilt),
-            piloting.set_max_tilt,
-            lambda: _range(piloting.state.max_tilt),
-        ),
-        Parameter(
-            "MPC_Z_VEL_MAX_UP",
-            REAL32,
-            lambda: _known(piloting.state.max_vertical_speed),
-            piloting.set_max_vertical_speed,
-            lambda: _range(piloting.state.max_vertical_speed),
-        ),
-        Parameter("MPC_Z_VEL_MAX_DN", REAL32, lambda: _known(piloting.state.max_vertical_speed)),
-        Parameter(
-            "MPC_MAN_Y_MAX",
-            REAL32,
-            lambda: _known(piloting.state.max_rotation_speed),
-            piloting.set_max_rotation_speed,
-            lambda: _range(piloting.state.max_rotation_speed),
-        ),
-        Parameter(
-            "GF_MAX_VER_DIST",
-            REAL32,
-            lambda: _known(piloting.state.max_altitude),
-            piloting.set_max_altitude,
-            lambda: _range(piloting.state.max_altitude),
-        ),
-        Parameter(
-            "GF_MAX_HOR_DIST",
-            REAL32,
-            lambda: _known(piloting.state.max_distance) if piloting.state.geofence else 0.0,
-        ),
-        fact("MAV_SYS_ID", sysid),
-        fact("SYS_AUTOSTART", 4001),
-        Parameter("CAL_GYRO0_ID", INT32, lambda: 1.0),
-        Parameter("CAL_ACC0_ID", INT32, lambda: 1.0),
-        Parameter("CAL_MAG0_ID", INT32, calibrated),
-        fact("CAL_MAG1_ID", 0),
-        fact("CAL_MAG2_ID", 0),
-        fact("COM_RC_IN_MODE", 1),
-        fact("NAV_DLL_ACT", 0),
-        fact("COM_DL_LOSS_T", 10),
-        fact("SYS_HAS_MAG", 1),
-        fact("SYS_HAS_BARO", 1),
-    ]
-    return sorted(parameters, key=lambda parameter: parameter.name)
+    def _raw(self, parameter: Parameter) -> bytes:
+        """Bytes, so that NaN is equal to NaN."""
+        return struct.pack("<d", parameter.value(self._host))
 
 
 class ParameterService(Service):
-    """Answers PARAM_REQUEST_LIST, PARAM_REQUEST_READ and PARAM_SET for one vehicle."""
+    """PARAM_REQUEST_LIST, PARAM_REQUEST_READ and PARAM_SET of one vehicle, on component 1."""
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
-        self._table = table(host.vehicle, host.sysid)
-        self._index = {parameter.name: index for index, parameter in enumerate(self._table)}
-        self._writes = 0
+        self._lists: dict[str, ParameterList] = {}
+        """By name of the flavour; empty until the drone has connected for the first time."""
+        self._by_news: dict[type[Message], dict[str, list[int]]] = {}
+        self._polled: dict[str, list[int]] = {}
+        self._trickle = Trickle(host)
+        self._waiting: deque[tuple[Inbound, Parameter, float]] = deque()
+        self._writers: set[asyncio.Task[None]] = set()
+        self._locks: dict[str, asyncio.Lock] = {}
+        """One for each value, by its native name: two writes of it are carried out in their order."""
 
     def messages(self) -> Mapping[int, MessageHandler]:
         return {
-            dialect.MAVLINK_MSG_ID_PARAM_REQUEST_LIST: self._param_list,
-            dialect.MAVLINK_MSG_ID_PARAM_REQUEST_READ: self._param_read,
-            dialect.MAVLINK_MSG_ID_PARAM_SET: self._param_set,
+            dialect.MAVLINK_MSG_ID_PARAM_REQUEST_LIST: self._request_list,
+            dialect.MAVLINK_MSG_ID_PARAM_REQUEST_READ: self._request_read,
+            dialect.MAVLINK_MSG_ID_PARAM_SET: self._set,
         }
 
-    def _param_list(self, inbound: Inbound) -> None:
-        for message in self.all_values():
-            self.host.send(message, inbound.channel)
+    def list_of(self, flavour: Flavour) -> ParameterList:
+        """The parameters that clients of a flavour see. Once the drone has connected."""
+        return self._lists[flavour.name]
 
-    def _param_read(self, inbound: Inbound) -> None:
-        self.host.send(self.read(inbound.message, inbound.sysid, inbound.compid), inbound.channel)
+    def link_up(self) -> None:
+        if not self._lists:
+            self._lists = {flavour.name: ParameterList(self.host, flavour) for flavour in FLAVOURS.values()}
+            for name, listed in self._lists.items():
+                self._polled[name] = [index for index, one in enumerate(listed.parameters) if one.polled]
+                for index, parameter in enumerate(listed.parameters):
+                    for event in parameter.news:
+                        self._by_news.setdefault(event, {}).setdefault(name, []).append(index)
+        for name, listed in self._lists.items():
+            self._tell(name, listed.changed(range(len(listed))))
 
-    def _param_set(self, inbound: Inbound) -> None:
-        if self._writes < MAX_WRITES:  # otherwise the client says it again
-            self._writes += 1
-            self.host.spawn(self._write_param(inbound))
+    def link_down(self) -> None:
+        self._trickle.clear()
+        self._waiting.clear()  # the writers end with the host's tasks
 
-    async def _write_param(self, inbound: Inbound) -> None:
-        try:
-            answers, changed = await self.write(inbound.message, inbound.sysid, inbound.compid)
-        finally:
-            self._writes -= 1
-        for message in answers:
-            self.host.send(message, None if changed else inbound.channel)
+    def channel_closed(self, channel: Channel) -> None:
+        self._trickle.closed(channel)
 
-    def all_values(self) -> list[dialect.MAVLink_message]:
-        """A PARAM_VALUE for each parameter, in the order of their index."""
-        return [self._value(index) for index in range(len(self._table))]
+    def on_event(self, message: Message, now: float) -> None:
+        for name, indices in self._by_news.get(type(message), {}).items():
+            self._tell(name, self._lists[name].changed(indices))
 
-    def read(
-        self, message: dialect.MAVLink_param_request_read_message, sysid: int, compid: int
-    ) -> dialect.MAVLink_message:
-        """The PARAM_VALUE, or PARAM_ERROR for a name or index that does not exist."""
-        index = message.param_index
-        if index < 0:
-            index = self._index.get(_name(message.param_id), -1)
-        if 0 <= index < len(self._table):
-            return self._value(index)
-        return self._error(message, sysid, compid, dialect.MAV_PARAM_ERROR_DOES_NOT_EXIST)
+    def tick(self, now: float) -> None:
+        self._tell_settings()
 
-    async def write(
-        self, message: dialect.MAVLink_param_set_message, sysid: int, compid: int
-    ) -> tuple[list[dialect.MAVLink_message], bool]:
-        """(answers, changed): a PARAM_VALUE with the value that holds now; before it a PARAM_ERROR when refused."""
-        index = self._index.get(_name(message.param_id))
+    # Reading.
+
+    def _request_list(self, inbound: Inbound) -> None:
+        """The list leaves bit by bit, before it the hash: who has it all in his cache stops us with it."""
+        flavour = flavour_of(inbound.channel)
+        listed = self._lists[flavour.name]
+
+        def messages() -> Iterator[dialect.MAVLink_message]:
+            if flavour.bytewise:
+                yield listed.hash_message()
+            for index in range(len(listed)):
+                yield listed.message(index)
+
+        self._trickle.start(inbound.channel, client_of(inbound), messages())
+
+    def _request_read(self, inbound: Inbound) -> None:
+        message = inbound.message
+        flavour = flavour_of(inbound.channel)
+        listed = self._lists[flavour.name]
+        name = name_of(message.param_id)
+        index = message.param_index if message.param_index >= 0 else listed.index.get(name, -1)
+        if message.param_index < 0 and name == HASH_NAME and flavour.bytewise:
+            self.host.send(listed.hash_message(), inbound.channel)
+        elif 0 <= index < len(listed):
+            self.host.send(listed.message(index), inbound.channel)
+        else:
+            self._error(inbound, dialect.MAV_PARAM_ERROR_DOES_NOT_EXIST)
+
+    # Writing.
+
+    def _set(self, inbound: Inbound) -> None:
+        message = inbound.message
+        flavour = flavour_of(inbound.channel)
+        name = name_of(message.param_id)
+        if name == HASH_NAME and flavour.bytewise:
+            self._trickle.stop(inbound.channel, client_of(inbound))
+            return
+        listed = self._lists[flavour.name]
+        index = listed.index.get(name)
         if index is None:
-            return [self._error(message, sysid, compid, dialect.MAV_PARAM_ERROR_DOES_NOT_EXIST)], False
-        parameter = self._table[index]
-        if message.param_type != parameter.type:
-            return self._refuse(message, sysid, compid, TYPE_MISMATCH, index), False
-        value = decode(message.param_value, parameter.type)
-        before = parameter.read()
+            self._error(inbound, dialect.MAV_PARAM_ERROR_DOES_NOT_EXIST)
+            return
+        parameter = listed.parameters[index]
+        # ArduPilot's clients do not know the types: ArduPilot itself looks at the name alone.
+        if flavour.bytewise and message.param_type != parameter.kind.mav:
+            self._refuse(inbound, dialect.MAV_PARAM_ERROR_TYPE_MISMATCH)
+            return
+        value = carried(message.param_value, parameter.kind, bytewise=flavour.bytewise)
         if parameter.write is None:
-            if value == before:
-                return [self._value(index)], False
-            return self._refuse(message, sysid, compid, dialect.MAV_PARAM_ERROR_READ_ONLY, index), False
-        low, high = parameter.limits() if parameter.limits is not None else (-math.inf, math.inf)
-        if not (math.isfinite(value) and low <= value <= high):
-            return self._refuse(message, sysid, compid, dialect.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, index), False
-        try:
-            await parameter.write(value)
-        except AnafiMavError as error:
-            self.host.text(Severity.WARNING, f"{parameter.name} not set: {error}")
-            return [self._value(index)], False
-        return [self._value(index)], True
+            if value == parameter.value(self.host):
+                self._answer(inbound)
+            else:
+                self._refuse(inbound, dialect.MAV_PARAM_ERROR_READ_ONLY)
+            return
+        if not parameter.accepts(self.host, value):
+            self._refuse(inbound, dialect.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE)
+            return
+        self._queue(inbound, parameter, value)
 
-    def _value(self, index: int) -> dialect.MAVLink_message:
-        parameter = self._table[index]
-        return dialect.MAVLink_param_value_message(
-            parameter.name.encode(), encode(parameter.read(), parameter.type), parameter.type, len(self._table), index
+    def _queue(self, inbound: Inbound, parameter: Parameter, value: float) -> None:
+        """Write when it is its turn. What a client says again while it still waits takes the old one's place."""
+        client = client_of(inbound)
+        for place, (waiting, other, _) in enumerate(self._waiting):
+            if other is parameter and client_of(waiting) == client:
+                self._waiting[place] = (inbound, parameter, value)
+                return
+        if len(self._waiting) < MAX_WAITING:
+            self._waiting.append((inbound, parameter, value))
+        if len(self._writers) < MAX_WRITES:
+            writer = self.host.spawn(self._work())
+            self._writers.add(writer)
+            writer.add_done_callback(self._writers.discard)
+
+    async def _work(self) -> None:
+        """Carry out writes for as long as there are any."""
+        while self._waiting:
+            await self._write(*self._waiting.popleft())
+
+    async def _write(self, inbound: Inbound, parameter: Parameter, value: float) -> None:
+        assert parameter.write is not None
+        listed = self._lists[flavour_of(inbound.channel).name]
+        index = listed.index[parameter.name]
+        before = listed.changes[index]
+        lock = self._locks.setdefault(parameter.native or parameter.name, asyncio.Lock())
+        async with lock:
+            try:
+                await parameter.write(self.host, value)
+            except AnafiMavError as error:
+                self.host.text(Severity.WARNING, f"{parameter.name} not set: {error}")
+        self._tell_settings()
+        if listed.changes[index] == before:  # otherwise everybody was told, he too
+            self._answer(inbound)
+
+    # Telling.
+
+    def _tell_settings(self) -> None:
+        """Tell everybody of the gateway's own settings that have changed."""
+        for name, indices in self._polled.items():
+            self._tell(name, self._lists[name].changed(indices))
+
+    def _tell(self, name: str, indices: list[int]) -> None:
+        """PARAM_VALUE of these to every channel of a flavour."""
+        if not indices:
+            return
+        channels = [channel for channel in self.host.channels if flavour_of(channel).name == name]
+        if channels:
+            for index in indices:
+                self.host.send(self._lists[name].message(index), channels)
+
+    def _answer(self, inbound: Inbound) -> None:
+        """The value that holds now, to the one who asked."""
+        listed = self._lists[flavour_of(inbound.channel).name]
+        self.host.send(listed.message(listed.index[name_of(inbound.message.param_id)]), inbound.channel)
+
+    def _refuse(self, inbound: Inbound, error: int) -> None:
+        self._error(inbound, error)
+        self._answer(inbound)
+
+    def _error(self, inbound: Inbound, error: int) -> None:
+        message: Any = inbound.message
+        self.host.send(
+            dialect.MAVLink_param_error_message(
+                inbound.sysid,
+                inbound.compid,
+                name_of(message.param_id).encode(),
+                getattr(message, "param_index", -1),
+                error,
+            ),
+            inbound.channel,
         )
-
-    def _refuse(self, message: Any, sysid: int, compid: int, error: int, index: int) -> list[dialect.MAVLink_message]:
-        return [self._error(message, sysid, compid, error), self._value(index)]
-
-    @staticmethod
-    def _error(message: Any, sysid: int, compid: int, error: int) -> dialect.MAVLink_message:
-        return dialect.MAVLink_param_error_message(
-            sysid, compid, _name(message.param_id).encode(), getattr(message, "param_index", -1), error
-        )
-
-
-def _name(param_id: str | bytes) -> str:
-    """The name in a param_id field: 16 characters fill it without a NUL."""
-    text = param_id.decode(errors="replace") if isinstance(param_id, bytes) else param_id
-    return text.split("\0", 1)[0]

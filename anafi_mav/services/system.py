@@ -22,6 +22,7 @@ from anafi_mav.services.command_service import CommandService
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.guided import GuidedService
 from anafi_mav.services.identity import IdentityService
+from anafi_mav.services.link_loss_service import LinkLossService
 from anafi_mav.services.maintenance import MaintenanceService
 from anafi_mav.services.message_service import MessageService
 from anafi_mav.services.modes import FlightMode
@@ -45,6 +46,7 @@ SERVICES: tuple[type[Service], ...] = (
     MaintenanceService,
     TelemetryService,
     ParameterService,
+    LinkLossService,
     PlanService,
     OffboardService,
     TimeService,

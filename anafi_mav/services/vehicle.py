@@ -20,6 +20,7 @@ from anafi_mav.drone import Drone
 from anafi_mav.drone.events import AlertLevel, FlyingState, FlyingStateChanged, ForcedLandingReason, PlayingState
 from anafi_mav.errors import AnafiMavError, CommandRejected
 from anafi_mav.services.height import HeightReference
+from anafi_mav.services.link_loss import LossPolicy
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.offboard_flight import OffboardFlight
 from anafi_mav.services.refusal import Refused as Refused
@@ -116,6 +117,8 @@ class Vehicle:
         """m/s over ground that moves keep to; None: the drone's own (MAV_CMD_DO_CHANGE_SPEED)."""
         self.climb_speed: float | None = None
         """m/s up and down that moves keep to; None: the drone's own."""
+        self.gcs_loss = LossPolicy()
+        """What to do when no ground station is heard any more (a parameter)."""
         self.origin: Place | None = None
         """Origin of the local frame: where the drone last took off, or first stood with a fix."""
         self._goto: Goto | None = None

@@ -52,8 +52,8 @@ class World:
     def client(self) -> Client:
         return self.clients[0]
 
-    async def connect(self, sysid: int = 255, compid: int = 190) -> Client:
-        client = await Client(sysid, compid).connect(5760, self.address)
+    async def connect(self, sysid: int = 255, compid: int = 190, port: int = 5760) -> Client:
+        client = await Client(sysid, compid).connect(port, self.address)
         self.clients.append(client)
         return client
 
@@ -83,11 +83,13 @@ async def world(
     clients: int = 1,
     skycontroller: int | None = None,
     flavour: str = "px4",
+    also: str | None = None,
     model: str = "4k",
 ) -> AsyncIterator[World]:
     """One simulated drone, one gateway with a TCP endpoint, and its clients, connected and ready.
 
-    With `flavour` the endpoint shows that autopilot; `World.take_off` and the mode numbers above are PX4's.
+    With `flavour` the endpoint shows that autopilot; `World.take_off` and the mode numbers above are PX4's. `also` is
+    the flavour of a second endpoint, at port 5761.
     """
     drone_address, address = loopback(), loopback()
     spec = DroneSpec(
@@ -99,7 +101,10 @@ async def world(
         skycontroller=skycontroller,
     )
     config = Config(
-        endpoints=(f"tcpin://{address}:5760?flavour={flavour}",),
+        endpoints=(
+            f"tcpin://{address}:5760?flavour={flavour}",
+            *([f"tcpin://{address}:5761?flavour={also}"] if also else []),
+        ),
         drones=(DroneConfig(name="alpha", sysid=sysid, address=drone_address),),
         allow_kill=allow_kill,
     )

@@ -13,7 +13,6 @@ from anafi_mav.services.flavours import ARDUPILOT, PX4
 from anafi_mav.services.height import HeightReference
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.offboard import SILENCE, Event, OffboardStream, State
-from anafi_mav.services.parameters import INT32, REAL32, decode, encode
 from anafi_mav.services.statustext import Severity, TextNumbers
 
 NAN = math.nan
@@ -352,19 +351,6 @@ def test_a_crowd_of_senders_is_bounded() -> None:
         assert stream.receive(number, LEVEL, 0.0)
     assert not stream.receive("one more", LEVEL, 0.1)
     assert stream.receive("one more", LEVEL, SILENCE)  # the others have fallen silent
-
-
-@pytest.mark.parametrize("value", [0, 1, -1, 4001, 2**31 - 1, -(2**31)])
-def test_integers_travel_as_bits(value: int) -> None:
-    carrier = encode(float(value), INT32)
-    packed = dialect.MAVLink_param_value_message(b"X", carrier, INT32, 1, 0).pack(dialect.MAVLink(None, 1, 1))
-    # header 10 bytes, then param_value as the first four of the payload
-    assert int.from_bytes(packed[10:14], "little", signed=True) == value
-    assert decode(carrier, INT32) == value
-
-
-def test_reals_travel_as_they_are() -> None:
-    assert encode(2.5, REAL32) == decode(2.5, REAL32) == 2.5
 
 
 @pytest.mark.parametrize("kind", [0, 1, 2])

@@ -1,0 +1,63 @@
+"""Carries out what is to be done when no ground station is heard any more: see `link_loss`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from anafi_mav.errors import AnafiMavError
+from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.node import Inbound
+from anafi_mav.services.link_loss import GcsWatch, LossAction
+from anafi_mav.services.service import Host, MessageHandler, Service
+from anafi_mav.services.statustext import Severity
+from anafi_mav.services.vehicle import Landed
+
+
+class LinkLossService(Service):
+    """Watches the heartbeats of ground stations, on whatever channel they come."""
+
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self._watch = GcsWatch()
+
+    def messages(self) -> Mapping[int, MessageHandler]:
+        return {dialect.MAVLINK_MSG_ID_HEARTBEAT: self._heard}
+
+    def link_down(self) -> None:
+        self._watch = GcsWatch()
+
+    def tick(self, now: float) -> None:
+        policy = self.host.vehicle.gcs_loss
+        if policy.action is not LossAction.NOTHING and self._watch.expire(now, policy.after):
+            self._lost()
+
+    def _heard(self, inbound: Inbound) -> None:
+        if inbound.message.type == dialect.MAV_TYPE_GCS and self._watch.heard(inbound.now):
+            self.host.text(Severity.NOTICE, "Ground station is back")
+
+    def _lost(self) -> None:
+        vehicle, policy = self.host.vehicle, self.host.vehicle.gcs_loss
+        silence = f"No ground station for {policy.after:g} s"
+        if vehicle.landed not in (Landed.IN_AIR, Landed.TAKEOFF):
+            self.host.text(Severity.WARNING, silence)
+        elif self.host.drone.controller.pilot_flies:
+            self.host.text(Severity.WARNING, f"{silence}: the pilot at the Skycontroller flies on")
+        elif vehicle.returning:
+            self.host.text(Severity.WARNING, f"{silence}: the drone is returning")
+        else:
+            self.host.text(Severity.CRITICAL, f"{silence}: {policy.action.name.lower()}")
+            self.host.spawn(self._act(policy.action))
+
+    async def _act(self, action: LossAction) -> None:
+        vehicle = self.host.vehicle
+        try:
+            if action is LossAction.HOLD:
+                await vehicle.hold()
+            elif action is LossAction.LAND:
+                await vehicle.land()
+            else:
+                await vehicle.return_home()
+        except AnafiMavError as error:
+            self.host.text(Severity.CRITICAL, f"Not done: {error}")
+            if action is LossAction.RETURN:  # without a way home, what is left is not to fly on
+                await self._act(LossAction.HOLD)

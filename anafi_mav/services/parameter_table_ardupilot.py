@@ -1,0 +1,210 @@
+"""What ArduPilot's clients know by ArduCopter's names: twins of the native parameters, and facts they want to see.
+
+Names, types and units are ArduCopter 4.5's (centimetres and centidegrees where it has them). QGroundControl's setup
+pages, Mission Planner and MAVProxy look for these (conformance E3). As with PX4's names, none is inert: what cannot be
+followed cannot be written, what an ANAFI does not tell is NaN or -1.
+"""
+
+from __future__ import annotations
+
+import math
+
+from anafi_mav.drone import events
+from anafi_mav.drone.events import RthEndingBehavior
+from anafi_mav.services.link_loss import LossAction
+from anafi_mav.services.parameter import Limits, Parameter, current, fact, mapped, number, twin
+from anafi_mav.services.parameter_codec import Kind
+from anafi_mav.services.parameter_table import (
+    CRUISE_SPEED,
+    GCS_LOSS,
+    GCS_LOSS_TIME,
+    GEOFENCE,
+    MAX_ALTITUDE,
+    MAX_DISTANCE,
+    MAX_TILT,
+    RETURN_ALTITUDE,
+    RETURN_BY_ITSELF,
+    RETURN_END_ALTITUDE,
+    RETURN_ENDING,
+    TILT_RATE,
+    VERTICAL_SPEED,
+    YAW_RATE,
+)
+from anafi_mav.services.refusal import Refused
+from anafi_mav.services.service import Host
+from anafi_mav.services.vehicle import AUTO_DISARM
+
+FACTS = "ArduPilot facts"
+
+UNTOLD = "An ANAFI does not tell it."
+
+CM = 100.0
+"""cm in a m, centidegrees in a degree."""
+
+
+def _final_altitude(host: Host) -> float:
+    home = host.drone.home.state
+    if home.ending == RthEndingBehavior.LANDING:
+        return 0.0
+    return current(home.ending_altitude) * CM
+
+
+def _final_limits(host: Host) -> Limits | None:
+    setting = host.drone.home.state.ending_altitude
+    return None if setting is None else (0.0, setting.max * CM)
+
+
+async def _set_final_altitude(host: Host, value: float) -> None:
+    home = host.drone.home
+    if value == 0.0:
+        await home.set_ending(RthEndingBehavior.LANDING)
+        return
+    setting = home.state.ending_altitude
+    if setting is not None and value < setting.min * CM:
+        raise Refused(f"Refused: a return ends at {setting.min:g} m at least, or with 0 on the ground", lasting=True)
+    await home.set_ending_altitude(value / CM)
+    await home.set_ending(RthEndingBehavior.HOVERING)
+
+
+FINAL_ALTITUDE = Parameter(
+    "RTL_ALT_FINAL",
+    Kind.INT16,
+    "Height at which a return ends, 0: it lands",
+    read=_final_altitude,
+    write=_set_final_altitude,
+    limits=_final_limits,
+    news=(events.ReturnEndingAltitude, events.ReturnEnding),
+    present=lambda drone: RETURN_END_ALTITUDE.present(drone) and RETURN_ENDING.present(drone),
+    unit="cm",
+    step=CM,
+    decimals=0,
+    group=RETURN_END_ALTITUDE.group,
+    native=RETURN_END_ALTITUDE.name,
+    source=RETURN_END_ALTITUDE.source,
+)
+
+TWINS: tuple[Parameter, ...] = (
+    twin(MAX_TILT, "ANGLE_MAX", Kind.INT16, scale=CM, unit="centi-degrees"),
+    twin(TILT_RATE, "ATC_RATE_R_MAX"),
+    twin(TILT_RATE, "ATC_RATE_P_MAX"),
+    twin(YAW_RATE, "PILOT_Y_RATE"),
+    twin(VERTICAL_SPEED, "PILOT_SPEED_UP", Kind.INT16, scale=CM, unit="cm/s", decimals=0),
+    twin(VERTICAL_SPEED, "PILOT_SPEED_DN", Kind.INT16, scale=CM, unit="cm/s", decimals=0),
+    twin(CRUISE_SPEED, "WPNAV_SPEED", scale=CM, unit="cm/s", decimals=0),
+    twin(MAX_ALTITUDE, "FENCE_ALT_MAX"),
+    twin(MAX_DISTANCE, "FENCE_RADIUS"),
+    mapped(GEOFENCE, "FENCE_TYPE", Kind.INT8, {1: "Ceiling", 3: "Ceiling and circle"}, {1: 0, 3: 1}),
+    twin(RETURN_ALTITUDE, "RTL_ALT", Kind.INT32, scale=CM, unit="cm", decimals=0),
+    FINAL_ALTITUDE,
+    mapped(
+        RETURN_BY_ITSELF,
+        "BATT_FS_LOW_ACT",
+        Kind.INT8,
+        {0: "None", 2: "RTL"},
+        {0: 0, 2: 1},
+    ),
+    mapped(
+        GCS_LOSS,
+        "FS_GCS_ENABLE",
+        Kind.INT8,
+        {0: "Disabled", 1: "RTL", 5: "Land", 7: "Brake"},
+        {0: LossAction.NOTHING, 1: LossAction.RETURN, 5: LossAction.LAND, 7: LossAction.HOLD},
+    ),
+    twin(GCS_LOSS_TIME, "FS_GCS_TIMEOUT"),
+)
+
+
+def _fact(name: str, value: float, short: str, kind: Kind = Kind.INT8, **more: object) -> Parameter:
+    return fact(name, value, short, kind, group=FACTS, source="fact", **more)
+
+
+def _untold(name: str, short: str, kind: Kind = Kind.REAL32, **more: object) -> Parameter:
+    return _fact(name, math.nan, short, kind, long=UNTOLD, **more)
+
+
+def _compass_offset(host: Host) -> float:
+    return 0.0 if host.drone.calibration.state.magneto_required else math.nan
+
+
+_CHANNELS = {"ROLL": 1, "PITCH": 2, "THROTTLE": 3, "YAW": 4}
+"""Where RC_CHANNELS_OVERRIDE has what."""
+
+FACTS_ARDUPILOT: tuple[Parameter, ...] = (
+    Parameter("SYSID_THISMAV", Kind.INT16, "System id", lambda host: float(host.sysid), group=FACTS, source="fleet"),
+    _fact("FRAME_CLASS", 1, "Frame: a quadrotor"),
+    _fact("FRAME_TYPE", 1, "Frame: X"),
+    _fact("ARMING_CHECK", 1, "Checks before arming: all", Kind.INT32),
+    _fact("DISARM_DELAY", AUTO_DISARM, "Disarms when no take-off follows", unit="s"),
+    _fact("FENCE_ENABLE", 1, "The drone's ceiling is always kept"),
+    _fact("FENCE_ACTION", 4, "At its own geofence the drone holds", values={4: "Brake"}),
+    _untold("FENCE_MARGIN", "Distance to the fence that it keeps", unit="m"),
+    _fact("FS_THR_ENABLE", 7, "Sticks lost: brake", values={7: "Brake"}),
+    _fact("FS_THR_VALUE", -1, "Throttle that means loss: none", Kind.INT16),
+    _fact("BATT_MONITOR", 7, "The battery is watched: it tells its charge itself"),
+    Parameter(
+        "BATT_CAPACITY",
+        Kind.INT32,
+        "Charge of the full battery",
+        lambda host: number(host.drone.battery.state.full_charge_mah),
+        news=(events.BatteryCapacity,),
+        unit="mAh",
+        group=FACTS,
+        source=events.BatteryCapacity.NAME,
+    ),
+    _fact("BATT_FS_CRT_ACT", 1, "Battery almost empty: the drone lands", values={1: "Land"}),
+    _untold("BATT_LOW_VOLT", "Voltage that is low", unit="V"),
+    _untold("BATT_CRT_VOLT", "Voltage that is critical", unit="V"),
+    _untold("BATT_LOW_MAH", "Charge that is low", unit="mAh"),
+    _untold("BATT_CRT_MAH", "Charge that is critical", unit="mAh"),
+    _untold("LAND_SPEED", "Speed of a landing", Kind.INT16, unit="cm/s"),
+    _fact("RTL_LOIT_TIME", 0, "Wait above home: none", Kind.INT32, unit="ms"),
+    _fact("COMPASS_DEV_ID", 1, "Compass: the drone has one", Kind.INT32),
+    _fact("COMPASS_DEV_ID2", 0, "Second compass: none", Kind.INT32),
+    _fact("COMPASS_DEV_ID3", 0, "Third compass: none", Kind.INT32),
+    _fact("COMPASS_USE", 1, "The compass is used"),
+    _fact("COMPASS_USE2", 0, "Second compass: none"),
+    _fact("COMPASS_USE3", 0, "Third compass: none"),
+    *(
+        Parameter(
+            f"COMPASS_OFS_{axis}",
+            Kind.REAL32,
+            "Compass offset: 0 while the drone demands a calibration",
+            _compass_offset,
+            news=(events.MagnetoCalibrationRequiredState,),
+            group=FACTS,
+            long=UNTOLD,
+            source=events.MagnetoCalibrationRequiredState.NAME,
+        )
+        for axis in "XYZ"
+    ),
+    *(
+        _fact(f"COMPASS_OFS{number}_{axis}", 0.0, "Compass offset: no such compass", Kind.REAL32)
+        for number in (2, 3)
+        for axis in "XYZ"
+    ),
+    *(_untold(f"INS_ACCOFFS_{axis}", "Accelerometer offset") for axis in "XYZ"),
+    *(_fact(f"RCMAP_{axis}", channel, "Channel of RC_CHANNELS_OVERRIDE") for axis, channel in _CHANNELS.items()),
+    *(
+        _fact(f"RC{channel}_{what}", value, "Of RC_CHANNELS_OVERRIDE", Kind.INT16, unit="PWM")
+        for channel in _CHANNELS.values()
+        for what, value in (("MIN", 1000), ("TRIM", 1500), ("MAX", 2000))
+    ),
+    *(_fact(f"RC{channel}_REVERSED", 0, "Channel reversed: no") for channel in _CHANNELS.values()),
+    _fact("FLTMODE_CH", 0, "Mode switch: none"),
+    *(_fact(f"FLTMODE{slot}", 5, "Mode switch: none; sticks fly Loiter") for slot in range(1, 7)),
+    _fact("SIMPLE", 0, "Simple mode: none"),
+    _fact("SUPER_SIMPLE", 0, "Super simple mode: none"),
+    Parameter(
+        "STAT_FLTTIME",
+        Kind.INT32,
+        "Total flight time",
+        lambda host: number(host.drone.product.state.total_flight_s),
+        news=(events.MotorFlightsStatusChanged,),
+        volatile=True,
+        unit="s",
+        group=FACTS,
+        source=events.MotorFlightsStatusChanged.NAME,
+    ),
+)
+
+ARDUPILOT_NAMES: tuple[Parameter, ...] = (*TWINS, *FACTS_ARDUPILOT)
