@@ -237,7 +237,7 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
             "below.",
             extra=expected(f"a list of 1 to {MAX_ENDPOINTS} URLs"),
         ),
-    ] = ("udpout://127.0.0.1:14550", "udpout://127.0.0.1:14540", "tcpin://127.0.0.1:5760")
+    ] = ("udpout://127.0.0.1:14550", "udpout://127.0.0.1:14540", "tcpin://127.0.0.1:5760?flavour=ardupilot")
     drones: Annotated[
         tuple[DroneConfig, ...],
         Meta(

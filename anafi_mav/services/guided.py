@@ -6,20 +6,23 @@ Conformance A4, B1, B2, D1 and items 78-83, 143.
 
 from __future__ import annotations
 
+import asyncio
 import math
 from collections.abc import Mapping
+from typing import Any
 
 from anafi_mav import units
 from anafi_mav.drone.events import PoiMode, RthHomeType
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import Command
-from anafi_mav.services.flavours import Flavour
+from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.modes import FlightMode
-from anafi_mav.services.service import Action, Host, Service
+from anafi_mav.services.service import Action, Host, Service, client_of
 from anafi_mav.services.statustext import Severity
-from anafi_mav.services.targets import height, height_in_frame, place
-from anafi_mav.services.vehicle import Goto, Place, Refused
+from anafi_mav.services.targets import UnsupportedFrame, height, height_in_frame, place
+from anafi_mav.services.vehicle import Goto, Place, Refused, Vehicle
 
 KEEP, DEFAULT = -1.0, -2.0
 """What stands for "no change" and "back to the default" in speed and throttle (MAVLink common.xml DO_CHANGE_SPEED)."""
@@ -29,6 +32,9 @@ _UPWARDS, _DOWNWARDS = 2.0, 3.0
 """SPEED_TYPE."""
 
 DEG_PER_TURN = 360.0
+
+_ITEM_GOTO, _ITEM_ALTITUDE = 2, 3
+"""`current` of a mission item that is an order (ArduPilot, MAVLink mission.md)."""
 
 
 def guided_mode(flavour: Flavour) -> FlightMode:
@@ -49,6 +55,58 @@ def heading_of(angle: float, way: float, relative: bool, now: float) -> float:
     if way < 0 and turn > 0:
         return turn - DEG_PER_TURN
     return turn
+
+
+def is_guided_item(item: Any) -> bool:
+    """A mission item that belongs to no mission: ArduPilot's older way of saying "go there" and "go to that height"."""
+    return item.current in (_ITEM_GOTO, _ITEM_ALTITUDE)
+
+
+def fly_item(host: Host, inbound: Inbound) -> None:
+    """Carry out a MISSION_ITEM or MISSION_ITEM_INT that `is_guided_item`; the MISSION_ACK says how it ended.
+
+    dronekit's simple_goto, MAVProxy's and Mission Planner's change of altitude (conformance D1-D3, item 141).
+    """
+    host.act(client_of(inbound), _fly_item(host, inbound))
+
+
+async def _fly_item(host: Host, inbound: Inbound) -> None:
+    item, flavour = inbound.message, flavour_of(inbound.channel)
+    scale = 1e7 if item.get_msgId() == dialect.MAVLINK_MSG_ID_MISSION_ITEM_INT else 1.0
+    vehicle = host.vehicle
+    result = dialect.MAV_MISSION_ERROR
+    try:
+        ato = height_in_frame(vehicle, item.z, item.frame)
+        if item.current == _ITEM_GOTO:
+            if item.command != dialect.MAV_CMD_NAV_WAYPOINT:
+                raise Refused("Goto refused: the item is no way point", lasting=True)
+            where = Place(item.x / scale, item.y / scale)
+            vehicle.check_on_earth(where, "Goto")
+            await vehicle.reposition(where, ato, None, mode=guided_mode(flavour))
+        else:
+            await change_altitude(vehicle, ato, flavour)
+        result = dialect.MAV_MISSION_ACCEPTED
+    except UnsupportedFrame:
+        result = dialect.MAV_MISSION_UNSUPPORTED_FRAME
+        raise
+    except Refused as error:
+        result = dialect.MAV_MISSION_INVALID if error.lasting else dialect.MAV_MISSION_DENIED
+        raise
+    except asyncio.CancelledError:
+        result = dialect.MAV_MISSION_OPERATION_CANCELLED
+        raise
+    finally:
+        host.send(dialect.MAVLink_mission_ack_message(inbound.sysid, inbound.compid, result), inbound.channel)
+
+
+async def change_altitude(vehicle: Vehicle, ato: float, flavour: Flavour) -> None:
+    """Go to a height (m above take-off): on the way to a place there, else here."""
+    goto = vehicle.goto
+    if goto is None:
+        await vehicle.reposition(None, ato, None, mode=guided_mode(flavour))
+    else:
+        vehicle.check_height(ato)
+        await vehicle.go(goto.at_height(ato))
 
 
 class GuidedService(Service):
@@ -107,12 +165,7 @@ class GuidedService(Service):
         if not math.isfinite(frame):
             raise Refused("Refused: param2 is a frame", lasting=True)
         ato = height_in_frame(vehicle, command.params[0], int(frame))
-        goto = vehicle.goto
-        if goto is None:
-            await vehicle.reposition(None, ato, None, mode=guided_mode(command.flavour))
-        else:
-            vehicle.check_height(ato)
-            await vehicle.go(goto.at_height(ato))
+        await change_altitude(vehicle, ato, command.flavour)
 
     async def _turn(self, command: Command) -> None:
         """MAV_CMD_CONDITION_YAW: param1 deg, param2 deg/s (unset or 0: the drone's own), param3 way, param4 relative.

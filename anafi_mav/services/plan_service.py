@@ -7,7 +7,10 @@ from collections.abc import Mapping
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services import plan_lists
+from anafi_mav.services.guided import fly_item, is_guided_item
 from anafi_mav.services.service import MessageHandler, Service
+
+_ITEMS = (dialect.MAVLINK_MSG_ID_MISSION_ITEM, dialect.MAVLINK_MSG_ID_MISSION_ITEM_INT)
 
 
 class PlanService(Service):
@@ -29,5 +32,8 @@ class PlanService(Service):
         )
 
     def _plan_list(self, inbound: Inbound) -> None:
+        if inbound.message.get_msgId() in _ITEMS and is_guided_item(inbound.message):
+            fly_item(self.host, inbound)
+            return
         for message in plan_lists.answer(inbound.message, inbound.sysid, inbound.compid):
             self.host.send(message, inbound.channel)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
-from collections.abc import Callable, Coroutine, Sequence
+from collections.abc import Callable, Coroutine, Hashable, Sequence
 from typing import Any
 
 from anafi_mav.clock import Clock
@@ -218,6 +218,10 @@ class System:
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
         return task
+
+    def act(self, client: Hashable, work: Coroutine[Any, Any, None]) -> None:
+        """Run an action that came by a message without COMMAND_ACK."""
+        self._commands.run(client, work)
 
     def times(self, at: float | None = None) -> Times:
         """A moment of the monotonic clock (None: now) in the clock of this system's messages."""

@@ -95,3 +95,50 @@ async def test_connect_look_and_fly(tmp_path: Path) -> None:
 
         alarming = re.compile("Traceback|ERROR|fence breach|PreArm")
         assert not [line for line in mavproxy.lines if alarming.search(line)], mavproxy
+
+
+async def test_conf_119_the_ardupilot_flavour(tmp_path: Path) -> None:
+    """Its own words: mode, arm, takeoff, guided, setspeed, changealt, setyaw, and mode again."""
+    address = loopback()
+    config = f"""
+        endpoints: ["tcpin://{address}:5760?flavour=ardupilot"]
+        drones: [{{name: alpha, sysid: 1, sim: {{address: {loopback()}, home: {list(HOME)}, speed: 3}}}}]
+    """
+    words = (sys.executable, "-u", MAVPROXY, f"--master=tcp:{address}:5760", f"--state-basedir={tmp_path}")
+    async with (
+        product(tmp_path, config) as p,
+        program(*words, stdin=asyncio.subprocess.PIPE, env={"HOME": str(tmp_path)}) as mavproxy,
+    ):
+
+        async def mode(name: str, shown_as: str = "") -> None:
+            since = len(mavproxy.lines)
+            mavproxy.say(f"mode {name}")
+            await mavproxy.line(lambda line: f"Mode {shown_as or name}" in line, since=since, timeout=5.0)
+
+        await mavproxy.line(lambda line: "online system 1" in line)
+        await mavproxy.line(lambda line: "Mode BRAKE" in line)
+        await mode("GUIDED")
+        await accepted(mavproxy, "arm throttle", "COMPONENT_ARM_DISARM")
+        await accepted(mavproxy, "takeoff 5", "NAV_TAKEOFF")
+        await at_rest(p, *HOME[:2], 5.0)
+
+        place = geo.destination(*HOME[:2], 20.0, 10.0)
+        await accepted(mavproxy, "setspeed 5", "DO_CHANGE_SPEED")
+        await accepted(mavproxy, f"guided {place[0]:.7f} {place[1]:.7f} 8", "DO_REPOSITION")
+        move = await p.entry("command", "move.extended_move_to")
+        assert move["args"]["max_horizontal_speed"] == 5.0
+        assert move["args"]["orientation_mode"] == 0  # its heading of 0 is no heading
+        await at_rest(p, *place, 8.0)
+
+        mavproxy.say("changealt 12")
+        await at_rest(p, *place, 12.0)
+        await accepted(mavproxy, "setyaw 90 0 0", "CONDITION_YAW")
+        await p.entry("pose", "", lambda pose: abs(pose["yaw"] - 1.5708) < 0.1)
+
+        await mode("LOITER")
+        await mode("RTL")
+        await p.entry("command", "rth.return_to_home")
+        await mode("LAND")
+        await p.flying_state("landed")
+        assert len(p.entries("command", "Piloting.Landing")) == 1
+        assert not [line for line in mavproxy.lines if re.search("Traceback|ERROR|fence breach", line)], mavproxy

@@ -33,7 +33,11 @@ def problem(text: str | bytes) -> str:
 def test_an_empty_file_is_the_default_fleet() -> None:
     config = from_text("", "fleet.yaml")
     assert config == Config()
-    assert config.endpoints == ("udpout://127.0.0.1:14550", "udpout://127.0.0.1:14540", "tcpin://127.0.0.1:5760")
+    assert config.endpoints == (
+        "udpout://127.0.0.1:14550",
+        "udpout://127.0.0.1:14540",
+        "tcpin://127.0.0.1:5760?flavour=ardupilot",
+    )
     assert config.drones == (DroneConfig(name="anafi", sysid=1, sim=SimConfig()),)
     assert config.allow_kill is False
     assert config.drones[0].allow_kill is None
