@@ -102,7 +102,8 @@ def format_description(session: SessionDescription) -> bytes:
         "t=0 0",
         *([f"a=tool:{session.tool}"] if session.tool else []),
         *([f"a=control:{session.control}"] if session.control else []),
-        f"a=range:npt={'now-' if session.duration is None else f'0-{session.duration:.3f}'}",
+        # Live streams have no range: Parrot's reader refuses "now" in a description (libsdp sdp.c).
+        *([] if session.duration is None else [f"a=range:npt=0-{session.duration:.3f}"]),
         *_attribute_lines(session.attributes),
     ]
     for media in session.media:

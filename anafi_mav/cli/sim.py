@@ -49,6 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--protocol", metavar="1|2|3", help="offer only this version of Parrot's transport")
     parser.add_argument("--http-port", default="80", metavar="PORT", help="of each drone's web server (%(default)s)")
+    parser.add_argument("--rtsp-port", default="554", metavar="PORT", help="of each drone's video (%(default)s)")
     parser.add_argument(
         "--storage", metavar="SIZE", help="bytes of the memory card, also with k, M or G behind: small ones fill soon"
     )
@@ -112,6 +113,7 @@ def _from_options(arguments: argparse.Namespace) -> Fleet:
             address=arguments.address,
             home=_home(arguments.home),
             http_port=integer("--http-port", arguments.http_port, "a port from 0 to 65535"),
+            rtsp_port=integer("--rtsp-port", arguments.rtsp_port, "a port from 0 to 65535"),
             versions=versions,
             telemetry_rate=number("--telemetry-rate", arguments.telemetry_rate, "events per second"),
             skycontroller=None
@@ -211,10 +213,11 @@ def _line(drone: SimulatedDrone) -> str:
     low, high = drone.spec.versions
     protocol = f"protocol {low}" if low == high else f"protocol {low} to {high}"
     web = drone.http_problem or ("no HTTP" if drone.http_port is None else f"HTTP {drone.http_port}")
+    video = drone.rtsp_problem or ("no video" if drone.rtsp_port is None else f"RTSP {drone.rtsp_port}")
     name = f"{drone.identity.name} ({drone.spec.model}, {drone.identity.serial})"
     if drone.spec.skycontroller is not None:
         name += f" behind a Skycontroller {drone.spec.skycontroller}"
-    return f"{name} at {drone.address}: discovery {drone.discovery_port}, {protocol}, {web}"
+    return f"{name} at {drone.address}: discovery {drone.discovery_port}, {protocol}, {web}, {video}"
 
 
 def _watch_stdin(stop: asyncio.Event) -> None:

@@ -39,6 +39,7 @@ from anafi_mav.arsdk.messages.camera import (
 from anafi_mav.arsdk.wire import Message
 from anafi_mav.sim.lenses import BITRATES, LOWEST_BITRATE, WIDTHS, Lens, Photos, Recording
 from anafi_mav.sim.model import Range
+from anafi_mav.sim.optics import Optics, seconds, sensitivity, white_balance, zoomed
 from anafi_mav.units import RAD_PER_DEG, clip
 
 STYLE_RANGE = (-3, 3)
@@ -358,11 +359,25 @@ class Camera:
             self._metering,
         )
 
-    def _exposure_now(self) -> Message:
-        """What the automatic chose: the same light every day."""
+    def optics(self) -> Optics:
+        """What its picture is taken with."""
+        shutter, iso = self._exposed()
+        return Optics(
+            hfov=zoomed(self.lens.hfov, self.zoom),
+            zoom=self.zoom,
+            exposure=seconds(shutter),
+            iso=sensitivity(iso),
+            gains=white_balance(self._white_balance, self._temperature),
+        )
+
+    def _exposed(self) -> tuple[ShutterSpeed, IsoSensitivity]:
+        """What was set, or what the automatic chose (`optics`)."""
         manual = self._exposure_mode
         shutter = self._shutter if manual in _MANUAL_SHUTTER else ShutterSpeed.SHUTTER_1_OVER_60
-        iso = self._iso if manual in _MANUAL_ISO else IsoSensitivity.ISO_100
+        return shutter, self._iso if manual in _MANUAL_ISO else IsoSensitivity.ISO_100
+
+    def _exposure_now(self) -> Message:
+        shutter, iso = self._exposed()
         size = ROI_SIZE if self._roi[0] >= 0.0 else -1.0
         return camera.Exposure(self.id, shutter, iso, self._lock, *self._roi, size, size)
 

@@ -21,6 +21,15 @@ from anafi_mav.sim.camera2_settings import CHOICES, COMMON, DEFAULTS, PHOTO, RAN
 from anafi_mav.sim.capture import Capture, Studio
 from anafi_mav.sim.lenses import AI
 from anafi_mav.sim.model import Model
+from anafi_mav.sim.optics import (
+    AUTOMATIC_EXPOSURE,
+    AUTOMATIC_ISO,
+    Optics,
+    seconds,
+    sensitivity,
+    white_balance,
+    zoomed,
+)
 from anafi_mav.units import RAD_PER_DEG, clip
 
 CAMERA = 0
@@ -64,6 +73,11 @@ _MODE_FIELDS = {
 """Settings that cannot change under a photo, and end a recording."""
 
 
+_MANUAL_SHUTTER = ("MANUAL_SHUTTER_SPEED", "MANUAL")
+_MANUAL_ISO = ("MANUAL_ISO_SENSITIVITY", "MANUAL")
+"""Exposure modes in which what was set by hand counts."""
+
+
 class Camera2:
     """The Ai's front camera."""
 
@@ -89,6 +103,20 @@ class Camera2:
     def busy(self) -> bool:
         """It is at work for the card."""
         return self._capture.busy
+
+    def optics(self, id: int) -> Optics:
+        """What its picture is taken with."""
+        config, at_work = self._config, self._camera
+        mode = config["exposure_mode"].name
+        shutter = config["exposure_manual_shutter_speed"] if mode in _MANUAL_SHUTTER else None
+        iso = config["exposure_manual_iso_sensitivity"] if mode in _MANUAL_ISO else None
+        return Optics(
+            hfov=zoomed(AI.hfov, at_work.zoom),
+            zoom=at_work.zoom,
+            exposure=AUTOMATIC_EXPOSURE if shutter is None else seconds(shutter),
+            iso=AUTOMATIC_ISO if iso is None else sensitivity(iso),
+            gains=white_balance(config["white_balance_mode"], config["white_balance_temperature"]),
+        )
 
     # -- time
 
@@ -373,8 +401,7 @@ class Camera2:
 
     def _zoom_level(self) -> Message:
         zoom = self._camera.zoom
-        hfov = 2.0 * math.atan(math.tan(AI.hfov / 2.0 * RAD_PER_DEG) / zoom) / RAD_PER_DEG
-        return camera2.ZoomLevel(camera_id=CAMERA, level=zoom, hfov=hfov)
+        return camera2.ZoomLevel(camera_id=CAMERA, level=zoom, hfov=zoomed(AI.hfov, zoom) / RAD_PER_DEG)
 
 
 def _rule(index: int, mode: camera2.CameraMode, names: Iterable[str]) -> camera2.CapabilitiesRule:

@@ -13,6 +13,7 @@ from anafi_mav.arsdk.wire import Message
 from anafi_mav.sim.camera import Camera, bits
 from anafi_mav.sim.capture import Capture, Studio
 from anafi_mav.sim.model import Model
+from anafi_mav.sim.optics import Optics
 
 ACTIVE = {ThermalMode.DISABLED: 0, ThermalMode.STANDARD: 1, ThermalMode.BLENDED: 2}
 """Id of the camera that a thermal mode makes the active one."""
@@ -39,6 +40,10 @@ class Cameras:
     @property
     def _active(self) -> Capture:
         return next(capture for capture in self._captures.values() if capture.camera.active)
+
+    def optics(self, id: int) -> Optics:
+        """What the picture of a camera is taken with."""
+        return self[id].optics()
 
     # -- time
 

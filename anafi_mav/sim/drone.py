@@ -18,6 +18,7 @@ from anafi_mav.arsdk.handshake import DeviceInfo
 from anafi_mav.arsdk.messages import common
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.mux_link import MuxServer
+from anafi_mav.arsdk.rtsp import DEFAULT_PORT as RTSP_PORT
 from anafi_mav.arsdk.session import OnMessage
 from anafi_mav.arsdk.wire import Buffer, Message, UnknownMessage
 from anafi_mav.errors import ConfigError
@@ -30,6 +31,7 @@ from anafi_mav.sim.model import MODELS
 from anafi_mav.sim.motion import Body, Pose
 from anafi_mav.sim.place import Origin
 from anafi_mav.sim.power import Battery
+from anafi_mav.sim.rtsp import VideoServer
 from anafi_mav.sim.skycontroller import MODELS as SKYCONTROLLERS
 from anafi_mav.sim.skycontroller import Skycontroller
 from anafi_mav.sim.states import all_settings, all_states
@@ -63,6 +65,8 @@ class DroneSpec:
     c2d_port: int = handshake.C2D_PORT
     http_port: int | None = 80
     """None: no web server."""
+    rtsp_port: int | None = RTSP_PORT
+    """None: no video."""
     versions: tuple[int, int] = (1, 3)
     """Lowest and highest ARSDK protocol version offered."""
     telemetry_rate: float = RATE
@@ -84,7 +88,7 @@ class DroneSpec:
         latitude, longitude, altitude = self.home
         if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0 and math.isfinite(altitude)):
             raise ConfigError("home", f"expected latitude, longitude (deg) and altitude (m), got {self.home}")
-        for key in ("discovery_port", "handshake_port", "c2d_port", "http_port"):
+        for key in ("discovery_port", "handshake_port", "c2d_port", "http_port", "rtsp_port"):
             port = getattr(self, key)
             if port is not None and not 0 <= port < 65536:
                 raise ConfigError(key, f"expected a port from 0 to 65535, got {port}")
@@ -129,6 +133,8 @@ class SimulatedDrone:
         self._air = Air(self.faults, random.Random(chance.getrandbits(64)), _later)
         self.http_problem = ""
         """Why there is no web server although one was asked for; empty: there is one, or nobody asked."""
+        self.rtsp_problem = ""
+        """The same of the video."""
         self._clock = clock
         self._body = body
         self.firmware = Firmware(model, identity, body, Origin(*spec.home), self._emit, self._note, self.faults, chance)
@@ -146,6 +152,16 @@ class SimulatedDrone:
             self._info = self.skycontroller.info
         self._server: DeviceServer | MuxServer | None = None
         self._web: WebServer | None = None
+        # The video has luck of its own, so that what else happens is the same whether it is watched or not.
+        luck = random.Random(identity.boot_id)
+        video_air = Air(self.faults, luck, _later)
+        self._video = VideoServer(
+            self.firmware,
+            luck,
+            lambda name, args: log.add(clock(), "video", name, args),
+            lambda: self._in_reach and not self.faults.mute,
+            lambda data, deliver: video_air(data, False, deliver) if self._in_reach and not self.faults.mute else None,
+        )
         self._session: DeviceSession | None = None
         self._next_pose = 0.0
         self._closing = False
@@ -192,6 +208,11 @@ class SimulatedDrone:
         """Where the web server listens; None: there is none."""
         return None if self._web is None else self._web.port
 
+    @property
+    def rtsp_port(self) -> int | None:
+        """Where the video server listens; None: there is none."""
+        return self._video.port or None
+
     def throw(self) -> None:
         """Hand launch: counts after UserTakeOff."""
         self.firmware.throw()
@@ -213,7 +234,7 @@ class SimulatedDrone:
     # -- life
 
     async def start(self) -> None:
-        """Open the sockets. Raises `OSError` when a port but the web server's is taken."""
+        """Open the sockets. Raises `OSError` when a port but the web or video server's is taken."""
         spec = self.spec
         if self.skycontroller is not None:
             self.firmware.link_up()
@@ -236,14 +257,21 @@ class SimulatedDrone:
                 on_session=self._on_session,
             )
         self._mute_link(self.faults.mute)
-        if spec.http_port is None:
-            return
+        if spec.http_port is not None:
+            await self._start_web(spec.http_port)
+        if spec.rtsp_port is not None:
+            # A Skycontroller offers its drone's video at the same port.
+            try:
+                await self._video.start(spec.address, spec.rtsp_port)
+            except OSError as error:
+                self.rtsp_problem = f"no video on port {spec.rtsp_port}: {os.strerror(error.errno or 0)}"
+
+    async def _start_web(self, port: int) -> None:
         web = self._make_web()
-        port = spec.http_port
         if self.skycontroller is not None and port:
             port += SKYCONTROLLER_PORTS
         try:
-            await web.start(spec.address, port)
+            await web.start(self.spec.address, port)
         except OSError as error:
             self.http_problem = f"no HTTP on port {port}: {os.strerror(error.errno or 0)}"
         else:
@@ -251,6 +279,8 @@ class SimulatedDrone:
 
     def _tcp_port(self, port: int) -> int:
         """Where a port of the drone is at the address of the Skycontroller."""
+        if port == self.spec.rtsp_port or port == RTSP_PORT:
+            return self.rtsp_port or port
         return (self.http_port or port) if port == self.spec.http_port else port
 
     def _make_web(self) -> WebServer:
@@ -272,6 +302,7 @@ class SimulatedDrone:
             await self._server.close()
         if self._web is not None:
             await self._web.close()
+        await self._video.close()
 
     def tick(self, now: float, elapsed: float, pose: Pose, arrived: bool, still: bool) -> None:
         """Called by the simulation after each of its turns; see `Firmware.tick`."""

@@ -153,11 +153,16 @@ class Flight:
         """True latitude and longitude."""
         return self._origin.place(self.pose.north, self.pose.east)
 
+    @property
+    def altitude(self) -> float:
+        """True height in m above mean sea level."""
+        return self._origin.altitude + self.pose.up
+
     def _scene(self) -> Scene:
         """What the first gimbal's camera sees."""
         self.gimbal.advance(self.time)
         looks = self.gimbal.attitude(self.pose)
-        place = (*self.place(), self._origin.altitude + self.pose.up) if self.fix else (UNKNOWN, UNKNOWN, UNKNOWN)
+        place = (*self.place(), self.altitude) if self.fix else (UNKNOWN, UNKNOWN, UNKNOWN)
         return Scene(*place, looks.pitch_absolute, looks.roll_absolute, self.pose.north, self.pose.east)
 
     def position_report(self) -> list[Message]:
@@ -168,10 +173,9 @@ class Flight:
                 ardrone3.GpsLocationChanged(UNKNOWN, UNKNOWN, UNKNOWN, -1, -1, -1),
             ]
         latitude, longitude = self.place()
-        altitude = self._origin.altitude + self.pose.up
         return [
-            ardrone3.PositionChanged(latitude, longitude, altitude),
-            ardrone3.GpsLocationChanged(latitude, longitude, altitude, 1, 1, 2),
+            ardrone3.PositionChanged(latitude, longitude, self.altitude),
+            ardrone3.GpsLocationChanged(latitude, longitude, self.altitude, 1, 1, 2),
         ]
 
     def motion_report(self) -> list[Message]:

@@ -62,6 +62,11 @@ class Guidance:
         """Somebody wants to move."""
         return self._move is not None or self._homing.flying or self._sticks_used
 
+    @property
+    def heading_for_place(self) -> bool:
+        """A moveTo is flown."""
+        return isinstance(self._move, MoveTo)
+
     def apply_limits(self) -> None:
         """Hand the settings that bound a flight to the body."""
         settings = self._settings

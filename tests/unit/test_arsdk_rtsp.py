@@ -181,7 +181,6 @@ c=IN IP4 192.168.42.1
 t=0 0
 a=tool:anafi 1.8.2
 a=control:rtsp://192.168.42.1/live
-a=range:npt=now-
 a=X-com-parrot-model-id:091a
 a=X-com-parrot-serial:PI040416AA
 m=video 0 RTP/AVP 96
