@@ -82,10 +82,12 @@ async def discover(address: str) -> dict[str, Any]:
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 async def test_it_says_ready_and_ends_on_a_signal(number: signal.Signals) -> None:
     address = loopback()
-    async with running("--address", address, "--http-port", "0", "--protocol", "2") as (process, lines):
+    ports = ("--http-port", "0", "--rtsp-port", "0")
+    async with running("--address", address, *ports, "--protocol", "2") as (process, lines):
         assert lines[-1] == "ready, Ctrl-C ends"
         (line,) = lines[:-1]
         assert f"at {address}: discovery 44445, protocol 2, HTTP " in line
+        assert ", RTSP " in line
         device = await discover(address)
         assert device["model.id"] == "0x0914"
         assert device["serial"] in line
@@ -108,13 +110,19 @@ async def test_three_drones_in_one_process() -> None:
 async def test_a_fleet_from_stdin_that_ends_with_it() -> None:
     network = loopback().rpartition(".")[0]
     drones = [
-        {"address": f"{network}.240", "http_port": None, "name": "Alpha", "serial": "PI040416DA9H777777"},
+        {
+            "address": f"{network}.240",
+            "http_port": None,
+            "rtsp_port": None,
+            "name": "Alpha",
+            "serial": "PI040416DA9H777777",
+        },
         {"address": f"{network}.241", "http_port": None, "home": [10.0, 20.0, 30.0], "versions": [1, 2]},
     ]
     fleet = json.dumps({"drones": drones, "speed": 2.0, "seed": 7}).encode() + b"\n"
     words = ("--fleet", "-", "--stdin-watch")
     async with running(*words, stdin=asyncio.subprocess.PIPE, first=fleet) as (process, lines):
-        assert "no HTTP" in lines[0]
+        assert "no HTTP, no video" in lines[0]
         assert "protocol 1 to 2" in lines[1]
         device = await discover(f"{network}.240")
         assert (device["name"], device["serial"]) == ("Alpha", "PI040416DA9H777777")
@@ -231,6 +239,7 @@ async def test_a_log_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
         ({"home": (0.0, 181.0, 0.0)}, "home"),
         ({"serial": "1234"}, "serial"),
         ({"http_port": -1}, "http_port"),
+        ({"rtsp_port": 65536}, "rtsp_port"),
         ({"c2d_port": 65536}, "c2d_port"),
         ({"handshake_port": -1}, "handshake_port"),
         ({"versions": (0, 3)}, "versions"),
