@@ -8,31 +8,27 @@ import time
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.mav import NAN
-from support.world import ARMED, HOLD, HOME, LAND, POSITION, RETURN, TAKEOFF, World, world
+from support.world import ARMED, HOLD, HOME, LAND, POSITION, RETURN, world
 
 from anafi_mav import geo
 
 ACCEPTED, DENIED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_DENIED
 REJECTED = dialect.MAV_RESULT_TEMPORARILY_REJECTED
 ARM, TAKE_OFF, REPOSITION, SET_MODE = 400, 22, 192, 176
+FLAVOURS = ("px4", "ardupilot")
 
 
-async def at_height(w: World, height: float) -> None:
-    """Wait until the drone itself, not the gateway's word, is at a height and holds it."""
-    await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD, timeout=20.0)
-    assert w.drone.pose.up == pytest.approx(height, abs=0.5)
-
-
-async def test_conf_019_takeoff_before_arming() -> None:
-    """QGroundControl: take-off while disarmed, AMSL height, then arm."""
-    async with world() as w:
-        ack = await w.client.command(TAKE_OFF, -1, NAN, NAN, NAN, z=HOME[2] + 8.0)
+@pytest.mark.parametrize("flavour", FLAVOURS)
+async def test_conf_019_takeoff_before_arming(flavour: str) -> None:
+    """QGroundControl: take-off while disarmed, then arm. The height is AMSL to PX4, above ground to ArduCopter."""
+    async with world(flavour=flavour) as w:
+        z = 8.0 if flavour == "ardupilot" else HOME[2] + 8.0
+        ack = await w.client.command(TAKE_OFF, -1, NAN, NAN, NAN, z=z)
         assert ack.result == ACCEPTED
         assert w.drone.flying_state.name == "LANDED"
-        mark = w.client.mark()
         assert (await w.client.command(ARM, 1)).result == ACCEPTED
-        await w.client.heartbeat(lambda beat: beat.custom_mode == TAKEOFF, since=mark)
-        await at_height(w, 8.0)
+        await w.drone.wait_log(lambda e: e.name.endswith("moveByEnd"), 20.0)
+        assert abs(w.drone.pose.up - 8.0) < 0.5
 
 
 async def test_a_takeoff_that_nobody_arms_is_forgotten() -> None:
@@ -54,8 +50,8 @@ async def test_conf_020_takeoff_to_the_parameter() -> None:
         await w.client.command(ARM, 1)
         mark = w.client.mark()
         assert (await w.client.command(TAKE_OFF)).result == ACCEPTED
-        await w.client.heartbeat(lambda beat: beat.custom_mode == TAKEOFF, since=mark)
-        await at_height(w, 7.0)
+        await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.takeoff, since=mark)
+        await w.at_height(7.0)
 
 
 async def test_conf_021_takeoff_relative() -> None:
@@ -64,8 +60,8 @@ async def test_conf_021_takeoff_relative() -> None:
         await w.client.command(ARM, 1)
         mark = w.client.mark()
         assert (await w.client.command(TAKE_OFF, 0, 0, 0, 0, x=0.0, y=0.0, z=10.0)).result == ACCEPTED
-        await w.client.heartbeat(lambda beat: beat.custom_mode == TAKEOFF, since=mark)
-        await at_height(w, 10.0)
+        await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.takeoff, since=mark)
+        await w.at_height(10.0)
 
 
 @pytest.mark.parametrize("place", [(NAN, NAN), HOME[:2]])
@@ -75,8 +71,8 @@ async def test_conf_022_takeoff_amsl(place: tuple[float, float]) -> None:
         mark = w.client.mark()
         ack = await w.client.command(TAKE_OFF, NAN, NAN, NAN, NAN, x=place[0], y=place[1], z=HOME[2] + 6.0)
         assert ack.result == ACCEPTED
-        await w.client.heartbeat(lambda beat: beat.custom_mode == TAKEOFF, since=mark)
-        await at_height(w, 6.0)
+        await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.takeoff, since=mark)
+        await w.at_height(6.0)
 
 
 @pytest.mark.parametrize("height", [0.5, -3.0, 151.0, math.inf])
@@ -89,19 +85,21 @@ async def test_takeoff_heights_are_refused_not_clamped(height: float) -> None:
         assert w.commands("ardrone3.Piloting.TakeOff") == []
 
 
-async def test_conf_023_land_by_mode() -> None:
-    async with world() as w:
+@pytest.mark.parametrize("flavour", FLAVOURS)
+async def test_conf_023_land_by_mode(flavour: str) -> None:
+    async with world(flavour=flavour) as w:
         await w.take_off()
         mark, began = w.client.mark(), time.monotonic()
-        w.client.send(dialect.MAVLink_set_mode_message(1, 1, LAND))
-        await w.client.heartbeat(lambda beat: beat.custom_mode == LAND, since=mark)
+        w.client.send(dialect.MAVLink_set_mode_message(1, 1, w.modes.land))
+        await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.land, since=mark)
         assert time.monotonic() - began < 1.3
         await w.client.heartbeat(lambda beat: not beat.base_mode & ARMED, timeout=20.0)
         assert w.drone.flying_state.name == "LANDED"
 
 
-async def test_conf_024_land_by_command() -> None:
-    async with world() as w:
+@pytest.mark.parametrize("flavour", FLAVOURS)
+async def test_conf_024_land_by_command(flavour: str) -> None:
+    async with world(flavour=flavour) as w:
         await w.take_off()
         assert (await w.client.command(21)).result == ACCEPTED
         assert w.drone.flying_state.name == "LANDING"
@@ -109,28 +107,31 @@ async def test_conf_024_land_by_command() -> None:
 
 
 @pytest.mark.parametrize("how", ["SET_MODE", "DO_SET_MODE", "NAV_RETURN_TO_LAUNCH"])
-async def test_conf_025_return(how: str) -> None:
-    async with world() as w:
+@pytest.mark.parametrize("flavour", FLAVOURS)
+async def test_conf_025_return(how: str, flavour: str) -> None:
+    async with world(flavour=flavour) as w:
         await w.take_off()
         mark = w.client.mark()
+        numbers = (4, 5) if flavour == "px4" else (6,)
         if how == "SET_MODE":
-            w.client.send(dialect.MAVLink_set_mode_message(1, 1, RETURN))
+            w.client.send(dialect.MAVLink_set_mode_message(1, 1, w.modes.returning))
         else:
-            ack = await (w.client.command(SET_MODE, 1, 4, 5) if how == "DO_SET_MODE" else w.client.command(20))
+            ack = await (w.client.command(SET_MODE, 1, *numbers) if how == "DO_SET_MODE" else w.client.command(20))
             assert ack.result == ACCEPTED
-        await w.client.heartbeat(lambda beat: beat.custom_mode == RETURN, since=mark)
+        await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.returning, since=mark)
         assert len(w.commands("rth.return_to_home")) == 1
 
 
-async def test_conf_026_pause() -> None:
-    async with world() as w:
+@pytest.mark.parametrize("flavour", FLAVOURS)
+async def test_conf_026_pause(flavour: str) -> None:
+    async with world(flavour=flavour) as w:
         await w.take_off()
         north = geo.destination(*HOME[:2], 60.0, 0.0)
         assert (await w.client.command(REPOSITION, -1, 1, 0, NAN, frame=6, x=north[0], y=north[1], z=5.0)).result == 0
         await w.client.wait("LOCAL_POSITION_NED", lambda m: m.vx > 2.0, timeout=10.0)
         mark = w.client.mark()
         assert (await w.client.command(REPOSITION, -1, 1, 0, NAN)).result == ACCEPTED
-        await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD, since=mark)
+        await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.hold, since=mark)
         await w.client.wait("LOCAL_POSITION_NED", lambda m: math.hypot(m.vx, m.vy) < 0.2, timeout=10.0)
         assert w.drone.pose.north < 50.0
         assert len(w.commands("ardrone3.Piloting.CancelMoveTo")) == 1
@@ -149,25 +150,28 @@ async def test_conf_027_modes(main: int, sub: int, mode: int, packed: bool) -> N
         await w.client.heartbeat(lambda beat: beat.custom_mode == mode, since=mark)
 
 
-async def test_conf_028_unknown_mode() -> None:
-    async with world() as w:
+@pytest.mark.parametrize("flavour", FLAVOURS)
+async def test_conf_028_unknown_mode(flavour: str) -> None:
+    async with world(flavour=flavour) as w:
         await w.take_off()
         mark = w.client.mark()
-        assert (await w.client.command(SET_MODE, 1, 5, 0)).result == DENIED  # ACRO
-        w.client.send(dialect.MAVLink_set_mode_message(1, 1, 5 << 16))
+        acro = (5, 0) if flavour == "px4" else (1,)
+        assert (await w.client.command(SET_MODE, 1, *acro)).result == DENIED
+        w.client.send(dialect.MAVLink_set_mode_message(1, 1, 5 << 16 if flavour == "px4" else 1))
         for _ in range(2):
             await w.client.wait("STATUSTEXT", lambda m: m.text.startswith("Mode refused"), since=mark)
         for _ in range(2):
             await w.client.wait("HEARTBEAT")
-        assert {beat.custom_mode for _, beat in w.client.since(mark, "HEARTBEAT")} == {HOLD}
+        assert {beat.custom_mode for _, beat in w.client.since(mark, "HEARTBEAT")} == {w.modes.hold}
 
 
 @pytest.mark.parametrize(
     ("frame", "z"), [(0, HOME[2] + 12.0), (5, HOME[2] + 12.0), (3, 12.0), (6, 12.0), (None, HOME[2] + 12.0)]
 )
-async def test_conf_029_goto(frame: int | None, z: float) -> None:
+@pytest.mark.parametrize("flavour", FLAVOURS)
+async def test_conf_029_goto(frame: int | None, z: float, flavour: str) -> None:
     """The frame decides what the height means; COMMAND_LONG is AMSL. The drone arrives at 12 m in every case."""
-    async with world() as w:
+    async with world(flavour=flavour) as w:
         await w.take_off()
         place = geo.destination(*HOME[:2], 20.0, -15.0)
         ack = await w.client.command(REPOSITION, -1, 1, 0, NAN, frame=frame, x=place[0], y=place[1], z=z)
@@ -184,8 +188,9 @@ async def test_goto_in_a_terrain_frame_is_refused() -> None:
         assert ack.result == 9  # COMMAND_UNSUPPORTED_MAV_FRAME, which pymavlink does not have yet
 
 
-async def test_conf_030_goto_without_fix() -> None:
-    async with world() as w:
+@pytest.mark.parametrize("flavour", FLAVOURS)
+async def test_conf_030_goto_without_fix(flavour: str) -> None:
+    async with world(flavour=flavour) as w:
         await w.take_off()
         w.drone.faults.gps = False
         await w.client.wait("GPS_RAW_INT", lambda m: m.fix_type < 2)
@@ -211,8 +216,9 @@ async def test_goto_on_the_ground_is_refused() -> None:
         assert ack.result == REJECTED
 
 
-async def test_conf_031_change_altitude() -> None:
-    async with world() as w:
+@pytest.mark.parametrize("flavour", FLAVOURS)
+async def test_conf_031_change_altitude(flavour: str) -> None:
+    async with world(flavour=flavour) as w:
         await w.take_off()
         before = w.drone.pose
         assert (await w.client.command(REPOSITION, -1, 1, 0, NAN, z=HOME[2] + 15.0)).result == ACCEPTED
@@ -231,8 +237,9 @@ async def test_change_heading() -> None:
         assert w.drone.pose.yaw == pytest.approx(math.pi / 2, abs=0.1)
 
 
-async def test_conf_032_landed_state() -> None:
-    async with world() as w:
+@pytest.mark.parametrize("flavour", FLAVOURS)
+async def test_conf_032_landed_state(flavour: str) -> None:
+    async with world(flavour=flavour) as w:
         mark = w.client.mark()
         await w.take_off()
         await w.client.command(21)
@@ -242,8 +249,9 @@ async def test_conf_032_landed_state() -> None:
         assert order == [1, 3, 2, 4, 1]
 
 
-async def test_conf_033_auto_disarm() -> None:
-    async with world() as w:
+@pytest.mark.parametrize("flavour", FLAVOURS)
+async def test_conf_033_auto_disarm(flavour: str) -> None:
+    async with world(flavour=flavour) as w:
         await w.take_off()
         mark = w.client.mark()
         await w.client.command(21)

@@ -23,18 +23,6 @@ COPTER = {"auto": 3, "guided": 4, "loiter": 5, "rtl": 6, "land": 9, "brake": 17}
 """ArduCopter's numbers (conformance A4)."""
 
 
-async def fly(w: World, flavour: str) -> None:
-    """Arm and take off in the way of the flavour's clients."""
-    if flavour == "px4":
-        await w.take_off()
-        return
-    client = w.client
-    assert (await client.command(SET_MODE, 1, COPTER["guided"])).result == ACCEPTED
-    assert (await client.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)).result == ACCEPTED
-    assert (await client.command(dialect.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, x=0, y=0, z=5)).result == ACCEPTED
-    await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["up"] > 4.7, 20.0)
-
-
 @pytest.mark.parametrize(
     ("name", "parameters"),
     [(name, (1, number, 0)) for name, number in COPTER.items() if name not in ("auto", "guided")]
@@ -42,7 +30,7 @@ async def fly(w: World, flavour: str) -> None:
 )
 async def test_conf_027_copter_modes_by_command(name: str, parameters: tuple[float, ...]) -> None:
     async with world(flavour="ardupilot") as w:
-        await fly(w, "ardupilot")
+        await w.take_off()
         assert (await w.client.command(SET_MODE, *parameters)).result == ACCEPTED
         await w.client.heartbeat(lambda beat: beat.custom_mode == COPTER[name], timeout=1.3)
 
@@ -50,7 +38,7 @@ async def test_conf_027_copter_modes_by_command(name: str, parameters: tuple[flo
 @pytest.mark.parametrize(("flavour", "number"), [("px4", LAND), ("ardupilot", COPTER["land"])])
 async def test_conf_027_land_by_the_message(flavour: str, number: int) -> None:
     async with world(flavour=flavour) as w:
-        await fly(w, flavour)
+        await w.take_off()
         w.client.send(dialect.MAVLink_set_mode_message(1, 1, number))
         await w.client.heartbeat(lambda beat: beat.custom_mode == number, timeout=1.3)
         await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landed", 20.0)
@@ -103,7 +91,7 @@ async def test_conf_056_available_modes(flavour: str) -> None:
 @pytest.mark.parametrize("flavour", FLAVOURS)
 async def test_conf_057_current_mode(flavour: str) -> None:
     async with world(flavour=flavour) as w:
-        await fly(w, flavour)
+        await w.take_off()
         hold = POSITION if flavour == "px4" else COPTER["loiter"]
         mark = w.client.mark()
         parameters = (1, 3, 0) if flavour == "px4" else (1, hold)
@@ -168,14 +156,3 @@ async def test_conf_001_the_copters_heartbeat() -> None:
         assert (beat.type, beat.autopilot) == (dialect.MAV_TYPE_QUADROTOR, dialect.MAV_AUTOPILOT_ARDUPILOTMEGA)
         assert beat.base_mode & dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
         assert beat.custom_mode == COPTER["brake"]
-
-
-async def test_conf_015_the_copters_capabilities() -> None:
-    async with world(flavour="ardupilot") as w:
-        mark = w.client.mark()
-        assert (await w.client.command(REQUEST, 148)).result == ACCEPTED
-        version = await w.client.wait("AUTOPILOT_VERSION", since=mark)
-        assert version.capabilities & dialect.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_C_CAST
-        assert not version.capabilities & dialect.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
-        assert not version.capabilities & dialect.MAV_PROTOCOL_CAPABILITY_PARAM_FLOAT
-        assert version.flight_sw_version >> 24 == 4

@@ -23,6 +23,26 @@ POSITION, OFFBOARD = 0x00030000, 0x00060000
 ARMED = dialect.MAV_MODE_FLAG_SAFETY_ARMED
 
 
+@dataclass(frozen=True)
+class Modes:
+    """custom_mode of what a vehicle can be doing, in one flavour (conformance A3, A4)."""
+
+    hold: int
+    """Where a vehicle is that `World.take_off` has lifted, or that was told to stop or to go somewhere."""
+    idle: int
+    """Where a vehicle is that nobody has told anything."""
+    position: int
+    land: int
+    returning: int
+    takeoff: int
+
+
+MODES = {
+    "px4": Modes(hold=HOLD, idle=HOLD, position=POSITION, land=LAND, returning=RETURN, takeoff=TAKEOFF),
+    "ardupilot": Modes(hold=4, idle=17, position=5, land=9, returning=6, takeoff=4),
+}
+
+
 def loopback() -> str:
     """An address of the loopback network that nobody else uses: two runs on one machine do not meet."""
     while True:
@@ -42,7 +62,13 @@ class World:
     simulator: Simulator
     gateway: Gateway
     address: str
+    flavour: str = "px4"
     clients: list[Client] = field(default_factory=list)
+
+    @property
+    def modes(self) -> Modes:
+        """The mode numbers that the clients see."""
+        return MODES[self.flavour]
 
     @property
     def drone(self) -> SimulatedDrone:
@@ -60,13 +86,21 @@ class World:
     async def take_off(self, height: float = 5.0) -> None:
         """Arm, take off, and wait until the vehicle holds at the height."""
         client = self.client
+        if self.flavour == "ardupilot":
+            ack = await client.command(dialect.MAV_CMD_DO_SET_MODE, 1, self.modes.hold)
+            assert ack.result == dialect.MAV_RESULT_ACCEPTED
         ack = await client.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)
         assert ack.result == dialect.MAV_RESULT_ACCEPTED
-        mark = client.mark()
         ack = await client.command(dialect.MAV_CMD_NAV_TAKEOFF, x=0.0, y=0.0, z=height)
         assert ack.result == dialect.MAV_RESULT_ACCEPTED
-        await client.heartbeat(lambda beat: beat.custom_mode == TAKEOFF, since=mark)
-        await client.heartbeat(lambda beat: beat.custom_mode == HOLD, timeout=20.0)
+        await self.at_height(height)
+
+    async def at_height(self, height: float, timeout: float = 20.0) -> None:
+        """Wait until the drone itself, not the gateway's word, has climbed to a height, and the vehicle holds it."""
+        await self.drone.wait_log(lambda e: e.name.endswith("moveByEnd"), timeout)
+        mark = self.client.mark()
+        await self.client.heartbeat(lambda beat: beat.custom_mode == self.modes.hold, since=mark)
+        assert abs(self.drone.pose.up - height) < 0.5
 
     def commands(self, name: str) -> list[Any]:
         """What the drone received under Parrot's name."""
@@ -88,8 +122,7 @@ async def world(
 ) -> AsyncIterator[World]:
     """One simulated drone, one gateway with a TCP endpoint, and its clients, connected and ready.
 
-    With `flavour` the endpoint shows that autopilot; `World.take_off` and the mode numbers above are PX4's. `also` is
-    the flavour of a second endpoint, at port 5761.
+    With `flavour` the endpoint shows that autopilot. `also` is the flavour of a second endpoint, at port 5761.
     """
     drone_address, address = loopback(), loopback()
     spec = DroneSpec(
@@ -109,7 +142,7 @@ async def world(
         allow_kill=allow_kill,
     )
     async with Simulator([spec], speed=speed, seed=1) as simulator, Gateway(config) as gateway:
-        held = World(simulator, gateway, address)
+        held = World(simulator, gateway, address, flavour)
         try:
             for _ in range(clients):
                 await held.connect()
