@@ -15,6 +15,8 @@ from typing import Any
 
 from typing_extensions import Self
 
+from support import flavours
+
 START_LIMIT = 30.0
 """s until a process has to say its first word: two of them share two busy cores."""
 
@@ -156,6 +158,7 @@ async def product(folder: Path, config: str, *arguments: str, ready: bool = True
     """The gateway and its simulator for the length of a block; by default it begins when both are ready."""
     path, log = folder / "fleet.yaml", folder / "sim.jsonl"
     path.write_text(config)
+    flavours.note(config)
     words = (sys.executable, "-m", "anafi_mav", "run", "-c", str(path), "--sim-log", str(log), *arguments)
     held = await Product.start(*words)
     held.log = log

@@ -14,6 +14,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from anafi_mav.config import Config, DroneConfig
 from anafi_mav.gateway import Gateway
 from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
+from support import flavours
 from support.mav import Client
 
 HOME = (48.8789, 2.3677, 35.0)
@@ -141,6 +142,7 @@ async def world(
         drones=(DroneConfig(name="alpha", sysid=sysid, address=drone_address),),
         allow_kill=allow_kill,
     )
+    flavours.note(*config.endpoints)
     async with Simulator([spec], speed=speed, seed=1) as simulator, Gateway(config) as gateway:
         held = World(simulator, gateway, address, flavour)
         try:

@@ -1,0 +1,92 @@
+"""Notes which flavours of the gateway a test has spoken to, and makes the conformance table of a run's results.
+
+pytest tests/conformance tests/clients --conformance docs/conformance.md
+"""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from support import flavours
+from support.conformance_items import ITEMS
+
+_NUMBER = re.compile(r"test_conf_(\d{3})")
+
+HEAD = """\
+# Conformance
+
+<!-- Made by `pytest tests/conformance tests/clients --conformance docs/conformance.md` from its results. -->
+
+What a MAVLink client needs of a vehicle, item by item, shown over real sockets with a simulated drone behind the
+gateway and judged by the simulator's own log. The numbers are those of the tests' names, `test_conf_NNN`. A flavour is
+the autopilot that an endpoint shows its clients. A number is how many tests of this flavour have passed, a dash that
+the item does not concern it; items that do not depend on the flavour have one count.
+
+| | item | px4 | ardupilot | shown in |
+|---|---|---|---|---|
+"""
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--conformance", metavar="FILE", default=None, help="write the conformance table of this run")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    path = config.getoption("--conformance")
+    if path is not None and not hasattr(config, "workerinput"):
+        config.pluginmanager.register(_Table(Path(path)), "conformance-table")
+
+
+@pytest.fixture(autouse=True)
+def _flavours_spoken_to(request: pytest.FixtureRequest) -> Iterator[None]:
+    flavours.SHOWN.clear()
+    yield
+    request.node.user_properties.append(("flavours", sorted(flavours.SHOWN)))
+
+
+class _Table:
+    """Collects what the tests of each item said."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._reports: dict[int, list[Any]] = defaultdict(list)
+        self._said: dict[str, list[str]] = {}
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        number = _NUMBER.search(report.nodeid)
+        if number is None:
+            return
+        if report.when == "call" or report.outcome != "passed":
+            self._reports[int(number[1])].append(report)
+        if report.when == "teardown":
+            self._said[report.nodeid] = dict(report.user_properties).get("flavours", [])
+
+    def pytest_sessionfinish(self) -> None:
+        rows = [self._row(number) for number in sorted(ITEMS)]
+        self._path.write_text(HEAD + "".join(rows), encoding="utf-8")
+
+    def _row(self, number: int) -> str:
+        item, reports = ITEMS[number], self._reports[number]
+        title = item.title + (f" (left to later: {item.part})" if item.part else "")
+        if not item.flavours:
+            one = self._outcome(reports)
+            cells = f"{one} | {one}"
+        else:
+            cells = " | ".join(
+                self._outcome([r for r in reports if flavour in self._said.get(r.nodeid, [])])
+                if flavour in item.flavours
+                else "–"
+                for flavour in ("px4", "ardupilot")
+            )
+        files = sorted({Path(report.nodeid.split("::")[0]).name for report in reports})
+        return f"| {number} | {title} | {cells} | {', '.join(f'`{name}`' for name in files)} |\n"
+
+    @staticmethod
+    def _outcome(reports: list[Any]) -> str:
+        failed = sorted({report.outcome for report in reports} - {"passed"})
+        return ", ".join(failed) if failed else str(len(reports) or "nothing")
