@@ -140,6 +140,11 @@ class Camera2:
         """What is told five times a second."""
         return [self._zoom_level()]
 
+    def panorama(self, act: Callable[[Capture], Iterable[Message]], time: float) -> list[Message]:
+        """Let it take part in a panorama."""
+        self._now = time
+        return self._translate(act(self._capture))
+
     # -- commands
 
     def handle(self, message: Message, time: float) -> list[Message] | None:
@@ -179,6 +184,8 @@ class Camera2:
                 return list(self._start_recording(message, time))
             case camera.StopRecording():
                 return list(self._stop_recording(message, time))
+            case camera.SetZoomTarget():
+                self._camera.handle(message)
         return []
 
     def _list(self, m: camera2.ListCameras, time: float) -> Iterable[Message]:
@@ -311,7 +318,7 @@ class Camera2:
             yield camera2.Photo(camera_id=CAMERA, type=event.TAKING_PHOTO)
         elif m.result is PhotoResult.PHOTO_SAVED:
             self._media_id = m.media_id
-            if self._camera.photo_mode in (CameraPhotoMode.TIME_LAPSE, CameraPhotoMode.GPS_LAPSE):
+            if self._capture.lapsing:
                 if not self._stopped:
                     return
                 reason = camera2.PhotoStopReason.USER_REQUEST

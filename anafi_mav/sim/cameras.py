@@ -77,6 +77,10 @@ class Cameras:
             if capture.camera.active and capture.camera.lens.zoom_max > 1.0
         ]
 
+    def panorama(self, act: Callable[[Capture], Iterable[Message]], time: float) -> list[Message]:
+        """Let the active camera take part in a panorama."""
+        return list(act(self._active))
+
     # -- commands
 
     def handle(self, message: Message, time: float) -> list[Message] | None:

@@ -127,6 +127,8 @@ class _Shoot:
     told_at: float = -math.inf
     result: Message | None = None
     """The last thing told of its progress."""
+    open: bool = False
+    """A panorama: its shots come when the drone looks where they are to be taken, and it is not over yet."""
 
     @property
     def lapse(self) -> bool:
@@ -167,15 +169,56 @@ class Capture:
     def busy(self) -> bool:
         return self.shooting or self.recording
 
+    @property
+    def lapsing(self) -> bool:
+        """It takes photos until somebody stops it."""
+        return self._shoot is not None and self._shoot.lapse
+
     # -- photos
 
-    def take_photo(self, time: float) -> Iterable[Message]:
+    def _refusal(self) -> PhotoResult | None:
+        """Why no photo can be taken now."""
         if not self._ready(CameraCameraMode.PHOTO) or self.busy:
-            yield self._photo(PhotoResult.ERROR_BAD_STATE)
+            return PhotoResult.ERROR_BAD_STATE
+        return PhotoResult.ERROR_NO_STORAGE_SPACE if self._studio.place.free < LEAST_ROOM else None
+
+    def begin_panorama(self, kind: str, count: int, time: float) -> Iterable[Message]:
+        """The first of `count` pictures of one media will be taken soon; `kind` in the words of the web server."""
+        refusal = self._refusal()
+        if refusal is None:
+            media = self._studio.media.begin(
+                video=False, mode="PANORAMA", date=self._date(time), panorama=kind, expected=count
+            )
+            kinds = _KINDS[PhotoFileFormat.JPEG]
+            self._shoot = _Shoot(CameraPhotoMode.SINGLE, media, [], kinds, open=True)
             yield self.photo_state()
+            yield self._tell(self._shoot, PhotoResult.TAKING_PHOTO, time)
+        else:
+            yield self._photo(refusal)
+            yield self.photo_state()
+
+    def panorama_shot(self, time: float) -> Iterable[Message]:
+        """A picture of what the camera sees now; nothing when no panorama is taken."""
+        if self._shoot is not None and self._shoot.open:
+            yield from self._press(self._shoot, time)
+
+    def end_panorama(self, time: float) -> Iterable[Message]:
+        """No more pictures. What was taken is written."""
+        shoot = self._shoot
+        if shoot is None or not shoot.open:
             return
-        if self._studio.place.free < LEAST_ROOM:
-            yield self._photo(PhotoResult.ERROR_NO_STORAGE_SPACE)
+        shoot.open = False
+        if shoot.count:
+            shoot.saved_at = time + SAVE_TIME
+        else:
+            self._shoot = None
+            yield self._photo(PhotoResult.ERROR)
+            yield self.photo_state()
+
+    def take_photo(self, time: float) -> Iterable[Message]:
+        refusal = self._refusal()
+        if refusal is not None:
+            yield self._photo(refusal)
             yield self.photo_state()
             return
         settings = self.camera
@@ -230,7 +273,7 @@ class Capture:
         if shoot.mode is CameraPhotoMode.TIME_LAPSE and not shoot.shots:
             shoot.shots.append(time + shoot.interval)
         last = not shoot.shots or shoot.lapse
-        if last:
+        if last and not shoot.open:
             shoot.saved_at = time + SAVE_TIME
         told = shoot.mode is CameraPhotoMode.BURST and time >= shoot.told_at + BURST_REPORT - 1e-9
         if last or told:

@@ -9,12 +9,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from anafi_mav.arsdk.messages import ardrone3, common, flight_plan, follow_me, gimbal, move, rth
+from anafi_mav.arsdk.messages import animation, ardrone3, common, flight_plan, follow_me, gimbal, move, rth
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.messages.rth import StateReason
 from anafi_mav.arsdk.wire import Message, UnknownMessage
+from anafi_mav.sim.figures import STARTS as ANIMATIONS
 from anafi_mav.sim.flight import Flight
 from anafi_mav.sim.flight import Identity as Identity
+from anafi_mav.sim.follow_me import COMMANDS as FOLLOW_ME
 from anafi_mav.sim.machine import AIRBORNE, GUIDED, LANDED, Event
 from anafi_mav.sim.safety import checklist
 
@@ -53,7 +55,8 @@ class Firmware(Flight):
         return True
 
     def _pilot(self, sticks: ardrone3.PCMD, now: float) -> None:
-        if self.state not in AIRBORNE or self.state is FlyingState.TAKINGOFF or self.flight_plan.playing:
+        deaf = self.flight_plan.playing or self.animations.running or self.follow.flies
+        if self.state not in AIRBORNE or self.state is FlyingState.TAKINGOFF or deaf:
             return
         if sticks.gaz > 0 and self.state is FlyingState.LANDING:
             self._fire(Event.CLIMB)
@@ -117,27 +120,57 @@ class Firmware(Flight):
             self._emit(event)
 
     def _move_by(self, message: ardrone3.MoveBy | move.ExtendedMoveBy) -> None:
-        self._leave_poi()
-        self.guidance.taken = self.flight_plan.playing
+        self._make_way()
         self.guidance.move_by(message, self.pose, self.state in GUIDED)
 
     def _move_to(self, message: ardrone3.MoveTo | move.ExtendedMoveTo) -> None:
-        self._leave_poi()
+        self._make_way()
         ready = self.state in GUIDED and self.fix and not self.compass.required
-        self.guidance.taken = self.flight_plan.playing
         self.guidance.move_to(message, self.pose, ready)
+
+    def _make_way(self) -> None:
+        """A move is about to begin, unless what flies does not let it."""
+        self.guidance.taken = self.flight_plan.playing or self.animations.running
+        if not self.guidance.taken:
+            self._free()
 
     def _cancel_move_to(self, message: Message) -> None:
         self.guidance.cancel_move_to(self.pose)
 
     def _start_poi(self, message: ardrone3.StartPilotedPOI | ardrone3.StartPilotedPOIV2) -> None:
-        if self.homing.flying or self.flight_plan.playing:
+        if self._taken:
             return
         if self.poi.start(message, self.state is FlyingState.HOVERING, self.time):
             self.guidance.cancel(self.pose)
+            self.follow.stop()
 
     def _stop_poi(self, message: Message) -> None:
-        self._leave_poi()
+        self.poi.stop()
+        self.guidance.stare(None)
+
+    @property
+    def _taken(self) -> bool:
+        """Something flies that is not given up for a point or a target."""
+        return self.homing.flying or self.flight_plan.playing or self.animations.running
+
+    def _follow_me(self, message: Message) -> None:
+        starts = isinstance(message, follow_me.Start)
+        if starts and self._taken:
+            message = follow_me.Start(follow_me.Mode.NONE)
+        for event in self.follow.handle(message, self.pose, self.time) or ():
+            self._emit(event)
+        if starts and self.follow.engaged and not self._taken:
+            self.guidance.cancel(self.pose)
+            self.poi.stop()
+
+    def _animate(self, message: Message) -> None:
+        if self.homing.flying or self.flight_plan.playing:
+            return
+        if self.animations.start(message, self.pose, self.target, self.model.airframe.max_speed):
+            self.guidance.cancel(self.pose)
+
+    def _cancel_animation(self, message: Message) -> None:
+        self.animations.cancel()
 
     # -- the rest
 
@@ -180,7 +213,7 @@ class Firmware(Flight):
         data = self.plans.get(uid)
         if self.flight_plan.start(uid, type, data, self.pose, self.time, name=name, item=item, goes_on=goes_on):
             self.guidance.cancel(self.pose)
-            self.poi.stop()
+            self._free()
             self.homing.abort()
 
     def _pause_plan(self, message: Message) -> None:
@@ -194,9 +227,6 @@ class Firmware(Flight):
 
     def _clear_recovery(self, message: Message) -> None:
         self.flight_plan.clear_recovery()
-
-    def _stop_follow_me(self, message: Message) -> None:
-        self._emit(follow_me.State(follow_me.Mode.NONE, follow_me.Behavior.IDLE, follow_me.Animation.NONE, 0))
 
 
 _HANDLERS: dict[type[Message], Callable[[Firmware, Any], None]] = {
@@ -231,5 +261,7 @@ _HANDLERS: dict[type[Message], Callable[[Firmware, Any], None]] = {
     flight_plan.StartAt: Firmware._start_plan_at,
     flight_plan.StartAtV2: Firmware._start_plan_at,
     flight_plan.ClearRecoveryInfo: Firmware._clear_recovery,
-    follow_me.Stop: Firmware._stop_follow_me,
+    **dict.fromkeys(FOLLOW_ME, Firmware._follow_me),
+    **dict.fromkeys(ANIMATIONS, Firmware._animate),
+    animation.Cancel: Firmware._cancel_animation,
 }

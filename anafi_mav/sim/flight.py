@@ -12,22 +12,26 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from anafi_mav.arsdk.messages import ardrone3, common, gimbal
+from anafi_mav.arsdk.messages import ardrone3, common
 from anafi_mav.arsdk.messages.alarms import TakeoffChecklistType, Type
 from anafi_mav.arsdk.messages.ardrone3 import AlertState, FlyingState
 from anafi_mav.arsdk.messages.rth import RthEndingBehavior, StateReason
 from anafi_mav.arsdk.wire import Message
 from anafi_mav.sim import power
+from anafi_mav.sim.animation import Animations
 from anafi_mav.sim.compass import Compass
 from anafi_mav.sim.endurance import Endurance
 from anafi_mav.sim.faults import Faults
+from anafi_mav.sim.figures import Target
 from anafi_mav.sim.flight_plan import FlightPlan
+from anafi_mav.sim.follow_me import FollowMe
 from anafi_mav.sim.gimbal import Gimbals
 from anafi_mav.sim.guidance import Guidance
 from anafi_mav.sim.homing import UNKNOWN, Homing
 from anafi_mav.sim.machine import AIRBORNE, GUIDED, LANDED, Event, next_state
 from anafi_mav.sim.model import Model
 from anafi_mav.sim.motion import Body, Pose
+from anafi_mav.sim.operator import Operator
 from anafi_mav.sim.payload import Payload
 from anafi_mav.sim.picture import Scene
 from anafi_mav.sim.place import Origin
@@ -81,14 +85,17 @@ class Flight:
         self.compass = Compass()
         self.gimbal = Gimbals(model)
         self.payload = Payload(model, identity.name, identity.run_id, emit, self._scene)
+        self.operator = Operator(self.gimbal, self.payload, lambda: (self.time, self.pose), emit, note)
         self.plans = FlightPlanStore()
         self.alarms = Alarms()
         self.warnings = Warnings()
         self.endurance = Endurance(model, self.settings)
         self.homing = Homing(body, origin, self.settings, emit)
         self.guidance = Guidance(model, body, origin, self.settings, self.homing, emit)
-        self.flight_plan = FlightPlan(model, body, origin, self.settings, self, emit, note)
-        self.poi = Poi(origin, emit, self.aim, lambda: self.settings.yaw_rate, model.modern)
+        self.flight_plan = FlightPlan(model, body, origin, self.settings, self, self.operator, emit, note)
+        self.poi = Poi(origin, emit, self.operator.aim, lambda: self.settings.yaw_rate, model.modern)
+        self.follow = FollowMe(body, origin, self.settings, emit, self.operator.aim, model.airframe.max_speed)
+        self.animations = Animations(model, body, self.operator, emit)
         self.state = LANDED
         self.pose = _REST
         self.time = 0.0
@@ -163,7 +170,9 @@ class Flight:
         self.gimbal.advance(self.time)
         looks = self.gimbal.attitude(self.pose)
         place = (*self.place(), self.altitude) if self.fix else (UNKNOWN, UNKNOWN, UNKNOWN)
-        return Scene(*place, looks.pitch_absolute, looks.roll_absolute, self.pose.north, self.pose.east)
+        return Scene(
+            *place, looks.pitch_absolute, looks.roll_absolute, self.pose.north, self.pose.east, looks.yaw_absolute
+        )
 
     def position_report(self) -> list[Message]:
         """Where GPS says the drone is: deg, deg, m above mean sea level."""
@@ -198,7 +207,7 @@ class Flight:
             return
         self.flight_plan.stop(hover=True)
         self.guidance.release_sticks()
-        self._leave_poi()
+        self._free()
         if self.state in GUIDED | {FlyingState.TAKINGOFF} and not self.homing.flying:
             self.guidance.cancel(self.pose)
             self._return_at = self.time + self.settings.number("rth_delay")
@@ -252,6 +261,8 @@ class Flight:
             self.flight_plan.tick(self.time, self.pose, arrived)
             if self.state not in GUIDED:
                 return
+        elif self.animations.running:
+            self.animations.tick(self.time, self.pose, arrived, still)
         else:
             ending = self.guidance.tick(self.time, self.pose, arrived, hovering)
             if self._alone:
@@ -263,10 +274,12 @@ class Flight:
         if self._return_at is not None and self.time >= self._return_at:
             self._return_at = None
             self._go_home(StateReason.CONNECTION_LOST)
-        self.guidance.stare(self.poi.tick(self.time, self.pose, hovering))
+        if not self.animations.running:
+            rate = self.poi.tick(self.time, self.pose, hovering)
+            self.guidance.stare(self.follow.tick(self.time, self.pose) if rate is None else rate)
         # A drone that hovers stays HOVERING while a gust shakes it, but not while it is carried off.
         moving = math.hypot(self.pose.ground_speed, self.pose.vd) > STRAY if hovering else not still
-        busy = self.guidance.busy or self.flight_plan.playing
+        busy = self.guidance.busy or self.flight_plan.playing or self.animations.running or self.follow.flies
         self._fire(Event.BUSY if busy or moving else Event.AT_REST)
 
     def _update_sensors(self, elapsed: float) -> None:
@@ -286,6 +299,7 @@ class Flight:
             self._set_fix(self.faults.gps)
         self.homing.sensors(self.fix, not self.compass.required)
         self._tell_readiness()
+        self._look_at_targets()
         for message in self.payload.lacks(self.fix, not self.compass.required, self.state in GUIDED):
             self._emit(message)
         if self.alert is not self._alert:
@@ -308,6 +322,13 @@ class Flight:
         fix, calibrated, can_fly, guided = ready
         self.flight_plan.sensors(fix, calibrated, can_fly)
         self.poi.sensors(fix, calibrated, guided)
+
+    def _look_at_targets(self) -> None:
+        """What follow me and animations need."""
+        calibrated, guided = not self.compass.required, self.state in GUIDED
+        self.follow.sensors(self.fix, calibrated, guided, self.pose, self.time)
+        free = not self.flight_plan.playing and not self.homing.flying
+        self.animations.sensors(self.fix, calibrated, guided, free, self.target is not None)
 
     def _look_after_aircraft(self, elapsed: float) -> None:
         """Motors, vibration, wind, and whether somebody carries it."""
@@ -426,7 +447,7 @@ class Flight:
         """End a move and a return, and say so."""
         self.flight_plan.stop(hover=False)
         self.guidance.cancel(self.pose)
-        self.poi.stop()
+        self._free()
         self.homing.abort()
 
     def _go_home(self, reason: StateReason) -> None:
@@ -436,23 +457,23 @@ class Flight:
         if self.homing.home is not None and not self.homing.flying:
             self.flight_plan.stop(hover=True)
             self.guidance.cancel(self.pose)
-            self.poi.stop()
+            self._free()
         self.homing.request(reason, self.pose, hovering)
 
-    def _leave_poi(self) -> None:
-        """A move takes over."""
+    def _free(self) -> None:
+        """Something else takes over: nothing is looked at or followed any more, and no animation flown."""
+        if self.animations.running:
+            self.animations.end()
+            self._body.hover()
+        self.follow.stop()
         self.poi.stop()
         self.guidance.stare(None)
 
-    def aim(self, elevation: float) -> None:
-        """Point the camera so far above the horizon (deg); the other axes stay as they are."""
-        position, none, absolute = (
-            gimbal.ControlMode.POSITION,
-            gimbal.FrameOfReference.NONE,
-            gimbal.FrameOfReference.ABSOLUTE,
-        )
-        target = gimbal.SetTarget(0, position, none, 0.0, absolute, elevation, none, 0.0)
-        self.gimbal.handle(target, self.pose, self.time, True)
+    @property
+    def target(self) -> Target | None:
+        """What an animation would be about: the point of interest, or who is followed or could be."""
+        point = self.poi.point if self.poi.running else self.follow.target(self.time)
+        return None if point is None else Target(*point)
 
     # -- what a flight plan needs
 
@@ -460,10 +481,6 @@ class Flight:
     def airborne(self) -> bool:
         """In the air and ready to be told where to go."""
         return self.state in GUIDED
-
-    @property
-    def camera_busy(self) -> bool:
-        return self.payload.cameras.busy
 
     def plan_take_off(self) -> None:
         self._fire(Event.TAKE_OFF)
@@ -474,9 +491,3 @@ class Flight:
     def plan_return(self) -> None:
         self._body.hover()
         self._go_home(StateReason.FLIGHTPLAN)
-
-    def operate(self, message: Message) -> None:
-        """Let the payload take a command of the flight plan."""
-        self._note("payload", {"command": message.NAME})
-        for event in self.payload.operate(message, self.time):
-            self._emit(event)

@@ -17,6 +17,8 @@ from anafi_mav.arsdk.messages.common import MavlinkType, PlayError, PlayingState
 from anafi_mav.arsdk.wire import Message
 from anafi_mav.sim.model import Model
 from anafi_mav.sim.motion import Body, Pose, Turn
+from anafi_mav.sim.operator import Operator
+from anafi_mav.sim.panorama import Panorama
 from anafi_mav.sim.place import Origin
 from anafi_mav.sim.plan_file import Command, Item, PlanFileError, read
 from anafi_mav.sim.poi import look
@@ -38,9 +40,6 @@ STALL = 4.0
 CAMERA_LIMIT = 5.0
 """s that a single photo is waited for."""
 
-PANORAMA_SPEED = 30.0
-"""deg/s of a panorama that names none. Assumed."""
-
 _MOVED = 0.05
 _LAND_SAFE = 1.0
 """m: no way point is flown lower than this."""
@@ -60,15 +59,6 @@ class Pilot(Protocol):
 
     def plan_return(self) -> None: ...
 
-    def aim(self, elevation: float) -> None: ...
-
-    def operate(self, message: Message) -> None:
-        """Let the payload take a command."""
-        ...
-
-    @property
-    def camera_busy(self) -> bool: ...
-
 
 class FlightPlan:
     """The plan that plays, or played last."""
@@ -80,6 +70,7 @@ class FlightPlan:
         origin: Origin,
         settings: Settings,
         pilot: Pilot,
+        operator: Operator,
         emit: Callable[[Message], None],
         note: Callable[[str, dict[str, Any]], None],
     ) -> None:
@@ -88,6 +79,7 @@ class FlightPlan:
         self._origin = origin
         self._settings = settings
         self._pilot = pilot
+        self._operator = operator
         self._emit = emit
         self._note = note
         self.state = PlayingState.STOPPED
@@ -114,6 +106,7 @@ class FlightPlan:
         self._rois: list[tuple[float, float, float]] = []
         self._roi: tuple[float, float, float] | None = None
         self._still: tuple[float, float] = (0.0, 0.0)
+        self._panning: Panorama | None = None
 
     # -- what others ask
 
@@ -254,11 +247,13 @@ class FlightPlan:
         self._emit(self._recovery)
 
     def _leave(self) -> None:
+        self._stop_panning()
         if self._pilot.airborne:
             self._body.hover()
         self._target = None
 
     def _end(self) -> None:
+        self._stop_panning()
         self._target = None
         self._set(PlayingState.STOPPED)
         if self._model.modern:
@@ -314,9 +309,13 @@ class FlightPlan:
                 self._emit(flight_plan.WaypointSkipped(self._index))
             return True
         if item.command is Command.PANORAMA:
-            return arrived and time > self._due  # not by what was flown before
+            assert self._panning is not None, "begun with the item"
+            over = self._panning.tick(time, arrived)
+            if over:
+                self._stop_panning()
+            return over
         if item.command is Command.START_PHOTO and self._count(item) == 1:
-            return not self._pilot.camera_busy or time >= self._due + CAMERA_LIMIT
+            return not self._operator.camera_busy or time >= self._due + CAMERA_LIMIT
         return time >= self._due
 
     def _near(self, item: Item, pose: Pose) -> bool:
@@ -386,7 +385,7 @@ class FlightPlan:
             return
         seen = look(pose, *self._roi)
         self._body.stick_yaw(seen.yaw_rate(pose.yaw, TURN_SPEED))
-        self._pilot.aim(seen.elevation * DEG_PER_RAD)
+        self._operator.aim(seen.elevation * DEG_PER_RAD)
 
     def _look_at(self, point: tuple[float, float, float] | None, pose: Pose) -> None:
         self._roi = point
@@ -445,7 +444,7 @@ class FlightPlan:
     def _mount(self, item: Item, pose: Pose, time: float) -> None:
         neutral = self._type is MavlinkType.FLIGHT_PLAN_V2 and item.altitude == 1
         if neutral or math.isfinite(item.p1):
-            self._pilot.aim(0.0 if neutral else item.p1)
+            self._operator.aim(0.0 if neutral else item.p1)
 
     def _still_mode(self, item: Item, pose: Pose, time: float) -> None:
         self._still = (item.p1, item.p2)
@@ -471,8 +470,8 @@ class FlightPlan:
             self._photograph(camera.CameraPhotoMode.TIME_LAPSE, item.p1 / 1000.0)
 
     def _photograph(self, mode: camera.CameraPhotoMode, step: float) -> None:
-        self._pilot.operate(camera.SetCameraMode(0, camera.CameraCameraMode.PHOTO))
-        self._pilot.operate(
+        self._operator.operate(camera.SetCameraMode(0, camera.CameraCameraMode.PHOTO))
+        self._operator.operate(
             camera.SetPhotoMode(
                 0,
                 mode,
@@ -483,29 +482,26 @@ class FlightPlan:
                 step,
             )
         )
-        self._pilot.operate(camera.TakePhoto(0))
+        self._operator.operate(camera.TakePhoto(0))
 
     def _stop_photo(self, item: Item, pose: Pose, time: float) -> None:
-        self._pilot.operate(camera.StopPhoto(0))
+        self._operator.operate(camera.StopPhoto(0))
 
     def _start_video(self, item: Item, pose: Pose, time: float) -> None:
-        self._pilot.operate(camera.SetCameraMode(0, camera.CameraCameraMode.RECORDING))
-        self._pilot.operate(camera.StartRecording(0))
+        self._operator.operate(camera.SetCameraMode(0, camera.CameraCameraMode.RECORDING))
+        self._operator.operate(camera.StartRecording(0))
 
     def _stop_video(self, item: Item, pose: Pose, time: float) -> None:
-        self._pilot.operate(camera.StopRecording(0))
+        self._operator.operate(camera.StopRecording(0))
 
     def _panorama(self, item: Item, pose: Pose, time: float) -> None:
-        speed = item.p3 if item.p3 > 0.0 else PANORAMA_SPEED
-        angle = item.p1 * RAD_PER_DEG if math.isfinite(item.p1) else 0.0
         self._target = (pose.north, pose.east, pose.up)
-        self._body.move(
-            *self._target,
-            yaw=self._body.heading + angle,
-            speed=CRUISE,
-            climb=1.0,
-            yaw_rate=speed * RAD_PER_DEG,
-        )
+        self._panning = Panorama(item, self._body, self._operator, pose, time, CRUISE)
+
+    def _stop_panning(self) -> None:
+        if self._panning is not None:
+            self._panning.end()
+            self._panning = None
 
 
 def _lifts(items: tuple[Item, ...]) -> bool:

@@ -119,6 +119,10 @@ class Media:
     date: str
     run_id: str
     thermal: bool = False
+    panorama: str = ""
+    """SPHERICAL, …; empty: it is none."""
+    expected: int = 0
+    """Pictures that a panorama is made of."""
     resources: list[Resource] = field(default_factory=list)
 
     @property
@@ -144,6 +148,10 @@ class Media:
             told |= {"video_mode": self.mode, "duration": round(seconds * 1000.0), "replay_url": f"replay/{first.id}"}
         else:
             told["photo_mode"] = self.mode
+        if self.panorama:
+            told["panorama_type"] = self.panorama
+        if self.expected:
+            told["expected_count"] = self.expected
         return told
 
 
@@ -186,9 +194,11 @@ class MediaStore:
 
     # -- writing
 
-    def begin(self, *, video: bool, mode: str, date: str, thermal: bool = False) -> Media:
+    def begin(
+        self, *, video: bool, mode: str, date: str, thermal: bool = False, panorama: str = "", expected: int = 0
+    ) -> Media:
         """A media without files; nobody is told before `add`."""
-        media = Media(str(self._next_id), video, mode, date, self._run_id, thermal)
+        media = Media(str(self._next_id), video, mode, date, self._run_id, thermal, panorama, expected)
         self._next_id += 1
         return media
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from anafi_mav.arsdk.messages import camera
 from anafi_mav.arsdk.messages.thermal import ThermalMode
 from anafi_mav.arsdk.wire import Message
 from anafi_mav.sim.calendar import Calendar
@@ -54,6 +55,19 @@ class Payload:
         if isinstance(self.cameras, Camera2):
             return self.cameras.operate(message, time)
         return self.handle(message, time) or []
+
+    def panorama_begin(self, kind: str, count: int, time: float) -> list[Message]:
+        """`count` pictures of one media will be taken; a camera that records, or does anything else, lets go."""
+        messages = self.operate(camera.SetCameraMode(0, camera.CameraCameraMode.PHOTO), time)
+        return messages + self.cameras.panorama(lambda capture: capture.begin_panorama(kind, count, time), time)
+
+    def panorama_shot(self, time: float) -> list[Message]:
+        """One of them, now."""
+        return self.cameras.panorama(lambda capture: capture.panorama_shot(time), time)
+
+    def panorama_end(self, time: float) -> list[Message]:
+        """That was all."""
+        return self.cameras.panorama(lambda capture: capture.end_panorama(time), time)
 
     def lacks(self, fix: bool, calibrated: bool, flying: bool) -> list[Message]:
         """What a move or a flight plan still lacks, on models that tell it and if it has changed."""

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
-from anafi_mav.units import RAD_PER_DEG
+from anafi_mav.units import RAD_PER_DEG, wrap_360
 
 WIDTH, HEIGHT = 160, 120
 """Pixels of a picture."""
@@ -26,6 +26,10 @@ FRAME_TIME = 1.0
 _BLOCK = 8
 _VFOV = 43.0
 """deg from the lower to the upper edge."""
+_HFOV = 55.4
+"""deg from the left to the right edge."""
+_SHADE = 60.0
+"""How much darker the sky is in the south."""
 _SKY, _GROUND = (190, 150, 110), (100, 115, 130)
 """Y, Cb, Cr."""
 _UNKNOWN = 500.0
@@ -49,6 +53,8 @@ class Scene:
     north: float = 0.0
     """m from the simulator's origin, true also without GPS."""
     east: float = 0.0
+    heading: float = 0.0
+    """deg clockwise from north that the camera looks to."""
 
 
 def blocks(scene: Scene, mark: int, width: int, height: int) -> Iterator[Colour]:
@@ -56,6 +62,7 @@ def blocks(scene: Scene, mark: int, width: int, height: int) -> Iterator[Colour]
     columns, rows = width // _BLOCK, height // _BLOCK
     slope = math.tan(max(-80.0, min(80.0, scene.roll)) * RAD_PER_DEG)
     middle = rows / 2.0 + scene.pitch / _VFOV * rows
+    skies = [_sky(scene.heading + ((column + 0.5) / columns - 0.5) * _HFOV) for column in range(columns)]
     for row in range(rows):
         for column in range(columns):
             if row == rows - 1:
@@ -63,7 +70,13 @@ def blocks(scene: Scene, mark: int, width: int, height: int) -> Iterator[Colour]
             else:
                 # Rolled to the right, the horizon falls to the left.
                 horizon = middle - slope * (column + 0.5 - columns / 2.0)
-                yield _SKY if row + 0.5 < horizon else _GROUND
+                yield skies[column] if row + 0.5 < horizon else _GROUND
+
+
+def _sky(azimuth: float) -> Colour:
+    """The sky is darkest in the south, so that a picture shows where the camera looked."""
+    light, blue, red = _SKY
+    return round(light - _SHADE * (1.0 - math.cos(azimuth * RAD_PER_DEG)) / 2.0), blue, red
 
 
 # -- JPEG (ITU T.81)
@@ -179,6 +192,8 @@ def exif(scene: Scene, make_model: str, date: str) -> bytes:
         _degrees(0x0004, scene.longitude),
         (0x0005, _BYTE, 1, b"\1" if scene.altitude < 0 else b"\0"),
         _rationals(0x0006, abs(scene.altitude)),
+        _text(0x0010, "T"),
+        _rationals(0x0011, wrap_360(scene.heading)),
     ]
     pointer = 8 + len(_directory([*entries, _long(0x8825, 0)], 8))
     return _HEADER + _directory([*entries, _long(0x8825, pointer)], 8) + _directory(place, pointer)

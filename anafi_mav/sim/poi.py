@@ -87,6 +87,11 @@ class Poi:
         return self.status is PoiStatus.RUNNING
 
     @property
+    def point(self) -> tuple[float, float, float]:
+        """Where it is: m from the simulator's origin."""
+        return self._point
+
+    @property
     def holds_gimbal(self) -> bool:
         """Commands to the gimbal do not count."""
         return self.running and self._mode is PoiMode.LOCKED_GIMBAL

@@ -9,10 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from anafi_mav.arsdk.messages import (
-    animation,
     ardrone3,
     common,
-    follow_me,
     piloting_style,
     precise_home,
     wifi,
@@ -20,8 +18,6 @@ from anafi_mav.arsdk.messages import (
 from anafi_mav.arsdk.wire import Message
 from anafi_mav.sim.firmware import Firmware
 from anafi_mav.sim.safety import checklist
-
-_FOLLOW_MODES = (follow_me.Mode.LOOK_AT, follow_me.Mode.GEOGRAPHIC, follow_me.Mode.RELATIVE)
 
 
 def _bits(values: Iterable[int]) -> int:
@@ -80,11 +76,8 @@ def all_states(firmware: Firmware) -> list[Message]:
         precise_home.Capabilities(_bits(precise_home.PreciseHomeMode)),
         precise_home.State(precise_home.PreciseHomeState.UNAVAILABLE),
         piloting_style.Capabilities(_bits(piloting_style.PilotingStyleStyle)),
-        animation.Availability(0),
-        animation.State(animation.Type.NONE, 0),
-        follow_me.State(follow_me.Mode.NONE, follow_me.Behavior.IDLE, follow_me.Animation.NONE, 0),
-        *(follow_me.ModeInfo(mode, _bits(follow_me.Input), 0) for mode in _FOLLOW_MODES),
-        follow_me.TargetIsController(0),
+        *firmware.animations.states_report(),
+        *firmware.follow.states_report(),
         *firmware.alarms.report(),
         *checklist(firmware.blockers()),
     ]

@@ -34,6 +34,7 @@ class Telemetry:
             firmware.gimbal.advance(firmware.time)
             messages += firmware.gimbal.attitudes(firmware.pose)
             messages += firmware.payload.telemetry()
+            messages += firmware.follow.telemetry()
             messages.append(ardrone3.AltitudeAboveGroundChanged(firmware.pose.up))
         if self._position.due(now):
             messages += firmware.position_report()

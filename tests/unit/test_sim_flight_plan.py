@@ -312,6 +312,36 @@ def test_a_panorama_turns_once_round() -> None:
     flight.play()
     assert math.degrees(flight.bench.body.heading - before) == pytest.approx(360.0, abs=2.0)
     assert 6.0 < flight.bench.now - began < 10.0  # at 60 deg/s
+    flight.bench.run(0.5)
+    (media,) = flight.bench.firmware.payload.media
+    assert (media.describe()["photo_mode"], media.describe()["expected_count"]) == ("PANORAMA", 13)
+    headings = [round(resource.scene.heading) % 360 for resource in media.resources]
+    off = [math.remainder(heading - 30.0 * number, 360.0) for number, heading in enumerate(headings)]
+    assert max(map(abs, off)) <= 3.0
+
+
+@pytest.mark.parametrize("model", ["usa", "ai"])
+def test_a_panorama_upwards(model: str) -> None:
+    # 60 degrees up at 20 a second, from 30 below the horizon.
+    flight = Flight(line(205, -30.0), line(93, 2.0), line(2800, 0, 60, 0, 20), model=model, flying=True)
+    flight.play()
+    assert flight.bench.firmware.operator.tilt == pytest.approx(30.0, abs=1.0)
+    flight.bench.run(0.5)
+    (media,) = flight.bench.firmware.payload.media
+    tilts = [resource.scene.pitch for resource in media.resources]
+    assert tilts == pytest.approx([-30.0, 0.0, 30.0], abs=3.0)
+    assert not flight.bench.firmware.payload.cameras.busy
+
+
+def test_a_panorama_that_is_stopped_keeps_what_it_has() -> None:
+    flight = Flight(line(2800, 360, 0, 30), flying=True)
+    flight.start()
+    flight.bench.run(4.0)
+    flight.bench.send(common.Stop())
+    flight.bench.run(0.5)
+    (media,) = flight.bench.firmware.payload.media
+    assert 2 <= len(media.resources) <= 6
+    assert not flight.bench.firmware.payload.cameras.busy
 
 
 # -- what keeps it from starting
