@@ -152,6 +152,7 @@ async def _connect(
         asyncio.get_running_loop().time(),
         ping_after=ping_after,
         silence_limit=silence_limit,
+        gives_up=False,  # who waits for a command takes it back in time; an order to stop has to arrive
     )
     session = ControllerSession(transport, on_message, device, (reader, writer))
     try:

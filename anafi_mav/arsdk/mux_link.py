@@ -177,6 +177,7 @@ async def connect(
             asyncio.get_running_loop().time(),
             ping_after=ping_after,
             silence_limit=silence_limit,
+            gives_up=False,  # who waits for a command takes it back in time; an order to stop has to arrive
         )
     except BaseException:
         writer.close()

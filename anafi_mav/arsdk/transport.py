@@ -151,7 +151,9 @@ class Transport:
         *,
         ping_after: float = 2.0,
         silence_limit: float | None = None,
+        gives_up: bool = True,
     ) -> None:
+        """`gives_up` False: a controller of version 1 repeats every command for ever, too."""
         if version not in VERSIONS:
             raise LocalProtocolError(f"protocol version {version}, expected one of {VERSIONS}")
         if ping_after <= 0 or (silence_limit is not None and silence_limit <= 0):
@@ -160,6 +162,7 @@ class Transport:
         self.version = version
         self.counters: Counter[str] = Counter()
         """What happened how often: "received", "sent", "retransmitted", "duplicate", "garbage.<reason>", …"""
+        self._gives_up = gives_up and version == 1 and role is Role.CONTROLLER
         self._ping_after = ping_after
         self._silence_limit = _NEVER if silence_limit is None else silence_limit
         self._tokens = itertools.count(1)
@@ -287,11 +290,7 @@ class Transport:
             self.counters["dropped.full"] += 1
             self._pending.append(Undelivered(token, "queue full"))
             return
-        forever = (
-            self.version > 1
-            or self.role is Role.DEVICE
-            or MessageId(*wire.HEADER.unpack_from(data)) in RETRIED_FOR_EVER
-        )
+        forever = not self._gives_up or MessageId(*wire.HEADER.unpack_from(data)) in RETRIED_FOR_EVER
         entry = Waiting(token, data, forever)
         if buffer is not Buffer.HIGH_PRIO:
             queue.waiting.append(entry)

@@ -90,6 +90,8 @@ def takeoff_blockers(alerts: AlertsState, battery: BatteryState, calibration: Ca
     reasons = [spoken(check) for check, blocks in alerts.checklist.items() if blocks]
     if TakeoffChecklistType.MAGNETO_CALIBRATION not in alerts.checklist and calibration.magneto_required:
         reasons.append("magnetometer calibration required")
+    if calibration.started:
+        reasons.append("the magnetometer is being calibrated")
     if not alerts.checklist:
         reasons += [
             f"sensor {spoken(s)}" for s, ok in calibration.sensors.items() if not ok and s not in _FLIES_WITHOUT

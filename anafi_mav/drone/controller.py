@@ -20,7 +20,17 @@ from typing import Any, ClassVar
 import msgspec
 from msgspec.structs import replace
 
-from anafi_mav.arsdk.messages import animation, ardrone3, common, drone_manager, follow_me, mapper, move, skyctrl
+from anafi_mav.arsdk.messages import (
+    animation,
+    ardrone3,
+    common,
+    drone_manager,
+    flight_plan,
+    follow_me,
+    mapper,
+    move,
+    skyctrl,
+)
 from anafi_mav.arsdk.messages.drone_manager import DroneManagerConnectionState as Connection
 from anafi_mav.arsdk.messages.generic import ListFlags
 from anafi_mav.arsdk.messages.mapper import ButtonEvent
@@ -216,6 +226,8 @@ class Controller(Element[ControllerState]):
         """Its number in `MODELS`; 0 while there is none."""
         self.taken = False
         """The user of ours flies: source and axes are taken, or about to be."""
+        self._confirmed = False
+        """The controller has said that the source is ours."""
         self._commander = commander
         self._moving = moving
         self._take_over = take_over
@@ -233,7 +245,7 @@ class Controller(Element[ControllerState]):
 
     def link_lost(self) -> None:
         """The controller has taken everything back by itself."""
-        self.present = self.taken = False
+        self.present = self.taken = self._confirmed = False
         self.model = 0
         self._extra_axes = self._extra_buttons = 0
         self._pilot_keeps_until = -math.inf
@@ -264,7 +276,7 @@ class Controller(Element[ControllerState]):
             raise CommandRejected("the pilot at the Skycontroller flies")
         self._last_motion = now
         if not self.taken:
-            self.taken = True
+            self.taken, self._confirmed = True, False
             log.info("the source of piloting is ours, the axes of the Skycontroller are grabbed")
             self._commander.send(self._grab_message())
             self._commander.send(skyctrl.SetPilotingSource(Source.CONTROLLER))
@@ -302,15 +314,27 @@ class Controller(Element[ControllerState]):
 
     def reactions(self) -> Mapping[type[Message], Callable[[Any, float], None]]:
         """Events to be shown to this element beyond its reducers."""
-        return {mapper.GrabAxisEvent: self._on_axis}
+        return {mapper.GrabAxisEvent: self._on_axis, skyctrl.PilotingSource: self._on_source}
 
     def _on_axis(self, message: mapper.GrabAxisEvent, now: float) -> None:
         if self.taken and STICKS >> message.axis & 1 and abs(message.value) > DEFLECTION:
-            log.warning("the pilot moved a stick of the Skycontroller and flies now")
-            self.give_back()
-            if self._take_over is not None:
-                self._take_over()
-            self._pilot_keeps_until = self._now() + PILOT_KEEPS
+            self._yield("the pilot moved a stick of the Skycontroller and flies now")
+
+    def _on_source(self, message: skyctrl.PilotingSource, now: float) -> None:
+        if not self.taken:
+            return
+        if message.source == Source.CONTROLLER:
+            self._confirmed = True
+        elif self._confirmed:  # otherwise it answers a `give_back` that was followed by a new motion
+            self._yield("the Skycontroller gave the source of piloting to its pilot")
+
+    def _yield(self, why: str) -> None:
+        """The pilot has the drone, and what the user ordered ends."""
+        log.warning("%s", why)
+        self.give_back()
+        if self._take_over is not None:
+            self._take_over()
+        self._pilot_keeps_until = self._now() + PILOT_KEEPS
 
     def _watch(self, delay: float) -> None:
         self._timer = asyncio.get_running_loop().call_later(delay, self._look)
@@ -408,6 +432,8 @@ class Controller(Element[ControllerState]):
 _ANIMATIONS = animation.Cancel.ID.project
 
 _MOVES = (
+    flight_plan.StartAt,
+    flight_plan.StartAtV2,
     ardrone3.MoveTo,
     move.ExtendedMoveTo,
     ardrone3.StartPilotedPOI,

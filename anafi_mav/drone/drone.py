@@ -17,9 +17,10 @@ from typing import Any, TypeAlias, TypeVar
 from anafi_mav.arsdk import mux_link
 from anafi_mav.arsdk.controller import ControllerSession
 from anafi_mav.arsdk.handshake import DISCOVERY_PORT
-from anafi_mav.arsdk.messages import common, drone_manager, skyctrl
+from anafi_mav.arsdk.messages import ardrone3, common, drone_manager, skyctrl
+from anafi_mav.arsdk.messages import flight_plan as modern_plan
 from anafi_mav.arsdk.messages.animation import Type as AnimationType
-from anafi_mav.arsdk.messages.ardrone3 import PoiStatus
+from anafi_mav.arsdk.messages.ardrone3 import FlyingState, PoiStatus
 from anafi_mav.arsdk.messages.common import PlayingState
 from anafi_mav.arsdk.messages.drone_manager import DroneManagerConnectionState as Connection
 from anafi_mav.arsdk.messages.follow_me import Mode as FollowMeMode
@@ -31,7 +32,7 @@ from anafi_mav.drone.battery import Battery
 from anafi_mav.drone.calibration import Calibration
 from anafi_mav.drone.camera import Camera
 from anafi_mav.drone.controller import MODELS as CONTROLLERS
-from anafi_mav.drone.controller import Controller
+from anafi_mav.drone.controller import Controller, is_motion
 from anafi_mav.drone.element import Element, Reducer
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander
 from anafi_mav.drone.features import Feature, Support, features
@@ -44,7 +45,6 @@ from anafi_mav.drone.link import Link
 from anafi_mav.drone.media import Media
 from anafi_mav.drone.moves import Move
 from anafi_mav.drone.piloting import Piloting
-from anafi_mav.drone.piloting_state import MOTORS_OFF
 from anafi_mav.drone.poi import Poi
 from anafi_mav.drone.product import MODELS, Identity, Model, Product
 from anafi_mav.drone.rest import HTTP_PORT, Rest
@@ -129,7 +129,7 @@ class Drone:
         self.video = Video()
         self.piloting = Piloting(self._commander, self.home, self.takeoff_blockers)
         self.controller = Controller(self._commander, self._user_moves, self._pilot_takes_over)
-        self._commander.gate = self.controller.allows
+        self._commander.gate = self._allows
         self._elements: tuple[Element[Any], ...] = (
             self.alerts,
             self.battery,
@@ -158,6 +158,7 @@ class Drone:
         self._reactions: dict[type[Message], Callable[[Any, float], None]] = {
             **self.piloting.reactions(),
             **self.controller.reactions(),
+            common.MavlinkFilePlayingStateChanged: self._plan_says,
             drone_manager.ConnectionState: self._controller_says,
         }
         self._subscribers: tuple[Callback, ...] = ()
@@ -317,11 +318,33 @@ class Drone:
         if self._complete and message.state != Connection.CONNECTED and self._session is not None:
             self._session.end(f"the Skycontroller lost the drone: {spoken(message.state)}")
 
+    def _plan_says(self, message: common.MavlinkFilePlayingStateChanged, now: float) -> None:
+        self.piloting.on_plan(message)
+        self.flight_plan.on_playing(message, now)
+
+    def _allows(self, message: Message) -> bool:
+        """The gate of every command: see `Commander.gate`."""
+        if is_motion(message) and not isinstance(message, ardrone3.PCMD):  # the sticks know by themselves
+            self.piloting.require_free()
+        if self.calibration.state.started and _starts_motors(message):
+            raise CommandRejected("the magnetometer is being calibrated: somebody turns the drone by hand")
+        if isinstance(message, common.MagnetoCalibration) and message.calibrate:
+            self._require_standing("calibrated")
+        return self.controller.allows(message)
+
+    def _require_standing(self, what: str) -> None:
+        """Raise `CommandRejected` unless the drone stands with its motors off and is going to stay so."""
+        if self.piloting.state.flying != FlyingState.LANDED:
+            raise CommandRejected(f"a drone that does not stand with its motors off is not {what}")
+        if self.piloting.about_to_fly:
+            raise CommandRejected(f"a drone that is about to take off is not {what}")
+
     def _user_moves(self) -> bool:
         """Does something fly the drone that a user of ours ordered?"""
         piloting = self.piloting
         return (
-            (bool(piloting.moves_started) and not self.home.state.returning)
+            piloting.moving
+            or self._commander.begins
             or piloting.state.plan == PlayingState.PLAYING
             or piloting.state.poi in (PoiStatus.RUNNING, PoiStatus.PENDING)
             or piloting.state.following not in (None, FollowMeMode.NONE)
@@ -394,19 +417,21 @@ class Drone:
     async def reboot(self, timeout: float = REBOOT_TIMEOUT) -> None:
         """Let the drone start anew; returns when it has the order and the link is lost, which is all that it says.
 
-        Raises `CommandRejected` while its motors turn, or when it has not said whether they do; `LinkLost` when the
-        link went before the order had arrived; `CommandTimeout` when the drone just goes on.
+        Raises `CommandRejected` unless it has said that it stands; `LinkLost` when the link went before the order had
+        arrived; `CommandTimeout` when the drone just goes on. Given up, the order is taken back.
         """
         if not self.connected:
             raise LinkLost("not connected")
-        flying = self.piloting.state.flying
-        if flying not in MOTORS_OFF:
-            raise CommandRejected("a drone that does not stand with its motors off is not rebooted")
-        delivery = self._commander.deliver(common.Reboot())
-        done, _ = await asyncio.wait({self._lost}, timeout=timeout)
-        if not done:
-            self._commander.withdraw(delivery)
-            raise CommandTimeout(common.Reboot.NAME, timeout)
+        self._require_standing("rebooted")
+        lost, delivery = self._lost, self._commander.deliver(common.Reboot())
+        timed_out = CommandTimeout(common.Reboot.NAME, timeout)
+        try:
+            await asyncio.wait({lost}, timeout=timeout)
+        finally:
+            if not lost.done():
+                self._commander.take_back(delivery, timed_out)
+        if not lost.done():
+            raise timed_out
         delivery.result()
 
     # -- what others may look at
@@ -472,6 +497,13 @@ class Drone:
                 log.exception("%s: a subscriber failed on %s", self.name, message.NAME)
         if message_log.isEnabledFor(logging.DEBUG):
             message_log.debug("%s: %r", self.name, message)
+
+
+def _starts_motors(message: Message) -> bool:
+    """Do the motors of a drone on the ground start by this command?"""
+    if isinstance(message, ardrone3.UserTakeOff):
+        return message.state != 0
+    return isinstance(message, ardrone3.TakeOff | common.Start | modern_plan.StartAt | modern_plan.StartAtV2)
 
 
 def _model(id: int) -> Model:

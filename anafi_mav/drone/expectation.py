@@ -8,11 +8,12 @@ refused (an error of ours). Silence is a timeout.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from collections.abc import Callable, Sequence
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 from anafi_mav.arsdk.wire import Message, UnknownMessage
-from anafi_mav.errors import AnafiMavError, CommandTimeout, LinkLost
+from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost
 
 T = TypeVar("T")
 
@@ -104,6 +105,13 @@ class Expectation(Generic[T]):
             self.future.exception()  # nobody may be waiting any more; asyncio would complain
 
 
+class _Beginning(NamedTuple):
+    """Something that is to fly the drone and has not been confirmed."""
+
+    answer: Expectation[Any]
+    undo: Message
+
+
 class Commander:
     """The way out to the drone while there is one, and everybody who waits for something from it."""
 
@@ -114,10 +122,21 @@ class Commander:
         self._open: set[Expectation[Any]] = set()
         self._waiting: dict[type[Message], list[Expectation[Any]]] = {}
         self._deliveries: dict[int, asyncio.Future[None]] = {}
+        self.halting: set[asyncio.Future[None]] = set()
+        """Orders to stop something that the drone may not have received yet, whoever gave them."""
+        self._beginning: dict[type[Message], _Beginning] = {}
+        """By the kind of command that undoes it."""
+        self._given_up: dict[type[Message], float] = {}
+        """By the kind of command that undid it, when a beginning was last given up without an answer."""
 
     @property
     def connected(self) -> bool:
         return self._wire is not None
+
+    @property
+    def begins(self) -> bool:
+        """Something that is to fly the drone waits for its confirmation (see `begin`)."""
+        return bool(self._beginning)
 
     def attach(self, wire: Wire) -> None:
         """Commands go out here from now on."""
@@ -134,6 +153,7 @@ class Commander:
                 delivery.set_exception(LinkLost(reason))
                 delivery.exception()  # nobody may be waiting; asyncio would complain
         self._deliveries.clear()
+        self._given_up.clear()
 
     def send(self, message: Message) -> int:
         """Hand a command to the transport. Raises `LinkLost` when there is no link, or what the gate raises."""
@@ -154,12 +174,43 @@ class Commander:
         self._deliveries[token] = delivery
         return delivery
 
-    def withdraw(self, delivery: asyncio.Future[None]) -> None:
-        """Take back what `deliver` sent, if the drone does not have it yet: it is never sent again."""
+    def halt(self, message: Message) -> asyncio.Future[None]:
+        """`deliver` an order to stop something; whoever has to confirm a stop waits for `halting`."""
+        delivery = self.deliver(message)
+        self.halting.add(delivery)
+        delivery.add_done_callback(self.halting.discard)
+        return delivery
+
+    def halt_if_connected(self, message: Message) -> None:
+        """`halt` for a verb that gives up: the loss of the link is reported elsewhere."""
+        with contextlib.suppress(LinkLost):
+            self.halt(message)
+
+    async def halted(self, what: str, timeout: float) -> None:
+        """Return when the drone has received every order to stop something, at once when none is on its way.
+
+        Raises `CommandTimeout` about `what`, or what became of an order.
+        """
+        halting = list(self.halting)
+        if not halting:
+            return
+        _, late = await asyncio.wait(halting, timeout=max(timeout, 0.0))
+        if not self.connected:
+            raise LinkLost("not connected")
+        if late:
+            raise CommandTimeout(what, timeout)
+        for delivery in halting:
+            delivery.result()
+
+    def take_back(self, delivery: asyncio.Future[None], error: AnafiMavError) -> None:
+        """Of what `deliver` sent, keep from the drone what it has not received; the delivery fails with this error."""
         for token, other in tuple(self._deliveries.items()):
             if other is delivery:
                 del self._deliveries[token]
                 self.cancel(token)
+        if not delivery.done():
+            delivery.set_exception(error)
+            delivery.exception()  # nobody may be waiting; asyncio would complain
 
     def _delivered(self, token: int, arrived: bool) -> None:
         delivery = self._deliveries.pop(token, None)
@@ -216,6 +267,69 @@ class Commander:
         expectation = self.expect(answers, judge)
         self.dispatch(expectation, command, timeout)
         return await expectation.wait()
+
+    async def begin(
+        self,
+        command: Message,
+        answers: Sequence[type[Message]],
+        judge: Callable[[Any], T | AnafiMavError | None],
+        timeout: float,
+        undo: Message,
+        *,
+        undo_refused: bool = False,
+    ) -> T:
+        """`confirm` for a command that flies the drone until `undo` ends it.
+
+        Given up, it is taken back and undone; with `undo_refused` also when the drone refused it, for one that would
+        begin later. Hover and whatever else takes over ends it by `call_off`, a newer one with the same kind of `undo`
+        replaces it: both raise `CommandRejected` here.
+        """
+        answer = self.expect(answers, judge)
+        self.dispatch(answer, command, timeout)
+        kind = type(undo)
+        older = self._beginning.get(kind)
+        if older is not None:
+            older.answer.fail(CommandRejected("replaced by a newer order"))
+        mine = self._beginning[kind] = _Beginning(answer, undo)
+        try:
+            return await answer.wait()
+        except LinkLost:
+            raise
+        except BaseException as error:
+            refused = isinstance(error, CommandRejected)
+            if self._beginning.get(kind) is mine and (undo_refused or not refused):
+                self._give_up(mine)
+            raise
+        finally:
+            if self._beginning.get(kind) is mine:
+                del self._beginning[kind]
+
+    def call_off(self, why: str, undo: type[Message] | None = None) -> None:
+        """Take back and undo what was begun and has not been answered: what this kind undoes, or everything."""
+        for kind, beginning in tuple(self._beginning.items()):
+            if undo not in (None, kind) or beginning.answer.future.done():
+                continue  # an answered one has begun, or never will; its verb does not know yet
+            del self._beginning[kind]
+            beginning.answer.fail(CommandRejected(why))
+            if beginning.answer.token is not None:
+                self.cancel(beginning.answer.token)
+            self._give_up(beginning)
+
+    def _give_up(self, beginning: _Beginning) -> None:
+        self._given_up[type(beginning.undo)] = asyncio.get_running_loop().time()
+        self.halt_if_connected(beginning.undo)
+
+    def may_begin(self, undo: type[Message], memory: float) -> bool:
+        """Can something that this kind of command undoes still begin: is it on its way, or was given up within so many
+        seconds, when the drone may have heard it already?"""
+        given_up = self._given_up.get(undo)
+        return undo in self._beginning or (
+            given_up is not None and asyncio.get_running_loop().time() - given_up < memory
+        )
+
+    def certainly_not(self, undo: type[Message]) -> None:
+        """What was given up has not begun, and will not: the drone has received the order against it and is quiet."""
+        self._given_up.pop(undo, None)
 
     def dispatch(self, expectation: Expectation[Any], command: Message, timeout: float) -> None:
         """Send the command whose answer is expected."""

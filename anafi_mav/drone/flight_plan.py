@@ -6,6 +6,7 @@ drone says which by what it reports (feature flight_plan).
 
 from __future__ import annotations
 
+import asyncio
 import re
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
@@ -119,6 +120,24 @@ class FlightPlan(Commanding[FlightPlanState]):
     def __init__(self, commander: Commander, rest: Rest) -> None:
         super().__init__(commander)
         self._rest = rest
+        self._starts = 0
+        self._asked: str | None = None
+        """The plan whose start was asked for last."""
+        self._unwanted: tuple[str, float] | None = None
+        """A plan whose start was given up, and until when the drone may still begin it."""
+
+    def reset(self) -> None:
+        super().reset()
+        self._asked = self._unwanted = None
+
+    def on_playing(self, message: common.MavlinkFilePlayingStateChanged, now: float) -> None:
+        """A flight plan plays, is paused or stopped."""
+        if self._unwanted is None or message.state != PlayingState.PLAYING:
+            return
+        uid, until = self._unwanted
+        if uid == message.filepath and now < until:
+            # It took the drone so long to read the plan that the order against it came before its beginning.
+            self._commander.halt_if_connected(common.Stop())
 
     @property
     def version(self) -> int:
@@ -175,26 +194,33 @@ class FlightPlan(Commanding[FlightPlanState]):
         """Fly an uploaded plan, or go on with the paused one; returns when it plays.
 
         `item` begins in the middle and `continue_on_disconnect` goes on without a link: Ai only. Raises
-        `CommandRejected` with what the drone lacks. A start that is given up is taken back.
+        `CommandRejected` with what the drone lacks. A start that is given up is taken back, also when the drone begins
+        the plan only then.
         """
         self._available()
         command = self._start(uid, item, type, continue_on_disconnect)
-        before = self.state
+        others = {self.state.uid, self._asked} - {uid, ""}
 
         def judge(message: Any) -> bool | AnafiMavError | None:
             if isinstance(message, common.StartingErrorEvent):
                 return CommandRejected(self._why())
-            return True if message.state == PlayingState.PLAYING else None
+            return True if message.state == PlayingState.PLAYING and message.filepath not in others else None
 
+        self._starts += 1
+        number, self._asked, self._unwanted = self._starts, uid, None
         try:
-            await self._commander.confirm(
-                command, (common.MavlinkFilePlayingStateChanged, common.StartingErrorEvent), judge, timeout
+            await self._commander.begin(
+                command,
+                (common.MavlinkFilePlayingStateChanged, common.StartingErrorEvent),
+                judge,
+                timeout,
+                common.Stop(),
             )
-        except (CommandRejected, LinkLost):
+        except LinkLost:
             raise
         except BaseException as error:
-            if before.playing != PlayingState.PLAYING and self._commander.connected:
-                self._commander.send(common.Stop())
+            if number == self._starts:
+                self._unwanted = uid, asyncio.get_running_loop().time() + START_TIMEOUT
             if isinstance(error, CommandTimeout) and self.state.unavailable:
                 raise CommandRejected(self._why()) from None
             raise
@@ -225,8 +251,10 @@ class FlightPlan(Commanding[FlightPlanState]):
         await self._end(common.Pause(), PlayingState.PAUSED, timeout)
 
     async def stop(self, timeout: float = ANSWER_TIMEOUT) -> None:
-        """Hover, and forget the plan. Returns at once when there is none."""
+        """Hover, and forget the plan. Returns at once when there is none, nor one on its way to the drone."""
         self._available()
+        self._commander.call_off("stopped", common.Stop)
+        await self._commander.halted(common.Stop.NAME, timeout)
         if self.state.playing == PlayingState.STOPPED:
             return
         await self._end(common.Stop(), PlayingState.STOPPED, timeout)

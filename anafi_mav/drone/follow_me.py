@@ -21,7 +21,6 @@ from anafi_mav.errors import (
     AnafiMavError,
     CommandRejected,
     CommandTimeout,
-    LinkLost,
     LocalProtocolError,
     NotSupported,
 )
@@ -95,13 +94,11 @@ class FollowMe(Commanding[FollowMeState]):
             return CommandRejected(self._why(mode)) if message.behavior == Behavior.IDLE else True
 
         try:
-            await self._commander.confirm(follow_me.Start(mode), (follow_me.State,), judge, timeout)
-        except LinkLost:
-            raise
-        except BaseException as error:
-            if self._commander.connected:
-                self._commander.send(follow_me.Stop())
-            if isinstance(error, CommandTimeout) and self.state.missing.get(mode):
+            await self._commander.begin(
+                follow_me.Start(mode), (follow_me.State,), judge, timeout, follow_me.Stop(), undo_refused=True
+            )
+        except CommandTimeout:
+            if self.state.missing.get(mode):
                 raise CommandRejected(self._why(mode)) from None
             raise
 
@@ -110,8 +107,10 @@ class FollowMe(Commanding[FollowMeState]):
         return f"cannot follow: it lacks {lacks}" if lacks else "cannot follow"
 
     async def stop(self, timeout: float = ANSWER_TIMEOUT) -> None:
-        """Returns when the drone follows nobody, at once when it does not."""
+        """Returns when the drone follows nobody, at once when it does not and is not about to."""
         self._require(self.state.mode, "follow me")
+        self._commander.call_off("stopped", follow_me.Stop)
+        await self._commander.halted(follow_me.Stop.NAME, timeout)
         if self.state.mode == Mode.NONE:
             return
         await self._commander.confirm(

@@ -214,7 +214,6 @@ class Moves:
             ardrone3.MoveToChanged: self._on_move_to,
             ardrone3.MoveByEnd: self._on_move_by_end,
             ardrone3.FlyingStateChanged: self._on_flying_state,
-            rth.State: self._on_return,
         }
 
     def _on_move_to(self, message: ardrone3.MoveToChanged, now: float) -> None:
@@ -269,10 +268,10 @@ class Moves:
 
         Nothing but a newer moveBy interrupts one, and a move that is not zero does not succeed by staying.
         """
-        if now >= self._stray_until or len(self.by) > 1:
+        if now >= self._stray_until:
             return False
         if message.error == MoveByError.INTERRUPTED:
-            return True
+            return len(self.by) == 1  # of two, the newer has interrupted the older
         went_nowhere = max(abs(message.dX), abs(message.dY), abs(message.dZ), abs(message.dPsi)) < _NO_MOVE
         return message.error == MoveByError.OK and went_nowhere
 
@@ -285,7 +284,8 @@ class Moves:
                 self._cancelling = None
             self.cancel_by("the motors are off", now)
 
-    def _on_return(self, message: rth.State, now: float) -> None:
+    def on_return(self, message: rth.State, now: float) -> None:
+        """A return of ours goes on or ends, or has become one of the drone's own."""
         if not self._home.state.returning:
             self.aborting = False
         move = self.returning

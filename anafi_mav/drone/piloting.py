@@ -8,7 +8,6 @@ body axes front, right, down; heights above the take-off point.
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import logging
 import math
 from collections.abc import Callable, Mapping
@@ -83,11 +82,14 @@ class Piloting(PilotingSettings):
         self._sticks = Sticks()
         self._timer: asyncio.TimerHandle | None = None
         self._landings_asked = 0
-        self._takeoffs_asked = 0
-        self._halting: set[asyncio.Future[None]] = set()
-        """Orders to stop something that the drone may not have received yet."""
-        self._stopping: set[type[Message]] = set()
-        """Orders to stop something that the drone has not answered yet: once is enough."""
+        self._stopping: dict[type[Message], float] = {}
+        """Orders to stop something that the drone has not answered yet: until when once is enough."""
+        self._launches: set[Expectation[bool]] = set()
+        """Waits of take-offs and hand launches whose command may not have left."""
+        self._abortion: asyncio.Future[None] | None = None
+        """The order to end a return that was given last."""
+        self._abortion_insists = False
+        """It is meant for a return of the drone's own, too."""
         self._may_take_off_until = -math.inf
 
     def reset(self) -> None:
@@ -100,14 +102,30 @@ class Piloting(PilotingSettings):
         self._moves.clear(MoveEnd.LINK_LOST)
         self._stopping.clear()
         self._may_take_off_until = -math.inf
+        self._abortion = None
 
     def reactions(self) -> Mapping[type[Message], Callable[[Any, float], None]]:
         """Events to be shown to this element beyond its reducers."""
         return {
             **self._moves.reactions(),
-            follow_me.State: lambda message, now: self._stopping.discard(follow_me.Stop),
-            animation.State: lambda message, now: self._stopping.discard(animation.Cancel),
+            rth.State: self._on_return,
+            follow_me.State: lambda message, now: self._obeyed(follow_me.Stop),
+            animation.State: lambda message, now: self._obeyed(animation.Cancel),
         }
+
+    def _obeyed(self, order: type[Message]) -> None:
+        self._stopping.pop(order, None)
+
+    def _on_return(self, message: rth.State, now: float) -> None:
+        self._moves.on_return(message, now)
+        if self._home.state.returning_by_itself and self._abortion is not None and not self._abortion_insists:
+            # It was given against a return that a user had asked for.
+            self._commander.take_back(self._abortion, CommandRejected("the drone returns home by itself"))
+
+    def on_plan(self, message: common.MavlinkFilePlayingStateChanged) -> None:
+        """A flight plan plays, is paused or stopped."""
+        if message.state == PlayingState.PLAYING:
+            self._silence_sticks()
 
     # -- facts about what we do
 
@@ -122,8 +140,20 @@ class Piloting(PilotingSettings):
         return self._moves.to
 
     @property
+    def moving(self) -> bool:
+        """A moveTo or moveBy of ours has not ended."""
+        return self._moves.to is not None or bool(self._moves.by)
+
+    @property
     def sticks_blocked(self) -> str | None:
-        """Why no PCMD is sent at present; None when the sticks work."""
+        """Why no setpoint is sent at present; None when the sticks work."""
+        if self.state.plan == PlayingState.PLAYING:
+            return "a flight plan plays"
+        return self._sticks_dead
+
+    @property
+    def _sticks_dead(self) -> str | None:
+        """Why no PCMD at all is sent at present, not even one that centres the sticks."""
         flying = self.state.flying
         if not self._commander.connected:
             return "not connected"
@@ -147,9 +177,14 @@ class Piloting(PilotingSettings):
 
     @property
     def about_to_fly(self) -> bool:
-        """The drone stands, but a take-off of ours is on its way to it, or was and cannot be taken back."""
+        """The drone stands, but a take-off of ours is on its way to it, or was and cannot be taken back.
+
+        The same goes for a hand launch and a flight plan.
+        """
         return self.state.flying == FlyingState.LANDED and (
-            self._takeoffs_asked > 0 or self._now() < self._may_take_off_until
+            bool(self._launches)
+            or self._now() < self._may_take_off_until
+            or self._commander.may_begin(common.Stop, TAKE_OFF_MEMORY)
         )
 
     # -- up and down
@@ -163,33 +198,9 @@ class Piloting(PilotingSettings):
         flying = self.state.flying
         if flying in _TAKEN_OFF:
             return
-        if flying in _STICKS_DEAD and flying != FlyingState.LANDED:
-            raise CommandRejected(f"the drone is in the state {spoken(flying)}")
-        self._silence_sticks()
-
-        def judge(message: ardrone3.FlyingStateChanged) -> bool | AnafiMavError | None:
-            if message.state in _TAKEN_OFF:
-                return True
-            if message.state == FlyingState.MOTOR_RAMPING:
-                answer.expire_after(RAMPING_TIMEOUT, CommandTimeout(ardrone3.TakeOff.NAME, RAMPING_TIMEOUT))
-            elif message.state in _MOTORS_CUT:
-                return CommandRejected(self._why_on_the_ground("the motors stopped again"))
-            return None
-
-        answer = self._commander.expect((ardrone3.FlyingStateChanged,), judge)
-        self._commander.dispatch(answer, ardrone3.TakeOff(), timeout)
-        self._takeoffs_asked += 1
-        try:
-            await answer.wait()
-        except CommandRejected:
-            raise
-        except BaseException as error:
-            self._may_take_off_until = self._now() + TAKE_OFF_MEMORY
-            if isinstance(error, CommandTimeout) and (reasons := self._why_on_the_ground("")):
-                raise CommandRejected(reasons) from None
-            raise
-        finally:
-            self._takeoffs_asked -= 1
+        if flying not in (FlyingState.LANDED, FlyingState.MOTOR_RAMPING):
+            raise CommandRejected(_in_state(flying))
+        await self._launch(ardrone3.TakeOff(), _TAKEN_OFF, timeout)
 
     async def hand_launch(self, timeout: float = ANSWER_TIMEOUT) -> None:
         """Motors idle, for a drone that is thrown or let go by a hand; returns when it waits for that.
@@ -201,32 +212,52 @@ class Piloting(PilotingSettings):
         if flying == FlyingState.USERTAKEOFF:
             return
         if flying != FlyingState.LANDED:
-            raise CommandRejected(f"the drone is in the state {spoken(flying)}" if flying is not None else "no state")
+            raise CommandRejected(_in_state(flying))
+        if self._launches:
+            raise CommandRejected("the drone is about to take off")
+        try:
+            await self._launch(ardrone3.UserTakeOff(1), _TAKEN_OFF | {FlyingState.USERTAKEOFF}, timeout)
+        except LinkLost:
+            raise
+        except BaseException:
+            # Given up: the motors of a drone that somebody holds must not start a moment later.
+            self._commander.halt_if_connected(ardrone3.UserTakeOff(0))
+            raise
+
+    async def _launch(self, command: Message, up: frozenset[FlyingState], timeout: float) -> None:
+        """Send a command that starts the motors; returns when the drone is in one of these states."""
         self._silence_sticks()
 
         def judge(message: ardrone3.FlyingStateChanged) -> bool | AnafiMavError | None:
-            if message.state == FlyingState.USERTAKEOFF or message.state in _TAKEN_OFF:
+            if message.state in up:
                 return True
             if message.state == FlyingState.MOTOR_RAMPING:
-                answer.expire_after(RAMPING_TIMEOUT, CommandTimeout(ardrone3.UserTakeOff.NAME, RAMPING_TIMEOUT))
+                answer.expire_after(RAMPING_TIMEOUT, CommandTimeout(command.NAME, RAMPING_TIMEOUT))
             elif message.state in _MOTORS_CUT:
                 return CommandRejected(self._why_on_the_ground("the motors stopped again"))
             return None
 
         answer = self._commander.expect((ardrone3.FlyingStateChanged,), judge)
-        self._commander.dispatch(answer, ardrone3.UserTakeOff(1), timeout)
+        self._commander.dispatch(answer, command, timeout)
+        self._launches.add(answer)
         try:
             await answer.wait()
+        except CommandRejected:
+            raise
         except BaseException as error:
-            # Given up: the motors of a drone that somebody holds must not start a moment later.
-            self._send_if_connected(ardrone3.UserTakeOff(0))
+            self._may_take_off_until = self._now() + TAKE_OFF_MEMORY
             if isinstance(error, CommandTimeout) and (reasons := self._why_on_the_ground("")):
                 raise CommandRejected(reasons) from None
             raise
+        finally:
+            self._launches.discard(answer)
 
     async def cancel_hand_launch(self, timeout: float = ANSWER_TIMEOUT) -> None:
-        """Stop the idling motors; returns when they stand, at once when they do already."""
+        """Stop the idling motors; returns when they stand, at once when they do and nothing is to start them."""
         self._require_link()
+        if self.about_to_fly:
+            await self.land(timeout)
+            return
         if self.state.flying in MOTORS_OFF:
             return
         if self.state.in_air:
@@ -247,6 +278,7 @@ class Piloting(PilotingSettings):
         A drone that stands but is `about_to_fly` is watched until it certainly stays there, or is made to land.
         """
         self._require_link()
+        self._commander.call_off("the drone is to land")
         if self.state.flying in _LANDING and not self.about_to_fly:
             return
         # Level at once, then nothing, from here on and not from the drone's answer on: a positive gaz would cancel
@@ -259,6 +291,7 @@ class Piloting(PilotingSettings):
                 await self._catch_take_off(timeout)
             if self.state.flying in _LANDING:
                 return
+            self._end_hand_launch()
             await self._commander.confirm(
                 ardrone3.Landing(),
                 (ardrone3.FlyingStateChanged,),
@@ -268,12 +301,18 @@ class Piloting(PilotingSettings):
         finally:
             self._landings_asked -= 1
 
+    def _end_hand_launch(self) -> None:
+        """A drone that idles in a hand has no use for a Landing: it waits to be thrown, or for this."""
+        if self.about_to_fly or self.state.flying in (FlyingState.MOTOR_RAMPING, FlyingState.USERTAKEOFF):
+            self._commander.halt(ardrone3.UserTakeOff(0))
+
     async def _catch_take_off(self, timeout: float) -> None:
         """Return when the drone is off the ground, or when it certainly stays there.
 
         That is known once it has received a Landing, behind any take-off of ours, and then says nothing. Raises
         `CommandTimeout` while it is not known; the Landing is not taken back.
         """
+        self._end_hand_launch()
         answer = self._commander.expect(
             (ardrone3.FlyingStateChanged,),
             lambda message: None if message.state in (FlyingState.MOTOR_RAMPING, FlyingState.USERTAKEOFF) else True,
@@ -282,6 +321,7 @@ class Piloting(PilotingSettings):
             delivery = self._commander.deliver(ardrone3.Landing())
             if not await self._ended(answer, delivery, ardrone3.Landing.NAME, timeout):
                 self._may_take_off_until = -math.inf
+                self._commander.certainly_not(common.Stop)
         finally:
             answer.close()
 
@@ -304,17 +344,26 @@ class Piloting(PilotingSettings):
         """Cut the motors, wherever the drone is: in the air it falls. Returns when the drone says that they are.
 
         Cancelling this does not take it back: it is repeated while there is a link, as Parrot does (arsdk-ng: timeout
-        policy RETRY).
+        policy RETRY), for at most `EMERGENCY_TIMEOUT` while somebody waits for it. What waits to be sent is taken back.
         """
         self._require_link()
         self._silence_sticks()
         cut = self.state.flying in _MOTORS_CUT and not self.about_to_fly
+        # Emergency overtakes what waits in the queue: nothing of that may follow it.
+        self._commander.call_off("the motors are cut")
+        for launch in self._launches:
+            launch.fail(CommandRejected("the motors are cut"))
+            if launch.token is not None:
+                self._commander.cancel(launch.token)
         answer = self._commander.expect(
             (ardrone3.FlyingStateChanged,), lambda message: True if message.state in _MOTORS_CUT else None
         )
         try:
             delivery = self._commander.deliver(ardrone3.Emergency())
             said = await self._ended(answer, delivery, ardrone3.Emergency.NAME, EMERGENCY_TIMEOUT)
+        except CommandTimeout as error:
+            self._commander.take_back(delivery, error)  # said to have failed, it must not be carried out later
+            raise
         finally:
             answer.close()
         if not said and not cut:
@@ -339,7 +388,7 @@ class Piloting(PilotingSettings):
         """
         if not math.isfinite(front + right + down + turn):
             raise LocalProtocolError("a relative move is not a number")
-        self._require_own_will()
+        self.require_free()
         command = self._move_by_command(front, right, down, turn, turn_rate_dps)
         if timeout is None:
             timeout = MOVE_BY_MARGIN + (math.hypot(front, right, down) + abs(turn)) / MOVE_BY_SLOWEST
@@ -347,6 +396,7 @@ class Piloting(PilotingSettings):
                 timeout += abs(turn) / (turn_rate_dps * RAD_PER_DEG)
         move = Move(self._commander.expect((), _decided_elsewhere))
         self._centre_sticks()
+        self._commander.call_off("a move was asked for")
         self._moves.by.append(move)
         try:
             self._commander.dispatch(move.answer, command, timeout)
@@ -355,7 +405,7 @@ class Piloting(PilotingSettings):
             if move in self._moves.by:  # given up: neither the drone nor hover has ended it
                 self._moves.drop_by(move, self._now())
                 if self.sticks_blocked is None:  # otherwise the drone is busy with what is not ours to disturb
-                    self._halt_if_connected(ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0))
+                    self._commander.halt_if_connected(ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0))
         return flown
 
     def _move_by_command(
@@ -390,12 +440,13 @@ class Piloting(PilotingSettings):
             latitude + longitude + altitude + (heading_deg or 0.0) + (horizontal_speed or 0.0) + (vertical_speed or 0.0)
         ):
             raise LocalProtocolError("a target is not a number")
-        self._require_own_will()
+        self.require_free()
         command = self._move_to_command(
             Position(latitude, longitude, altitude), heading_deg, horizontal_speed, vertical_speed
         )
         move = Move(self._commander.expect((), _decided_elsewhere), Position(latitude, longitude, altitude))
         self._centre_sticks()
+        self._commander.call_off("a move was asked for")
         obsolete = self._moves.begin_to(move)
         if obsolete is not None and obsolete.answer.token is not None:
             self._commander.cancel(obsolete.answer.token)
@@ -407,7 +458,7 @@ class Piloting(PilotingSettings):
         finally:
             if not move.running and self._moves.to is move:  # given up: it must not start later
                 self._moves.cancel_to("given up")
-                self._halt_if_connected(ardrone3.CancelMoveTo())
+                self._commander.halt_if_connected(ardrone3.CancelMoveTo())
         return move
 
     def _move_to_command(
@@ -446,6 +497,8 @@ class Piloting(PilotingSettings):
             return None
         if self._home.state.rth == RthState.UNAVAILABLE:
             raise CommandRejected("return home is unavailable")
+        if self.state.flying == FlyingState.EMERGENCY_LANDING:
+            raise CommandRejected(_in_state(self.state.flying))
 
         def judge(message: rth.State) -> bool | AnafiMavError | None:
             if message.state in (RthState.IN_PROGRESS, RthState.PENDING):
@@ -455,6 +508,7 @@ class Piloting(PilotingSettings):
             return None
 
         move = Move(self._commander.expect((rth.State,), judge))
+        self._commander.call_off("the drone is to return home")
         self._release_sticks()
         self._moves.returning = move
         try:
@@ -481,21 +535,29 @@ class Piloting(PilotingSettings):
         if not home.returning and not asked and not self._moves.aborting:
             return
         answer = self._commander.expect((rth.State,), _ends_return)
+        began = self._now()
         try:
-            await self._ended(answer, self._abort(), rth.Abort.NAME, timeout)
+            await self._ended(answer, self._abort(even_its_own), rth.Abort.NAME, timeout)
         finally:
             answer.close()
+        # The event may have been about an earlier return: what ends this one is that the drone has the order.
+        await self._commander.halted(rth.Abort.NAME, timeout - (self._now() - began))
         if self._home.state.returning:
             raise CommandTimeout(rth.Abort.NAME, timeout)
 
-    def _abort(self) -> asyncio.Future[None]:
+    def _abort(self, even_its_own: bool = False) -> asyncio.Future[None]:
         """End a return. Until the drone has answered, what it last said of a return is no longer true."""
         self._moves.aborting = True
+        self._abortion_insists = even_its_own
+
+        def quiet(delivery: asyncio.Future[None]) -> None:
+            if delivery is self._abortion:  # a newer one has its own time
+                self._moves.aborted()
 
         def heard(delivery: asyncio.Future[None]) -> None:
-            asyncio.get_running_loop().call_later(QUIET, self._moves.aborted)
+            asyncio.get_running_loop().call_later(QUIET, quiet, delivery)
 
-        delivery = self._halt(rth.Abort())
+        delivery = self._abortion = self._commander.halt(rth.Abort())
         delivery.add_done_callback(heard)
         return delivery
 
@@ -543,25 +605,26 @@ class Piloting(PilotingSettings):
 
         Cancels moveTo and moveBys (those of an earlier connection or another controller too, as far as the drone
         tells), a running point of interest, an animation, the following of a target, a playing flight plan (it is
-        paused) and a return that was asked for through us, then centres the sticks for two seconds, since a PCMD alone
-        neither stops a moveTo nor is it acknowledged. A landing or a return that the drone began by itself goes on.
-        Raises `LinkLost` without a link.
+        paused) and a return that was asked for through us, and whatever of these has been asked for and has not begun;
+        then centres the sticks for two seconds, since a PCMD alone neither stops a moveTo nor is it acknowledged. A
+        landing or a return that the drone began by itself goes on. Raises `LinkLost` without a link.
         """
         self._require_link()
         state = self.state
+        self._commander.call_off("stopped by hover")
         cancelled = self._stop_moves("stopped by hover")
         if not self._home.state.returning_by_itself:
             if state.move_to == MoveToStatus.RUNNING and not cancelled:
-                self._halt(ardrone3.CancelMoveTo())
+                self._commander.halt(ardrone3.CancelMoveTo())
             if self._moves.inherited and state.flying in _IN_FLIGHT:
                 self._moves.expect_stray(self._now())
-                self._halt(ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0))
+                self._commander.halt(ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0))
         if state.poi in (PoiStatus.RUNNING, PoiStatus.PENDING):
-            self._halt(ardrone3.StopPilotedPOI())
+            self._commander.halt(ardrone3.StopPilotedPOI())
         self._stop_following()
         self._stop_animation()
         if state.plan == PlayingState.PLAYING:
-            self._halt(common.Pause())
+            self._commander.halt(common.Pause())
         if self._drop_return("stopped by hover"):
             self._abort()
         self._sticks.centre(self._now())
@@ -577,7 +640,7 @@ class Piloting(PilotingSettings):
         if self.state.plan == PlayingState.PLAYING:
             answers.append(self._commander.expect((common.MavlinkFilePlayingStateChanged,), _ends_playing))
         if self._moves.returning is not None and self._moves.returning.running:
-            answers.append(self._commander.expect((rth.State,), _ends_return))
+            answers.append(self._commander.expect((rth.State,), self._ends_our_return))
         if self.state.following not in (None, FollowMeMode.NONE):
             answers.append(self._commander.expect((follow_me.State,), _ends_following))
         if self.state.animation not in (None, animation.Type.NONE):
@@ -590,29 +653,15 @@ class Piloting(PilotingSettings):
             for answer in answers:
                 await answer.wait()
             # Of what was given up before it was confirmed no event may speak; but the order to stop has to arrive.
-            if self._halting:
-                halting = list(self._halting)
-                _, late = await asyncio.wait(halting, timeout=max(timeout - (self._now() - began), 0.0))
-                self._require_link()
-                if late:
-                    raise CommandTimeout("hover", timeout)
-                for delivery in halting:
-                    delivery.result()  # raises what became of it
+            await self._commander.halted("hover", timeout - (self._now() - began))
         finally:
             for answer in answers:
                 answer.close()
 
-    def _halt(self, message: Message) -> asyncio.Future[None]:
-        """Send an order to stop something. `stop` waits until the drone has it, whoever gave it."""
-        delivery = self._commander.deliver(message)
-        self._halting.add(delivery)
-        delivery.add_done_callback(self._halting.discard)
-        return delivery
-
-    def _halt_if_connected(self, message: Message) -> None:
-        """For a verb that gives up: the loss of the link is reported elsewhere."""
-        with contextlib.suppress(LinkLost):
-            self._halt(message)
+    def _ends_our_return(self, message: rth.State) -> bool | AnafiMavError | None:
+        if self._home.state.returning_by_itself:
+            return CommandRejected("the drone returns home by itself")
+        return _ends_return(message)
 
     def _stop_moves(self, why: str) -> bool:
         """Cancel our moveTo and moveBys; in the order of the queue, so a later move is not hit.
@@ -623,31 +672,42 @@ class Piloting(PilotingSettings):
         if move is not None:
             if move.answer.token is not None:
                 self._commander.cancel(move.answer.token)
-            self._halt(ardrone3.CancelMoveTo())
+            self._commander.halt(ardrone3.CancelMoveTo())
         moves = self._moves.cancel_by(why, self._now())
         for move in moves:
             if move.answer.token is not None:
                 self._commander.cancel(move.answer.token)
         if moves:
-            self._halt(ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0))
+            self._commander.halt(ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0))
         return move is not None
 
     def _stop_following(self) -> None:
-        if self.state.following not in (None, FollowMeMode.NONE) and follow_me.Stop not in self._stopping:
-            self._stopping.add(follow_me.Stop)
-            self._halt(follow_me.Stop())
+        if self.state.following not in (None, FollowMeMode.NONE):
+            self._stop_once(follow_me.Stop())
 
     def _stop_animation(self) -> None:
-        if self.state.animation not in (None, animation.Type.NONE) and animation.Cancel not in self._stopping:
-            self._stopping.add(animation.Cancel)
-            self._halt(animation.Cancel())
+        if self.state.animation not in (None, animation.Type.NONE):
+            self._stop_once(animation.Cancel())
+
+    def _stop_once(self, order: Message) -> None:
+        """Halt what setpoints take over from many times a second. Once it was heard and not obeyed, say it again."""
+        kind = type(order)
+        if self._now() < self._stopping.get(kind, -math.inf):
+            return
+        self._stopping[kind] = math.inf
+
+        def heard(delivery: asyncio.Future[None]) -> None:
+            if kind in self._stopping:
+                self._stopping[kind] = self._now() + QUIET
+
+        self._commander.halt(order).add_done_callback(heard)
 
     def _pump(self) -> None:
         """Send the PCMD that is due and come back for the next."""
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
-        if self.sticks_blocked is not None:
+        if self._sticks_dead is not None:
             self._sticks.stop()
         now = self._now()
         pcmd = self._sticks.due(now)
@@ -672,7 +732,7 @@ class Piloting(PilotingSettings):
 
     def _release_sticks(self) -> None:
         """Take the hands off: a return waits for a PCMD with flag 0 (rth.xml 146-0-11)."""
-        if self._sticks.active and self.sticks_blocked is None:
+        if self._sticks.active and self._sticks_dead is None:
             for _ in range(RELEASES):
                 self._commander.send(self._sticks.released(self._now()))
         self._silence_sticks()
@@ -689,10 +749,13 @@ class Piloting(PilotingSettings):
     def _now() -> float:
         return asyncio.get_running_loop().time()
 
-    def _require_own_will(self) -> None:
-        """Raise `CommandRejected` while the drone returns for reasons of its own: no move of ours gets in its way."""
+    def require_free(self) -> None:
+        """Raise `CommandRejected` while the drone returns for reasons of its own, or lands: no move of ours gets in its
+        way."""
         if self._home.state.returning_by_itself:
             raise CommandRejected("the drone returns home by itself")
+        if self.state.flying in (FlyingState.LANDING, FlyingState.EMERGENCY_LANDING):
+            raise CommandRejected(_in_state(self.state.flying))
 
     def _require_link(self) -> None:
         if not self._commander.connected:
@@ -705,6 +768,14 @@ class Piloting(PilotingSettings):
         except LinkLost as error:
             log.debug("%s not sent: %s", message.NAME, error)
             self._sticks.stop()
+
+
+def _in_state(flying: FlyingState | None) -> str:
+    return (
+        "the drone has not reported its flying state"
+        if flying is None
+        else f"the drone is in the state {spoken(flying)}"
+    )
 
 
 def _decided_elsewhere(message: Message) -> None:

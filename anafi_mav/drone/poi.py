@@ -18,7 +18,7 @@ from anafi_mav.drone.alerts import spoken
 from anafi_mav.drone.element import Position, Reducer, members, position
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT
 from anafi_mav.drone.settings import Commanding
-from anafi_mav.errors import AnafiMavError, CommandRejected, LinkLost, LocalProtocolError
+from anafi_mav.errors import AnafiMavError, CommandRejected, LocalProtocolError
 
 _SAME_PLACE_DEG = 1e-7
 """About a centimetre."""
@@ -71,18 +71,13 @@ class Poi(Commanding[PoiState]):
             return True if same and message.status in (PoiStatus.RUNNING, PoiStatus.PENDING) else None
 
         command = ardrone3.StartPilotedPOIV2(latitude, longitude, altitude, mode)
-        try:
-            await self._commander.confirm(command, (ardrone3.PilotedPOIV2,), judge, timeout)
-        except (CommandRejected, LinkLost):
-            raise
-        except BaseException:
-            if self._commander.connected:
-                self._commander.send(ardrone3.StopPilotedPOI())
-            raise
+        await self._commander.begin(command, (ardrone3.PilotedPOIV2,), judge, timeout, ardrone3.StopPilotedPOI())
 
     async def stop(self, timeout: float = ANSWER_TIMEOUT) -> None:
-        """Look anywhere; at once when there is no point."""
+        """Look anywhere; returns at once when there is no point, nor one on its way to the drone."""
         self._require(self.state.status, "points of interest")
+        self._commander.call_off("stopped", ardrone3.StopPilotedPOI)
+        await self._commander.halted(ardrone3.StopPilotedPOI.NAME, timeout)
         if self.state.status not in (PoiStatus.RUNNING, PoiStatus.PENDING):
             return
         await self._commander.confirm(

@@ -35,7 +35,7 @@ SETTINGS: list[Message] = [
 class ScriptedDevice:
     """Keeps every command it receives; `script` says which events answer a kind of command."""
 
-    def __init__(self, model_id: int = 0x0914) -> None:
+    def __init__(self, model_id: int = 0x0914, versions: tuple[int, int] = (1, 3)) -> None:
         self._info = DeviceInfo(model_id, "PI040416DA9H000001", 0, "ANAFI-H000001")
         self.received: list[tuple[float, Message | UnknownMessage]] = []
         """(loop time, command), oldest first."""
@@ -43,13 +43,20 @@ class ScriptedDevice:
             common.AllStates: lambda _: [*STATES, common.AllStatesChanged()],
             common.AllSettings: lambda _: [*SETTINGS, common.AllSettingsChanged()],
         }
+        self._versions = versions
         self.sessions: list[DeviceSession] = []
         self._news = asyncio.Event()
         self._server: DeviceServer
 
     async def __aenter__(self) -> ScriptedDevice:
         self._server = await DeviceServer.start(
-            "127.0.0.1", discovery_port=0, handshake_port=0, c2d_port=0, info=self._info, on_session=self._on_session
+            "127.0.0.1",
+            discovery_port=0,
+            handshake_port=0,
+            c2d_port=0,
+            info=self._info,
+            versions=self._versions,
+            on_session=self._on_session,
         )
         return self
 

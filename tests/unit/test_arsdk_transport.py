@@ -272,6 +272,16 @@ def test_version_1_controller_gives_up_after_five_repetitions() -> None:
     assert frames(transport, transport.outgoing(5.0))[0].seq == 1
 
 
+def test_a_version_1_controller_that_does_not_give_up() -> None:
+    transport = Transport(Role.CONTROLLER, 1, 0.0, gives_up=False)
+    token = transport.send(tilt(1), 0.0)
+    count, events = sendings(transport, token)
+    assert count > 30
+    assert events == []
+    transport.cancel(token)
+    assert frames(transport, transport.outgoing(60.0)) == []
+
+
 @pytest.mark.parametrize("message", [common.AllStates(), common.AllSettings(), ardrone3.Emergency()])
 def test_version_1_never_gives_up_what_parrot_marks_so(message: wire.Message) -> None:
     transport = Transport(Role.CONTROLLER, 1, 0.0)

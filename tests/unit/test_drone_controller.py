@@ -9,17 +9,29 @@ from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass
 
 import pytest
+from scripted_device import STATES, ScriptedDevice
 from support.world import loopback
 
-from anafi_mav.arsdk.messages import animation, ardrone3, drone_manager, mapper, rth, skyctrl
+from anafi_mav.arsdk.messages import (
+    animation,
+    ardrone3,
+    common,
+    drone_manager,
+    flight_plan,
+    follow_me,
+    mapper,
+    move,
+    rth,
+    skyctrl,
+)
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.messages.drone_manager import DroneManagerConnectionState as Connection
 from anafi_mav.arsdk.messages.skyctrl import Source
 from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone import Drone, PilotingCommand
 from anafi_mav.drone.controller import PILOT_KEEPS, STICKS, TILT, is_motion
-from anafi_mav.drone.moves import MoveEnd
-from anafi_mav.errors import CommandRejected, LinkLost, LocalProtocolError, NotSupported
+from anafi_mav.drone.moves import Move, MoveEnd
+from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, LocalProtocolError, NotSupported
 from anafi_mav.sim import DroneSpec, LogEntry, SimulatedDrone, Simulator
 from anafi_mav.sim.skycontroller import PITCH, RETURN_HOME, ROLL, TAKEOFF_LAND, Skycontroller
 
@@ -305,6 +317,17 @@ async def test_without_a_controller_there_is_none() -> None:
         (ardrone3.MoveBy(0.0, 0.0, 0.0, 0.1), True),
         (ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0), False),
         (ardrone3.MoveTo(48.0, 2.0, 5.0, ardrone3.OrientationMode.NONE, 0.0), True),
+        (move.ExtendedMoveTo(48.0, 2.0, 5.0, move.OrientationMode.NONE, 0.0, 1.0, 1.0, 1.0), True),
+        (move.ExtendedMoveBy(1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0), True),
+        (ardrone3.StartPilotedPOIV2(48.0, 2.0, 5.0, ardrone3.PoiMode.FREE_GIMBAL), True),
+        (common.Start("abc", common.MavlinkType.FLIGHT_PLAN), True),
+        (flight_plan.StartAt("abc", "abc", flight_plan.MavlinkType.FLIGHT_PLAN, 0), True),
+        (flight_plan.StartAtV2("abc", "abc", flight_plan.MavlinkType.FLIGHT_PLAN, 0, 0), True),
+        (follow_me.Start(follow_me.Mode.LOOK_AT), True),
+        (animation.StartFlip(animation.FlipType.FRONT), True),
+        (common.Stop(), False),
+        (common.Pause(), False),
+        (follow_me.Stop(), False),
         (ardrone3.CancelMoveTo(), False),
         (ardrone3.TakeOff(), False),
         (ardrone3.Landing(), False),
@@ -331,3 +354,116 @@ async def test_odd_words_of_a_controller_are_survived(crew: Crew) -> None:
     await until(lambda: crew.drone.controller.state.visible == {})
     assert crew.drone.controller.state.axes == {}
     assert crew.drone.connected
+
+
+# -- scripted: what the simulated controller never does
+
+
+LOOK_AT = follow_me.Mode.LOOK_AT
+
+
+@contextlib.asynccontextmanager
+async def behind() -> AsyncIterator[tuple[Drone, ScriptedDevice]]:
+    """A drone that hovers behind a Skycontroller 3 which obeys, and says nothing by itself."""
+    async with ScriptedDevice(0x0918) as device:
+        device.script[skyctrl.AllStates] = lambda _: [
+            drone_manager.ConnectionState(Connection.CONNECTED, "PI040416DA9H000001", 0x0914, "ANAFI"),
+            skyctrl.PilotingSource(Source.SKY_CONTROLLER),
+            skyctrl.AllStatesChanged(),
+        ]
+        device.script[skyctrl.AllSettings] = lambda _: [skyctrl.AllSettingsChanged()]
+        device.script[skyctrl.SetPilotingSource] = lambda m: [skyctrl.PilotingSource(m.source)]
+        device.script[mapper.Grab] = lambda m: [mapper.GrabState(m.buttons, m.axes, 0)]
+        device.script[common.AllStates] = lambda _: [
+            *STATES,
+            ardrone3.FlyingStateChanged(FlyingState.HOVERING),
+            common.MavlinkFilePlayingStateChanged(common.PlayingState.STOPPED, "", common.MavlinkType.FLIGHT_PLAN),
+            follow_me.State(follow_me.Mode.NONE, follow_me.Behavior.IDLE, follow_me.Animation.NONE, 0),
+            follow_me.ModeInfo(follow_me.Mode.LOOK_AT, 0, 0),
+            common.AllStatesChanged(),
+        ]
+        drone = device.drone()
+        await drone.connect()
+        try:
+            yield drone, device
+        finally:
+            await drone.close()
+
+
+def sources(device: ScriptedDevice) -> list[Source]:
+    return [m.source for m in device.got(skyctrl.SetPilotingSource)]
+
+
+def under_way(command: ardrone3.MoveTo) -> list[Message]:
+    fields = (getattr(command, name) for name in command.__struct_fields__)
+    return [ardrone3.MoveToChanged(*fields, ardrone3.MoveToStatus.RUNNING)]
+
+
+def ended(move: Move) -> Message:
+    assert move.target is not None
+    place = (move.target.latitude, move.target.longitude, move.target.altitude)
+    none, canceled = ardrone3.OrientationMode.NONE, ardrone3.MoveToStatus.CANCELED
+    return ardrone3.MoveToChanged(*place, none, 0.0, canceled)
+
+
+async def test_a_controller_that_takes_the_source_back_ends_a_move() -> None:
+    async with behind() as (drone, device):
+        device.script[ardrone3.MoveTo] = under_way
+        move = await drone.piloting.move_to(48.0, 2.0, 5.0)
+        if drone.controller.state.source != Source.CONTROLLER:
+            await drone.expect(skyctrl.PilotingSource, lambda m: m.source == Source.CONTROLLER)
+        device.say(skyctrl.PilotingSource(Source.SKY_CONTROLLER))
+        await device.until(ardrone3.CancelMoveTo)
+        assert drone.piloting.move is None
+        assert drone.controller.pilot_flies
+        device.say(ended(move))
+        assert await asyncio.wait_for(move.result(), 3.0) is MoveEnd.CANCELED
+        # The axes of the sticks are given back too: otherwise nobody would fly.
+        await device.until(mapper.Grab, 2)
+        assert device.got(mapper.Grab)[-1].axes == 0
+        with pytest.raises(CommandRejected, match="the pilot"):
+            await drone.piloting.move_to(48.0, 2.0, 5.0)
+
+
+async def test_the_answer_to_an_earlier_giving_back_ends_nothing() -> None:
+    async with behind() as (drone, device):
+        device.script[ardrone3.MoveTo] = under_way
+        drone.piloting.pilot(FORWARD)
+        await drone.expect(skyctrl.PilotingSource, lambda m: m.source == Source.CONTROLLER)
+        drone.controller.give_back()
+        await drone.piloting.move_to(48.0, 2.0, 5.0)  # at once: both orders are on their way
+        if drone.controller.state.source != Source.CONTROLLER:
+            await drone.expect(skyctrl.PilotingSource, lambda m: m.source == Source.CONTROLLER)
+        assert sources(device) == [Source.CONTROLLER, Source.SKY_CONTROLLER, Source.CONTROLLER]
+        assert drone.piloting.move is not None
+        assert device.got(ardrone3.CancelMoveTo) == []
+
+
+@pytest.mark.parametrize("what", ["flight plan", "follow me", "following"])
+async def test_the_pilot_is_seen_while_something_is_to_begin(what: str) -> None:
+    """And as long as it goes on: his stick ends it."""
+    async with behind() as (drone, device):
+        if what == "following":
+            device.script[follow_me.Start] = lambda m: [
+                follow_me.State(m.mode, follow_me.Behavior.LOOK_AT, follow_me.Animation.NONE, 0)
+            ]
+        verb = drone.flight_plan.start("abc") if what == "flight plan" else drone.follow_me.start(LOOK_AT)
+        task = asyncio.ensure_future(verb)
+        await device.until(skyctrl.SetPilotingSource)
+        await asyncio.sleep(1.2)  # more than twice the quiet time
+        assert sources(device) == [Source.CONTROLLER]
+        device.say(mapper.GrabAxisEvent(PITCH, 60))
+        await device.until(common.Stop if what == "flight plan" else follow_me.Stop)
+        assert sources(device) == [Source.CONTROLLER, Source.SKY_CONTROLLER]
+        await asyncio.wait([task])
+        assert (task.exception() is None) == (what == "following")
+
+
+async def test_a_return_that_never_began_does_not_hold_the_source() -> None:
+    async with behind() as (drone, device):
+        drone.piloting.pilot(FORWARD)
+        await device.until(skyctrl.SetPilotingSource)
+        with pytest.raises(CommandTimeout):
+            await drone.piloting.return_home(timeout=0.2)
+        await device.until(skyctrl.SetPilotingSource, 2)
+        assert sources(device) == [Source.CONTROLLER, Source.SKY_CONTROLLER]
