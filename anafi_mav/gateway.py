@@ -12,7 +12,9 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import os
 from collections import Counter
+from pathlib import Path
 from types import TracebackType
 
 from typing_extensions import Self
@@ -36,6 +38,18 @@ CANCEL_WAIT = 0.1
 
 HOVER_TIME = 2.0
 """s that closing stays with a flying drone after its moves have ended: as long as hover centres the sticks."""
+
+
+def state_folder(configured: str | None) -> Path | None:
+    """Where to keep what outlives the gateway; None when the user has no home (XDG Base Directory Specification)."""
+    given = os.environ.get("XDG_STATE_HOME", "")
+    try:
+        if configured is not None:
+            return Path(configured).expanduser()
+        return (Path(given) if Path(given).is_absolute() else Path.home() / ".local" / "state") / "anafi-mav"
+    except RuntimeError as error:
+        logger.warning("nothing will outlive the gateway: %s", error)
+        return None
 
 
 class _Supervised:
@@ -125,6 +139,7 @@ class Gateway:
         """Open every endpoint, then begin to connect to every drone. Raises `ConfigError`; nothing is left open."""
         await self.open()
         started = self._clock.monotonic()
+        state = state_folder(self.config.state)
         for config in self.config.drones:
             assert config.address is not None
             drone = Drone(
@@ -134,7 +149,7 @@ class Gateway:
                 name=config.name,
             )
             allow_kill = self.config.allow_kill if config.allow_kill is None else config.allow_kill
-            system = System(self._node, drone, config.sysid, self._clock, started, allow_kill=allow_kill)
+            system = System(self._node, drone, config.sysid, self._clock, started, allow_kill=allow_kill, state=state)
             supervised = _Supervised(config, drone, system)
             supervised.task = asyncio.get_running_loop().create_task(supervised.run())
             self._supervised.append(supervised)

@@ -49,6 +49,13 @@ def _flavours_spoken_to(request: pytest.FixtureRequest) -> Iterator[None]:
     request.node.user_properties.append(("flavours", sorted(flavours.SHOWN)))
 
 
+@pytest.fixture(autouse=True)
+def _own_state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A gateway remembers plans by the serial number of its drone, and simulated drones share those: no test finds what
+    another one left, and none writes where its user keeps his own."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+
+
 class _Table:
     """Collects what the tests of each item said."""
 

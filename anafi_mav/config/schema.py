@@ -254,6 +254,15 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
             extra=expected("true or false"),
         ),
     ] = False
+    state: Annotated[
+        Annotated[str, Meta(min_length=1, max_length=MAX_PATH)] | None,
+        Meta(
+            description="The folder of what outlives the gateway: of each drone a file with its fence and rally points "
+            "and how they are used. `~` is the user's home. Left out: `$XDG_STATE_HOME/anafi-mav`, which without that "
+            "variable is `~/.local/state/anafi-mav`.",
+            extra=expected("the path of a folder"),
+        ),
+    ] = None
 
 
 SECTIONS: dict[str, type[msgspec.Struct]] = {

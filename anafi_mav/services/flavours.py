@@ -51,6 +51,11 @@ class Flavour:
     """Parameters: an INT32 travels as the bits of the float field; otherwise as the float of equal value."""
     zero_home: bool = False
     """Item 0 of a mission is home."""
+    float_plans: bool = False
+    """Items of plans are requested with MISSION_REQUEST, which clients of this family answer in either form; otherwise
+    with MISSION_REQUEST_INT."""
+    partial_plans: bool = False
+    """Clients replace single items of a plan (MISSION_WRITE_PARTIAL_LIST)."""
     relative_takeoff: bool = False
     """The height of a take-off command counts from the ground, whatever else the command says."""
     zero_is_unset: bool = False
@@ -152,6 +157,8 @@ ARDUPILOT = Flavour(
     version_type=dialect.FIRMWARE_VERSION_TYPE_OFFICIAL,
     bytewise=False,
     zero_home=True,
+    float_plans=True,
+    partial_plans=True,
     relative_takeoff=True,
     zero_is_unset=True,
     guided_setpoints=True,

@@ -18,7 +18,6 @@ from anafi_mav.services.parameter_table import (
     CRUISE_SPEED,
     GCS_LOSS,
     GCS_LOSS_TIME,
-    GEOFENCE,
     MAX_ALTITUDE,
     MAX_DISTANCE,
     MAX_TILT,
@@ -30,6 +29,7 @@ from anafi_mav.services.parameter_table import (
     VERTICAL_SPEED,
     YAW_RATE,
 )
+from anafi_mav.services.parameter_table_fence import FENCE_ARDUPILOT
 from anafi_mav.services.refusal import Refused
 from anafi_mav.services.service import Host
 from anafi_mav.services.vehicle import AUTO_DISARM
@@ -93,7 +93,6 @@ TWINS: tuple[Parameter, ...] = (
     twin(CRUISE_SPEED, "WPNAV_SPEED", scale=CM, unit="cm/s", decimals=0),
     twin(MAX_ALTITUDE, "FENCE_ALT_MAX"),
     twin(MAX_DISTANCE, "FENCE_RADIUS"),
-    mapped(GEOFENCE, "FENCE_TYPE", Kind.INT8, {1: "Ceiling", 3: "Ceiling and circle"}, {1: 0, 3: 1}),
     twin(RETURN_ALTITUDE, "RTL_ALT", Kind.INT32, scale=CM, unit="cm", decimals=0),
     FINAL_ALTITUDE,
     mapped(
@@ -135,8 +134,6 @@ FACTS_ARDUPILOT: tuple[Parameter, ...] = (
     _fact("FRAME_TYPE", 1, "Frame: X"),
     _fact("ARMING_CHECK", 1, "Checks before arming: all", Kind.INT32),
     _fact("DISARM_DELAY", AUTO_DISARM, "Disarms when no take-off follows", unit="s"),
-    _fact("FENCE_ENABLE", 1, "The drone's ceiling is always kept"),
-    _fact("FENCE_ACTION", 4, "At its own geofence the drone holds", values={4: "Brake"}),
     _untold("FENCE_MARGIN", "Distance to the fence that it keeps", unit="m"),
     _fact("FS_THR_ENABLE", 7, "Sticks lost: brake", values={7: "Brake"}),
     _fact("FS_THR_VALUE", -1, "Throttle that means loss: none", Kind.INT16),
@@ -207,4 +204,4 @@ FACTS_ARDUPILOT: tuple[Parameter, ...] = (
     ),
 )
 
-ARDUPILOT_NAMES: tuple[Parameter, ...] = (*TWINS, *FACTS_ARDUPILOT)
+ARDUPILOT_NAMES: tuple[Parameter, ...] = (*TWINS, *FENCE_ARDUPILOT, *FACTS_ARDUPILOT)

@@ -33,6 +33,7 @@ from anafi_mav.services.parameter_table import (
     VERTICAL_SPEED,
     YAW_RATE,
 )
+from anafi_mav.services.parameter_table_fence import FENCE_PX4
 from anafi_mav.services.refusal import Refused
 from anafi_mav.services.service import Host
 from anafi_mav.services.vehicle import AUTO_DISARM
@@ -190,7 +191,6 @@ FACTS_PX4: tuple[Parameter, ...] = (
     _fact("CP_DIST", -1, "Collision prevention by distance: none", Kind.REAL32),
     _fact("MPC_LAND_SPEED", math.nan, "Speed of a landing", Kind.REAL32, unit="m/s", long=UNTOLD),
     _fact("MPC_XY_VEL_MAX", MAX_CRUISE_SPEED, "The fastest that may be asked for", Kind.REAL32, unit="m/s", decimals=1),
-    _fact("GF_ACTION", 2, "At its own geofence the drone holds", values={2: "Hold"}),
     Parameter(
         "LND_FLIGHT_T_HI",
         Kind.INT32,
@@ -213,4 +213,4 @@ FACTS_PX4: tuple[Parameter, ...] = (
     ),
 )
 
-PX4_NAMES: tuple[Parameter, ...] = (*TWINS, *FACTS_PX4)
+PX4_NAMES: tuple[Parameter, ...] = (*TWINS, *FENCE_PX4, *FACTS_PX4)

@@ -31,6 +31,7 @@ from anafi_mav.services.parameter_codec import (
 )
 from anafi_mav.services.parameter_table import NATIVE
 from anafi_mav.services.parameter_table_ardupilot import ARDUPILOT_NAMES
+from anafi_mav.services.parameter_table_fence import FENCE_NATIVE
 from anafi_mav.services.parameter_table_px4 import PX4_NAMES
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
 from anafi_mav.services.statustext import Severity
@@ -46,7 +47,7 @@ MAX_WAITING = 512
 def parameters_of(flavour: Flavour) -> tuple[Parameter, ...]:
     """All that clients of a flavour can be shown, sorted by name; which of them a drone has is another matter."""
     names = ARDUPILOT_NAMES if flavour is ARDUPILOT else PX4_NAMES
-    return tuple(sorted((*NATIVE, *names), key=lambda parameter: parameter.name))
+    return tuple(sorted((*NATIVE, *FENCE_NATIVE, *names), key=lambda parameter: parameter.name))
 
 
 class ParameterList:

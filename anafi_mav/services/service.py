@@ -18,6 +18,7 @@ from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import Command
 from anafi_mav.services.flavours import Flavour
+from anafi_mav.services.memory import Memory
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.stream import Stream, Times
 from anafi_mav.services.vehicle import Vehicle
@@ -44,6 +45,7 @@ class Host(Protocol):
     drone: Drone
     vehicle: Vehicle
     clock: Clock
+    memory: Memory
 
     @property
     def channels(self) -> Sequence[Channel]:

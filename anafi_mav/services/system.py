@@ -10,6 +10,7 @@ import asyncio
 import logging
 import math
 from collections.abc import Callable, Coroutine, Hashable, Sequence
+from pathlib import Path
 from typing import Any
 
 from anafi_mav.clock import Clock
@@ -19,17 +20,20 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound, Node
 from anafi_mav.services.command_service import CommandService
+from anafi_mav.services.fence_service import FenceService
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.guided import GuidedService
 from anafi_mav.services.identity import IdentityService
 from anafi_mav.services.link_loss_service import LinkLossService
 from anafi_mav.services.maintenance import MaintenanceService
+from anafi_mav.services.memory import Memory
 from anafi_mav.services.message_service import MessageService
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.modes_service import ModesService
 from anafi_mav.services.offboard_service import OffboardService
 from anafi_mav.services.parameters import ParameterService
 from anafi_mav.services.plan_service import PlanService
+from anafi_mav.services.rally_service import RallyService
 from anafi_mav.services.service import MessageHandler, Service
 from anafi_mav.services.statustext import Severity, TextNumbers
 from anafi_mav.services.stream import Times
@@ -48,6 +52,8 @@ SERVICES: tuple[type[Service], ...] = (
     ParameterService,
     LinkLossService,
     PlanService,
+    FenceService,
+    RallyService,
     OffboardService,
     TimeService,
 )
@@ -74,10 +80,21 @@ MAX_COMPLAINTS = 100
 class System:
     """The MAVLink side of one drone; the `Host` of its services."""
 
-    def __init__(self, node: Node, drone: Drone, sysid: int, clock: Clock, started: float, *, allow_kill: bool) -> None:
+    def __init__(
+        self,
+        node: Node,
+        drone: Drone,
+        sysid: int,
+        clock: Clock,
+        started: float,
+        *,
+        allow_kill: bool,
+        state: Path | None = None,
+    ) -> None:
         self.sysid = sysid
         self.drone = drone
         self.clock = clock
+        self.memory = Memory(state)
         self.active = False
         self._node = node
         self._started = started
@@ -122,6 +139,8 @@ class System:
         self.vehicle.on_flying_state()
         self.vehicle.on_position()
         self._last_state = None
+        if (problem := self.memory.load(self.drone.identity.serial)) is not None:
+            self.text(Severity.WARNING, problem)
         for service in self.services:
             service.link_up()
         self._changed()

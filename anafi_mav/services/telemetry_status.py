@@ -128,11 +128,13 @@ _SENSOR_BITS: dict[Sensor, int] = {
 }
 
 
-def sensor_bits(vehicle: Vehicle) -> tuple[int, int]:
-    """(present, healthy) bits of MAV_SYS_STATUS_SENSOR by the drone's own sensor list; what is present is enabled."""
-    drone = vehicle.drone
-    # We have no fence; MAVProxy calls one that is not healthy a breach, whether it is present or not.
-    present, healthy = dialect.MAV_SYS_STATUS_PREARM_CHECK, dialect.MAV_SYS_STATUS_GEOFENCE
+def sensor_bits(vehicle: Vehicle) -> tuple[int, int, int]:
+    """(present, enabled, healthy) bits of MAV_SYS_STATUS_SENSOR by the drone's own sensor list. What is present is
+    enabled, but for a fence that is not."""
+    drone, fence = vehicle.drone, vehicle.fence
+    present = dialect.MAV_SYS_STATUS_PREARM_CHECK | (dialect.MAV_SYS_STATUS_GEOFENCE if fence.present else 0)
+    # MAVProxy calls a fence that is not healthy a breach, whether it is present or not.
+    healthy = dialect.MAV_SYS_STATUS_GEOFENCE if fence.healthy else 0
     for sensor, works in drone.calibration.state.sensors.items():
         bits = _SENSOR_BITS.get(sensor, 0)
         present |= bits
@@ -155,16 +157,17 @@ def sensor_bits(vehicle: Vehicle) -> tuple[int, int]:
             healthy |= dialect.MAV_SYS_STATUS_SENSOR_RC_RECEIVER
     if not vehicle.prearm_problems():
         healthy |= dialect.MAV_SYS_STATUS_PREARM_CHECK
-    return present, healthy
+    enabled = present if fence.in_force else present & ~dialect.MAV_SYS_STATUS_GEOFENCE
+    return present, enabled, healthy
 
 
 def sys_status(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
     """SYS_STATUS. Load and error counters are not reported by an ANAFI and have no "unknown": 0."""
-    present, healthy = sensor_bits(vehicle)
+    present, enabled, healthy = sensor_bits(vehicle)
     state = vehicle.drone.battery.state
     return dialect.MAVLink_sys_status_message(
         present,
-        present,
+        enabled,
         healthy,
         0,
         UNKNOWN_U16 if state.voltage_mv is None else state.voltage_mv,

@@ -19,10 +19,12 @@ from anafi_mav.clock import Clock
 from anafi_mav.drone import Drone
 from anafi_mav.drone.events import AlertLevel, FlyingState, FlyingStateChanged, ForcedLandingReason, PlayingState
 from anafi_mav.errors import AnafiMavError, CommandRejected
+from anafi_mav.services.fence_watch import FenceWatch, OutsideFence
 from anafi_mav.services.height import HeightReference
 from anafi_mav.services.link_loss import LossPolicy
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.offboard_flight import OffboardFlight
+from anafi_mav.services.rally import RallyPoints
 from anafi_mav.services.refusal import Refused as Refused
 from anafi_mav.services.statustext import Severity
 
@@ -71,6 +73,15 @@ class Place:
 
     latitude: float
     longitude: float
+
+    @property
+    def point(self) -> tuple[float, float]:
+        """Latitude and longitude."""
+        return self.latitude, self.longitude
+
+
+def _point(place: Place | None) -> tuple[float, float] | None:
+    return None if place is None else place.point
 
 
 @dataclass(frozen=True)
@@ -121,6 +132,10 @@ class Vehicle:
         """What to do when no ground station is heard any more (a parameter)."""
         self.origin: Place | None = None
         """Origin of the local frame: where the drone last took off, or first stood with a fix."""
+        self.fence = FenceWatch()
+        self.rally = RallyPoints()
+        self.orders = 0
+        """Counts who took the vehicle over."""
         self._goto: Goto | None = None
         self.intended: FlightMode | None = None
         """The mode that a client last asked for by name or number."""
@@ -248,6 +263,11 @@ class Vehicle:
         if self.flying_state == FlyingState.EMERGENCY:
             problems.append("emergency stop")
         problems += self.drone.takeoff_blockers()
+        if self.on_ground:
+            try:
+                self.fence.check_place(_point(self.place), _point(self.home))
+            except OutsideFence as error:
+                problems.append(str(error))
         return problems
 
     # What it can be told to do. Each returns when the drone confirmed, or raises.
@@ -321,6 +341,10 @@ class Vehicle:
                 f"Refused: {ato:.1f} m above take-off is above the drone's ceiling of {ceiling.current:g} m",
                 lasting=True,
             )
+        try:
+            self.fence.check_height(ato)
+        except OutsideFence as error:
+            raise Refused(f"Refused: {error}", lasting=True) from error
 
     def amsl_to_ato(self, amsl: float) -> float:
         """Height above take-off (m) of an AMSL height; raises `Refused` when no bridge is known."""
@@ -417,7 +441,7 @@ class Vehicle:
         if not self.in_air:
             raise Refused("Goto refused: the drone is not in the air")
         if not checked:
-            self.check_place(goto.place)
+            self.check_place(goto.place, start=self.place)
         if self.returning_by_itself:
             raise Refused("Goto refused: the drone returns home by itself")
         await self.take_over()
@@ -460,8 +484,8 @@ class Vehicle:
         if place.latitude == 0.0 and place.longitude == 0.0:
             raise Refused(f"{what} refused: latitude and longitude are both 0", lasting=True)
 
-    def check_place(self, place: Place) -> None:
-        """Raise `Refused` unless the drone may fly there."""
+    def check_place(self, place: Place, *, start: Place | None = None) -> None:
+        """Raise `Refused` unless the drone may fly there, and the straight way from `start` if that is given."""
         self.check_on_earth(place, "Goto")
         state, centre = self.drone.piloting.state, self.home
         if state.geofence and state.max_distance is not None and centre is not None:
@@ -472,6 +496,11 @@ class Vehicle:
                     f"{state.max_distance.current:g} m",
                     lasting=True,
                 )
+
+        try:
+            self.fence.check_place(_point(place), _point(centre), _point(start))
+        except OutsideFence as error:
+            raise Refused(f"Goto refused: {error}", lasting=error.lasting) from error
 
     async def set_mode(self, mode: FlightMode, client: Hashable = None) -> None:
         """Whatever doing this mode means. `client` is who asks, for Offboard flies its setpoints."""
@@ -588,6 +617,7 @@ class Vehicle:
         """
         if self._terminating:
             raise Refused("Refused: the motors are being cut")
+        self.orders += 1
         ended = [*self._end_others(), *self._let_go()]
         if ended:
             await asyncio.wait(ended)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -142,17 +141,6 @@ async def test_conf_041_velocity_signs() -> None:
             await w.client.wait("HEARTBEAT")
         local = await w.client.wait("LOCAL_POSITION_NED", timeout=5)
         assert (local.x, local.y, local.z) == pytest.approx((25.0, -25.0, -25.0), abs=1.5)
-
-
-@pytest.mark.parametrize("kind", [0, 1, 2])
-async def test_conf_046_empty_lists(kind: int) -> None:
-    async with world() as w:
-        mark, began = w.client.mark(), time.monotonic()
-        w.client.send(dialect.MAVLink_mission_request_list_message(1, 1, kind))
-        count = await w.client.wait("MISSION_COUNT", since=mark)
-        assert (count.count, count.mission_type) == (0, kind)
-        assert (count.target_system, count.target_component) == (255, 190)
-        assert time.monotonic() - began < 0.5
 
 
 async def test_message_intervals_are_per_client() -> None:

@@ -82,13 +82,14 @@ class Client:
 
     async def wait(
         self,
-        kind: str,
+        kind: str | tuple[str, ...],
         accept: Callable[[Any], bool] = lambda message: True,
         *,
         since: int | None = None,
         timeout: float = 5.0,
     ) -> Any:
-        """The first message of a kind from a mark (default: from now) on that `accept` likes."""
+        """The first message of a kind, or of several, from a mark (default: from now) on that `accept` likes."""
+        kinds = (kind,) if isinstance(kind, str) else kind
         position = self.mark() if since is None else since
         start = position
         deadline = time.monotonic() + timeout
@@ -96,14 +97,15 @@ class Client:
             while position < len(self.received):
                 message = self.received[position][1]
                 position += 1
-                if message.get_type() == kind and accept(message):
+                if message.get_type() in kinds and accept(message):
                     return message
             left = deadline - time.monotonic()
             news = self._news
             try:
                 await asyncio.wait_for(news.wait(), max(left, 0.0))
             except asyncio.TimeoutError:
-                seen = [str(m) for _, m in self.received[start:] if m.get_type() in (kind, "STATUSTEXT", "COMMAND_ACK")]
+                told = (*kinds, "STATUSTEXT", "COMMAND_ACK")
+                seen = [str(m) for _, m in self.received[start:] if m.get_type() in told]
                 raise AssertionError(f"no such {kind} within {timeout} s; seen: {seen[-8:]}") from None
 
     async def command(

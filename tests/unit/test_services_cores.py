@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from anafi_mav.mavlink import dialect
-from anafi_mav.services import commands, offboard, plan_lists
+from anafi_mav.services import commands, offboard
 from anafi_mav.services.flavours import ARDUPILOT, PX4
 from anafi_mav.services.height import HeightReference
 from anafi_mav.services.modes import FlightMode
@@ -351,26 +351,3 @@ def test_a_crowd_of_senders_is_bounded() -> None:
         assert stream.receive(number, LEVEL, 0.0)
     assert not stream.receive("one more", LEVEL, 0.1)
     assert stream.receive("one more", LEVEL, SILENCE)  # the others have fallen silent
-
-
-@pytest.mark.parametrize("kind", [0, 1, 2])
-def test_lists_are_empty(kind: int) -> None:
-    (count,) = plan_lists.answer(dialect.MAVLink_mission_request_list_message(1, 1, kind), 255, 190)
-    assert (count.get_type(), count.count, count.mission_type) == ("MISSION_COUNT", 0, kind)
-    assert (count.target_system, count.target_component) == (255, 190)
-
-
-@pytest.mark.parametrize(
-    ("message", "result"),
-    [
-        (dialect.MAVLink_mission_clear_all_message(1, 1, 255), "MAV_MISSION_ACCEPTED"),
-        (dialect.MAVLink_mission_count_message(1, 1, 0, 0), "MAV_MISSION_ACCEPTED"),
-        (dialect.MAVLink_mission_count_message(1, 1, 3, 0), "MAV_MISSION_UNSUPPORTED"),
-        (dialect.MAVLink_mission_request_int_message(1, 1, 0, 0), "MAV_MISSION_INVALID_SEQUENCE"),
-        (dialect.MAVLink_mission_request_list_message(1, 1, 7), "MAV_MISSION_UNSUPPORTED"),
-    ],
-)
-def test_what_needs_a_mission_is_refused(message: object, result: str) -> None:
-    (ack,) = plan_lists.answer(message, 255, 0)
-    assert ack.get_type() == "MISSION_ACK"
-    assert ack.type == getattr(dialect, result)

@@ -1,0 +1,259 @@
+"""The fence enforced: watches where the drone is, acts at the boundary, tells everybody (MAVLink FENCE_STATUS).
+
+What is to be done is `fence_watch`'s to say; which zones there are, a client's upload (`plan_service`). The settings
+outlive the gateway, whoever changes them.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from anafi_mav.drone import events
+from anafi_mav.drone.events import Message, PlayingState
+from anafi_mav.errors import AnafiMavError
+from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.node import Inbound
+from anafi_mav.services.commands import Command
+from anafi_mav.services.fence_mirror import FenceMirror
+from anafi_mav.services.fence_watch import CEILING, EVERYTHING, FLOOR, Action, FenceWatch, Sight, State
+from anafi_mav.services.modes import FlightMode
+from anafi_mav.services.service import Host, Query, Service
+from anafi_mav.services.statustext import Severity
+from anafi_mav.services.stream import Stream, Times
+from anafi_mav.services.vehicle import Refused, Vehicle
+
+LOOK_EVERY = 0.5
+"""s between looks while the drone tells nothing new."""
+
+MIRROR_EVERY = 1.0
+"""s between looks whether the drone's own geofence has to change."""
+
+HIGHEST_FLOOR = 1000.0
+"""m above take-off."""
+
+KEY = "fence"
+"""In the drone's memory: the settings."""
+
+DISABLE, ENABLE, DISABLE_FLOOR = 0.0, 1.0, 2.0
+"""param1 of MAV_CMD_DO_FENCE_ENABLE."""
+
+
+async def set_action(host: Host, action: Action) -> None:
+    """What happens at the boundary. Raises `Refused` for a motor cut that the configuration does not allow."""
+    if action is Action.TERMINATE and not host.vehicle.allow_kill:
+        raise Refused("Refused: a fence that cuts the motors needs allow_kill: true", lasting=True)
+    host.vehicle.fence.action = action
+
+
+async def set_floor(host: Host, metres: float) -> None:
+    """Lowest height above the take-off point; 0: none."""
+    if not 0.0 <= metres <= HIGHEST_FLOOR:
+        raise Refused(f"Refused: a floor is 0 to {HIGHEST_FLOOR:g} m above take-off", lasting=True)
+    host.vehicle.fence.floor = metres
+
+
+class FenceService(Service):
+    """Where the drone may be."""
+
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self._mirror = FenceMirror(host)
+        self._located = -math.inf
+        """When the drone last told its place."""
+        self._looked = self._mirrored = -math.inf
+        self._breach_ms = 0
+        self._told: tuple[Any, ...] | None = None
+        """What the newest FENCE_STATUS said."""
+
+    @property
+    def _watch(self) -> FenceWatch:
+        return self.host.vehicle.fence
+
+    def queries(self) -> Mapping[int, Query]:
+        return {dialect.MAV_CMD_DO_FENCE_ENABLE: self._enable}
+
+    def streams(self) -> Mapping[int, Stream]:
+        return {dialect.MAVLINK_MSG_ID_FENCE_STATUS: Stream(self._status, on_change=True)}
+
+    def link_up(self) -> None:
+        self._restore_settings()
+        self._located = -math.inf if self.host.vehicle.place is None else self.host.clock.monotonic()
+
+    def link_down(self) -> None:
+        self._watch.link_down()
+        self._mirror.link_down()
+        self._located = self._looked = self._mirrored = -math.inf
+
+    def on_event(self, message: Message, now: float) -> None:
+        kind = type(message)
+        if kind is events.GpsLocationChanged:
+            self._located = self.host.clock.monotonic()
+        if kind in (events.GpsLocationChanged, events.SpeedChanged, events.FlyingStateChanged):
+            self._look(self.host.clock.monotonic())
+
+    def tick(self, now: float) -> None:
+        if now - self._looked >= LOOK_EVERY:
+            self._look(now)
+        if now - self._mirrored >= MIRROR_EVERY:
+            self._mirrored = now
+            self._mirror.update(now)
+        self._keep_settings()
+
+    # Watching.
+
+    def _sight(self, now: float) -> Sight:
+        vehicle, drone = self.host.vehicle, self.host.drone
+        state, place, home = drone.piloting.state, vehicle.place, vehicle.home
+        velocity = (0.0, 0.0) if state.velocity is None else (state.velocity.north, state.velocity.east)
+        # A moveTo or a plan stops where it was told to, an orbit turns.
+        own_way = drone.piloting.move is not None or vehicle.mode in (FlightMode.MISSION, FlightMode.ORBIT)
+        return Sight(
+            None if place is None else place.point,
+            now - self._located,
+            velocity,
+            state.altitude,
+            None if state.max_altitude is None else state.max_altitude.current,
+            None if home is None else home.point,
+            airborne=not vehicle.on_ground and vehicle.flying_state is not None,
+            flying=vehicle.in_air and not vehicle.returning,
+            steering=not own_way and state.plan != PlayingState.PLAYING,
+            orders=vehicle.orders,
+        )
+
+    def _look(self, now: float) -> None:
+        self._looked = now
+        watch, before = self._watch, self._watch.state
+        blind = watch.blind
+        action = watch.look(self._sight(now), now)
+        if watch.blind and not blind:
+            self.host.text(Severity.WARNING, "Fence not watched: the drone does not know where it is")
+        if watch.state is State.OUTSIDE and before is not State.OUTSIDE:
+            self._breach_ms = self.host.times().boot_ms
+        if action is not None:
+            self._begin(action)
+        elif before is State.OUTSIDE and watch.state is State.INSIDE:
+            self.host.text(Severity.NOTICE, "Inside the fence again")
+        self._tell()
+
+    def _begin(self, action: Action) -> None:
+        verdict = self._watch.verdict
+        assert verdict is not None
+        head = "Fence breach" if self._watch.state is State.OUTSIDE else "Fence ahead"
+        if action is Action.WARN:
+            self.host.text(Severity.WARNING, f"{head}: {verdict.text}")
+        elif self.host.drone.controller.pilot_flies:
+            # He has the drone, and no order of ours would reach it.
+            self.host.text(Severity.CRITICAL, f"{head}: {verdict.text}; the pilot at the Skycontroller flies")
+            self._watch.done(self.host.vehicle.orders)
+        else:
+            self.host.text(Severity.CRITICAL, f"{head}: {verdict.text}: {action.value}")
+            self.host.spawn(self._carry_out(action))
+
+    async def _carry_out(self, action: Action) -> None:
+        vehicle = self.host.vehicle
+        try:
+            match action:
+                case Action.RETURN:
+                    await self._return_or_hold()
+                case Action.LAND:
+                    await vehicle.land()
+                case Action.TERMINATE:
+                    await vehicle.terminate()
+                case _:
+                    await vehicle.hold()
+        except AnafiMavError as error:
+            self.host.text(Severity.ERROR, f"Fence: {action.value} failed: {error}")
+            self._watch.failed(self.host.clock.monotonic())
+        except asyncio.CancelledError:
+            self._watch.failed(self.host.clock.monotonic())
+            raise
+        else:
+            self._watch.done(vehicle.orders)
+
+    async def _return_or_hold(self) -> None:
+        try:
+            await self.host.vehicle.return_home()
+        except AnafiMavError as error:
+            self.host.text(Severity.ERROR, f"Fence: no return: {error}: hold")
+            await self.host.vehicle.hold()
+
+    # Telling.
+
+    def _status(self, vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
+        """FENCE_STATUS, while there is a fence in force or one was breached."""
+        watch = self._watch
+        if not watch.in_force and watch.breaches == 0:
+            return None
+        return dialect.MAVLink_fence_status_message(
+            int(watch.state is State.OUTSIDE),
+            min(watch.breaches, 0xFFFF),
+            watch.breach.value,
+            self._breach_ms,
+            dialect.FENCE_MITIGATE_NONE,
+        )
+
+    def _tell(self) -> None:
+        """Everybody hears of a breach at once."""
+        watch = self._watch
+        now = (watch.state is State.OUTSIDE, watch.breaches)
+        if now != self._told:
+            first, self._told = self._told is None, now
+            message = self._status(self.host.vehicle, self.host.times())
+            if message is not None and not first:
+                self.host.send(message)
+
+    # Settings.
+
+    def _enable(self, inbound: Inbound, command: Command) -> int:
+        """MAV_CMD_DO_FENCE_ENABLE: param1 0 disable, 1 enable, 2 disable the floor; param2 FENCE_TYPE bits, 0 all."""
+        what, types = command.params[:2]
+        watch = self._watch
+        wanted = EVERYTHING if math.isnan(types) or types == 0.0 else types
+        if what == DISABLE_FLOOR:
+            wanted = FLOOR
+        if what not in (DISABLE, ENABLE, DISABLE_FLOOR) or wanted not in range(1, EVERYTHING + 1):
+            self.host.complain("Fence: param1 is 0, 1 or 2, param2 bits of FENCE_TYPE")
+            return dialect.MAV_RESULT_DENIED
+        if what != ENABLE and wanted == CEILING:
+            self.host.complain("Fence: the drone always keeps to its ceiling; set another one instead")
+            return dialect.MAV_RESULT_DENIED
+        if what == ENABLE:
+            watch.enable(int(wanted))
+        else:
+            watch.disable(int(wanted))
+        self._look(self.host.clock.monotonic())
+        return dialect.MAV_RESULT_ACCEPTED
+
+    def _keep_settings(self) -> None:
+        """Whoever changed them: they are there when the gateway comes back."""
+        watch = self._watch
+        now = {"action": watch.action.name, "types": watch.types, "predict": watch.predict, "floor": watch.floor}
+        memory = self.host.memory
+        if memory.settings.get(KEY, _DEFAULTS) != now:
+            memory.settings[KEY] = now
+            self.host.spawn(self._save())
+
+    async def _save(self) -> None:
+        if (problem := await self.host.memory.save()) is not None:
+            self.host.complain(problem)
+
+    def _restore_settings(self) -> None:
+        """What is remembered; the defaults for what is not, or makes no sense."""
+        kept = self.host.memory.settings.get(KEY)
+        kept = {**_DEFAULTS, **kept} if isinstance(kept, dict) else _DEFAULTS
+        watch = self._watch
+        action = Action.__members__.get(str(kept["action"]), Action.HOLD)
+        if action is Action.TERMINATE and not self.host.vehicle.allow_kill:
+            self.host.text(Severity.WARNING, "Fence: its action was a motor cut, which is not allowed any more: hold")
+            action = Action.HOLD
+        watch.action = action
+        types, floor = kept["types"], kept["floor"]
+        watch.types = types if isinstance(types, int) and 0 <= types <= EVERYTHING else EVERYTHING
+        watch.predict = kept["predict"] is not False
+        watch.floor = float(floor) if isinstance(floor, int | float) and 0.0 <= floor <= HIGHEST_FLOOR else 0.0
+
+
+_DEFAULTS: Mapping[str, Any] = {"action": Action.HOLD.name, "types": EVERYTHING, "predict": True, "floor": 0.0}

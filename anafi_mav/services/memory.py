@@ -1,0 +1,192 @@
+"""What outlives the gateway: the plans of a drone and the gateway's own settings for it, one file per drone.
+
+A file is replaced as a whole, never half: whoever reads it finds the old or the new. One that cannot be read is put
+aside under another name and told of in one line; nothing of it is lost, and the drone begins with nothing.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import math
+import os
+import re
+import tempfile
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import msgspec
+from msgspec import Meta
+
+from anafi_mav.services.plan_items import PlanItem
+from anafi_mav.services.plan_transfer import MAX_ITEMS
+
+logger = logging.getLogger(__name__)
+
+VERSION = 1
+
+MAX_BYTES = 4 * 1024 * 1024
+"""Of a file: three full lists take 1.5 MB."""
+
+MAX_ASIDE = 100
+"""Unreadable files of one drone that are kept."""
+
+_SERIAL = re.compile(r"[A-Za-z0-9_-]{1,64}")
+"""Parrot's are 18 letters and digits. It comes from the drone and becomes the name of a file."""
+
+_WRITER = ThreadPoolExecutor(max_workers=1, thread_name_prefix="anafi-mav-memory")
+"""One thread, so that files are written in the order of their changes, and never by the event loop: a memory card may
+take a second."""
+
+Number = Annotated[float, Meta(ge=-3.5e38, le=3.5e38)] | Literal["inf", "-inf"] | None
+"""A single-precision number as JSON can have it; None is NaN."""
+
+
+class _Item(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """A `PlanItem` as it stands in the file."""
+
+    command: Annotated[int, Meta(ge=0, le=0xFFFF)]
+    frame: Annotated[int, Meta(ge=0, le=0xFF)]
+    params: tuple[Number, Number, Number, Number]
+    x: Annotated[int, Meta(ge=-(2**31), le=2**31 - 1)]
+    y: Annotated[int, Meta(ge=-(2**31), le=2**31 - 1)]
+    z: Number
+    autocontinue: Annotated[int, Meta(ge=0, le=0xFF)]
+    current: Annotated[int, Meta(ge=0, le=0xFF)]
+
+
+class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    version: int
+    serial: str
+    plans: dict[int, Annotated[list[_Item], Meta(max_length=MAX_ITEMS)]]
+    """By MAV_MISSION_TYPE."""
+    settings: dict[str, Any] = {}
+
+
+def _written(value: float) -> Number:
+    if math.isfinite(value):
+        return value
+    if math.isnan(value):
+        return None
+    return "inf" if value > 0 else "-inf"
+
+
+def _read(value: Number) -> float:
+    return math.nan if value is None else float(value)
+
+
+def _stored(item: PlanItem) -> _Item:
+    one, two, three, four = map(_written, item.params)
+    return _Item(
+        item.command, item.frame, (one, two, three, four), item.x, item.y, _written(item.z), item.autocontinue,
+        item.current,
+    )  # fmt: skip
+
+
+def _loaded(item: _Item) -> PlanItem:
+    one, two, three, four = map(_read, item.params)
+    return PlanItem(
+        item.command, item.frame, (one, two, three, four), item.x, item.y, _read(item.z), item.autocontinue,
+        item.current,
+    )  # fmt: skip
+
+
+class Memory:
+    """The file of one drone. `folder` None: nothing outlives the gateway."""
+
+    def __init__(self, folder: Path | None) -> None:
+        self.plans: dict[int, tuple[PlanItem, ...]] = {}
+        """By MAV_MISSION_TYPE."""
+        self.settings: dict[str, Any] = {}
+        """Plain JSON values by name. Who reads one looks whether it makes sense: people can write files."""
+        self._folder = folder
+        self._serial = ""
+
+    @property
+    def path(self) -> Path | None:
+        """The file; None where there is none."""
+        if self._folder is None or not _SERIAL.fullmatch(self._serial):
+            return None
+        return self._folder / f"{self._serial}.json"
+
+    def load(self, serial: str) -> str | None:
+        """Read what is remembered of a drone. Returns a line for people when that could not be read."""
+        self._serial = serial
+        self.plans, self.settings = {}, {}
+        path = self.path
+        if path is None:
+            return None
+        try:
+            with path.open("rb") as file:
+                data = file.read(MAX_BYTES + 1)
+            if len(data) > MAX_BYTES:
+                raise ValueError(f"it is larger than {MAX_BYTES} bytes")
+            content = msgspec.json.decode(data, type=_File)
+            if content.version != VERSION:
+                raise ValueError(f"it is of version {content.version}, not {VERSION}")
+            if content.serial != serial:
+                raise ValueError("it is of another drone")
+        except FileNotFoundError:
+            return None
+        except OSError as error:
+            self._serial = ""  # what cannot be read now may be another time: it must not be replaced
+            return f"{path}: {error.strerror}; the drone begins without its plans, and new ones are not kept"
+        except (ValueError, RecursionError) as error:
+            return f"{path}: {error}; put aside as {self._put_aside(path)}"
+        self.plans = {kind: tuple(map(_loaded, items)) for kind, items in content.plans.items()}
+        self.settings = content.settings
+        return None
+
+    def put(self, mission_type: int, items: Sequence[PlanItem]) -> None:
+        """Remember a plan; `save` writes it."""
+        self.plans[mission_type] = tuple(items)
+
+    async def save(self) -> str | None:
+        """Write the file as things are now. Returns a line for people when that failed."""
+        path = self.path
+        if path is None:
+            return None
+        plans = {kind: list(map(_stored, items)) for kind, items in self.plans.items() if items}
+        content = _File(VERSION, self._serial, plans, dict(self.settings))
+        try:
+            await asyncio.get_running_loop().run_in_executor(_WRITER, _write, path, msgspec.json.encode(content))
+        except OSError as error:
+            return f"{path}: {error.strerror}; what was changed is lost when the gateway ends"
+        return None
+
+    @staticmethod
+    def _put_aside(path: Path) -> str:
+        for number in range(1, MAX_ASIDE + 1):
+            aside = path.with_suffix(f".unreadable-{number}")
+            if not aside.exists():
+                try:
+                    path.rename(aside)
+                except OSError as error:
+                    return f"nothing, for {error.strerror}"
+                return aside.name
+        return "nothing, for there are too many of them"
+
+
+def _write(path: Path, data: bytes) -> None:
+    """Replace the file, so that it survives a power cut at any moment."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        Path(name).replace(path)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            Path(name).unlink()
+        raise
+    with contextlib.suppress(OSError):  # not every system can do this, and the file itself is complete
+        folder = os.open(path.parent, os.O_RDONLY)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)

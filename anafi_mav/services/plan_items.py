@@ -1,0 +1,153 @@
+"""One item of a mission, fence or rally list, verbatim as MAVLink carries it, and the messages that do.
+
+MISSION_ITEM_INT is the form that is kept. What comes as MISSION_ITEM, with places in single precision, becomes the
+integers that give the same floats back (MAVLink mission.md; conformance C5, D2).
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+import zlib
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import msgspec
+
+from anafi_mav.mavlink import dialect
+
+DEGREES = 1e7
+"""MISSION_ITEM_INT's x and y per degree, in items with a place."""
+
+UNSET = 2**31 - 1
+"""x and y that stand for "not set" (MAVLink mission.md); NaN in MISSION_ITEM."""
+
+AMSL_FRAMES = (dialect.MAV_FRAME_GLOBAL, dialect.MAV_FRAME_GLOBAL_INT)
+RELATIVE_FRAMES = (dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT, dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
+
+_CONTENT = struct.Struct("<HBB4fiif")
+
+
+@dataclass(frozen=True)
+class Fault:
+    """Why an item or a plan is not taken."""
+
+    result: int
+    """MAV_MISSION_RESULT."""
+    reason: str
+    """A clause for people, which names the item where it is one item's fault."""
+
+
+class PlanItem(msgspec.Struct, frozen=True):
+    """The fields of a MISSION_ITEM_INT that say something by themselves; its place in the list is its number."""
+
+    command: int
+    frame: int
+    params: tuple[float, float, float, float]
+    """param1..param4, NaN where they are not set."""
+    x: int
+    y: int
+    z: float
+    autocontinue: int = 1
+    current: int = 0
+
+    @property
+    def latitude(self) -> float:
+        """deg, of an item with a place."""
+        return self.x / DEGREES
+
+    @property
+    def longitude(self) -> float:
+        """deg, of an item with a place."""
+        return self.y / DEGREES
+
+    @property
+    def has_place(self) -> bool:
+        """x and y are degrees times 1e7, not plain numbers."""
+        return _has_place(self.command, self.frame)
+
+
+def _has_place(command: int, frame: int) -> bool:
+    entry = dialect.enums["MAV_CMD"].get(command)
+    return frame != dialect.MAV_FRAME_MISSION and bool(getattr(entry, "has_location", False))
+
+
+def _integer(value: float, scale: float) -> int | None:
+    """x or y of a MISSION_ITEM as MISSION_ITEM_INT has it; None when that cannot hold it."""
+    if math.isnan(value):
+        return UNSET
+    if not abs(value * scale) < UNSET:
+        return None
+    return round(value * scale)
+
+
+def item_of(message: Any) -> PlanItem | Fault:
+    """What a client sent as MISSION_ITEM or MISSION_ITEM_INT."""
+    x: int | None = message.x
+    y: int | None = message.y
+    if message.get_msgId() == dialect.MAVLINK_MSG_ID_MISSION_ITEM:
+        scale = DEGREES if _has_place(message.command, message.frame) else 1.0
+        x, y = _integer(message.x, scale), _integer(message.y, scale)
+    if x is None:
+        return Fault(dialect.MAV_MISSION_INVALID_PARAM5_X, f"{message.x:g} is no latitude")
+    if y is None:
+        return Fault(dialect.MAV_MISSION_INVALID_PARAM6_Y, f"{message.y:g} is no longitude")
+    params = (message.param1, message.param2, message.param3, message.param4)
+    return PlanItem(message.command, message.frame, params, x, y, message.z, message.autocontinue, message.current)
+
+
+def item_int(
+    item: PlanItem, seq: int, sysid: int, compid: int, mission_type: int
+) -> dialect.MAVLink_mission_item_int_message:
+    """MISSION_ITEM_INT to one client."""
+    return dialect.MAVLink_mission_item_int_message(
+        sysid, compid, seq, item.frame, item.command, item.current, item.autocontinue,
+        *item.params, item.x, item.y, item.z, mission_type,
+    )  # fmt: skip
+
+
+def item_float(
+    item: PlanItem, seq: int, sysid: int, compid: int, mission_type: int
+) -> dialect.MAVLink_mission_item_message:
+    """MISSION_ITEM to one client: places are as exact as single precision is, about 0.4 m."""
+    scale = DEGREES if item.has_place else 1.0
+    x, y = (math.nan if value == UNSET else value / scale for value in (item.x, item.y))
+    return dialect.MAVLink_mission_item_message(
+        sysid, compid, seq, item.frame, item.command, item.current, item.autocontinue,
+        *item.params, x, y, item.z, mission_type,
+    )  # fmt: skip
+
+
+def opaque_id(items: Iterable[PlanItem]) -> int:
+    """A number for a list of items: the same for the same list, another for another; 0 for an empty one.
+
+    A checksum, as PX4 does it, so that it outlives the gateway. Which item is current does not count: it is progress.
+    """
+    checksum, empty = 0, True
+    for item in items:
+        empty = False
+        checksum = zlib.crc32(
+            _CONTENT.pack(item.command, item.frame, item.autocontinue, *item.params, item.x, item.y, item.z), checksum
+        )
+    return 0 if empty else checksum or 1
+
+
+def place_fault(item: PlanItem) -> Fault | None:
+    """What is wrong with the place of an item that needs one."""
+    if item.frame not in (*AMSL_FRAMES, *RELATIVE_FRAMES):
+        return Fault(dialect.MAV_MISSION_UNSUPPORTED_FRAME, f"frame {item.frame} is neither AMSL nor above home")
+    if not abs(item.latitude) <= 90.0:
+        return Fault(dialect.MAV_MISSION_INVALID_PARAM5_X, "its latitude is none")
+    if not abs(item.longitude) <= 180.0:
+        return Fault(dialect.MAV_MISSION_INVALID_PARAM6_Y, "its longitude is none")
+    if item.x == 0 and item.y == 0:
+        return Fault(dialect.MAV_MISSION_INVALID_PARAM5_X, "its latitude and longitude are both 0")
+    return None
+
+
+def height_ato(item: PlanItem, takeoff_amsl: float | None) -> float | None:
+    """Height of an item above the take-off point, m; None for an AMSL height while that point's own is not known."""
+    if item.frame in RELATIVE_FRAMES:
+        return item.z
+    return None if takeoff_amsl is None else item.z - takeoff_amsl

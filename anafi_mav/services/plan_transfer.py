@@ -1,0 +1,483 @@
+"""The transfer of one list of items, both ways, as a state machine without I/O: a mission, a fence or rally points.
+
+A client's upload replaces the plan as a whole, once all of it has arrived, was found good and is stored; whatever goes
+wrong before leaves the old plan as it was. A download is answered from the plan as it was when the client asked for
+its list. `PlanDesk` (plan_desk) holds the three lists and sorts the messages.
+
+Rules: MAVLink mission.md; conformance A7, C5, D1, items 46, 61-72.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, TypeAlias
+
+from anafi_mav.mavlink import dialect
+from anafi_mav.services.flavours import Flavour
+from anafi_mav.services.plan_items import Fault, PlanItem, item_float, item_int, item_of, opaque_id
+from anafi_mav.services.statustext import Severity
+
+MAX_ITEMS = 5000
+"""Items of a list: more than any client sends, small enough to be checked and stored at once."""
+
+REQUEST_EVERY = 0.25
+"""s after which the expected item is requested again: QGroundControl gives up after 1.5 s without a word."""
+
+MAX_TRIES = 20
+"""Requests of one item. With a quarter lost each way an item fails to come 20 times in a row once in 15 million."""
+
+PATIENCE = 1.5
+"""s of silence after which a client no longer keeps others away (the "1500 ms others" of conformance C5)."""
+
+RECENT = 5.0
+"""s after which a transfer is history: what comes late of it is answered as if it had never been."""
+
+ECHOES = 5
+"""How often the final acknowledgement is repeated, `REQUEST_EVERY` apart, after a transfer that lost something:
+clients wait 1.5 to 2.5 s for it and do not ask. One that lost nothing is acknowledged once, for a repetition could
+meet the client's next transfer."""
+
+MAX_DOWNLOADS = 16
+"""Clients whose download is remembered; an address is easily made up."""
+
+
+class State(enum.Enum):
+    IDLE = "nobody uploads"
+    RECEIVING = "a client uploads"
+    STORING = "a whole plan, or none, is being stored"
+
+
+class Event(enum.Enum):
+    BEGIN = "MISSION_COUNT above 0, or MISSION_WRITE_PARTIAL_LIST"
+    ITEM = "the expected item"
+    LAST_ITEM = "the last expected item"
+    CLEAR = "MISSION_CLEAR_ALL, or MISSION_COUNT of 0"
+    REFUSE = "an item or the plan is not good"
+    CANCEL = "the client gives up, or its channel is gone"
+    SILENCE = "the item was requested in vain"
+    STORED = "stored"
+
+
+TRANSITIONS: dict[State, dict[Event, State]] = {
+    State.IDLE: {Event.BEGIN: State.RECEIVING, Event.CLEAR: State.STORING},
+    State.RECEIVING: {
+        Event.BEGIN: State.RECEIVING,
+        Event.ITEM: State.RECEIVING,
+        Event.LAST_ITEM: State.STORING,
+        Event.CLEAR: State.STORING,
+        Event.REFUSE: State.IDLE,
+        Event.CANCEL: State.IDLE,
+        Event.SILENCE: State.IDLE,
+    },
+    State.STORING: {Event.STORED: State.IDLE},
+}
+"""What is not here does not happen: `PlanTransfer` ignores, refuses or defers it."""
+
+
+@dataclass(frozen=True)
+class Peer:
+    """A client, told apart from others by `client` and addressed exactly (conformance R11)."""
+
+    client: Hashable
+    sysid: int
+    compid: int
+    flavour: Flavour
+
+
+@dataclass(frozen=True)
+class Reply:
+    """Send this to one client."""
+
+    message: dialect.MAVLink_message
+    peer: Peer
+
+
+@dataclass(frozen=True)
+class Commit:
+    """Store these lists, then say so to `PlanDesk.stored`."""
+
+    plans: dict[int, tuple[PlanItem, ...]]
+    """By MAV_MISSION_TYPE."""
+    peer: Peer
+    mission_type: int
+    """Of the acknowledgement: a list's own, or that of all of them."""
+
+
+@dataclass(frozen=True)
+class Changed:
+    """Another plan is in force."""
+
+    mission_type: int
+
+
+@dataclass(frozen=True)
+class Say:
+    """A text to everybody."""
+
+    severity: Severity
+    text: str
+
+
+Effect: TypeAlias = Reply | Commit | Changed | Say
+
+
+class PlanKind:
+    """What one of the three lists is about: which items it takes. Subclasses override what differs."""
+
+    mission_type: int
+    name: str
+    """For people: "fence"."""
+    capacity = MAX_ITEMS
+    refusal: Fault | None = None
+    """Why no plan of this kind is taken at all; None: they are."""
+
+    def check_item(self, item: PlanItem) -> Fault | None:
+        """What is wrong with one item by itself."""
+        return None
+
+    def check_plan(self, items: Sequence[PlanItem]) -> Fault | None:
+        """What is wrong with good items together."""
+        return None
+
+    def shown(self, items: Sequence[PlanItem], flavour: Flavour) -> Sequence[PlanItem]:
+        """The list as clients of this flavour see it."""
+        return items
+
+    def taken(self, items: Sequence[PlanItem], flavour: Flavour) -> Sequence[PlanItem]:
+        """The plan in a list that a client of this flavour sent; the inverse of `shown`."""
+        return items
+
+
+@dataclass
+class _Upload:
+    peer: Peer
+    items: list[PlanItem]
+    """The list as it will be: for a partial one with the items that stay."""
+    expected: int
+    last: int
+    heard: float
+    due: float
+    """When to request the expected item again."""
+    tries: int = 0
+    as_float: bool = False
+    """The form of the newest request, which sticks while it is answered."""
+    lossy: bool = False
+    """Something had to be said twice."""
+
+
+@dataclass
+class _Download:
+    items: Sequence[PlanItem]
+    asked: float
+    left: set[int] = field(default_factory=set)
+    """Items that were not asked for yet."""
+
+
+@dataclass
+class _Done:
+    """A transfer that ended with an acknowledgement."""
+
+    peer: Peer
+    at: float
+    last: int
+    """The last item it brought; -1 for none."""
+    echoes: int = 0
+    due: float = 0.0
+
+
+class PlanTransfer:
+    """One list and the transfers of it. Every method returns what is to be done; messages of peers never raise."""
+
+    def __init__(self, kind: PlanKind) -> None:
+        self.kind = kind
+        self.state = State.IDLE
+        self.items: tuple[PlanItem, ...] = ()
+        self.opaque_id = 0
+        self._upload: _Upload | None = None
+        self._downloads: dict[Hashable, _Download] = {}
+        self._done: _Done | None = None
+        self._committing: _Done | None = None
+
+    def put(self, items: Sequence[PlanItem]) -> None:
+        """The plan in force, without a transfer."""
+        self.items, self.opaque_id = tuple(items), opaque_id(items)
+
+    def reset(self) -> None:
+        """No transfer is under way any more; the plan stays."""
+        self.state = State.IDLE
+        self._upload = self._done = self._committing = None
+        self._downloads.clear()
+
+    # Uploads.
+
+    def count(self, count: int, peer: Peer, now: float) -> list[Effect]:
+        """MISSION_COUNT: an upload of so many items begins, or the list becomes empty."""
+        if count == 0:
+            return self.clear(peer, now)
+        if self.kind.refusal is not None:
+            return self._deny(self.kind.refusal, peer)
+        if count > self.kind.capacity:
+            return self._deny(
+                Fault(dialect.MAV_MISSION_NO_SPACE, f"{count} items are more than {self.kind.capacity}"), peer
+            )
+        return self._begin(_Upload(peer, [], 0, count - 1, now, now), now)
+
+    def partial(self, first: int, last: int, peer: Peer, now: float) -> list[Effect]:
+        """MISSION_WRITE_PARTIAL_LIST: some items are replaced, or one follows the last. ArduPilot has it, PX4 not.
+
+        MAVProxy names as `last` the one after it; it has no such item and never sends it.
+        """
+        if not peer.flavour.partial_plans:
+            return [self._ack(peer, dialect.MAV_MISSION_UNSUPPORTED)]
+        if self.kind.refusal is not None:
+            return self._deny(self.kind.refusal, peer)
+        items = list(self.kind.shown(self.items, peer.flavour))
+        if last == len(items) > first:
+            last -= 1
+        if not 0 <= first <= last < max(len(items), first + 1) or first > len(items):
+            fault = Fault(dialect.MAV_MISSION_INVALID_SEQUENCE, f"there are no items {first} to {last} to replace")
+            return self._deny(fault, peer)
+        if first >= self.kind.capacity:
+            return self._deny(Fault(dialect.MAV_MISSION_NO_SPACE, f"it has {first} items already"), peer)
+        return self._begin(_Upload(peer, items, first, last, now, now), now)
+
+    def _begin(self, upload: _Upload, now: float) -> list[Effect]:
+        if self._busy(upload.peer, now):
+            return self._occupied(upload.peer)
+        effects: list[Effect] = []
+        old = self._upload
+        if old is not None and old.peer.client == upload.peer.client:
+            upload.as_float = old.as_float
+            upload.lossy = True  # it says the same again, or begins anew because something was lost
+        elif old is not None:
+            effects += [self._ack(old.peer, dialect.MAV_MISSION_OPERATION_CANCELLED)]
+        else:
+            upload.as_float = upload.peer.flavour.float_plans
+        self._downloads.pop(upload.peer.client, None)
+        self._forget_done(upload.peer)
+        self.state = TRANSITIONS[self.state][Event.BEGIN]
+        self._upload = upload
+        return [*effects, self._request(upload, now)]
+
+    def item(self, message: Any, peer: Peer, now: float) -> list[Effect]:
+        """MISSION_ITEM or MISSION_ITEM_INT, in whichever form it was requested.
+
+        One that is not expected is ignored: the expected one has been requested and will be again. Answering copies
+        with requests would double the traffic with every copy.
+        """
+        upload = self._upload
+        if upload is None:
+            return self._late_item(message.seq, peer, now)
+        if peer.client != upload.peer.client:
+            return [self._ack(peer, dialect.MAV_MISSION_DENIED)]
+        upload.heard = now
+        if message.seq != upload.expected:
+            upload.lossy = True
+            return []
+        item = item_of(message)
+        fault = item if isinstance(item, Fault) else self.kind.check_item(item)
+        if fault is not None:
+            return self._refuse(Fault(fault.result, f"item {message.seq}: {fault.reason}"))
+        assert isinstance(item, PlanItem)
+        upload.items[upload.expected : upload.expected + 1] = [item]
+        if upload.expected < upload.last:
+            upload.expected += 1
+            upload.tries = 0
+            self.state = TRANSITIONS[self.state][Event.ITEM]
+            return [self._request(upload, now)]
+        items = tuple(self.kind.taken(upload.items, peer.flavour))
+        fault = self.kind.check_plan(items)
+        if fault is not None:
+            return self._refuse(fault)
+        self.state = TRANSITIONS[self.state][Event.LAST_ITEM]
+        self._upload = None
+        self._committing = _Done(peer, now, upload.last, ECHOES if upload.lossy else 0)
+        return [Commit({self.kind.mission_type: items}, peer, self.kind.mission_type)]
+
+    def clear(self, peer: Peer, now: float) -> list[Effect]:
+        """MISSION_CLEAR_ALL, or MISSION_COUNT of 0: acknowledged also when there is nothing to clear."""
+        if not self.may_clear(peer, now):
+            return self._occupied(peer)
+        self.begin_clear(peer, now)
+        return [Commit({self.kind.mission_type: ()}, peer, self.kind.mission_type)]
+
+    def may_clear(self, peer: Peer, now: float) -> bool:
+        """Nobody else transfers this list."""
+        return not self._busy(peer, now)
+
+    def begin_clear(self, peer: Peer, now: float) -> None:
+        """The list becomes empty with the commit that the caller makes."""
+        self._upload = None
+        self._downloads.pop(peer.client, None)
+        self._forget_done(peer)
+        self.state = TRANSITIONS[self.state][Event.CLEAR]
+        self._committing = _Done(peer, now, -1)
+
+    def stored(self, items: tuple[PlanItem, ...], now: float, fault: Fault | None = None) -> list[Effect]:
+        """What a `Commit` asked for is done, or cannot be done. The acknowledgement is the caller's to send."""
+        if self.state is not State.STORING:
+            return []  # the link was lost meanwhile
+        self.state = TRANSITIONS[self.state][Event.STORED]
+        done, self._committing = self._committing, None
+        if fault is not None:
+            return []
+        self.put(items)
+        if done is not None:
+            done.at, done.due = now, now + REQUEST_EVERY
+            self._done = done
+        return [Changed(self.kind.mission_type)]
+
+    def cancel(self, peer: Peer) -> list[Effect]:
+        """MISSION_ACK from a client: it has all it asked for, or gives its upload up."""
+        self._downloads.pop(peer.client, None)
+        self._forget_done(peer)
+        if self._upload is not None and self._upload.peer.client == peer.client:
+            self._end(Event.CANCEL)
+        return []
+
+    def leave(self, gone: Callable[[Hashable], bool]) -> None:
+        """Some clients' channel is gone: whatever they transferred ends."""
+        self._downloads = {client: download for client, download in self._downloads.items() if not gone(client)}
+        if self._upload is not None and gone(self._upload.peer.client):
+            self._end(Event.CANCEL)
+        if self._done is not None and gone(self._done.peer.client):
+            self._done = None
+
+    # Downloads.
+
+    def request_list(self, peer: Peer, now: float) -> list[Effect]:
+        """MISSION_REQUEST_LIST: how many items there are. Who asks while it uploads has given its upload up."""
+        self.cancel(peer)
+        items = self.kind.shown(self.items, peer.flavour)
+        if items:
+            while len(self._downloads) >= MAX_DOWNLOADS:
+                del self._downloads[next(iter(self._downloads))]
+            self._downloads[peer.client] = _Download(items, now, set(range(len(items))))
+        return [
+            Reply(
+                dialect.MAVLink_mission_count_message(
+                    peer.sysid, peer.compid, len(items), self.kind.mission_type, self.opaque_id
+                ),
+                peer,
+            )
+        ]
+
+    def request(self, seq: int, as_float: bool, peer: Peer, now: float) -> list[Effect]:
+        """MISSION_REQUEST_INT or MISSION_REQUEST: in any order, again, and several at once."""
+        self._forget_done(peer)
+        download = self._downloads.get(peer.client)
+        if download is not None and now - download.asked > RECENT:
+            del self._downloads[peer.client]
+            download = None
+        if download is None:
+            items = self.kind.shown(self.items, peer.flavour)
+        else:
+            items = download.items
+            download.asked = now
+            download.left.discard(seq)
+        if seq >= len(items):
+            return [self._ack(peer, dialect.MAV_MISSION_INVALID_SEQUENCE)]
+        build = item_float if as_float else item_int
+        return [Reply(build(items[seq], seq, peer.sysid, peer.compid, self.kind.mission_type), peer)]
+
+    # Time.
+
+    def deadline(self) -> float | None:
+        """When `expire` has something to do; None: never."""
+        if self._upload is not None:
+            return self._upload.due
+        return self._done.due if self._done is not None and self._done.echoes > 0 else None
+
+    def expire(self, now: float) -> list[Effect]:
+        """Time has passed."""
+        upload, done = self._upload, self._done
+        if upload is not None and now >= upload.due:
+            upload.lossy = True
+            if upload.tries >= MAX_TRIES:
+                self._end(Event.SILENCE)
+                return [
+                    self._ack(upload.peer, dialect.MAV_MISSION_OPERATION_CANCELLED),
+                    Say(Severity.WARNING, f"{self.kind.name.capitalize()} upload given up: item {upload.expected} "
+                        "does not come"),
+                ]  # fmt: skip
+            return [self._request(upload, now)]
+        if upload is None and done is not None and done.echoes > 0 and now >= done.due:
+            done.echoes -= 1
+            done.due = now + REQUEST_EVERY
+            return [self._ack(done.peer, dialect.MAV_MISSION_ACCEPTED)]
+        return []
+
+    # Machinery.
+
+    def _request(self, upload: _Upload, now: float) -> Reply:
+        """Ask for the expected item.
+
+        MAVSDK knows MISSION_REQUEST_INT alone, dronekit MISSION_REQUEST alone. A flavour says which one its clients
+        know; a client of component 0, which is pymavlink's default, may be either, so each try takes the other form.
+        """
+        if upload.tries > 0 and upload.peer.compid == 0 and not upload.peer.flavour.float_plans:
+            upload.as_float = not upload.as_float
+        upload.tries += 1
+        upload.due = now + REQUEST_EVERY
+        kind = (
+            dialect.MAVLink_mission_request_message if upload.as_float else dialect.MAVLink_mission_request_int_message
+        )
+        peer = upload.peer
+        return Reply(kind(peer.sysid, peer.compid, upload.expected, self.kind.mission_type), peer)
+
+    def _ack(self, peer: Peer, result: int) -> Reply:
+        identity = self.opaque_id if result == dialect.MAV_MISSION_ACCEPTED else 0
+        return Reply(
+            dialect.MAVLink_mission_ack_message(peer.sysid, peer.compid, result, self.kind.mission_type, identity), peer
+        )
+
+    def _busy(self, peer: Peer, now: float) -> bool:
+        """Somebody else transfers this list, and was heard of late."""
+        upload = self._upload
+        if upload is not None and upload.peer.client != peer.client and now - upload.heard < PATIENCE:
+            return True
+        return any(
+            client != peer.client and download.left and now - download.asked < PATIENCE
+            for client, download in self._downloads.items()
+        )
+
+    def _occupied(self, peer: Peer) -> list[Effect]:
+        return self._deny(Fault(dialect.MAV_MISSION_DENIED, "another client transfers it just now"), peer)
+
+    def _deny(self, fault: Fault, peer: Peer) -> list[Effect]:
+        """No transfer begins."""
+        text = f"{self.kind.name.capitalize()} refused: {fault.reason}"
+        return [self._ack(peer, fault.result), Say(Severity.WARNING, text)]
+
+    def _refuse(self, fault: Fault) -> list[Effect]:
+        """The upload ends, the old plan stays."""
+        assert self._upload is not None
+        peer = self._upload.peer
+        self._end(Event.REFUSE)
+        return self._deny(fault, peer)
+
+    def _end(self, event: Event) -> None:
+        self.state = TRANSITIONS[self.state][event]
+        upload, self._upload = self._upload, None
+        if upload is not None:
+            self._done = _Done(upload.peer, upload.heard, -1)
+
+    def _late_item(self, seq: int, peer: Peer, now: float) -> list[Effect]:
+        """An item while nobody uploads: a copy of one that came, or nonsense."""
+        committing, done = self._committing, self._done
+        if committing is not None and committing.peer.client == peer.client:
+            return []
+        if done is None or done.peer.client != peer.client or now - done.at > RECENT:
+            return [self._ack(peer, dialect.MAV_MISSION_ERROR)]
+        if seq != done.last:
+            return []
+        return [
+            self._ack(peer, dialect.MAV_MISSION_ACCEPTED)
+        ]  # the client has not heard it: it says its last item again
+
+    def _forget_done(self, peer: Peer) -> None:
+        """The client goes on to something else: nothing late of its last transfer must meet it."""
+        if self._done is not None and self._done.peer.client == peer.client:
+            self._done = None

@@ -1,0 +1,160 @@
+"""Rally points in use: while the drone flies, the chosen one is its custom home, so that a return needs no gateway.
+
+Only where RTL_TYPE says so. What the drone preferred before comes back when it has landed, and when the rally points
+are gone. A custom home that somebody else chose is left alone.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+
+from anafi_mav.drone.events import RthHomeType
+from anafi_mav.errors import AnafiMavError
+from anafi_mav.services.rally import DEFAULT_TYPE, RTL_TYPES, RallyPoint, RallyPoints, Return
+from anafi_mav.services.refusal import Refused
+from anafi_mav.services.service import Host, Service
+from anafi_mav.services.statustext import Severity
+
+LOOK_EVERY = 1.0
+"""s between two choices: the drone's place comes as often."""
+
+REJECTED_FOR = 30.0
+"""s for which a point that the drone did not accept is not proposed again: it may be too far away only for now."""
+
+KEY = "rally"
+"""In the drone's memory: RTL_TYPE."""
+
+MIRROR = "rally_home"
+"""In the drone's memory: the home type that the drone preferred before a rally point became its home."""
+
+
+async def set_rtl_type(host: Host, number: int) -> None:
+    """RTL_TYPE. Raises `Refused` for a number that PX4 does not have."""
+    if number not in RTL_TYPES:
+        raise Refused(f"Refused: RTL_TYPE is 0 to {max(RTL_TYPES)}", lasting=True)
+    host.vehicle.rally.rtl_type = number
+
+
+class RallyService(Service):
+    """Where a return ends, as far as rally points decide it."""
+
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self._looked = -math.inf
+        self._task: asyncio.Task[None] | None = None
+        self._chosen: RallyPoint | None = None
+        """The drone's custom home by our doing."""
+        self._rejected: dict[RallyPoint, float] = {}
+        """Until when they are not proposed again."""
+
+    @property
+    def _rally(self) -> RallyPoints:
+        return self.host.vehicle.rally
+
+    def link_up(self) -> None:
+        kept = self.host.memory.settings.get(KEY)
+        self._rally.rtl_type = kept if isinstance(kept, int) and kept in RTL_TYPES else DEFAULT_TYPE
+        self._chosen = None
+
+    def link_down(self) -> None:
+        self._task = self._chosen = None
+        self._rejected.clear()
+        self._looked = -math.inf
+
+    def tick(self, now: float) -> None:
+        if now - self._looked < LOOK_EVERY:
+            return
+        self._looked = now
+        self._keep_setting()
+        if self._task is not None and not self._task.done():
+            return
+        vehicle, state = self.host.vehicle, self.host.drone.home.state
+        if vehicle.returning or not (vehicle.in_air or vehicle.on_ground):
+            return  # a return under way, or a landing, keeps its end
+        chosen = self._choose(now) if vehicle.in_air else None
+        if chosen is not None:
+            if chosen == self._chosen or not self._may_choose(state.preferred_type):
+                return
+            self._task = self.host.spawn(self._use(chosen, state.preferred_type, now))
+        elif self._before() is not None:
+            self._task = self.host.spawn(self._restore())
+
+    def _choose(self, now: float) -> RallyPoint | None:
+        vehicle = self.host.vehicle
+        if self._rally.purpose is Return.HOME or not self._rally.items or vehicle.place is None:
+            return None
+        takeoff = self.host.drone.home.state.takeoff_location
+        home = None if takeoff is None else (takeoff.latitude, takeoff.longitude)
+        self._rejected = {point: until for point, until in self._rejected.items() if now < until}
+        zones = vehicle.fence.zones
+
+        def usable(point: RallyPoint) -> bool:
+            inside = zones.margin((point.latitude, point.longitude), home).metres >= 0.0
+            return inside and point not in self._rejected
+
+        return self._rally.choose(vehicle.place.point, home, vehicle.height.takeoff_amsl, self._chosen, usable)
+
+    def _may_choose(self, preferred: RthHomeType | None) -> bool:
+        """The drone can have a custom home, and has none that somebody else chose."""
+        types = self.host.drone.home.state.types
+        if preferred is None or types is None or RthHomeType.CUSTOM not in types:
+            return False
+        if preferred == RthHomeType.CUSTOM and self._before() is None:
+            self.host.complain("Rally points not used: the drone returns to the home that was set")
+            return False
+        return True
+
+    async def _use(self, point: RallyPoint, preferred: RthHomeType | None, now: float) -> None:
+        home = self.host.drone.home
+        try:
+            if self._before() is None:
+                assert preferred is not None
+                await self._remember(preferred.name)
+            await home.set_preferred_type(RthHomeType.CUSTOM)
+            await home.set_custom_location(point.latitude, point.longitude, point.ato)
+        except AnafiMavError as error:
+            self._rejected[point] = now + REJECTED_FOR
+            self._chosen = None
+            self.host.text(Severity.WARNING, f"Rally point {point.number} not used: {error}")
+        else:
+            self._chosen = point
+            self.host.text(Severity.NOTICE, f"Returns end at rally point {point.number}")
+
+    async def _restore(self) -> None:
+        home = self.host.drone.home
+        before = self._before()
+        assert before is not None
+        self._chosen = None
+        try:
+            if home.state.preferred_type == RthHomeType.CUSTOM:
+                await home.set_preferred_type(before)
+        except AnafiMavError as error:
+            self.host.complain(f"The drone's home type could not be put back: {error}")
+            return
+        await self._remember(None)
+        if not self.host.vehicle.on_ground:
+            self.host.text(Severity.NOTICE, "Returns end at home")
+
+    def _before(self) -> RthHomeType | None:
+        """What the drone preferred before we changed it; None: we have not."""
+        name = self.host.memory.settings.get(MIRROR)
+        return RthHomeType.__members__.get(name) if isinstance(name, str) else None
+
+    async def _remember(self, name: str | None) -> None:
+        settings = self.host.memory.settings
+        if name is None:
+            settings.pop(MIRROR, None)
+        else:
+            settings[MIRROR] = name
+        await self._save()
+
+    def _keep_setting(self) -> None:
+        settings = self.host.memory.settings
+        if settings.get(KEY, DEFAULT_TYPE) != self._rally.rtl_type:
+            settings[KEY] = self._rally.rtl_type
+            self.host.spawn(self._save())
+
+    async def _save(self) -> None:
+        if (problem := await self.host.memory.save()) is not None:
+            self.host.complain(problem)
