@@ -28,6 +28,7 @@ from anafi_mav.arsdk.rtsp import DEFAULT_PORT as RTSP_PORT
 from anafi_mav.arsdk.wire import Message, UnknownMessage
 from anafi_mav.clock import Clock, SystemClock
 from anafi_mav.drone.alerts import Alerts, spoken, takeoff_blockers
+from anafi_mav.drone.animations import Animations
 from anafi_mav.drone.battery import Battery
 from anafi_mav.drone.calibration import Calibration
 from anafi_mav.drone.camera import Camera
@@ -111,6 +112,7 @@ class Drone:
         self._rtsp_port = rtsp_port
         self._rest = Rest(address, http_port, local_address, interface)
         self.alerts = Alerts()
+        self.animations = Animations(self._commander)
         self.battery = Battery()
         self.calibration = Calibration(self._commander)
         self.camera = Camera(self._commander)
@@ -132,6 +134,7 @@ class Drone:
         self._commander.gate = self._allows
         self._elements: tuple[Element[Any], ...] = (
             self.alerts,
+            self.animations,
             self.battery,
             self.calibration,
             self.camera,

@@ -4,6 +4,9 @@ They are Parrot's, declared in `anafi_mav.arsdk.messages`; who works with a `Dro
 know the wire.
 """
 
+from anafi_mav.arsdk.messages.animation import PlayMode as PlayMode
+from anafi_mav.arsdk.messages.animation import Type as AnimationType
+from anafi_mav.arsdk.messages.animation import VertigoFinishAction as VertigoFinishAction
 from anafi_mav.arsdk.messages.ardrone3 import AltitudeAboveGroundChanged as AltitudeAboveGroundChanged
 from anafi_mav.arsdk.messages.ardrone3 import AltitudeChanged as AltitudeChanged
 from anafi_mav.arsdk.messages.ardrone3 import AttitudeChanged as AttitudeChanged
@@ -95,6 +98,7 @@ __all__ = [
     "AlertLevel",
     "AltitudeAboveGroundChanged",
     "AltitudeChanged",
+    "AnimationType",
     "AttitudeChanged",
     "Axis",
     "BankedTurnChanged",
@@ -152,6 +156,7 @@ __all__ = [
     "PilotingSource",
     "PilotingStyleStyle",
     "PlayError",
+    "PlayMode",
     "PlayingState",
     "PoiMode",
     "PoiStatus",
@@ -175,6 +180,7 @@ __all__ = [
     "TakeoffLocation",
     "ThermalMode",
     "ThermalSensitivity",
+    "VertigoFinishAction",
     "VibrationLevelChanged",
     "WarningLevel",
     "WindStateChanged",

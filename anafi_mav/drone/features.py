@@ -50,6 +50,7 @@ class Feature(enum.Enum):
     PRECISE_HOME = "precise return home"
     POI = "points of interest"
     FOLLOW_ME = "follow me"
+    ANIMATIONS = "animations"
     OBSTACLE_AVOIDANCE = "obstacle avoidance"
     PILOTING_STYLE = "piloting style"
     MAX_HORIZONTAL_SPEED = "maximum horizontal speed"
@@ -92,6 +93,7 @@ def features(drone: Drone) -> Mapping[Feature, Support]:
         Feature.PRECISE_HOME: _has(home.precise_mode, home.precise != PreciseHomeState.UNAVAILABLE),
         Feature.POI: _has(drone.poi.state.status, drone.poi.state.status != PoiStatus.UNAVAILABLE),
         Feature.FOLLOW_ME: _has(drone.follow_me.state.mode, not all(drone.follow_me.state.missing.values())),
+        Feature.ANIMATIONS: _has(drone.animations.state.running, bool(drone.animations.state.available)),
         Feature.OBSTACLE_AVOIDANCE: _has(
             piloting.avoidance,
             piloting.avoidance is not None and piloting.avoidance.availability != AvoidanceAvailability.UNAVAILABLE,

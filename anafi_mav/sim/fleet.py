@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import random
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -21,6 +22,10 @@ TURN, FAST_TURN = 0.01, STEP
 MAX_CATCH_UP = 0.25
 """s of the machine's clock that one turn makes up for; what is beyond (a stopped process, a machine too slow for
 the fleet) is lost to the simulated world, whose drones must not leap."""
+
+MAX_TURN = 2
+"""Times the usual length of a turn that one turn may be. A world that is behind catches up in pieces and looks at its
+sockets in between: on a busy machine its drones would else be deaf for longer than a controller waits."""
 
 LOG_CAPACITY = 40_000
 """Log entries kept in memory for the whole fleet (about 50 MB): an hour of one drone, poses ten times a second."""
@@ -53,6 +58,7 @@ class Simulator:
             raise ConfigError("speed", f"expected more than 0 and at most 100, got {speed:g}")
         self._speed = speed
         self._period = TURN if all(spec.telemetry_rate <= 0.5 / TURN for spec in specs) else FAST_TURN
+        self._most_steps = math.ceil(MAX_TURN * self._period * speed / STEP)
         self._motion = Motion([MODELS[spec.model].airframe for spec in specs])
         self._file = None if log is None else LogFile(log)
         self._task: asyncio.Task[None] | None = None
@@ -119,14 +125,14 @@ class Simulator:
         last = _clock()
         debt = 0.0
         while True:
-            await asyncio.sleep(max(0.0, last + self._period - _clock()))
+            await asyncio.sleep(0.0 if debt >= STEP else max(0.0, last + self._period - _clock()))
             now = _clock()
             debt += (now - last) * self._speed
             last = now
             if debt > MAX_CATCH_UP * self._speed:
                 self.lost_time += debt - MAX_CATCH_UP * self._speed
                 debt = MAX_CATCH_UP * self._speed
-            steps = int(debt / STEP)
+            steps = min(int(debt / STEP), self._most_steps)
             debt -= steps * STEP
             self._turn(now, steps)
 

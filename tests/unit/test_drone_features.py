@@ -20,6 +20,7 @@ EVERYWHERE = {
     Feature.PRECISE_HOME,
     Feature.POI,
     Feature.FOLLOW_ME,
+    Feature.ANIMATIONS,
     Feature.PILOTING_STYLE,
     Feature.GEOFENCE,
     Feature.MAGNETOMETER_CALIBRATION,
@@ -51,6 +52,8 @@ async def test_the_models(model: str) -> None:
         assert Support.UNKNOWN not in drone.features.values()
         # It stands on the ground: nothing to look at from there.
         assert drone.features[Feature.POI] is Support.UNAVAILABLE
+        assert drone.features[Feature.FOLLOW_ME] is Support.UNAVAILABLE
+        assert drone.features[Feature.ANIMATIONS] is Support.UNAVAILABLE
         assert drone.features[Feature.CAMERA] is Support.AVAILABLE
         await drone.close()
         assert set(drone.features.values()) == {Support.UNKNOWN}

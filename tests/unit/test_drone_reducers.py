@@ -16,6 +16,7 @@ from anafi_mav.arsdk.messages import gimbal
 from anafi_mav.arsdk.messages.proto import camera2 as new
 from anafi_mav.arsdk.protobuf import Kind, Map, Record, record_fields
 from anafi_mav.arsdk.wire import Message, OpenEnum
+from anafi_mav.drone.animations import Animations
 from anafi_mav.drone.calibration import Calibration
 from anafi_mav.drone.camera import Camera
 from anafi_mav.drone.camera_state import MAX_OPTIONS, CamerasState
@@ -32,6 +33,7 @@ from anafi_mav.drone.storage import Storage
 from anafi_mav.drone.thermal import Thermal
 
 ELEMENTS: list[type[Element[Any]]] = [
+    Animations,
     Calibration,
     Camera,
     FlightPlan,
