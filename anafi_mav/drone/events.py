@@ -7,6 +7,7 @@ know the wire.
 from anafi_mav.arsdk.messages.animation import PlayMode as PlayMode
 from anafi_mav.arsdk.messages.animation import Type as AnimationType
 from anafi_mav.arsdk.messages.animation import VertigoFinishAction as VertigoFinishAction
+from anafi_mav.arsdk.messages.ardrone3 import AlertState as AlertState
 from anafi_mav.arsdk.messages.ardrone3 import AltitudeAboveGroundChanged as AltitudeAboveGroundChanged
 from anafi_mav.arsdk.messages.ardrone3 import AltitudeChanged as AltitudeChanged
 from anafi_mav.arsdk.messages.ardrone3 import AttitudeChanged as AttitudeChanged
@@ -73,12 +74,14 @@ from anafi_mav.arsdk.messages.precise_home import Mode as PreciseHomeModeChanged
 from anafi_mav.arsdk.messages.precise_home import PreciseHomeMode as PreciseHomeMode
 from anafi_mav.arsdk.messages.precise_home import PreciseHomeState as PreciseHomeState
 from anafi_mav.arsdk.messages.rth import AutoTriggerMode as ReturnAutoTriggerMode
+from anafi_mav.arsdk.messages.rth import AutoTriggerReason as AutoTriggerReason
 from anafi_mav.arsdk.messages.rth import Delay as ReturnDelay
 from anafi_mav.arsdk.messages.rth import EndingBehavior as ReturnEnding
 from anafi_mav.arsdk.messages.rth import EndingHoveringAltitude as ReturnEndingAltitude
 from anafi_mav.arsdk.messages.rth import MinAltitude as ReturnMinAltitude
 from anafi_mav.arsdk.messages.rth import PreferredHomeType as PreferredHomeType
 from anafi_mav.arsdk.messages.rth import RthEndingBehavior as RthEndingBehavior
+from anafi_mav.arsdk.messages.rth import RthHomeReachability as HomeReachability
 from anafi_mav.arsdk.messages.rth import RthHomeType as RthHomeType
 from anafi_mav.arsdk.messages.rth import State as ReturnStateChanged
 from anafi_mav.arsdk.messages.rth import TakeoffLocation as TakeoffLocation
@@ -96,10 +99,12 @@ from anafi_mav.arsdk.wire import Message as Message
 
 __all__ = [
     "AlertLevel",
+    "AlertState",
     "AltitudeAboveGroundChanged",
     "AltitudeChanged",
     "AnimationType",
     "AttitudeChanged",
+    "AutoTriggerReason",
     "Axis",
     "BankedTurnChanged",
     "BatteryAlert",
@@ -126,6 +131,7 @@ __all__ = [
     "GrabButtonEvent",
     "GrabState",
     "HomeChanged",
+    "HomeReachability",
     "HoveringWarning",
     "IcingLevelChanged",
     "MagnetoCalibrationRequiredState",

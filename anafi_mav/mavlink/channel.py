@@ -48,6 +48,9 @@ class Channel:
         """What the line carries; None where that is no concern."""
         self.counters: Counter[str] = Counter()
         """sent_frames, dropped_frames (queue full, or sent after the channel had closed)."""
+        self.sent_bytes = 0
+        self.received_bytes = 0
+        self.dropped_bytes = 0
         self.is_open = True
         self.parser = Parser()
         self._write = write
@@ -69,7 +72,13 @@ class Channel:
 
     def receive(self, data: bytes) -> list[Received]:
         """The frames in bytes that arrived; what is none is counted by the parser."""
+        self.received_bytes += len(data)
         return self.parser.receive_datagram(data) if self._datagrams else self.parser.receive(data)
+
+    @property
+    def free(self) -> float:
+        """The share of the outgoing queue that is free, 0..1."""
+        return max(0.0, 1.0 - self._waiting_bytes / self._queue_bytes)
 
     def send(self, message: dialect.MAVLink_message, sysid: int, compid: int) -> None:
         """Send as this system and component. Raises `LocalProtocolError` for a field that does not fit."""
@@ -85,8 +94,7 @@ class Channel:
     def forward(self, raw: bytes, id: int) -> None:
         """Send another system's version 2 frame as it is; `id` is its message id."""
         if self.is_open and not self._paused:
-            self.counters["sent_frames"] += 1
-            self._write(raw)
+            self._give(raw)
         else:
             self._wait(raw, id)
 
@@ -102,15 +110,15 @@ class Channel:
                 waiting = queue.popleft()
                 self._waiting_bytes -= _size(waiting)
                 if isinstance(waiting, bytes):
-                    self.counters["sent_frames"] += 1
-                    self._write(waiting)
+                    self._give(waiting)
                 else:
                     self._leave(*waiting)
 
     def close(self) -> None:
         """The peer is gone. What waits is forgotten, what is still sent is counted and dropped."""
         self.is_open = False
-        self.counters["dropped_frames"] += len(self._answers) + len(self._telemetry)
+        for waiting in (*self._answers, *self._telemetry):
+            self._drop(waiting)
         self._answers.clear()
         self._telemetry.clear()
         self._waiting_bytes = 0
@@ -119,18 +127,27 @@ class Channel:
         sender = (sysid, compid)
         sequence = self._sequence.get(sender, 0)
         self._sequence[sender] = (sequence + 1) & 0xFF
+        self._give(frame(packed, sequence, sysid, compid))
+
+    def _give(self, raw: bytes) -> None:
         self.counters["sent_frames"] += 1
-        self._write(frame(packed, sequence, sysid, compid))
+        self.sent_bytes += len(raw)
+        self._write(raw)
 
     def _wait(self, waiting: _Waiting, id: int) -> None:
         if not self.is_open:
-            self.counters["dropped_frames"] += 1
+            self._drop(waiting)
             return
         (self._telemetry if id in GIVE_WAY else self._answers).append(waiting)
         self._waiting_bytes += _size(waiting)
         while self._waiting_bytes > self._queue_bytes:
-            self._waiting_bytes -= _size((self._telemetry or self._answers).popleft())
-            self.counters["dropped_frames"] += 1
+            oldest = (self._telemetry or self._answers).popleft()
+            self._waiting_bytes -= _size(oldest)
+            self._drop(oldest)
+
+    def _drop(self, waiting: _Waiting) -> None:
+        self.counters["dropped_frames"] += 1
+        self.dropped_bytes += _size(waiting)
 
 
 def _size(waiting: _Waiting) -> int:

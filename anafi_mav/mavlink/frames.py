@@ -137,9 +137,11 @@ class Parser:
 
     def __init__(self) -> None:
         self.counters: Counter[str] = Counter()
-        """frames, unknown_frames, bad_checksums (start marks with a plausible header that were none), garbage_bytes."""
+        """frames, unknown_frames, bad_checksums (start marks with a plausible header that were none), garbage_bytes,
+        lost_frames (by the gaps in their senders' numbers)."""
         self._pending = b""
-        self._sources: set[tuple[int, int]] = set()
+        self._sources: dict[tuple[int, int], int] = {}
+        """Who has sent a good frame -> the number of the last one."""
         self._decoder = dialect.MAVLink(None)
 
     def receive(self, data: bytes) -> list[Received]:
@@ -217,9 +219,9 @@ class Parser:
     def _decode(self, raw: bytes) -> Received | None:
         """The message in a frame of the right length; None if the checksum says that it is none."""
         if raw[0] == MAGIC_1:
-            sysid, compid, id = raw[3], raw[4], raw[5]
+            seq, sysid, compid, id = raw[2], raw[3], raw[4], raw[5]
         else:
-            sysid, compid, id = raw[5], raw[6], int.from_bytes(raw[7:10], "little")
+            seq, sysid, compid, id = raw[4], raw[5], raw[6], int.from_bytes(raw[7:10], "little")
         extra = _EXTRA.get(id)
         if extra is None:
             return Received(None, id, sysid, compid, raw)
@@ -233,8 +235,12 @@ class Parser:
             self.counters["bad_checksums"] += 1
             return None
         self.counters["frames"] += 1
-        if len(self._sources) < MAX_SOURCES:
-            self._sources.add((sysid, compid))
+        source = (sysid, compid)
+        last = self._sources.get(source)
+        if last is not None and (gap := (seq - last - 1) & 0xFF):
+            self.counters["lost_frames"] += gap
+        if last is not None or len(self._sources) < MAX_SOURCES:
+            self._sources[source] = seq
         return Received(message, id, sysid, compid, raw)
 
 

@@ -28,6 +28,12 @@ DEFAULT_INTERVALS: Mapping[int, float] = {
     mav.MAVLINK_MSG_ID_HOME_POSITION: 2.0,
     mav.MAVLINK_MSG_ID_MISSION_CURRENT: 1.0,
     mav.MAVLINK_MSG_ID_FENCE_STATUS: 1.0,
+    mav.MAVLINK_MSG_ID_RC_CHANNELS: 1.0,
+    mav.MAVLINK_MSG_ID_RADIO_STATUS: 1.0,
+    mav.MAVLINK_MSG_ID_DISTANCE_SENSOR: 0.2,
+    mav.MAVLINK_MSG_ID_SYSTEM_TIME: 1.0,
+    mav.MAVLINK_MSG_ID_EKF_STATUS_REPORT: 1.0,
+    mav.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT: 1.0,
     mav.MAVLINK_MSG_ID_CURRENT_MODE: 2.0,
     mav.MAVLINK_MSG_ID_AVAILABLE_MODES_MONITOR: 3.3,
 }
@@ -39,7 +45,6 @@ ON_REQUEST = frozenset(
         mav.MAVLINK_MSG_ID_FLIGHT_INFORMATION,
         mav.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN,
         mav.MAVLINK_MSG_ID_BATTERY_INFO,
-        mav.MAVLINK_MSG_ID_LINK_NODE_STATUS,
         mav.MAVLINK_MSG_ID_ONBOARD_COMPUTER_STATUS,
         mav.MAVLINK_MSG_ID_HIGH_LATENCY2,
         mav.MAVLINK_MSG_ID_RANGEFINDER,
@@ -61,18 +66,22 @@ class _Stream:
 
 
 class Pace:
-    """How often a source has news, by the pauses between them. Exact after the second, a mean of the last few later."""
+    """How often a source has news: the mean of about its last eight pauses."""
 
-    __slots__ = ("_last", "interval")
+    __slots__ = ("_breaks", "_last", "interval")
 
     SHARE = 0.125
-    """Weight of the newest pause: about the last eight count."""
+    """Weight of the newest pause."""
 
     BREAK = 4.0
-    """A pause so many times longer than the mean is a break, after which the rate is learned anew."""
+    """A pause so many times longer than the mean is a break and says nothing about the pace."""
+
+    NEW_PACE = 3
+    """So many breaks in a row are no breaks: the source has become slower."""
 
     def __init__(self) -> None:
         self._last: float | None = None
+        self._breaks = 0
         self.interval: float | None = None
         """s; None before there are two."""
 
@@ -84,10 +93,13 @@ class Pace:
         pause, mean = now - last, self.interval
         if mean is None:
             self.interval = pause
-        elif pause > self.BREAK * mean:
-            self.interval = None
-        else:
+        elif pause <= self.BREAK * mean:
             self.interval = mean + self.SHARE * (pause - mean)
+            self._breaks = 0
+        else:
+            self._breaks += 1
+            if self._breaks == self.NEW_PACE:
+                self.interval, self._breaks = pause, 0
 
 
 class Streams(Generic[ChannelT]):

@@ -13,7 +13,6 @@ from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import Command
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.service import Request, Service
-from anafi_mav.services.statustext import Severity
 
 CAPABILITIES = (
     dialect.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
@@ -67,17 +66,13 @@ def protocol_version() -> dialect.MAVLink_message:
 
 
 class IdentityService(Service):
-    """Says who we are, to whoever asks and once to all."""
+    """Says who we are, to whoever asks."""
 
     def requests(self) -> Mapping[int, Request]:
         return {
             dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION: self._version,
             dialect.MAVLINK_MSG_ID_PROTOCOL_VERSION: lambda inbound, command: protocol_version(),
         }
-
-    def link_up(self) -> None:
-        product = self.host.drone.identity
-        self.host.text(Severity.INFO, f"{product.model.title} {product.serial} firmware {product.firmware}")
 
     def _version(self, inbound: Inbound, command: Command) -> dialect.MAVLink_message:
         return autopilot_version(self.host.drone, flavour_of(inbound.channel), allow_kill=self.host.vehicle.allow_kill)

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.link_loss import GcsWatch, LossAction
-from anafi_mav.services.service import Host, MessageHandler, Service
+from anafi_mav.services.service import Host, Service
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.vehicle import Landed
 
@@ -20,9 +18,6 @@ class LinkLossService(Service):
         super().__init__(host)
         self._watch = GcsWatch()
 
-    def messages(self) -> Mapping[int, MessageHandler]:
-        return {dialect.MAVLINK_MSG_ID_HEARTBEAT: self._heard}
-
     def link_down(self) -> None:
         self._watch = GcsWatch()
 
@@ -31,7 +26,7 @@ class LinkLossService(Service):
         if policy.action is not LossAction.NOTHING and self._watch.expire(now, policy.after):
             self._lost()
 
-    def _heard(self, inbound: Inbound) -> None:
+    def heartbeat(self, inbound: Inbound) -> None:
         if inbound.message.type == dialect.MAV_TYPE_GCS and self._watch.heard(inbound.now):
             self.host.text(Severity.NOTICE, "Ground station is back")
 

@@ -118,7 +118,7 @@ class MessageService(Service):
             self._stream(id, now)
 
     def state_changed(self) -> None:
-        """Mode, armed state, health or something else that clients wait for has changed: they are told at once."""
+        """They are told at once."""
         now = self.host.clock.monotonic()
         for id in self._on_change:
             self._news_at[id] = now
@@ -170,7 +170,12 @@ class MessageService(Service):
         rate = request.req_message_rate if request.start_stop else 0
         for id in data_streams.members(request.req_stream_id):
             if id in self._table:
-                self._intervals.set(inbound.channel, id, 1.0 / rate if rate else None)
+                self._ask(inbound.channel, id, 1.0 / rate if rate else None)
+
+    def _ask(self, channel: Channel, id: int, interval: float | None) -> None:
+        if interval is not None and self._table[id].is_repeated:
+            interval = max(interval, FASTEST)
+        self._intervals.set(channel, id, interval)
 
     # Requests: answered at once, every time.
 
@@ -205,9 +210,9 @@ class MessageService(Service):
         if math.isnan(interval) or interval == 0:
             self._intervals.reset(inbound.channel, int(id))
         elif interval == -1:
-            self._intervals.set(inbound.channel, int(id), None)
+            self._ask(inbound.channel, int(id), None)
         elif interval > 0 and math.isfinite(interval):
-            self._intervals.set(inbound.channel, int(id), min(interval, LONGEST) / 1e6)
+            self._ask(inbound.channel, int(id), min(interval, LONGEST) / 1e6)
         else:
             return dialect.MAV_RESULT_DENIED
         return dialect.MAV_RESULT_ACCEPTED
@@ -233,8 +238,6 @@ class MessageService(Service):
         return dialect.MAVLink_message_interval_message(int(id), microseconds)
 
     def _source(self, id: int) -> float:
-        """The shortest time (s) between two of this message that what it is made of allows, as far as is known."""
-        if self._table[id].is_repeated:
-            return FASTEST
+        """The mean time (s) between two pieces of news for this message, as far as is known; 0: not by news alone."""
         pace = self._paces.get(id)
-        return 0.0 if pace is None or pace.interval is None else pace.interval
+        return 0.0 if self._table[id].is_repeated or pace is None or pace.interval is None else pace.interval

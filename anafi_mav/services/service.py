@@ -59,8 +59,8 @@ class Host(Protocol):
     ) -> None:
         """Send to each of these channels (None: all) what `build` makes for its flavour; None of it is not sent."""
 
-    def text(self, severity: Severity, text: str) -> None:
-        """A STATUSTEXT to everybody, and a line in the log."""
+    def text(self, severity: Severity, text: str, to: Channel | None = None) -> None:
+        """A STATUSTEXT to everybody, and a line in the log; or to one channel alone."""
 
     def complain(self, text: str) -> None:
         """A warning about something that arrives many times a second: said rarely."""
@@ -118,6 +118,12 @@ class Service:
 
     def on_event(self, message: Message, now: float) -> None:
         """The drone said this; its states know it already."""
+
+    def heartbeat(self, inbound: Inbound) -> None:
+        """Somebody's heartbeat, a ground station's or anybody else's: the one message that is for every service."""
+
+    def state_changed(self) -> None:
+        """Mode, armed state, health, or whether it flies, or something else that clients wait for has changed."""
 
     def tick(self, now: float) -> None:
         """About ten times a second while the link is up."""

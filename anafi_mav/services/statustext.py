@@ -10,15 +10,35 @@ from anafi_mav.mavlink import dialect
 CHUNK = 50
 """Bytes of text that one message carries."""
 
+LONGEST = 500
+"""Bytes of a text: ten lines of a ground station, and far below the 255 chunks that could be numbered."""
+
 
 class Severity(enum.IntEnum):
     """MAV_SEVERITY, the ones in use."""
 
+    EMERGENCY = 0
+    """The motors were cut in the air."""
+    ALERT = 1
+    """The drone does something by itself that nobody can stop."""
     CRITICAL = 2
+    """Something fails that flight depends on."""
     ERROR = 3
+    """Something that a user asked for did not work."""
     WARNING = 4
+    """A request was refused, or the drone warns."""
     NOTICE = 5
+    """Out of the ordinary, and no reason to worry."""
     INFO = 6
+
+
+def _clean(text: str) -> bytes:
+    """One line without control characters: NUL ends a text on the wire, and QGroundControl drops what ends in a tab."""
+    line = " ".join("".join(character if character.isprintable() else " " for character in text).split())
+    data = line.encode()
+    if len(data) > LONGEST:
+        data = data[: LONGEST - 3].decode(errors="ignore").encode() + b"..."
+    return data
 
 
 class TextNumbers:
@@ -28,8 +48,10 @@ class TextNumbers:
         self._next = itertools.cycle(range(1, 1 << 16))
 
     def messages(self, severity: Severity, text: str) -> list[dialect.MAVLink_statustext_message]:
-        """The message, or the chunks in order, that carry `text`."""
-        data = text.encode()
+        """The message, or the chunks in order, that carry `text`; none for a text of nothing."""
+        data = _clean(text)
+        if not data:
+            return []
         if len(data) <= CHUNK:
             return [dialect.MAVLink_statustext_message(int(severity), data)]
         number = next(self._next)

@@ -19,27 +19,35 @@ from anafi_mav.drone.events import Message
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound, Node
+from anafi_mav.services.banner import BannerService
 from anafi_mav.services.command_service import CommandService
 from anafi_mav.services.fence_service import FenceService
 from anafi_mav.services.flavours import Flavour, flavour_of
+from anafi_mav.services.flight_record import FlightRecordService
 from anafi_mav.services.guided import GuidedService
+from anafi_mav.services.high_latency import HighLatencyService
 from anafi_mav.services.identity import IdentityService
 from anafi_mav.services.link_loss_service import LinkLossService
+from anafi_mav.services.logs import LogService
 from anafi_mav.services.maintenance import MaintenanceService
 from anafi_mav.services.memory import Memory
 from anafi_mav.services.message_service import MessageService
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.modes_service import ModesService
+from anafi_mav.services.node_status import NodeStatusService
 from anafi_mav.services.offboard_service import OffboardService
 from anafi_mav.services.parameters import ParameterService
 from anafi_mav.services.plan_service import PlanService
 from anafi_mav.services.rally_service import RallyService
 from anafi_mav.services.service import MessageHandler, Service
+from anafi_mav.services.shell import ShellService
 from anafi_mav.services.statustext import Severity, TextNumbers
 from anafi_mav.services.stream import Times
 from anafi_mav.services.telemetry import CHANGES, TelemetryService
 from anafi_mav.services.time_service import TimeService
+from anafi_mav.services.tune import TuneService
 from anafi_mav.services.vehicle import Health, Landed, Vehicle
+from anafi_mav.services.warnings import WarningService
 
 logger = logging.getLogger(__name__)
 
@@ -56,6 +64,14 @@ SERVICES: tuple[type[Service], ...] = (
     RallyService,
     OffboardService,
     TimeService,
+    BannerService,
+    WarningService,
+    HighLatencyService,
+    LogService,
+    ShellService,
+    TuneService,
+    NodeStatusService,
+    FlightRecordService,
 )
 """What a system consists of, beside commands and messages themselves."""
 
@@ -128,6 +144,7 @@ class System:
             _joined(service.requests() for service in self.services),
         )
         self._handlers: dict[int, MessageHandler] = _joined(service.messages() for service in self.services)
+        self._handlers[dialect.MAVLINK_MSG_ID_HEARTBEAT] = self._heard
 
     # Link up, link down.
 
@@ -214,12 +231,13 @@ class System:
             if message is not None:
                 self.send(message, channels)
 
-    def text(self, severity: Severity, text: str) -> None:
-        """A STATUSTEXT to everybody, and a line in the log."""
-        logger.log(logging.WARNING if severity <= Severity.WARNING else logging.INFO, "%s: %s", self.sysid, text)
+    def text(self, severity: Severity, text: str, to: Channel | None = None) -> None:
+        """A STATUSTEXT to everybody, and a line in the log; or to one channel alone."""
+        if to is None:
+            logger.log(logging.WARNING if severity <= Severity.WARNING else logging.INFO, "%s: %s", self.sysid, text)
         if self.active:
             for message in self._texts.messages(severity, text):
-                self.send(message)
+                self.send(message, to)
 
     def complain(self, text: str) -> None:
         """A warning about something that arrives many times a second: said every `STATUS_EVERY` seconds at most."""
@@ -304,7 +322,8 @@ class System:
             self._heartbeat()
         elif not force:
             return
-        self._messages.state_changed()
+        for service in self.services:
+            service.state_changed()
 
     # What clients send.
 
@@ -319,6 +338,10 @@ class System:
         if getattr(message, "target_component", 0) not in (0, AUTOPILOT):
             return
         handler(inbound)
+
+    def _heard(self, inbound: Inbound) -> None:
+        for service in self.services:
+            service.heartbeat(inbound)
 
     def channel_closed(self, channel: Channel) -> None:
         """A client's channel is gone."""

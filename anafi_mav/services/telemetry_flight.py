@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import NamedTuple
 
 from anafi_mav import geo, units
 from anafi_mav.drone import events
@@ -162,17 +163,37 @@ def rangefinder(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | Non
     return None if height is None else dialect.MAVLink_rangefinder_message(height, 0.0)
 
 
+class Goal(NamedTuple):
+    """Where a running moveTo goes, seen from the drone."""
+
+    bearing: float
+    """deg, clockwise from north, -180..180."""
+    distance: float
+    """m, horizontally."""
+    altitude: float
+    """m above the take-off point."""
+
+
+def target(vehicle: Vehicle) -> Goal | None:
+    """What is flown to now; None while nothing is, or the drone does not know where it is."""
+    place, state = vehicle.place, vehicle.drone.piloting.state
+    if place is None or state.move_target is None or state.move_to != MoveToStatus.RUNNING:
+        return None
+    goal = state.move_target
+    north, east = geo.offset(place.latitude, place.longitude, goal.latitude, goal.longitude)
+    return Goal(math.degrees(math.atan2(east, north)), math.hypot(north, east), goal.altitude)
+
+
 def nav_controller_output(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
     """NAV_CONTROLLER_OUTPUT: how far and where the target of a running moveTo is; without one distance 0, ahead."""
-    place, state = vehicle.place, vehicle.drone.piloting.state
-    if place is None or state.attitude is None:
+    state, goal = vehicle.drone.piloting.state, target(vehicle)
+    if vehicle.place is None or state.attitude is None:
         return None
     heading = units.wrap_pi(state.attitude.yaw) * units.DEG_PER_RAD
     bearing, distance, above = heading, 0.0, 0.0
-    if state.move_to == MoveToStatus.RUNNING and (target := state.move_target) is not None:
-        north, east = geo.offset(place.latitude, place.longitude, target.latitude, target.longitude)
-        bearing, distance = math.degrees(math.atan2(east, north)), math.hypot(north, east)
-        above = NAN if state.altitude is None else target.altitude - state.altitude
+    if goal is not None:
+        bearing, distance = goal.bearing, goal.distance
+        above = NAN if state.altitude is None else goal.altitude - state.altitude
     return dialect.MAVLink_nav_controller_output_message(
         NAN, NAN, round(heading), round(bearing), units.saturate(distance, 16, signed=False), above, NAN, NAN
     )

@@ -31,9 +31,9 @@ BAD_LINK = 1
 """The drone's "a disconnection is highly probable" (common.xml 0-5-16)."""
 
 
-def _percent(percent: int | None) -> int:
+def percent(charge: int | None) -> int:
     """Charge left; -1 for what the drone has not said, or cannot mean."""
-    return percent if percent is not None and 0 <= percent <= 100 else -1
+    return charge if charge is not None and 0 <= charge <= 100 else -1
 
 
 def _voltages(state: BatteryState) -> tuple[list[int], list[int]]:
@@ -78,7 +78,7 @@ def battery_status(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | 
         -1,
         used,
         -1,
-        _percent(state.percent),
+        percent(state.percent),
         charge_state=_CHARGE_STATES.get(max(power, state.worst_alert()), dialect.MAV_BATTERY_CHARGE_STATE_UNDEFINED),
         voltages_ext=more,
         fault_bitmask=sum(bit for alert, bit in _FAULTS.items() if state.alerts.get(alert, 0) > AlertLevel.NONE),
@@ -172,7 +172,7 @@ def sys_status(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None
         0,
         UNKNOWN_U16 if state.voltage_mv is None else state.voltage_mv,
         -1,
-        _percent(state.percent),
+        percent(state.percent),
         0,
         0,
         0,
@@ -234,6 +234,6 @@ STREAMS: Mapping[int, Stream] = {
     dialect.MAVLINK_MSG_ID_BATTERY_INFO: Stream(battery_info),
     dialect.MAVLINK_MSG_ID_EKF_STATUS_REPORT: Stream(ekf_status_report),
     dialect.MAVLINK_MSG_ID_ESTIMATOR_STATUS: Stream(
-        estimator_status, (events.GpsLocationChanged, events.AttitudeChanged), repeated=True
+        estimator_status, (events.GpsLocationChanged, events.HoveringWarning), repeated=True
     ),
 }

@@ -31,6 +31,7 @@ UPSTREAM = [
     (47, "MISSION_ACK", 153, 3, 8, "target_system target_component type mission_type opaque_id"),
     (80, "COMMAND_CANCEL", 14, 4, 4, "command target_system target_component"),
     (111, "TIMESYNC", 34, 16, 18, "tc1 ts1 target_system target_component"),
+    (126, "SERIAL_CONTROL", 220, 79, 81, "baudrate timeout device flags count data target_system target_component"),
     (
         *(300, "PROTOCOL_VERSION", 217, 22, 22),
         "version min_version max_version spec_version_hash library_version_hash",

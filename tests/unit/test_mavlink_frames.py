@@ -86,8 +86,9 @@ def test_every_message_is_framed_as_pymavlink_frames_it_and_comes_back(id: int) 
     sender = dialect.MAVLink(None, 17, 18)
     parser = Parser()
     kind = dialect.mavlink_map[id]
-    for message in [random_message(kind, source) for _ in range(3)]:
-        sender.seq = source.randrange(256)
+    first = source.randrange(256)
+    for number, message in enumerate(random_message(kind, source) for _ in range(3)):
+        sender.seq = (first + number) % 256
         theirs = message.pack(sender)
         assert frame(pack(message), sender.seq, 17, 18) == theirs
         [received] = parser.receive(theirs)
@@ -95,6 +96,15 @@ def test_every_message_is_framed_as_pymavlink_frames_it_and_comes_back(id: int) 
         assert type(received.message) is kind
         assert frame(pack(received.message), sender.seq, 17, 18) == theirs
     assert parser.counters == {"frames": 3, "garbage_bytes": 0}
+
+
+def test_frames_that_got_lost_are_counted_for_each_sender() -> None:
+    parser = Parser()
+    ping = pack(dialect.MAVLink_ping_message(1, 2, 0, 0))
+    for seq, sysid in ((250, 7), (251, 7), (3, 9), (2, 7), (3, 7), (3, 9)):  # 252 to 1, and all but one number of 9's
+        parser.receive(frame(ping, seq, sysid, 1))
+    assert parser.counters["frames"] == 6
+    assert parser.counters["lost_frames"] == 6 + 255
 
 
 def test_trailing_zeros_are_cut_but_for_one_byte() -> None:

@@ -1,0 +1,72 @@
+"""Who speaks here, as texts: to everybody when the drone connects, to each client when it appears, and on request.
+
+Mission Planner takes the firmware from a text that begins like ArduCopter's (conformance D3, F 149).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping
+
+from anafi_mav import __version__
+from anafi_mav.drone import Drone
+from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.channel import Channel
+from anafi_mav.mavlink.node import Inbound
+from anafi_mav.services.commands import Command
+from anafi_mav.services.flavours import Flavour, flavour_of
+from anafi_mav.services.service import Host, Query, Service, client_of
+from anafi_mav.services.statustext import Severity
+
+GONE = 30.0
+"""s of silence after which a client that speaks again is a new one: a ground station that was restarted."""
+
+MAX_CLIENTS = 64
+"""Clients that are remembered; there are a handful."""
+
+_NO_CLIENTS = (dialect.MAV_TYPE_CAMERA, dialect.MAV_TYPE_GIMBAL, dialect.MAV_TYPE_ADSB)
+
+
+def banner(drone: Drone, flavour: Flavour) -> list[str]:
+    """The texts: the gateway, and the drone with its firmware."""
+    identity = drone.identity
+    gateway = f"anafi-mav {__version__}"
+    return [
+        f"{flavour.title} ({gateway})" if flavour.title else gateway,
+        f"{identity.model.title} {identity.serial} firmware {identity.firmware}",
+    ]
+
+
+class BannerService(Service):
+    """Greets."""
+
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self._heard: dict[Hashable, float] = {}
+        """Client -> when its last heartbeat came."""
+
+    def queries(self) -> Mapping[int, Query]:
+        return {dialect.MAV_CMD_DO_SEND_BANNER: self._banner}
+
+    def link_up(self) -> None:
+        for channel in self.host.channels:
+            self._greet(channel)
+
+    def heartbeat(self, inbound: Inbound) -> None:
+        beat = inbound.message
+        if beat.autopilot != dialect.MAV_AUTOPILOT_INVALID or beat.type in _NO_CLIENTS:
+            return  # another vehicle, or a part of one
+        client = client_of(inbound)
+        last = self._heard.pop(client, None)
+        self._heard[client] = inbound.now
+        if len(self._heard) > MAX_CLIENTS:
+            del self._heard[next(iter(self._heard))]
+        if last is None or inbound.now - last > GONE:
+            self._greet(inbound.channel)
+
+    def _greet(self, channel: Channel) -> None:
+        for text in banner(self.host.drone, flavour_of(channel)):
+            self.host.text(Severity.INFO, text, channel)
+
+    def _banner(self, inbound: Inbound, command: Command) -> int:
+        self._greet(inbound.channel)
+        return dialect.MAV_RESULT_ACCEPTED

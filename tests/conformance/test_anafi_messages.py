@@ -1,0 +1,179 @@
+"""The messages of our own dialect over a real socket: what the simulated drone told is what they say."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as stock
+from support.mav import Client
+from support.world import World, world
+
+from anafi_mav.arsdk.messages import alarms, ardrone3, camera, common, rth, wifi
+from anafi_mav.arsdk.messages.generic import ListFlags
+from anafi_mav.mavlink import dialect
+
+ACCEPTED, REJECTED = stock.MAV_RESULT_ACCEPTED, stock.MAV_RESULT_TEMPORARILY_REJECTED
+FIRST, LAST = 1 << ListFlags.FIRST, 1 << ListFlags.LAST
+
+
+async def ask(client: Client, id: int) -> Any:
+    mark = client.mark()
+    assert (await client.command(stock.MAV_CMD_REQUEST_MESSAGE, id)).result == ACCEPTED
+    return await client.wait(dialect.mavlink_map[id].msgname, since=mark)
+
+
+async def stream(client: Client, id: int, interval: float = 0.1) -> None:
+    assert (await client.command(stock.MAV_CMD_SET_MESSAGE_INTERVAL, id, interval * 1e6)).result == ACCEPTED
+
+
+async def test_they_are_told_to_who_asks_only() -> None:
+    async with world(clients=2) as w:
+        asking, other = w.clients
+        await stream(asking, dialect.MAVLINK_MSG_ID_ANAFI_HOME)
+        await asking.wait("ANAFI_HOME")
+        await asking.wait("ANAFI_HOME")
+        assert not any(m.get_type().startswith("ANAFI_") for _, m in other.received)
+        assert {m.get_type() for _, m in asking.received if m.get_type().startswith("ANAFI_")} == {"ANAFI_HOME"}
+
+
+async def test_flight_status() -> None:
+    async with world(speed=1.0) as w:
+        told = await ask(w.client, dialect.MAVLINK_MSG_ID_ANAFI_FLIGHT_STATUS)
+        assert told.flying_state == dialect.ANAFI_FLYING_STATE_LANDED
+        assert (told.steady, told.plan, told.alert) == (1, dialect.ANAFI_PLAN_STATE_STOPPED, dialect.ANAFI_ALERT_NONE)
+        assert (told.wind, told.vibration, told.icing) == (0, 0, 255)  # the simulated one says nothing of ice
+        assert (told.hover_warnings, told.forced_landing_in) == (0, 255)
+        await stream(w.client, dialect.MAVLINK_MSG_ID_ANAFI_FLIGHT_STATUS)
+        for event in (
+            ardrone3.WindStateChanged(ardrone3.WarningLevel.WARNING),
+            ardrone3.IcingLevelChanged(ardrone3.WarningLevel.CRITICAL),
+            ardrone3.HoveringWarning(0, 1),
+            ardrone3.MotorErrorStateChanged(0b0100, ardrone3.MotorError.ERROR_MOTOR_STALLED),
+            ardrone3.AlertStateChanged(ardrone3.AlertState.TOO_MUCH_ANGLE),
+            ardrone3.ForcedLandingAutoTrigger(ardrone3.ForcedLandingReason.DEFECTIVE_SENSOR, 0),
+        ):
+            w.drone._emit(event)
+        told = await w.client.wait("ANAFI_FLIGHT_STATUS", lambda m: m.forced_landing != 0)
+        assert (told.wind, told.icing) == (1, 2)
+        assert told.hover_warnings == dialect.ANAFI_HOVER_WARNING_TOO_HIGH
+        assert (told.motor_error, told.motors) == (2, 4)
+        assert told.alert == dialect.ANAFI_ALERT_TOO_MUCH_ANGLE
+        assert (told.forced_landing, told.forced_landing_in) == (dialect.ANAFI_FORCED_LANDING_SENSOR, 0)
+        # Repeated, it keeps the time of its news.
+        again = await w.client.wait("ANAFI_FLIGHT_STATUS")
+        last = await w.client.wait("ANAFI_FLIGHT_STATUS")
+        assert again.time_boot_ms == last.time_boot_ms
+
+
+async def test_home() -> None:
+    async with world() as w:
+        told = await ask(w.client, dialect.MAVLINK_MSG_ID_ANAFI_HOME)
+        assert (told.min_altitude, told.hovering_altitude) == (20.0, 10.0)
+        assert told.preferred_type == w.drone.firmware.settings["home_type"]
+        assert told.state == dialect.ANAFI_RETURN_STATE_AVAILABLE
+        assert told.trigger_in == 65535
+        await w.take_off(8.0)
+        told = await ask(w.client, dialect.MAVLINK_MSG_ID_ANAFI_HOME)
+        home = w.drone.log.find("event", "ardrone3.GPSSettingsState.HomeChanged")[-1].args
+        assert (told.latitude, told.longitude) == (round(home["latitude"] * 1e7), round(home["longitude"] * 1e7))
+        assert told.type in (dialect.ANAFI_HOME_TYPE_TAKEOFF, dialect.ANAFI_HOME_TYPE_PILOT)
+        w.drone._emit(rth.RthAutoTrigger(rth.AutoTriggerReason.BATTERY_CRITICAL_SOON, 17))
+        w.drone._emit(rth.HomeReachability(rth.RthHomeReachability.CRITICAL))
+        await stream(w.client, dialect.MAVLINK_MSG_ID_ANAFI_HOME)
+        told = await w.client.wait("ANAFI_HOME", lambda m: m.reachability == dialect.ANAFI_REACHABILITY_CRITICAL)
+        assert (told.trigger, told.trigger_in) == (dialect.ANAFI_RETURN_TRIGGER_BATTERY, 17)
+        assert (await w.client.command(stock.MAV_CMD_NAV_RETURN_TO_LAUNCH)).result == ACCEPTED
+        told = await w.client.wait("ANAFI_HOME", lambda m: m.state == dialect.ANAFI_RETURN_STATE_IN_PROGRESS)
+        assert told.reason == dialect.ANAFI_RETURN_REASON_USER_REQUEST
+
+
+async def test_checklist() -> None:
+    async with world() as w:
+        await stream(w.client, dialect.MAVLINK_MSG_ID_ANAFI_CHECKLIST)
+        w.drone.faults.magneto_required = True
+        told = await w.client.wait("ANAFI_CHECKLIST", lambda m: m.checks_failed)
+        assert told.checks_failed == dialect.ANAFI_CHECK_MAGNETO_CALIBRATION
+        assert told.checks_told & told.checks_failed
+        on, off = alarms.State.ON, alarms.State.OFF
+        w.drone._emit(alarms.Alarms(alarms.Type.HORIZONTAL_GEOFENCE_REACHED, on, FIRST))
+        w.drone._emit(alarms.Alarms(alarms.Type.MAGNETO_PERTURBATION, off, LAST))
+        told = await w.client.wait("ANAFI_CHECKLIST", lambda m: m.alarms_raised)
+        assert told.alarms_raised == dialect.ANAFI_ALARM_HORIZONTAL_GEOFENCE
+        assert told.alarms_told == dialect.ANAFI_ALARM_HORIZONTAL_GEOFENCE | dialect.ANAFI_ALARM_MAGNETO_PERTURBATION
+
+
+async def test_link() -> None:
+    async with world() as w:
+        await stream(w.client, dialect.MAVLINK_MSG_ID_ANAFI_LINK)
+        w.drone._emit(common.LinkSignalQuality(0x83))  # quality 3, perturbed
+        w.drone._emit(wifi.RssiChanged(-67))
+        told = await w.client.wait("ANAFI_LINK", lambda m: m.rssi == -67)
+        assert told.quality == 3
+        assert told.flags == dialect.ANAFI_LINK_FLAGS_TOLD | dialect.ANAFI_LINK_FLAGS_PERTURBED
+        assert told.goodput == 0xFFFFFFFF  # the live video alone tells it
+
+
+@pytest.mark.parametrize("model", ["4k", "ai"])
+async def test_camera_exposure_and_intrinsics(model: str) -> None:
+    async with world(model=model) as w:
+        told = await ask(w.client, dialect.MAVLINK_MSG_ID_ANAFI_CAMERA_EXPOSURE)
+        assert (told.camera, told.source) == (0, dialect.ANAFI_EXPOSURE_SOURCE_STEPS)
+        assert told.ev == 0.0
+        assert told.zoom == pytest.approx(1.0)
+        assert math.isnan(told.awb_r_gain)
+        if model == "4k":
+            await stream(w.client, dialect.MAVLINK_MSG_ID_ANAFI_CAMERA_EXPOSURE)
+            w.drone._emit(camera.ZoomLevel(0, 2.5))
+            told = await w.client.wait("ANAFI_CAMERA_EXPOSURE", lambda m: m.zoom == 2.5)
+        lens = await ask(w.client, dialect.MAVLINK_MSG_ID_ANAFI_CAMERA_INTRINSICS)
+        width, fx = {"4k": (1280, 953.87), "ai": (1920, 1505.94)}[model]
+        assert (lens.width, lens.fx) == (width, pytest.approx(fx))
+        # Half the width over the focal length is the tangent of half the field of view: 69 and 68 degrees by Parrot.
+        assert 2 * math.degrees(math.atan(lens.width / 2 / lens.fx)) == pytest.approx(
+            67 if model == "4k" else 65, abs=2
+        )
+
+
+async def test_no_skycontroller() -> None:
+    async with world() as w:
+        for id in (61410, 61411, 61412):
+            assert (await w.client.command(stock.MAV_CMD_REQUEST_MESSAGE, id)).result == REJECTED
+
+
+async def controller_world(w: World) -> None:
+    await stream(w.client, dialect.MAVLINK_MSG_ID_ANAFI_CONTROLLER_INPUT, 0.05)
+    await stream(w.client, dialect.MAVLINK_MSG_ID_ANAFI_CONTROLLER_ATTITUDE, 0.05)
+
+
+async def test_skycontroller() -> None:
+    async with world(skycontroller=3, speed=1.0) as w:
+        await controller_world(w)
+        attitude = await w.client.wait("ANAFI_CONTROLLER_ATTITUDE")
+        assert math.hypot(*attitude.q) == pytest.approx(1.0, abs=1e-6)
+        status = await ask(w.client, dialect.MAVLINK_MSG_ID_ANAFI_CONTROLLER_STATUS)
+        assert status.model == 0x0918
+        assert status.source == dialect.ANAFI_PILOTING_SOURCE_SKYCONTROLLER
+        assert status.battery in (0, 1, 2)
+        assert 0 < status.battery_remaining <= 100
+        assert status.serial_number
+        told = await ask(w.client, dialect.MAVLINK_MSG_ID_ANAFI_CONTROLLER_INPUT)
+        assert told.grabbed_axes == 0
+        assert told.axes == [-128] * 6
+
+
+async def test_the_dialect_works_in_pymavlink_as_the_page_says() -> None:
+    """docs/dialect.md: mavutil with our module in place of its own."""
+    from pymavlink import mavutil
+
+    before = mavutil.mavlink
+    try:
+        mavutil.mavlink = dialect
+        link = mavutil.mavlink_connection("udpin:127.0.0.1:0", dialect=None)
+        sender = dialect.MAVLink(None, 1, 1)
+        [message] = link.mav.parse_buffer(dialect.MAVLink_anafi_link_message(5, 6, -40, 4, 1).pack(sender))
+        assert (message.get_type(), message.rssi) == ("ANAFI_LINK", -40)
+        link.close()
+    finally:
+        mavutil.mavlink = before

@@ -1,0 +1,220 @@
+"""The I/O-free cores of what a vehicle reports: paces, groups, flights, texts, and single values in other scales."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from anafi_mav.drone.battery import BatteryState
+from anafi_mav.drone.link import LinkState
+from anafi_mav.drone.piloting_state import Attitude, PilotingState
+from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.streams import DEFAULT_INTERVALS, ON_REQUEST, Pace
+from anafi_mav.services import (
+    data_streams,
+    telemetry_anafi,
+    telemetry_flight,
+    telemetry_link,
+    telemetry_status,
+)
+from anafi_mav.services.flavours import ARDUPILOT, PX4, STANDARD
+from anafi_mav.services.flight_record import FlightRecord
+from anafi_mav.services.shell import PROMPT, answer
+from anafi_mav.services.statustext import Severity, TextNumbers
+from anafi_mav.services.stream import Times
+from anafi_mav.services.vehicle import Landed
+
+NOW = Times(1_234_567_890)
+
+
+def test_pace_is_the_mean_pause_of_a_source() -> None:
+    pace = Pace()
+    assert pace.interval is None
+    pace.note(10.0)
+    assert pace.interval is None
+    pace.note(10.2)
+    assert pace.interval == pytest.approx(0.2)
+    for number in range(2, 200):
+        pace.note(10.0 + 0.2 * number + (0.05 if number % 2 else 0.0))  # jitter
+    assert pace.interval == pytest.approx(0.2, rel=0.15)
+
+
+def test_a_break_is_no_pace_but_three_are() -> None:
+    pace = Pace()
+    for now in (0.0, 0.2, 0.4, 60.4, 60.6):
+        pace.note(now)
+    assert pace.interval == pytest.approx(0.2)
+    for now in (61.6, 62.6):
+        pace.note(now)
+    assert pace.interval == pytest.approx(0.2)
+    pace.note(63.6)
+    assert pace.interval == pytest.approx(1.0)
+    pace.note(63.6)  # twice in one turn is once
+    assert pace.interval == pytest.approx(1.0)
+
+
+def test_groups_of_ardupilot_have_what_we_stream() -> None:
+    everything = data_streams.members(dialect.MAV_DATA_STREAM_ALL)
+    assert len(set(everything)) == len(everything)
+    assert dialect.MAVLINK_MSG_ID_ATTITUDE in data_streams.members(dialect.MAV_DATA_STREAM_EXTRA1)
+    assert list(data_streams.members(dialect.MAV_DATA_STREAM_RAW_CONTROLLER)) == []
+    assert list(data_streams.members(99)) == []
+    # Heartbeat and home are in no group of ArduCopter's either, nor are PX4's standard modes.
+    left = {id for id in DEFAULT_INTERVALS if id not in everything}
+    assert left == {
+        dialect.MAVLINK_MSG_ID_HOME_POSITION,
+        dialect.MAVLINK_MSG_ID_CURRENT_MODE,
+        dialect.MAVLINK_MSG_ID_AVAILABLE_MODES_MONITOR,
+    }
+
+
+def test_every_stream_is_telemetry_that_gives_way() -> None:
+    for module in (telemetry_flight, telemetry_status, telemetry_link, telemetry_anafi):
+        for id in module.STREAMS:
+            assert id in DEFAULT_INTERVALS or id in ON_REQUEST, dialect.mavlink_map[id].msgname
+
+
+def test_a_flight_is_armed_takes_off_and_lands() -> None:
+    record = FlightRecord()
+    record.look(armed=False, landed=Landed.ON_GROUND, now=1)
+    record.look(armed=True, landed=Landed.ON_GROUND, now=5)
+    record.look(armed=True, landed=Landed.TAKEOFF, now=8)
+    record.flight_id("A5")
+    record.look(armed=True, landed=Landed.IN_AIR, now=9)
+    assert (record.armed_at, record.took_off_at, record.landed_at) == (5, 8, 0)
+    number = record.number
+    # sha256 of "A5", its first eight bytes, little-endian
+    assert number == 0xBD0A0B9F354B64EA
+    record.look(armed=True, landed=Landed.LANDING, now=20)
+    record.look(armed=True, landed=Landed.ON_GROUND, now=22)
+    record.flight_id("")
+    record.look(armed=False, landed=Landed.ON_GROUND, now=23)
+    assert (record.armed_at, record.took_off_at, record.landed_at, record.number) == (5, 8, 22, number)
+    record.look(armed=True, landed=Landed.ON_GROUND, now=30)
+    assert (record.armed_at, record.took_off_at, record.landed_at) == (30, 0, 0)
+
+
+def test_what_began_before_we_looked_is_unknown() -> None:
+    record = FlightRecord()
+    record.look(armed=True, landed=Landed.IN_AIR, now=1)
+    record.look(armed=True, landed=Landed.UNKNOWN, now=2)
+    record.look(armed=True, landed=Landed.IN_AIR, now=3)
+    assert (record.armed_at, record.took_off_at, record.landed_at, record.number) == (0, 0, 0, 0)
+    record.look(armed=False, landed=Landed.ON_GROUND, now=9)
+    assert record.landed_at == 9
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[cal] done\t", b"[cal] done"),
+        ("two\nlines\r\n", b"two lines"),
+        ("nul\0 inside", b"nul inside"),
+        ("höher als 50 m", "höher als 50 m".encode()),
+    ],
+)
+def test_a_text_is_one_clean_line(text: str, said: bytes) -> None:
+    [message] = TextNumbers().messages(Severity.NOTICE, text)
+    assert message._text_raw.rstrip(b"\0") == said
+    assert message.severity == 5
+
+
+def test_nothing_is_no_text_and_too_much_is_cut() -> None:
+    assert TextNumbers().messages(Severity.INFO, " \t\n") == []
+    messages = TextNumbers().messages(Severity.INFO, "ü" * 400)
+    data = b"".join(m._text_raw.rstrip(b"\0") for m in messages)
+    assert len(data) <= 500
+    assert data.decode().endswith("ü...")
+    assert [m.chunk_seq for m in messages] == list(range(len(messages)))
+
+
+def vehicle(**elements: Any) -> Any:
+    """A vehicle of which these elements have told something."""
+    return SimpleNamespace(
+        drone=SimpleNamespace(**{name: SimpleNamespace(state=state) for name, state in elements.items()})
+    )
+
+
+@pytest.mark.parametrize("quality", [1, 2, 3, 4, 5])
+def test_rssi_in_the_scale_of_the_family(quality: int) -> None:
+    # fifths of 100, and of 254: 50.8, 101.6, 152.4, 203.2, 254
+    told = vehicle(link=LinkState(quality=quality))
+    for flavour, full in (
+        (PX4, [20, 40, 60, 80, 100]),
+        (STANDARD, [20, 40, 60, 80, 100]),
+        (ARDUPILOT, [51, 102, 152, 203, 254]),
+    ):
+        message: Any = telemetry_link.rc_channels(told, NOW.for_flavour(flavour))
+        assert message.rssi == full[quality - 1]
+        assert message.time_boot_ms == 1234
+
+
+@pytest.mark.parametrize(
+    ("dbm", "px4", "ardupilot"),
+    [(-30, 226, 184), (-100, 156, 51), (-127, 129, 0), (-200, 128, 0), (-2, 254, 238), (-1, 254, 239)],
+)
+def test_radio_signal_in_the_scale_of_the_family(dbm: int, px4: int, ardupilot: int) -> None:
+    told = vehicle(link=LinkState(rssi_dbm=dbm))
+    a: Any = telemetry_link.radio_status(told, NOW)
+    b: Any = telemetry_link.radio_status(told, NOW.for_flavour(ARDUPILOT))
+    assert (a.rssi, b.rssi) == (px4, ardupilot)
+    assert telemetry_link.radio_status(vehicle(link=LinkState()), NOW) is None
+    assert telemetry_link.radio_status(vehicle(link=LinkState(rssi_dbm=0)), NOW) is None  # 0 dBm is no reading
+
+
+@pytest.mark.parametrize(
+    ("state", "voltages", "more"),
+    [
+        (BatteryState(percent=50), [65535] * 10, [0] * 4),
+        (BatteryState(percent=50, voltage_mv=7600), [7600] + [65535] * 9, [0] * 4),
+        (
+            BatteryState(percent=50, voltage_mv=12300, cell_voltages_mv={2: 4099, 0: 4101, 1: 4100}),
+            [4101, 4100, 4099] + [65535] * 7,
+            [0] * 4,
+        ),
+        # One of three cells is missing: their sum would be wrong, so the pack's voltage it is.
+        (
+            BatteryState(percent=50, voltage_mv=12300, cell_count=3, cell_voltages_mv={0: 4101, 1: 4100}),
+            [12300] + [65535] * 9,
+            [0] * 4,
+        ),
+        (BatteryState(percent=50, cell_voltages_mv=dict.fromkeys(range(12), 4000)), [4000] * 10, [4000, 4000, 0, 0]),
+    ],
+)
+def test_cells(state: BatteryState, voltages: list[int], more: list[int]) -> None:
+    message: Any = telemetry_status.battery_status(vehicle(battery=state), NOW)
+    assert message.voltages == voltages
+    assert message.voltages_ext == more
+
+
+@pytest.mark.parametrize(("height", "distance"), [(1.234, 123), (-0.1, 0), (700.0, 65535)])
+def test_distance_to_the_ground(height: float, distance: int) -> None:
+    message: Any = telemetry_flight.distance_sensor(vehicle(piloting=PilotingState(height=height)), NOW)
+    assert message.current_distance == distance
+    assert (message.min_distance, message.max_distance) == (0, 65535)
+
+
+def test_an_attitude_alone_is_no_estimate_of_a_place() -> None:
+    held: Any = vehicle(
+        piloting=PilotingState(attitude=Attitude(0.0, 0.0, 0.0)),
+        alerts=SimpleNamespace(too_dark_to_hover=None, too_high_to_hover=None),
+    )
+    held.place = None
+    assert telemetry_status.ekf_flags(held) == dialect.EKF_ATTITUDE
+    held.drone.piloting.state = PilotingState()
+    assert telemetry_status.ekf_flags(held) == dialect.EKF_UNINITIALIZED
+    report: Any = telemetry_status.ekf_status_report(held, NOW)
+    assert math.isnan(report.pos_horiz_variance)
+
+
+def test_a_mask_has_a_bit_for_each_number_that_fits() -> None:
+    assert telemetry_anafi._mask([0, 3, 3, 31, 32, 99]) == 0x80000009
+
+
+def test_the_shell_answers_a_line_and_prompts() -> None:
+    assert answer(None, "  ") == PROMPT  # type: ignore[arg-type]  # asks nothing of its host
+    assert answer(None, "halt").startswith("no such command: halt")  # type: ignore[arg-type]
+    assert "status" in answer(None, " HELP ")  # type: ignore[arg-type]
