@@ -43,9 +43,9 @@ _FAILURES: Mapping[int, int] = {
 
 
 def failures(vehicle: Vehicle) -> int:
-    """HL_FAILURE_FLAG of what is present and not healthy."""
-    present, healthy = sensor_bits(vehicle)
-    return sum(flag for bit, flag in _FAILURES.items() if present & bit and not healthy & bit)
+    """HL_FAILURE_FLAG of what is enabled and not healthy."""
+    _, enabled, healthy = sensor_bits(vehicle)
+    return sum(flag for bit, flag in _FAILURES.items() if enabled & bit and not healthy & bit)
 
 
 def _half_degrees(radians: float) -> int:
