@@ -41,6 +41,7 @@ from anafi_mav.sim.wind import CALM, Wind, WindSpec
 POSE_PERIOD = 0.1
 """s between two poses in the log."""
 
+HTTP_PORT = 80
 SKYCONTROLLER_PORTS = 100
 """A Skycontroller offers the TCP ports of its drone this much higher: HTTP at 180."""
 
@@ -63,7 +64,7 @@ class DroneSpec:
     discovery_port: int = handshake.DISCOVERY_PORT
     handshake_port: int = handshake.HANDSHAKE_PORT
     c2d_port: int = handshake.C2D_PORT
-    http_port: int | None = 80
+    http_port: int | None = HTTP_PORT
     """None: no web server."""
     rtsp_port: int | None = RTSP_PORT
     """None: no video."""
@@ -278,10 +279,12 @@ class SimulatedDrone:
             self._web = web
 
     def _tcp_port(self, port: int) -> int:
-        """Where a port of the drone is at the address of the Skycontroller."""
-        if port == self.spec.rtsp_port or port == RTSP_PORT:
+        """Where a port of the drone is at the address of the Skycontroller; the aircraft's own are known too."""
+        if port in (HTTP_PORT, self.spec.http_port):
+            return self.http_port or port
+        if port in (RTSP_PORT, self.spec.rtsp_port):
             return self.rtsp_port or port
-        return (self.http_port or port) if port == self.spec.http_port else port
+        return port
 
     def _make_web(self) -> WebServer:
         firmware, model = self.firmware, self.firmware.model
