@@ -138,6 +138,7 @@ def metadata(firmware: Firmware, stream: Stream, now: float) -> FrameMetadata:
         battery_percentage=firmware.battery.percent,
         flying_state=FlyingState(int(firmware.state)),
         piloting_mode=_mode(firmware),
+        animation_in_progress=firmware.animations.running,
         position=Ned(pose.north, pose.east, 0.0 - pose.up) if model.modern else None,
         local_position=Vector3(pose.north, pose.east, 0.0 - pose.up) if model.modern else None,
         timestamp=round(now * 1e6),
@@ -170,6 +171,8 @@ def _mode(firmware: Firmware) -> PilotingMode:
         return PilotingMode.FLIGHT_PLAN
     if firmware.homing.flying:
         return PilotingMode.RETURN_HOME
+    if firmware.follow.engaged:
+        return PilotingMode.TRACKING
     return PilotingMode.MOVE_TO if firmware.guidance.heading_for_place else PilotingMode.MANUAL
 
 

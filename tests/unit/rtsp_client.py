@@ -56,6 +56,11 @@ class Eye(asyncio.DatagramProtocol):
         await self.until(lambda: len(self.pictures) >= begin + count)
         return self.pictures[begin : begin + count]
 
+    async def first(self, count: int) -> list[Picture]:
+        """The first so many pictures of all."""
+        await self.until(lambda: len(self.pictures) >= count)
+        return self.pictures[:count]
+
     async def until(self, happened: object) -> None:
         assert callable(happened)
 

@@ -10,7 +10,7 @@ import cv2
 import pytest
 from sim_bench import HOME, Bench
 
-from anafi_mav.arsdk.messages import ardrone3, camera, gimbal, rth
+from anafi_mav.arsdk.messages import animation, ardrone3, camera, controller_info, follow_me, gimbal, rth
 from anafi_mav.arsdk.messages.camera import ExposureMode, IsoSensitivity, ShutterSpeed, WhiteBalanceMode
 from anafi_mav.arsdk.messages.proto import camera2
 from anafi_mav.arsdk.sdp import CAMERA_TYPE, DEFAULT_MEDIA, MODEL_ID, PICTURE_FOV, format_description, parse_description
@@ -153,6 +153,22 @@ def test_who_flies() -> None:
     bench.send(ardrone3.NavigateHome(0))
     bench.run(1.0)
     assert say(bench).piloting_mode is PilotingMode.MANUAL
+
+
+def test_animations_and_the_following_of_a_target_are_told() -> None:
+    bench = Bench()
+    bench.take_off()
+    bench.climb(10.0)
+    assert not say(bench).animation_in_progress
+    bench.send(animation.StartHorizontalPanorama(0, 0.0, 0.0))
+    assert say(bench).animation_in_progress
+    bench.send(animation.Cancel())
+    bench.send(follow_me.SetTargetIsController(1))
+    for _ in range(3):
+        bench.send(controller_info.Gps(HOME[0], HOME[1] + 0.0001, HOME[2], 3.0, 3.0, 0.0, 0.0, 0.0, 0.0))
+        bench.run(0.2)
+    bench.send(follow_me.Start(follow_me.Mode.LOOK_AT))
+    assert say(bench).piloting_mode is PilotingMode.TRACKING
 
 
 def test_without_a_fix_the_place_is_unknown() -> None:

@@ -1,0 +1,48 @@
+"""ffmpeg, as OpenCV brings it, watches the simulated models: a player that is not Parrot's."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import sys
+from pathlib import Path
+
+import pytest
+from support.process import simulator_process
+from support.world import loopback
+
+SCRIPT = """
+import json, os, sys
+os.environ["OPENCV_FFMPEG_CAPTURE_OPTIONS"] = "rtsp_transport;udp"
+import cv2
+capture = cv2.VideoCapture(sys.argv[1], cv2.CAP_FFMPEG)
+shapes, rows = [], []
+for _ in range(40):
+    ok, picture = capture.read()
+    if not ok:
+        break
+    shapes.append(picture.shape)
+    rows.append([int(picture[0].mean()), int(picture[-1].mean())])
+print(json.dumps({"shapes": shapes, "rows": rows}))
+"""
+PORT = 8554
+
+
+@pytest.mark.parametrize(("model", "shape"), [("4k", [720, 1280, 3]), ("ai", [1080, 1920, 3])])
+async def test_ffmpeg_plays_the_live_stream(model: str, shape: list[int], tmp_path: Path) -> None:
+    address, log = loopback(), tmp_path / "sim.jsonl"
+    options = ("--model", model, "--http-port", "0", "--rtsp-port", str(PORT))
+    async with simulator_process(address, log, *options):
+        process = await asyncio.create_subprocess_exec(
+            *(sys.executable, "-c", SCRIPT, f"rtsp://{address}:{PORT}/live"), stdout=asyncio.subprocess.PIPE
+        )
+        try:
+            out, _ = await asyncio.wait_for(process.communicate(), 60.0)
+        finally:
+            if process.returncode is None:
+                process.kill()
+                await process.wait()
+    seen = json.loads(out)
+    assert seen["shapes"] == [shape] * 40
+    # Sky above, ground below, in every picture.
+    assert {tuple(rows) for rows in seen["rows"]} == {(176, 83)}
