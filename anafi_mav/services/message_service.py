@@ -8,7 +8,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from anafi_mav.drone.events import Message
 from anafi_mav.mavlink import dialect
@@ -105,13 +105,19 @@ class MessageService(Service):
         self._paces.clear()
 
     def on_event(self, message: Message, now: float) -> None:
-        ids = self._by_news.get(type(message))
-        if ids is None:
-            return
+        if (ids := self._by_news.get(type(message))) is not None:
+            self.news(ids, now)
+
+    def news(self, ids: Iterable[int], at: float) -> None:
+        """These messages have something new; they leave at the end of the loop's turn."""
         if not self._fresh:
             asyncio.get_running_loop().call_soon(self._tell_news)
         for id in ids:
-            self._fresh[id] = now
+            self._fresh[id] = at
+
+    def wanted(self, id: int) -> bool:
+        """Does anybody have a stream of this message?"""
+        return any(self._intervals.interval(channel, id) is not None for channel in self.host.channels)
 
     def tick(self, now: float) -> None:
         for id in self._repeated:

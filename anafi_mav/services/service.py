@@ -75,6 +75,12 @@ class Host(Protocol):
     def times(self, at: float | None = None) -> Times:
         """A moment of the monotonic clock (None: now) in the clock of this system's messages."""
 
+    def wanted(self, id: int) -> bool:
+        """Does anybody have a stream of this message?"""
+
+    def news(self, id: int, at: float) -> None:
+        """A streamed message has something new, true at a moment of the monotonic clock, that no event told of."""
+
     def hush(self, channel: Channel, *, quiet: bool) -> None:
         """Say nothing of our own accord on this channel: only answers go there, until it is to be told all again."""
 

@@ -47,6 +47,7 @@ from anafi_mav.services.telemetry import CHANGES, TelemetryService
 from anafi_mav.services.time_service import TimeService
 from anafi_mav.services.tune import TuneService
 from anafi_mav.services.vehicle import Health, Landed, Vehicle
+from anafi_mav.services.video_telemetry import VideoTelemetryService
 from anafi_mav.services.warnings import WarningService
 
 logger = logging.getLogger(__name__)
@@ -72,6 +73,7 @@ SERVICES: tuple[type[Service], ...] = (
     TuneService,
     NodeStatusService,
     FlightRecordService,
+    VideoTelemetryService,
 )
 """What a system consists of, beside commands and messages themselves."""
 
@@ -204,6 +206,14 @@ class System:
             told = [channel for channel in self._node.channels if channel not in self._hushed]
             self._told = (self._node.channels, told)
         return told
+
+    def wanted(self, id: int) -> bool:
+        """Does anybody have a stream of this message?"""
+        return self._messages.wanted(id)
+
+    def news(self, id: int, at: float) -> None:
+        """A streamed message has something new, true at a moment of the monotonic clock, that no event told of."""
+        self._messages.news((id,), at)
 
     def hush(self, channel: Channel, *, quiet: bool) -> None:
         """Say nothing of our own accord on this channel: only answers go there, until it is to be told all again."""

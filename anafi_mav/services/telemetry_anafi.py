@@ -11,20 +11,17 @@ from collections.abc import Callable, Iterable, Mapping
 from anafi_mav import units
 from anafi_mav.drone import events
 from anafi_mav.drone.alerts import Alerts
-from anafi_mav.drone.camera import Camera
 from anafi_mav.drone.controller import MAX_AXIS, Controller
 from anafi_mav.drone.element import Range
 from anafi_mav.drone.home import Home
 from anafi_mav.drone.lens import INTRINSICS
-from anafi_mav.drone.link import Link
 from anafi_mav.drone.piloting_state import REDUCERS as PILOTING
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.stream import Stream, Times
 from anafi_mav.services.vehicle import Vehicle
 
 NAN = math.nan
-UNKNOWN_U8, UNKNOWN_U16, UNKNOWN_U32 = 0xFF, 0xFFFF, 0xFFFFFFFF
-UNKNOWN_I16, UNKNOWN_I32 = 0x7FFF, 0x7FFFFFFF
+UNKNOWN_U8, UNKNOWN_U16, UNKNOWN_I32 = 0xFF, 0xFFFF, 0x7FFFFFFF
 NO_AXIS = -128
 
 
@@ -39,10 +36,6 @@ def _seconds(value: int | None, unknown: int) -> int:
 
 def _current(setting: Range | None) -> float:
     return NAN if setting is None else setting.current
-
-
-def _number(value: float | None) -> float:
-    return NAN if value is None else value
 
 
 def _mask(members: Iterable[int]) -> int:
@@ -108,25 +101,6 @@ def checklist(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
     )
 
 
-def link(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
-    """ANAFI_LINK."""
-    state = vehicle.drone.link.state
-    flags = 0
-    if state.perturbed is not None:
-        flags = (
-            dialect.ANAFI_LINK_FLAGS_TOLD
-            | (dialect.ANAFI_LINK_FLAGS_4G_INTERFERENCE if state.interference_4g else 0)
-            | (dialect.ANAFI_LINK_FLAGS_PERTURBED if state.perturbed else 0)
-        )
-    return dialect.MAVLink_anafi_link_message(
-        times.boot_ms,
-        UNKNOWN_U32,
-        UNKNOWN_I16 if state.rssi_dbm is None else state.rssi_dbm,
-        _u8(state.quality),
-        flags,
-    )
-
-
 def controller_input(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
     """ANAFI_CONTROLLER_INPUT; none without a Skycontroller."""
     controller = vehicle.drone.controller
@@ -177,26 +151,6 @@ def controller_status(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message
     )
 
 
-def camera_exposure(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
-    """ANAFI_CAMERA_EXPOSURE of the main camera."""
-    camera = vehicle.drone.camera[0]
-    if camera.mode is None:
-        return None
-    return dialect.MAVLink_anafi_camera_exposure_message(
-        times.boot_ms,
-        _number(camera.shutter_s),
-        _number(camera.iso),
-        NAN,
-        NAN,
-        _number(camera.ev),
-        _number(camera.zoom),
-        _number(camera.hfov_deg),
-        NAN,
-        0,
-        dialect.ANAFI_EXPOSURE_SOURCE_STEPS,
-    )
-
-
 def camera_intrinsics(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
     """ANAFI_CAMERA_INTRINSICS; none for a model that nobody has measured."""
     lens = INTRINSICS.get(vehicle.drone.identity.model.key)
@@ -240,13 +194,11 @@ STREAMS: Mapping[int, Stream] = {
     ),
     dialect.MAVLINK_MSG_ID_ANAFI_HOME: _state(home, Home.REDUCERS),
     dialect.MAVLINK_MSG_ID_ANAFI_CHECKLIST: _state(checklist, Alerts.REDUCERS),
-    dialect.MAVLINK_MSG_ID_ANAFI_LINK: _state(link, Link.REDUCERS),
     dialect.MAVLINK_MSG_ID_ANAFI_CONTROLLER_INPUT: _state(controller_input, _INPUT),
     dialect.MAVLINK_MSG_ID_ANAFI_CONTROLLER_ATTITUDE: Stream(controller_attitude, (events.ControllerAttitudeChanged,)),
     dialect.MAVLINK_MSG_ID_ANAFI_CONTROLLER_STATUS: _state(
         controller_status,
         [e for e in Controller.REDUCERS if e not in (events.ControllerAttitudeChanged, *_INPUT)],
     ),
-    dialect.MAVLINK_MSG_ID_ANAFI_CAMERA_EXPOSURE: _state(camera_exposure, Camera.REDUCERS),
     dialect.MAVLINK_MSG_ID_ANAFI_CAMERA_INTRINSICS: Stream(camera_intrinsics),
 }

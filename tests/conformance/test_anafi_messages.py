@@ -136,6 +136,37 @@ async def test_camera_exposure_and_intrinsics(model: str) -> None:
         )
 
 
+@pytest.mark.parametrize("model", ["4k", "ai"])
+async def test_the_video_runs_while_somebody_wants_what_only_it_says(model: str) -> None:
+    async with world(model=model, speed=1.0) as w:
+        if w.drone.rtsp_port is None:
+            pytest.skip(w.drone.rtsp_problem)
+        await stream(w.client, dialect.MAVLINK_MSG_ID_ANAFI_LINK)
+        told = await w.client.wait("ANAFI_LINK")
+        assert told.goodput == 0xFFFFFFFF
+        video = w.gateway._supervised[0].drone.video
+        assert not video.state.playing
+        await stream(w.client, dialect.MAVLINK_MSG_ID_ANAFI_CAMERA_EXPOSURE)
+        frame = dialect.ANAFI_EXPOSURE_SOURCE_FRAME
+        told = await w.client.wait("ANAFI_CAMERA_EXPOSURE", lambda m: m.source == frame, timeout=12.0)
+        # The simulated camera's numbers: ms on the wire, rad on the wire.
+        assert 0.0 < told.exposure_time < 0.1
+        assert 25 <= told.iso <= 6400
+        assert 0.5 < told.awb_r_gain < 4.0
+        assert 0.5 < told.awb_b_gain < 4.0
+        assert told.hfov == pytest.approx({"4k": 69.0, "ai": 68.0}[model], abs=0.5)
+        assert 30.0 < told.vfov < told.hfov
+        if model == "4k":
+            radio = await w.client.wait("ANAFI_LINK", lambda m: m.goodput != 0xFFFFFFFF)
+            assert radio.goodput == video.state.frame.metadata.wifi.goodput * 1000
+        exposure = dialect.MAVLINK_MSG_ID_ANAFI_CAMERA_EXPOSURE
+        assert (await w.client.command(stock.MAV_CMD_SET_MESSAGE_INTERVAL, exposure, -1)).result == ACCEPTED
+        while video.state.playing:
+            await w.client.wait("ANAFI_LINK")
+        told = await ask(w.client, exposure)
+        assert (told.source, math.isnan(told.awb_r_gain)) == (dialect.ANAFI_EXPOSURE_SOURCE_STEPS, True)
+
+
 async def test_no_skycontroller() -> None:
     async with world() as w:
         for id in (61410, 61411, 61412):
