@@ -73,6 +73,10 @@ class CommandService(Service):
         self._actions = {id: _bound(handler, vehicle) for id, handler in ACTIONS.items()}
         self._actions.update(actions)
 
+    def capabilities(self) -> int:
+        cut = dialect.MAV_PROTOCOL_CAPABILITY_FLIGHT_TERMINATION if self.host.vehicle.allow_kill else 0
+        return dialect.MAV_PROTOCOL_CAPABILITY_COMMAND_INT | cut
+
     def messages(self) -> Mapping[int, MessageHandler]:
         return {
             dialect.MAVLINK_MSG_ID_COMMAND_LONG: lambda inbound: self._command(

@@ -12,15 +12,7 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import Command
 from anafi_mav.services.flavours import Flavour, flavour_of
-from anafi_mav.services.service import Request, Service
-
-CAPABILITIES = (
-    dialect.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
-    | dialect.MAV_PROTOCOL_CAPABILITY_SET_ATTITUDE_TARGET
-    | dialect.MAV_PROTOCOL_CAPABILITY_MAVLINK2
-)
-"""Exactly what the services implement: no mission, fence or rally items yet, no FTP, no position setpoints."""
-
+from anafi_mav.services.service import MessageHandler, Request, Service
 
 def _version(text: str) -> int:
     """ "1.8.2" as MAVLink's four version bytes, the last one 0."""
@@ -29,7 +21,7 @@ def _version(text: str) -> int:
     return min(numbers[0], 255) << 24 | min(numbers[1], 255) << 16 | min(numbers[2], 255) << 8
 
 
-def autopilot_version(drone: Drone, flavour: Flavour, *, allow_kill: bool) -> dialect.MAVLink_message:
+def autopilot_version(drone: Drone, flavour: Flavour, capabilities: int) -> dialect.MAVLink_message:
     """AUTOPILOT_VERSION. The serial number is the unique id; its hash is the older 64-bit one.
 
     flight_sw_version is the release that the flavour follows, middleware_sw_version is anafi-mav's own,
@@ -45,7 +37,7 @@ def autopilot_version(drone: Drone, flavour: Flavour, *, allow_kill: bool) -> di
         else dialect.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_C_CAST
     )
     return dialect.MAVLink_autopilot_version_message(
-        CAPABILITIES | encoding | (dialect.MAV_PROTOCOL_CAPABILITY_FLIGHT_TERMINATION if allow_kill else 0),
+        capabilities | encoding | dialect.MAV_PROTOCOL_CAPABILITY_MAVLINK2,
         major << 24 | minor << 16 | patch << 8 | flavour.version_type,
         _version(__version__),
         _version(firmware),
@@ -74,5 +66,15 @@ class IdentityService(Service):
             dialect.MAVLINK_MSG_ID_PROTOCOL_VERSION: lambda inbound, command: protocol_version(),
         }
 
+    def messages(self) -> Mapping[int, MessageHandler]:
+        return {dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION_REQUEST: self._asked}
+
+    def _asked(self, inbound: Inbound) -> None:
+        """AUTOPILOT_VERSION_REQUEST, of before MAV_CMD_REQUEST_MESSAGE: Mission Planner still sends it."""
+        self.host.send(self._made(inbound), inbound.channel)
+
     def _version(self, inbound: Inbound, command: Command) -> dialect.MAVLink_message:
-        return autopilot_version(self.host.drone, flavour_of(inbound.channel), allow_kill=self.host.vehicle.allow_kill)
+        return self._made(inbound)
+
+    def _made(self, inbound: Inbound) -> dialect.MAVLink_message:
+        return autopilot_version(self.host.drone, flavour_of(inbound.channel), self.host.capabilities)

@@ -13,6 +13,9 @@ from anafi_mav.services.service import MessageHandler, Service, client_of
 class OffboardService(Service):
     """SET_ATTITUDE_TARGET."""
 
+    def capabilities(self) -> int:
+        return dialect.MAV_PROTOCOL_CAPABILITY_SET_ATTITUDE_TARGET
+
     def messages(self) -> Mapping[int, MessageHandler]:
         return {dialect.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET: self._set_attitude_target}
 

@@ -55,6 +55,13 @@ class PlanService(Service):
         self._desk = PlanDesk([MissionKind(), FenceKind(), RallyKind()])
         self._timer: asyncio.TimerHandle | None = None
 
+    def capabilities(self) -> int:
+        return (
+            dialect.MAV_PROTOCOL_CAPABILITY_MISSION_INT
+            | dialect.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
+            | dialect.MAV_PROTOCOL_CAPABILITY_MISSION_RALLY
+        )
+
     def messages(self) -> Mapping[int, MessageHandler]:
         return {
             **dict.fromkeys(MESSAGES, self._receive),

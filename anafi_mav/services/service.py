@@ -45,6 +45,8 @@ class Host(Protocol):
     drone: Drone
     vehicle: Vehicle
     clock: Clock
+    capabilities: int
+    """MAV_PROTOCOL_CAPABILITY bits of all services."""
     memory: Memory
 
     @property
@@ -95,6 +97,10 @@ class Service:
 
     def __init__(self, host: Host) -> None:
         self.host = host
+
+    def capabilities(self) -> int:
+        """MAV_PROTOCOL_CAPABILITY bits that this service is the reason for."""
+        return 0
 
     def messages(self) -> Mapping[int, MessageHandler]:
         """By message id."""

@@ -82,9 +82,6 @@ AUTOPILOT = dialect.MAV_COMP_ID_AUTOPILOT1
 HEARTBEAT_EVERY = 1.0
 """s (MAVLink heartbeat.md)."""
 
-TICK = 0.05
-"""s between looks at the heartbeat, which may be late by no more than a tenth of its second."""
-
 LOOK_EVERY = 0.1
 """s between looks at the other periodic messages; none of them is wanted more often."""
 
@@ -137,6 +134,9 @@ class System:
         self._commands = CommandService(self)
         self._messages = MessageService(self)
         self.services: list[Service] = [self._commands, self._messages, *(kind(self) for kind in SERVICES)]
+        self.capabilities = 0
+        for service in self.services:
+            self.capabilities |= service.capabilities()
         self._commands.take_tables(
             _joined(service.queries() for service in self.services),
             _joined(service.actions() for service in self.services),
@@ -302,7 +302,7 @@ class System:
                         service.tick(now)
                     except Exception:  # the heartbeat goes on whatever happens to one service
                         logger.exception("%s of system %d", type(service).__name__, self.sysid)
-            await asyncio.sleep(TICK)
+            await asyncio.sleep(max(0.0, min(self._next_heartbeat, next_look) - self.clock.monotonic()))
 
     # What the drone reports.
 
