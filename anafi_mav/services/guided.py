@@ -22,7 +22,7 @@ from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.service import Action, Host, Service, client_of
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.targets import UnsupportedFrame, height, height_in_frame, place
-from anafi_mav.services.vehicle import Goto, Place, Refused, Vehicle
+from anafi_mav.services.vehicle import SLOWEST, Goto, Place, Refused, Vehicle
 
 KEEP, DEFAULT = -1.0, -2.0
 """What stands for "no change" and "back to the default" in speed and throttle (MAVLink common.xml DO_CHANGE_SPEED)."""
@@ -32,6 +32,9 @@ _UPWARDS, _DOWNWARDS = 2.0, 3.0
 """SPEED_TYPE."""
 
 DEG_PER_TURN = 360.0
+
+SLOWEST_TURN = 1.0
+"""deg/s. A turn that is slower than this is a number in the wrong place, and would take for ever."""
 
 _ITEM_GOTO, _ITEM_ALTITUDE = 2, 3
 """`current` of a mission item that is an order (ArduPilot, MAVLink mission.md)."""
@@ -147,8 +150,8 @@ class GuidedService(Service):
             raise Refused("Speed refused: param1 is 0 to 3", lasting=True)
         if math.isnan(speed) or speed == KEEP:
             return
-        if speed != DEFAULT and not (math.isfinite(speed) and speed > 0.0):
-            raise Refused("Speed refused: param2 is m/s above 0, -1 or -2", lasting=True)
+        if speed != DEFAULT and not (math.isfinite(speed) and speed >= SLOWEST):
+            raise Refused(f"Speed refused: param2 is {SLOWEST:g} m/s or more, -1 or -2", lasting=True)
         wanted = None if speed == DEFAULT else speed
         vehicle = self.host.vehicle
         if kind in (_AIRSPEED, _GROUNDSPEED):
@@ -175,8 +178,8 @@ class GuidedService(Service):
         angle, rate, way, relative = command.params
         if not math.isfinite(angle) or abs(angle) > DEG_PER_TURN:
             raise Refused("Turn refused: param1 is an angle of up to 360 degrees", lasting=True)
-        if math.isinf(rate) or rate < 0.0 or math.isinf(way):
-            raise Refused("Turn refused: param2 is deg/s, param3 -1, 0 or 1", lasting=True)
+        if math.isinf(rate) or rate < 0.0 or 0.0 < rate < SLOWEST_TURN or math.isinf(way):
+            raise Refused(f"Turn refused: param2 is {SLOWEST_TURN:g} deg/s or more, param3 -1, 0 or 1", lasting=True)
         vehicle = self.host.vehicle
         attitude = vehicle.drone.piloting.state.attitude
         if not vehicle.in_air or attitude is None:

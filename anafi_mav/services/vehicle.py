@@ -39,6 +39,12 @@ ARM_WAIT = 10.0
 CLIMB_WAIT = 15.0
 """s for the drone to hover after it took off, before the climb to the asked height is given up."""
 
+SLOWEST = 0.1
+"""m/s. A speed that is lower than this is a number in the wrong place, and would get nowhere."""
+
+NOWHERE = 1e-5
+"""deg. A place that is so near to 0/0 is no place but numbers that were not set, or integers in the place of floats."""
+
 LOWEST = 1.0
 """m above take-off: where an ANAFI hovers by itself after take-off. Lower targets are refused, never clamped."""
 
@@ -481,7 +487,7 @@ class Vehicle:
         """Raise `Refused` unless this is a place."""
         if not (abs(place.latitude) <= 90.0 and abs(place.longitude) <= 180.0):
             raise Refused(f"{what} refused: that is no place on earth", lasting=True)
-        if place.latitude == 0.0 and place.longitude == 0.0:
+        if abs(place.latitude) < NOWHERE and abs(place.longitude) < NOWHERE:
             raise Refused(f"{what} refused: latitude and longitude are both 0", lasting=True)
 
     def check_place(self, place: Place, *, start: Place | None = None) -> None:
