@@ -10,7 +10,7 @@ from anafi_mav.services.commands import Command
 from anafi_mav.services.guided import guided_mode
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.targets import height, place
-from anafi_mav.services.vehicle import SLOWEST, Refused, Vehicle
+from anafi_mav.services.vehicle import FASTEST, SLOWEST, Refused, Vehicle
 
 Handler = Callable[[Vehicle, Command], Awaitable[None]]
 
@@ -62,10 +62,10 @@ async def reposition(vehicle: Vehicle, command: Command) -> None:
     pause; a speed alone is refused, for it would not stop anything.
     """
     speed, flags, yaw = command.params[0], command.params[1], command.params[3]
-    if math.isinf(yaw) or math.isinf(speed):
-        raise Refused("Refused: speed and heading must be numbers", lasting=True)
-    if 0.0 < speed < SLOWEST:
-        raise Refused(f"Refused: a speed is {SLOWEST:g} m/s or more", lasting=True)
+    if math.isinf(speed) or abs(yaw) > 2.0 * math.pi:
+        raise Refused("Refused: speed is in m/s, heading in radians of up to a turn", lasting=True)
+    if speed > 0.0 and not SLOWEST <= speed <= FASTEST:
+        raise Refused(f"Refused: a speed is {SLOWEST:g} to {FASTEST:g} m/s", lasting=True)
     where, ato = place(command), height(vehicle, command)
     heading = None if math.isnan(yaw) else yaw
     if heading == 0.0 and command.flavour.zero_is_unset:

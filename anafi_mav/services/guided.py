@@ -22,7 +22,7 @@ from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.service import Action, Host, Service, client_of
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.targets import UnsupportedFrame, height, height_in_frame, place
-from anafi_mav.services.vehicle import SLOWEST, Goto, Place, Refused, Vehicle
+from anafi_mav.services.vehicle import FASTEST, SLOWEST, Goto, Place, Refused, Vehicle
 
 KEEP, DEFAULT = -1.0, -2.0
 """What stands for "no change" and "back to the default" in speed and throttle (MAVLink common.xml DO_CHANGE_SPEED)."""
@@ -150,8 +150,8 @@ class GuidedService(Service):
             raise Refused("Speed refused: param1 is 0 to 3", lasting=True)
         if math.isnan(speed) or speed == KEEP:
             return
-        if speed != DEFAULT and not (math.isfinite(speed) and speed >= SLOWEST):
-            raise Refused(f"Speed refused: param2 is {SLOWEST:g} m/s or more, -1 or -2", lasting=True)
+        if speed != DEFAULT and not SLOWEST <= speed <= FASTEST:
+            raise Refused(f"Speed refused: param2 is {SLOWEST:g} to {FASTEST:g} m/s, -1 or -2", lasting=True)
         wanted = None if speed == DEFAULT else speed
         vehicle = self.host.vehicle
         if kind in (_AIRSPEED, _GROUNDSPEED):

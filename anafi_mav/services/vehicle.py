@@ -39,8 +39,8 @@ ARM_WAIT = 10.0
 CLIMB_WAIT = 15.0
 """s for the drone to hover after it took off, before the climb to the asked height is given up."""
 
-SLOWEST = 0.1
-"""m/s. A speed that is lower than this is a number in the wrong place, and would get nowhere."""
+SLOWEST, FASTEST = 0.1, 100.0
+"""m/s. A speed beyond these is a number in the wrong place, or in another unit. Within them the drone limits itself."""
 
 NOWHERE = 1e-5
 """deg. A place that is so near to 0/0 is no place but numbers that were not set, or integers in the place of floats."""

@@ -29,6 +29,10 @@ FRAMES = 100_000
 BATCH = 500
 """Frames between two looks at the heartbeat."""
 
+LOST = 3.0
+"""s without a heartbeat after which the most impatient client, MAVSDK, takes a vehicle for lost. Client, gateway and
+simulator share one process here, and a storm goes through it: the heartbeat's own jitter is measured elsewhere."""
+
 LONGEST = 280
 """Bytes of a frame with the longest payload and a signature (MAVLink serialization.md)."""
 
@@ -144,7 +148,7 @@ async def test_random_frames_on_the_ground(flavour: str, mistakes: list[str]) ->
         beats = [at for at, _ in w.client.since(mark, "HEARTBEAT")]
         gaps = [b - a for a, b in itertools.pairwise(beats)]
         assert gaps
-        assert max(gaps) < 1.5, max(gaps)
+        assert max(gaps) < LOST, max(gaps)
         assert motions(w, began) == []
         assert w.drone.flying_state.name == "LANDED"
         assert mistakes == []
@@ -195,7 +199,7 @@ async def test_commands_with_numbers_that_make_no_sense(flavour: str, mistakes: 
                 await each(w, id, w.drone.log[-1].t, MAY_MOVE.get(id, lambda p: False))
                 assert w.drone.flying_state.name in ("HOVERING", "FLYING"), id
         beats = [at for at, _ in w.client.since(mark, "HEARTBEAT")]
-        assert max(b - a for a, b in itertools.pairwise(beats)) < 1.5
+        assert max(b - a for a, b in itertools.pairwise(beats)) < LOST
         assert mistakes == []
 
 
