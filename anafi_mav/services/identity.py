@@ -14,6 +14,7 @@ from anafi_mav.services.commands import Command
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.service import MessageHandler, Request, Service
 
+
 def _version(text: str) -> int:
     """ "1.8.2" as MAVLink's four version bytes, the last one 0."""
     numbers = [int(number) for number in re.findall(r"\d+", text)[:3]]

@@ -131,10 +131,10 @@ class System:
             changed=self._changed,
             end_others=lambda: self._commands.end_others(),
         )
-        self._commands = CommandService(self)
+        self._commands: CommandService = CommandService(self)
         self._messages = MessageService(self)
         self.services: list[Service] = [self._commands, self._messages, *(kind(self) for kind in SERVICES)]
-        self.capabilities = 0
+        self.capabilities: int = 0
         for service in self.services:
             self.capabilities |= service.capabilities()
         self._commands.take_tables(
