@@ -48,6 +48,7 @@ ON_REQUEST = frozenset(
         mav.MAVLINK_MSG_ID_ONBOARD_COMPUTER_STATUS,
         mav.MAVLINK_MSG_ID_HIGH_LATENCY2,
         mav.MAVLINK_MSG_ID_RANGEFINDER,
+        mav.MAVLINK_MSG_ID_ODOMETRY,
         *(id for id in mav.mavlink_map if 61400 <= id <= 61499),
     }
 )

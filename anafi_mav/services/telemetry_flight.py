@@ -15,6 +15,7 @@ from typing import NamedTuple
 from anafi_mav import geo, units
 from anafi_mav.drone import events
 from anafi_mav.drone.events import MoveToStatus
+from anafi_mav.drone.piloting_state import Attitude, Velocity
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.stream import Stream, Times
 from anafi_mav.services.vehicle import Vehicle
@@ -83,6 +84,42 @@ def local_position_ned(vehicle: Vehicle, times: Times) -> dialect.MAVLink_messag
     velocity = state.velocity
     return dialect.MAVLink_local_position_ned_message(
         times.boot_ms, north, east, -state.altitude, velocity.north, velocity.east, velocity.down
+    )
+
+
+def _to_body(velocity: Velocity, attitude: Attitude) -> tuple[float, float, float]:
+    """A velocity over ground (north, east, down) along the drone's axes (forward, right, down)."""
+    cr, sr = math.cos(attitude.roll), math.sin(attitude.roll)
+    cp, sp = math.cos(attitude.pitch), math.sin(attitude.pitch)
+    cy, sy = math.cos(attitude.yaw), math.sin(attitude.yaw)
+    north, east, down = velocity.north, velocity.east, velocity.down
+    level_forward, level_right = cy * north + sy * east, cy * east - sy * north
+    forward = cp * level_forward - sp * down
+    below = sp * level_forward + cp * down
+    return forward, cr * level_right + sr * below, cr * below - sr * level_right
+
+
+def odometry(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
+    """ODOMETRY: LOCAL_POSITION_NED and the attitude in one, the velocity along the drone's axes. Rates and covariances
+    are not told: NaN."""
+    place, origin, state = vehicle.place, vehicle.origin, vehicle.drone.piloting.state
+    if place is None or origin is None or state.altitude is None or state.velocity is None or state.attitude is None:
+        return None
+    north, east = geo.offset(origin.latitude, origin.longitude, place.latitude, place.longitude)
+    return dialect.MAVLink_odometry_message(
+        times.boot_us,
+        dialect.MAV_FRAME_LOCAL_NED,
+        dialect.MAV_FRAME_BODY_FRD,
+        north,
+        east,
+        -state.altitude,
+        list(units.quaternion_from_euler(state.attitude.roll, state.attitude.pitch, state.attitude.yaw)),
+        *_to_body(state.velocity, state.attitude),
+        NAN,
+        NAN,
+        NAN,
+        [NAN] * 21,
+        [NAN] * 21,
     )
 
 
@@ -245,6 +282,7 @@ STREAMS: Mapping[int, Stream] = {
     dialect.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: Stream(attitude_quaternion, (events.AttitudeChanged,)),
     dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: Stream(global_position_int, _POSITION),
     dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED: Stream(local_position_ned, _POSITION),
+    dialect.MAVLINK_MSG_ID_ODOMETRY: Stream(odometry, (events.AttitudeChanged, *_POSITION)),
     dialect.MAVLINK_MSG_ID_ALTITUDE: Stream(altitude, (events.AltitudeChanged, events.AltitudeAboveGroundChanged)),
     dialect.MAVLINK_MSG_ID_VFR_HUD: Stream(vfr_hud, (events.SpeedChanged, events.AltitudeChanged)),
     dialect.MAVLINK_MSG_ID_GPS_RAW_INT: Stream(

@@ -43,7 +43,7 @@ STATES = [
 """Repeated without news, ten times a second at most."""
 
 MOTION = ["ATTITUDE", "ATTITUDE_QUATERNION", "GLOBAL_POSITION_INT", "LOCAL_POSITION_NED", "ALTITUDE", "VFR_HUD"]
-MOTION += ["DISTANCE_SENSOR", "RANGEFINDER"]
+MOTION += ["DISTANCE_SENSOR", "RANGEFINDER", "ODOMETRY"]
 """The drone tells what they are made of five times a second."""
 
 SLOW = ["GPS_RAW_INT"]

@@ -10,7 +10,7 @@ import pytest
 
 from anafi_mav.drone.battery import BatteryState
 from anafi_mav.drone.link import LinkState
-from anafi_mav.drone.piloting_state import Attitude, PilotingState
+from anafi_mav.drone.piloting_state import Attitude, PilotingState, Velocity
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.streams import DEFAULT_INTERVALS, ON_REQUEST, Pace
 from anafi_mav.services import (
@@ -195,6 +195,23 @@ def test_distance_to_the_ground(height: float, distance: int) -> None:
     message: Any = telemetry_flight.distance_sensor(vehicle(piloting=PilotingState(height=height)), NOW)
     assert message.current_distance == distance
     assert (message.min_distance, message.max_distance) == (0, 65535)
+
+
+@pytest.mark.parametrize(
+    ("attitude", "velocity", "body"),
+    [
+        (Attitude(0.0, 0.0, 0.0), Velocity(1.0, 2.0, 3.0), (1.0, 2.0, 3.0)),
+        (Attitude(0.0, 0.0, math.pi / 2), Velocity(1.0, 2.0, 3.0), (2.0, -1.0, 3.0)),  # nose east
+        (Attitude(0.0, math.pi / 2, 0.0), Velocity(1.0, 2.0, 3.0), (-3.0, 2.0, 1.0)),  # nose up: forward is up
+        (Attitude(math.pi / 2, 0.0, 0.0), Velocity(1.0, 2.0, 3.0), (1.0, 3.0, -2.0)),  # right wing down
+        # Nose up 30 degrees and climbing along it: all of it is forward.
+        (Attitude(0.0, math.pi / 6, 0.0), Velocity(2 * math.sqrt(3), 0.0, -2.0), (4.0, 0.0, 0.0)),
+    ],
+)
+def test_velocity_along_the_drones_axes(
+    attitude: Attitude, velocity: Velocity, body: tuple[float, float, float]
+) -> None:
+    assert telemetry_flight._to_body(velocity, attitude) == pytest.approx(body, abs=1e-12)
 
 
 def test_an_attitude_alone_is_no_estimate_of_a_place() -> None:
