@@ -140,8 +140,8 @@ class Camera2:
         """What is told five times a second."""
         return [self._zoom_level()]
 
-    def panorama(self, act: Callable[[Capture], Iterable[Message]], time: float) -> list[Message]:
-        """Let it take part in a panorama."""
+    def work(self, act: Callable[[Capture], Iterable[Message]], time: float) -> list[Message]:
+        """Let it do something; what it says of it."""
         self._now = time
         return self._translate(act(self._capture))
 

@@ -77,8 +77,8 @@ class Cameras:
             if capture.camera.active and capture.camera.lens.zoom_max > 1.0
         ]
 
-    def panorama(self, act: Callable[[Capture], Iterable[Message]], time: float) -> list[Message]:
-        """Let the active camera take part in a panorama."""
+    def work(self, act: Callable[[Capture], Iterable[Message]], time: float) -> list[Message]:
+        """Let the active camera do something; what it says of it."""
         return list(act(self._active))
 
     # -- commands

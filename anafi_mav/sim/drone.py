@@ -9,7 +9,7 @@ import os
 import random
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from anafi_mav.arsdk import handshake
@@ -44,6 +44,9 @@ POSE_PERIOD = 0.1
 HTTP_PORT = 80
 SKYCONTROLLER_PORTS = 100
 """A Skycontroller offers the TCP ports of its drone this much higher: HTTP at 180."""
+
+SHUTDOWN_TIME, REBOOT_TIME = 1.0, 10.0
+"""s from the order to reboot until the drone is gone, and until it is back. Assumed: an aircraft takes longer."""
 
 MAX_RATE = 200.0
 """Hz; the motion itself is not computed more often."""
@@ -160,12 +163,18 @@ class SimulatedDrone:
             self.firmware,
             luck,
             lambda name, args: log.add(clock(), "video", name, args),
-            lambda: self._in_reach and not self.faults.mute,
-            lambda data, deliver: video_air(data, False, deliver) if self._in_reach and not self.faults.mute else None,
+            lambda: self._audible,
+            lambda data, deliver: video_air(data, False, deliver) if self._audible else None,
         )
         self._session: DeviceSession | None = None
         self._next_pose = 0.0
         self._closing = False
+        self._off_at: float | None = None
+        self._off_until: float | None = None
+        """Simulated times at which a drone that reboots is gone, and back."""
+        self._factory = False
+        """It comes back as from the factory."""
+        self._chance = chance
 
     # -- what tests and scenarios use
 
@@ -186,6 +195,11 @@ class SimulatedDrone:
     def pose(self) -> Pose:
         """The true pose."""
         return self.firmware.pose
+
+    @property
+    def powered(self) -> bool:
+        """False while it reboots."""
+        return self._off_until is None
 
     @property
     def flying_state(self) -> FlyingState:
@@ -310,6 +324,10 @@ class SimulatedDrone:
     def tick(self, now: float, elapsed: float, pose: Pose, arrived: bool, still: bool) -> None:
         """Called by the simulation after each of its turns; see `Firmware.tick`."""
         self.firmware.tick(now, elapsed, pose, arrived, still)
+        if self._off_at is not None and self.time >= self._off_at:
+            self._go_off()
+        elif self._off_until is not None and self.time >= self._off_until:
+            self._boot()
         if elapsed and (self.wind.spec is not CALM or self._body.windy):
             self._body.blow(*self.wind.advance(elapsed))
         session = self._session
@@ -345,12 +363,49 @@ class SimulatedDrone:
 
     def _mute_link(self, mute: bool) -> None:
         if self._server is not None:
-            self._server.mute = mute
+            self._server.mute = mute or (self.skycontroller is None and not self.powered)
+        if self._web is not None:
+            self._web.mute = not self._audible
+
+    @property
+    def _audible(self) -> bool:
+        """Whatever the drone says goes through the air."""
+        return self._in_reach and not self.faults.mute
+
+    # -- its power
+
+    def _reboot(self, factory: bool) -> None:
+        """Be gone soon, and for a while."""
+        self._off_at, self._factory = self.time + SHUTDOWN_TIME, factory
+
+    def _go_off(self) -> None:
+        """Nobody is told: the link is silent from here on."""
+        if self.firmware.state is not FlyingState.LANDED:
+            self._off_at = None
+            return
+        self._off_at, self._off_until = None, self.time + REBOOT_TIME
+        self.log.add(self._clock(), "state", "power", {"on": False, "factory": self._factory})
+        if self.skycontroller is not None:
+            self.skycontroller.radio = False
+        self._mute_link(self.faults.mute)
+
+    def _boot(self) -> None:
+        chance = self._chance
+        ids = (f"{chance.getrandbits(128):032X}", f"{chance.getrandbits(128):032X}")
+        self.identity = replace(self.identity, boot_id=ids[0], run_id=ids[1])
+        self.firmware.reboot(self.identity, factory=self._factory)
+        self._off_until = None
+        self.log.add(self._clock(), "state", "power", {"on": True, "boot_id": ids[0]})
+        if self.skycontroller is not None:
+            self.skycontroller.radio = True
+        elif self._session is not None:
+            self._session.end("the drone has rebooted")
+        self._mute_link(self.faults.mute)
 
     def _on_session(self, session: DeviceSession) -> OnMessage:
         now = self._clock()
         self._session = session
-        session.mute = self.faults.mute
+        session.mute = self.faults.mute or (self.skycontroller is None and not self.powered)
         session.air = self._air
         session.lost.add_done_callback(lambda lost: self._on_lost(session, lost.result()))
         self.log.add(now, "session", "up", {"peer": session.peer, "version": session.version})
@@ -376,7 +431,7 @@ class SimulatedDrone:
 
     @property
     def _in_reach(self) -> bool:
-        return self.skycontroller is None or self.skycontroller.radio
+        return self.powered and (self.skycontroller is None or self.skycontroller.radio)
 
     def _radio_changed(self, up: bool) -> None:
         """The Skycontroller is in reach again, or not any more."""
@@ -384,6 +439,7 @@ class SimulatedDrone:
             self.firmware.link_up()
         else:
             self.firmware.link_lost()
+        self._mute_link(self.faults.mute)
 
     def _on_message(self, session: DeviceSession, message: Message | UnknownMessage, now: float) -> None:
         if self.skycontroller is not None and self.skycontroller.receive(message, now):
@@ -394,6 +450,9 @@ class SimulatedDrone:
             self._send_all(session, all_states(self.firmware), common.AllStatesChanged())
         elif isinstance(message, common.AllSettings):
             self._send_all(session, all_settings(self.firmware), common.AllSettingsChanged())
+        elif isinstance(message, common.Reboot | common.FactoryReset):
+            if self.firmware.state is FlyingState.LANDED and self._off_at is None:
+                self._reboot(isinstance(message, common.FactoryReset))
         else:
             self.firmware.receive(message, now)
 

@@ -82,11 +82,24 @@ class Flight:
         self.faults = faults
         self.settings = Settings(model, identity.name)
         self.battery = Battery(model)
+        self.payload = Payload(model, identity.name, identity.run_id, emit, self._scene)
+        self.plans = FlightPlanStore()
+        self.pose = _REST
+        self.time = 0.0
+        self._body = body
+        self._origin = origin
+        self._emit = emit
+        self._note = note
+        self._chance = chance
+        self._flights, self._last_flight, self._flown = 0, 0.0, 0.0
+        self._wake()
+
+    def _wake(self) -> None:
+        """All that a drone has forgotten when it is switched on."""
+        model, body, origin, emit, note = self.model, self._body, self._origin, self._emit, self._note
         self.compass = Compass()
         self.gimbal = Gimbals(model)
-        self.payload = Payload(model, identity.name, identity.run_id, emit, self._scene)
         self.operator = Operator(self.gimbal, self.payload, lambda: (self.time, self.pose), emit, note)
-        self.plans = FlightPlanStore()
         self.alarms = Alarms()
         self.warnings = Warnings()
         self.endurance = Endurance(model, self.settings)
@@ -97,18 +110,11 @@ class Flight:
         self.follow = FollowMe(body, origin, self.settings, emit, self.operator.aim, model.airframe.max_speed)
         self.animations = Animations(model, body, self.operator, emit)
         self.state = LANDED
-        self.pose = _REST
-        self.time = 0.0
-        self.fix = faults.gps
+        self.fix = self.faults.gps
         self.flight_id = ""
         self.datetime = "19700101T000000+0000"
         self.sound = ardrone3.AlertSoundState.STOPPED
         self._wind = WindWatch(model.envelope.wind_resistance)
-        self._body = body
-        self._origin = origin
-        self._emit = emit
-        self._note = note
-        self._chance = chance
         self._alert = AlertState.NONE
         self._blockers: frozenset[TakeoffChecklistType] = frozenset()
         self._ready: tuple[bool, ...] = ()
@@ -119,11 +125,20 @@ class Flight:
         self._return_at: float | None = None
         self._alone = False
         """Nobody is there, and a flight plan plays on."""
-        self._flights, self._last_flight, self._flown = 0, 0.0, 0.0
         self._took_off_at: float | None = None
         self._unseen = SENSOR_PERIOD
         """Simulated seconds since the sensors were last looked at."""
         self.guidance.apply_limits()
+
+    def reboot(self, identity: Identity, *, factory: bool = False) -> None:
+        """Switched off and on again, on the ground. What is on the card and in the settings stays, unless `factory`."""
+        self.identity = identity
+        self.payload.reboot(identity.run_id, self.time, wipe=factory)
+        if factory:
+            self.settings.reset()
+            self.plans.clear()
+        self._body.off()
+        self._wake()
 
     # -- what others ask
 

@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from aiohttp import WSCloseCode, web
+from aiohttp.typedefs import Handler
 
 from anafi_mav.sim.media import Kind, MediaStore
 from anafi_mav.sim.plan_store import FlightPlanStore
@@ -47,8 +48,10 @@ class WebServer:
         self._plans = plans
         self._properties = dict(properties)
         self._date = date
+        self._audible = asyncio.Event()
+        self._audible.set()
         self._listeners: dict[web.WebSocketResponse, tuple[asyncio.Queue[str], asyncio.Transport | None]] = {}
-        app = web.Application(client_max_size=MAX_BODY)
+        app = web.Application(client_max_size=MAX_BODY, middlewares=[self._through_the_air])
         api = "/api/v1"
         app.add_routes(
             [
@@ -83,10 +86,30 @@ class WebServer:
         self.port = self._runner.addresses[0][1]
         self._media.notify = self._notify
 
+    @property
+    def mute(self) -> bool:
+        """True: the air is gone, and what is asked waits until it is back."""
+        return not self._audible.is_set()
+
+    @mute.setter
+    def mute(self, mute: bool) -> None:
+        if mute:
+            self._audible.clear()
+        else:
+            self._audible.set()
+
     async def close(self) -> None:
         """Stop. Idempotent."""
         self._media.notify = _deaf
+        self._audible.set()
         await self._runner.cleanup()
+
+    @web.middleware
+    async def _through_the_air(self, request: web.Request, handler: Handler) -> web.StreamResponse:
+        await self._audible.wait()
+        response = await handler(request)
+        await self._audible.wait()
+        return response
 
     # -- media
 
@@ -174,7 +197,7 @@ class WebServer:
         await socket.prepare(request)
         queue: asyncio.Queue[str] = asyncio.Queue(MAX_UNREAD)
         self._listeners[socket] = (queue, request.transport)
-        writer = asyncio.create_task(_write(socket, queue))
+        writer = asyncio.create_task(_write(socket, queue, self._audible))
         try:
             async for _ in socket:
                 pass  # What a client says here means nothing.
@@ -218,10 +241,12 @@ class WebServer:
         return web.Response() if self._plans.remove(request.match_info["id"]) else _unknown("flight plan")
 
 
-async def _write(socket: web.WebSocketResponse, queue: asyncio.Queue[str]) -> None:
+async def _write(socket: web.WebSocketResponse, queue: asyncio.Queue[str], audible: asyncio.Event) -> None:
     with contextlib.suppress(ConnectionError):
         while True:
-            await socket.send_str(await queue.get())
+            text = await queue.get()
+            await audible.wait()
+            await socket.send_str(text)
 
 
 def _deaf(name: str, data: dict[str, Any]) -> None:

@@ -172,6 +172,10 @@ class MediaStore:
         self.used = 0
         """Bytes of all files."""
 
+    def begin_run(self, run_id: str) -> None:
+        """What is taken from now on belongs to this run."""
+        self._run_id = run_id
+
     def __iter__(self) -> Iterator[Media]:
         return iter(list(self._media.values()))
 

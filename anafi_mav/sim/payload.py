@@ -35,6 +35,14 @@ class Payload:
         self.services = Services(name) if model.modern else None
         self._time = 0.0
 
+    def reboot(self, run_id: str, time: float, *, wipe: bool) -> None:
+        """The drone is switched off: what is being taken ends, what is on the card stays unless it is wiped."""
+        self.cameras.work(lambda capture: capture.interrupt(time), time)
+        self.storage.forget()
+        self.media.begin_run(run_id)
+        if wipe:
+            self.media.remove_all()
+
     def handle(self, message: Message, time: float) -> list[Message] | None:
         """The answer to a command; None when it is not for the payload."""
         self._time = time
@@ -59,15 +67,15 @@ class Payload:
     def panorama_begin(self, kind: str, count: int, time: float) -> list[Message]:
         """`count` pictures of one media will be taken; a camera that records, or does anything else, lets go."""
         messages = self.operate(camera.SetCameraMode(0, camera.CameraCameraMode.PHOTO), time)
-        return messages + self.cameras.panorama(lambda capture: capture.begin_panorama(kind, count, time), time)
+        return messages + self.cameras.work(lambda capture: capture.begin_panorama(kind, count, time), time)
 
     def panorama_shot(self, time: float) -> list[Message]:
         """One of them, now."""
-        return self.cameras.panorama(lambda capture: capture.panorama_shot(time), time)
+        return self.cameras.work(lambda capture: capture.panorama_shot(time), time)
 
     def panorama_end(self, time: float) -> list[Message]:
         """That was all."""
-        return self.cameras.panorama(lambda capture: capture.end_panorama(time), time)
+        return self.cameras.work(lambda capture: capture.end_panorama(time), time)
 
     def lacks(self, fix: bool, calibrated: bool, flying: bool) -> list[Message]:
         """What a move or a flight plan still lacks, on models that tell it and if it has changed."""

@@ -36,6 +36,9 @@ class FlightPlanStore:
             del self._plans[next(iter(self._plans))]
         return uid
 
+    def clear(self) -> None:
+        self._plans.clear()
+
     def get(self, uid: str) -> bytes | None:
         """The file; None when there is no such plan."""
         plan = self._plans.get(uid)

@@ -161,6 +161,11 @@ class Storage:
         """What has come due by now (s)."""
         return [message for place in self._places for message in place.tick(time)]
 
+    def forget(self) -> None:
+        """Nobody has asked for reports of the free space any more."""
+        for place in self._places:
+            place.stop_monitor()
+
     def handle(self, message: Message, time: float) -> list[Message] | None:
         """The answer to a command of this feature; None when it is none this model knows."""
         if type(message) not in (_NUMBERED if self._numbered else _PLAIN):

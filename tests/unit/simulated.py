@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState, FlyingStateChanged
 from anafi_mav.drone import Drone
+from anafi_mav.drone.drone import CONTROLLER_PORTS
 from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
 
 HOME = (48.8789, 2.3677, 35.0)
@@ -20,15 +21,26 @@ class Pair(NamedTuple):
 
 
 @asynccontextmanager
-async def connected(model: str, speed: float = SPEED) -> AsyncIterator[Pair]:
+async def connected(model: str, speed: float = SPEED, skycontroller: int | None = None) -> AsyncIterator[Pair]:
     """Both, connected; on ports that the system chooses."""
     spec = DroneSpec(
-        model=model, address="127.0.0.1", home=HOME, discovery_port=0, handshake_port=0, c2d_port=0, http_port=0
+        model=model,
+        address="127.0.0.1",
+        home=HOME,
+        discovery_port=0,
+        handshake_port=0,
+        c2d_port=0,
+        http_port=0,
+        skycontroller=skycontroller,
     )
     async with Simulator([spec], speed=speed, seed=1) as simulator:
         real = simulator.drones[0]
+        shift = CONTROLLER_PORTS if skycontroller == 3 else 0
         drone = Drone(
-            "127.0.0.1", discovery_port=real.discovery_port, http_port=real.http_port or 80, name=f"simulated {model}"
+            "127.0.0.1",
+            discovery_port=real.discovery_port,
+            http_port=(real.http_port or 80) - shift,
+            name=f"simulated {model}",
         )
         await drone.connect()
         try:

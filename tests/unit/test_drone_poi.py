@@ -14,6 +14,7 @@ from anafi_mav.arsdk.messages import ardrone3, common, controller_info, follow_m
 from anafi_mav.arsdk.messages.ardrone3 import PoiMode, PoiStatus
 from anafi_mav.arsdk.messages.common import CalibrationAxis
 from anafi_mav.drone import Drone, Position
+from anafi_mav.drone.camera_words import CameraMode
 from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, LocalProtocolError, NotSupported
 
 PLACE = (48.8795, 2.3680, 3.0)
@@ -163,6 +164,30 @@ async def test_a_reboot_is_confirmed_by_the_lost_link(device: ScriptedDevice, dr
     assert not drone.connected
     with pytest.raises(LinkLost):
         await drone.reboot()
+
+
+@pytest.mark.parametrize("skycontroller", [None, 3])
+async def test_a_drone_that_reboots_comes_back_with_a_fresh_state(skycontroller: int | None) -> None:
+    async with connected("4k", speed=5.0, skycontroller=skycontroller) as (drone, real):
+        await drone.piloting.set_max_tilt(23.0)
+        await drone.camera.set_mode(CameraMode.PHOTO)
+        await drone.camera.take_photo()
+        await drone.sound.start()
+        before = drone.product.state
+        await drone.reboot()
+        assert not drone.connected
+        off = await real.wait_log(lambda entry: entry.name == "power" and not entry.args["on"])
+        await real.wait_log(lambda entry: entry.name == "power" and entry.args["on"], timeout=20.0, since=off.t)
+        await drone.connect()
+        after = drone.product.state
+        assert after.boot_id not in (None, before.boot_id)
+        assert after.run_id not in (None, before.run_id)
+        assert drone.sound.state.playing is False
+        limit = drone.piloting.state.max_tilt
+        assert limit is not None
+        assert limit.current == 23.0  # a setting is kept,
+        (media,) = await drone.media.list()
+        assert len(media.resources) == 1  # and so is what was on the card
 
 
 async def test_no_reboot_in_the_air() -> None:

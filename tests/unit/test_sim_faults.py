@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import random
 from collections.abc import AsyncIterator, Callable
+from dataclasses import replace
 
 import pytest
 from sim_bench import Bench
@@ -12,6 +13,7 @@ from sim_bench import Bench
 from anafi_mav.arsdk.controller import ControllerSession, connect
 from anafi_mav.arsdk.messages import ardrone3, common, rth
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
+from anafi_mav.arsdk.messages.proto import camera2
 from anafi_mav.arsdk.wire import Message, UnknownMessage
 from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
 from anafi_mav.sim.air import HELD, MAX_UNDER_WAY, Air
@@ -134,20 +136,37 @@ async def real() -> AsyncIterator[SimulatedDrone]:
         yield simulator.drones[0]
 
 
-async def join(real: SimulatedDrone) -> tuple[ControllerSession, list[Message | UnknownMessage]]:
-    heard: list[Message | UnknownMessage] = []
-    port = real.discovery_port
-    session = await connect(
-        "127.0.0.1", discovery_port=port, on_message=lambda message, now: heard.append(message), silence_limit=None
-    )
-    return session, heard
+class Ear:
+    """Keeps what a drone says, and waits for it."""
+
+    def __init__(self) -> None:
+        self.heard: list[Message | UnknownMessage] = []
+        self._news = asyncio.Event()
+
+    def __call__(self, message: Message | UnknownMessage, now: float) -> None:
+        self.heard.append(message)
+        self._news.set()
+
+    async def until(self, happened: Callable[[], bool], timeout: float) -> None:
+        async def wait() -> None:
+            while not happened():
+                self._news.clear()
+                await self._news.wait()
+
+        await asyncio.wait_for(wait(), timeout)
+
+
+async def join(real: SimulatedDrone) -> tuple[ControllerSession, Ear]:
+    ear = Ear()
+    session = await connect("127.0.0.1", discovery_port=real.discovery_port, on_message=ear, silence_limit=None)
+    return session, ear
 
 
 BAD_AIR = Impairment(loss=0.25, delay=0.005, jitter=0.02, duplicate=0.2, reorder=0.2)
 
 
 async def test_every_command_arrives_once_and_in_order_through_bad_air(real: SimulatedDrone) -> None:
-    session, heard = await join(real)
+    session, ear = await join(real)
     real.faults.up = real.faults.down = BAD_AIR
     names = [f"drone {number}" for number in range(20)]
     for name in names:
@@ -155,21 +174,21 @@ async def test_every_command_arrives_once_and_in_order_through_bad_air(real: Sim
     await real.wait_log(lambda entry: entry.args.get("name") == names[-1], 30.0)
     received = [entry.args["name"] for entry in real.log.find("command", "ProductName")]
     assert received == names
-    for _ in range(400):
-        answers = [message.name for message in heard if isinstance(message, common.ProductNameChanged)]
-        if len(answers) >= len(names):
-            break
-        await asyncio.sleep(0.05)
-    assert answers == names
+
+    def answers() -> list[str]:
+        return [message.name for message in ear.heard if isinstance(message, common.ProductNameChanged)]
+
+    await ear.until(lambda: len(answers()) >= len(names), 20.0)
+    assert answers() == names
     await session.close()
 
 
 async def test_one_direction_alone_can_be_dead(real: SimulatedDrone) -> None:
-    session, heard = await join(real)
+    session, ear = await join(real)
     real.faults.down = Impairment(loss=1.0)
     session.send(common.ProductName("still heard"))
     await real.wait_log(lambda entry: entry.args.get("name") == "still heard", 10.0)
-    assert common.ProductNameChanged("still heard") not in heard
+    assert common.ProductNameChanged("still heard") not in ear.heard
     await session.close()
 
 
@@ -185,6 +204,36 @@ def test_without_a_home_it_stays_where_it_is() -> None:
     bench.run(6.0)
     assert bench.state is FlyingState.HOVERING
     assert [event for event in bench.of(rth.State) if event.state is rth.RthState.IN_PROGRESS] == []
+
+
+def test_a_reboot_forgets_what_flies_and_keeps_what_is_set() -> None:
+    bench = Bench("ai")
+    bench.take_off()
+    bench.send(ardrone3.MaxTilt(25.0))
+    bench.send(camera2.StartRecording())
+    bench.run(3.0)
+    bench.send(ardrone3.Landing())
+    bench.run_until(lambda: bench.state is FlyingState.LANDED)
+    firmware = bench.firmware
+    charge, flights = firmware.battery.charge, firmware.flights_report()
+    uid = firmware.plans.put(b"QGC WPL 120\n")
+    firmware.reboot(replace(firmware.identity, boot_id="second", run_id="next"))
+    bench.run(0.1)
+    assert firmware.homing.takeoff is None
+    assert firmware.battery.charge == pytest.approx(charge, abs=0.01)
+    assert firmware.flights_report() == flights
+    assert firmware.settings.number("max_tilt") == 25.0
+    assert firmware.plans.get(uid)
+    assert not firmware.payload.cameras.busy
+    (film,) = firmware.payload.media
+    assert (film.video, film.run_id) == (True, "run")
+    bench.take_off()
+    firmware = bench.firmware
+    bench.send(ardrone3.Landing())
+    bench.run_until(lambda: bench.state is FlyingState.LANDED)
+    firmware.reboot(firmware.identity, factory=True)
+    assert (len(firmware.payload.media), firmware.plans.list()) == (0, ())
+    assert firmware.settings.number("max_tilt") == 10.0
 
 
 def test_sticks_are_let_go_with_the_link() -> None:

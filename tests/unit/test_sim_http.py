@@ -65,6 +65,19 @@ async def site() -> AsyncIterator[Site]:
     await site.server.close()
 
 
+async def test_who_asks_while_the_air_is_gone_waits(site: Site) -> None:
+    async with site.client.ws_connect(f"{API}/media/notifications") as socket:
+        site.server.mute = True
+        asking = asyncio.ensure_future(site.ask("GET", f"{API}/media/medias"))
+        hearing = asyncio.ensure_future(socket.receive_json())
+        media = site.photo()
+        done, _ = await asyncio.wait({asking, hearing}, timeout=0.2)
+        assert not done
+        site.server.mute = False
+        assert (await asyncio.wait_for(asking, 5.0)) == (200, [media.describe()])
+        assert (await asyncio.wait_for(hearing, 5.0))["name"] == "media_created"
+
+
 # -- media
 
 
