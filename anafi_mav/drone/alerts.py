@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import enum
 from collections.abc import Mapping
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import msgspec
 from msgspec.structs import replace
@@ -81,24 +82,48 @@ _FLIES_WITHOUT = (Sensor.GPS,)
 """Sensors that a drone takes off without."""
 
 
-def takeoff_blockers(alerts: AlertsState, battery: BatteryState, calibration: CalibrationState) -> list[str]:
-    """What the drone has reported that can keep it on the ground, in words; empty when nothing is known.
+class BlockerKind(enum.Enum):
+    """What keeps a drone on the ground; the value is how its text begins."""
+
+    CHECK = ""
+    """A line of the take-off checklist."""
+    MAGNETOMETER = "magnetometer calibration required"
+    CALIBRATING = "the magnetometer is being calibrated"
+    SENSOR = "sensor "
+    BATTERY = "battery "
+    ALERT = "alert "
+    MOTOR = "motor "
+
+
+class Blocker(NamedTuple):
+    """One thing that the drone has reported and that can keep it on the ground."""
+
+    kind: BlockerKind
+    value: OpenEnum | None = None
+    """Which check, sensor, alert or error."""
+
+    def __str__(self) -> str:
+        return self.kind.value + ("" if self.value is None else spoken(self.value))
+
+
+def takeoff_blockers(alerts: AlertsState, battery: BatteryState, calibration: CalibrationState) -> list[Blocker]:
+    """What the drone has reported that can keep it on the ground; empty when nothing is known.
 
     ARSDK refuses a take-off by silence. The take-off checklist (alarms.xml 175-0-2) is the drone's own list of
     reasons; firmware without it leaves the alerts, the battery's alerts, the calibration and the sensors.
     """
-    reasons = [spoken(check) for check, blocks in alerts.checklist.items() if blocks]
+    reasons = [Blocker(BlockerKind.CHECK, check) for check, blocks in alerts.checklist.items() if blocks]
     if TakeoffChecklistType.MAGNETO_CALIBRATION not in alerts.checklist and calibration.magneto_required:
-        reasons.append("magnetometer calibration required")
+        reasons.append(Blocker(BlockerKind.MAGNETOMETER))
     if calibration.started:
-        reasons.append("the magnetometer is being calibrated")
+        reasons.append(Blocker(BlockerKind.CALIBRATING))
     if not alerts.checklist:
-        reasons += [
-            f"sensor {spoken(s)}" for s, ok in calibration.sensors.items() if not ok and s not in _FLIES_WITHOUT
-        ]
-    reasons += [f"battery {spoken(a)}" for a, level in battery.alerts.items() if level == AlertLevel.CRITICAL]
+        failed = [sensor for sensor, ok in calibration.sensors.items() if not ok and sensor not in _FLIES_WITHOUT]
+        reasons += [Blocker(BlockerKind.SENSOR, sensor) for sensor in failed]
+    critical = [alert for alert, level in battery.alerts.items() if level == AlertLevel.CRITICAL]
+    reasons += [Blocker(BlockerKind.BATTERY, alert) for alert in critical]
     if alerts.alert not in (None, AlertState.NONE, AlertState.LOW_BATTERY):
-        reasons.append(f"alert {spoken(alerts.alert)}")
+        reasons.append(Blocker(BlockerKind.ALERT, alerts.alert))
     if alerts.motor_error not in (None, MotorError.NO_ERROR):
-        reasons.append(f"motor {spoken(alerts.motor_error)}")
+        reasons.append(Blocker(BlockerKind.MOTOR, alerts.motor_error))
     return reasons

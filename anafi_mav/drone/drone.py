@@ -27,7 +27,7 @@ from anafi_mav.arsdk.messages.follow_me import Mode as FollowMeMode
 from anafi_mav.arsdk.rtsp import DEFAULT_PORT as RTSP_PORT
 from anafi_mav.arsdk.wire import Message, UnknownMessage
 from anafi_mav.clock import Clock, SystemClock
-from anafi_mav.drone.alerts import Alerts, spoken, takeoff_blockers
+from anafi_mav.drone.alerts import Alerts, Blocker, spoken, takeoff_blockers
 from anafi_mav.drone.animations import Animations
 from anafi_mav.drone.battery import Battery
 from anafi_mav.drone.calibration import Calibration
@@ -449,9 +449,13 @@ class Drone:
         """See `Piloting.moves_started`."""
         return self.piloting.moves_started
 
-    def takeoff_blockers(self) -> list[str]:
-        """What the drone has reported against a take-off, in words."""
+    def blockers(self) -> list[Blocker]:
+        """What the drone has reported against a take-off."""
         return takeoff_blockers(self.alerts.state, self.battery.state, self.calibration.state)
+
+    def takeoff_blockers(self) -> list[str]:
+        """The same in words."""
+        return [str(blocker) for blocker in self.blockers()]
 
     def subscribe(self, callback: Callback) -> Callable[[], None]:
         """Call this with every known message once the states have it. Returns the function that ends it.

@@ -4,10 +4,13 @@ They are Parrot's, declared in `anafi_mav.arsdk.messages`; who works with a `Dro
 know the wire.
 """
 
+from anafi_mav.arsdk.messages.alarms import TakeoffChecklist as TakeoffChecklist
+from anafi_mav.arsdk.messages.alarms import TakeoffChecklistType as TakeoffChecklistType
 from anafi_mav.arsdk.messages.animation import PlayMode as PlayMode
 from anafi_mav.arsdk.messages.animation import Type as AnimationType
 from anafi_mav.arsdk.messages.animation import VertigoFinishAction as VertigoFinishAction
 from anafi_mav.arsdk.messages.ardrone3 import AlertState as AlertState
+from anafi_mav.arsdk.messages.ardrone3 import AlertStateChanged as AlertStateChanged
 from anafi_mav.arsdk.messages.ardrone3 import AltitudeAboveGroundChanged as AltitudeAboveGroundChanged
 from anafi_mav.arsdk.messages.ardrone3 import AltitudeChanged as AltitudeChanged
 from anafi_mav.arsdk.messages.ardrone3 import AttitudeChanged as AttitudeChanged
@@ -96,10 +99,13 @@ from anafi_mav.arsdk.messages.user_storage import FormattingType as FormattingTy
 from anafi_mav.arsdk.messages.user_storage import FsState as FsState
 from anafi_mav.arsdk.messages.user_storage import PhyState as PhyState
 from anafi_mav.arsdk.wire import Message as Message
+from anafi_mav.drone.alerts import Blocker as Blocker
+from anafi_mav.drone.alerts import BlockerKind as BlockerKind
 
 __all__ = [
     "AlertLevel",
     "AlertState",
+    "AlertStateChanged",
     "AltitudeAboveGroundChanged",
     "AltitudeChanged",
     "AnimationType",
@@ -110,6 +116,8 @@ __all__ = [
     "BatteryAlert",
     "BatteryAlertChanged",
     "BatteryCapacity",
+    "Blocker",
+    "BlockerKind",
     "CalibrationAxis",
     "ControllerAttitudeChanged",
     "FlightId",
@@ -183,6 +191,8 @@ __all__ = [
     "SensorsStatesListChanged",
     "ShutterTrigger",
     "SpeedChanged",
+    "TakeoffChecklist",
+    "TakeoffChecklistType",
     "TakeoffLocation",
     "ThermalMode",
     "ThermalSensitivity",

@@ -36,6 +36,7 @@ DEFAULT_INTERVALS: Mapping[int, float] = {
     mav.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT: 1.0,
     mav.MAVLINK_MSG_ID_CURRENT_MODE: 2.0,
     mav.MAVLINK_MSG_ID_AVAILABLE_MODES_MONITOR: 3.3,
+    mav.MAVLINK_MSG_ID_CURRENT_EVENT_SEQUENCE: 1.0,
 }
 """Seconds by message id: what ground stations need to look alive, and a 57600 baud radio can carry."""
 

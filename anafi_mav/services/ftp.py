@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import enum
 import struct
-from collections.abc import Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -259,13 +259,15 @@ class FtpServer:
             if not client.sessions and now - client.seen >= SESSION_TIMEOUT:
                 del self._clients[who]
 
-    def forget(self, who: Hashable) -> None:
-        """This client is gone."""
-        self._clients.pop(who, None)
+    def forget(self, gone: Callable[[Hashable], bool]) -> None:
+        """These clients are gone."""
+        for who in [who for who in self._clients if gone(who)]:
+            del self._clients[who]
 
-    def clients(self) -> list[Hashable]:
-        """Those that are remembered."""
-        return list(self._clients)
+    def bursting(self, who: Hashable) -> bool:
+        """Is a part of a burst due to this client?"""
+        client = self._clients.get(who)
+        return client is not None and any(one.state is State.BURSTING for one in client.sessions.values())
 
     # One request.
 

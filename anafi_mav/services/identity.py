@@ -15,6 +15,16 @@ from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.service import MessageHandler, Request, Service
 
 
+def capability_bits(promised: int, flavour: Flavour) -> int:
+    """MAV_PROTOCOL_CAPABILITY bits that clients of a flavour are told, given those of the services."""
+    encoding = (
+        dialect.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
+        if flavour.bytewise
+        else dialect.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_C_CAST
+    )
+    return promised | encoding | dialect.MAV_PROTOCOL_CAPABILITY_MAVLINK2
+
+
 def _version(text: str) -> int:
     """ "1.8.2" as MAVLink's four version bytes, the last one 0."""
     numbers = [int(number) for number in re.findall(r"\d+", text)[:3]]
@@ -32,13 +42,8 @@ def autopilot_version(drone: Drone, flavour: Flavour, capabilities: int) -> dial
     serial = identity.serial.encode()
     firmware = identity.firmware or ""
     major, minor, patch = flavour.version
-    encoding = (
-        dialect.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
-        if flavour.bytewise
-        else dialect.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_C_CAST
-    )
     return dialect.MAVLink_autopilot_version_message(
-        capabilities | encoding | dialect.MAV_PROTOCOL_CAPABILITY_MAVLINK2,
+        capability_bits(capabilities, flavour),
         major << 24 | minor << 16 | patch << 8 | flavour.version_type,
         _version(__version__),
         _version(firmware),

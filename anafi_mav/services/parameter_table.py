@@ -374,10 +374,23 @@ MAX_CRUISE_SPEED = 15.0
 
 async def _set_cruise_speed(host: Host, value: float) -> None:
     host.vehicle.cruise_speed = value or None
+    await _go_on(host)
 
 
-def _cruise_limits(host: Host) -> Limits:
-    return 0.0, MAX_CRUISE_SPEED
+async def _set_climb_speed(host: Host, value: float) -> None:
+    host.vehicle.climb_speed = value or None
+    await _go_on(host)
+
+
+async def _go_on(host: Host) -> None:
+    """A move under way changes its speed, as it does for MAV_CMD_DO_CHANGE_SPEED."""
+    if (goto := host.vehicle.goto) is not None:
+        await host.vehicle.go(goto)
+
+
+def _climb_limits(host: Host) -> Limits | None:
+    setting = host.drone.piloting.state.max_vertical_speed
+    return None if setting is None else (0.0, setting.max)
 
 
 CRUISE_SPEED = Parameter(
@@ -386,7 +399,7 @@ CRUISE_SPEED = Parameter(
     "Speed over ground that moves keep to",
     read=lambda host: host.vehicle.cruise_speed or 0.0,
     write=_set_cruise_speed,
-    limits=_cruise_limits,
+    limits=lambda host: (0.0, MAX_CRUISE_SPEED),
     polled=True,
     unit="m/s",
     step=0.1,
@@ -395,6 +408,22 @@ CRUISE_SPEED = Parameter(
     long="0: the drone's own. MAV_CMD_DO_CHANGE_SPEED sets the same.",
     default=0.0,
     source="gateway",
+)
+CLIMB_SPEED = Parameter(
+    "ANF_CLIMB_SPEED",
+    Kind.REAL32,
+    "Vertical speed that moves keep to",
+    read=lambda host: host.vehicle.climb_speed or 0.0,
+    write=_set_climb_speed,
+    limits=_climb_limits,
+    polled=True,
+    unit="m/s",
+    step=0.1,
+    decimals=1,
+    group=GATEWAY,
+    long="0: the drone's own. MAV_CMD_DO_CHANGE_SPEED sets the same.",
+    default=0.0,
+    source="gateway; up to the most that ANF_VERT_SPEED can be",
 )
 
 
@@ -458,6 +487,7 @@ NATIVE: tuple[Parameter, ...] = (
     TAKEOFF_HEIGHT,
     HAND_LAUNCH,
     CRUISE_SPEED,
+    CLIMB_SPEED,
     GCS_LOSS,
     GCS_LOSS_TIME,
 )

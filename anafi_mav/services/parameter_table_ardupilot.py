@@ -15,6 +15,7 @@ from anafi_mav.services.link_loss import LossAction
 from anafi_mav.services.parameter import Limits, Parameter, current, fact, mapped, number, twin
 from anafi_mav.services.parameter_codec import Kind
 from anafi_mav.services.parameter_table import (
+    CLIMB_SPEED,
     CRUISE_SPEED,
     GCS_LOSS,
     GCS_LOSS_TIME,
@@ -91,6 +92,8 @@ TWINS: tuple[Parameter, ...] = (
     twin(VERTICAL_SPEED, "PILOT_SPEED_UP", Kind.INT16, scale=CM, unit="cm/s", decimals=0),
     twin(VERTICAL_SPEED, "PILOT_SPEED_DN", Kind.INT16, scale=CM, unit="cm/s", decimals=0),
     twin(CRUISE_SPEED, "WPNAV_SPEED", scale=CM, unit="cm/s", decimals=0),
+    twin(CLIMB_SPEED, "WPNAV_SPEED_UP", scale=CM, unit="cm/s", decimals=0),
+    twin(CLIMB_SPEED, "WPNAV_SPEED_DN", scale=CM, unit="cm/s", decimals=0),
     twin(MAX_ALTITUDE, "FENCE_ALT_MAX"),
     twin(MAX_DISTANCE, "FENCE_RADIUS"),
     twin(RETURN_ALTITUDE, "RTL_ALT", Kind.INT32, scale=CM, unit="cm", decimals=0),

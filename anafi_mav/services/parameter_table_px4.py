@@ -15,6 +15,7 @@ from anafi_mav.services.parameter import Limits, Parameter, current, fact, mappe
 from anafi_mav.services.parameter_codec import Kind
 from anafi_mav.services.parameter_table import (
     AVOIDANCE,
+    CLIMB_SPEED,
     CRUISE_SPEED,
     GCS_LOSS,
     GCS_LOSS_TIME,
@@ -127,6 +128,8 @@ TWINS: tuple[Parameter, ...] = (
     twin(VERTICAL_SPEED, "MPC_Z_VEL_MAX_DN"),
     twin(HORIZONTAL_SPEED, "MPC_VEL_MANUAL"),
     twin(CRUISE_SPEED, "MPC_XY_CRUISE"),
+    twin(CLIMB_SPEED, "MPC_Z_V_AUTO_UP"),
+    twin(CLIMB_SPEED, "MPC_Z_V_AUTO_DN"),
     twin(MAX_ALTITUDE, "GF_MAX_VER_DIST"),
     FENCE_RADIUS,
     mapped(

@@ -18,7 +18,9 @@ from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
+from anafi_mav.services.files import Query, ServedFile
 from anafi_mav.services.flavours import ARDUPILOT, FLAVOURS, Flavour, flavour_of
+from anafi_mav.services.metadata import parameter_file, to_json
 from anafi_mav.services.parameter import Parameter
 from anafi_mav.services.parameter_codec import (
     HASH_NAME,
@@ -27,6 +29,7 @@ from anafi_mav.services.parameter_codec import (
     carried,
     hash_check,
     name_of,
+    packed_file,
     param_value,
 )
 from anafi_mav.services.parameter_table import NATIVE
@@ -125,6 +128,12 @@ class ParameterService(Service):
             dialect.MAVLINK_MSG_ID_PARAM_SET: self._set,
         }
 
+    def files(self) -> Mapping[str, ServedFile]:
+        return {
+            "/parameter.json": ServedFile(self._described, metadata=dialect.COMP_METADATA_TYPE_PARAMETER),
+            "/@PARAM/param.pck": ServedFile(self._packed, flavour=ARDUPILOT),
+        }
+
     def list_of(self, flavour: Flavour) -> ParameterList:
         """The parameters that clients of a flavour see. Once the drone has connected."""
         return self._lists[flavour.name]
@@ -153,6 +162,22 @@ class ParameterService(Service):
 
     def tick(self, now: float) -> None:
         self._tell_settings()
+
+    # Files.
+
+    def _described(self, flavour: Flavour, query: Query) -> bytes:
+        return to_json(parameter_file(self._lists[flavour.name].parameters, self.host))
+
+    def _packed(self, flavour: Flavour, query: Query) -> bytes | None:
+        """ArduPilot's file of all values, or of `count` from `start` on. PX4's clients do not look for it, and MAVProxy
+        takes its integers for floats."""
+        if query.keys() - {"start", "count", "withdefaults"}:
+            return None
+        numbers = {name: text for name, text in query.items() if text.isascii() and text.isdigit() and len(text) < 6}
+        if numbers.keys() != query.keys():
+            return None
+        count = int(numbers.get("count", "0")) or None
+        return packed_file(self._lists[flavour.name].values(), int(numbers.get("start", "0")), count)
 
     # Reading.
 

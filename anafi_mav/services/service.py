@@ -17,6 +17,7 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import Command
+from anafi_mav.services.files import ServedFile
 from anafi_mav.services.flavours import Flavour
 from anafi_mav.services.memory import Memory
 from anafi_mav.services.statustext import Severity
@@ -120,6 +121,10 @@ class Service:
 
     def streams(self) -> Mapping[int, Stream]:
         """By message id."""
+        return {}
+
+    def files(self) -> Mapping[str, ServedFile]:
+        """What MAVLink FTP serves, by path."""
         return {}
 
     def link_up(self) -> None:

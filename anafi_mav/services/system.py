@@ -21,9 +21,11 @@ from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound, Node
 from anafi_mav.services.banner import BannerService
 from anafi_mav.services.command_service import CommandService
+from anafi_mav.services.event_service import EventService
 from anafi_mav.services.fence_service import FenceService
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.flight_record import FlightRecordService
+from anafi_mav.services.ftp_service import FtpService
 from anafi_mav.services.guided import GuidedService
 from anafi_mav.services.high_latency import HighLatencyService
 from anafi_mav.services.identity import IdentityService
@@ -60,6 +62,7 @@ SERVICES: tuple[type[Service], ...] = (
     TelemetryService,
     ParameterService,
     LinkLossService,
+    EventService,
     PlanService,
     FenceService,
     RallyService,
@@ -133,7 +136,9 @@ class System:
         )
         self._commands: CommandService = CommandService(self)
         self._messages = MessageService(self)
-        self.services: list[Service] = [self._commands, self._messages, *(kind(self) for kind in SERVICES)]
+        self._ftp = FtpService(self)
+        self.services: list[Service] = [self._commands, self._messages, self._ftp]
+        self.services += [kind(self) for kind in SERVICES]
         self.capabilities: int = 0
         for service in self.services:
             self.capabilities |= service.capabilities()
@@ -145,6 +150,7 @@ class System:
             _joined(service.streams() for service in self.services),
             _joined(service.requests() for service in self.services),
         )
+        self._ftp.take_tables(_joined(service.files() for service in self.services))
         self._handlers: dict[int, MessageHandler] = _joined(service.messages() for service in self.services)
         self._handlers[dialect.MAVLINK_MSG_ID_HEARTBEAT] = self._heard
 

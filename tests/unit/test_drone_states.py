@@ -348,7 +348,7 @@ CHECK = TakeoffChecklistType
 def test_reasons_against_a_takeoff(
     alerts: AlertsState, power: BatteryState, calibration: CalibrationState, expected: list[str]
 ) -> None:
-    assert takeoff_blockers(alerts, power, calibration) == expected
+    assert [str(blocker) for blocker in takeoff_blockers(alerts, power, calibration)] == expected
 
 
 def test_the_models_are_those_of_the_family() -> None:

@@ -1,0 +1,77 @@
+"""The files that a vehicle shows over MAVLink FTP, by path. Nothing is on a disk: each is made when it is asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from urllib.parse import parse_qs
+
+from anafi_mav.services.flavours import Flavour
+from anafi_mav.services.ftp import Entry
+
+Query = Mapping[str, str]
+"""What stands behind the question mark of a path, as ArduPilot's clients write it."""
+
+MAX_QUERY = 8
+"""Words of a query: ArduPilot knows three."""
+
+
+@dataclass(frozen=True)
+class ServedFile:
+    """One file of a service."""
+
+    make: Callable[[Flavour, Query], bytes | None]
+    """The content as clients of a flavour see it; None: not with such a query."""
+    flavour: Flavour | None = None
+    """The only one that is shown it; None: all are."""
+    metadata: int | None = None
+    """COMP_METADATA_TYPE. Such a file is made once for each connection, and served compressed as well."""
+
+
+class FileTree:
+    """A tree of made files. Paths are absolute, or begin with a virtual directory as "@PARAM"."""
+
+    def __init__(self, makers: Mapping[str, Callable[[Query], bytes | None]]) -> None:
+        """`makers` by path, e.g. "/general.json" or "/@PARAM/param.pck"."""
+        self._makers = dict(makers)
+        self._directories: dict[str, list[str]] = {"/": []}
+        """Names of the files and directories in each directory, sorted."""
+        for path in self._makers:
+            parts = path.strip("/").split("/")
+            for depth, name in enumerate(parts):
+                above = "/" + "/".join(parts[:depth])
+                names = self._directories.setdefault(above, [])
+                if name not in names:
+                    names.append(name)
+                    names.sort()
+
+    def read(self, path: str) -> bytes | None:
+        """The content; None when there is no such file."""
+        plain, _, query = path.partition("?")
+        maker = self._makers.get(_absolute(plain) or "")
+        if maker is None:
+            return None
+        try:
+            words = parse_qs(query, max_num_fields=MAX_QUERY) if query else {}
+        except ValueError:
+            return None
+        return maker({name: values[-1] for name, values in words.items()})
+
+    def list(self, path: str) -> list[Entry] | None:
+        """The entries; None when there is no such directory."""
+        directory = _absolute(path)
+        names = None if directory is None else self._directories.get(directory)
+        if directory is None or names is None:
+            return None
+        entries = []
+        for name in names:
+            below = f"{directory.rstrip('/')}/{name}"
+            content = self.read(below) if below in self._makers else None
+            entries.append(Entry(name, None if content is None else len(content)))
+        return entries
+
+
+def _absolute(path: str) -> str | None:
+    """The path from the root, without what means nothing; None for one that wants out of it."""
+    parts = [part for part in path.split("/") if part not in ("", ".")]
+    return None if ".." in parts else "/" + "/".join(parts)

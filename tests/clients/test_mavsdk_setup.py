@@ -1,0 +1,73 @@
+"""Unmodified MAVSDK: parameters, files, metadata and events, in both flavours (conformance B2, 116)."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+from support.params import fetch
+from support.product import Process, program
+from support.world import world
+
+SCRIPT = Path(__file__).with_name("mavsdk_setup.py")
+
+
+def said(script: Process, word: str) -> list[str]:
+    """What followed this word, line by line."""
+    return [line.removeprefix(word).strip() for line in script.lines if line.split(" ", 1)[0] == word]
+
+
+@pytest.mark.timeout(180)
+@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+async def test_mavsdk_param_ftp_metadata_events(flavour: str, tmp_path: Path) -> None:
+    async with world(flavour=flavour) as w:
+        count = len(await fetch(w.client))
+        folder = tmp_path / "downloads"
+        folder.mkdir()
+        words = (sys.executable, "-u", str(SCRIPT), f"tcpout://{w.address}:5760", str(folder), flavour)
+        # Its cache of metadata lies in the home directory: an empty one, so that it has to load.
+        env = {"HOME": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path / "cache")}
+        async with program(*words, env=env) as script:
+            await script.line(lambda line: line == "done", timeout=90.0)
+
+            assert said(script, "parameters") == [str(count)]
+            before, after, at_last = said(script, "height")
+            assert (after, at_last) == ("41.5", "41.5")
+            assert before != after
+            name = "rth.set_min_altitude" if flavour == "px4" else "ardrone3.PilotingSettings.MaxAltitude"
+            assert [list(entry.args.values()) for entry in w.commands(name)] == [[41.5]]
+            assert said(script, "whole") == ["4001" if flavour == "px4" else "2000"]
+            assert len(said(script, "refused")) == 1
+
+            listed = said(script, "listed")[0].split()
+            assert {"general.json.xz", "parameter.json", "parameter.json.xz", "events.json.xz"} <= set(listed)
+            burst, read = said(script, "downloaded")
+            assert burst == read
+            assert int(burst.split()[1]) == count
+            assert said(script, "identical") == ["True", "True"]
+            assert said(script, "missing") == ["FILE_DOES_NOT_EXIST"]
+            assert said(script, "upload") == ["FILE_PROTECTED"]
+            assert said(script, "remove") == ["FILE_PROTECTED"]
+            assert sorted(said(script, "metadata")) == ["events 1", f"parameter {count}"]
+
+            # Health and arming checks, as QGroundControl's own library reads them.
+            await script.line(lambda line: line.startswith("report"), timeout=20.0)
+            assert "can_arm=True problems=[] errors=[]" in said(script, "report")[-1]
+            w.drone.faults.magneto_required = True
+            line = await script.line(
+                lambda line: line.startswith("report") and "Magnetometer calibration required" in line
+            )
+            assert "can_arm=False" in line
+            assert "errors=['magnetometer']" in line
+            w.drone.faults.magneto_required = False
+            since = len(script.lines)
+            await script.line(
+                lambda line: line.startswith("report") and "can_arm=True problems=[]" in line, since=since
+            )
+            w.drone.faults.gps = False
+            line = await script.line(lambda line: "No GPS fix (gps)" in line, since=since)
+            assert "can_arm=True" in line  # an ANAFI hovers without
+            w.drone.faults.gps = True
+            assert (await w.client.command(400, 1)).result == 0
+            await script.line(lambda line: line == "event anafi armed Armed")
