@@ -209,7 +209,80 @@ def dialect() -> str:
     return "".join(parts)
 
 
-PAGES: dict[str, Callable[[], str]] = {"configuration.md": configuration, "dialect.md": dialect, "seed.md": seed}
+PARAMETERS = """\
+# Parameters
+
+<!-- Made by docs/generate.py from anafi_mav/services/parameter_table*.py. -->
+
+A value has one place and several names. The native ones, `ANF_*`, are seen by every client; beside them a client of
+the PX4 flavour sees PX4's names and one of the ArduPilot flavour ArduPilot's. A write by one name is told under all of
+them, to everybody. Ranges are the drone's own: it tells them with each setting, and a client reads them in
+`parameter.json`, which QGroundControl and MAVSDK load by themselves over MAVLink FTP.
+
+A write is answered when the drone has confirmed it, with what it confirmed. What is out of range, read only or of
+another type is refused with PARAM_ERROR. A value that is not known is NaN, a whole number -1. Settings of the gateway
+begin with their default whenever it is started; the drone keeps its own.
+"""
+
+PARAMETERS_NATIVE = """
+## Native
+
+| name | what it is | unit | values | PX4 | ArduPilot | source of value and range | models |
+|---|---|---|---|---|---|---|---|
+"""
+
+PARAMETERS_FACTS = """
+## Facts in {title}'s words
+
+What its clients ask for and nobody could set. They can be read only.
+
+| name | what it is | value | unit | source |
+|---|---|---|---|---|
+"""
+
+
+def parameters() -> str:
+    """docs/parameters.md."""
+    from anafi_mav.services.parameter_table import NATIVE
+    from anafi_mav.services.parameter_table_ardupilot import ARDUPILOT_NAMES
+    from anafi_mav.services.parameter_table_px4 import PX4_NAMES
+
+    def twins(name: str, names: Any) -> str:
+        found = [f"`{one.name}`" + (f" ({one.unit})" if one.unit else "") for one in names if one.native == name]
+        return ", ".join(found) or "–"
+
+    def values(one: Any) -> str:
+        return ", ".join(f"{value} {what}" for value, what in one.values.items()) or "a range"
+
+    def stated(one: Any) -> str:
+        if one.source != "fact":
+            return "–"
+        value = one.read(None)
+        return "not told" if value != value else f"{value:g}"
+
+    parts = [PARAMETERS, PARAMETERS_NATIVE]
+    for one in sorted(NATIVE, key=lambda parameter: parameter.name):
+        told = f"{one.short}. {one.long}".strip() if one.long else one.short
+        where = f"`{one.source}`" if "." in one.source else one.source
+        both = f"{twins(one.name, PX4_NAMES)} | {twins(one.name, ARDUPILOT_NAMES)}"
+        parts.append(
+            f"| `{one.name}` | {told} | {one.unit or '–'} | {values(one)} | {both} | {where} | {one.models} |\n"
+        )
+    for title, names in (("PX4", PX4_NAMES), ("ArduPilot", ARDUPILOT_NAMES)):
+        parts.append(PARAMETERS_FACTS.format(title=title))
+        for one in sorted(names, key=lambda parameter: parameter.name):
+            if not one.native:
+                where = f"`{one.source}`" if "." in one.source else one.source
+                parts.append(f"| `{one.name}` | {one.short} | {stated(one)} | {one.unit or '–'} | {where} |\n")
+    return "".join(parts)
+
+
+PAGES: dict[str, Callable[[], str]] = {
+    "configuration.md": configuration,
+    "dialect.md": dialect,
+    "parameters.md": parameters,
+    "seed.md": seed,
+}
 
 
 def main(arguments: list[str]) -> int:

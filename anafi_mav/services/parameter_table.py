@@ -35,6 +35,7 @@ def _range(
     decimals: int = 0,
     group: str,
     long: str = "",
+    models: str = "all",
 ) -> Parameter:
     """A setting that the drone reports with its range."""
     return Parameter(
@@ -52,6 +53,7 @@ def _range(
         group=group,
         long=long,
         source=news.NAME,
+        models=models,
     )
 
 
@@ -138,6 +140,7 @@ HORIZONTAL_SPEED = _range(
     decimals=1,
     group=FLIGHT,
     long="Firmware of later generations only; elsewhere a speed is said with each move (ANF_CRUISE_SPEED).",
+    models="none of these",
 )
 MAX_ALTITUDE = _range(
     "ANF_MAX_ALT",

@@ -20,7 +20,7 @@ def said(script: Process, word: str) -> list[str]:
 
 @pytest.mark.timeout(180)
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
-async def test_mavsdk_param_ftp_metadata_events(flavour: str, tmp_path: Path) -> None:
+async def test_conf_116_mavsdk_param_ftp_metadata_events(flavour: str, tmp_path: Path) -> None:
     async with world(flavour=flavour) as w:
         count = len(await fetch(w.client))
         folder = tmp_path / "downloads"
