@@ -53,6 +53,7 @@ from anafi_mav.arsdk.messages.common import CalibrationAxis as CalibrationAxis
 from anafi_mav.arsdk.messages.common import FlightId as FlightId
 from anafi_mav.arsdk.messages.common import FlightPlanComponent as FlightPlanComponent
 from anafi_mav.arsdk.messages.common import MagnetoCalibrationRequiredState as MagnetoCalibrationRequiredState
+from anafi_mav.arsdk.messages.common import MagnetoCalibrationStartedChanged as MagnetoCalibrationStartedChanged
 from anafi_mav.arsdk.messages.common import MavlinkFilePlayingStateChanged as MavlinkFilePlayingStateChanged
 from anafi_mav.arsdk.messages.common import MavlinkType as MavlinkType
 from anafi_mav.arsdk.messages.common import MissionItemExecuted as MissionItemExecuted
@@ -143,6 +144,7 @@ __all__ = [
     "HoveringWarning",
     "IcingLevelChanged",
     "MagnetoCalibrationRequiredState",
+    "MagnetoCalibrationStartedChanged",
     "MavlinkFilePlayingStateChanged",
     "MavlinkType",
     "MaxAltitudeChanged",

@@ -37,6 +37,7 @@ _NEWS = (
     parrot.FlyingStateChanged,
     parrot.GPSFixStateChanged,
     parrot.MagnetoCalibrationRequiredState,
+    parrot.MagnetoCalibrationStartedChanged,
     parrot.MotorErrorStateChanged,
     parrot.SensorsStatesListChanged,
     parrot.TakeoffChecklist,

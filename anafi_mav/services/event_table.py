@@ -228,6 +228,8 @@ NO_FIX = _check(
     text="Without it the drone knows no way home and flies to no place.",
 )
 
+CALIBRATING = _check(19, "check_calibrating", "The magnetometer is being calibrated")
+
 ARMED = Event(100, "armed", "Armed", Level.INFO)
 DISARMED = Event(101, "disarmed", "Disarmed", Level.INFO)
 TAKEOFF = Event(102, "takeoff_detected", "Takeoff detected", Level.INFO)
@@ -245,6 +247,7 @@ EVENTS: Sequence[Event] = (
     ALERT,
     MOTOR,
     NO_FIX,
+    CALIBRATING,
     ARMED,
     DISARMED,
     TAKEOFF,

@@ -80,6 +80,7 @@ _PART_OF_CHECK = {
 _EVENTS = {
     BlockerKind.CHECK: (table.CHECKLIST, Health.SYSTEM),
     BlockerKind.MAGNETOMETER: (table.MAGNETOMETER, Health.MAGNETOMETER),
+    BlockerKind.CALIBRATING: (table.CALIBRATING, Health.MAGNETOMETER),
     BlockerKind.SENSOR: (table.SENSOR, Health.SENSORS),
     BlockerKind.BATTERY: (table.BATTERY, Health.BATTERY),
     BlockerKind.ALERT: (table.ALERT, Health.SYSTEM),
