@@ -10,12 +10,10 @@ from typing import Any
 
 import msgspec
 
-from anafi_mav.config import schema
-
 HERE = Path(__file__).parent
 TESTS = HERE.parent / "tests" / "unit"
 DIALECT_XML = HERE.parent / "dialect" / "anafi.xml"
-sys.path.insert(0, str(TESTS))
+sys.path[:0] = [str(HERE.parent), str(TESTS)]
 
 CONFIGURATION = """\
 # Configuration
@@ -94,6 +92,8 @@ def _rows(struct: type[msgspec.Struct]) -> Iterator[str]:
 
 def configuration() -> str:
     """docs/configuration.md."""
+    from anafi_mav.config import schema
+
     parts = [CONFIGURATION]
     for place, struct in schema.SECTIONS.items():
         doc = " ".join((struct.__doc__ or "").split())
@@ -243,9 +243,9 @@ What its clients ask for and nobody could set. They can be read only.
 
 def parameters() -> str:
     """docs/parameters.md."""
-    from anafi_mav.services.parameter_table import NATIVE
     from anafi_mav.services.parameter_table_ardupilot import ARDUPILOT_NAMES
     from anafi_mav.services.parameter_table_px4 import PX4_NAMES
+    from anafi_mav.services.parameters import NATIVE_NAMES
 
     def twins(name: str, names: Any) -> str:
         found = [f"`{one.name}`" + (f" ({one.unit})" if one.unit else "") for one in names if one.native == name]
@@ -261,7 +261,7 @@ def parameters() -> str:
         return "not told" if value != value else f"{value:g}"
 
     parts = [PARAMETERS, PARAMETERS_NATIVE]
-    for one in sorted(NATIVE, key=lambda parameter: parameter.name):
+    for one in sorted(NATIVE_NAMES, key=lambda parameter: parameter.name):
         told = f"{one.short}. {one.long}".strip() if one.long else one.short
         where = f"`{one.source}`" if "." in one.source else one.source
         both = f"{twins(one.name, PX4_NAMES)} | {twins(one.name, ARDUPILOT_NAMES)}"

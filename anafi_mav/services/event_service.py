@@ -28,6 +28,9 @@ RESET_FOR = 3.0
 """s after the start for which CURRENT_EVENT_SEQUENCE says that the sequence began anew: three of them, one may be
 lost."""
 
+LOOK_EVERY = 1.0
+"""s between looks at what no news of the drone tell of: a fence that changes, a place on the wrong side of it."""
+
 PAUSE = 0.3
 """s between two reports: what changes together is told together."""
 
@@ -83,7 +86,7 @@ class EventService(Service):
 
     def tick(self, now: float) -> None:
         self._tell_changes()
-        if self._stale and now >= self._next_report:
+        if now >= self._next_report + (0.0 if self._stale else LOOK_EVERY - PAUSE):
             self._stale, self._next_report = False, now + PAUSE
             found = report(self.host.vehicle)
             if found != self._report:

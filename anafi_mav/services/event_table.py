@@ -229,6 +229,8 @@ NO_FIX = _check(
 )
 
 CALIBRATING = _check(19, "check_calibrating", "The magnetometer is being calibrated")
+FENCE = _check(20, "check_fence", "The drone stands where the fence does not let it fly")
+OTHER = _check(21, "check_other", "The drone would not take off", text="Messages say why when it is to arm.")
 
 ARMED = Event(100, "armed", "Armed", Level.INFO)
 DISARMED = Event(101, "disarmed", "Disarmed", Level.INFO)
@@ -248,6 +250,8 @@ EVENTS: Sequence[Event] = (
     MOTOR,
     NO_FIX,
     CALIBRATING,
+    FENCE,
+    OTHER,
     ARMED,
     DISARMED,
     TAKEOFF,

@@ -110,6 +110,8 @@ def _checks(vehicle: Vehicle) -> Iterator[tuple[Event, Health, int, tuple[int, .
         told = len(event.arguments) > len(table.CHECK_ARGUMENTS) and blocker.value is not None
         # A value that is newer than our tables may not fit into a byte; 255 reads as unknown, too.
         yield event, part, ALL_MODES, (min(max(int(blocker.value or 0), 0), 255),) if told else ()
+    if vehicle.fence_problem is not None:
+        yield table.FENCE, Health.SYSTEM, ALL_MODES, ()
     if vehicle.place is None:
         yield table.NO_FIX, Health.GPS, mode_bits(NEED_POSITION), ()
 
@@ -134,6 +136,8 @@ def _present(vehicle: Vehicle) -> Health:
 def report(vehicle: Vehicle) -> Report:
     """How things stand. The checks are `Vehicle.prearm_problems`, part by part; arming obeys the same."""
     found = list(_checks(vehicle))
+    if vehicle.prearm_problems() and all(event.level != Level.ERROR for event, *_ in found):
+        found.append((table.OTHER, Health.SYSTEM, ALL_MODES, ()))  # what is not in the table keeps it down all the same
     errors = warnings = Health(0)
     for event, part, _, _ in found:
         if event.level == Level.ERROR:

@@ -113,7 +113,13 @@ class Memory:
         return self._folder / f"{self._serial}.json"
 
     def load(self, serial: str) -> str | None:
-        """Read what is remembered of a drone. Returns a line for people when that could not be read."""
+        """Read what is remembered of a drone. Returns a line for people when that could not be read.
+
+        Of a drone that is back after a loss of the link there is nothing to read: what is here is as new as its file,
+        or newer, if that could not be written.
+        """
+        if serial and serial == self._serial:
+            return None
         self._serial = serial
         self.plans, self.settings = {}, {}
         path = self.path

@@ -54,6 +54,8 @@ class Parameter:
     long: str = ""
     default: float | None = None
     """Of the gateway's own settings; a drone does not tell its own."""
+    put: Callable[[Host, float], None] | None = None
+    """Sets it without further ado: of the gateway's own settings that outlive it."""
     volatile: bool = False
     """It changes by itself: left out of the hash."""
     native: str = ""
@@ -86,6 +88,15 @@ class Parameter:
             return value in self.values
         limits = None if self.limits is None else self.limits(host)
         return limits is None or limits[0] <= value <= limits[1]
+
+
+def own(put: Callable[[Host, float], None]) -> Callable[[Host, float], Awaitable[None]]:
+    """The `write` of a setting that takes nobody's consent."""
+
+    async def write(host: Host, value: float) -> None:
+        put(host, value)
+
+    return write
 
 
 def fact(name: str, value: float, short: str, kind: Kind = Kind.INT32, **more: object) -> Parameter:

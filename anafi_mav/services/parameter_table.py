@@ -15,7 +15,7 @@ from anafi_mav.drone import MODELS, Drone, Range, events
 from anafi_mav.drone.events import Axis, PreciseHomeMode, RthEndingBehavior, RthHomeType
 from anafi_mav.drone.events import ObstacleAvoidanceMode as AvoidanceMode
 from anafi_mav.services.link_loss import LossAction
-from anafi_mav.services.parameter import Limits, Parameter, bounds, current, number
+from anafi_mav.services.parameter import Limits, Parameter, bounds, current, number, own
 from anafi_mav.services.parameter_codec import Kind
 from anafi_mav.services.service import Host
 from anafi_mav.services.vehicle import LOWEST
@@ -326,7 +326,7 @@ MODEL = Parameter(
 # The gateway's own.
 
 
-async def _set_takeoff_height(host: Host, value: float) -> None:
+def _put_takeoff_height(host: Host, value: float) -> None:
     host.vehicle.takeoff_height = value
 
 
@@ -340,7 +340,8 @@ TAKEOFF_HEIGHT = Parameter(
     Kind.REAL32,
     "Height of a take-off that names none",
     read=lambda host: host.vehicle.takeoff_height,
-    write=_set_takeoff_height,
+    write=own(_put_takeoff_height),
+    put=_put_takeoff_height,
     limits=_takeoff_limits,
     polled=True,
     unit="m",
@@ -430,11 +431,11 @@ CLIMB_SPEED = Parameter(
 )
 
 
-async def _set_loss_action(host: Host, value: float) -> None:
+def _put_loss_action(host: Host, value: float) -> None:
     host.vehicle.gcs_loss.action = LossAction(int(value))
 
 
-async def _set_loss_time(host: Host, value: float) -> None:
+def _put_loss_time(host: Host, value: float) -> None:
     host.vehicle.gcs_loss.after = value
 
 
@@ -443,7 +444,8 @@ GCS_LOSS = Parameter(
     Kind.INT32,
     "What to do in the air when no ground station is heard any more",
     read=lambda host: float(host.vehicle.gcs_loss.action),
-    write=_set_loss_action,
+    write=own(_put_loss_action),
+    put=_put_loss_action,
     values={action.value: action.name.capitalize() for action in LossAction},
     polled=True,
     group=GATEWAY,
@@ -456,7 +458,8 @@ GCS_LOSS_TIME = Parameter(
     Kind.REAL32,
     "Silence of all ground stations that counts as their loss",
     read=lambda host: host.vehicle.gcs_loss.after,
-    write=_set_loss_time,
+    write=own(_put_loss_time),
+    put=_put_loss_time,
     limits=lambda host: (2.0, 300.0),
     polled=True,
     unit="s",

@@ -43,14 +43,23 @@ from anafi_mav.services.trickle import Trickle
 MAX_WRITES = 8
 """Writes under way at once. A drone answers one within tens of milliseconds; several clients load their files."""
 
+KEY = "parameters"
+"""In the drone's memory: those of the gateway's own settings that are kept, by native name."""
+
 MAX_WAITING = 512
 """Writes that wait for their turn: a whole list, from two clients. What comes beyond that comes again (1 s later)."""
+
+
+NATIVE_NAMES: tuple[Parameter, ...] = (*NATIVE, *FENCE_NATIVE)
+"""What every client sees, whatever its flavour."""
+
+KEPT = tuple(parameter for parameter in NATIVE_NAMES if parameter.put is not None)
 
 
 def parameters_of(flavour: Flavour) -> tuple[Parameter, ...]:
     """All that clients of a flavour can be shown, sorted by name; which of them a drone has is another matter."""
     names = ARDUPILOT_NAMES if flavour is ARDUPILOT else PX4_NAMES
-    return tuple(sorted((*NATIVE, *FENCE_NATIVE, *names), key=lambda parameter: parameter.name))
+    return tuple(sorted((*NATIVE_NAMES, *names), key=lambda parameter: parameter.name))
 
 
 class ParameterList:
@@ -118,6 +127,8 @@ class ParameterService(Service):
         self._trickle = Trickle(host)
         self._waiting: deque[tuple[Inbound, Parameter, float]] = deque()
         self._writers: set[asyncio.Task[None]] = set()
+        self._kept_of: str | None = None
+        """Serial number of the drone whose settings these are."""
         self._locks: dict[str, asyncio.Lock] = {}
         """One for each value, by its native name: two writes of it are carried out in their order."""
 
@@ -139,6 +150,7 @@ class ParameterService(Service):
         return self._lists[flavour.name]
 
     def link_up(self) -> None:
+        self._restore()
         if not self._lists:
             self._lists = {flavour.name: ParameterList(self.host, flavour) for flavour in FLAVOURS.values()}
             for name, listed in self._lists.items():
@@ -162,6 +174,37 @@ class ParameterService(Service):
 
     def tick(self, now: float) -> None:
         self._tell_settings()
+        self._keep()
+
+    # What outlives the gateway.
+
+    def _restore(self) -> None:
+        """What is remembered of this drone; the defaults for what is not, or makes no sense any more."""
+        serial = self.host.drone.identity.serial
+        if serial == self._kept_of:
+            return
+        self._kept_of = serial
+        found = self.host.memory.settings.get(KEY)
+        kept = found if isinstance(found, dict) else {}
+        for parameter in KEPT:
+            assert parameter.put is not None
+            assert parameter.default is not None
+            value = kept.get(parameter.name)
+            if not isinstance(value, int | float) or not parameter.accepts(self.host, value):
+                value = parameter.default
+            parameter.put(self.host, value)
+
+    def _keep(self) -> None:
+        """Whoever changed them: they are there when the gateway comes back."""
+        now = {one.name: one.value(self.host) for one in KEPT}
+        settings = self.host.memory.settings
+        if now != settings.get(KEY, {one.name: one.default for one in KEPT}):
+            settings[KEY] = now
+            self.host.spawn(self._save())
+
+    async def _save(self) -> None:
+        if (problem := await self.host.memory.save()) is not None:
+            self.host.complain(problem)
 
     # Files.
 

@@ -269,12 +269,19 @@ class Vehicle:
         if self.flying_state == FlyingState.EMERGENCY:
             problems.append("emergency stop")
         problems += self.drone.takeoff_blockers()
+        if (problem := self.fence_problem) is not None:
+            problems.append(problem)
+        return problems
+
+    @property
+    def fence_problem(self) -> str | None:
+        """Why the fence keeps the drone on the ground, in a sentence; None when it does not."""
         if self.on_ground:
             try:
                 self.fence.check_place(_point(self.place), _point(self.home))
             except OutsideFence as error:
-                problems.append(str(error))
-        return problems
+                return str(error)
+        return None
 
     # What it can be told to do. Each returns when the drone confirmed, or raises.
 

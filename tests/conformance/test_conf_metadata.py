@@ -14,8 +14,10 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.ftp import Ftp
 from support.mav import Client
 from support.params import fetch, value_of, write
-from support.world import world
+from support.plans import circle, upload
+from support.world import HOME, world
 
+from anafi_mav import geo
 from anafi_mav.mavlink import dialect as newer  # the stock dialect has never heard of events
 
 both = pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
@@ -210,6 +212,18 @@ async def test_conf_126_health_and_arming_checks(flavour: str) -> None:
         returning = [int(i) for i, modes in groups.items() if (0x05040000 if flavour == "px4" else 6) in modes]
         assert can_arm & 1 << group
         assert not can_arm & 1 << returning[0]
+
+
+async def test_conf_126_the_fence_is_a_check() -> None:
+    async with world() as w:
+        events = await reader(w.client)
+        mark = w.client.mark()
+        elsewhere = geo.destination(HOME[0], HOME[1], 800.0, 800.0)
+        assert (await upload(w.client, [circle(elsewhere, 100.0)], dialect.MAV_MISSION_TYPE_FENCE)).type == 0
+        wrong = await w.client.wait("EVENT", lambda m: events.read(m)[0] == "check_fence", since=mark)
+        assert events.text(wrong) == "The drone stands where the fence does not let it fly"
+        await w.client.wait("EVENT", lambda m: events.read(m)[0] == "health_summary", since=mark)
+        assert (await w.client.command(ARM, 1)).result == TEMPORARILY_REJECTED
 
 
 async def test_conf_126_what_happens() -> None:

@@ -9,6 +9,7 @@ import os
 import struct
 import time
 import zlib
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -504,6 +505,41 @@ async def test_what_nav_dll_act_promises_is_done(action: int, mode: int, command
         w.client.send(dialect.MAVLink_heartbeat_message(dialect.MAV_TYPE_GCS, 8, 0, 0, 4, 3))
         await onlooker.wait("STATUSTEXT", lambda m: "is back" in m.text)
         assert len(w.commands(command)) == 1
+
+
+async def test_what_is_set_in_the_gateway_outlives_it(tmp_path: Path) -> None:
+    """By drone. Not what makes motors turn, and not what MAV_CMD_DO_CHANGE_SPEED changes in passing."""
+    mine = {"ANF_TKOFF_ALT": (4.5, REAL32, 2.5), "ANF_GCS_LOSS": (2, INT32, 0), "ANF_GCS_LOSS_T": (7.0, REAL32, 10.0)}
+    passing = {"ANF_HAND_LAUNCH": (1, INT32, 0), "ANF_CRUISE_SPEED": (3.0, REAL32, 0.0)}
+    address = loopback()
+    async with world(drone_address=address) as w:
+        for name, (value, kind, _) in {**mine, **passing}.items():
+            assert value_of(await write(w.client, name, value, kind)) == value
+        folder = tmp_path / "state" / "anafi-mav"
+        until = time.monotonic() + 5.0
+        while not any(b'"ANF_GCS_LOSS_T":7.0' in file.read_bytes() for file in folder.glob("*.json")):
+            assert time.monotonic() < until
+            await asyncio.sleep(0.05)
+        w.drone.faults.mute = True
+        await asyncio.sleep(4.0)
+        w.drone.faults.mute = False
+        await w.client.heartbeat(lambda beat: True, timeout=15.0)
+        for name, (value, _, _) in {**mine, **passing}.items():
+            assert value_of(await read(w.client, name)) == value
+    async with world(drone_address=address) as w:
+        for name, (value, _, _) in mine.items():
+            assert value_of(await read(w.client, name)) == value
+        for name, (_, _, default) in passing.items():
+            assert value_of(await read(w.client, name)) == default
+    (file,) = folder.iterdir()
+    spoiled = file.read_text().replace('"ANF_GCS_LOSS":2', '"ANF_GCS_LOSS":9').replace("4.5", '"high"')
+    file.write_text(spoiled)
+    async with world(drone_address=address) as w:
+        assert value_of(await read(w.client, "ANF_GCS_LOSS")) == 0
+        assert value_of(await read(w.client, "ANF_TKOFF_ALT")) == 2.5
+        assert value_of(await read(w.client, "ANF_GCS_LOSS_T")) == 7.0
+    async with world() as w:
+        assert value_of(await read(w.client, "ANF_GCS_LOSS_T")) == 10.0, "another drone"
 
 
 async def test_without_a_policy_silence_of_the_ground_means_nothing() -> None:

@@ -120,12 +120,14 @@ async def world(
     flavour: str = "px4",
     also: str | None = None,
     model: str = "4k",
+    drone_address: str | None = None,
 ) -> AsyncIterator[World]:
     """One simulated drone, one gateway with a TCP endpoint, and its clients, connected and ready.
 
     With `flavour` the endpoint shows that autopilot. `also` is the flavour of a second endpoint, at port 5761.
+    A drone at the same `drone_address` as an earlier one has the same serial number.
     """
-    drone_address, address = loopback(), loopback()
+    drone_address, address = drone_address or loopback(), loopback()
     spec = DroneSpec(
         model=model,
         address=drone_address,
