@@ -404,7 +404,8 @@ class Piloting(PilotingSettings):
         finally:
             if move in self._moves.by:  # given up: neither the drone nor hover has ended it
                 self._moves.drop_by(move, self._now())
-                if self.sticks_blocked is None:  # otherwise the drone is busy with what is not ours to disturb
+                # Otherwise the drone is busy with what is not ours to disturb.
+                if self.sticks_blocked is None and not self._home.state.returning:
                     self._commander.halt_if_connected(ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0))
         return flown
 
@@ -616,7 +617,7 @@ class Piloting(PilotingSettings):
         if not self._home.state.returning_by_itself:
             if state.move_to == MoveToStatus.RUNNING and not cancelled:
                 self._commander.halt(ardrone3.CancelMoveTo())
-            if self._moves.inherited and state.flying in _IN_FLIGHT:
+            if self._moves.inherited and state.flying in _IN_FLIGHT and not self._home.state.returning:
                 self._moves.expect_stray(self._now())
                 self._commander.halt(ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0))
         if state.poi in (PoiStatus.RUNNING, PoiStatus.PENDING):

@@ -29,6 +29,12 @@ PROGRESS_AFTER, PROGRESS_EVERY = 0.3, 0.8
 
 _MODE_COMMANDS = (dialect.MAV_CMD_DO_SET_MODE, dialect.MAV_CMD_DO_SET_STANDARD_MODE)
 _STOPPING_MODES = (*HOVERING, FlightMode.LAND)
+_STOPPING = (
+    dialect.MAV_CMD_NAV_LAND,
+    dialect.MAV_CMD_DO_FLIGHTTERMINATION,
+    dialect.MAV_CMD_DO_SET_ROI_NONE,
+)
+_IRREVOCABLE = (dialect.MAV_CMD_NAV_TAKEOFF, dialect.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN)
 
 _UNSET_INT = (2**31 - 1, -(2**31))
 """x and y of a COMMAND_INT that stand for "not set": the specified INT32_MAX, and what a cast NaN becomes (R8)."""
@@ -65,12 +71,13 @@ class Command:
     def stops(self) -> bool:
         """It ends something and begins nothing: hold, land, disarm, cut the motors. It may be carried out twice."""
         if self.id == dialect.MAV_CMD_DO_REPOSITION:
-            return all(math.isnan(value) for value in (self.params[3], self.x, self.y, self.z))
+            no_heading = math.isnan(self.params[3]) or (self.params[3] == 0.0 and self.flavour.zero_is_unset)
+            return no_heading and all(math.isnan(value) for value in (self.x, self.y, self.z))
         if self.id in _MODE_COMMANDS:
             return self.mode in _STOPPING_MODES
-        if self.id == dialect.MAV_CMD_COMPONENT_ARM_DISARM:
+        if self.id in (dialect.MAV_CMD_COMPONENT_ARM_DISARM, dialect.MAV_CMD_DO_PAUSE_CONTINUE):
             return self.params[0] == 0.0
-        return self.id in (dialect.MAV_CMD_NAV_LAND, dialect.MAV_CMD_DO_FLIGHTTERMINATION)
+        return self.id in _STOPPING
 
     @property
     def returns(self) -> bool:
@@ -82,11 +89,10 @@ class Command:
     @property
     def revocable(self) -> bool:
         """COMMAND_CANCEL may end it. Not an order to stop, which somebody else must not call off; and not what a drone
-        that has heard it does whatever we say then, so that "cancelled" would be a lie: to take off, to return."""
-        begins = self.mode if self.id == dialect.MAV_CMD_DO_SET_MODE else None
-        if self.id == dialect.MAV_CMD_NAV_TAKEOFF or begins in (FlightMode.TAKEOFF, FlightMode.TERMINATED):
+        that has heard it does whatever we say then, so that "cancelled" would be a lie: take off, return, restart."""
+        if self.id in _MODE_COMMANDS and self.mode in (FlightMode.TAKEOFF, FlightMode.TERMINATED):
             return False
-        return not self.stops and not self.returns
+        return not (self.stops or self.returns or self.id in _IRREVOCABLE)
 
     def same_as(self, other: Command) -> bool:
         """Equal, with NaN equal to NaN."""

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from anafi_mav import units
-from anafi_mav.drone.events import PoiMode, RthHomeType
+from anafi_mav.drone.events import FlyingStateChanged, Message, PoiMode, RthHomeType
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
@@ -117,8 +117,8 @@ class GuidedService(Service):
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
-        self._paused: Goto | None = None
-        """Where the drone was going when it was told to pause."""
+        self._paused: tuple[Goto, int] | None = None
+        """Where the drone was going when it was told to pause, and the vehicle's count of orders then."""
 
     def actions(self) -> Mapping[int, Action]:
         return {
@@ -134,6 +134,16 @@ class GuidedService(Service):
 
     def link_down(self) -> None:
         self._paused = None
+
+    def on_event(self, message: Message, now: float) -> None:
+        if isinstance(message, FlyingStateChanged) and not self.host.vehicle.in_air:
+            self._paused = None  # the next flight's heights count from elsewhere
+
+    @property
+    def _interrupted(self) -> Goto | None:
+        """Where a pause stopped the drone; None when something else was ordered since."""
+        goto, orders = self._paused or (None, 0)
+        return goto if orders == self.host.vehicle.orders else None
 
     async def _change_speed(self, command: Command) -> None:
         """MAV_CMD_DO_CHANGE_SPEED: param1 SPEED_TYPE, param2 m/s. A move that is under way changes its speed at once.
@@ -192,16 +202,20 @@ class GuidedService(Service):
             await vehicle.turn(turn * units.RAD_PER_DEG, rate if rate > 0.0 else None, guided_mode(command.flavour))
 
     async def _pause_or_continue(self, command: Command) -> None:
-        """MAV_CMD_DO_PAUSE_CONTINUE: param1 0 hovers, 1 goes on to where the pause stopped it."""
+        """MAV_CMD_DO_PAUSE_CONTINUE: param1 0 hovers, 1 goes on to where the pause stopped it.
+
+        Not after anybody has ordered anything else, or the drone has landed.
+        """
         vehicle = self.host.vehicle
         if command.params[0] == 0.0:
-            goto = vehicle.goto
+            goto = vehicle.goto or self._interrupted
             await vehicle.hold(guided_mode(command.flavour))
-            self._paused = goto or self._paused
+            self._paused = None if goto is None else (goto, vehicle.orders)
         elif command.params[0] == 1.0:
-            if self._paused is None:
-                raise Refused("Continue refused: nothing was paused")
-            await vehicle.go(self._paused)
+            goto = self._interrupted
+            if goto is None:
+                raise Refused("Continue refused: nothing was paused, or something else was ordered since")
+            await vehicle.go(goto)
             self._paused = None
         else:
             raise Refused("Refused: param1 is 0 to pause, 1 to continue", lasting=True)
@@ -239,6 +253,14 @@ class GuidedService(Service):
 
     # Home.
 
+    async def _prefer(self, kind: RthHomeType) -> None:
+        try:
+            await self.host.drone.home.set_preferred_type(kind)
+        except AnafiMavError as error:
+            self.host.text(
+                Severity.CRITICAL, f"The drone prefers a custom home, and could not be told otherwise: {error}"
+            )
+
     async def _set_home(self, command: Command) -> None:
         """MAV_CMD_DO_SET_HOME: param1 1 where the drone is, else the command's place.
 
@@ -256,11 +278,12 @@ class GuidedService(Service):
             ato = height(vehicle, command) or 0.0
         vehicle.check_on_earth(where, "Home")
         before = home.state.preferred_type
-        await home.set_preferred_type(RthHomeType.CUSTOM)
         try:
+            await home.set_preferred_type(RthHomeType.CUSTOM)
             await home.set_custom_location(where.latitude, where.longitude, ato)
-        except AnafiMavError:
+        except BaseException:
+            # The custom home of some other day must not stay: a return that replaces this waits until it is gone.
             if before is not None and before != RthHomeType.CUSTOM:
-                await home.set_preferred_type(before)
+                await asyncio.wait([self.host.spawn(self._prefer(before))])
             raise
         self.host.text(Severity.NOTICE, "Home set: the drone returns there until its home type is changed")

@@ -41,7 +41,7 @@ class LinkLossService(Service):
             self.host.text(Severity.WARNING, f"{silence}: the drone is returning")
         else:
             self.host.text(Severity.CRITICAL, f"{silence}: {policy.action.name.lower()}")
-            self.host.spawn(self._act(policy.action))
+            self.host.act(LinkLossService, self._act(policy.action))
 
     async def _act(self, action: LossAction) -> None:
         vehicle = self.host.vehicle

@@ -413,6 +413,8 @@ class Vehicle:
             await self.drone.piloting.stop()
             # One asked for through somebody else, or before the link was lost. Raises when it is the drone's own.
             await self.drone.piloting.cancel_return_home()
+            if self.flying_state in _LANDING:
+                raise Refused(f"{mode.value} refused: the drone is landing")
         self.select(mode)
 
     async def reposition(
@@ -462,15 +464,19 @@ class Vehicle:
         if not self.in_air or self.returning:  # no await from here to the moveTo
             raise Refused("Goto refused: the drone does something else now")
         self.select(goto.mode)
-        self._goto = goto
-        await self.drone.piloting.move_to(
-            goto.place.latitude,
-            goto.place.longitude,
-            goto.ato,
-            heading_deg=None if goto.yaw is None else units.wrap_360(goto.yaw * units.DEG_PER_RAD),
-            horizontal_speed=self.cruise_speed if goto.speed is None else goto.speed,
-            vertical_speed=self.climb_speed,
-        )
+        before, self._goto = self._goto, goto
+        try:
+            await self.drone.piloting.move_to(
+                goto.place.latitude,
+                goto.place.longitude,
+                goto.ato,
+                heading_deg=None if goto.yaw is None else units.wrap_360(goto.yaw * units.DEG_PER_RAD),
+                horizontal_speed=self.cruise_speed if goto.speed is None else goto.speed,
+                vertical_speed=self.climb_speed,
+            )
+        except BaseException:
+            self._goto = before  # a refused one must not be flown by the next change of height or speed
+            raise
 
     async def turn(self, angle: float, rate_dps: float | None, mode: FlightMode) -> None:
         """Turn by `angle` (rad, clockwise +) where the drone hovers, at `rate_dps` (None: the drone's own).

@@ -28,7 +28,7 @@ from support.world import HOME, RETURN, world
 from anafi_mav import geo
 from anafi_mav.mavlink import dialect
 
-MAV_CMD_DO_FLIGHTTERMINATION = 185
+MAV_CMD_DO_FLIGHTTERMINATION, STANDARD_MODE = 185, 262
 
 
 def call_off(client: Client, command: int) -> None:
@@ -63,15 +63,16 @@ async def test_cutting_the_motors_cannot_be_called_off(order: tuple[Any, ...]) -
         assert w.drone.flying_state.name in ("EMERGENCY", "LANDED")
 
 
-async def test_a_take_off_that_the_drone_has_heard_cannot_be_called_off() -> None:
+@pytest.mark.parametrize("order", [(TAKEOFF_CMD,), (SET_MODE, 1.0, 4.0, 2.0), (STANDARD_MODE, 8.0)])
+async def test_a_take_off_that_the_drone_has_heard_cannot_be_called_off(order: tuple[Any, ...]) -> None:
     async with world(speed=1.0) as w:
         assert (await w.client.command(ARM, 1)).result == ACCEPTED
         muted = now_mute(w, "ardrone3.Piloting.TakeOff", 0.7)
         mark = w.client.mark()
-        w.client.send_command(TAKEOFF_CMD, x=0.0, y=0.0, z=5.0)
+        w.client.send_command(*order)
         await muted
-        call_off(w.client, TAKEOFF_CMD)
-        assert await until(w.client, mark, 1) == [(TAKEOFF_CMD, ACCEPTED)]
+        call_off(w.client, order[0])
+        assert await until(w.client, mark, 1) == [(order[0], ACCEPTED)]
         await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "takingoff")
 
 

@@ -416,6 +416,19 @@ async def test_a_return_is_not_confirmed_by_one_whose_second_abort_is_on_its_way
     ]
 
 
+async def test_a_move_that_ends_in_a_return_leaves_the_return_alone(drone: Drone, device: ScriptedDevice) -> None:
+    """The pilot at a Skycontroller pressed his button: nothing of ours is sent into his return."""
+    await flies(drone, device)
+    moving = asyncio.ensure_future(drone.piloting.move_by(50.0, 0.0, 0.0, 0.0))
+    await device.until(ardrone3.MoveBy)
+    await reported(drone, device, rth.State(RthState.IN_PROGRESS, StateReason.USER_REQUEST))
+    moving.cancel()
+    await asyncio.wait([moving])
+    drone.piloting.hover()
+    await in_order(drone, device)
+    assert [m.dX for m in device.got(ardrone3.MoveBy)] == [50.0]
+
+
 # -- hand launch, take-off, motors
 
 

@@ -1,0 +1,155 @@
+"""What one client wanted is over when another client or a landing has ended it; what was refused is not flown later."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from support.mav import NAN
+from support.trouble import (
+    ACCEPTED,
+    CANCELLED,
+    GOTO,
+    LAND_CMD,
+    REJECTED,
+    RTL,
+    goto,
+    heard,
+    now_mute,
+    somebody_else,
+    until,
+)
+from support.world import HOME, World, world
+
+from anafi_mav import geo
+from anafi_mav.arsdk.messages import ardrone3, rth
+from anafi_mav.mavlink import dialect
+from anafi_mav.services.link_loss import LossAction
+
+PAUSE, SET_HOME, ALTITUDE, ROI_NONE = 193, 179, 186, 197
+
+
+async def leaves(w: World, north: float) -> None:
+    await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > north, 20.0, since=w.drone.log[-1].t)
+
+
+async def lands(w: World) -> None:
+    await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landed", 30.0)
+
+
+def moves(w: World) -> list[dict[str, Any]]:
+    """Places that the drone was sent to."""
+    names = ("ardrone3.Piloting.moveTo", "move.extended_move_to")
+    return [e.args for e in w.drone.log if e.kind == "command" and e.name in names]
+
+
+# -- pause and continue
+
+
+async def test_a_second_pause_stops_what_somebody_else_began_meanwhile() -> None:
+    async with world(speed=1.0) as w:
+        other = await w.connect(sysid=250)
+        await w.take_off()
+        assert (await w.client.command(PAUSE, 0)).result == ACCEPTED
+        place = geo.destination(*HOME[:2], 60.0, 0.0)
+        assert (await other.command(GOTO, -1, 1, 0, NAN, frame=6, x=place[0], y=place[1], z=10.0)).result == ACCEPTED
+        assert (await w.client.command(PAUSE, 0)).result == ACCEPTED
+        assert heard(w, "moveTo", "CancelMoveTo") == ["moveTo", "CancelMoveTo"]
+
+
+@pytest.mark.parametrize("since", ["hold", "landing", "landing by somebody else"])
+async def test_a_pause_is_not_continued_after_something_else(since: str) -> None:
+    """A place from before a landing has its height above another take-off point."""
+    async with world() as w:
+        other = await w.connect(sysid=250)
+        await w.take_off()
+        assert await goto(w, 80.0, 10.0) == ACCEPTED
+        await leaves(w, 3.0)
+        assert (await w.client.command(PAUSE, 0)).result == ACCEPTED
+        if since == "hold":
+            assert (await other.command(PAUSE, 0)).result == ACCEPTED
+            assert (await other.command(GOTO, -1, 1, 0, 1.0)).result == ACCEPTED
+        else:
+            if since == "landing":
+                assert (await other.command(LAND_CMD)).result == ACCEPTED
+            else:
+                somebody_else(w, ardrone3.Landing())
+            await lands(w)
+            await w.take_off()
+        before = len(moves(w))
+        assert (await w.client.command(PAUSE, 1)).result == REJECTED
+        assert len(moves(w)) == before
+
+
+async def test_two_pauses_are_continued_like_one() -> None:
+    async with world() as w:
+        await w.take_off()
+        assert await goto(w, 80.0, 10.0) == ACCEPTED
+        await leaves(w, 3.0)
+        assert (await w.client.command(PAUSE, 0)).result == ACCEPTED
+        assert (await w.client.command(PAUSE, 0)).result == ACCEPTED
+        assert (await w.client.command(PAUSE, 1)).result == ACCEPTED
+        assert moves(w)[0] == moves(w)[-1]
+
+
+# -- what was refused
+
+
+async def test_a_change_of_height_does_not_fly_to_a_place_that_was_refused() -> None:
+    async with world(speed=1.0) as w:
+        await w.take_off()
+        assert await goto(w, 80.0, 10.0) == ACCEPTED
+        w.drone.faults.magneto_required = True
+        await w.drone.wait_log(lambda e: e.name == "rth.state" and e.args["state"] == rth.RthState.UNAVAILABLE)
+        south = geo.destination(*HOME[:2], -80.0, 0.0)
+        ack = await w.client.command(GOTO, -1, 1, 0, NAN, frame=6, x=south[0], y=south[1], z=10.0)
+        assert ack.result == REJECTED
+        w.drone.faults.magneto_required = False
+        await w.drone.wait_log(
+            lambda e: e.name == "rth.state" and e.args["state"] == rth.RthState.AVAILABLE, since=w.drone.log[-1].t
+        )
+        assert (await w.client.command(ALTITUDE, 20.0, 3.0)).result == ACCEPTED
+        north = geo.destination(*HOME[:2], 80.0, 0.0)
+        assert moves(w)[-1]["latitude"] == pytest.approx(north[0], abs=1e-6)
+
+
+# -- home
+
+
+@pytest.mark.parametrize("how", ["a return", "cancel"])
+async def test_a_home_that_is_given_up_leaves_the_old_one(how: str) -> None:
+    """In between the drone prefers a place that was chosen some other day."""
+    async with world(speed=1.0) as w:
+        await w.take_off()
+        muted = now_mute(w, "rth.set_custom_location", 0.5)
+        mark = w.client.mark()
+        w.client.send_command(SET_HOME, 0, frame=6, x=HOME[0] + 0.0003, y=HOME[1], z=NAN)
+        await muted
+        if how == "cancel":
+            w.client.send(dialect.MAVLink_command_cancel_message(1, 1, SET_HOME))
+        else:
+            other = await w.connect(sysid=250)
+            assert (await other.command(RTL)).result == ACCEPTED
+        assert await until(w.client, mark, 1) == [(SET_HOME, CANCELLED)]
+        types = [e.args["type"] for e in w.drone.log if e.kind == "command" and e.name == "rth.set_preferred_home_type"]
+        assert types == [rth.RthHomeType.CUSTOM, rth.RthHomeType.TAKEOFF]
+        if how != "cancel":
+            assert heard(w, "set_preferred_home_type", "return_to_home")[-1] == "return_to_home"
+
+
+# -- the ground station is back
+
+
+async def test_who_comes_back_while_its_loss_is_being_acted_upon_has_the_say() -> None:
+    async with world(speed=1.0) as w:
+        other = await w.connect(sysid=254)
+        await w.take_off(8.0)
+        policy = w.gateway._supervised[0].system.vehicle.gcs_loss
+        policy.action, policy.after = LossAction.RETURN, 1.0
+        muted = now_mute(w, "rth.return_to_home", 0.5)
+        w.client.send(dialect.MAVLink_heartbeat_message(dialect.MAV_TYPE_GCS, 8, 0, 0, 4, 3))
+        await muted
+        place = geo.destination(*HOME[:2], 40.0, 0.0)
+        assert (await other.command(GOTO, -1, 1, 0, NAN, frame=6, x=place[0], y=place[1], z=8.0)).result == ACCEPTED
+        await leaves(w, 10.0)
+        assert heard(w, "CancelMoveTo") == []
