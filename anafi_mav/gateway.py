@@ -19,9 +19,11 @@ from types import TracebackType
 
 from typing_extensions import Self
 
+from anafi_mav.arsdk.rtsp import DEFAULT_PORT as RTSP_PORT
 from anafi_mav.clock import Clock, SystemClock
 from anafi_mav.config import Config, DroneConfig
 from anafi_mav.drone import Drone
+from anafi_mav.drone.rest import HTTP_PORT
 from anafi_mav.errors import AnafiMavError, ConfigError
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound, Node
@@ -145,6 +147,8 @@ class Gateway:
             drone = Drone(
                 config.address,
                 discovery_port=config.discovery_port,
+                http_port=HTTP_PORT if config.http_port is None else config.http_port,
+                rtsp_port=RTSP_PORT if config.rtsp_port is None else config.rtsp_port,
                 interface=config.interface,
                 name=config.name,
             )

@@ -7,12 +7,23 @@ import errno
 import ipaddress
 import socket
 from collections.abc import Collection
+from typing import NamedTuple
 
 from anafi_mav.arsdk.handshake import C2D_PORT, HANDSHAKE_PORT
 from anafi_mav.errors import ConfigError
 
 HTTP_PORT, HTTP_PORT_FOR_USERS = 80, 8080
 """The aircraft's web server, and its stand-in where an ordinary user may not open port 80."""
+RTSP_PORT, RTSP_PORT_FOR_USERS = 554, 8554
+"""The same of its video."""
+
+
+class Ports(NamedTuple):
+    """Where the two servers of a simulated drone are. What is wanted: None is the aircraft's, or its stand-in."""
+
+    http: int
+    rtsp: int
+
 
 CANDIDATES = [f"127.0.42.{host}" for host in range(1, 255)] + ["127.0.0.1"]
 """Where simulated drones live. The last is for systems whose loopback is that one address (macOS)."""
@@ -32,48 +43,59 @@ class Reservations(contextlib.ExitStack):
     """
 
     def choose(
-        self, key_path: str, discovery_port: int, http_port: int | None, avoid: Collection[str | None] = ()
-    ) -> tuple[str, int]:
-        """The first address whose ports are free, and the port of its web server. Raises `ConfigError`."""
+        self,
+        key_path: str,
+        discovery_port: int,
+        http_port: int | None,
+        rtsp_port: int | None,
+        avoid: Collection[str | None] = (),
+    ) -> tuple[str, Ports]:
+        """The first address whose ports are free, and the ports of its servers. Raises `ConfigError`."""
         for address in CANDIDATES:
             if address in avoid:
                 continue
             try:
-                return address, self.take(address, discovery_port, http_port)
+                return address, self.take(address, discovery_port, http_port, rtsp_port)
             except OSError as error:
                 if error.errno not in (errno.EADDRINUSE, errno.EADDRNOTAVAIL):
                     raise ConfigError(key_path, f"cannot open ports on {address}: {error.strerror}") from error
         raise ConfigError(key_path, f"expected free ports on one of {CANDIDATES[0]} to {CANDIDATES[-2]}, found none")
 
-    def take(self, address: str, discovery_port: int, http_port: int | None) -> int:
-        """Mark `address` as ours; returns the port of its web server. Raises OSError if a port is not free."""
+    def take(self, address: str, discovery_port: int, http_port: int | None, rtsp_port: int | None) -> Ports:
+        """Mark `address` as ours; returns the ports of its servers. Raises OSError if a port is not free."""
         with contextlib.ExitStack() as attempt:
             attempt.enter_context(_bound(socket.SOCK_DGRAM, address, discovery_port))
             with _bound(socket.SOCK_DGRAM, address, C2D_PORT):
                 for port in (discovery_port, HANDSHAKE_PORT):
                     _bound(socket.SOCK_STREAM, address, port).close()
-                found = _web_port(address, http_port)
+                found = Ports(
+                    _server_port(address, http_port, HTTP_PORT, HTTP_PORT_FOR_USERS),
+                    _server_port(address, rtsp_port, RTSP_PORT, RTSP_PORT_FOR_USERS),
+                )
             self.push(attempt.pop_all())
         return found
 
-    def take_configured(self, key_path: str, address: str, discovery_port: int, http_port: int | None) -> int:
+    def take_configured(
+        self, key_path: str, address: str, discovery_port: int, http_port: int | None, rtsp_port: int | None
+    ) -> Ports:
         """As `take`, for an address that the user wrote down. Raises `ConfigError`."""
         try:
-            return self.take(address, discovery_port, http_port)
+            return self.take(address, discovery_port, http_port, rtsp_port)
         except OSError as error:
-            ports = f"{discovery_port}, {HANDSHAKE_PORT}, {C2D_PORT} and {http_port or HTTP_PORT}"
+            servers = f"{http_port or HTTP_PORT} and {rtsp_port or RTSP_PORT}"
+            ports = f"{discovery_port}, {HANDSHAKE_PORT}, {C2D_PORT}, {servers}"
             wanted = f"an address of this machine with free ports {ports}"
             raise ConfigError(key_path, f"expected {wanted}, got {address}: {error.strerror}") from error
 
 
-def _web_port(address: str, wanted: int | None) -> int:
-    """The port that a web server may have there: `wanted`, else 80 or its stand-in. Raises OSError if it is taken."""
+def _server_port(address: str, wanted: int | None, usual: int, stand_in: int) -> int:
+    """The port that a server may have there: `wanted`, else the usual or its stand-in. Raises OSError if taken."""
     if wanted is None:
         try:
-            _bound(socket.SOCK_STREAM, address, HTTP_PORT).close()
-            return HTTP_PORT
+            _bound(socket.SOCK_STREAM, address, usual).close()
+            return usual
         except PermissionError:
-            wanted = HTTP_PORT_FOR_USERS
+            wanted = stand_in
     _bound(socket.SOCK_STREAM, address, wanted).close()
     return wanted
 

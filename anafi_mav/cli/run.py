@@ -14,7 +14,7 @@ from typing import Any
 import msgspec
 
 from anafi_mav.cli import options
-from anafi_mav.cli.addresses import Reservations, spot
+from anafi_mav.cli.addresses import Ports, Reservations, spot
 from anafi_mav.cli.child import SimulatorProcess
 from anafi_mav.cli.terminal import complain, say
 from anafi_mav.config import Config, DroneConfig, SimConfig, from_mapping, load, remarks
@@ -178,18 +178,19 @@ def place(config: Config, reservations: Reservations) -> tuple[Config, dict[str,
     if not simulated:
         return config, None
     real = {drone.address for drone in config.drones}
-    places: dict[int, tuple[str, int]] = {}
+    places: dict[int, tuple[str, Ports]] = {}
     # Addresses that the user wrote down come first, so that none of them is chosen for another drone.
     for index, sim in sorted(simulated.items(), key=lambda item: item[1].address is None):
         key_path, port = f"drones[{index}].sim", config.drones[index].discovery_port
         if sim.address is None:
-            places[index] = reservations.choose(key_path, port, sim.http_port, avoid=real)
+            places[index] = reservations.choose(key_path, port, sim.http_port, sim.rtsp_port, avoid=real)
         else:
-            web = reservations.take_configured(f"{key_path}.address", sim.address, port, sim.http_port)
-            places[index] = sim.address, web
+            places[index] = (
+                sim.address,
+                reservations.take_configured(f"{key_path}.address", sim.address, port, sim.http_port, sim.rtsp_port),
+            )
     drones = tuple(
-        msgspec.structs.replace(drone, address=places[index][0], sim=None) if index in places else drone
-        for index, drone in enumerate(config.drones)
+        _placed(drone, *places[index]) if index in places else drone for index, drone in enumerate(config.drones)
     )
     first = next(iter(simulated.values()))
     fleet = {
@@ -201,7 +202,12 @@ def place(config: Config, reservations: Reservations) -> tuple[Config, dict[str,
     return msgspec.structs.replace(config, drones=drones), fleet
 
 
-def _entry(drone: DroneConfig, sim: SimConfig, address: str, http_port: int) -> dict[str, Any]:
+def _placed(drone: DroneConfig, address: str, ports: Ports) -> DroneConfig:
+    """A simulated drone as the gateway sees it: one like any other."""
+    return msgspec.structs.replace(drone, address=address, http_port=ports.http, rtsp_port=ports.rtsp, sim=None)
+
+
+def _entry(drone: DroneConfig, sim: SimConfig, address: str, ports: Ports) -> dict[str, Any]:
     """A drone as `anafi-mav sim --fleet` reads it."""
     return {
         "name": drone.name,
@@ -209,7 +215,8 @@ def _entry(drone: DroneConfig, sim: SimConfig, address: str, http_port: int) -> 
         "address": address,
         "home": sim.home,
         "discovery_port": drone.discovery_port,
-        "http_port": http_port,
+        "http_port": ports.http,
+        "rtsp_port": ports.rtsp,
         "versions": (1, sim.protocol),
         "telemetry_rate": sim.telemetry_rate,
         "skycontroller": sim.skycontroller,

@@ -208,6 +208,9 @@ def _of_one_drone(key_path: str, drone: DroneConfig) -> Iterator[tuple[str, str]
     if (drone.address is None) == (drone.sim is None):
         got = "neither" if drone.sim is None else "both"
         yield key_path, f"expected either address or sim, got {got}"
+    for key in ("http_port", "rtsp_port"):
+        if drone.sim is not None and getattr(drone, key) is not None:
+            yield f"{key_path}.{key}", f"expected it in sim, got {getattr(drone, key)} here"
     if drone.address is not None and not _is_host(drone.address):
         yield f"{key_path}.address", _wrong(DroneConfig, "address", drone.address)
     if drone.sim is not None and drone.sim.model == "ai" and drone.sim.skycontroller == 3:

@@ -158,6 +158,14 @@ class SimConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
             extra=expected("a port from 1 to 65535"),
         ),
     ] = None
+    rtsp_port: Annotated[
+        Port | None,
+        Meta(
+            description="Port of its video. Left out: 554 as on the aircraft, or 8554 where this user may not open "
+            "port 554.",
+            extra=expected("a port from 1 to 65535"),
+        ),
+    ] = None
 
 
 class DroneConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -211,6 +219,20 @@ class DroneConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
             extra=expected("a port from 1 to 65535"),
         ),
     ] = 44445
+    http_port: Annotated[
+        Port | None,
+        Meta(
+            description="TCP port of its web server, where it is not the aircraft's. Left out: 80.",
+            extra=expected("a port from 1 to 65535"),
+        ),
+    ] = None
+    rtsp_port: Annotated[
+        Port | None,
+        Meta(
+            description="TCP port of its video, where it is not the aircraft's. Left out: 554.",
+            extra=expected("a port from 1 to 65535"),
+        ),
+    ] = None
     allow_kill: Annotated[
         bool | None,
         Meta(

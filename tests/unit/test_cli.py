@@ -126,10 +126,36 @@ def test_what_the_simulator_is_told_of_a_drone(tmp_path: Path) -> None:
         " wind: {speed: 6, direction: 90}}}]"
     )
     with Reservations() as reservations:
-        _, fleet = place(load(path), reservations)
+        seen, fleet = place(load(path), reservations)
     (drone,) = msgspec.json.decode(msgspec.json.encode(fleet), type=Fleet).drones
     assert (drone.storage, drone.skycontroller) == (500_000, 4)
     assert drone.wind == WindSpec(6.0, 90.0)
+    # The gateway looks for the servers where they are, also where this user may not open the aircraft's ports.
+    assert (seen.drones[0].http_port, seen.drones[0].rtsp_port) == (drone.http_port, drone.rtsp_port)
+    assert (drone.http_port, drone.rtsp_port) in ((80, 554), (8080, 8554))
+
+
+UNPRIVILEGED = Path("/proc/sys/net/ipv4/ip_unprivileged_port_start")
+
+
+@pytest.mark.skipif(
+    not UNPRIVILEGED.exists() or int(UNPRIVILEGED.read_text()) <= 554, reason="here anybody may open ports 80 and 554"
+)
+async def test_an_ordinary_user_gets_stand_ins_for_the_ports_of_the_aircraft() -> None:
+    script = """
+import os, sys
+from anafi_mav.cli.addresses import Reservations
+if os.geteuid() == 0:
+    os.setuid(65534)
+with Reservations() as reservations:
+    print(*reservations.take(sys.argv[1], 44445, None, None))
+    print(*reservations.take(sys.argv[2], 44445, 8081, 8555))
+"""
+    process = await asyncio.create_subprocess_exec(
+        *(sys.executable, "-c", script, loopback(), loopback()), stdout=asyncio.subprocess.PIPE
+    )
+    out, _ = await asyncio.wait_for(process.communicate(), 30.0)
+    assert out.decode().splitlines() == ["8080 8554", "8081 8555"]
 
 
 def test_without_a_configuration_it_flies_the_default_fleet() -> None:
@@ -321,7 +347,8 @@ SIM = "sim: {address: DRONE}"
         ),
         (
             "{endpoints: ['tcpin://HOST:5761'], drones: [{name: a, sysid: 1, sim: {address: TAKEN}}]}",
-            "drones[0].sim.address: expected an address of this machine with free ports 44445, 44444, 2233 and 80, "
+            "drones[0].sim.address: expected an address of this machine with free ports 44445, 44444, 2233, 80 "
+            "and 554, "
             "got TAKEN: Address already in use",
         ),
         ("drones: [", "fleet.yaml, line 1, column"),

@@ -20,7 +20,7 @@ REPOSITORY = Path(__file__).parents[2]
 HOST = "expected an IPv4 address or a host name, like 192.168.42.1, got"
 NAME = "expected 1 to 32 letters, digits, '-', '_' or '.', beginning with a letter or digit, got"
 SYSID = "expected a whole number from 1 to 250"
-KEYS_OF_A_DRONE = "name, sysid, address, interface, sim, discovery_port, allow_kill"
+KEYS_OF_A_DRONE = "name, sysid, address, interface, sim, discovery_port, http_port, rtsp_port, allow_kill"
 
 
 def problem(text: str | bytes) -> str:
@@ -67,9 +67,10 @@ def test_one_address_on_two_interfaces_is_two_drones() -> None:
 def test_every_value_survives() -> None:
     config = from_text(
         "endpoints: ['udpin://0.0.0.0:14550']\nallow_kill: true\ndrones:\n"
-        "  - {name: a.b-c_1, sysid: 250, address: anafi.local, discovery_port: 44447, allow_kill: false}\n"
+        "  - {name: a.b-c_1, sysid: 250, address: anafi.local, discovery_port: 44447, allow_kill: false, http_port: 81,"
+        " rtsp_port: 555}\n"
         "  - {name: b, sysid: 2, sim: {home: [-33, 151, -2], address: 127.0.42.9, speed: 4, telemetry_rate: 30,"
-        " seed: 7, protocol: 1, http_port: 8080, skycontroller: 4, storage: 500k, scenario: bad-day.yaml,"
+        " seed: 7, protocol: 1, http_port: 8080, rtsp_port: 8555, skycontroller: 4, storage: 500k, scenario: bad-day.yaml,"
         " wind: {speed: 8, direction: 270, gusts: 0.2}}}\n",
         "fleet.yaml",
     )
@@ -77,7 +78,15 @@ def test_every_value_survives() -> None:
         endpoints=("udpin://0.0.0.0:14550",),
         allow_kill=True,
         drones=(
-            DroneConfig(name="a.b-c_1", sysid=250, address="anafi.local", discovery_port=44447, allow_kill=False),
+            DroneConfig(
+                name="a.b-c_1",
+                sysid=250,
+                address="anafi.local",
+                discovery_port=44447,
+                allow_kill=False,
+                http_port=81,
+                rtsp_port=555,
+            ),
             DroneConfig(
                 name="b",
                 sysid=2,
@@ -89,6 +98,7 @@ def test_every_value_survives() -> None:
                     seed=7,
                     protocol=1,
                     http_port=8080,
+                    rtsp_port=8555,
                     skycontroller=4,
                     storage="500k",
                     scenario="bad-day.yaml",
@@ -172,6 +182,8 @@ MISTAKES = {
     one("sim: {}"): f"drones[0].sysid: missing; {SYSID}",
     one("sysid: 1"): "drones[0]: expected either address or sim, got neither",
     one("sysid: 1, sim: {}, address: 1.2.3.4"): "drones[0]: expected either address or sim, got both",
+    one("sysid: 1, sim: {}, rtsp_port: 8554"): "drones[0].rtsp_port: expected it in sim, got 8554 here",
+    one("sysid: 1, sim: {}, http_port: 80"): "drones[0].http_port: expected it in sim, got 80 here",
     # Out of range
     "drones: []": "drones: expected a list of 1 to 250 drones, got []",
     "endpoints: []": "endpoints: expected a list of 1 to 32 URLs, got []",
