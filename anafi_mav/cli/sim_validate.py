@@ -1,7 +1,8 @@
 """`anafi-mav sim validate`: fly section IV of the anafi_ros paper with simulated drones and compare.
 
-Everything goes over real sockets: a simulator of its own, and Parrot's controller role at the other end. The paper
-reads 30 Hz frame metadata; here the drone's own events come at a higher rate than an aircraft sends them.
+Everything goes over real sockets: a simulator of its own, and a `Drone` as the gateway has it at the other end. As in
+the paper the numbers are what the drone says with each picture of its video, 30 times a second. All times are those of
+the drone's own clock, from the moment on when a command has reached it, so that a busy machine makes nothing longer.
 """
 
 from __future__ import annotations
@@ -10,18 +11,22 @@ import argparse
 import asyncio
 import importlib
 from collections.abc import Callable, Iterable
+from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from anafi_mav.arsdk.controller import ControllerSession, connect
 from anafi_mav.arsdk.messages import ardrone3, gimbal
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
-from anafi_mav.arsdk.messages.gimbal import ControlMode, FrameOfReference
-from anafi_mav.arsdk.wire import Message, UnknownMessage
+from anafi_mav.arsdk.messages.gimbal import FrameOfReference
 from anafi_mav.cli import options
 from anafi_mav.cli.terminal import complain, say
+from anafi_mav.drone import Drone, PilotingCommand
+from anafi_mav.drone.gimbal import Aim
+from anafi_mav.drone.sticks import HOLD_LIMIT
+from anafi_mav.drone.video import VideoFrame
 from anafi_mav.errors import CommandTimeout, ConfigError
-from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
+from anafi_mav.sim import DroneSpec, LogEntry, SimulatedDrone, Simulator
 from anafi_mav.sim.model import MODELS
 from anafi_mav.sim.validation import (
     AFTER,
@@ -38,12 +43,6 @@ from anafi_mav.sim.validation import (
     yaw_results,
 )
 
-RATE = 100.0
-"""Hz of attitude, speed and height; an aircraft sends 5, its video carries 30."""
-
-PERIOD = 0.05
-"""s of the machine's clock between two PCMD, as Parrot's own controllers send them."""
-
 HEIGHT = 30.0
 """m above take-off that everything is flown at."""
 
@@ -53,8 +52,15 @@ LIMIT = 60.0
 REST = 1.0
 """Simulated s of hover before the first test."""
 
-MAX_LOST = 0.1
-"""Simulated s that may be missing from all flights together: the shortest time that the paper tells."""
+PATIENCE = 10.0
+"""s of the machine's clock for a picture, or for a command to arrive: a video that died has begun anew by then."""
+
+STANDSTILL = HOLD_LIMIT - 0.1
+"""s of the machine's clock between two pictures from which a test is invalid: the sticks have been let go, since
+whoever holds them did not say so any more."""
+
+TRIES = 3
+"""Times that a test is flown until it is valid."""
 
 GIMBAL_SPEED = 180.0
 """deg/s"""
@@ -91,12 +97,10 @@ def run(arguments: argparse.Namespace) -> int:
             arguments.plots.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise ConfigError("--plots", f"expected a folder, got {arguments.plots}: {error.strerror}") from error
-    flights, lost = asyncio.run(_fly_all(models, speed))
-    if lost > MAX_LOST:
-        complain(
-            f"the flights are invalid: this machine was too slow for them and {lost:.1f} simulated s are missing; "
-            f"a lower --speed than {speed:g} may help"
-        )
+    try:
+        flights = asyncio.run(_fly_all(models, speed))
+    except StoodStill as error:
+        complain(f"the flights are invalid: {error}; try again when it is less busy, or one --model at a time")
         return 1
     agreed = True
     for flight in flights:
@@ -107,152 +111,167 @@ def run(arguments: argparse.Namespace) -> int:
             number = f"{result.measured:>9.2f} {result.unit:<6}"
             line = f"  {result.what:<34}{number} published {result.published:<24} {verdict}"
             say(line, "" if result.agrees else "red")
-    say(
-        f"from the drone's own events at {RATE:g} Hz over the wire, speed {speed:g}; "
-        "the paper used 30 Hz frame metadata"
-    )
+    rate = sum(flight.rate for flight in flights) / len(flights)
+    say(f"from the frame metadata of the video, {rate:.0f} times a simulated second, speed {speed:g}")
     if arguments.plots is not None:
         for path in _plot(flights, arguments.plots):
             say(f"drawn {path}")
     return 0 if agreed else 1
 
 
-class Flight:
-    """One model in the air, its controller, and what was measured; all times are simulated seconds."""
+class StoodStill(Exception):
+    """The machine was too slow for a test, as often as it was flown."""
 
-    def __init__(self, drone: SimulatedDrone, speed: float) -> None:
-        self.drone = drone
-        self._speed = speed
-        self.model = drone.spec.model
+
+class Flight:
+    """One model in the air, its controller, and what was measured; all times are seconds of the drone's own clock."""
+
+    def __init__(self, real: SimulatedDrone, speed: float) -> None:
+        self.real = real
+        self.model = real.spec.model
         self.results: list[Result] = []
         self.series: dict[str, tuple[Series, Series]] = {}
         """By figure: what was commanded, what was measured."""
-        self._session: ControllerSession | None = None
-        self._track = Track()
-        self._zero = 0.0
-        self._waiting: list[tuple[Callable[[Message], bool], asyncio.Future[None]]] = []
+        self._speed = speed
+        self._frames: list[VideoFrame] = []
+        """Since the test began."""
+        self._came = asyncio.Event()
+        self._drone = Drone(
+            ADDRESS, discovery_port=real.discovery_port, rtsp_port=real.rtsp_port or 0, name=f"simulated {self.model}"
+        )
 
     async def fly(self) -> None:
-        """All tests, one after the other. Raises `LinkLost`, `CommandTimeout`."""
-        self._session = await connect(
-            ADDRESS, discovery_port=self.drone.discovery_port, on_message=self._hear, silence_limit=None
-        )
+        """All tests, one after the other. Raises `LinkLost`, `CommandTimeout`, `CommandRejected`, `StoodStill`."""
+        await self._drone.connect()
         try:
-            await self._take_off()
-            await self._pitch_and_roll()
-            await self._climb()
-            await self._yaw()
-            await self._gimbal()
+            self._drone.video.subscribe(self._see)
+            async with self._drone.video.watching():
+                await self._take_off()
+                await self._pitch_and_roll()
+                await self._climb()
+                await self._yaw()
+                await self._gimbal()
         finally:
-            await self._session.close()
-
-    def _send(self, message: Message) -> None:
-        assert self._session is not None
-        self._session.send(message)
-
-    def _hear(self, message: Message | UnknownMessage, now: float) -> None:
-        t, track = (now - self._zero) * self._speed, self._track
-        match message:
-            case ardrone3.AttitudeChanged(roll, pitch, yaw):
-                track.attitude.append((t, roll, pitch, yaw))
-            case ardrone3.SpeedChanged(north, east, down):
-                track.speed.append((t, north, east, down))
-            case ardrone3.AltitudeChanged(height):
-                track.height.append((t, height))
-            case gimbal.Attitude() if message.gimbal_id == 0:
-                track.gimbal.append((t, message.pitch_absolute, message.roll_absolute))
-        if isinstance(message, Message):
-            for met, future in self._waiting:
-                if not future.done() and met(message):
-                    future.set_result(None)
-
-    def _begin(self) -> None:
-        """Forget what was heard; time counts from now on."""
-        self._track, self._zero = Track(), asyncio.get_running_loop().time()
-
-    async def _pass(self, seconds: float) -> None:
-        await asyncio.sleep(seconds / self._speed)
-
-    async def _until(self, what: str, met: Callable[[Message], bool]) -> None:
-        future: asyncio.Future[None] = asyncio.get_running_loop().create_future()
-        self._waiting.append((met, future))
-        try:
-            await asyncio.wait_for(future, LIMIT / self._speed)
-        except asyncio.TimeoutError:
-            raise CommandTimeout(what, LIMIT) from None
-        finally:
-            self._waiting.remove((met, future))
+            await self._drone.close()
 
     async def _take_off(self) -> None:
-        for setting in (
-            ardrone3.MaxTilt(TILT),
-            ardrone3.MaxVerticalSpeed(CLIMB),
-            ardrone3.MaxRotationSpeed(SPIN),
-            ardrone3.MaxPitchRollRotationSpeed(300.0),
-            gimbal.SetMaxSpeed(0, GIMBAL_SPEED, GIMBAL_SPEED, GIMBAL_SPEED),
-            ardrone3.TakeOff(),
-        ):
-            self._send(setting)
-        await self._until("a take-off", _hovers)
-        self._send(ardrone3.MoveBy(0.0, 0.0, -HEIGHT, 0.0))
-        await self._until("a climb", lambda message: isinstance(message, ardrone3.MoveByEnd))
-        await self._pass(REST)
+        piloting, patience = self._drone.piloting, LIMIT / self._speed
+        await piloting.set_max_tilt(TILT)
+        await piloting.set_max_vertical_speed(CLIMB)
+        await piloting.set_max_rotation_speed(SPIN)
+        await piloting.set_max_tilt_speed(300.0)
+        await self._drone.gimbal.set_max_speed(GIMBAL_SPEED)
+        await piloting.take_off()
+        if piloting.state.flying is not FlyingState.HOVERING:
+            await self._drone.expect(
+                ardrone3.FlyingStateChanged, lambda message: message.state is FlyingState.HOVERING, patience
+            )
+        await piloting.move_by(0.0, 0.0, -HEIGHT, 0.0, timeout=patience)
+        await self._watch(self.real.time, REST)
 
-    async def _test(self, *, roll: int = 0, pitch: int = 0, yaw: int = 0, gaz: int = 0) -> Track:
-        """Full stick one way, the other way, nothing; what was heard meanwhile, time counted from the first PCMD."""
-        loop = asyncio.get_running_loop()
-        self._begin()
-        end = 2 * HOLD + AFTER
-        while (t := (loop.time() - self._zero) * self._speed) < end:
-            sign = 1 if t < HOLD else -1 if t < 2 * HOLD else 0
-            self._send(ardrone3.PCMD(1, sign * roll, sign * pitch, sign * yaw, sign * gaz, 0))
-            changes = [moment for moment in (HOLD, 2 * HOLD, end) if moment > t]
-            await self._pass(max(0.0, min(PERIOD * self._speed, changes[0] - t)))
-        return self._track
+    def _see(self, frame: VideoFrame) -> None:
+        self._frames.append(frame)
+        self._came.set()
+
+    @property
+    def rate(self) -> float:
+        """Pictures a simulated second, in the last test."""
+        span = self._frames[-1].taken - self._frames[0].taken
+        return (len(self._frames) - 1) / span
+
+    async def _watch(self, zero: float, until: float, each: Callable[[float], None] = lambda t: None) -> Track:
+        """What the pictures say until so long after `zero`; `each` is told the time of every one.
+
+        Raises `CommandTimeout` when they do not come any more.
+        """
+        t = 0.0
+        while t < until:
+            each(t)
+            self._came.clear()
+            try:
+                await asyncio.wait_for(self._came.wait(), PATIENCE)
+            except asyncio.TimeoutError:
+                raise CommandTimeout("a picture", PATIENCE) from None
+            t = self._frames[-1].taken - zero
+        track = Track()
+        for frame in self._frames:
+            track.add(frame.taken - zero, frame.metadata)
+        return track
+
+    async def _order(self, means: Callable[[LogEntry], bool], send: Callable[[], None]) -> float:
+        """Send a command; when the drone received it, by its own clock."""
+        moments: list[float] = []
+
+        def comes(entry: LogEntry) -> bool:
+            if entry.kind != "command" or not means(entry):
+                return False
+            moments.append(self.real.time)
+            return True
+
+        self._frames.clear()
+        coming = asyncio.ensure_future(self.real.wait_log(comes, PATIENCE))
+        await asyncio.sleep(0)  # it listens from now on
+        send()
+        await coming
+        return moments[0]
+
+    async def _test(self, stick: PilotingCommand) -> Track:
+        """Full stick one way, the other way, nothing; what the pictures said meanwhile."""
+        piloting = self._drone.piloting
+        back = PilotingCommand(-stick.roll_deg, -stick.pitch_deg, -stick.yaw_rate_dps, -stick.climb_mps)
+
+        def hold(t: float) -> None:
+            piloting.pilot(stick if t < HOLD else back if t < 2 * HOLD else PilotingCommand())
+
+        for _ in range(TRIES):
+            zero = await self._order(_is_deflected, partial(hold, 0.0))
+            track = await self._watch(zero, 2 * HOLD + AFTER, hold)
+            held = [frame.arrived for frame in self._frames if frame.taken - zero < 2 * HOLD]
+            wait = max((after - before for before, after in pairwise(held)), default=PATIENCE)
+            if wait < STANDSTILL:
+                return track
+        raise StoodStill(f"this machine was too slow for them and stood still for {wait:.1f} s")
 
     async def _pitch_and_roll(self) -> None:
-        track = await self._test(pitch=100)
+        track = await self._test(PilotingCommand(pitch_deg=-TILT))
         self.results += tilt_results("pitch", track.pitch(), track, 8.0)
         self.series["pitch, deg"] = (_steps(TILT), track.pitch())
-        track = await self._test(roll=100)
+        track = await self._test(PilotingCommand(roll_deg=TILT))
         self.results += tilt_results("roll", track.roll(), track, 10.0)
         self.series["roll, deg"] = (_steps(TILT), track.roll())
 
     async def _climb(self) -> None:
-        track = await self._test(gaz=100)
+        track = await self._test(PilotingCommand(climb_mps=CLIMB))
         self.results += climb_results(track)
         self.series["vertical speed, m per s"] = (_steps(CLIMB), track.climb())
 
     async def _yaw(self) -> None:
-        track = await self._test(yaw=100)
+        track = await self._test(PilotingCommand(yaw_rate_dps=SPIN))
         self.results += yaw_results(track, self.model)
         self.series["yaw rate, deg per s"] = (_steps(SPIN), track.yaw_rate())
 
     async def _gimbal(self) -> None:
-        model = MODELS[self.model].gimbals[0]
+        model, mount = MODELS[self.model].gimbals[0], self._drone.gimbal
         for name, limits, column in (("roll", model.roll, 2), ("pitch", model.pitch, 1)):
             if limits == (0.0, 0.0):
                 continue
-            await self._aim(name, ControlMode.POSITION, limits[0])
-            position = _column(await self._aim(name, ControlMode.POSITION, limits[1]), column)
-            await self._aim(name, ControlMode.POSITION, limits[0])
-            velocity = _column(await self._aim(name, ControlMode.VELOCITY, 1.0), column)
+            low, high, fast = (Aim(value, FrameOfReference.ABSOLUTE) for value in (*limits, GIMBAL_SPEED))
+            await self._turn(mount.aim, name, low)
+            position = _column(await self._turn(mount.aim, name, high), column)
+            await self._turn(mount.aim, name, low)
+            velocity = _column(await self._turn(mount.turn, name, fast), column)
             self.results += gimbal_results(name, position, velocity, limits, GIMBAL_SPEED)
             wanted = [(0.0, limits[1]), (GIMBAL_TIME, limits[1])]
             self.series[f"gimbal {name} by orientation, deg"] = (wanted, position)
             self.series[f"gimbal {name} by velocity, deg"] = (wanted, velocity)
 
-    async def _aim(self, axis: str, mode: ControlMode, value: float) -> Track:
-        none, absolute = FrameOfReference.NONE, FrameOfReference.ABSOLUTE
-        pitch, roll = (absolute, none) if axis == "pitch" else (none, absolute)
-        self._begin()
-        self._send(gimbal.SetTarget(0, mode, none, 0.0, pitch, value, roll, value))
-        await self._pass(GIMBAL_TIME)
-        return self._track
+    async def _turn(self, send: Callable[..., None], axis: str, aim: Aim) -> Track:
+        zero = await self._order(lambda entry: entry.name == gimbal.SetTarget.NAME, partial(send, **{axis: aim}))
+        return await self._watch(zero, GIMBAL_TIME)
 
 
-async def _fly_all(models: list[str], speed: float) -> tuple[list[Flight], float]:
-    """Each model in the air at the same time; and how much simulated time the machine was too slow for."""
+async def _fly_all(models: list[str], speed: float) -> list[Flight]:
+    """Each model in the air at the same time."""
     specs = [
         DroneSpec(
             model=model,
@@ -261,7 +280,7 @@ async def _fly_all(models: list[str], speed: float) -> tuple[list[Flight], float
             handshake_port=0,
             c2d_port=0,
             http_port=None,
-            telemetry_rate=RATE,
+            rtsp_port=0,
         )
         for model in models
     ]
@@ -274,11 +293,12 @@ async def _fly_all(models: list[str], speed: float) -> tuple[list[Flight], float
             for task in tasks:
                 task.cancel()
             await asyncio.wait(tasks)
-    return flights, simulator.lost_time
+    return flights
 
 
-def _hovers(message: Message) -> bool:
-    return isinstance(message, ardrone3.FlyingStateChanged) and message.state is FlyingState.HOVERING
+def _is_deflected(entry: LogEntry) -> bool:
+    sticks = ("roll", "pitch", "yaw", "gaz")
+    return entry.name == ardrone3.PCMD.NAME and any(entry.args[stick] for stick in sticks)
 
 
 def _column(track: Track, column: int) -> Series:

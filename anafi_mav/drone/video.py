@@ -119,8 +119,8 @@ class Video(Element[VideoState]):
         self._picture_callbacks: tuple[PictureCallback, ...] = ()
         self._stale: asyncio.TimerHandle | None = None
         self._arrivals: deque[float] = deque(maxlen=MAX_RATE)
-        self._clock: tuple[int, int] | None = None
-        """The last timestamp of RTP, and how many of its units passed since the stream began."""
+        self._clock: tuple[int, float] | None = None
+        """The timestamp of RTP of the last picture, and when that was taken."""
 
     # -- the connection
 
@@ -306,8 +306,6 @@ class Video(Element[VideoState]):
                     first.set_result(None)
         metadata = picture.metadata
         if metadata is not None:
-            if metadata.timestamp is not None:
-                taken = metadata.timestamp / 1e6
             self._arrivals.append(now)
             while now - self._arrivals[0] > RATE_WINDOW:
                 self._arrivals.popleft()
@@ -319,11 +317,14 @@ class Video(Element[VideoState]):
         self._tell(self._picture_callbacks, picture)
 
     def _taken(self, picture: Picture) -> float:
-        """s since the stream began, by the timestamps of RTP, which wrap."""
-        last, passed = self._clock or (picture.timestamp, 0)
-        passed += (picture.timestamp - last + _CLOCK_WRAP // 2) % _CLOCK_WRAP - _CLOCK_WRAP // 2
-        self._clock = picture.timestamp, passed
-        return passed / CLOCK_RATE
+        """s on the camera's clock where it tells it; else since the stream began, by the timestamps of RTP, which
+        wrap."""
+        before, taken = self._clock or (picture.timestamp, 0.0)
+        taken += ((picture.timestamp - before + _CLOCK_WRAP // 2) % _CLOCK_WRAP - _CLOCK_WRAP // 2) / CLOCK_RATE
+        if picture.metadata is not None and picture.metadata.timestamp is not None:
+            taken = picture.metadata.timestamp / 1e6
+        self._clock = picture.timestamp, taken
+        return taken
 
     @staticmethod
     def _tell(callbacks: tuple[Callable[[Any], None], ...], value: object) -> None:

@@ -197,6 +197,8 @@ class Stream:
         if deadline is not None and self._timer is None:
             self._timer = self._loop.call_at(deadline, self._expire)
         for picture in pictures:
+            if not self._wanted():
+                return  # the sockets close only when the task that owns them gets to run
             self._last_picture = now
             self._on_picture(picture, now)
 

@@ -343,6 +343,7 @@ class SimulatedDrone:
     def _log_pose(self, now: float, pose: Pose) -> None:
         latitude, longitude = self.firmware.place()
         args = {
+            "time": self.firmware.time,
             "north": pose.north,
             "east": pose.east,
             "up": pose.up,

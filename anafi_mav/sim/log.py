@@ -4,7 +4,7 @@ An entry is one line of JSON in the file: ``{"t": 12.345, "drone": "127.0.42.1",
 "name": "ardrone3.Piloting.PCMD", "args": {"flag": 1, ...}}``. `t` is the monotonic clock of the machine in seconds,
 which all its processes share. Kinds: command (received), event (sent or meant to be sent, telemetry left out),
 state (flying state), plan (what a flight plan does), session (up, lost), scenario (a step begins or
-ends), pose (the true pose, 10 Hz).
+ends), pose (the true pose, 10 Hz, and the simulated time in s).
 """
 
 from __future__ import annotations

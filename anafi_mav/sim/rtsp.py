@@ -361,7 +361,7 @@ class VideoServer:
                 stream = track.stream
                 # Of what a recording shows nothing but the place is kept: its pictures say nothing.
                 if session.resource.seconds is None and stream.title not in said:
-                    said[stream.title] = video.metadata(self._firmware, stream, now)
+                    said[stream.title] = video.metadata(self._firmware, stream)
                 track.send(now, said.get(stream.title) if session.resource.seconds is None else None)
             if session.resource.seconds is not None:
                 session.position += 1.0 / FRAME_RATE

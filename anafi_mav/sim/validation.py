@@ -1,8 +1,8 @@
 """What section IV of the anafi_ros paper measured on the aircraft, and the same read off a simulated flight.
 
-A series is a list of (seconds since the first command, value). The paper gives its results in words and figures; the
-bounds here are those words. "Approximately 100 ms" is taken as within 50 ms, "almost 7 m" as within half a metre,
-"around 0" as within 1 deg, 0.1 m/s or 2 deg/s.
+A series is a list of (seconds since the drone received the first command, value). The paper gives its results in words
+and figures; the bounds here are those words. "Approximately 100 ms" is taken as within 50 ms, "almost 7 m" as within
+half a metre, "around 0" as within 1 deg, 0.1 m/s or 2 deg/s.
 """
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
-from anafi_mav.units import DEG_PER_RAD, wrap_pi
+from anafi_mav.arsdk.video_metadata import FrameMetadata, Quaternion
+from anafi_mav.units import DEG_PER_RAD, euler_from_quaternion, wrap_pi
 
 Series: TypeAlias = Sequence[tuple[float, float]]
 
@@ -31,7 +32,7 @@ _REST = (2 * HOLD + AFTER - 1.0, 2 * HOLD + AFTER)
 
 @dataclass
 class Track:
-    """What a controller heard during one test."""
+    """What the pictures of a video said during one test, against seconds since its first command."""
 
     attitude: list[tuple[float, float, float, float]] = field(default_factory=list)
     """t, roll, pitch, yaw in rad"""
@@ -40,6 +41,19 @@ class Track:
     height: list[tuple[float, float]] = field(default_factory=list)
     gimbal: list[tuple[float, float, float]] = field(default_factory=list)
     """t, pitch, roll in deg, to the horizon"""
+
+    def add(self, t: float, said: FrameMetadata) -> None:
+        """What was said of the picture taken at `t`; what was not said is left out."""
+        if said.drone_quat is not None:
+            roll, pitch, yaw = euler_from_quaternion(*said.drone_quat)
+            self.attitude.append((t, roll, pitch, yaw))
+            if said.quat is not None:
+                pitch, roll = _looks(said.quat, yaw)
+                self.gimbal.append((t, pitch * DEG_PER_RAD, roll * DEG_PER_RAD))
+        if said.speed is not None:
+            self.speed.append((t, *said.speed))
+        if said.ground_distance is not None:
+            self.height.append((t, said.ground_distance))
 
     def roll(self) -> Series:
         return [(t, roll * DEG_PER_RAD) for t, roll, _, _ in self.attitude]
@@ -66,6 +80,14 @@ class Track:
 
     def climb(self) -> Series:
         return [(t, -down) for t, _, _, down in self.speed]
+
+
+def _looks(quat: Quaternion, heading: float) -> tuple[float, float]:
+    """Pitch and roll (rad) of a camera that looks along the drone's heading (rad), up to where it looks backwards."""
+    w, x, y, z = quat
+    north, east, down = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)
+    ahead = north * math.cos(heading) + east * math.sin(heading)
+    return math.atan2(-down, ahead), math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
 
 
 RATE_WINDOW = 0.1

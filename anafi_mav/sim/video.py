@@ -111,8 +111,13 @@ def optics(firmware: Firmware, stream: Stream) -> Optics:
     return firmware.payload.cameras.optics(stream.lens)
 
 
-def metadata(firmware: Firmware, stream: Stream, now: float) -> FrameMetadata:
-    """What is said of a picture taken `now` (s of the machine's clock, which the log has too)."""
+def metadata(firmware: Firmware, stream: Stream) -> FrameMetadata:
+    """What is said of a picture taken now.
+
+    Its timestamp is of the simulated clock, which `SimulatedDrone.time` tells and on which everything that it says
+    happened: what is measured between two pictures does not depend on how busy the machine is. It is never zero, which
+    the protocol buffer cannot say.
+    """
     pose, model, seen = firmware.pose, firmware.model, optics(firmware, stream)
     firmware.gimbal.advance(firmware.time)
     looks = firmware.gimbal.attitude(pose, stream.gimbal)
@@ -141,7 +146,7 @@ def metadata(firmware: Firmware, stream: Stream, now: float) -> FrameMetadata:
         animation_in_progress=firmware.animations.running,
         position=Ned(pose.north, pose.east, 0.0 - pose.up) if model.modern else None,
         local_position=Vector3(pose.north, pose.east, 0.0 - pose.up) if model.modern else None,
-        timestamp=round(now * 1e6),
+        timestamp=max(1, round(firmware.time * 1e6)),
         # What the user turns is pitch, and yaw where the gimbal has it.
         base_quat=Quaternion(*quaternion_from_euler(roll, 0.0, pose.yaw)),
         quat=Quaternion(*quaternion_from_euler(roll, pitch, yaw)),

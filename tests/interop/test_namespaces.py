@@ -196,6 +196,37 @@ async def fly(client: Client, system: int) -> None:
     await asyncio.sleep(0.5)
 
 
+async def test_media_and_video_of_two_aircraft_with_one_address(spaces: tuple[str, str, str], tmp_path: Path) -> None:
+    """Both videos run at the same time, and both web servers are asked, over sockets that one interface each has."""
+    left, right, home = spaces
+    logs = [tmp_path / "left.jsonl", tmp_path / "right.jsonl"]
+    script = Path(__file__).with_name("two_of_one_address.py")
+    async with (
+        inside(left, "sim", "--address", AIRCRAFT, "--model", "4k", "--log", str(logs[0])),
+        inside(right, "sim", "--address", AIRCRAFT, "--model", "thermal", "--log", str(logs[1])),
+    ):
+        words = ("ip", "netns", "exec", home, sys.executable, str(script), AIRCRAFT, "wlan1", "wlan2", str(tmp_path))
+        visit = await Process.start(*words)
+        try:
+            assert await visit.end(60.0) == 0, str(visit)
+        finally:
+            await visit.put_away()
+    told = json.loads(visit.lines[-1])
+    assert told["wlan1"]["streams"] == ["DefaultVideo"]
+    assert told["wlan2"]["streams"] == ["DefaultVideo", "ParrotThermalVideo", "ParrotThermalBlendedVideo"]
+    assert told["wlan1"]["serial"] != told["wlan2"]["serial"]
+    for log, one in zip(logs, told.values(), strict=True):
+        assert one["frames"] == 30
+        assert one["foreign"] == 0
+        assert one["files"]
+        assert one["bytes"] > 0
+        # Each aircraft has shown its video to the one who asked there, and nobody else has asked.
+        videos = entries(log, "video")
+        assert [entry["name"] for entry in videos] == ["setup", "play", "end"]
+        assert videos[0]["args"]["client"][0] == OURS
+        assert len([entry for entry in entries(log, "command") if "take_photo" in entry["name"]]) == 1
+
+
 async def test_an_interface_that_is_not_there_is_told_and_retried(tmp_path: Path) -> None:
     path = tmp_path / "fleet.yaml"
     path.write_text(

@@ -105,7 +105,7 @@ class Truth:
 
     def __init__(self, log: list[dict[str, Any]]) -> None:
         self._poses: list[tuple[float, Pose]] = [
-            (entry["t"], entry["args"]) for entry in log if entry["kind"] == "pose"
+            (entry["args"]["time"], entry["args"]) for entry in log if entry["kind"] == "pose"
         ]
         self._times = [t for t, _ in self._poses]
 
@@ -115,7 +115,7 @@ class Truth:
         if not 0 < index < len(self._poses):
             return None
         (before, one), (after, two) = self._poses[index - 1 : index + 1]
-        return (one, two) if after - before < 0.15 else None
+        return (one, two) if after - before < 0.15 * float(SPEED) else None
 
 
 def check_flight(said: list[dict[str, Any]], log: list[dict[str, Any]], *, modern: bool) -> None:

@@ -20,17 +20,17 @@ from anafi_mav.arsdk.messages.piloting_style import PilotingStyleStyle
 from anafi_mav.arsdk.messages.rth import RthEndingBehavior, RthHomeType
 from anafi_mav.arsdk.messages.thermal import RenderingMode
 from anafi_mav.arsdk.messages.user_storage import FormattingType
+from anafi_mav.arsdk.rtp_h264 import Picture
 from anafi_mav.drone import Drone, PilotingCommand
 from anafi_mav.drone.camera_state import PhotoSettings
 from anafi_mav.drone.camera_words import CameraMode, PhotoMode, Streaming, Style
 from anafi_mav.drone.gimbal import Aim
+from anafi_mav.drone.video import VideoFrame
 
 MODELS = ("4k", "thermal", "usa", "ai")
 OLDER = ("4k", "thermal", "usa")
 THERMAL = ("thermal", "usa")
 
-METADATA = "told only in the video's frame metadata, which `drone` does not read yet"
-VIDEO = "part of the video stream, which `drone` does not read yet"
 CONTROLLER = "through a Skycontroller only: tests/unit/test_drone_controller.py"
 LOCAL = "a setting of the computer, not of the drone: the directory is an argument of `media.download`"
 
@@ -261,6 +261,44 @@ async def _emergency(pair: Pair) -> object:
     return pair.drone.piloting.state.flying in (FlyingState.EMERGENCY, FlyingState.LANDED)
 
 
+async def _picture(pair: Pair) -> object:
+    pictures: list[Picture] = []
+    undo = pair.drone.video.subscribe_pictures(pictures.append)
+    async with pair.drone.video.watching():
+        undo()
+    return any(picture.is_key for picture in pictures)
+
+
+async def _camera_info(pair: Pair) -> object:
+    async with pair.drone.video.watching():
+        shown = pair.drone.video.state.shown
+        return shown is not None and None not in (shown.fov_deg, shown.principal_point, shown.distortion)
+
+
+async def _frame(pair: Pair) -> VideoFrame:
+    async with pair.drone.video.watching():
+        return await pair.drone.video.next_frame()
+
+
+def _said(name: str, field: str, note: str = "") -> Row:
+    """What is told with the pictures only."""
+
+    async def drive(pair: Pair) -> object:
+        return getattr((await _frame(pair)).metadata, field)
+
+    return Row("published topic", name, f"`video.state.frame.metadata.{field}`{note}", drive)
+
+
+def _both(name: str, path: str, read: Callable[[VideoFrame], object], where: str) -> Row:
+    """What comes as an event, and with every picture while the video runs."""
+
+    async def drive(pair: Pair) -> object:
+        assert read(await _frame(pair)) is not None
+        return await _reads(path)(pair)
+
+    return Row("published topic", name, f"`{path}`; with the video `{where}`", drive)
+
+
 def _reading(name: str, path: str, first: Callable[[Pair], Awaitable[object]] | None = None) -> Row:
     return Row("published topic", name, f"`{path}`", _reads(path, first))
 
@@ -281,23 +319,27 @@ ROWS: tuple[Row, ...] = (
     _reading("battery/health", "battery.state.health_percent"),
     _reading("battery/percentage", "battery.state.percent"),
     _reading("battery/voltage", "battery.state.voltage_mv"),
-    Row("published topic", "camera/awb_b_gain", METADATA),
-    Row("published topic", "camera/awb_r_gain", METADATA),
-    Row("published topic", "camera/camera_info", VIDEO),
-    Row("published topic", "camera/exposure_time", METADATA + "; `camera[0].shutter_s` has the nearest step"),
-    Row("published topic", "camera/image", VIDEO),
-    Row("published topic", "camera/hfov", METADATA + "; the Ai's is `camera[0].hfov_deg`"),
-    Row("published topic", "camera/iso_gain", METADATA + "; `camera[0].iso` has the nearest step"),
-    Row("published topic", "camera/vfov", METADATA),
+    _said("camera/awb_b_gain", "awb_b_gain"),
+    _said("camera/awb_r_gain", "awb_r_gain"),
+    Row("published topic", "camera/camera_info", "`video.state.shown`", _camera_info),
+    _said(
+        "camera/exposure_time", "exposure_time", ", ms; without the video `camera[0].shutter_s` has the nearest step"
+    ),
+    Row("published topic", "camera/image", "`video.subscribe_pictures`, not decoded", _picture),
+    _said("camera/hfov", "hfov", ", rad"),
+    _said("camera/iso_gain", "iso_gain", "; without the video `camera[0].iso` has the nearest step"),
+    _said("camera/vfov", "vfov", ", rad"),
     _reading("camera/zoom", "camera.state.cameras[0].zoom"),
     _reading("drone/altitude", "piloting.state.height"),
     _reading("drone/altitude_above_to", "piloting.state.altitude"),
-    _reading("drone/attitude", "piloting.state.attitude"),
+    _both("drone/attitude", "piloting.state.attitude", lambda frame: frame.attitude, "video.state.frame.attitude"),
     _reading("drone/gps/fix", "gps.state.fixed"),
     _reading("drone/gps/location", "gps.state.location"),
     _reading("drone/gps/satellites", "gps.state.satellites"),
-    _reading("drone/rpy", "piloting.state.attitude"),
-    _reading("drone/speed", "piloting.state.velocity"),
+    _both("drone/rpy", "piloting.state.attitude", lambda frame: frame.attitude, "video.state.frame.attitude"),
+    _both(
+        "drone/speed", "piloting.state.velocity", lambda frame: frame.metadata.speed, "video.state.frame.metadata.speed"
+    ),
     _reading("drone/state", "piloting.state.flying"),
     _reading("gimbal/attitude/absolute", "gimbal.state[0].attitude"),
     _reading("home/location", "home.state.location", _up),

@@ -32,6 +32,7 @@ async def connected(model: str, speed: float = SPEED, skycontroller: int | None 
         c2d_port=0,
         http_port=0,
         skycontroller=skycontroller,
+        rtsp_port=0,
     )
     async with Simulator([spec], speed=speed, seed=1) as simulator:
         real = simulator.drones[0]
@@ -40,6 +41,7 @@ async def connected(model: str, speed: float = SPEED, skycontroller: int | None 
             "127.0.0.1",
             discovery_port=real.discovery_port,
             http_port=(real.http_port or 80) - shift,
+            rtsp_port=real.rtsp_port or 554,
             name=f"simulated {model}",
         )
         await drone.connect()

@@ -17,7 +17,7 @@ from support.world import loopback
 from video_server import KEY, METADATA, PPS, SDP, SPS, Asked, VideoServer, ok, refused
 
 from anafi_mav.arsdk.rtcp import ReceiverReport
-from anafi_mav.arsdk.rtp_h264 import Picture
+from anafi_mav.arsdk.rtp_h264 import Picture, PictureSender
 from anafi_mav.arsdk.video_metadata import PROTO_PROFILE, V3_PROFILE, Quaternion
 from anafi_mav.drone import Drone
 from anafi_mav.drone import video as video_module
@@ -333,6 +333,22 @@ async def test_nothing_of_it_survives_the_link() -> None:
         await drone.connect()
         await drone.video.next_frame(10.0)
     assert server.methods().count("PLAY") == 2
+
+
+async def test_a_picture_that_comes_behind_the_end_says_nothing() -> None:
+    """The sockets are open until the task that owns them gets to run."""
+    server = VideoServer()
+    async with watched(server) as (drone, _), drone.video.watching():
+        await drone.video.next_frame(5.0)
+        stream = drone.video._stream
+        assert stream is not None
+        drone.video.link_lost()
+        for datagram in PictureSender(1).send([KEY], 0, METADATA, V3_PROFILE) * 2:
+            stream._receive(datagram)
+        for datagram in PictureSender(1, 10).send([KEY], 0, METADATA, V3_PROFILE):
+            stream._receive(datagram)
+        assert stream.receiver.window.ssrc == 1
+        assert drone.video.state == VideoState()
 
 
 async def test_closing_says_goodbye() -> None:

@@ -32,7 +32,7 @@ from anafi_mav.sim.video import STREAMS
 
 
 def say(bench: Bench, stream: int = 0) -> FrameMetadata:
-    return video.metadata(bench.firmware, STREAMS[bench.firmware.model.name][stream], bench.now)
+    return video.metadata(bench.firmware, STREAMS[bench.firmware.model.name][stream])
 
 
 # -- the picture
@@ -91,7 +91,7 @@ def test_a_drone_on_the_ground() -> None:
     assert (said.battery_percentage, said.flying_state, said.piloting_mode) == (
         100, FlyingState.LANDED, PilotingMode.MANUAL,
     )  # fmt: skip
-    assert said.timestamp == round(bench.now * 1e6)
+    assert said.timestamp == round(bench.firmware.time * 1e6)
     assert (said.exposure_time, said.iso_gain) == (pytest.approx(16.667, abs=1e-3), 100)
     assert (said.awb_r_gain, said.awb_b_gain) == (1.60, 2.05)
     # 69 degrees across 16:9: 2 atan(tan 34.5 * 9/16) = 42.27 degrees.
