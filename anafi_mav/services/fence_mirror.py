@@ -16,7 +16,7 @@ from anafi_mav import geo
 from anafi_mav.drone import Range
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.services.fence import Circle, Point
-from anafi_mav.services.fence_watch import Action
+from anafi_mav.services.fence_watch import Reaction
 from anafi_mav.services.service import Host
 from anafi_mav.services.statustext import Severity
 
@@ -65,7 +65,7 @@ class FenceMirror:
         watch, state = vehicle.fence, self._host.drone.piloting.state
         zones = [zone for zone in watch.zones.zones if zone.inclusion]
         circle = zones[0] if len(zones) == 1 else None
-        if not isinstance(circle, Circle) or watch.action is Action.NONE:
+        if not isinstance(circle, Circle) or watch.action is Reaction.NONE:
             return True, None
         setting = state.max_distance
         if setting is None or state.geofence is None or not setting.min <= circle.radius <= setting.max:

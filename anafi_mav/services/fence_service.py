@@ -15,12 +15,11 @@ from anafi_mav.drone import events
 from anafi_mav.drone.events import Message, PlayingState
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
-from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import Command
 from anafi_mav.services.fence_mirror import FenceMirror
-from anafi_mav.services.fence_watch import CEILING, EVERYTHING, FLOOR, Action, FenceWatch, Sight, State
+from anafi_mav.services.fence_watch import CEILING, EVERYTHING, FLOOR, FenceWatch, Reaction, Sight, State
 from anafi_mav.services.modes import FlightMode
-from anafi_mav.services.service import Host, Query, Service
+from anafi_mav.services.service import Action, Host, Service
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.stream import Stream, Times
 from anafi_mav.services.vehicle import Refused, Vehicle
@@ -41,9 +40,9 @@ DISABLE, ENABLE, DISABLE_FLOOR = 0.0, 1.0, 2.0
 """param1 of MAV_CMD_DO_FENCE_ENABLE."""
 
 
-async def set_action(host: Host, action: Action) -> None:
+async def set_action(host: Host, action: Reaction) -> None:
     """What happens at the boundary. Raises `Refused` for a motor cut that the configuration does not allow."""
-    if action is Action.TERMINATE and not host.vehicle.allow_kill:
+    if action is Reaction.TERMINATE and not host.vehicle.allow_kill:
         raise Refused("Refused: a fence that cuts the motors needs allow_kill: true", lasting=True)
     host.vehicle.fence.action = action
 
@@ -72,7 +71,8 @@ class FenceService(Service):
     def _watch(self) -> FenceWatch:
         return self.host.vehicle.fence
 
-    def queries(self) -> Mapping[int, Query]:
+    def actions(self) -> Mapping[int, Action]:
+        # Not a query: who was refused a place before may ask for it again at once.
         return {dialect.MAV_CMD_DO_FENCE_ENABLE: self._enable}
 
     def streams(self) -> Mapping[int, Stream]:
@@ -138,11 +138,11 @@ class FenceService(Service):
             self.host.text(Severity.NOTICE, "Inside the fence again")
         self._tell()
 
-    def _begin(self, action: Action) -> None:
+    def _begin(self, action: Reaction) -> None:
         verdict = self._watch.verdict
         assert verdict is not None
         head = "Fence breach" if self._watch.state is State.OUTSIDE else "Fence ahead"
-        if action is Action.WARN:
+        if action is Reaction.WARN:
             self.host.text(Severity.WARNING, f"{head}: {verdict.text}")
         elif self.host.drone.controller.pilot_flies:
             # He has the drone, and no order of ours would reach it.
@@ -152,15 +152,15 @@ class FenceService(Service):
             self.host.text(Severity.CRITICAL, f"{head}: {verdict.text}: {action.value}")
             self.host.spawn(self._carry_out(action))
 
-    async def _carry_out(self, action: Action) -> None:
+    async def _carry_out(self, action: Reaction) -> None:
         vehicle = self.host.vehicle
         try:
             match action:
-                case Action.RETURN:
+                case Reaction.RETURN:
                     await self._return_or_hold()
-                case Action.LAND:
+                case Reaction.LAND:
                     await vehicle.land()
-                case Action.TERMINATE:
+                case Reaction.TERMINATE:
                     await vehicle.terminate()
                 case _:
                     await vehicle.hold()
@@ -207,7 +207,7 @@ class FenceService(Service):
 
     # Settings.
 
-    def _enable(self, inbound: Inbound, command: Command) -> int:
+    async def _enable(self, command: Command) -> None:
         """MAV_CMD_DO_FENCE_ENABLE: param1 0 disable, 1 enable, 2 disable the floor; param2 FENCE_TYPE bits, 0 all."""
         what, types = command.params[:2]
         watch = self._watch
@@ -215,17 +215,14 @@ class FenceService(Service):
         if what == DISABLE_FLOOR:
             wanted = FLOOR
         if what not in (DISABLE, ENABLE, DISABLE_FLOOR) or wanted not in range(1, EVERYTHING + 1):
-            self.host.complain("Fence: param1 is 0, 1 or 2, param2 bits of FENCE_TYPE")
-            return dialect.MAV_RESULT_DENIED
+            raise Refused("Fence: param1 is 0, 1 or 2, param2 bits of FENCE_TYPE", lasting=True)
         if what != ENABLE and wanted == CEILING:
-            self.host.complain("Fence: the drone always keeps to its ceiling; set another one instead")
-            return dialect.MAV_RESULT_DENIED
+            raise Refused("Fence: the drone always keeps to its ceiling; set another one instead", lasting=True)
         if what == ENABLE:
             watch.enable(int(wanted))
         else:
             watch.disable(int(wanted))
         self._look(self.host.clock.monotonic())
-        return dialect.MAV_RESULT_ACCEPTED
 
     def _keep_settings(self) -> None:
         """Whoever changed them: they are there when the gateway comes back."""
@@ -245,10 +242,10 @@ class FenceService(Service):
         kept = self.host.memory.settings.get(KEY)
         kept = {**_DEFAULTS, **kept} if isinstance(kept, dict) else _DEFAULTS
         watch = self._watch
-        action = Action.__members__.get(str(kept["action"]), Action.HOLD)
-        if action is Action.TERMINATE and not self.host.vehicle.allow_kill:
+        action = Reaction.__members__.get(str(kept["action"]), Reaction.HOLD)
+        if action is Reaction.TERMINATE and not self.host.vehicle.allow_kill:
             self.host.text(Severity.WARNING, "Fence: its action was a motor cut, which is not allowed any more: hold")
-            action = Action.HOLD
+            action = Reaction.HOLD
         watch.action = action
         types, floor = kept["types"], kept["floor"]
         watch.types = types if isinstance(types, int) and 0 <= types <= EVERYTHING else EVERYTHING
@@ -256,4 +253,4 @@ class FenceService(Service):
         watch.floor = float(floor) if isinstance(floor, int | float) and 0.0 <= floor <= HIGHEST_FLOOR else 0.0
 
 
-_DEFAULTS: Mapping[str, Any] = {"action": Action.HOLD.name, "types": EVERYTHING, "predict": True, "floor": 0.0}
+_DEFAULTS: Mapping[str, Any] = {"action": Reaction.HOLD.name, "types": EVERYTHING, "predict": True, "floor": 0.0}

@@ -35,11 +35,15 @@ STALE = 3.0
 SLACK = 1.0
 """m beyond floor or ceiling that are no breach yet: the barometer drifts, and climbs overshoot."""
 
+CALM = 2.0
+"""s without danger after which a vehicle that was about to leave no longer is. Where it is between two positions is an
+estimate, and each position corrects it."""
+
 RETRY = 2.0
 """s until an action that was not carried out is tried again."""
 
 
-class Action(enum.Enum):
+class Reaction(enum.Enum):
     """What happens at the boundary."""
 
     NONE = "nothing"
@@ -51,22 +55,22 @@ class Action(enum.Enum):
 
 
 PX4_ACTIONS = {
-    0: Action.NONE,
-    1: Action.WARN,
-    2: Action.HOLD,
-    3: Action.RETURN,
-    4: Action.TERMINATE,
-    5: Action.LAND,
+    0: Reaction.NONE,
+    1: Reaction.WARN,
+    2: Reaction.HOLD,
+    3: Reaction.RETURN,
+    4: Reaction.TERMINATE,
+    5: Reaction.LAND,
 }
 """GF_ACTION (PX4-Autopilot src/modules/navigator/geofence_params.c)."""
 
 ARDUPILOT_ACTIONS = {
-    0: Action.WARN,
-    1: Action.RETURN,
-    2: Action.LAND,
-    3: Action.RETURN,
-    4: Action.HOLD,
-    5: Action.RETURN,
+    0: Reaction.WARN,
+    1: Reaction.RETURN,
+    2: Reaction.LAND,
+    3: Reaction.RETURN,
+    4: Reaction.HOLD,
+    5: Reaction.RETURN,
 }
 """FENCE_ACTION of ArduCopter: report only, RTL, land, SmartRTL, brake, SmartRTL (ardupilot AC_Fence.h). A motor cut has
 no number there."""
@@ -162,7 +166,7 @@ class FenceWatch:
     """The fence of one vehicle: its zones, its settings, and where the vehicle is in relation to it."""
 
     def __init__(self) -> None:
-        self.action = Action.HOLD
+        self.action = Reaction.HOLD
         """PX4's default."""
         self.types = EVERYTHING
         """Kinds of boundaries that are enabled."""
@@ -183,6 +187,8 @@ class FenceWatch:
         self.blind = False
         """In the air with a fence and without knowing where."""
         self._above_floor = False
+        self._calm_since: float | None = None
+        """Since when nothing ahead was seen."""
         self._acting = False
         """An action is being carried out."""
         self._orders: int | None = None
@@ -243,7 +249,7 @@ class FenceWatch:
 
     def check_height(self, ato: float) -> None:
         """Raise `OutsideFence` for a height (m above take-off) below the floor."""
-        if self._has_floor and self.action is not Action.NONE and ato < self.floor:
+        if self._has_floor and self.action is not Reaction.NONE and ato < self.floor:
             raise OutsideFence(f"{ato:.1f} m above take-off is below the fence's floor of {self.floor:g} m")
 
     def check_place(self, place: Point | None, home: Point | None, start: Point | None = None) -> None:
@@ -252,7 +258,7 @@ class FenceWatch:
         From outside every way is good that ends inside. Of no place nothing can be said, so it is not inside either.
         """
         zones = self.zones
-        if not zones.zones or self.action is Action.NONE:
+        if not zones.zones or self.action is Reaction.NONE:
             return
         if place is None:
             raise OutsideFence("there is a fence and no GPS fix; disable the fence to fly without", lasting=False)
@@ -266,7 +272,7 @@ class FenceWatch:
 
     # Watching.
 
-    def look(self, sight: Sight, now: float) -> Action | None:
+    def look(self, sight: Sight, now: float) -> Reaction | None:
         """The vehicle was seen; what is to be done about it now. `done` or `failed` is to be told how that went."""
         zones = self.zones
         if not sight.airborne:
@@ -275,6 +281,13 @@ class FenceWatch:
             self._above_floor = True
         self.blind = bool(zones.zones) and sight.airborne and (sight.place is None or sight.age > STALE)
         event, verdict = self._judge(zones, sight)
+        if event is not Event.SAFE:
+            self._calm_since = None
+        elif self.state is State.LEAVING:
+            if self._calm_since is None:
+                self._calm_since = now
+            if now - self._calm_since < CALM:
+                return None
         if event is None:
             return None
         before, self.state = self.state, TRANSITIONS[self.state].get(event, self.state)
@@ -285,7 +298,7 @@ class FenceWatch:
         if self.state is State.OUTSIDE and before is not State.OUTSIDE:
             self.breach, self.breached_at = verdict.breach, now
             self.breaches += 1
-        if self.action is Action.NONE or self._acting:
+        if self.action is Reaction.NONE or self._acting:
             return None
         if self._retry_at is not None:
             return self._act(verdict, sight) if now >= self._retry_at else None
@@ -293,14 +306,14 @@ class FenceWatch:
             return None
         if before is State.LEAVING and self._orders == sight.orders:
             # It brakes already; should it not come to rest in time, nothing better can be done.
-            return Action.WARN if self.state is State.OUTSIDE else None
+            return Reaction.WARN if self.state is State.OUTSIDE else None
         return self._act(verdict, sight)
 
-    def _act(self, verdict: Verdict, sight: Sight) -> Action:
+    def _act(self, verdict: Verdict, sight: Sight) -> Reaction:
         self._retry_at = None
-        if not sight.flying or verdict.breach is Breach.CEILING or self.action is Action.WARN:
+        if not sight.flying or verdict.breach is Breach.CEILING or self.action is Reaction.WARN:
             self._orders = sight.orders
-            return Action.WARN
+            return Reaction.WARN
         self._acting = True
         return self.action
 
@@ -312,7 +325,7 @@ class FenceWatch:
         """Nothing is known any more of what the vehicle does. The fence and its settings stay."""
         self.state, self.verdict, self.blind = State.INSIDE, None, False
         self._above_floor = self._acting = False
-        self._orders = self._retry_at = None
+        self._calm_since = self._orders = self._retry_at = None
 
     def failed(self, now: float) -> None:
         """The action was not carried out: it is tried again, unless the vehicle comes back inside before."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from anafi_mav.drone import events
 from anafi_mav.services.fence_service import HIGHEST_FLOOR, set_action, set_floor
-from anafi_mav.services.fence_watch import ARDUPILOT_ACTIONS, CEILING, FLOOR, HOME_CIRCLE, PX4_ACTIONS, ZONES, Action
+from anafi_mav.services.fence_watch import ARDUPILOT_ACTIONS, CEILING, FLOOR, HOME_CIRCLE, PX4_ACTIONS, ZONES, Reaction
 from anafi_mav.services.parameter import Parameter, mapped, twin
 from anafi_mav.services.parameter_codec import Kind
 from anafi_mav.services.parameter_table import GEOFENCE, OFF_ON
@@ -32,7 +32,7 @@ FENCE_ACTION = Parameter(
     polled=True,
     group=GROUP,
     long="With 0 the fence is told of and nothing else. A motor cut needs allow_kill.",
-    default=float(_NUMBERS[Action.HOLD]),
+    default=float(_NUMBERS[Reaction.HOLD]),
     source="gateway",
 )
 

@@ -1,0 +1,493 @@
+"""Conformance items 76, 77 and 143 (DO_FENCE_ENABLE): fences enforced and rally points used, in both flavours.
+
+What the drone did is read from the simulator's own log. Where it is flown by setpoints the simulator runs at the speed
+of life: how far a drone goes before it stands is a matter of real seconds.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import struct
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.mav import NAN, Client
+from support.plans import ACCEPTED as TAKEN
+from support.plans import FENCE, RALLY, Item, around, circle, clear, content, download, rally, square, upload
+from support.world import HOME, MODES, World, world
+
+from anafi_mav import geo
+from anafi_mav.config import Config, DroneConfig
+from anafi_mav.gateway import Gateway
+from anafi_mav.units import quaternion_from_euler
+
+both = pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+
+PLACE = (HOME[0], HOME[1])
+ACCEPTED, REJECTED, DENIED = (
+    dialect.MAV_RESULT_ACCEPTED,
+    dialect.MAV_RESULT_TEMPORARILY_REJECTED,
+    dialect.MAV_RESULT_DENIED,
+)
+GEOFENCE = dialect.MAV_SYS_STATUS_GEOFENCE
+REPOSITION, ENABLE = dialect.MAV_CMD_DO_REPOSITION, dialect.MAV_CMD_DO_FENCE_ENABLE
+BRAKE = 17
+
+FORWARD = -0.17
+"""rad of pitch: more than the 10 degrees that are full tilt."""
+
+
+async def put(w: World, name: str, value: float, kind: int | None = None) -> Any:
+    """Set a parameter of the gateway's; whole numbers in the flavour's encoding."""
+    kind = kind or (6 if w.flavour == "px4" else 2)
+    carrier = float(value)
+    if kind == 6 and w.flavour == "px4":
+        (carrier,) = struct.unpack("<f", struct.pack("<i", int(value)))
+    mark = w.client.mark()
+    w.client.send(dialect.MAVLink_param_set_message(1, 1, name.encode(), carrier, kind))
+    return await w.client.wait(("PARAM_VALUE", "PARAM_ERROR"), lambda m: m.param_id == name, since=mark)
+
+
+ACTION = {"px4": "GF_ACTION", "ardupilot": "FENCE_ACTION"}
+NUMBER = {"px4": {"hold": 2, "return": 3, "land": 5}, "ardupilot": {"hold": 4, "return": 1, "land": 2}}
+
+
+@asynccontextmanager
+async def flown(w: World, *, pitch: float = FORWARD) -> AsyncIterator[None]:
+    """A program at the PX4 endpoint that flies the drone north by setpoints, and goes on whatever the fence does."""
+    pilot = await w.connect(254, port=5761)
+
+    async def stream() -> None:
+        rotation = list(quaternion_from_euler(0.0, pitch, 0.0))
+        while True:
+            pilot.send(dialect.MAVLink_set_attitude_target_message(0, 1, 1, 0b111, rotation, 0.0, 0.0, 0.0, 0.5))
+            await asyncio.sleep(0.05)  # the program's own rate
+
+    task = asyncio.ensure_future(stream())
+    try:
+        await asyncio.sleep(0.3)  # what it takes to be listened to
+        assert (await pilot.command(dialect.MAV_CMD_DO_SET_MODE, 1, 6, 0)).result == ACCEPTED
+        yield
+    finally:
+        task.cancel()
+        await asyncio.wait([task])
+
+
+def farthest(w: World) -> float:
+    """m from home that the drone has ever been."""
+    return max(math.hypot(e.args["north"], e.args["east"]) for e in w.drone.log if e.kind == "pose")
+
+
+async def at_rest(w: World, timeout: float = 20.0) -> None:
+    """The drone stands in the air."""
+    deadline = asyncio.get_running_loop().time() + timeout
+    while math.hypot(w.drone.pose.vn, w.drone.pose.ve) > 0.3:
+        assert asyncio.get_running_loop().time() < deadline
+        await asyncio.sleep(0.1)  # the simulation's own time
+
+
+def texts(client: Client, since: int = 0) -> list[str]:
+    """What was said, whole: a long text comes in chunks that share a number."""
+    result: list[str] = []
+    number = 0
+    for _, m in client.since(since, "STATUSTEXT"):
+        if m.id and m.id == number:
+            result[-1] += m.text
+        else:
+            result.append(m.text)
+        number = m.id
+    return result
+
+
+async def said(client: Client, words: str, *, since: int = 0, timeout: float = 5.0) -> None:
+    """Wait until something with these words is said."""
+    await client.wait(
+        "STATUSTEXT", lambda m: any(words in text for text in texts(client, since)), since=since, timeout=timeout
+    )
+
+
+async def bits(client: Client, present: bool, enabled: bool, healthy: bool | None) -> None:
+    """SYS_STATUS tells of the fence; its health may be left open."""
+    await client.wait(
+        "SYS_STATUS",
+        lambda m: (
+            bool(m.onboard_control_sensors_present & GEOFENCE) is present
+            and bool(m.onboard_control_sensors_enabled & GEOFENCE) is enabled
+            and healthy in (None, bool(m.onboard_control_sensors_health & GEOFENCE))
+        ),
+    )
+
+
+@both
+async def test_conf_076_stopped_before_the_fence(flavour: str) -> None:
+    """A square of 50 m, flown at by setpoints: the drone holds inside, once, and the setpoints fly it no more."""
+    async with world(flavour=flavour, also="px4", speed=1.0) as w:
+        assert (await upload(w.client, square(PLACE, 25.0), FENCE)).type == TAKEN
+        await bits(w.client, True, True, True)
+        await w.take_off()
+        mark = w.client.mark()
+        async with flown(w):
+            await said(w.client, "Fence ahead", since=mark, timeout=15.0)
+            stopped = BRAKE if flavour == "ardupilot" else MODES["px4"].hold
+            await w.client.heartbeat(lambda beat: beat.custom_mode == stopped, since=mark)
+            await at_rest(w)
+            assert 10.0 < farthest(w) < 25.0
+            here = w.drone.pose.north
+            await w.client.wait("HEARTBEAT", timeout=3.0)
+            await w.client.wait("HEARTBEAT", timeout=3.0)
+            assert w.drone.pose.north == pytest.approx(here, abs=0.5)
+        statuses = [m for _, m in w.client.since(mark, "FENCE_STATUS")]
+        assert {(m.breach_status, m.breach_count) for m in statuses} == {(0, 0)}
+        assert len([text for text in texts(w.client, mark) if text.startswith("Fence")]) == 1
+
+
+@pytest.mark.parametrize(
+    ("flavour", "action", "command"),
+    [
+        ("px4", "return", "rth.return_to_home"),
+        ("ardupilot", "return", "rth.return_to_home"),
+        ("px4", "land", "ardrone3.Piloting.Landing"),
+        ("ardupilot", "land", "ardrone3.Piloting.Landing"),
+    ],
+)
+async def test_conf_076_a_breach_is_acted_upon_once(flavour: str, action: str, command: str) -> None:
+    """A square of 24 m, no prediction: the drone leaves it, and goes home or lands, and is left in peace meanwhile."""
+    async with world(flavour=flavour, also="px4", speed=1.0) as w:
+        assert (await upload(w.client, square(PLACE, 12.0), FENCE)).type == TAKEN
+        value = await put(w, ACTION[flavour], NUMBER[flavour][action])
+        assert value.get_type() == "PARAM_VALUE"
+        assert (await put(w, "ANF_FENCE_AHEAD", 0, 6)).get_type() == "PARAM_VALUE"
+        await w.take_off()
+        mark = w.client.mark()
+        async with flown(w):
+            status = await w.client.wait("FENCE_STATUS", lambda m: m.breach_status == 1, since=mark, timeout=15.0)
+            assert (status.breach_count, status.breach_type) == (1, dialect.FENCE_BREACH_BOUNDARY)
+            assert status.breach_time > 0
+            await said(w.client, "Fence breach: ", since=mark)
+            await bits(w.client, True, True, False)
+            mode = {"return": w.modes.returning, "land": w.modes.land}[action]
+            await w.client.heartbeat(lambda beat: beat.custom_mode == mode, since=mark)
+            if action == "return":  # it flies home although the setpoints go on, and the way in is no new breach
+                await w.client.wait("FENCE_STATUS", lambda m: m.breach_status == 0, timeout=20.0)
+                await said(w.client, "Inside the fence again", since=mark)
+            else:
+                await w.drone.wait_log(lambda e: e.kind == "state" and e.args.get("to") == "landed", 20.0)
+        assert len(w.commands(command)) == 1
+        assert farthest(w) > 12.0
+        counts = [m.breach_count for _, m in w.client.since(mark, "FENCE_STATUS")]
+        assert max(counts) == 1
+        if action == "return":
+            assert not w.commands("ardrone3.Piloting.Landing")
+            north = [e.args["north"] for e in w.drone.log if e.kind == "pose"]
+            assert north[-1] < max(north) - 1.0
+
+
+async def test_conf_076_warned_and_nothing_else() -> None:
+    async with world(also="px4", speed=1.0) as w:
+        assert (await upload(w.client, square(PLACE, 12.0), FENCE)).type == TAKEN
+        await put(w, "GF_ACTION", 1)
+        await w.take_off()
+        mark = w.client.mark()
+        async with flown(w):
+            await said(w.client, "Fence ahead: too fast to stop", since=mark, timeout=15.0)
+            await said(w.client, "Fence breach: ", since=mark, timeout=15.0)
+            await w.client.heartbeat(lambda beat: True)
+            assert {beat.custom_mode for _, beat in w.client.since(mark, "HEARTBEAT")} <= {
+                0x00060000,
+                MODES["px4"].hold,
+            }
+            assert w.drone.pose.north > 12.0
+            before = w.drone.pose.north
+            await w.client.heartbeat(lambda beat: beat.custom_mode == 0x00060000)
+            assert w.drone.pose.north > before
+
+
+@both
+async def test_conf_076_targets_outside_are_refused(flavour: str) -> None:
+    async with world(flavour=flavour) as w:
+        hole = circle(around(PLACE, (30.0, 0.0))[0], 8.0, inclusion=False)
+        assert (await upload(w.client, [*square(PLACE, 60.0), hole], FENCE)).type == TAKEN
+        await w.take_off()
+        for (north, east), words in (
+            ((80.0, 0.0), "beyond the inclusion polygon"),
+            ((32.0, 1.0), "beyond the exclusion circle"),
+            ((50.0, 0.0), "the way there leaves the fence"),
+        ):
+            place = around(PLACE, (north, east))[0]
+            mark = w.client.mark()
+            ack = await w.client.command(REPOSITION, -1, 1, 0, NAN, frame=6, x=place[0], y=place[1], z=8.0)
+            assert ack.result == DENIED
+            await said(w.client, words, since=mark)
+        assert w.commands("ardrone3.Piloting.moveTo") == []
+        place = around(PLACE, (50.0, 30.0))[0]
+        ack = await w.client.command(REPOSITION, -1, 1, 0, NAN, frame=6, x=place[0], y=place[1], z=8.0)
+        assert ack.result == ACCEPTED
+        await w.drone.wait_log(lambda e: e.name.endswith("moveToChanged") and e.args["status"] == 1, 40.0)
+        mark = w.client.mark()
+        await w.client.wait("HEARTBEAT")
+        assert not [m for _, m in w.client.since(0, "STATUSTEXT") if "breach" in m.text or "ahead" in m.text]
+
+
+@both
+async def test_conf_076_no_takeoff_outside(flavour: str) -> None:
+    async with world(flavour=flavour) as w:
+        elsewhere = around(PLACE, (500.0, 0.0))[0]
+        assert (await upload(w.client, [circle(elsewhere, 100.0)], FENCE)).type == TAKEN
+        await bits(w.client, True, True, True)  # on the ground it is no breach
+        await w.client.wait(
+            "SYS_STATUS", lambda m: not m.onboard_control_sensors_health & dialect.MAV_SYS_STATUS_PREARM_CHECK
+        )
+        mark = w.client.mark()
+        assert (await w.client.command(400, 1)).result == REJECTED
+        await said(w.client, "beyond the inclusion circle", since=mark)
+        assert (await w.client.command(22, x=0.0, y=0.0, z=5.0)).result in (DENIED, REJECTED)
+        assert w.commands("ardrone3.Piloting.TakeOff") == []
+        assert (await w.client.command(ENABLE, 0)).result == ACCEPTED
+        await w.take_off()
+
+
+async def test_conf_076_no_takeoff_without_knowing_where() -> None:
+    async with world() as w:
+        assert (await upload(w.client, [circle(PLACE, 100.0)], FENCE)).type == TAKEN
+        w.drone.faults.gps = False
+        await w.client.wait("GPS_RAW_INT", lambda m: m.fix_type < 2)
+        mark = w.client.mark()
+        assert (await w.client.command(400, 1)).result == REJECTED
+        await said(w.client, "no GPS fix", since=mark)
+
+
+@both
+async def test_conf_143_do_fence_enable(flavour: str) -> None:
+    async with world(flavour=flavour) as w:
+        client = w.client
+        assert (await upload(client, square(PLACE, 30.0), FENCE)).type == TAKEN
+        assert (await put(w, "ANF_FENCE_FLOOR", 3.0, 9)).param_value == 3.0
+        await w.take_off()
+        far = around(PLACE, (60.0, 0.0))[0]
+
+        async def goes(place: tuple[float, float], height: float) -> int:
+            ack = await client.command(REPOSITION, -1, 1, 0, NAN, frame=6, x=place[0], y=place[1], z=height)
+            return int(ack.result)
+
+        assert await goes(far, 5.0) == DENIED
+        assert await goes(PLACE, 2.0) == DENIED
+        # 2: the floor only.
+        assert (await client.command(ENABLE, 2)).result == ACCEPTED
+        await bits(client, True, True, True)
+        assert await goes(PLACE, 2.0) == ACCEPTED
+        assert await goes(far, 5.0) == DENIED
+        # By kind: 4 polygons, 8 the floor.
+        assert (await client.command(ENABLE, 0, 4)).result == ACCEPTED
+        assert await goes(far, 5.0) == ACCEPTED
+        assert (await client.command(ENABLE, 1, 8)).result == ACCEPTED
+        assert await goes(PLACE, 2.0) == DENIED
+        # All of it off and on again, however it is sent.
+        assert (await client.command(ENABLE, 0, 0)).result == ACCEPTED
+        await bits(client, True, False, True)
+        assert await goes(PLACE, 2.0) == ACCEPTED
+        assert (await client.command(ENABLE, 1, frame=0, x=0.0, y=0.0, z=0.0)).result == ACCEPTED
+        await bits(client, True, True, None)  # the drone may be outside now
+        assert await goes(far, 5.0) == DENIED
+        for params in ((NAN,), (3.0,), (math.inf,), (1.0, 16.0), (1.0, 0.5), (0.0, math.inf), (0.0, 1.0)):
+            assert (await client.command(ENABLE, *params)).result == DENIED, params
+        if flavour == "ardupilot":
+            assert (await put(w, "FENCE_ENABLE", 0)).param_value == 0
+            await bits(client, True, False, True)
+        await clear(client, FENCE)
+        assert (await put(w, "ANF_FENCE_FLOOR", 0.0, 9)).param_value == 0.0
+        await bits(client, False, False, True)
+
+
+async def test_conf_076_a_motor_cut_needs_leave() -> None:
+    async with world() as w:
+        value = await put(w, "GF_ACTION", 4)
+        assert value.get_type() == "PARAM_VALUE"
+        assert struct.unpack("<i", struct.pack("<f", value.param_value)) == (2,)
+        await said(w.client, "allow_kill")
+    async with world(allow_kill=True) as w:
+        value = await put(w, "GF_ACTION", 4)
+        assert struct.unpack("<i", struct.pack("<f", value.param_value)) == (4,)
+
+
+# The drone's own geofence.
+
+DISTANCE = "ardrone3.PilotingSettings.MaxDistance"
+SWITCH = "ardrone3.PilotingSettings.NoFlyOverMaxDistance"
+
+
+def own_fence(w: World) -> tuple[float, int]:
+    """The radius of the drone's own geofence, and whether it is on: what it was told last."""
+    settings = w.drone.firmware.settings
+    return settings.number("max_distance"), int(settings["geofence"])
+
+
+async def until(condition: Callable[[], bool], timeout: float = 5.0) -> None:
+    """Look again and again: the simulator has no event for a setting."""
+    deadline = asyncio.get_running_loop().time() + timeout
+    while not condition():
+        assert asyncio.get_running_loop().time() < deadline
+        await asyncio.sleep(0.05)
+
+
+@both
+@pytest.mark.parametrize("item", [circle(PLACE, 60.0), Item(5005, 0.0, 0.0, p1=60.0)], ids=["circle", "home"])
+async def test_a_circle_around_the_start_is_the_drones_own_too(flavour: str, item: Item) -> None:
+    async with world(flavour=flavour) as w:
+        before = own_fence(w)
+        assert before == (100.0, 0)
+        assert (await upload(w.client, [item], FENCE)).type == TAKEN
+        await until(lambda: own_fence(w) == (60.0, 1))
+        await said(w.client, "the drone keeps to 60 m", since=0)
+        await w.take_off()
+        assert own_fence(w) == (60.0, 1)
+        # Another one: what was before all of them is what comes back.
+        assert (await upload(w.client, [circle(PLACE, 80.0)], FENCE)).type == TAKEN
+        await until(lambda: own_fence(w) == (80.0, 1))
+        assert (await w.client.command(ENABLE, 0)).result == ACCEPTED
+        await until(lambda: own_fence(w) == before)
+        assert (await w.client.command(ENABLE, 1)).result == ACCEPTED
+        await until(lambda: own_fence(w) == (80.0, 1))
+        assert (await clear(w.client, FENCE)).type == TAKEN
+        await until(lambda: own_fence(w) == before)
+
+
+async def test_what_the_drone_cannot_express_leaves_it_alone() -> None:
+    async with world() as w:
+        elsewhere = around(PLACE, (40.0, 0.0))[0]
+        for items in (
+            square(PLACE, 60.0),
+            [circle(elsewhere, 60.0)],
+            [circle(PLACE, 60.0), circle(PLACE, 70.0)],
+            [circle(PLACE, 60.0, inclusion=False)],
+            [circle(PLACE, 9.0)],  # the drone's smallest is 10 m
+        ):
+            assert (await upload(w.client, items, FENCE)).type == TAKEN
+            for _ in range(3):
+                await w.client.wait("HEARTBEAT")
+            assert (w.commands(DISTANCE), w.commands(SWITCH)) == ([], [])
+
+
+async def test_a_geofence_that_somebody_changed_meanwhile_stays() -> None:
+    async with world() as w:
+        assert (await upload(w.client, [circle(PLACE, 60.0)], FENCE)).type == TAKEN
+        await until(lambda: own_fence(w) == (60.0, 1))
+        await put(w, "ANF_MAX_DIST", 90.0, 9)
+        assert own_fence(w) == (90.0, 1)
+        assert (await clear(w.client, FENCE)).type == TAKEN
+        await said(w.client, "somebody has changed it")
+        assert own_fence(w) == (90.0, 1)
+
+
+async def test_the_next_gateway_puts_the_geofence_back() -> None:
+    """It finds the fence, the settings and what the drone had before; then the fence is cleared."""
+    async with world() as w:
+        await put(w, "GF_ACTION", 3)
+        assert (await upload(w.client, [circle(PLACE, 60.0)], FENCE)).type == TAKEN
+        await until(lambda: own_fence(w) == (60.0, 1))
+        (drone,) = w.gateway.config.drones
+        await w.gateway.close()
+        config = Config(
+            endpoints=(f"tcpin://{w.address}:5761",),
+            drones=(DroneConfig(name="again", sysid=1, address=drone.address),),
+        )
+        async with Gateway(config) as again:
+            client = await w.connect(port=5761)
+            assert await again.ready(10.0), again.lines()
+            await said(client, "Fence: 1 inclusion circle")
+            mark = client.mark()
+            client.send(dialect.MAVLink_param_request_read_message(1, 1, b"GF_ACTION", -1))
+            value = await client.wait("PARAM_VALUE", since=mark)
+            assert struct.unpack("<i", struct.pack("<f", value.param_value)) == (3,)
+            assert own_fence(w) == (60.0, 1)
+            assert (await clear(client, FENCE)).type == TAKEN
+            await until(lambda: own_fence(w) == (100.0, 0))
+
+
+# Rally points.
+
+
+@both
+async def test_conf_077_rally_points_are_kept_and_not_used(flavour: str) -> None:
+    """The default: they come back as they were sent, and a return ends at home."""
+    async with world(flavour=flavour) as w:
+        points = [rally(around(PLACE, (60.0, 0.0))[0], 15.0), rally(around(PLACE, (0.0, 80.0))[0], 20.0)]
+        mark = w.client.mark()
+        assert (await upload(w.client, points, RALLY)).type == TAKEN
+        await said(w.client, "2 rally points kept and not used", since=mark)
+        assert [content(item) for item in await download(w.client, RALLY)] == [item.content for item in points]
+        await w.take_off()
+        for _ in range(3):
+            await w.client.wait("HEARTBEAT")
+        assert (w.commands("rth.set_custom_location"), w.commands("rth.set_preferred_home_type")) == ([], [])
+
+
+def preferred(w: World) -> list[int]:
+    return [entry.args["type"] for entry in w.commands("rth.set_preferred_home_type")]
+
+
+async def test_conf_077_rally_points_used_where_rtl_type_says_so() -> None:
+    """A return ends at the closest one; after the landing the drone's home is what it was."""
+    async with world() as w:
+        near, far = around(PLACE, (40.0, 30.0), (-90.0, 0.0))
+        await put(w, "RTL_TYPE", 1)
+        assert (await upload(w.client, [rally(far, 25.0), rally(near, 25.0)], RALLY)).type == TAKEN
+        assert preferred(w) == []  # not on the ground
+        await w.take_off()
+        await said(w.client, "Returns end at rally point 1", since=0, timeout=10.0)
+        (location,) = w.commands("rth.set_custom_location")
+        assert geo.distance(location.args["latitude"], location.args["longitude"], *near) < 0.1
+        assert location.args["altitude"] == pytest.approx(25.0)
+        await w.client.wait("HOME_POSITION", lambda m: geo.distance(m.latitude / 1e7, m.longitude / 1e7, *near) < 1.0)
+        assert (await w.client.command(20)).result == ACCEPTED
+        await w.drone.wait_log(
+            lambda e: e.kind == "pose" and math.hypot(e.args["north"] - 40.0, e.args["east"] - 30.0) < 1.0, 60.0
+        )
+        assert (await w.client.command(21)).result == ACCEPTED
+        await w.client.heartbeat(lambda beat: not beat.base_mode & 128, timeout=60.0)
+        await until(lambda: len(preferred(w)) == 2)
+        assert preferred(w) == [3, 1]  # custom, then take-off again
+
+
+async def test_conf_077_the_closest_of_home_and_rally_points() -> None:
+    async with world() as w:
+        far = around(PLACE, (100.0, 0.0))[0]
+        await put(w, "RTL_TYPE", 0)
+        assert (await upload(w.client, [rally(far, 20.0)], RALLY)).type == TAKEN
+        await w.take_off()
+        for _ in range(3):
+            await w.client.wait("HEARTBEAT")
+        assert w.commands("rth.set_custom_location") == []
+        place = around(PLACE, (80.0, 0.0))[0]
+        ack = await w.client.command(REPOSITION, -1, 1, 0, NAN, frame=6, x=place[0], y=place[1], z=8.0)
+        assert ack.result == ACCEPTED
+        await said(w.client, "Returns end at rally point 0", timeout=30.0)
+        assert w.drone.pose.north > 50.0
+        await put(w, "RTL_TYPE", 2)
+        await until(lambda: preferred(w) == [3, 1])
+
+
+async def test_conf_077_a_rally_point_outside_the_fence_is_not_used() -> None:
+    async with world() as w:
+        await put(w, "RTL_TYPE", 1)
+        assert (await upload(w.client, square(PLACE, 50.0), FENCE)).type == TAKEN
+        outside, inside = around(PLACE, (60.0, 0.0), (-45.0, 0.0))
+        assert (await upload(w.client, [rally(outside, 20.0), rally(inside, 20.0)], RALLY)).type == TAKEN
+        await w.take_off()
+        await said(w.client, "Returns end at rally point 1", since=0, timeout=10.0)
+
+
+async def test_conf_077_a_home_that_somebody_chose_is_left_alone() -> None:
+    async with world() as w:
+        await put(w, "RTL_TYPE", 1)
+        await w.take_off()
+        place = around(PLACE, (10.0, 0.0))[0]
+        ack = await w.client.command(dialect.MAV_CMD_DO_SET_HOME, 0, x=place[0], y=place[1], z=HOME[2])
+        assert ack.result == ACCEPTED
+        sent = len(w.commands("rth.set_custom_location"))
+        assert (await upload(w.client, [rally(around(PLACE, (30.0, 0.0))[0], 20.0)], RALLY)).type == TAKEN
+        await said(w.client, "Rally points not used", timeout=10.0)
+        assert len(w.commands("rth.set_custom_location")) == sent
