@@ -140,6 +140,32 @@ def seed() -> str:
     return "".join(parts)
 
 
+SEED_MAVLINK = """\
+# The rows of the anafi_ros paper over MAVLink
+
+<!-- Made by docs/generate.py from tests/unit/seed_mavlink.py. -->
+
+What the paper's programs can read and do with an ANAFI ([seed.md](seed.md)), and the MAVLink that reaches it. Messages
+that begin with `ANAFI_` are in [dialect.md](dialect.md), parameters that begin with `ANF_` in
+[parameters.md](parameters.md).
+
+| row | MAVLink | shown by |
+|---|---|---|
+"""
+
+
+def seed_mavlink() -> str:
+    """docs/seed-mavlink.md."""
+    from seed_mavlink import REACHED
+
+    rows = []
+    for name, reach in REACHED.items():
+        file, _, function = reach.test.partition("::")
+        shown = f"`{function}` in `tests/{file}`" if reach.test else f"waits for {reach.waits}"
+        rows.append(f"| `{name}` | {reach.mavlink or '–'} | {shown} |\n")
+    return SEED_MAVLINK + "".join(rows)
+
+
 DIALECT = """\
 # The dialect
 
@@ -282,6 +308,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "dialect.md": dialect,
     "parameters.md": parameters,
     "seed.md": seed,
+    "seed-mavlink.md": seed_mavlink,
 }
 
 

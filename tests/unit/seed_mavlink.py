@@ -1,0 +1,151 @@
+"""Each row of the anafi_ros paper's appendix, the MAVLink that reaches it, and the test that shows it.
+
+A row without a test waits for the issue that is named in its place.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+PAYLOAD = "camera, gimbal and media over MAVLink"
+MISSIONS = "missions over MAVLink"
+
+
+class Reach(NamedTuple):
+    mavlink: str
+    """Messages, commands or parameters, as they are written in MAVLink."""
+    test: str = ""
+    """file::function below tests/; empty: not shown yet."""
+    waits: str = ""
+
+
+_FLIGHT = "conformance/test_conf_flight.py::"
+_GUIDED = "conformance/test_conf_guided.py::"
+_TELEMETRY = "conformance/test_conf_telemetry.py::"
+_ANAFI = "conformance/test_anafi_messages.py::"
+_MAINTENANCE = "conformance/test_conf_maintenance.py::"
+_TWIN = "conformance/test_conf_params.py::test_a_twin_and_its_native_are_one_value"
+_PARAMETER = "conformance/test_conf_params.py::test_native_settings_reach_the_drone"
+_SAFETY = "conformance/test_safety.py::"
+
+REACHED: dict[str, Reach] = {
+    "camera/command": Reach("", waits=PAYLOAD),
+    "drone/command": Reach(
+        "`SET_ATTITUDE_TARGET`", _SAFETY + "test_a_setpoint_ends_with_its_own_sender_not_with_the_last_of_all"
+    ),
+    "drone/moveby": Reach(
+        "`MAV_CMD_CONDITION_YAW`, `MAV_CMD_DO_CHANGE_ALTITUDE`; `SET_POSITION_TARGET_LOCAL_NED`",
+        _GUIDED + "test_conf_143_condition_yaw",
+    ),
+    "drone/moveto": Reach("`MAV_CMD_DO_REPOSITION`", _FLIGHT + "test_conf_029_goto"),
+    "gimbal/command": Reach("", waits=PAYLOAD),
+    "battery/health": Reach("`BATTERY_INFO`.state_of_health", _TELEMETRY + "test_conf_037_the_cells_of_an_ai"),
+    "battery/percentage": Reach("`BATTERY_STATUS`.battery_remaining", _TELEMETRY + "test_conf_037_battery"),
+    "battery/voltage": Reach("`BATTERY_STATUS`.voltages", _TELEMETRY + "test_conf_037_battery"),
+    "camera/awb_b_gain": Reach(
+        "`ANAFI_CAMERA_EXPOSURE`.awb_b_gain", _ANAFI + "test_the_video_runs_while_somebody_wants_what_only_it_says"
+    ),
+    "camera/awb_r_gain": Reach(
+        "`ANAFI_CAMERA_EXPOSURE`.awb_r_gain", _ANAFI + "test_the_video_runs_while_somebody_wants_what_only_it_says"
+    ),
+    "camera/camera_info": Reach("`ANAFI_CAMERA_INTRINSICS`", _ANAFI + "test_camera_exposure_and_intrinsics"),
+    "camera/exposure_time": Reach(
+        "`ANAFI_CAMERA_EXPOSURE`.exposure_time", _ANAFI + "test_the_video_runs_while_somebody_wants_what_only_it_says"
+    ),
+    "camera/image": Reach("", waits=PAYLOAD),
+    "camera/hfov": Reach(
+        "`ANAFI_CAMERA_EXPOSURE`.hfov", _ANAFI + "test_the_video_runs_while_somebody_wants_what_only_it_says"
+    ),
+    "camera/iso_gain": Reach(
+        "`ANAFI_CAMERA_EXPOSURE`.iso", _ANAFI + "test_the_video_runs_while_somebody_wants_what_only_it_says"
+    ),
+    "camera/vfov": Reach(
+        "`ANAFI_CAMERA_EXPOSURE`.vfov", _ANAFI + "test_the_video_runs_while_somebody_wants_what_only_it_says"
+    ),
+    "camera/zoom": Reach("`ANAFI_CAMERA_EXPOSURE`.zoom", _ANAFI + "test_camera_exposure_and_intrinsics"),
+    "drone/altitude": Reach(
+        "`ALTITUDE`.bottom_clearance, `DISTANCE_SENSOR`",
+        _TELEMETRY + "test_conf_133_what_is_below_and_nothing_invented",
+    ),
+    "drone/altitude_above_to": Reach(
+        "`GLOBAL_POSITION_INT`.relative_alt, `ALTITUDE`", _TELEMETRY + "test_conf_035_altitudes_agree"
+    ),
+    "drone/attitude": Reach("`ATTITUDE_QUATERNION`", _TELEMETRY + "test_conf_040_attitude_signs"),
+    "drone/gps/fix": Reach("`GPS_RAW_INT`.fix_type", _TELEMETRY + "test_conf_036_gps"),
+    "drone/gps/location": Reach("`GLOBAL_POSITION_INT`, `GPS_RAW_INT`", _TELEMETRY + "test_conf_036_gps"),
+    "drone/gps/satellites": Reach("`GPS_RAW_INT`.satellites_visible", _TELEMETRY + "test_conf_036_gps"),
+    "drone/rpy": Reach("`ATTITUDE`", _TELEMETRY + "test_conf_040_attitude_signs"),
+    "drone/speed": Reach("`LOCAL_POSITION_NED`, `GLOBAL_POSITION_INT`", _TELEMETRY + "test_conf_041_velocity_signs"),
+    "drone/state": Reach("`EXTENDED_SYS_STATE`, `HEARTBEAT`, `ANAFI_FLIGHT_STATUS`", _ANAFI + "test_flight_status"),
+    "gimbal/attitude/absolute": Reach("", waits=PAYLOAD),
+    "home/location": Reach("`HOME_POSITION`, `ANAFI_HOME`", _TELEMETRY + "test_conf_034_home"),
+    "link/quality": Reach("`RADIO_STATUS`, `ANAFI_LINK`", _TELEMETRY + "test_conf_135_radio_status"),
+    "skycontroller/attitude": Reach("`ANAFI_CONTROLLER_ATTITUDE`", _ANAFI + "test_skycontroller"),
+    "skycontroller/command": Reach("`ANAFI_CONTROLLER_INPUT`", _ANAFI + "test_skycontroller"),
+    "skycontroller/rpy": Reach("`ANAFI_CONTROLLER_ATTITUDE`", _ANAFI + "test_skycontroller"),
+    "storage/available": Reach("", waits=PAYLOAD),
+    "time": Reach("`SYSTEM_TIME`", "conformance/test_conf_talk.py::test_conf_111_system_time"),
+    "camera/photo/stop": Reach("", waits=PAYLOAD),
+    "camera/photo/take": Reach("", waits=PAYLOAD),
+    "camera/recording/start": Reach("", waits=PAYLOAD),
+    "camera/recording/stop": Reach("", waits=PAYLOAD),
+    "camera/reset": Reach("", waits=PAYLOAD),
+    "drone/arm": Reach("`MAV_CMD_COMPONENT_ARM_DISARM` with `ANF_HAND_LAUNCH`", _MAINTENANCE + "test_a_launch_by_hand"),
+    "drone/calibrate": Reach("`MAV_CMD_PREFLIGHT_CALIBRATION`", _MAINTENANCE + "test_conf_130_the_magnetometer"),
+    "drone/emergency": Reach(
+        "`MAV_CMD_DO_FLIGHTTERMINATION`, `MAV_CMD_COMPONENT_ARM_DISARM`",
+        "conformance/test_conf_sequences.py::test_conf_050_the_cut_obeys_the_policy",
+    ),
+    "drone/halt": Reach("mode Hold, `MAV_CMD_DO_REPOSITION` with nothing set", _FLIGHT + "test_conf_026_pause"),
+    "drone/land": Reach("`MAV_CMD_NAV_LAND`, mode Land", _FLIGHT + "test_conf_024_land_by_command"),
+    "drone/reboot": Reach("`MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN`", _MAINTENANCE + "test_conf_148_reboot"),
+    "drone/rth": Reach("`MAV_CMD_NAV_RETURN_TO_LAUNCH`, mode Return", _FLIGHT + "test_conf_025_return"),
+    "drone/takeoff": Reach("`MAV_CMD_NAV_TAKEOFF`, mode Takeoff", _FLIGHT + "test_conf_021_takeoff_relative"),
+    "flightplan/pause": Reach("", waits=MISSIONS),
+    "flightplan/start": Reach("", waits=MISSIONS),
+    "flightplan/stop": Reach("", waits=MISSIONS),
+    "flightplan/upload": Reach("", waits=MISSIONS),
+    "gimbal/calibrate": Reach(
+        "`MAV_CMD_PREFLIGHT_CALIBRATION`, `MAV_CMD_GIMBAL_REQUEST_AXIS_CALIBRATION`",
+        _MAINTENANCE + "test_conf_130_the_gimbal",
+    ),
+    "gimbal/reset": Reach("", waits=PAYLOAD),
+    "home/navigate": Reach("`MAV_CMD_NAV_RETURN_TO_LAUNCH`, mode Hold", _FLIGHT + "test_conf_025_return"),
+    "home/set": Reach("`MAV_CMD_DO_SET_HOME`", _GUIDED + "test_conf_083_set_home"),
+    "skycontroller/offboard": Reach(
+        "`ANAFI_CONTROLLER_INPUT`.source; the gateway takes it when it is told to move",
+        _SAFETY + "test_a_pilots_stick_ends_offboard_for_good",
+    ),
+    "storage/download": Reach("", waits=PAYLOAD),
+    "storage/format": Reach("", waits=PAYLOAD),
+    "camera/autorecord": Reach("", waits=PAYLOAD),
+    "camera/ev_compensation": Reach("", waits=PAYLOAD),
+    "camera/hdr": Reach("", waits=PAYLOAD),
+    "camera/max_zoom_speed": Reach("", waits=PAYLOAD),
+    "camera/mode": Reach("", waits=PAYLOAD),
+    "camera/relative": Reach("", waits=PAYLOAD),
+    "camera/rendering": Reach("", waits=PAYLOAD),
+    "camera/streaming": Reach("", waits=PAYLOAD),
+    "camera/style": Reach("", waits=PAYLOAD),
+    "drone/banked_turn": Reach("`ANF_BANKED_TURN`", _PARAMETER),
+    "drone/max_altitude": Reach("`ANF_MAX_ALT`", _TWIN),
+    "drone/max_distance": Reach("`ANF_MAX_DIST`, `ANF_GEOFENCE`", _TWIN),
+    "drone/max_horizontal_speed": Reach(
+        "`ANF_HORI_SPEED` where the firmware has it; `MAV_CMD_DO_CHANGE_SPEED`",
+        _GUIDED + "test_conf_082_a_speed_counts_for_later_moves_too",
+    ),
+    "drone/max_pitch_roll": Reach("`ANF_MAX_TILT`", _TWIN),
+    "drone/max_pitch_roll_rate": Reach("`ANF_TILT_RATE`", _TWIN),
+    "drone/max_vertical_speed": Reach("`ANF_VERT_SPEED`", _TWIN),
+    "drone/max_yaw_rate": Reach("`ANF_YAW_RATE`", _TWIN),
+    "drone/model": Reach(
+        "`ANF_MODEL`, `AUTOPILOT_VERSION`", "conformance/test_conf_talk.py::test_conf_149_banner_and_version"
+    ),
+    "gimbal/max_speed": Reach("`ANF_GMB_SPEED`", _PARAMETER),
+    "home/autotrigger": Reach("`ANF_RTH_AUTO`", _TWIN),
+    "home/ending_behavior": Reach("`ANF_RTH_END`, `ANF_RTH_END_ALT`", _TWIN),
+    "home/min_altitude": Reach("`ANF_RTH_ALT`", _TWIN),
+    "home/precise": Reach("`ANF_RTH_PRECISE`", _PARAMETER),
+    "home/type": Reach("`ANF_HOME_TYPE`", _PARAMETER),
+    "storage/download_folder": Reach("", waits="nothing: a setting of the computer, not of the drone"),
+}
