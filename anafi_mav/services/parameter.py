@@ -58,6 +58,8 @@ class Parameter:
     """Sets it without further ado: of the gateway's own settings that outlive it."""
     volatile: bool = False
     """It changes by itself: left out of the hash."""
+    derived: bool = False
+    """Computed from its native: it has changed only if that has."""
     native: str = ""
     """The native name of the same value; empty for one that is native itself, or a fact."""
     source: str = ""
@@ -137,6 +139,7 @@ def twin(native: Parameter, name: str, kind: Kind = Kind.REAL32, *, scale: float
         step=None if native.step is None else native.step * scale,
         default=None if native.default is None else native.default * scale,
         native=native.name,
+        derived=True,
         **more,  # type: ignore[arg-type]
     )
 
@@ -166,6 +169,7 @@ def mapped(
         values=values,
         default=default,
         native=native.name,
+        derived=True,
         **more,  # type: ignore[arg-type]
     )
 

@@ -124,6 +124,11 @@ class ParameterService(Service):
         """By name of the flavour; empty until the drone has connected for the first time."""
         self._by_news: dict[type[Message], dict[str, list[int]]] = {}
         self._polled: dict[str, list[int]] = {}
+        """By name of the flavour: places of the gateway's own settings."""
+        self._own: list[Parameter] = []
+        """The gateway's own settings, each once."""
+        self._seen: list[float] = []
+        """Their values at the last look."""
         self._trickle = Trickle(host)
         self._waiting: deque[tuple[Inbound, Parameter, float]] = deque()
         self._writers: set[asyncio.Task[None]] = set()
@@ -155,6 +160,8 @@ class ParameterService(Service):
             self._lists = {flavour.name: ParameterList(self.host, flavour) for flavour in FLAVOURS.values()}
             for name, listed in self._lists.items():
                 self._polled[name] = [index for index, one in enumerate(listed.parameters) if one.polled]
+                own = (one for one in listed.parameters if one.polled and not one.derived)
+                self._own += [one for one in own if one not in self._own]
                 for index, parameter in enumerate(listed.parameters):
                     for event in parameter.news:
                         self._by_news.setdefault(event, {}).setdefault(name, []).append(index)
@@ -174,7 +181,6 @@ class ParameterService(Service):
 
     def tick(self, now: float) -> None:
         self._tell_settings()
-        self._keep()
 
     # What outlives the gateway.
 
@@ -318,7 +324,12 @@ class ParameterService(Service):
     # Telling.
 
     def _tell_settings(self) -> None:
-        """Tell everybody of the gateway's own settings that have changed."""
+        """Tell everybody of the gateway's own settings that have changed, and remember them."""
+        now = [one.read(self.host) for one in self._own]
+        if now == self._seen:
+            return
+        self._seen = now
+        self._keep()
         for name, indices in self._polled.items():
             self._tell(name, self._lists[name].changed(indices))
 

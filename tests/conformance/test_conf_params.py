@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import json
+import lzma
 import os
 import struct
 import time
@@ -14,6 +16,7 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.ftp import Ftp
 from support.lines import SerialClient, pseudo_terminal
 from support.mav import Client
 from support.params import fetch, read, send_set, value_of, write
@@ -23,6 +26,7 @@ from anafi_mav import geo
 from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.config import Config, DroneConfig
 from anafi_mav.gateway import Gateway
+from anafi_mav.services.parameters import NATIVE_NAMES
 from anafi_mav.sim import DroneSpec, Simulator
 
 INT8, INT16, INT32, REAL32 = 2, 4, 6, 9
@@ -264,6 +268,14 @@ async def test_the_ai_avoids_obstacles_by_parameter() -> None:
             assert w.commands("obstacle_avoidance.set_mode")[-1].args == {"mode": number}
 
 
+@pytest.mark.parametrize("model", ["4k", "thermal", "usa", "ai"])
+async def test_a_model_has_what_the_page_says(model: str) -> None:
+    """docs/parameters.md tells which models have a parameter; the drone's own events decide."""
+    async with world(model=model) as w:
+        names = {name for name in await fetch(w.client) if name.startswith("ANF_")}
+    assert names == {one.name for one in NATIVE_NAMES if one.models == "all" or model in one.models.split(", ")}
+
+
 async def test_two_flavours_see_one_value() -> None:
     """A write on a PX4 channel reaches the clients of an ArduPilot channel under their own name."""
     async with world(also="ardupilot") as w:
@@ -467,6 +479,12 @@ async def test_a_list_fits_through_a_radio() -> None:
             assert counts == {len(values)}
             assert gateway.counters()["dropped_frames"] == 0
             assert len(radio.since(mark, "ATTITUDE")) >= 2
+            # So does a file, and QGroundControl fetches this one before the list.
+            mark = radio.mark()
+            described = json.loads(lzma.decompress(await Ftp(radio).download("/parameter.json.xz")))
+            assert {one["name"] for one in described["parameters"]} == set(values)
+            assert gateway.counters()["dropped_frames"] == 0
+            assert radio.since(mark, "ATTITUDE")
             assert radio.bad == 0
             await radio.close()
 
