@@ -20,7 +20,7 @@ from anafi_mav.drone.alerts import spoken
 from anafi_mav.drone.element import Reducer, members, with_item
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT
 from anafi_mav.drone.settings import Commanding, number
-from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost, NotSupported
+from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, NotSupported
 
 FIGURE_TIMEOUT = 60.0
 """s between two signs of life of a figure: it tells how far it is every few percent."""
@@ -244,8 +244,10 @@ class Animations(Commanding[AnimationsState]):
         return not self.state.canceled
 
     async def cancel(self, timeout: float = ANSWER_TIMEOUT) -> None:
-        """Returns when nothing is flown, at once when nothing is."""
+        """Returns when nothing is flown, at once when nothing is and nothing is about to be."""
         self._require(self.state.running, "animations")
+        self._commander.call_off("stopped", animation.Cancel)
+        await self._commander.halted(animation.Cancel.NAME, timeout)
         if self.state.running == Type.NONE:
             return
         await self._commander.confirm(
@@ -272,15 +274,15 @@ class Animations(Commanding[AnimationsState]):
         if type not in (state.available or ()):
             raise CommandRejected(self._why(type))
         try:
-            await self._commander.confirm(
-                order, (_FIGURES[type],), lambda m: True if m.state == AnimationState.RUNNING else None, ANSWER_TIMEOUT
+            await self._commander.begin(
+                order,
+                (_FIGURES[type],),
+                lambda m: True if m.state == AnimationState.RUNNING else None,
+                ANSWER_TIMEOUT,
+                animation.Cancel(),
             )
-        except LinkLost:
-            raise
-        except BaseException as error:
-            if self._commander.connected:
-                self._commander.send(animation.Cancel())
-            if isinstance(error, CommandTimeout) and type not in (self.state.available or ()):
+        except CommandTimeout:
+            if type not in (self.state.available or ()):
                 raise CommandRejected(self._why(type)) from None
             raise
 

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from scripted_device import STATES, ScriptedDevice
 
-from anafi_mav.arsdk.messages import ardrone3, common, follow_me, rth
+from anafi_mav.arsdk.messages import animation, ardrone3, common, follow_me, rth
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState, MoveByError, PoiMode, PoiStatus
 from anafi_mav.arsdk.messages.common import MavlinkType, PlayingState
 from anafi_mav.arsdk.messages.rth import RthState, StateReason
@@ -28,6 +28,8 @@ OTHERS: list[Message] = [
     follow_me.State(follow_me.Mode.NONE, follow_me.Behavior.IDLE, follow_me.Animation.NONE, 0),
     follow_me.ModeInfo(LOOK_AT, 0, 0),
     common.MagnetoCalibrationStartedChanged(0),
+    animation.State(animation.Type.NONE, 0),
+    animation.Availability(1 << animation.Type.HORIZONTAL_PANORAMA),
 ]
 
 
@@ -98,6 +100,12 @@ BEGINNINGS: list[Any] = [
         lambda d: d.poi.start(*PLACE), ardrone3.StartPilotedPOIV2, ardrone3.StopPilotedPOI, id="point of interest"
     ),
     pytest.param(lambda d: d.follow_me.start(LOOK_AT), follow_me.Start, follow_me.Stop, id="follow me"),
+    pytest.param(
+        lambda d: d.animations.horizontal_panorama(),
+        animation.StartHorizontalPanorama,
+        animation.Cancel,
+        id="animation",
+    ),
 ]
 
 Verb = Callable[[Drone], Awaitable[Any]]
@@ -165,8 +173,14 @@ async def test_a_stop_is_confirmed_when_the_drone_has_the_order(
         (lambda d: d.flight_plan.start("abc"), lambda d: d.flight_plan.stop(), common.Start, common.Stop),
         (lambda d: d.poi.start(*PLACE), lambda d: d.poi.stop(), ardrone3.StartPilotedPOIV2, ardrone3.StopPilotedPOI),
         (lambda d: d.follow_me.start(LOOK_AT), lambda d: d.follow_me.stop(), follow_me.Start, follow_me.Stop),
+        (
+            lambda d: d.animations.horizontal_panorama(),
+            lambda d: d.animations.cancel(),
+            animation.StartHorizontalPanorama,
+            animation.Cancel,
+        ),
     ],
-    ids=["flight plan", "point of interest", "follow me"],
+    ids=["flight plan", "point of interest", "follow me", "animation"],
 )
 async def test_a_stop_of_what_has_not_begun_is_no_stop_of_nothing(
     drone: Drone, device: ScriptedDevice, verb: Verb, stop: Verb, start: type[Message], order: type[Message]
@@ -321,6 +335,7 @@ WISHES: list[Any] = [
     pytest.param(lambda d: d.flight_plan.start("abc"), id="flight plan"),
     pytest.param(lambda d: d.poi.start(*PLACE), id="point of interest"),
     pytest.param(lambda d: d.follow_me.start(LOOK_AT), id="follow me"),
+    pytest.param(lambda d: d.animations.horizontal_panorama(), id="animation"),
     pytest.param(lambda d: d.piloting.move_to(48.0, 2.0, 5.0), id="moveTo"),
     pytest.param(lambda d: d.piloting.move_by(1.0, 0.0, 0.0, 0.0), id="moveBy"),
 ]
