@@ -303,12 +303,37 @@ def parameters() -> str:
     return "".join(parts)
 
 
+SILENCE = """\
+# What the simulator does not answer
+
+<!-- Made by docs/generate.py from tests/unit/silent_commands.py. -->
+
+`tests/unit/test_sim_silence.py` sends every command that is declared, with several values and in every situation in
+which it could mean something, to each model and to each Skycontroller. All of them are answered by an event at once but
+these.
+"""
+
+
+def silence() -> str:
+    """docs/silence.md."""
+    from silent_commands import CONTROLLERS, DRONES
+
+    parts = [SILENCE]
+    for title, column, table in (("Drones", "models", DRONES), ("Skycontrollers", "generations", CONTROLLERS)):
+        parts.append(f"\n## {title}\n\n| commands | {column} | why |\n|---|---|---|\n")
+        for row in table:
+            names = ", ".join(f"`{name}`" for name in row.names.split())
+            parts.append(f"| {names} | {', '.join(row.where)} | {row.reason} |\n")
+    return "".join(parts)
+
+
 PAGES: dict[str, Callable[[], str]] = {
     "configuration.md": configuration,
     "dialect.md": dialect,
     "parameters.md": parameters,
     "seed.md": seed,
     "seed-mavlink.md": seed_mavlink,
+    "silence.md": silence,
 }
 
 

@@ -13,6 +13,7 @@ from anafi_mav.arsdk.messages import animation, ardrone3, common, flight_plan, f
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.messages.rth import StateReason
 from anafi_mav.arsdk.wire import Message, UnknownMessage
+from anafi_mav.sim import wireless
 from anafi_mav.sim.figures import STARTS as ANIMATIONS
 from anafi_mav.sim.flight import Flight
 from anafi_mav.sim.flight import Identity as Identity
@@ -44,6 +45,8 @@ class Firmware(Flight):
             self.guidance.apply_limits()
         for part in (self.compass, self.payload):
             answer = part.handle(message, self.time) if answer is None else answer
+        if answer is None:
+            answer = wireless.classic(message)
         if answer is None:
             answer = self.gimbal.handle(message, self.pose, self.time, self.state in AIRBORNE)
         if answer is None:

@@ -13,23 +13,20 @@ from anafi_mav.arsdk.messages import flight_plan, move, obstacle_avoidance
 from anafi_mav.arsdk.messages.proto import antiflicker, connectivity, developer, network, piloting, pointnfly, privacy
 from anafi_mav.arsdk.protobuf import Empty
 from anafi_mav.arsdk.wire import Message
+from anafi_mav.sim.wireless import Radio
 from anafi_mav.units import clip
 
-RADIO = 0
-"""Id of the one Wi-Fi radio."""
 HOVERING_ALTITUDES = (1.0, 10.0)
 """m that a take-off may end at. Assumed."""
-QUALITY, RSSI = 5, -40
-"""Of the link: 0 to 5, and dBm."""
-
-_CHANNEL = connectivity.Channel(radio_channel=connectivity.RadioChannel(band=connectivity.Band._5_0_GHZ, id=36))
+QUALITY = 5
+"""Of the link: 0 to 5."""
 
 
 class Services:
     """The settings of one Ai's services."""
 
     def __init__(self, ssid: str) -> None:
-        self._ssid = ssid
+        self._radio = Radio(ssid)
         self._antiflicker = antiflicker.Mode.AUTOMATIC
         self._shell = developer.Shell()
         self._airsdk_log = False
@@ -147,35 +144,8 @@ class Services:
 
     # -- connectivity
 
-    def _radios(self, m: connectivity.ListRadios) -> Iterable[Message]:
-        wifi = connectivity.RadioType.WIFI
-        yield connectivity.RadioList(radios={RADIO: wifi} if not m.type_filter or wifi in m.type_filter else {})
-
-    def _radio(self, m: connectivity.GetState) -> Iterable[Message]:
-        if m.radio_id != RADIO:
-            return
-        encryption = (connectivity.EncryptionType.OPEN, connectivity.EncryptionType.WPA2)
-        capabilities = connectivity.Capabilities(
-            model="simulated",
-            supported_modes=(connectivity.Mode.AP,),
-            supported_encryption_types=encryption,
-            supported_countries=("FR", "US", "GB", "DE", "CH"),
-        )
-        config = connectivity.AccessPointConfig(
-            security=connectivity.NetworkSecurityMode(encryption=encryption[1:]),
-            ssid=self._ssid,
-            country="FR",
-            environment=connectivity.EnvironmentValue(value=connectivity.Environment.OUTDOOR),
-            manual_channel=_CHANNEL,
-        )
-        yield connectivity.State(
-            radio_id=RADIO,
-            default_capabilities=capabilities if m.include_default_capabilities else None,
-            access_point_config=config,
-            access_point=connectivity.AccessPointState(system_state=connectivity.SystemState.RUNNING),
-            channel=_CHANNEL,
-            rssi=RSSI,
-        )
+    def _connectivity(self, m: Message) -> Iterable[Message]:
+        return self._radio.handle(m)
 
     # -- privacy
 
@@ -261,8 +231,11 @@ _HANDLERS: dict[type[Message], Callable[[Services, Any], Iterable[Message]]] = {
     network.SetRoutingPolicy: Services._network,
     network.SetCellularMaxBitrate: Services._network,
     network.SetDirectConnection: Services._network,
-    connectivity.ListRadios: Services._radios,
-    connectivity.GetState: Services._radio,
+    connectivity.ListRadios: Services._connectivity,
+    connectivity.GetState: Services._connectivity,
+    connectivity.SetMode: Services._connectivity,
+    connectivity.Scan: Services._connectivity,
+    connectivity.Configure: Services._connectivity,
     privacy.GetState: Services._privacy,
     privacy.SetLogMode: Services._privacy,
     privacy.EnableLogEncryption: Services._privacy,

@@ -12,14 +12,17 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+from anafi_mav.arsdk.envelope import ProtobufMessage
 from anafi_mav.arsdk.handshake import DeviceInfo
 from anafi_mav.arsdk.messages import ardrone3, camera, drone_manager, gimbal, mapper, rth, skyctrl
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.messages.drone_manager import DroneManagerConnectionState as Connection
 from anafi_mav.arsdk.messages.generic import ListFlags
 from anafi_mav.arsdk.messages.mapper import AxisAction, ButtonAction, ButtonEvent
+from anafi_mav.arsdk.messages.proto import device_manager
 from anafi_mav.arsdk.messages.skyctrl import Source
 from anafi_mav.arsdk.wire import Message, UnknownMessage
+from anafi_mav.sim.device_manager import DeviceManager
 
 MODELS = {3: 0x0918, 4: 0x091D}
 """Generation -> product number."""
@@ -93,6 +96,10 @@ class Skycontroller:
         """It would connect to the drone again by itself."""
         self.dropped = 0
         """PCMDs that did not reach the drone because the sticks fly it."""
+        self._manager = DeviceManager(drone) if generation >= 4 else None
+        """What speaks protobuf."""
+        self._calibration: list[tuple[float, skyctrl.State]] = []
+        """What the calibration of the controller's magnetometer will have reached, and when."""
         self._pressed = 0
         self._forward = forward
         self._note = note
@@ -176,6 +183,8 @@ class Skycontroller:
         self._set_radio(up)
         self._tell(self._connection())
         self._tell(mapper.ActiveProduct(self.drone.model_id if up else 0))
+        if self._manager is not None:
+            self._tell(self._manager.state(up, self.knows_drone))
 
     def _connection(self) -> Message:
         drone = self.drone
@@ -200,6 +209,8 @@ class Skycontroller:
         if now >= self._next_attitude:
             self._next_attitude = max(self._next_attitude + ATTITUDE_PERIOD, now)
             self._tell(skyctrl.AttitudeChanged(*_quaternion(*self.attitude)))
+        while self._calibration and now >= self._calibration[0][0]:
+            self._tell(skyctrl.MagnetoCalibrationStateV2(self._calibration.pop(0)[1]))
         if self.source is not Source.SKY_CONTROLLER or now < self._next_sticks:
             return
         sticks = [0 if self.grabbed_axes >> axis & 1 else self.axes[axis] for axis in (ROLL, PITCH, YAW, THROTTLE)]
@@ -235,6 +246,11 @@ class Skycontroller:
                 self._tell(skyctrl.PilotingSource(self.source))
             case skyctrl.EnableMagnetoCalibrationQualityUpdates(enable):
                 self._tell(skyctrl.MagnetoCalibrationQualityUpdatesState(int(enable != 0)))
+            case skyctrl.StartCalibration():
+                self._calibrate()
+            case skyctrl.AbortCalibration():
+                self._calibration.clear()
+                self._tell(skyctrl.MagnetoCalibrationStateV2(skyctrl.State.CALIBRATED))
             case drone_manager.DiscoverDrones():
                 self._tell(self._list_item())
             case drone_manager.Connect(serial, _):
@@ -256,11 +272,23 @@ class Skycontroller:
                 self._tell(mapper.VolatileMappingState(int(isinstance(message, mapper.EnterVolatileMapping))))
             case ardrone3.PCMD() if self.source is Source.SKY_CONTROLLER:
                 self.dropped += 1
+            case ProtobufMessage() if self._manager is not None:
+                if isinstance(message, device_manager.ForgetDevice) and message.uid == self.drone.serial:
+                    self.knows_drone = False
+                answer = self._manager.handle(message, self._radio, self.knows_drone)
+                self._tell(*(answer or ()))
+                return answer is not None or not self._radio
             case Message() | UnknownMessage():
                 project = message.id.project if isinstance(message, UnknownMessage) else message.ID.project
                 # What is left of its own projects it has no answer to.
                 return project in (4, 137, 138) or not self._radio
         return True
+
+    def _calibrate(self) -> None:
+        """Somebody turns the controller as it wishes, an axis a second."""
+        if not self._calibration:
+            axes = (skyctrl.State.CALIBRATING_X, skyctrl.State.CALIBRATING_Y, skyctrl.State.CALIBRATING_Z)
+            self._calibration = [(self._now + n, one) for n, one in enumerate((*axes, skyctrl.State.CALIBRATED))]
 
     def _tell(self, *messages: Message) -> None:
         if self.send is not None:
@@ -310,6 +338,7 @@ class Skycontroller:
             skyctrl.GpsPositionChanged(500.0, 500.0, 500.0, 500.0),
             skyctrl.MagnetoCalibrationQualityUpdatesState(0),
             skyctrl.MagnetoCalibrationState(skyctrl.CalibrationStatus.CALIBRATED, 255, 255, 255),
+            skyctrl.MagnetoCalibrationStateV2(skyctrl.State.CALIBRATED),
         ]
 
     def _settings(self) -> list[Message]:

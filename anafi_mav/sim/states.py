@@ -18,6 +18,7 @@ from anafi_mav.arsdk.messages import (
 from anafi_mav.arsdk.wire import Message
 from anafi_mav.sim.firmware import Firmware
 from anafi_mav.sim.safety import checklist
+from anafi_mav.sim.wireless import COUNTRIES, RSSI
 
 
 def _bits(values: Iterable[int]) -> int:
@@ -40,7 +41,7 @@ def all_settings(firmware: Firmware) -> list[Message]:
         ardrone3.MotorSoftwareVersionChanged("1.0"),
         firmware.flights_report(),
         *firmware.warnings.settings_report(),
-        wifi.SupportedCountries("FR;US;GB;DE;CH"),
+        wifi.SupportedCountries(";".join(COUNTRIES)),
         wifi.SupportedSecurityTypes(1 << wifi.SecurityType.OPEN | 1 << wifi.SecurityType.WPA2),
     ]
 
@@ -53,7 +54,7 @@ def all_states(firmware: Firmware) -> list[Message]:
         *(common.SensorsStatesListChanged(sensor, int(firmware.sensor_ok(sensor))) for sensor in common.Sensor),
         common.CurrentDateTimeChanged(firmware.datetime),
         common.LinkSignalQuality(5),
-        wifi.RssiChanged(-40),
+        wifi.RssiChanged(RSSI),
         common.BootId(firmware.identity.boot_id),
         common.FlightId(firmware.flight_id),
         common.RunIdChanged(firmware.identity.run_id),
