@@ -1,9 +1,9 @@
 """Live video and replay with Parrot's Olympe alone: ``olympe_video.py ADDRESS CLASS RTSP_PORT HTTP_PORT MEDIA...``.
 
 CLASS is Olympe's: Drone, SkyController3 or SkyController4; through a Skycontroller the ports are not used. The first
-MEDIA is watched while the drone flies and its camera zooms, the others for a moment. With HTTP_PORT a recording is
-made and replayed. Knows nothing of this project. Prints one JSON object: what each step came to, and for each stream
-what Olympe decoded: pictures and what they say. Olympe's log goes to stderr.
+MEDIA is watched while the drone flies and its camera zooms, the others for a moment, and then all at once. With
+HTTP_PORT a recording is made and replayed. Knows nothing of this project. Prints one JSON object: what each step came
+to, and for each stream what Olympe decoded: pictures and what they say. Olympe's log goes to stderr.
 """
 
 from __future__ import annotations
@@ -20,8 +20,10 @@ OUT = os.fdopen(os.dup(1), "w")
 os.dup2(2, 1)  # Olympe logs to stdout
 
 import olympe  # noqa: E402
+from olympe.features.video.pdraw import Callbacks, StreamInfo, video_frame_type  # noqa: E402
 from olympe.messages import camera, camera2  # noqa: E402
 from olympe.messages.ardrone3 import Piloting, PilotingEvent, PilotingState  # noqa: E402
+from olympe.utils.enum import get_enum_value_as_int  # noqa: E402
 
 LIMIT = 20.0
 """s for anything."""
@@ -111,6 +113,25 @@ class Visit:
         )
         return watch
 
+    def together(self) -> None:
+        """All streams in one session."""
+        watches = {name: Watch() for name in self.names}
+        raw = (get_enum_value_as_int(video_frame_type.raw), None)
+        streams = [
+            StreamInfo(name=name, callbacks=[Callbacks(media_type=raw, video_frame=watch.raw)])
+            for name, watch in watches.items()
+        ]
+        self.steps["play all"] = bool(
+            self.drone.streaming.play_multiple_stream(
+                resource_name="live", streams_list=streams, timeout=LIMIT, **self.where
+            )
+        )
+        for name, watch in watches.items():
+            self.steps[f"{name} beside others"] = watch.wait(20)
+        self.steps["stop all"] = bool(self.drone.streaming.stop())
+        for name, watch in watches.items():
+            self.streams[f"{name} beside others"] = watch.told()
+
     def stop(self, name: str, watch: Watch) -> None:
         for stream in self.drone.streaming.multistreams:
             told = stream.session_metadata
@@ -169,6 +190,8 @@ class Visit:
             self.stop(name, watch)
         if self.http_port:
             self.replay()
+        if others:
+            self.together()
         self.steps["disconnect"] = bool(self.drone.disconnect())
 
 

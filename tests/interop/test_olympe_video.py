@@ -219,6 +219,9 @@ def check_streams(report: dict[str, Any], names: list[str], log: list[dict[str, 
         assert sent[name]["lost"] <= 1
         if name != names[0]:
             assert len(stream["said"]) >= 30
+        if len(names) > 1:
+            beside = report["streams"][f"{name} beside others"]
+            assert (beside["size"], beside["shades"]) == (SIZES[name], [168, 88])
 
 
 @pytest.mark.parametrize(
