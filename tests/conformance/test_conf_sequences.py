@@ -113,6 +113,36 @@ async def mode(w: World, number: int) -> None:
     await w.client.heartbeat(lambda beat: beat.custom_mode == number, since=mark, timeout=1.3)
 
 
+async def test_the_same_flight_ends_at_the_same_place_in_both_flavours() -> None:
+    """Each in the words of its own clients: up, over there, another height, a turn, back down where it is."""
+    places = []
+    for flavour in FLAVOURS:
+        async with world(flavour=flavour) as w:
+            client, there = w.client, geo.destination(*HOME[:2], 18.0, -12.0)
+            await w.take_off(6.0)
+            heading = NAN if flavour == "px4" else 0.0  # what each family sends for none
+            ack = await client.command(REPOSITION, -1, 1, 0, heading, frame=3, x=there[0], y=there[1], z=9.0)
+            assert ack.result == ACCEPTED
+            await w.drone.wait_log(lambda e: e.name.endswith("moveToChanged") and e.args["status"] == 1, 30.0)
+            if flavour == "px4":
+                assert (await client.command(REPOSITION, NAN, 1, NAN, NAN, z=HOME[2] + 5.0)).result == ACCEPTED
+            else:
+                client.send(dialect.MAVLink_mission_item_message(1, 1, 0, 3, 16, 3, 1, 0, 0, 0, 0, 0, 0, 5.0))
+            await w.drone.wait_log(lambda e: e.kind == "pose" and abs(e.args["up"] - 5.0) < 0.2, 20.0)
+            if flavour == "px4":
+                assert (await client.command(REPOSITION, NAN, 1, NAN, 1.0)).result == ACCEPTED
+            else:
+                degrees = 180.0 / 3.141592653589793
+                assert (await client.command(115, degrees, 0, 0, 0, timeout=20.0)).result == ACCEPTED
+            await w.drone.wait_log(lambda e: e.kind == "pose" and abs(e.args["yaw"] - 1.0) < 0.05, 20.0)
+            client.send(dialect.MAVLink_set_mode_message(1, 1, w.modes.land))
+            await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landed", 30.0)
+            pose = w.drone.pose
+            places.append((pose.north, pose.east, pose.up, pose.yaw))
+    assert places[0] == pytest.approx(places[1], abs=0.7)
+    assert places[0][:2] == pytest.approx((18.0, -12.0), abs=1.0)
+
+
 async def test_conf_120_mission_planner() -> None:
     """Its connection, its buttons, and what it asks of cameras and gimbals that are not there."""
     async with world(flavour="ardupilot") as w:
