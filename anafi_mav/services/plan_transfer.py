@@ -174,6 +174,11 @@ class _Download:
     left: set[int] = field(default_factory=set)
     """Items that were not asked for yet."""
 
+    @property
+    def under_way(self) -> bool:
+        """Some items were asked for, and others will be. Who asks for no more than their number keeps nobody away."""
+        return 0 < len(self.left) < len(self.items)
+
 
 @dataclass
 class _Done:
@@ -439,7 +444,7 @@ class PlanTransfer:
         if upload is not None and upload.peer.client != peer.client and now - upload.heard < PATIENCE:
             return True
         return any(
-            client != peer.client and download.left and now - download.asked < PATIENCE
+            client != peer.client and download.under_way and now - download.asked < PATIENCE
             for client, download in self._downloads.items()
         )
 

@@ -360,6 +360,13 @@ def test_an_upload_during_another_clients_download_is_refused() -> None:
     assert replies(plans.receive(count(1), OTHER, 2.0 + PATIENCE))[0].seq == 0  # it fell silent
 
 
+def test_asking_how_many_there_are_keeps_nobody_away() -> None:
+    plans = desk()
+    plans.transfers[FENCE].put(items(3))
+    plans.receive(ask_list(), ME, 0.0)
+    assert replies(plans.receive(count(1), OTHER, 0.0))[0].seq == 0
+
+
 def test_a_download_that_has_all_it_asked_for_keeps_nobody_away() -> None:
     """MAVProxy does not say that it is done."""
     plans = desk()
