@@ -327,6 +327,46 @@ def silence() -> str:
     return "".join(parts)
 
 
+STATES = """\
+# State machines
+
+<!-- Made by docs/generate.py from the tables of the code. -->
+
+What can happen in which state, and what comes of it. A test walks every pair of state and event. What has no arrow
+changes nothing: it is ignored, refused or put off, as the module says.
+"""
+
+
+def states() -> str:
+    """docs/states.md."""
+    from anafi_mav.services import fence_watch, ftp, offboard, plan_transfer
+    from anafi_mav.sim import machine
+
+    tables: list[tuple[str, Any]] = [
+        ("Transfer of a mission, a fence or rally points", plan_transfer),
+        ("The fence", fence_watch),
+        ("Setpoints of a program", offboard),
+        ("A session of MAVLink FTP", ftp),
+        ("The simulated drone's flight", machine),
+    ]
+    parts = [STATES]
+    for title, module in tables:
+        table = module.TRANSITIONS
+        parts.append(f"\n## {title}\n\n`{module.__name__}`\n\n```mermaid\nstateDiagram-v2\n")
+        for state, row in table.items():
+            by_target: dict[Any, list[str]] = {}
+            for event, target in row.items():
+                by_target.setdefault(target, []).append(event.name)
+            for target, events in by_target.items():
+                parts.append(f"    {state.name} --> {target.name}: {', '.join(events)}\n")
+        parts.append("```\n\n| | |\n|---|---|\n")
+        for state in table:
+            if isinstance(state.value, str):
+                parts.append(f"| state `{state.name}` | {state.value} |\n")
+        parts += [f"| event `{event.name}` | {event.value} |\n" for event in module.Event]
+    return "".join(parts)
+
+
 PAGES: dict[str, Callable[[], str]] = {
     "configuration.md": configuration,
     "dialect.md": dialect,
@@ -334,6 +374,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "seed.md": seed,
     "seed-mavlink.md": seed_mavlink,
     "silence.md": silence,
+    "states.md": states,
 }
 
 

@@ -1,7 +1,7 @@
 """The fence enforced: watches where the drone is, acts at the boundary, tells everybody (MAVLink FENCE_STATUS).
 
-What is to be done is `fence_watch`'s to say; which zones there are, a client's upload (`plan_service`). The settings
-outlive the gateway, whoever changes them.
+What is to be done is `fence_watch`'s to say; which zones there are, a client's upload (`plan_service`). Settings are
+parameters (`parameter_table_fence`).
 """
 
 from __future__ import annotations
@@ -30,28 +30,8 @@ LOOK_EVERY = 0.5
 MIRROR_EVERY = 1.0
 """s between looks whether the drone's own geofence has to change."""
 
-HIGHEST_FLOOR = 1000.0
-"""m above take-off."""
-
-KEY = "fence"
-"""In the drone's memory: the settings."""
-
 DISABLE, ENABLE, DISABLE_FLOOR = 0.0, 1.0, 2.0
 """param1 of MAV_CMD_DO_FENCE_ENABLE."""
-
-
-async def set_action(host: Host, action: Reaction) -> None:
-    """What happens at the boundary. Raises `Refused` for a motor cut that the configuration does not allow."""
-    if action is Reaction.TERMINATE and not host.vehicle.allow_kill:
-        raise Refused("Refused: a fence that cuts the motors needs allow_kill: true", lasting=True)
-    host.vehicle.fence.action = action
-
-
-async def set_floor(host: Host, metres: float) -> None:
-    """Lowest height above the take-off point; 0: none."""
-    if not 0.0 <= metres <= HIGHEST_FLOOR:
-        raise Refused(f"Refused: a floor is 0 to {HIGHEST_FLOOR:g} m above take-off", lasting=True)
-    host.vehicle.fence.floor = metres
 
 
 class FenceService(Service):
@@ -79,7 +59,6 @@ class FenceService(Service):
         return {dialect.MAVLINK_MSG_ID_FENCE_STATUS: Stream(self._status, on_change=True)}
 
     def link_up(self) -> None:
-        self._restore_settings()
         self._located = -math.inf if self.host.vehicle.place is None else self.host.clock.monotonic()
 
     def link_down(self) -> None:
@@ -100,7 +79,6 @@ class FenceService(Service):
         if now - self._mirrored >= MIRROR_EVERY:
             self._mirrored = now
             self._mirror.update(now)
-        self._keep_settings()
 
     # Watching.
 
@@ -205,7 +183,7 @@ class FenceService(Service):
             if message is not None and not first:
                 self.host.send(message)
 
-    # Settings.
+    # Commands.
 
     async def _enable(self, command: Command) -> None:
         """MAV_CMD_DO_FENCE_ENABLE: param1 0 disable, 1 enable, 2 disable the floor; param2 FENCE_TYPE bits, 0 all."""
@@ -223,34 +201,3 @@ class FenceService(Service):
         else:
             watch.disable(int(wanted))
         self._look(self.host.clock.monotonic())
-
-    def _keep_settings(self) -> None:
-        """Whoever changed them: they are there when the gateway comes back."""
-        watch = self._watch
-        now = {"action": watch.action.name, "types": watch.types, "predict": watch.predict, "floor": watch.floor}
-        memory = self.host.memory
-        if memory.settings.get(KEY, _DEFAULTS) != now:
-            memory.settings[KEY] = now
-            self.host.spawn(self._save())
-
-    async def _save(self) -> None:
-        if (problem := await self.host.memory.save()) is not None:
-            self.host.complain(problem)
-
-    def _restore_settings(self) -> None:
-        """What is remembered; the defaults for what is not, or makes no sense."""
-        kept = self.host.memory.settings.get(KEY)
-        kept = {**_DEFAULTS, **kept} if isinstance(kept, dict) else _DEFAULTS
-        watch = self._watch
-        action = Reaction.__members__.get(str(kept["action"]), Reaction.HOLD)
-        if action is Reaction.TERMINATE and not self.host.vehicle.allow_kill:
-            self.host.text(Severity.WARNING, "Fence: its action was a motor cut, which is not allowed any more: hold")
-            action = Reaction.HOLD
-        watch.action = action
-        types, floor = kept["types"], kept["floor"]
-        watch.types = types if isinstance(types, int) and 0 <= types <= EVERYTHING else EVERYTHING
-        watch.predict = kept["predict"] is not False
-        watch.floor = float(floor) if isinstance(floor, int | float) and 0.0 <= floor <= HIGHEST_FLOOR else 0.0
-
-
-_DEFAULTS: Mapping[str, Any] = {"action": Reaction.HOLD.name, "types": EVERYTHING, "predict": True, "floor": 0.0}

@@ -32,6 +32,9 @@ BACK_INSIDE = 2.0
 STALE = 3.0
 """s after which a position is not known any more: it comes once a second."""
 
+HIGHEST_FLOOR = 1000.0
+"""m above take-off."""
+
 SLACK = 1.0
 """m beyond floor or ceiling that are no breach yet: the barometer drifts, and climbs overshoot."""
 

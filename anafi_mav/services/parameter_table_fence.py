@@ -3,23 +3,42 @@
 from __future__ import annotations
 
 from anafi_mav.drone import events
-from anafi_mav.services.fence_service import HIGHEST_FLOOR, set_action, set_floor
-from anafi_mav.services.fence_watch import ARDUPILOT_ACTIONS, CEILING, FLOOR, HOME_CIRCLE, PX4_ACTIONS, ZONES, Reaction
-from anafi_mav.services.parameter import Parameter, mapped, twin
+from anafi_mav.services.fence_watch import (
+    ARDUPILOT_ACTIONS,
+    CEILING,
+    EVERYTHING,
+    FLOOR,
+    HIGHEST_FLOOR,
+    HOME_CIRCLE,
+    PX4_ACTIONS,
+    ZONES,
+    Reaction,
+)
+from anafi_mav.services.parameter import Parameter, mapped, own, twin
 from anafi_mav.services.parameter_codec import Kind
 from anafi_mav.services.parameter_table import GEOFENCE, OFF_ON
 from anafi_mav.services.rally import DEFAULT_TYPE, RTL_TYPES
-from anafi_mav.services.rally_service import set_rtl_type
 from anafi_mav.services.refusal import Refused
 from anafi_mav.services.service import Host
+from anafi_mav.services.statustext import Severity
 
 GROUP = "Fence and rally points"
 
 _NUMBERS = {action: number for number, action in PX4_ACTIONS.items()}
 
 
+def _put_action(host: Host, value: float) -> None:
+    action = PX4_ACTIONS[int(value)]
+    if action is Reaction.TERMINATE and not host.vehicle.allow_kill:
+        host.text(Severity.WARNING, "Fence: its action was a motor cut, which is not allowed any more: hold")
+        action = Reaction.HOLD
+    host.vehicle.fence.action = action
+
+
 async def _set_action(host: Host, value: float) -> None:
-    await set_action(host, PX4_ACTIONS[int(value)])
+    if PX4_ACTIONS[int(value)] is Reaction.TERMINATE and not host.vehicle.allow_kill:
+        raise Refused("Refused: a fence that cuts the motors needs allow_kill: true", lasting=True)
+    _put_action(host, value)
 
 
 FENCE_ACTION = Parameter(
@@ -28,6 +47,7 @@ FENCE_ACTION = Parameter(
     "What happens at the fence",
     read=lambda host: float(_NUMBERS[host.vehicle.fence.action]),
     write=_set_action,
+    put=_put_action,
     values={number: action.value.capitalize() for number, action in PX4_ACTIONS.items()},
     polled=True,
     group=GROUP,
@@ -59,7 +79,28 @@ FENCE_ENABLED = Parameter(
 )
 
 
-async def _set_predict(host: Host, value: float) -> None:
+def _put_types(host: Host, value: float) -> None:
+    host.vehicle.fence.types = int(value)
+
+
+FENCE_TYPES = Parameter(
+    "ANF_FENCE_TYPES",
+    Kind.INT32,
+    "Kinds of boundaries that are in force",
+    read=lambda host: float(host.vehicle.fence.types),
+    write=own(_put_types),
+    put=_put_types,
+    limits=lambda host: (0.0, float(EVERYTHING)),
+    polled=True,
+    group=GROUP,
+    long="Bits: 1 the drone's own ceiling, to which it keeps in any case, 2 circles around home, 4 all other zones, "
+    "8 the floor.",
+    default=float(EVERYTHING),
+    source="gateway",
+)
+
+
+def _put_predict(host: Host, value: float) -> None:
     host.vehicle.fence.predict = value == 1
 
 
@@ -68,7 +109,8 @@ FENCE_AHEAD = Parameter(
     Kind.INT32,
     "Act when the drone is too fast to stop before the fence",
     read=lambda host: float(host.vehicle.fence.predict),
-    write=_set_predict,
+    write=own(_put_predict),
+    put=_put_predict,
     values=OFF_ON,
     polled=True,
     group=GROUP,
@@ -76,12 +118,19 @@ FENCE_AHEAD = Parameter(
     default=1.0,
     source="gateway",
 )
+
+
+def _put_floor(host: Host, value: float) -> None:
+    host.vehicle.fence.floor = value
+
+
 FENCE_FLOOR = Parameter(
     "ANF_FENCE_FLOOR",
     Kind.REAL32,
     "Lowest height of the fence above the take-off point, 0: none",
     read=lambda host: host.vehicle.fence.floor,
-    write=set_floor,
+    write=own(_put_floor),
+    put=_put_floor,
     limits=lambda host: (0.0, HIGHEST_FLOOR),
     polled=True,
     unit="m",
@@ -94,8 +143,8 @@ FENCE_FLOOR = Parameter(
 )
 
 
-async def _set_rtl_type(host: Host, value: float) -> None:
-    await set_rtl_type(host, int(value))
+def _put_rtl_type(host: Host, value: float) -> None:
+    host.vehicle.rally.rtl_type = int(value)
 
 
 RTL_TYPE = Parameter(
@@ -103,7 +152,8 @@ RTL_TYPE = Parameter(
     Kind.INT32,
     "Where a return ends",
     read=lambda host: float(host.vehicle.rally.rtl_type),
-    write=_set_rtl_type,
+    write=own(_put_rtl_type),
+    put=_put_rtl_type,
     values={number: purpose.value.capitalize() for number, purpose in RTL_TYPES.items()},
     polled=True,
     group=GROUP,
@@ -112,7 +162,7 @@ RTL_TYPE = Parameter(
     source="gateway",
 )
 
-FENCE_NATIVE: tuple[Parameter, ...] = (FENCE_ACTION, FENCE_ENABLED, FENCE_AHEAD, FENCE_FLOOR, RTL_TYPE)
+FENCE_NATIVE: tuple[Parameter, ...] = (FENCE_ACTION, FENCE_ENABLED, FENCE_TYPES, FENCE_AHEAD, FENCE_FLOOR, RTL_TYPE)
 
 FENCE_PX4: tuple[Parameter, ...] = (
     mapped(FENCE_ACTION, "GF_ACTION", Kind.INT32, FENCE_ACTION.values, {number: number for number in PX4_ACTIONS}),
@@ -151,7 +201,7 @@ FENCE_TYPE = Parameter(
     write=_set_types,
     values={
         types: ", ".join(word for bit, word in _TYPE_WORDS.items() if types & bit).capitalize()
-        for types in range(CEILING, 16, 2)
+        for types in range(CEILING, EVERYTHING + 1, 2)
     },
     news=(events.NoFlyOverMaxDistanceChanged,),
     polled=True,

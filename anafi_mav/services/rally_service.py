@@ -11,8 +11,7 @@ import math
 
 from anafi_mav.drone.events import RthHomeType
 from anafi_mav.errors import AnafiMavError
-from anafi_mav.services.rally import DEFAULT_TYPE, RTL_TYPES, RallyPoint, RallyPoints, Return
-from anafi_mav.services.refusal import Refused
+from anafi_mav.services.rally import RallyPoint, RallyPoints, Return
 from anafi_mav.services.service import Host, Service
 from anafi_mav.services.statustext import Severity
 
@@ -22,18 +21,8 @@ LOOK_EVERY = 1.0
 REJECTED_FOR = 30.0
 """s for which a point that the drone did not accept is not proposed again: it may be too far away only for now."""
 
-KEY = "rally"
-"""In the drone's memory: RTL_TYPE."""
-
 MIRROR = "rally_home"
 """In the drone's memory: the home type that the drone preferred before a rally point became its home."""
-
-
-async def set_rtl_type(host: Host, number: int) -> None:
-    """RTL_TYPE. Raises `Refused` for a number that PX4 does not have."""
-    if number not in RTL_TYPES:
-        raise Refused(f"Refused: RTL_TYPE is 0 to {max(RTL_TYPES)}", lasting=True)
-    host.vehicle.rally.rtl_type = number
 
 
 class RallyService(Service):
@@ -53,8 +42,6 @@ class RallyService(Service):
         return self.host.vehicle.rally
 
     def link_up(self) -> None:
-        kept = self.host.memory.settings.get(KEY)
-        self._rally.rtl_type = kept if isinstance(kept, int) and kept in RTL_TYPES else DEFAULT_TYPE
         self._chosen = None
 
     def link_down(self) -> None:
@@ -66,7 +53,6 @@ class RallyService(Service):
         if now - self._looked < LOOK_EVERY:
             return
         self._looked = now
-        self._keep_setting()
         if self._task is not None and not self._task.done():
             return
         vehicle, state = self.host.vehicle, self.host.drone.home.state
@@ -148,12 +134,6 @@ class RallyService(Service):
         else:
             settings[MIRROR] = name
         await self._save()
-
-    def _keep_setting(self) -> None:
-        settings = self.host.memory.settings
-        if settings.get(KEY, DEFAULT_TYPE) != self._rally.rtl_type:
-            settings[KEY] = self._rally.rtl_type
-            self.host.spawn(self._save())
 
     async def _save(self) -> None:
         if (problem := await self.host.memory.save()) is not None:

@@ -20,6 +20,7 @@ class Item(NamedTuple):
 
 
 _LATER_CAMERA = "camera and gimbal components"
+_MISSIONS = "missions"
 
 ITEMS: dict[int, Item] = {
     1: Item("heartbeat at 1 Hz from component 1, type quadrotor, the flavour's autopilot, custom mode flag"),
@@ -66,6 +67,8 @@ ITEMS: dict[int, Item] = {
     44: Item("a parameter written: echoed; unknown: PARAM_ERROR"),
     45: Item("integers and floats in the flavour's encoding"),
     46: Item("empty lists of missions, fences, rally points: COUNT 0 within 500 ms"),
+    47: Item("ten items uploaded and downloaded are equal", part=_MISSIONS),
+    48: Item("requests and acknowledgements go to who asked", part=_MISSIONS),
     50: Item("the motors' cut obeys the policy and says so"),
     51: Item("QGroundControl's connection sequence is through within 10 s"),
     52: Item("every parameter that QGroundControl's pages ask for is there"),
@@ -77,6 +80,18 @@ ITEMS: dict[int, Item] = {
     58: Item("AVAILABLE_MODES_MONITOR tells that the list has changed"),
     59: Item("DO_SET_STANDARD_MODE"),
     60: Item("PROTOCOL_VERSION on request"),
+    61: Item("an upload with a quarter of everything lost; requested again within 250 ms", part=_MISSIONS),
+    62: Item("copies and items out of order are ignored", part=_MISSIONS),
+    63: Item("an aborted upload keeps the old plan", part=_MISSIONS),
+    64: Item("the client cancels", part=_MISSIONS),
+    65: Item("a second client is refused during a transfer", part=_MISSIONS),
+    66: Item("what cannot be kept is refused with the item and the reason", part=_MISSIONS),
+    67: Item("NO_SPACE", part=_MISSIONS),
+    68: Item("COUNT 0 and CLEAR_ALL of every type", part=_MISSIONS),
+    69: Item("MISSION_REQUEST answered by MISSION_ITEM", part=_MISSIONS),
+    70: Item("five requests at once", part=_MISSIONS),
+    71: Item("opaque ids agree and change", part=_MISSIONS),
+    72: Item("setting the current item", part=_MISSIONS),
     76: Item("fence uploaded and enforced, FENCE_STATUS"),
     77: Item("rally points uploaded and downloaded"),
     78: Item("orbit: AMSL in every frame, both directions"),
@@ -103,6 +118,7 @@ ITEMS: dict[int, Item] = {
     119: Item("MAVProxy on ArduPilot's flavour", COPTER, "missions"),
     120: Item("Mission Planner's sequences on ArduPilot's flavour", COPTER, "missions, camera"),
     121: Item("two vehicles, two ground stations: no answer goes astray", NEITHER),
+    122: Item("plans outlive the gateway and a lost link", NEITHER, _MISSIONS),
     125: Item("COMPONENT_METADATA, general.json, parameter.json", NEITHER),
     126: Item("EVENT, REQUEST_EVENT, arming report", NEITHER),
     127: Item("RUN_PREARM_CHECKS", NEITHER),
@@ -114,6 +130,7 @@ ITEMS: dict[int, Item] = {
     134: Item("RC_CHANNELS rssi in the flavour's scale"),
     135: Item("RADIO_STATUS from the link's quality", NEITHER),
     140: Item("EKF_STATUS_REPORT"),
+    142: Item("MISSION_WRITE_PARTIAL_LIST for ArduPilot's clients, refused to PX4's", part=_MISSIONS),
     143: Item("pause and continue, heading, altitude, fence by command"),
     146: Item("malformed, truncated and oversized frames change nothing", NEITHER),
     147: Item("PING storm, 50 Hz MANUAL_CONTROL, four clients: the heartbeat keeps its time", NEITHER),
@@ -124,5 +141,5 @@ ITEMS: dict[int, Item] = {
     155: Item("LINK_NODE_STATUS, ONBOARD_COMPUTER_STATUS on request", NEITHER),
     156: Item("the standard flavour connects and takes off", NEITHER),
 }
-"""In scope so far, by number. Missing: 3, 4, 84-103, 128, 136-139, 154 (camera, gimbal), 47-49, 61-75, 122, 141, 142
-(missions), 123, 124, 144, 145, 151, 152 (fleet)."""
+"""In scope so far, by number. Missing: 3, 4, 84-103, 128, 136-139, 154 (camera, gimbal), 49, 73-75, 141 (missions),
+123, 124, 144, 145, 151, 152 (fleet)."""
