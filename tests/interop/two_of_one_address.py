@@ -25,7 +25,7 @@ async def visit(address: str, interface: str, folder: Path, watching: asyncio.Ev
         async with drone.video.watching():
             watching.set()
             await other.wait()
-            frames = [await drone.video.next_frame() for _ in range(30)]
+            frames = [await drone.video.next_frame(10.0) for _ in range(30)]
             shown = drone.video.state.shown
             assert shown is not None
             await drone.camera.set_mode(CameraMode.PHOTO)

@@ -277,7 +277,7 @@ async def _camera_info(pair: Pair) -> object:
 
 async def _frame(pair: Pair) -> VideoFrame:
     async with pair.drone.video.watching():
-        return await pair.drone.video.next_frame()
+        return await pair.drone.video.next_frame(10.0)
 
 
 def _said(name: str, field: str, note: str = "") -> Row:

@@ -29,7 +29,7 @@ async def test_the_pictures_say_what_the_drone_does(model: str) -> None:
         await drone.piloting.move_by(0.0, 0.0, -3.0, math.radians(100.0))
         async with drone.video.watching():
             # Standing still, the newest picture and the drone itself say the same.
-            said = (await drone.video.next_frame()).metadata
+            said = (await drone.video.next_frame(10.0)).metadata
             frame, pose = drone.video.state.frame, real.pose
             assert frame is not None
             assert frame.attitude is not None
@@ -48,7 +48,7 @@ async def test_the_pictures_say_what_the_drone_does(model: str) -> None:
                 assert said.wifi.goodput > 0
             for _ in range(20):
                 drone.piloting.pilot(PilotingCommand(roll_deg=8.0))
-                frame = await drone.video.next_frame()
+                frame = await drone.video.next_frame(10.0)
             assert frame.attitude is not None
             assert math.degrees(frame.attitude.roll) == pytest.approx(8.0, abs=1.5)
             drone.piloting.hover()
@@ -59,16 +59,16 @@ async def test_what_was_set_is_seen_in_the_pictures(model: str) -> None:
     async with connected(model) as pair, pair.drone.video.watching():
         drone = pair.drone
         await drone.camera.set_mode(CameraMode.RECORDING)
-        wide = (await drone.video.next_frame()).metadata
+        wide = (await drone.video.next_frame(10.0)).metadata
         await drone.camera.set_zoom_speed(10.0)
         await drone.camera.zoom(2.0)
-        near = (await drone.video.next_frame()).metadata
+        near = (await drone.video.next_frame(10.0)).metadata
         assert wide.hfov is not None
         assert near.hfov is not None
         assert math.tan(wide.hfov / 2) / math.tan(near.hfov / 2) == pytest.approx(2.0, rel=0.02)
         assert wide.hfov == pytest.approx(math.radians(68.0 if model == "ai" else 69.0), abs=0.01)
         await drone.gimbal.point(pitch=Aim(-30.0))
-        frame = await drone.video.next_frame()
+        frame = await drone.video.next_frame(10.0)
         assert frame.camera_attitude is not None
         assert math.degrees(frame.camera_attitude.pitch) == pytest.approx(-30.0, abs=1.5)
 
@@ -91,7 +91,7 @@ async def test_each_camera_has_a_stream_of_its_own(model: str) -> None:
                 assert shown is not None
                 assert shown.title == title
                 assert shown.offered == STREAMS[model]
-                await drone.video.next_frame()
+                await drone.video.next_frame(10.0)
         other = "Front camera" if model != "ai" else "DefaultVideo"
         with pytest.raises(NotSupported, match=other):
             async with drone.video.watching(other):
@@ -106,7 +106,7 @@ async def test_a_bad_link_costs_pictures_and_not_their_order(model: str) -> None
         pair.drone.video.subscribe(frames.append)
         pair.real.faults.down = Impairment(loss=0.2, duplicate=0.1, reorder=0.2)
         while len(frames) < 60:
-            await pair.drone.video.next_frame(5.0)
+            await pair.drone.video.next_frame(10.0)
         assert all(before.taken < after.taken for before, after in pairwise(frames))
         assert all(90 <= (frame.metadata.battery_percentage or 0) <= 100 for frame in frames)
         assert None not in {frame.metadata.hfov for frame in frames}
@@ -119,7 +119,7 @@ async def test_a_drone_that_falls_silent_takes_its_video_with_it() -> None:
     async with connected("4k") as pair:
         drone, real = pair
         async with drone.video.watching():
-            await drone.video.next_frame()
+            await drone.video.next_frame(10.0)
             real.faults.mute = True
             real.faults.on_mute(True)
             await asyncio.wait({drone.lost})
@@ -138,7 +138,7 @@ async def test_the_video_behind_a_skycontroller(model: str, generation: int) -> 
         drone, real = Drone(spec.address, rtsp_port=8554, name="behind"), simulator.drones[0]
         await drone.connect()
         async with drone.video.watching():
-            said = (await drone.video.next_frame()).metadata
+            said = (await drone.video.next_frame(10.0)).metadata
             assert said.battery_percentage == real.battery.percent
             gone = drone.lost
             assert real.skycontroller is not None
@@ -155,7 +155,7 @@ async def test_the_simulator_saw_one_session_for_all_who_watched() -> None:
     async with connected("4k") as pair:
         drone, real = pair
         async with drone.video.watching(), drone.video.watching():
-            await drone.video.next_frame()
+            await drone.video.next_frame(10.0)
 
         entries = [entry for entry in real.log if entry.kind == "video"]
         assert [entry.name for entry in entries] == ["setup", "play", "end"]
