@@ -45,7 +45,29 @@ def _ignore(message: Message | UnknownMessage, now: float) -> None:
     pass
 
 
-class DeviceServer:
+class Mutable:
+    """A server whose air can be gone."""
+
+    session: DeviceSession | None
+    """The present or last session."""
+
+    def __init__(self) -> None:
+        self.session = None
+        self._mute = False
+
+    @property
+    def mute(self) -> bool:
+        """True: as if the air were gone. The session is mute, and nobody who connects gets an answer."""
+        return self._mute
+
+    @mute.setter
+    def mute(self, mute: bool) -> None:
+        self._mute = mute
+        if self.session is not None:
+            self.session.mute = mute
+
+
+class DeviceServer(Mutable):
     """A drone on the network. The newest handshake wins: it ends the session before it."""
 
     def __init__(
@@ -57,10 +79,9 @@ class DeviceServer:
         on_session: OnSession,
         ping_after: float,
     ) -> None:
+        super().__init__()
         self.info = info
         """What discovery says; `port` is the real handshake port."""
-        self.session: DeviceSession | None = None
-        """The present or last session."""
         self.discovery_port = 0
         self._address = address
         self._c2d_port = c2d_port
@@ -70,7 +91,6 @@ class DeviceServer:
         self._servers: list[asyncio.AbstractServer] = []
         self._connections: dict[asyncio.StreamWriter, asyncio.Task[None]] = {}
         self._turn = asyncio.Lock()
-        self._mute = False
         self._closed = False
 
     @classmethod
@@ -108,17 +128,6 @@ class DeviceServer:
     def handshake_port(self) -> int:
         """TCP port of the handshake."""
         return self.info.port
-
-    @property
-    def mute(self) -> bool:
-        """True: as if the air were gone. The session is mute, and nobody who connects gets an answer."""
-        return self._mute
-
-    @mute.setter
-    def mute(self, mute: bool) -> None:
-        self._mute = mute
-        if self.session is not None:
-            self.session.mute = mute
 
     async def close(self) -> None:
         """Stop listening and end the session. Idempotent."""

@@ -11,7 +11,7 @@ from typing import Any, cast
 
 from anafi_mav.arsdk import controller, handshake, mux, mux_proxy
 from anafi_mav.arsdk.controller import CONTROLLER_NAME, CONTROLLER_TYPE, ControllerSession
-from anafi_mav.arsdk.device import DeviceSession, OnSession
+from anafi_mav.arsdk.device import MAX_CONNECTIONS, DeviceSession, Mutable, OnSession
 from anafi_mav.arsdk.handshake import ConnectRequest, DeviceInfo
 from anafi_mav.arsdk.interface import open_connection
 from anafi_mav.arsdk.mux_udp import UdpTunnel
@@ -160,10 +160,9 @@ async def connect(
         raise LinkLost(f"cannot connect to {host}:{port}: {reason_of(error)}") from error
     try:
         stream = Stream(reader, writer)
-        stream.write(mux.DISCOVERY, mux.encode_pomp(mux.DISCOVER))
-        (name, model_id, serial), _ = await _answer(stream, mux.DISCOVERY, mux.DEVICE_ADDED, (str, int, str))
+        device = await _introduced(stream, port)
         request = json.dumps({"proto_v_min": versions[0], "proto_v_max": versions[1]})
-        texts = (CONTROLLER_NAME, CONTROLLER_TYPE, serial, request)
+        texts = (CONTROLLER_NAME, CONTROLLER_TYPE, device.serial, request)
         stream.write(mux.BACKEND, mux.encode_pomp(mux.CONN_REQ, [("%s", text) for text in texts]))
         (status, text), early = await _answer(stream, mux.BACKEND, mux.CONN_RESP, (int, str))
         if status != 0:
@@ -182,9 +181,42 @@ async def connect(
     except BaseException:
         writer.close()
         raise
-    session = MuxControllerSession(transport, on_message, DeviceInfo(model_id, serial, port, name), stream, early)
+    session = MuxControllerSession(transport, on_message, device, stream, early)
     session.begin()
     return session
+
+
+async def look(host: str, *, port: int = mux.PORT, interface: str | None = None) -> DeviceInfo:
+    """What the device behind the mux at `host` says of itself; who calls limits the time. Raises as `connect` does."""
+    try:
+        reader, writer = await open_connection(host, port, interface=interface)
+    except OSError as error:
+        raise LinkLost(f"cannot connect to {host}:{port}: {reason_of(error)}") from error
+    try:
+        return await _introduced(Stream(reader, writer), port)
+    finally:
+        writer.close()
+
+
+async def look_either(
+    host: str, *, mux_port: int = mux.PORT, interface: str | None = None, timeout: float = 2.0
+) -> DeviceInfo:
+    """As `controller.look`; where nothing listens on the discovery port, a Skycontroller 4 is looked for on the mux."""
+    try:
+        return await controller.look(host, interface=interface, timeout=timeout)
+    except LinkLost as error:
+        if not isinstance(error.__cause__, ConnectionRefusedError):
+            raise
+    try:
+        return await asyncio.wait_for(look(host, port=mux_port, interface=interface), timeout)
+    except asyncio.TimeoutError:
+        raise LinkLost(f"no answer from {host}:{mux_port} within {timeout:g} s") from None
+
+
+async def _introduced(stream: Stream, port: int) -> DeviceInfo:
+    stream.write(mux.DISCOVERY, mux.encode_pomp(mux.DISCOVER))
+    (name, model_id, serial), _ = await _answer(stream, mux.DISCOVERY, mux.DEVICE_ADDED, (str, int, str))
+    return DeviceInfo(model_id, serial, port, name)
 
 
 async def connect_either(
@@ -250,16 +282,19 @@ class MuxDeviceSession(DeviceSession):
     def __init__(self, transport: Transport, request: ConnectRequest, peer: str, stream: Stream) -> None:
         super().__init__(transport, request, peer)
         self._peer = PEER
-        self._stream = stream
+        self.stream = stream
 
     def begin(self) -> None:
         """Send and receive from now on."""
-        self.connection_made(cast(asyncio.BaseTransport, _Endpoint(self._stream, self.connection_lost)))
+        self.connection_made(cast(asyncio.BaseTransport, _Endpoint(self.stream, self.connection_lost)))
         self._flush()
 
 
-class MuxServer:
-    """A device on the mux, one connection at a time: a new one ends the one before. As `device.DeviceServer`."""
+class MuxServer(Mutable):
+    """A device on the mux, one session at a time: a new one ends the one before. As `device.DeviceServer`.
+
+    Who only asks for the introduction disturbs nobody; that it is so on the real thing is assumed.
+    """
 
     def __init__(
         self,
@@ -270,17 +305,15 @@ class MuxServer:
         address: str,
         tcp_port: Callable[[int], int],
     ) -> None:
+        super().__init__()
         self.info = info
         self._address = address
         self._tcp_port = tcp_port
-        self.session: DeviceSession | None = None
         self._versions = versions
         self._on_session = on_session
         self._ping_after = ping_after
         self._server: asyncio.AbstractServer | None = None
-        self._stream: Stream | None = None
-        self._tasks: set[asyncio.Task[None]] = set()
-        self._mute = False
+        self._streams: dict[Stream, asyncio.Task[None]] = {}
 
     @classmethod
     async def start(
@@ -308,35 +341,24 @@ class MuxServer:
 
     handshake_port = discovery_port
 
-    @property
-    def mute(self) -> bool:
-        """True: as if the air were gone."""
-        return self._mute
-
-    @mute.setter
-    def mute(self, mute: bool) -> None:
-        self._mute = mute
-        if self.session is not None:
-            self.session.mute = mute
-
     async def close(self) -> None:
         """Stop listening and end the session. Idempotent."""
         server, self._server = self._server, None
         if server is not None:
             server.close()
-        if self._stream is not None:
-            self._stream.writer.close()
-        if self._tasks:
-            await asyncio.wait(tuple(self._tasks))
+        for stream in self._streams:
+            stream.writer.close()
+        if self._streams:
+            await asyncio.wait(tuple(self._streams.values()))
         if server is not None:
             await server.wait_closed()
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        task = cast("asyncio.Task[None]", asyncio.current_task())
-        self._tasks.add(task)
-        if self._stream is not None:
-            self._stream.writer.close()
-        stream = self._stream = Stream(reader, writer)
+        if len(self._streams) >= MAX_CONNECTIONS:
+            writer.close()
+            return
+        stream = Stream(reader, writer)
+        self._streams[stream] = cast("asyncio.Task[None]", asyncio.current_task())
         proxy = stream.proxy = mux_proxy.Slave(stream, self._resolve, self._tcp_port)
         session: MuxDeviceSession | None = None
         try:
@@ -355,7 +377,7 @@ class MuxServer:
             if session is not None:
                 session.end("the controller closed the connection")
             await proxy.close()
-            self._tasks.discard(task)
+            del self._streams[stream]
 
     def _resolve(self, host: str) -> str | None:
         return self._address if host in ("drone", "skycontroller") else None
@@ -380,9 +402,12 @@ class MuxServer:
             return session
         if id != mux.CONN_REQ or len(arguments) < 4 or not all(isinstance(one, str) for one in arguments):
             return session
-        if session is not None:
-            session.end("connected anew")
-            await session.close()
+        before = self.session
+        if before is not None:
+            before.end("another controller connected")
+            await before.close()
+        if isinstance(before, MuxDeviceSession) and before.stream is not stream:
+            before.stream.writer.close()
         return self._accept(stream, cast("list[str]", arguments))
 
     def _accept(self, stream: Stream, arguments: list[str]) -> MuxDeviceSession | None:

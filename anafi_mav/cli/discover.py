@@ -14,9 +14,9 @@ from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
-from anafi_mav.arsdk.controller import look
 from anafi_mav.arsdk.handshake import DeviceInfo
 from anafi_mav.arsdk.interface import networks
+from anafi_mav.arsdk.mux_link import look_either
 from anafi_mav.cli.addresses import spot
 from anafi_mav.cli.terminal import complain, say
 from anafi_mav.drone.controller import MODELS as CONTROLLERS
@@ -125,7 +125,7 @@ async def discover(where: Collection[Place], timeout: float) -> list[Find]:
 
 async def _look(place: Place, timeout: float) -> Find | None:
     try:
-        device = await look(place.address, interface=place.interface, timeout=timeout)
+        device = await look_either(place.address, interface=place.interface, timeout=timeout)
     except (AnafiMavError, OSError):
         return None
     return Find(place, device)

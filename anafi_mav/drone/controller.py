@@ -17,9 +17,6 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
-import msgspec
-from msgspec.structs import replace
-
 from anafi_mav.arsdk.messages import (
     animation,
     ardrone3,
@@ -33,10 +30,11 @@ from anafi_mav.arsdk.messages import (
 )
 from anafi_mav.arsdk.messages.drone_manager import DroneManagerConnectionState as Connection
 from anafi_mav.arsdk.messages.generic import ListFlags
-from anafi_mav.arsdk.messages.mapper import ButtonEvent
-from anafi_mav.arsdk.messages.skyctrl import BatteryStatus, CalibrationStatus, Source
+from anafi_mav.arsdk.messages.proto import controller_network, device_manager
+from anafi_mav.arsdk.messages.skyctrl import Source
 from anafi_mav.arsdk.wire import Message
-from anafi_mav.drone.element import Element, Position, Reducer, position, with_item
+from anafi_mav.drone.controller_state import REDUCERS, ControllerState, KnownDrone
+from anafi_mav.drone.element import Element, Reducer
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost, LocalProtocolError, NotSupported
 
@@ -49,6 +47,9 @@ MODELS: Mapping[int, str] = {
     0x0921: "Skycontroller 4 Black",
 }
 """Controllers by the number they announce themselves with; what is not here is a drone."""
+
+PROTOBUF = frozenset({0x091D, 0x0921})
+"""Those that speak protobuf too."""
 
 YAW, THROTTLE, ROLL, PITCH, TILT, ZOOM = range(6)
 """Axes."""
@@ -73,147 +74,12 @@ PILOT_KEEPS = 2.0
 """s that a pilot who moved a stick keeps the drone. A user who goes on commanding without a pause does not get it
 back: the time begins anew with every command, for a joystick that somebody forgot about must not win."""
 
-MAX_AXIS = 5
-"""Highest number of an axis."""
-
-
-class Attitude(msgspec.Struct, frozen=True):
-    """A unit quaternion from the controller's axes (forward, right, down) to North-East-Down."""
-
-    w: float
-    x: float
-    y: float
-    z: float
-
-
-class KnownDrone(msgspec.Struct, frozen=True):
-    """A drone that the controller has seen or been paired with."""
-
-    serial: str
-    model: int
-    name: str
-    has_key: bool
-    """The controller knows the passphrase of its Wi-Fi, or needs none."""
-    active: bool = False
-    """The controller is connected to it."""
-    rssi_dbm: int | None = None
-    """How well it is received; None: it is not in sight."""
-
-
-class ControllerState(msgspec.Struct, frozen=True):
-    serial: str | None = None
-    firmware: str | None = None
-    hardware: str | None = None
-    battery_percent: int | None = None
-    """None while it is charging, too."""
-    battery: BatteryStatus | None = None
-    attitude: Attitude | None = None
-    position: Position | None = None
-    """Where the controller is; altitude above mean sea level."""
-    magnetometer: CalibrationStatus | None = None
-    link: Connection | None = None
-    """To the drone."""
-    drone_serial: str | None = None
-    drone_name: str | None = None
-    drone_model: int | None = None
-    """Parrot's product number; 0 while there is no drone."""
-    source: Source | None = None
-    """Whose sticks fly."""
-    grabbed_axes: int | None = None
-    grabbed_buttons: int | None = None
-    axes: Mapping[int, int] = {}
-    """Grabbed axis -> percent, -100..100."""
-    pressed: frozenset[int] = frozenset()
-    """Grabbed buttons that are held down."""
-    visible: Mapping[str, KnownDrone] = {}
-    """By serial number, drones that the controller saw when it was last asked."""
-    known: Mapping[str, KnownDrone] = {}
-    """By serial number, drones that it will connect to."""
-
-
-def _attitude(state: ControllerState, message: skyctrl.AttitudeChanged) -> ControllerState:
-    norm = math.sqrt(message.q0**2 + message.q1**2 + message.q2**2 + message.q3**2)
-    if not math.isfinite(norm) or norm < 0.5:
-        return state
-    parts = (message.q0, message.q1, message.q2, message.q3)
-    return replace(state, attitude=Attitude(*(part / norm for part in parts)))
-
-
-def _battery(state: ControllerState, message: skyctrl.BatteryChanged) -> ControllerState:
-    return replace(state, battery_percent=message.percent if message.percent <= 100 else None)
-
-
-def _place(state: ControllerState, message: skyctrl.GpsPositionChanged) -> ControllerState:
-    return replace(state, position=position(message.latitude, message.longitude, message.altitude))
-
-
-def _connection(state: ControllerState, message: drone_manager.ConnectionState) -> ControllerState:
-    return replace(
-        state, link=message.state, drone_serial=message.serial, drone_name=message.name, drone_model=message.model
-    )
-
-
-def _grabbed(state: ControllerState, message: mapper.GrabState) -> ControllerState:
-    pressed = frozenset(button for button in range(32) if message.buttons_state >> button & 1)
-    axes = {axis: value for axis, value in state.axes.items() if message.axes >> axis & 1}
-    return replace(state, grabbed_axes=message.axes, grabbed_buttons=message.buttons, pressed=pressed, axes=axes)
-
-
-def _axis(state: ControllerState, message: mapper.GrabAxisEvent) -> ControllerState:
-    if message.axis > MAX_AXIS:
-        return state
-    return replace(state, axes={**state.axes, message.axis: message.value})
-
-
-def _button(state: ControllerState, message: mapper.GrabButtonEvent) -> ControllerState:
-    if message.button >= 32:
-        return state
-    held = {message.button}
-    return replace(state, pressed=state.pressed | held if message.event == ButtonEvent.PRESS else state.pressed - held)
-
-
-def _seen(state: ControllerState, message: drone_manager.DroneListItem) -> ControllerState:
-    in_sight = message.visible & 1 << drone_manager.VisibleState.WIFI_VISIBLE
-    drone = KnownDrone(
-        message.serial,
-        message.model,
-        message.name,
-        bool(message.has_saved_key) or message.security == drone_manager.Security.NONE,
-        bool(message.active),
-        message.rssi if in_sight else None,
-    )
-    return replace(state, visible=with_item(state.visible, message.serial, drone, message.list_flags))
-
-
-def _known(state: ControllerState, message: drone_manager.KnownDroneItem) -> ControllerState:
-    open_to_all = message.security == drone_manager.Security.NONE
-    drone = KnownDrone(message.serial, message.model, message.name, bool(message.has_saved_key) or open_to_all)
-    return replace(state, known=with_item(state.known, message.serial, drone, message.list_flags))
-
 
 class Controller(Element[ControllerState]):
     """The Skycontroller, if there is one. `take_over` is called when its pilot has taken the drone."""
 
     NOTHING = ControllerState()
-    REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = {
-        skyctrl.ProductSerialChanged: lambda state, message: replace(state, serial=message.serialNumber),
-        skyctrl.ProductVersionChanged: lambda state, message: replace(
-            state, firmware=message.software, hardware=message.hardware
-        ),
-        skyctrl.BatteryChanged: _battery,
-        skyctrl.BatteryState: lambda state, message: replace(state, battery=message.state),
-        skyctrl.AttitudeChanged: _attitude,
-        skyctrl.GpsPositionChanged: _place,
-        skyctrl.MagnetoCalibrationState: lambda state, message: replace(state, magnetometer=message.status),
-        skyctrl.PilotingSource: lambda state, message: replace(state, source=message.source),
-        drone_manager.ConnectionState: _connection,
-        drone_manager.DroneListItem: _seen,
-        drone_manager.KnownDroneItem: _known,
-        mapper.ActiveProduct: lambda state, message: replace(state, drone_model=message.product),
-        mapper.GrabState: _grabbed,
-        mapper.GrabAxisEvent: _axis,
-        mapper.GrabButtonEvent: _button,
-    }
+    REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = REDUCERS
 
     def __init__(
         self, commander: Commander, moving: Callable[[], bool], take_over: Callable[[], None] | None = None
@@ -312,6 +178,12 @@ class Controller(Element[ControllerState]):
         with contextlib.suppress(CommandTimeout, LinkLost):
             await back.wait()
 
+    def questions(self) -> tuple[Message, ...]:
+        """What to ask a Skycontroller that speaks protobuf; one that does not stays silent."""
+        if self.model not in PROTOBUF:
+            return ()
+        return (device_manager.GetState(), controller_network.GetState())
+
     def reactions(self) -> Mapping[type[Message], Callable[[Any, float], None]]:
         """Events to be shown to this element beyond its reducers."""
         return {mapper.GrabAxisEvent: self._on_axis, skyctrl.PilotingSource: self._on_source}
@@ -383,6 +255,11 @@ class Controller(Element[ControllerState]):
     async def discover_drones(self, timeout: float = ANSWER_TIMEOUT) -> Mapping[str, KnownDrone]:
         """Let the controller look for drones; what it sees, by serial number."""
         self._require()
+        if self.state.protobuf:
+            await self._commander.confirm(
+                device_manager.DiscoverDevices(), (device_manager.DiscoveredDevices,), lambda message: True, timeout
+            )
+            return self.state.visible
         last = 1 << ListFlags.LAST | 1 << ListFlags.EMPTY
         await self._commander.confirm(
             drone_manager.DiscoverDrones(),
@@ -395,6 +272,10 @@ class Controller(Element[ControllerState]):
     async def connect_drone(self, serial: str, key: str = "", timeout: float = 30.0) -> None:
         """Let the controller change to this drone. The connection to us ends and has to be made anew, when it has."""
         self._require()
+
+        if self.state.protobuf:
+            await self._connect_device(serial, key, timeout)
+            return
 
         def judge(message: Any) -> bool | AnafiMavError | None:
             if message.serial != serial:
@@ -412,14 +293,29 @@ class Controller(Element[ControllerState]):
         )
         await self._commander.confirm(drone_manager.Connect(serial, key), answers, judge, timeout)
 
+    async def _connect_device(self, serial: str, key: str, timeout: float) -> None:
+        def judge(message: Any) -> bool | AnafiMavError | None:
+            if isinstance(message, device_manager.State):
+                connected = self.state.link == Connection.CONNECTED and self.state.drone_serial == serial
+                return True if connected else None
+            if message.device is None or message.device.uid != serial:
+                return None
+            wrong = message.reason == device_manager.ConnectionFailureReason.AUTHENTICATION_FAILED
+            return CommandRejected("the passphrase is wrong" if wrong else "the drone refuses the controller")
+
+        wifi = device_manager.ConnectDeviceWifi(security_key=key)
+        answers = (device_manager.State, device_manager.ConnectionFailure)
+        await self._commander.confirm(device_manager.ConnectDevice(uid=serial, wifi=wifi), answers, judge, timeout)
+
     async def forget_drone(self, serial: str, timeout: float = ANSWER_TIMEOUT) -> None:
         """Let the controller forget a drone that it knows."""
         self._require()
         if serial not in self.state.known:
             raise CommandRejected(f"the Skycontroller knows no drone {serial}")
+        modern = self.state.protobuf
         await self._commander.confirm(
-            drone_manager.Forget(serial),
-            (drone_manager.KnownDroneItem,),
+            device_manager.ForgetDevice(uid=serial) if modern else drone_manager.Forget(serial),
+            (device_manager.State if modern else drone_manager.KnownDroneItem,),
             lambda message: True if serial not in self.state.known else None,
             timeout,
         )

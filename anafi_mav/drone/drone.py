@@ -24,6 +24,7 @@ from anafi_mav.arsdk.messages.ardrone3 import FlyingState, PoiStatus
 from anafi_mav.arsdk.messages.common import PlayingState
 from anafi_mav.arsdk.messages.drone_manager import DroneManagerConnectionState as Connection
 from anafi_mav.arsdk.messages.follow_me import Mode as FollowMeMode
+from anafi_mav.arsdk.messages.proto import device_manager
 from anafi_mav.arsdk.rtsp import DEFAULT_PORT as RTSP_PORT
 from anafi_mav.arsdk.wire import Message, UnknownMessage
 from anafi_mav.clock import Clock, SystemClock
@@ -163,6 +164,7 @@ class Drone:
             **self.controller.reactions(),
             common.MavlinkFilePlayingStateChanged: self._plan_says,
             drone_manager.ConnectionState: self._controller_says,
+            device_manager.State: self._controller_says,
         }
         self._subscribers: tuple[Callback, ...] = ()
 
@@ -259,6 +261,8 @@ class Drone:
                 (skyctrl.CurrentDateTime(date), skyctrl.AllStates(), skyctrl.AllSettings()),
                 (skyctrl.AllStatesChanged, skyctrl.AllSettingsChanged),
             )
+            for question in self.controller.questions():
+                self._commander.send(question)
             await self._find_drone()
         await self._read(
             "drone",
@@ -306,9 +310,12 @@ class Drone:
         state = self.controller.state
         if state.link != Connection.CONNECTED:
             try:
-                await self.expect(
-                    drone_manager.ConnectionState, lambda m: m.state == Connection.CONNECTED, CONTROLLER_TIMEOUT
+                answer = self._commander.expect(
+                    (drone_manager.ConnectionState, device_manager.State),
+                    lambda message: True if self.controller.state.link == Connection.CONNECTED else None,
                 )
+                answer.expire_after(CONTROLLER_TIMEOUT, CommandTimeout("a drone behind it", CONTROLLER_TIMEOUT))
+                await answer.wait()
             except CommandTimeout:
                 what = "says nothing of a drone" if state.link is None else f"has no drone: {spoken(state.link)}"
                 raise LinkLost(f"the Skycontroller {what}") from None
@@ -316,10 +323,11 @@ class Drone:
         self._model = _model(state.drone_model or 0)
         self._announced_serial, self._announced_name = state.drone_serial or "", state.drone_name or ""
 
-    def _controller_says(self, message: drone_manager.ConnectionState, now: float) -> None:
+    def _controller_says(self, message: Message, now: float) -> None:
         """The drone is gone from behind the Skycontroller: as if our own link to it were."""
-        if self._complete and message.state != Connection.CONNECTED and self._session is not None:
-            self._session.end(f"the Skycontroller lost the drone: {spoken(message.state)}")
+        link = self.controller.state.link
+        if self._complete and link is not None and link != Connection.CONNECTED and self._session is not None:
+            self._session.end(f"the Skycontroller lost the drone: {spoken(link)}")
 
     def _plan_says(self, message: common.MavlinkFilePlayingStateChanged, now: float) -> None:
         self.piloting.on_plan(message)

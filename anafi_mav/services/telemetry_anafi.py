@@ -11,7 +11,8 @@ from collections.abc import Callable, Iterable, Mapping
 from anafi_mav import units
 from anafi_mav.drone import events
 from anafi_mav.drone.alerts import Alerts
-from anafi_mav.drone.controller import MAX_AXIS, Controller
+from anafi_mav.drone.controller import Controller
+from anafi_mav.drone.controller_state import MAX_AXIS
 from anafi_mav.drone.element import Range
 from anafi_mav.drone.home import Home
 from anafi_mav.drone.lens import INTRINSICS

@@ -56,6 +56,18 @@ def main() -> None:
         except Exception as error:
             known[name] = repr(error)
 
+    if kind == "SkyController4":
+        from olympe.messages import controllerNetwork, devicemanager
+
+        expect(
+            "links", controllerNetwork.Command.GetState(_timeout=3) >> controllerNetwork.Event.State(_policy="check")
+        )
+        told = controller(
+            devicemanager.Command.GetState(_timeout=3) >> devicemanager.Event.State(_policy="check")
+        ).wait()
+        steps["devices"] = bool(told.success())
+        known["devices"] = json.loads(json.dumps(controller.get_state(devicemanager.Event.State), default=str))
+
     # The drone's web server, by whatever way Olympe has to it.
     deadline = time.monotonic() + 8.0
     while controller.http_proxy is None and time.monotonic() < deadline:

@@ -16,6 +16,8 @@ from support.world import loopback
 
 SCRIPT = Path(__file__).with_name("olympe_skycontroller.py")
 
+CONTROLLERS_OWN = ("skyctrl.", "mapper.", "drone_manager.", "devicemanager.", "controllerNetwork.")
+
 HARMLESS = {
     r"ulog - pomp - timer \S+: missed \d+ events": "the machine is busy, so Olympe's stick timer came late",
     r"ulog - mux - mux_channel_ip_disconnected err=2": "the web server closed what Olympe has just closed itself",
@@ -66,13 +68,18 @@ async def test_olympe_flies_through_the_skycontroller(
     assert known["version"]["software"] == "1.8.2"
     assert known["drone name"]["name"].startswith("ANAFI")
 
+    if generation == 4:
+        assert known["devices"]["connected"]["device"]["uid"] == known["web"]["serial"]
+        assert known["devices"]["connected"]["device"]["model"] == product
+        (paired,) = known["devices"]["known_devices"]["devices"]
+        assert paired["info"]["uid"] == known["web"]["serial"]
     assert known["web"]["serial"] == known["serial of the drone"]["high"] + known["serial of the drone low"]["low"]
 
     # The drone was not told what was the controller's business, and flew what it was told.
     commands = [entry for entry in log if entry["kind"] == "command"]
-    assert not [entry for entry in commands if entry["name"].startswith(("skyctrl.", "mapper.", "drone_manager."))]
+    assert not [entry for entry in commands if entry["name"].startswith(CONTROLLERS_OWN)]
     sticks = [entry["args"]["pitch"] for entry in commands if entry["name"] == "ardrone3.Piloting.PCMD"]
     assert 40 in sticks
     poses = [entry["args"] for entry in log if entry["kind"] == "pose"]
     assert max(pose["north"] for pose in poses) > 5.5, "5 m by moveBy and some more with the sticks"
-    assert abs(poses[-1]["up"]) < 0.1
+    assert [entry["args"]["to"] for entry in log if entry["kind"] == "state"][-1] == "landed"

@@ -5,11 +5,11 @@ from __future__ import annotations
 import asyncio
 import random
 import tracemalloc
-from collections.abc import Callable
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from support.ear import Ear, Listener
 
 from anafi_mav.arsdk import mux, mux_link
 from anafi_mav.arsdk.handshake import DeviceInfo
@@ -115,37 +115,46 @@ class Device:
         return receive
 
 
-async def until(true: Callable[[], bool]) -> None:
-    deadline = asyncio.get_running_loop().time() + 5.0
-    while not true():
-        assert asyncio.get_running_loop().time() < deadline
-        await asyncio.sleep(0.005)
-
-
 @pytest.mark.parametrize("version", [1, 2, 3])
 async def test_a_session_over_the_mux(version: int) -> None:
-    device, heard = Device(), []
+    device, ear = Device(), Ear()
     server = await mux_link.MuxServer.start(
         "127.0.0.1", port=0, info=INFO, versions=(1, version), on_session=device.on_session
     )
     try:
-        session = await mux_link.connect(
-            "127.0.0.1", port=server.discovery_port, on_message=lambda message, now: heard.append(message)
-        )
+        session = await mux_link.connect("127.0.0.1", port=server.discovery_port, on_message=ear)
         assert session.device == DeviceInfo(INFO.model_id, INFO.serial, server.discovery_port, INFO.name)
         assert session.version == version
         session.send(common.AllStates())
-        await until(lambda: common.AllStatesChanged() in heard)
-        assert ardrone3.AltitudeChanged(1.5) in heard
+        await ear.until(lambda: common.AllStatesChanged() in ear.heard)
+        assert ardrone3.AltitudeChanged(1.5) in ear.heard
         assert device.heard == [common.AllStates()]
         # A new connection ends the one before.
         second = await mux_link.connect("127.0.0.1", port=server.discovery_port, on_message=lambda message, now: None)
         assert await asyncio.wait_for(asyncio.shield(session.lost), 3.0) == "the Skycontroller closed the connection"
         await session.close()
         await second.close()
-        await until(lambda: server.session is not None and server.session.lost.done())
+        assert server.session is not None
+        await asyncio.wait_for(asyncio.shield(server.session.lost), 5.0)
     finally:
         await server.close()
+
+
+async def test_looking_hears_the_introduction_and_disturbs_nobody() -> None:
+    device, ear = Device(), Ear()
+    server = await mux_link.MuxServer.start("127.0.0.1", port=0, info=INFO, on_session=device.on_session)
+    port = server.discovery_port
+    try:
+        session = await mux_link.connect("127.0.0.1", port=port, on_message=ear)
+        assert await mux_link.look("127.0.0.1", port=port) == DeviceInfo(INFO.model_id, INFO.serial, port, INFO.name)
+        session.send(common.AllStates())
+        await ear.until(lambda: common.AllStatesChanged() in ear.heard)
+        assert len(device.sessions) == 1
+        await session.close()
+    finally:
+        await server.close()
+    with pytest.raises(LinkLost, match=f"cannot connect to 127.0.0.1:{port}"):
+        await mux_link.look("127.0.0.1", port=port)
 
 
 async def test_silence_is_noticed_on_the_mux_too() -> None:
@@ -211,49 +220,50 @@ class Echo(asyncio.DatagramProtocol):
     """What a Skycontroller's video server is to a socket: sends where it was told to, hears who is aimed at it."""
 
     def __init__(self) -> None:
-        self.heard: list[tuple[bytes, int]] = []
+        self.ear: Listener[tuple[bytes, int]] = Listener()
 
     def connection_made(self, transport: asyncio.DatagramTransport) -> None:  # type: ignore[override]
         self.transport = transport
         self.port = transport.get_extra_info("sockname")[1]
 
     def datagram_received(self, data: bytes, address: tuple[str, int]) -> None:
-        self.heard.append((data, address[1]))
+        self.ear.hear((data, address[1]))
 
 
 async def test_datagrams_over_the_mux() -> None:
-    device, heard = Device(), []
+    device = Device()
+    ear: Listener[bytes] = Listener()
     server = await mux_link.MuxServer.start("127.0.0.1", port=0, info=INFO, on_session=device.on_session)
     loop = asyncio.get_running_loop()
     _, video = await loop.create_datagram_endpoint(Echo, local_addr=("127.0.0.1", 0))
     _, stranger = await loop.create_datagram_endpoint(Echo, local_addr=("127.0.0.2", 0))
     session = await mux_link.connect("127.0.0.1", port=server.discovery_port, on_message=lambda message, now: None)
     try:
-        tunnel = await session.open_udp("skycontroller", heard.append)
+        tunnel = await session.open_udp("skycontroller", ear.hear)
         assert 1024 <= tunnel.port <= 65535
         stranger.transport.sendto(b"not for us", ("127.0.0.1", tunnel.port))
         video.transport.sendto(b"frame", ("127.0.0.1", tunnel.port))
-        await until(lambda: bool(heard))
+        await ear.until(lambda: bool(ear.heard))
         tunnel.send(b"nowhere yet")
         await tunnel.aim(video.port)
         tunnel.send(b"report")
-        await until(lambda: bool(video.heard))
-        assert video.heard == [(b"report", tunnel.port)]
-        assert heard == [b"frame"]
+        await video.ear.until(lambda: bool(video.ear.heard))
+        assert video.ear.heard == [(b"report", tunnel.port)]
+        assert ear.heard == [b"frame"]
 
         tunnel.close()
         tunnel.close()
         tunnel.send(b"too late")
-        again = await session.open_udp("skycontroller", heard.append)  # behind the closing, so that it is through
+        again = await session.open_udp("skycontroller", ear.hear)  # behind the closing, so that it is through
         video.transport.sendto(b"too late", ("127.0.0.1", tunnel.port))
         video.transport.sendto(b"second", ("127.0.0.1", again.port))
-        await until(lambda: len(heard) > 1)
-        assert heard == [b"frame", b"second"]
-        assert len(video.heard) == 1
+        await ear.until(lambda: len(ear.heard) > 1)
+        assert ear.heard == [b"frame", b"second"]
+        assert len(video.ear.heard) == 1
         with pytest.raises(LocalProtocolError):
             await again.aim(0)
         with pytest.raises(LinkLost, match="knows no moon"):
-            await session.open_udp("moon", heard.append)
+            await session.open_udp("moon", ear.hear)
     finally:
         await session.close()
         await server.close()
@@ -261,7 +271,7 @@ async def test_datagrams_over_the_mux() -> None:
         stranger.transport.close()
     assert again.closed
     with pytest.raises(LinkLost):
-        await session.open_udp("skycontroller", heard.append)
+        await session.open_udp("skycontroller", ear.hear)
 
 
 async def test_what_was_opened_over_the_mux_ends_with_it() -> None:

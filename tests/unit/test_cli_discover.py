@@ -38,17 +38,19 @@ def spec(model: str, skycontroller: int | None = None) -> DroneSpec:
 
 
 async def test_what_it_prints_is_a_configuration() -> None:
-    async with Simulator([spec("4k"), spec("usa", 3)], seed=1) as simulator:
-        direct, behind = simulator.drones
-        async with words("discover", direct.address, behind.address, "--timeout", "5") as held:
+    async with Simulator([spec("4k"), spec("usa", 3), spec("ai", 4)], seed=1) as simulator:
+        direct, behind, modern = simulator.drones
+        async with words("discover", *(one.address for one in simulator.drones), "--timeout", "5") as held:
             assert await held.end() == 0, str(held)
         text = "\n".join(held.lines)
         found = {drone.address: drone for drone in from_text(text, "stdout").drones}
-        assert set(found) == {direct.address, behind.address}
+        assert set(found) == {direct.address, behind.address, modern.address}
         assert found[direct.address].name == direct.identity.name
-        assert sorted(drone.sysid for drone in found.values()) == [1, 2]
+        assert sorted(drone.sysid for drone in found.values()) == [1, 2, 3]
         assert f"# ANAFI 4K {direct.identity.serial}, found at {direct.address}" in text
         assert re.search(rf"# Skycontroller 3 with the drone behind it, PI\w+, found at {behind.address}", text)
+        # By Parrot's mux, which is all that a Skycontroller 4 speaks.
+        assert re.search(rf"# Skycontroller 4 with the drone behind it, PI\w+, found at {modern.address}", text)
         # Nobody was disturbed: no session was begun.
         assert not [entry for drone in simulator.drones for entry in drone.log.find("session")]
 

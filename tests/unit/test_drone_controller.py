@@ -26,6 +26,7 @@ from anafi_mav.arsdk.messages import (
 )
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.messages.drone_manager import DroneManagerConnectionState as Connection
+from anafi_mav.arsdk.messages.proto import controller_network, device_manager, network
 from anafi_mav.arsdk.messages.skyctrl import Source
 from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone import Drone, PilotingCommand
@@ -69,8 +70,26 @@ class Crew:
     async def until(self, accept: Callable[[LogEntry], bool], since: float = -math.inf) -> LogEntry:
         return await self.real.wait_log(accept, 8.0, since=since)
 
+    async def sees(self, true: Callable[[], bool], timeout: float = 8.0) -> None:
+        """Wait until this is true of the aircraft or its controller: looked at with every line of the log."""
+        if not true():
+            await self.real.wait_log(lambda entry: true(), timeout, since=now())
+
+    async def hears(self, true: Callable[[], bool]) -> None:
+        """Wait until this is true of our drone: looked at with every message."""
+        if true():
+            return
+        found = asyncio.get_running_loop().create_future()
+        undo = self.drone.subscribe(
+            lambda message, now: found.set_result(None) if true() and not found.done() else None
+        )
+        try:
+            await asyncio.wait_for(found, 8.0)
+        finally:
+            undo()
+
     async def grabbed(self, axes: int) -> None:
-        await until(lambda: self.sc.grabbed_axes == axes)
+        await self.sees(lambda: self.sc.grabbed_axes == axes)
 
     def sticks(self, since: float = -math.inf) -> list[int]:
         """Pitch of each PCMD that reached the drone."""
@@ -79,13 +98,6 @@ class Crew:
     def told(self, name: str) -> list[LogEntry]:
         """What the controller itself was told."""
         return [entry for entry in self.real.log.find("controller") if entry.name.endswith(name)]
-
-
-async def until(true: Callable[[], bool], timeout: float = 8.0) -> None:
-    deadline = now() + timeout
-    while not true():
-        assert now() < deadline
-        await asyncio.sleep(0.01)
 
 
 def now() -> float:
@@ -131,7 +143,7 @@ async def test_both_are_read(crew: Crew) -> None:
 async def test_connecting_and_taking_off_leaves_the_sticks_to_the_pilot(crew: Crew) -> None:
     await crew.take_off()
     crew.drone.piloting.hover()
-    await asyncio.sleep(0.3)
+    await crew.sees(lambda: crew.sc.dropped >= 5)  # what hover sends besides would have come before
     assert crew.told("setPilotingSource") == []
     assert crew.told("grab") == []
     crew.sc.stick(PITCH, 50)
@@ -142,13 +154,13 @@ async def test_a_setpoint_takes_the_source_and_silence_gives_it_back(crew: Crew)
     await crew.take_off()
     async with crew.piloting():
         await crew.grabbed(STICKS)
-        await until(lambda: crew.sc.source is Source.CONTROLLER)
-        await until(lambda: 50 in crew.sticks())  # 5 of 10 degrees, nose down
-        await until(lambda: crew.drone.controller.state.source is Source.CONTROLLER)
-        await until(lambda: crew.drone.controller.state.grabbed_axes == STICKS)
+        await crew.sees(lambda: crew.sc.source is Source.CONTROLLER)
+        await crew.sees(lambda: 50 in crew.sticks())  # 5 of 10 degrees, nose down
+        await crew.hears(lambda: crew.drone.controller.state.source is Source.CONTROLLER)
+        await crew.hears(lambda: crew.drone.controller.state.grabbed_axes == STICKS)
         assert crew.sc.grabbed_buttons == 0
     quiet = now()
-    await until(lambda: crew.sc.source is Source.SKY_CONTROLLER)
+    await crew.sees(lambda: crew.sc.source is Source.SKY_CONTROLLER)
     assert now() - quiet < 1.3  # the sticks hold for 0.5 s, then it is quiet for 0.5 s
     await crew.grabbed(0)
     assert [entry.args["axes"] for entry in crew.told("grab")] == [STICKS, 0]
@@ -157,39 +169,40 @@ async def test_a_setpoint_takes_the_source_and_silence_gives_it_back(crew: Crew)
 async def test_a_stick_of_the_pilot_takes_the_drone_at_once(crew: Crew) -> None:
     await crew.take_off()
     async with crew.piloting():
-        await until(lambda: crew.sc.source is Source.CONTROLLER)
-        await until(lambda: 50 in crew.sticks())
-        crew.sc.stick(ROLL, 10)  # touched, not meant
-        await asyncio.sleep(0.3)
+        await crew.sees(lambda: crew.sc.source is Source.CONTROLLER)
+        await crew.sees(lambda: 50 in crew.sticks())
+        touched = now()
+        crew.sc.stick(ROLL, 10)  # not meant
+        await crew.sees(lambda: len(crew.sticks(touched)) >= 6)
         assert crew.sc.source is Source.CONTROLLER
         moved = now()
         crew.sc.stick(ROLL, 11)
-        await until(lambda: crew.sc.source is Source.SKY_CONTROLLER)
+        await crew.sees(lambda: crew.sc.source is Source.SKY_CONTROLLER)
         await crew.grabbed(0)
         assert now() - moved < 0.25
         assert crew.drone.controller.pilot_flies
         # The user goes on, and is not heard: it is the pilot who flies.
         flown = now()
-        await asyncio.sleep(PILOT_KEEPS + 0.5)
+        await crew.until(lambda entry: entry.t > flown + PILOT_KEEPS + 0.5)
         assert crew.sc.source is Source.SKY_CONTROLLER
         assert set(crew.sticks(flown)) == {0}
     crew.sc.stick(ROLL, 0)
-    await until(lambda: not crew.drone.controller.pilot_flies)
+    await crew.hears(lambda: not crew.drone.controller.pilot_flies)
     # After a pause the user may have it again.
     async with crew.piloting():
-        await until(lambda: crew.sc.source is Source.CONTROLLER)
+        await crew.sees(lambda: crew.sc.source is Source.CONTROLLER)
 
 
 async def test_a_move_holds_the_source_to_its_end(crew: Crew) -> None:
     await crew.take_off()
     began = now()
     flight = asyncio.create_task(crew.drone.piloting.move_by(12.0, 0.0, 0.0, 0.0))
-    await until(lambda: crew.sc.source is Source.CONTROLLER)
+    await crew.sees(lambda: crew.sc.source is Source.CONTROLLER)
     flown = await flight
     assert now() - began > 1.0  # longer than the quiet time
     assert crew.sc.source is Source.CONTROLLER
     assert flown.front == pytest.approx(12.0, abs=0.5)
-    await until(lambda: crew.sc.source is Source.SKY_CONTROLLER, 1.5)
+    await crew.sees(lambda: crew.sc.source is Source.SKY_CONTROLLER, 1.5)
     await crew.grabbed(0)
 
 
@@ -200,9 +213,9 @@ async def test_a_stick_of_the_pilot_ends_a_move(crew: Crew) -> None:
     await crew.grabbed(STICKS)
     crew.sc.stick(PITCH, -60)
     assert await asyncio.wait_for(move.result(), 3.0) is MoveEnd.CANCELED
-    await until(lambda: crew.sc.source is Source.SKY_CONTROLLER)
+    await crew.sees(lambda: crew.sc.source is Source.SKY_CONTROLLER)
     await crew.until(lambda entry: entry.kind == "command" and entry.name.endswith("CancelMoveTo"))
-    await until(lambda: -60 in crew.sticks())
+    await crew.sees(lambda: -60 in crew.sticks())
     with pytest.raises(CommandRejected, match="the pilot"):
         await crew.drone.piloting.move_to(latitude, longitude, 5.0)
     # What is not motion is not refused.
@@ -222,10 +235,10 @@ async def test_the_pilots_buttons_work_while_a_user_flies(crew: Crew) -> None:
 async def test_the_end_of_the_program_gives_everything_back(crew: Crew) -> None:
     await crew.take_off()
     async with crew.piloting():
-        await until(lambda: crew.sc.source is Source.CONTROLLER)
+        await crew.sees(lambda: crew.sc.source is Source.CONTROLLER)
         mark = now()
         await crew.drone.close()
-    await until(lambda: crew.sc.source is Source.SKY_CONTROLLER, 1.0)
+    await crew.sees(lambda: crew.sc.source is Source.SKY_CONTROLLER, 1.0)
     # It was told so, and did not find it out by itself.
     assert [entry.args for entry in crew.told("setPilotingSource") if entry.t >= mark] == [
         {"source": Source.SKY_CONTROLLER}
@@ -241,8 +254,7 @@ async def test_a_controller_that_loses_the_drone_is_a_lost_link(crew: Crew) -> N
     with pytest.raises(LinkLost, match="the Skycontroller has no drone: searching"):
         await crew.drone.connect()
     attempt = asyncio.create_task(crew.drone.connect())
-    await crew.until(lambda entry: entry.kind == "controller" and "AllStates" in entry.name)
-    await asyncio.sleep(0.3)
+    await crew.hears(lambda: crew.drone.controller.state.link is Connection.SEARCHING)
     crew.sc.radio = True
     await attempt
     assert crew.drone.identity.model.key == "thermal"
@@ -253,10 +265,10 @@ async def test_what_may_be_grabbed(crew: Crew) -> None:
     await controller.grab(axes=1 << TILT, buttons=1 << 2)
     crew.sc.stick(TILT, 30)
     crew.sc.press(2)
-    await until(lambda: controller.state.pressed == {2})
+    await crew.hears(lambda: controller.state.pressed == {2})
     assert controller.state.axes == {TILT: 30}
     crew.sc.release(2)
-    await until(lambda: controller.state.pressed == frozenset())
+    await crew.hears(lambda: controller.state.pressed == frozenset())
     # A motion grabs the sticks besides, and its end leaves the rest as it was.
     await crew.take_off()
     async with crew.piloting():
@@ -294,6 +306,64 @@ async def test_the_web_server_of_the_drone_is_reached(generation: int) -> None:
         answer = await drone._rest.json("GET", "/api/v1/info/properties")
         assert answer["serial"] == simulator.drones[0].identity.serial
         await drone.close()
+
+
+async def test_a_controller_that_speaks_protobuf_alone() -> None:
+    def device_info(uid: str) -> device_manager.DeviceInfo:
+        return device_manager.DeviceInfo(uid=uid, model=0x091A, network_id="ANAFI-Ai")
+
+    def known(*uids: str) -> device_manager.StateKnownDevices:
+        secret = device_manager.WifiInfo(security=device_manager.WifiSecurity.WPA2, saved_key=True)
+        return device_manager.StateKnownDevices(
+            devices=tuple(device_manager.KnownDevice(info=device_info(uid), wifi=secret) for uid in uids)
+        )
+
+    def connected(uid: str) -> device_manager.State:
+        return device_manager.State(connected=device_manager.ConnectionStateConnected(device=device_info(uid)))
+
+    async with ScriptedDevice(0x091D) as device:
+        device.script[skyctrl.AllStates] = lambda _: [skyctrl.AllStatesChanged()]
+        device.script[skyctrl.AllSettings] = lambda _: [skyctrl.AllSettingsChanged()]
+        device.script[device_manager.GetState] = lambda _: [
+            device_manager.State(known_devices=known("A", "B"), searching=device_manager.ConnectionStateSearching()),
+            connected("A"),
+        ]
+        cellular = network.LinksStatusLinkInfo(type=network.LinkType.CELLULAR, status=network.LinkStatus.UP)
+        device.script[controller_network.GetState] = lambda _: [
+            controller_network.State(links_status=network.LinksStatus(links=(cellular,)))
+        ]
+        drone = device.drone()
+        await drone.connect()
+        controller = drone.controller
+        assert (drone.identity.model.key, drone.identity.serial, drone.identity.name) == ("ai", "A", "ANAFI-Ai")
+        assert set(controller.state.known) == {"A", "B"}
+        assert controller.state.known["B"].has_key
+        assert controller.state.links == {network.LinkType.CELLULAR: network.LinkStatus.UP}
+
+        seen = device_manager.DiscoveredDevice(
+            info=device_info("B"), known=True, wifi_visibility=device_manager.DiscoveredDeviceWifiVisibility(rssi=-60)
+        )
+        device.script[device_manager.DiscoverDevices] = lambda _: [device_manager.DiscoveredDevices(devices=(seen,))]
+        found = (await controller.discover_drones())["B"]
+        assert (found.model, found.rssi_dbm, found.has_key, found.active) == (0x091A, -60, True, False)
+
+        device.script[device_manager.ForgetDevice] = lambda m: [device_manager.State(known_devices=known("A"))]
+        await controller.forget_drone("B")
+        assert set(controller.state.known) == {"A"}
+        refused = device_manager.ConnectionFailureReason.AUTHENTICATION_FAILED
+        device.script[device_manager.ConnectDevice] = lambda m: [
+            device_manager.ConnectionFailure(device=device_info(m.uid), reason=refused)
+        ]
+        with pytest.raises(CommandRejected, match="passphrase"):
+            await controller.connect_drone("B", "wrong")
+        sent = device.got(device_manager.ConnectDevice)[-1]
+        assert sent == device_manager.ConnectDevice(
+            uid="B", wifi=device_manager.ConnectDeviceWifi(security_key="wrong")
+        )
+
+        device.say(device_manager.State(idle=device_manager.ConnectionStateIdle()))
+        assert await asyncio.wait_for(asyncio.shield(drone.lost), 3.0) == "the Skycontroller lost the drone: idle"
+        assert device.got(drone_manager.DiscoverDrones) == []
 
 
 async def test_without_a_controller_there_is_none() -> None:
@@ -350,8 +420,8 @@ async def test_odd_words_of_a_controller_are_survived(crew: Crew) -> None:
         drone_manager.DroneListItem("", 0, "", 0, 0, 0, drone_manager.Security.NONE, 0, 0, 4),
     ):
         real.send(event)
-    await until(lambda: crew.drone.controller.state.battery_percent is None)
-    await until(lambda: crew.drone.controller.state.visible == {})
+    await crew.hears(lambda: crew.drone.controller.state.battery_percent is None)
+    await crew.hears(lambda: crew.drone.controller.state.visible == {})
     assert crew.drone.controller.state.axes == {}
     assert crew.drone.connected
 
@@ -450,7 +520,7 @@ async def test_the_pilot_is_seen_while_something_is_to_begin(what: str) -> None:
         verb = drone.flight_plan.start("abc") if what == "flight plan" else drone.follow_me.start(LOOK_AT)
         task = asyncio.ensure_future(verb)
         await device.until(skyctrl.SetPilotingSource)
-        await asyncio.sleep(1.2)  # more than twice the quiet time
+        await asyncio.sleep(1.2)  # more than twice the quiet time, in which nothing may come
         assert sources(device) == [Source.CONTROLLER]
         device.say(mapper.GrabAxisEvent(PITCH, 60))
         await device.until(common.Stop if what == "flight plan" else follow_me.Stop)

@@ -20,6 +20,7 @@ from anafi_mav.drone.animations import Animations
 from anafi_mav.drone.calibration import Calibration
 from anafi_mav.drone.camera import Camera
 from anafi_mav.drone.camera_state import MAX_OPTIONS, CamerasState
+from anafi_mav.drone.controller import Controller
 from anafi_mav.drone.element import MAX_ITEMS, Element
 from anafi_mav.drone.flight_plan import FlightPlan
 from anafi_mav.drone.follow_me import FollowMe
@@ -36,6 +37,7 @@ ELEMENTS: list[type[Element[Any]]] = [
     Animations,
     Calibration,
     Camera,
+    Controller,
     FlightPlan,
     FollowMe,
     Gimbal,

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import asyncio
 import random
 from collections.abc import AsyncIterator, Callable
 from dataclasses import replace
 
 import pytest
 from sim_bench import Bench
+from support.ear import Ear
 
 from anafi_mav.arsdk.controller import ControllerSession, connect
 from anafi_mav.arsdk.messages import ardrone3, common, rth
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.messages.proto import camera2
-from anafi_mav.arsdk.wire import Message, UnknownMessage
 from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
 from anafi_mav.sim.air import HELD, MAX_UNDER_WAY, Air
 from anafi_mav.sim.faults import CLEAR, Faults, Impairment
@@ -134,26 +133,6 @@ async def real() -> AsyncIterator[SimulatedDrone]:
     spec = DroneSpec(address="127.0.0.1", discovery_port=0, handshake_port=0, c2d_port=0, http_port=None)
     async with Simulator([spec], speed=5.0, seed=1) as simulator:
         yield simulator.drones[0]
-
-
-class Ear:
-    """Keeps what a drone says, and waits for it."""
-
-    def __init__(self) -> None:
-        self.heard: list[Message | UnknownMessage] = []
-        self._news = asyncio.Event()
-
-    def __call__(self, message: Message | UnknownMessage, now: float) -> None:
-        self.heard.append(message)
-        self._news.set()
-
-    async def until(self, happened: Callable[[], bool], timeout: float) -> None:
-        async def wait() -> None:
-            while not happened():
-                self._news.clear()
-                await self._news.wait()
-
-        await asyncio.wait_for(wait(), timeout)
 
 
 async def join(real: SimulatedDrone) -> tuple[ControllerSession, Ear]:

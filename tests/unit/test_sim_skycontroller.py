@@ -136,9 +136,8 @@ async def test_the_sticks_fly_until_the_source_is_the_controller() -> None:
         forward = ardrone3.PCMD(1, 0, 30, 0, 0, 0)
         for _ in range(5):
             station.session.send(forward)
-            await asyncio.sleep(0.02)
+        await station.drone.wait_log(lambda entry: station.sc.dropped == 5)
         assert station.commands("PCMD") == []
-        assert station.sc.dropped == 5
 
         station.sc.stick(ROLL, 40)
         station.sc.stick(YAW, -20)

@@ -1,0 +1,40 @@
+"""Somebody who listens: keeps what it is told, and waits until what it has heard is enough."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import Generic, TypeVar
+
+from anafi_mav.arsdk.wire import Message, UnknownMessage
+
+T = TypeVar("T")
+
+
+class Listener(Generic[T]):
+    """`hear` is told of each thing; `heard` has all of them, oldest first."""
+
+    def __init__(self) -> None:
+        self.heard: list[T] = []
+        self._news = asyncio.Event()
+
+    def hear(self, thing: T) -> None:
+        self.heard.append(thing)
+        self._news.set()
+
+    async def until(self, happened: Callable[[], bool], timeout: float = 5.0) -> None:
+        """Wait until this is true; it is looked at whenever something is heard."""
+
+        async def wait() -> None:
+            while not happened():
+                self._news.clear()
+                await self._news.wait()
+
+        await asyncio.wait_for(wait(), timeout)
+
+
+class Ear(Listener[Message | UnknownMessage]):
+    """What a session tells of its messages: `on_message`."""
+
+    def __call__(self, message: Message | UnknownMessage, now: float) -> None:
+        self.hear(message)
