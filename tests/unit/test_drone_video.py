@@ -303,6 +303,25 @@ async def test_a_server_that_ends_it_is_asked_again(end: Callable[[VideoServer],
         await drone.video.next_frame(10.0)
 
 
+async def test_a_server_that_stays_away_is_asked_less_and_less_often() -> None:
+    server = VideoServer()
+    async with watched(server) as (drone, _), drone.video.watching():
+        await drone.video.next_frame(10.0)
+        server.answers["DESCRIBE"] = refused("404 Not Found")
+        server.asked.clear()
+        ended = asyncio.get_running_loop().time()
+        server.hang_up()
+        await server.until(lambda: server.methods().count("DESCRIBE") == 3, timeout=20.0)
+        times = [ended, *(one.at for one in server.asked if one.method == "DESCRIBE")]
+        gaps = [after - before for before, after in pairwise(times)]
+        assert all(gap >= least for gap, least in zip(gaps, (0.5, 1.0, 2.0), strict=True)), gaps
+        assert "closed the connection" in drone.video.state.problem or "404" in drone.video.state.problem
+        assert drone.video.state.frame is None
+        server.answers.clear()
+        await drone.video.next_frame(20.0)
+        assert drone.video.state.problem == ""
+
+
 async def test_what_the_server_asks_is_answered() -> None:
     server = VideoServer()
     async with watched(server) as (drone, _), drone.video.watching():

@@ -75,6 +75,8 @@ class Asked:
     method: str
     uri: str
     headers: dict[str, str]
+    at: float = 0.0
+    """Loop time."""
 
 
 @dataclass
@@ -153,7 +155,8 @@ class VideoServer:
                     self.asked.append(Asked(first, "", {}))
                     continue
                 method, uri, _ = first.split()
-                asked = Asked(method, uri, dict(line.split(": ", 1) for line in lines))
+                now = asyncio.get_running_loop().time()
+                asked = Asked(method, uri, dict(line.split(": ", 1) for line in lines), now)
                 self.asked.append(asked)
                 answer = self.answers.get(method, self._usual)(asked)
                 if answer is not None:
