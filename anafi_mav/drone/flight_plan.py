@@ -219,7 +219,7 @@ class FlightPlan(Commanding[FlightPlanState]):
         except LinkLost:
             raise
         except BaseException as error:
-            if number == self._starts:
+            if number == self._starts and self._commander.may_begin(common.Stop, START_TIMEOUT):
                 self._unwanted = uid, asyncio.get_running_loop().time() + START_TIMEOUT
             if isinstance(error, CommandTimeout) and self.state.unavailable:
                 raise CommandRejected(self._why()) from None

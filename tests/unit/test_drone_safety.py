@@ -280,6 +280,20 @@ async def test_a_plan_that_begins_after_it_was_called_off_is_stopped(drone: Dron
     assert len(device.got(common.Stop)) == 2
 
 
+async def test_a_plan_of_somebody_else_is_not_stopped(drone: Drone, device: ScriptedDevice) -> None:
+    """Ours of the same name was refused, by ourselves or by the drone: there is nothing to take back."""
+    await flies(drone, device, FlyingState.LANDING)
+    with pytest.raises(CommandRejected, match="landing"):
+        await drone.flight_plan.start("abc")
+    await flies(drone, device)
+    device.script[common.Start] = lambda _: [common.StartingErrorEvent()]
+    with pytest.raises(CommandRejected):
+        await drone.flight_plan.start("abc")
+    await reported(drone, device, plan(PlayingState.PLAYING))
+    await in_order(drone, device)
+    assert device.got(common.Stop) == []
+
+
 async def test_another_plan_that_plays_confirms_no_start(drone: Drone, device: ScriptedDevice) -> None:
     await flies(drone, device)
     await reported(drone, device, plan(PlayingState.PLAYING, "first"))
