@@ -9,4 +9,5 @@ from anafi_mav.drone.moves import MoveEnd as MoveEnd
 from anafi_mav.drone.product import MODELS as MODELS
 from anafi_mav.drone.product import Identity as Identity
 from anafi_mav.drone.product import Model as Model
+from anafi_mav.drone.sticks import Limits as Limits
 from anafi_mav.drone.sticks import PilotingCommand as PilotingCommand

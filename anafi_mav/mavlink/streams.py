@@ -37,6 +37,10 @@ DEFAULT_INTERVALS: Mapping[int, float] = {
     mav.MAVLINK_MSG_ID_CURRENT_MODE: 2.0,
     mav.MAVLINK_MSG_ID_AVAILABLE_MODES_MONITOR: 3.3,
     mav.MAVLINK_MSG_ID_CURRENT_EVENT_SEQUENCE: 1.0,
+    # Only while setpoints or moves are flown.
+    mav.MAVLINK_MSG_ID_ATTITUDE_TARGET: 0.5,
+    mav.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: 0.5,
+    mav.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT: 0.5,
 }
 """Seconds by message id: what ground stations need to look alive, and a 57600 baud radio can carry."""
 

@@ -108,10 +108,10 @@ class CommandService(Service):
         if self._running:
             await asyncio.wait(tuple(self._running))
 
-    def run(self, client: Hashable, work: Coroutine[Any, Any, None]) -> None:
+    def run(self, client: Hashable, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
         """Run an action that came by a message without acknowledgement; a refusal of it becomes a text."""
         self._desk.forget(client)  # the vehicle was moved by other means than this client's newest command
-        self._spawn(self._explained(work), _Running(client, None))
+        return self._spawn(self._explained(work), _Running(client, None))
 
     def end_others(self) -> list[asyncio.Task[None]]:
         """What begins now replaces what was under way; whoever waits for that learns that it was cancelled.
@@ -138,7 +138,8 @@ class CommandService(Service):
         if command.id not in self._actions:
             self._acknowledge(inbound, command.id, dialect.MAV_RESULT_UNSUPPORTED)
             return
-        repeated = self._desk.retransmission(command.client, command, self.host.clock.monotonic())
+        now, mode = self.host.clock.monotonic(), self.host.vehicle.mode
+        repeated = self._desk.retransmission(command.client, command, now, mode)
         if repeated is not None:
             self._acknowledge(inbound, command.id, repeated)
             return
@@ -169,10 +170,11 @@ class CommandService(Service):
             execution.result, execution.ended = result, self.host.clock.monotonic()
             self._acknowledge(inbound, execution.command.id, result)
 
-    def _spawn(self, work: Coroutine[Any, Any, None], running: _Running) -> None:
+    def _spawn(self, work: Coroutine[Any, Any, None], running: _Running) -> asyncio.Task[None]:
         task = self.host.spawn(work)
         self._running[task] = running
         task.add_done_callback(self._done)
+        return task
 
     def _done(self, task: asyncio.Task[None]) -> None:
         running = self._running.pop(task, None)

@@ -94,6 +94,11 @@ class Command:
             return False
         return not (self.stops or self.returns or self.id in _IRREVOCABLE)
 
+    @property
+    def lapses(self) -> bool:
+        """It asks for a mode that ends when nobody says any more how to fly: asked for again, it begins again."""
+        return self.id == dialect.MAV_CMD_DO_SET_MODE and self.mode in (FlightMode.OFFBOARD, FlightMode.FOLLOW)
+
     def same_as(self, other: Command) -> bool:
         """Equal, with NaN equal to NaN."""
         return (self.id, self.frame) == (other.id, other.frame) and all(
@@ -174,11 +179,14 @@ class CommandDesk:
     def __init__(self) -> None:
         self._newest: dict[Hashable, Execution] = {}
 
-    def retransmission(self, client: Hashable, command: Command, now: float) -> int | None:
+    def retransmission(
+        self, client: Hashable, command: Command, now: float, mode: FlightMode | None = None
+    ) -> int | None:
         """The MAV_RESULT to answer a command with that this client sends once more; None: it is to be executed.
 
-        What may be carried out twice is: orders to stop always, a return while nobody else has taken over. What another
-        client has replaced is neither carried out over its head nor confirmed: it is answered with CANCELLED.
+        What may be carried out twice is: orders to stop always, a return while nobody else has taken over, and modes
+        that have ended by themselves (`mode` is the vehicle's). What another client has replaced is neither carried out
+        over its head nor confirmed: it is answered with CANCELLED.
         """
         newest = self._newest.get(client)
         if newest is None or not newest.command.same_as(command):
@@ -192,7 +200,8 @@ class CommandDesk:
             return None
         if newest.superseded:
             return dialect.MAV_RESULT_CANCELLED
-        return None if command.returns else newest.result
+        ended = command.lapses and mode is not None and mode is not command.mode
+        return None if command.returns or ended else newest.result
 
     def begin(self, client: Hashable, command: Command) -> Execution:
         """Note that an action begins; this client's next one is compared with it."""

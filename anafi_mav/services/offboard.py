@@ -1,38 +1,26 @@
 """Offboard: setpoints of a program fly the drone for as long as they keep coming, and not a moment longer.
 
-I/O-free: `OffboardStream` keeps the state, `Vehicle` sends what it says. SET_ATTITUDE_TARGET becomes the stick
-vector u = [vz, roll, pitch, yaw rate] of the anafi_ros paper, the only thing ARSDK has:
+I/O-free: `OffboardStream` keeps whose setpoints there are and whether they fly the drone; what they ask for is in
+`offboard_setpoints`, and `OffboardFlight` flies it.
 
-- roll and pitch of the quaternion: tilt, limited by the drone's own MaxTilt;
-- yaw of the quaternion: held by a proportional loop on the yaw rate; a body yaw rate that is not ignored is added
-  as feed-forward;
-- thrust: 0.5 holds height, 0 and 1 are full descent and climb, in between linear; ignored or NaN is 0.5.
-
-A session has one pilot: whoever engages it. Setpoints of others change nothing while it lasts.
+A session has one pilot: whoever engages it. Setpoints of others change nothing while it lasts. PX4's way to engage is
+mode Offboard, refused without setpoints. ArduPilot's way is to send setpoints in mode Guided, and there a single
+position is a move of its own, which nothing but its end or another order ends; a second setpoint of the same program
+within `TOGETHER` makes a stream of it, whose end is silence.
 """
 
 from __future__ import annotations
 
 import enum
-import math
 from collections.abc import Hashable
-from dataclasses import dataclass
 
-from anafi_mav import units
-from anafi_mav.mavlink import dialect
+from anafi_mav.services.offboard_setpoints import Setpoint
 
 SILENCE = 0.45
 """s without a setpoint until the drone is told to hover, so that it has been told within half a second."""
 
-YAW_GAIN = 1.5
-"""1/s: turn rate per heading error. Attitude comes at 5 Hz and answers after 0.1-0.2 s, which stays well damped."""
-
-
-UNIT_TOLERANCE = 0.1
-"""How far a quaternion's length may be from 1: single precision and sloppy sums, not garbage."""
-
-THRUST_TOLERANCE = 1e-3
-"""How far thrust may be outside of 0..1: rounding, not another unit."""
+TOGETHER = 0.5
+"""s within which a second setpoint makes a stream of the first."""
 
 MAX_PILOTS = 8
 """Programs whose setpoints are listened to at once."""
@@ -44,13 +32,15 @@ class State(enum.Enum):
     IDLE = "no setpoints"
     STREAMING = "setpoints come, another mode flies"
     ENGAGED = "setpoints fly the drone"
+    SINGLE = "a single setpoint is flown to its end"
 
 
 class Event(enum.Enum):
     """What can happen to it."""
 
     SETPOINT = "a usable setpoint of the pilot arrived"
-    ENGAGE = "mode Offboard asked for"
+    ENGAGE = "mode Offboard asked for, or a stream in mode Guided"
+    ENGAGE_SINGLE = "a single position in mode Guided"
     DISENGAGE = "another mode took over"
     SILENCE = "no setpoint for too long"
 
@@ -60,6 +50,7 @@ TRANSITIONS: dict[State, dict[Event, State]] = {
     State.STREAMING: {
         Event.SETPOINT: State.STREAMING,
         Event.ENGAGE: State.ENGAGED,
+        Event.ENGAGE_SINGLE: State.SINGLE,
         Event.DISENGAGE: State.STREAMING,
         Event.SILENCE: State.IDLE,
     },
@@ -69,53 +60,15 @@ TRANSITIONS: dict[State, dict[Event, State]] = {
         Event.DISENGAGE: State.STREAMING,
         Event.SILENCE: State.IDLE,
     },
+    State.SINGLE: {
+        Event.SETPOINT: State.SINGLE,
+        Event.ENGAGE: State.ENGAGED,
+        Event.ENGAGE_SINGLE: State.SINGLE,
+        Event.DISENGAGE: State.STREAMING,
+    },
 }
-"""A pair that is missing cannot happen: without setpoints Offboard is refused, and there is no silence to notice."""
-
-
-@dataclass(frozen=True)
-class AttitudeSetpoint:
-    """What one SET_ATTITUDE_TARGET asks for."""
-
-    roll: float
-    """rad, right wing down +."""
-    pitch: float
-    """rad, nose up +."""
-    yaw: float
-    """rad, clockwise from north."""
-    yaw_rate: float
-    """rad/s, clockwise +; feed-forward."""
-    climb: float
-    """-1 full descent .. 1 full climb."""
-
-
-def attitude_setpoint(message: dialect.MAVLink_set_attitude_target_message) -> AttitudeSetpoint | str:
-    """The setpoint in a message, or one sentence on why it cannot be flown."""
-    mask = message.type_mask
-    if mask & dialect.ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE:
-        return "body rates alone cannot be flown: an ANAFI takes angles"
-    try:
-        roll, pitch, yaw = units.euler_from_quaternion(*message.q)
-    except ValueError:
-        return "the attitude quaternion is no rotation"
-    if not abs(math.hypot(*message.q) - 1.0) <= UNIT_TOLERANCE:
-        return "the attitude quaternion is not of length 1"
-    if abs(roll) > math.pi / 2:
-        return "the attitude quaternion is upside down"
-    yaw_rate = 0.0
-    if not mask & dialect.ATTITUDE_TARGET_TYPEMASK_BODY_YAW_RATE_IGNORE and math.isfinite(message.body_yaw_rate):
-        yaw_rate = message.body_yaw_rate
-    thrust = 0.5
-    if not mask & dialect.ATTITUDE_TARGET_TYPEMASK_THROTTLE_IGNORE and math.isfinite(message.thrust):
-        if not -THRUST_TOLERANCE <= message.thrust <= 1.0 + THRUST_TOLERANCE:
-            return "thrust is not between 0 and 1"
-        thrust = units.clip(message.thrust, 0.0, 1.0)
-    return AttitudeSetpoint(roll, pitch, yaw, yaw_rate, 2.0 * thrust - 1.0)
-
-
-def yaw_rate_towards(setpoint: AttitudeSetpoint, yaw: float) -> float:
-    """Turn rate (rad/s, clockwise +) that brings a drone heading `yaw` (rad) to the setpoint the short way."""
-    return setpoint.yaw_rate + YAW_GAIN * units.wrap_pi(setpoint.yaw - yaw)
+"""A pair that is missing cannot happen: without setpoints Offboard is refused, and there is no silence to notice; a
+stream does not become a single setpoint again, and a single one is followed by silence."""
 
 
 class OffboardStream:
@@ -125,22 +78,37 @@ class OffboardStream:
         self.state = State.IDLE
         self.pilot: Hashable = None
         """Whose setpoints fly the drone while the session is engaged."""
-        self._heard: dict[Hashable, tuple[AttitudeSetpoint, float]] = {}
+        self._heard: dict[Hashable, tuple[Setpoint, float]] = {}
 
     @property
-    def setpoint(self) -> AttitudeSetpoint | None:
-        """The pilot's newest setpoint; None while no session is engaged."""
-        heard = self._heard.get(self.pilot) if self.state is State.ENGAGED else None
+    def flying(self) -> bool:
+        """Setpoints fly the drone, a stream of them or a single one."""
+        return self.state in (State.ENGAGED, State.SINGLE)
+
+    @property
+    def setpoint(self) -> Setpoint | None:
+        """The pilot's newest setpoint; None while none is flown."""
+        heard = self._heard.get(self.pilot) if self.flying else None
         return None if heard is None else heard[0]
 
     def age(self, now: float) -> float:
-        """Seconds since the pilot's newest setpoint; 0 while no session is engaged."""
-        return now - self._heard[self.pilot][1] if self.state is State.ENGAGED else 0.0
+        """Seconds since the pilot's newest setpoint; 0 while none is flown."""
+        return now - self._heard[self.pilot][1] if self.flying else 0.0
 
-    def receive(self, sender: Hashable, setpoint: AttitudeSetpoint, now: float) -> bool:
+    def follows(self, sender: Hashable, now: float) -> bool:
+        """This program's last setpoint is so young that one that arrives now is of the same stream."""
+        heard = self._heard.get(sender)
+        return heard is not None and now - heard[1] < TOGETHER
+
+    def newest(self, sender: Hashable) -> Setpoint | None:
+        """What this program asked for last."""
+        heard = self._heard.get(sender)
+        return None if heard is None else heard[0]
+
+    def receive(self, sender: Hashable, setpoint: Setpoint, now: float) -> bool:
         """A usable setpoint arrived. False: somebody else flies, or too many want to."""
         if sender not in self._heard and len(self._heard) >= MAX_PILOTS:
-            self._heard = {other: heard for other, heard in self._heard.items() if self._is_fresh(heard, now)}
+            self._prune(now)
             if len(self._heard) >= MAX_PILOTS:
                 return False
         self._heard[sender] = (setpoint, now)
@@ -160,8 +128,15 @@ class OffboardStream:
         return max(fresh, key=lambda sender: fresh[sender][1], default=None)
 
     def engage(self, pilot: Hashable) -> None:
-        """Mode Offboard begins, flown by a `candidate`."""
+        """Setpoints begin to fly the drone, those of a `candidate`."""
         self.state, self.pilot = TRANSITIONS[self.state][Event.ENGAGE], pilot
+
+    def engage_single(self, pilot: Hashable, setpoint: Setpoint, said: float) -> None:
+        """This one setpoint of a program is flown to its end, however old it has become until its turn came."""
+        self._heard[pilot] = (setpoint, said)
+        if self.state is State.IDLE:
+            self.state = TRANSITIONS[self.state][Event.SETPOINT]
+        self.state, self.pilot = TRANSITIONS[self.state][Event.ENGAGE_SINGLE], pilot
 
     def disengage(self) -> None:
         """Another mode takes over; setpoints may go on coming."""
@@ -169,7 +144,7 @@ class OffboardStream:
 
     def deadline(self) -> float | None:
         """When silence will have lasted too long; None while there is nothing to wait for."""
-        if self.state is State.IDLE:
+        if self.state in (State.IDLE, State.SINGLE):
             return None
         if self.state is State.ENGAGED:
             return self._heard[self.pilot][1] + SILENCE
@@ -181,13 +156,21 @@ class OffboardStream:
         if deadline is None or now < deadline:
             return False
         engaged = self.state is State.ENGAGED
-        self._heard = {sender: heard for sender, heard in self._heard.items() if self._is_fresh(heard, now)}
+        self._prune(now)
         self.pilot = None
         self.state = TRANSITIONS[self.state][Event.SILENCE]
         if self._heard:  # others stream on; none of them flies
             self.state = TRANSITIONS[self.state][Event.SETPOINT]
         return engaged
 
+    def _prune(self, now: float) -> None:
+        """Forget who has fallen silent, but for the author of a single setpoint that is being flown."""
+        self._heard = {
+            sender: heard
+            for sender, heard in self._heard.items()
+            if self._is_fresh(heard, now) or (self.state is State.SINGLE and sender == self.pilot)
+        }
+
     @staticmethod
-    def _is_fresh(heard: tuple[AttitudeSetpoint, float], now: float) -> bool:
+    def _is_fresh(heard: tuple[Setpoint, float], now: float) -> bool:
         return now < heard[1] + SILENCE

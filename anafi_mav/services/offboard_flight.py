@@ -1,7 +1,8 @@
-"""Flies the drone by the pilot's setpoints for as long as mode Offboard is engaged: the shell around `offboard`.
+"""Flies the drone by the pilot's setpoints: the shell around the cores `offboard` and `offboard_control`.
 
-A setpoint reaches the sticks the moment it arrives, and again whenever the drone tells its attitude; a timer turns the
-pilot's silence into a hover.
+An attitude or a velocity reaches the sticks the moment it arrives, and again whenever the drone tells how it moves. A
+position is a move that the drone makes by itself (`offboard_moves`). A timer turns the pilot's silence into a hover,
+which ends a move as well.
 """
 
 from __future__ import annotations
@@ -9,128 +10,342 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
-from collections.abc import Hashable
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Coroutine, Hashable
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from anafi_mav import units
 from anafi_mav.clock import Clock
-from anafi_mav.drone import PilotingCommand
-from anafi_mav.errors import LinkLost
+from anafi_mav.drone import Limits, PilotingCommand, events
+from anafi_mav.drone.events import Message
+from anafi_mav.errors import AnafiMavError, LinkLost
 from anafi_mav.services.modes import FlightMode
-from anafi_mav.services.offboard import AttitudeSetpoint, OffboardStream, State, yaw_rate_towards
+from anafi_mav.services.offboard import OffboardStream, State
+from anafi_mav.services.offboard_control import STILL, WIND, Controller, Motion, tilt_for, turn_towards
+from anafi_mav.services.offboard_goals import Goal, demand, resolve
+from anafi_mav.services.offboard_moves import OffboardMoves
+from anafi_mav.services.offboard_setpoints import NOTHING, AttitudeSetpoint, MotionSetpoint, Setpoint
 from anafi_mav.services.refusal import Refused
 from anafi_mav.services.statustext import Severity
 
 if TYPE_CHECKING:
     from anafi_mav.services.vehicle import Vehicle
 
-HEADING_AGE = 1.0
-"""s after which the drone's heading is not known any more: it comes five times a second. A heading loop that closes on
-an older one turns for ever."""
+SINGLE_WAIT = 2.0
+"""s that a single setpoint may wait until what was under way has let go of the drone; then it is out of date."""
+
+
+class _Course(NamedTuple):
+    """A heading as it was asked for, and what it meant when it first arrived (rad from north)."""
+
+    body: bool
+    asked: float | None
+    yaw: float | None
 
 
 class OffboardFlight:
     """The setpoints of programs on one vehicle, and the drone flown by those of its pilot."""
 
     def __init__(self, vehicle: Vehicle, clock: Clock) -> None:
+        self.motion = Motion()
+        """How the drone moves; whoever else flies it by sticks uses it too."""
+        self.complain: Callable[[str], None] = lambda text: vehicle.text(Severity.WARNING, text)
+        """Says what is wrong with something that arrives many times a second."""
+        self.act: Callable[[Hashable, Coroutine[Any, Any, None]], asyncio.Task[None]] = _at_once
+        """Runs what takes the drone over, in its turn among the commands."""
+        self.flown: PilotingCommand | None = None
+        """The sticks that setpoints hold at present; None while they hold none."""
         self._vehicle = vehicle
         self._clock = clock
         self._stream = OffboardStream()
         self._timer: asyncio.TimerHandle | None = None
-        self._attitude_at = -math.inf
+        self._engaging: asyncio.Task[None] | None = None
+        self._alone = False
+        """What is being engaged is a single setpoint."""
+        self._afterwards = FlightMode.HOLD
+        """The mode that silence ends in."""
+        self._controller = Controller(self.motion)
+        self._goal: Goal | None = None
+        self._course = _Course(False, None, None)
+        self._moves = OffboardMoves(vehicle, lambda text: self.complain(text))
 
     @property
     def engaged(self) -> bool:
         """Setpoints fly the drone."""
-        return self._stream.state is State.ENGAGED
+        return self._stream.flying
 
-    def setpoint(self, sender: Hashable, setpoint: AttitudeSetpoint) -> bool:
-        """A program's newest setpoint; flies the drone at once when mode Offboard is engaged and it is the pilot.
+    @property
+    def setpoint(self) -> Setpoint | None:
+        """What is being flown; None when no setpoint is."""
+        return self._stream.setpoint
 
-        False: it is not listened to, another program flies.
+    @property
+    def goal(self) -> Goal | None:
+        """The position of what is being flown, resolved; None when it has none."""
+        return self._goal if self.engaged else None
+
+    @property
+    def yaw(self) -> float | None:
+        """The heading (rad from north) that is turned to or held; None when none is."""
+        return self._course.yaw if self.engaged else None
+
+    @property
+    def age(self) -> float:
+        """s since the setpoint that is being flown arrived."""
+        return self._stream.age(self._clock.monotonic())
+
+    # What programs ask for.
+
+    def receive(self, sender: Hashable, setpoint: Setpoint, *, guided: bool = False) -> str | None:
+        """A program's newest setpoint; flies the drone at once when this program is the pilot.
+
+        `guided`: the program is of the family whose setpoints fly the drone in mode Guided, without engagement.
+        Returns None, or one sentence on why nobody listens.
         """
-        if not self._stream.receive(sender, setpoint, self._clock.monotonic()):
-            return False
+        now = self._clock.monotonic()
+        if isinstance(setpoint, MotionSetpoint) and (reason := self._objection(sender, setpoint)):
+            return reason
+        follows = self._stream.follows(sender, now)
+        if not self._stream.receive(sender, setpoint, now):
+            return "another program flies"
         if self._timer is None:
             self._watch()
-        if self.engaged:
+        pilot = self.engaged and sender == self._stream.pilot
+        if pilot and self._stream.state is State.SINGLE and (follows or not _ends(setpoint)):
+            self._stream.engage(sender)
+            self._watch()
+            self._vehicle.select(FlightMode.OFFBOARD, self)
+        if pilot:
             self._fly()
-        return True
+        elif guided:
+            return self._begin_guided(sender, setpoint, now, follows=follows)
+        return None
+
+    def _objection(self, sender: Hashable, setpoint: MotionSetpoint) -> str | None:
+        """Why a position cannot be flown to; None when it can, or is being flown to."""
+        if setpoint.position == NOTHING:
+            return None
+        if sender == self._stream.pilot and self._goal is not None and self._goal.is_of(setpoint):
+            return None
+        try:
+            resolve(setpoint, self._vehicle, self.motion)
+        except Refused as refusal:
+            return refusal.reason.partition("efused: ")[2] or refusal.reason
+        return None
 
     async def engage(self, client: Hashable) -> None:
         """Mode Offboard begins for this client; returns when its setpoints fly the drone, or raises `Refused`."""
-        vehicle = self._vehicle
-        if not vehicle.in_air:
-            raise Refused("Offboard refused: take off first, setpoints do not lift an ANAFI off the ground")
-        if vehicle.returning:
-            raise Refused("Offboard refused: the drone returns home")
-        if vehicle.drone.controller.pilot_flies:
-            raise Refused("Offboard refused: the pilot at the Skycontroller flies")
-        if vehicle.drone.piloting.limits is None:
-            raise Refused("Offboard refused: the drone has not reported what full tilt and speed are")
+        self._require_freedom("Offboard")
         if self._stream.candidate(client, self._clock.monotonic()) is None:
             raise Refused("Offboard refused: no setpoints arrive")
-        await vehicle.take_over()
-        await vehicle.drone.piloting.cancel_return_home()
+        await self._vehicle.take_over()
+        await self._vehicle.drone.piloting.cancel_return_home()
         pilot = self._stream.candidate(client, self._clock.monotonic())
-        if pilot is None or not vehicle.in_air or vehicle.returning:
+        if pilot is None or not self._vehicle.in_air or self._vehicle.returning:
             raise Refused("Offboard refused: the setpoints stopped, or the drone is not free to fly them")
+        self._afterwards = FlightMode.HOLD
         self._stream.engage(pilot)
-        self._watch()  # the pilot's, which may be older than the newest of all
-        vehicle.drone.piloting.hover()  # ends a moveTo or moveBy of ours, which would ignore sticks
-        vehicle.select(FlightMode.OFFBOARD)
-        self._fly()
+        self._begin(FlightMode.OFFBOARD)
 
-    def end(self) -> None:
-        """Whoever flew by setpoints flies no more, and the last one does not fly on."""
-        if self.engaged:
-            self._stream.disengage()
-            self._vehicle.forget_mode()
-            with contextlib.suppress(LinkLost):
-                self._vehicle.drone.piloting.pilot(None)
+    def _require_freedom(self, what: str) -> None:
+        vehicle = self._vehicle
+        if not vehicle.in_air:
+            raise Refused(f"{what} refused: take off first, setpoints do not lift an ANAFI off the ground")
+        if vehicle.returning:
+            raise Refused(f"{what} refused: the drone returns home")
+        if vehicle.drone.controller.pilot_flies:
+            raise Refused(f"{what} refused: the pilot at the Skycontroller flies")
+        if vehicle.drone.piloting.limits is None:
+            raise Refused(f"{what} refused: the drone has not reported what full tilt and speed are")
 
-    def on_attitude(self) -> None:
-        """The drone told its attitude: the heading loop closes on it."""
-        self._attitude_at = self._clock.monotonic()
-        if self.engaged:
-            self._fly()
+    # ArduPilot's way.
+
+    def _begin_guided(self, sender: Hashable, setpoint: Setpoint, now: float, *, follows: bool) -> str | None:
+        mode = self._vehicle.mode
+        if not self._vehicle.in_air:
+            return "take off first"
+        if mode is not FlightMode.GUIDED:
+            return f"setpoints fly the drone in mode Guided, this is {mode.value}"
+        self._alone = not follows and _ends(setpoint)
+        if self._engaging is None or self._engaging.done():
+            self._engaging = self.act(sender, self._engage_guided(sender, setpoint, now))
+        return None
+
+    async def _engage_guided(self, sender: Hashable, setpoint: Setpoint, said: float) -> None:
+        """A setpoint in mode Guided takes the drone over from whatever it does in that mode."""
+        try:
+            self._require_freedom("Setpoint")
+            await self._vehicle.take_over()
+            await self._vehicle.drone.piloting.cancel_return_home()
+            if not self._vehicle.in_air or self._vehicle.returning:
+                raise Refused("Setpoint refused: the drone does something else now")
+        except AnafiMavError as error:
+            self.complain(str(error))
+            return
+        now = self._clock.monotonic()
+        self._afterwards = FlightMode.GUIDED
+        if self._alone and now - said < SINGLE_WAIT:
+            self._stream.engage_single(sender, setpoint, said)
+            self._begin(FlightMode.GUIDED)
+        elif not self._alone and self._stream.candidate(sender, now) == sender:
+            self._stream.engage(sender)
+            self._begin(FlightMode.OFFBOARD)
+        else:
+            self._vehicle.select(FlightMode.GUIDED)
+
+    # Ending.
+
+    def end(self) -> list[asyncio.Task[None]]:
+        """Whoever flew by setpoints flies no more, and the last one does not fly on. Tasks that are about to end."""
+        if not self.engaged:
+            return []
+        self._stream.disengage()
+        self._watch()
+        self._vehicle.forget_mode()
+        self.flown = None
+        ending = self._moves.stop()
+        with contextlib.suppress(LinkLost):
+            self._vehicle.drone.piloting.pilot(None)
+        return ending
 
     def link_down(self) -> None:
         """Setpoints of before count for nothing."""
         self._cancel_timer()
+        self._moves.forget()
+        self._goal = self.flown = None
         self._stream = OffboardStream()
-        self._attitude_at = -math.inf
+        self.motion = Motion()
+        self._controller = Controller(self.motion)
+
+    # What the drone tells.
+
+    def on_event(self, message: Message, now: float) -> None:
+        """How the drone moves: the loops close on it."""
+        piloting, motion = self._vehicle.drone.piloting.state, self.motion
+        kind = type(message)
+        if kind is events.AttitudeChanged:
+            if (attitude := piloting.attitude) is None:
+                motion.forget_attitude()
+            else:
+                motion.on_attitude(attitude.roll, attitude.pitch, attitude.yaw, now)
+            if isinstance(self._stream.setpoint, AttitudeSetpoint):
+                self._fly()
+        elif kind is events.SpeedChanged:
+            if (velocity := piloting.velocity) is None:
+                motion.forget_velocity()
+            else:
+                motion.on_velocity(velocity.north, velocity.east, velocity.down, now)
+            if isinstance(self._stream.setpoint, MotionSetpoint):
+                self._fly()
+        elif kind is events.AltitudeChanged:
+            if piloting.altitude is None:
+                motion.forget_height()
+            else:
+                motion.on_height(piloting.altitude, now)
+        elif kind is events.GpsLocationChanged and (place := self._vehicle.place) is not None:
+            motion.on_place(place.latitude, place.longitude)
+
+    # Flying.
+
+    def _begin(self, mode: FlightMode) -> None:
+        """The session has a pilot from now on."""
+        self._watch()  # the pilot's, which may be older than the newest of all
+        self._controller = Controller(self.motion)
+        self._goal, self._course = None, _Course(False, None, None)
+        self._vehicle.drone.piloting.hover()  # ends a moveTo or moveBy of ours, which would ignore sticks
+        self._vehicle.select(mode, self)
+        self._fly()
 
     def _fly(self) -> None:
-        """Send the pilot's newest setpoint, with what the heading loop makes of it at this moment."""
-        now, drone = self._clock.monotonic(), self._vehicle.drone
-        setpoint, limits = self._stream.setpoint, drone.piloting.limits
+        """Do what the pilot's newest setpoint asks for at this moment."""
+        vehicle, setpoint = self._vehicle, self._stream.setpoint
+        limits = vehicle.drone.piloting.limits
         if setpoint is None or limits is None:
             return
-        if drone.controller.pilot_flies:
+        if vehicle.drone.controller.pilot_flies:
             # He moved a stick. That he let go of it again does not give the drone back to the program.
-            self._vehicle.select(FlightMode.HOLD)
-            self._vehicle.text(Severity.WARNING, "Offboard ended: the pilot at the Skycontroller flies")
+            self.end()
+            vehicle.select(FlightMode.HOLD)
+            vehicle.text(Severity.WARNING, "Offboard ended: the pilot at the Skycontroller flies")
             return
-        attitude = drone.piloting.state.attitude
+        now = self._clock.monotonic()
+        if isinstance(setpoint, AttitudeSetpoint):
+            self._hold(self._attitude(setpoint, limits, now), now)
+            return
+        try:
+            self._goal, self._course = self._resolved(setpoint), self._turned_to(setpoint)
+            if setpoint.moves and self._goal is not None:
+                self.flown = None
+                self._moves.go(self._goal, self._course.yaw, now)
+            else:
+                self._hold(self._motion_sticks(setpoint, limits, now), now)
+        except Refused as refusal:  # what the drone told when the setpoint arrived is not known any more
+            self.complain(f"Setpoint not flown: {refusal.reason}")
+            self._hold(PilotingCommand(), now)
+
+    def _attitude(self, setpoint: AttitudeSetpoint, limits: Limits, now: float) -> PilotingCommand:
+        self._goal, self._course = None, _Course(False, setpoint.yaw, setpoint.yaw)
         turn = setpoint.yaw_rate
-        if attitude is not None and now - self._attitude_at < HEADING_AGE:
-            turn = yaw_rate_towards(setpoint, attitude.yaw)
-        drone.piloting.pilot(
-            PilotingCommand(
-                roll_deg=setpoint.roll * units.DEG_PER_RAD,
-                pitch_deg=setpoint.pitch * units.DEG_PER_RAD,
-                yaw_rate_dps=turn * units.DEG_PER_RAD,
-                climb_mps=setpoint.climb * limits.climb_mps,
-            ),
-            age=self._stream.age(now),
+        if self.motion.yaw is not None and self.motion.knows_heading(now):
+            turn = turn_towards(setpoint.yaw, self.motion.yaw, turn)
+        return PilotingCommand(
+            roll_deg=setpoint.roll * units.DEG_PER_RAD,
+            pitch_deg=setpoint.pitch * units.DEG_PER_RAD,
+            yaw_rate_dps=turn * units.DEG_PER_RAD,
+            climb_mps=setpoint.climb * limits.climb_mps,
         )
+
+    def _motion_sticks(self, setpoint: MotionSetpoint, limits: Limits, now: float) -> PilotingCommand:
+        speed = math.hypot(setpoint.velocity[0] or 0.0, setpoint.velocity[1] or 0.0)
+        needed = tilt_for(speed) * units.DEG_PER_RAD
+        if speed > STILL and needed > limits.tilt_deg:
+            self.complain(
+                f"MaxTilt of {limits.tilt_deg:.0f} degrees does not hold {speed:.1f} m/s against {WIND:g} m/s of wind, "
+                f"{math.ceil(needed)} would"
+            )
+        located = self._vehicle.place is not None
+        wanted = demand(setpoint, self._goal, self._course.yaw, located=located)
+        sticks = self._controller.sticks(wanted, limits, now)
+        if sticks is None:
+            raise Refused("the drone does not tell how it moves")
+        if self._controller.short_of is not None:
+            self.complain(f"MaxTilt of {limits.tilt_deg:.0f} degrees is too little for this setpoint")
+        return sticks
+
+    def _resolved(self, setpoint: MotionSetpoint) -> Goal | None:
+        """Where the setpoint's position is: what it meant when it first arrived."""
+        if setpoint.position == NOTHING:
+            return None
+        if self._goal is not None and self._goal.is_of(setpoint):
+            return self._goal
+        return resolve(setpoint, self._vehicle, self.motion)
+
+    def _turned_to(self, setpoint: MotionSetpoint) -> _Course:
+        """Where the setpoint's heading is: what it meant when it first arrived."""
+        if self._course[:2] == (setpoint.body, setpoint.yaw):
+            return self._course
+        yaw = setpoint.yaw
+        if yaw is not None and setpoint.body:
+            if self.motion.yaw is None:
+                raise Refused("the drone's heading is not known")
+            yaw = units.wrap_pi(self.motion.yaw + yaw)
+        return _Course(setpoint.body, setpoint.yaw, yaw)
+
+    def _hold(self, sticks: PilotingCommand, now: float) -> None:
+        """These sticks, for as long as the setpoint is young."""
+        if self._moves.active:
+            self._moves.stop()
+        self.flown = sticks
+        self._vehicle.drone.piloting.pilot(sticks, age=self._stream.age(now))
+
+    # Silence.
 
     def _expired(self) -> None:
         self._timer = None
         if self._stream.expire(self._clock.monotonic()):
+            self.flown = None
+            self._moves.forget()
             self._vehicle.drone.piloting.hover()
-            self._vehicle.select(FlightMode.HOLD)
+            self._vehicle.select(self._afterwards)
             self._vehicle.text(Severity.WARNING, "Offboard setpoints stopped: hovering")
         self._watch()
 
@@ -146,3 +361,12 @@ class OffboardFlight:
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
+
+
+def _ends(setpoint: Setpoint) -> bool:
+    """It can be flown to its end: a position can, a velocity has none."""
+    return isinstance(setpoint, MotionSetpoint) and setpoint.moves
+
+
+def _at_once(client: Hashable, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
+    return asyncio.get_running_loop().create_task(work)

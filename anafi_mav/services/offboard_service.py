@@ -1,27 +1,62 @@
-"""Setpoints of programs, as they arrive (MAVLink offboard.md; conformance C16). What they mean is in `offboard`."""
+"""Setpoints of programs as they arrive, and what of them is being flown, told back (MAVLink offboard.md, C16).
+
+What the messages mean is in `offboard_setpoints`, how they are flown in `offboard_flight`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from typing import Any
 
+from anafi_mav.drone.events import Message
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
-from anafi_mav.services.offboard import attitude_setpoint
-from anafi_mav.services.service import MessageHandler, Service, client_of
+from anafi_mav.services import offboard_setpoints
+from anafi_mav.services.flavours import flavour_of
+from anafi_mav.services.offboard_echo import STREAMS
+from anafi_mav.services.offboard_setpoints import Setpoint
+from anafi_mav.services.service import Host, MessageHandler, Service, client_of
+from anafi_mav.services.stream import Stream
 
 
 class OffboardService(Service):
-    """SET_ATTITUDE_TARGET."""
+    """SET_ATTITUDE_TARGET, SET_POSITION_TARGET_LOCAL_NED, SET_POSITION_TARGET_GLOBAL_INT and their echoes."""
+
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self._flight = host.vehicle.offboard
+        self._flight.complain = host.complain
+        self._flight.act = host.act
 
     def capabilities(self) -> int:
-        return dialect.MAV_PROTOCOL_CAPABILITY_SET_ATTITUDE_TARGET
+        return (
+            dialect.MAV_PROTOCOL_CAPABILITY_SET_ATTITUDE_TARGET
+            | dialect.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
+            | dialect.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
+        )
 
     def messages(self) -> Mapping[int, MessageHandler]:
-        return {dialect.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET: self._set_attitude_target}
+        return {
+            dialect.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET: self._takes(offboard_setpoints.attitude_setpoint),
+            dialect.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED: self._takes(offboard_setpoints.local_setpoint),
+            dialect.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT: self._takes(offboard_setpoints.global_setpoint),
+        }
 
-    def _set_attitude_target(self, inbound: Inbound) -> None:
-        setpoint = attitude_setpoint(inbound.message)
-        if isinstance(setpoint, str):
-            self.host.complain(f"Setpoint refused: {setpoint}")
-        elif not self.host.vehicle.offboard.setpoint(client_of(inbound), setpoint):
-            self.host.complain("Setpoints refused: another program flies")
+    def streams(self) -> Mapping[int, Stream]:
+        return STREAMS
+
+    def on_event(self, message: Message, now: float) -> None:
+        self._flight.on_event(message, now)
+
+    def _takes(self, read: Callable[[Any], Setpoint | str]) -> MessageHandler:
+        def take(inbound: Inbound) -> None:
+            setpoint = read(inbound.message)
+            if isinstance(setpoint, str):
+                objection: str | None = setpoint
+            else:
+                guided = flavour_of(inbound.channel).guided_setpoints
+                objection = self._flight.receive(client_of(inbound), setpoint, guided=guided)
+            if objection is not None:
+                self.host.complain(f"Setpoint refused: {objection}")
+
+        return take

@@ -71,9 +71,9 @@ class Host(Protocol):
     def spawn(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
         """Run in the background; cancelled when the drone's link goes down."""
 
-    def act(self, client: Hashable, work: Coroutine[Any, Any, None]) -> None:
-        """Run an action that came by a message without COMMAND_ACK. It replaces what is under way; a refusal of it
-        becomes a text."""
+    def act(self, client: Hashable, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
+        """Run an action that came by a message without COMMAND_ACK, in its turn among the commands: it replaces what is
+        under way, and newer ones replace it. A refusal of it becomes a text."""
 
     def times(self, at: float | None = None) -> Times:
         """A moment of the monotonic clock (None: now) in the clock of this system's messages."""

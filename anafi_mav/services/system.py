@@ -272,9 +272,9 @@ class System:
         task.add_done_callback(self._tasks.discard)
         return task
 
-    def act(self, client: Hashable, work: Coroutine[Any, Any, None]) -> None:
+    def act(self, client: Hashable, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
         """Run an action that came by a message without COMMAND_ACK."""
-        self._commands.run(client, work)
+        return self._commands.run(client, work)
 
     def times(self, at: float | None = None) -> Times:
         """A moment of the monotonic clock (None: now) in the clock of this system's messages."""
@@ -318,8 +318,6 @@ class System:
             self.vehicle.on_flying_state()
         elif kind is events.GpsLocationChanged or kind is events.FlightId:
             self.vehicle.on_position()
-        elif kind is events.AttitudeChanged:
-            self.vehicle.on_attitude()
         elif kind is events.ReturnStateChanged:
             self.vehicle.on_return()
         for service in self.services:

@@ -21,9 +21,11 @@ from anafi_mav.drone.events import AlertLevel, FlyingState, FlyingStateChanged, 
 from anafi_mav.errors import AnafiMavError, CommandRejected
 from anafi_mav.services.fence_watch import FenceWatch, OutsideFence
 from anafi_mav.services.height import HeightReference
+from anafi_mav.services.helm import Helm
 from anafi_mav.services.link_loss import LossPolicy
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.offboard_flight import OffboardFlight
+from anafi_mav.services.place import Place as Place
 from anafi_mav.services.rally import RallyPoints
 from anafi_mav.services.refusal import Refused as Refused
 from anafi_mav.services.statustext import Severity
@@ -71,19 +73,6 @@ class Health(enum.Enum):
     ACTIVE = 4
     CRITICAL = 5
     EMERGENCY = 6
-
-
-@dataclass(frozen=True)
-class Place:
-    """A point on the map."""
-
-    latitude: float
-    longitude: float
-
-    @property
-    def point(self) -> tuple[float, float]:
-        """Latitude and longitude."""
-        return self.latitude, self.longitude
 
 
 def _point(place: Place | None) -> tuple[float, float] | None:
@@ -162,6 +151,8 @@ class Vehicle:
         self._background: asyncio.Task[None] | None = None
         self._tasks: set[asyncio.Task[None]] = set()
         self.offboard = OffboardFlight(self, clock)
+        self.helms: tuple[Helm, ...] = (self.offboard,)
+        """Who can fly the drone for as long as somebody keeps telling them how; one of them at a time."""
 
     # What the vehicle is.
 
@@ -553,11 +544,11 @@ class Vehicle:
         if state in _ON_GROUND and before is not None:
             self._armed = False
             self._forget_takeoff()
-            self.offboard.end()
+            self._end_helms()
             self._end_climb()
             self._selected = FlightMode.HOLD
         elif state in _LANDING:
-            self.offboard.end()
+            self._end_helms()
             self._end_climb()
         elif state in _TAKING_OFF and before in _ON_GROUND:
             self.height.take_off()
@@ -580,14 +571,10 @@ class Vehicle:
         elif self.flying_state is not None:
             self.height.in_flight(self.drone.product.state.flight_id)
 
-    def on_attitude(self) -> None:
-        """A new attitude: the heading loop of an engaged offboard session closes on it."""
-        self.offboard.on_attitude()
-
     def on_return(self) -> None:
         """The drone's return began, ended or changed: setpoints and the climb after a take-off never fight it."""
         if self.returning:
-            self.offboard.end()
+            self._end_helms()
             self._end_climb()
         self._changed()
 
@@ -599,7 +586,8 @@ class Vehicle:
         self._selected = FlightMode.HOLD
         self.intended = None
         self._last_flying = None
-        self.offboard.link_down()
+        for helm in self.helms:
+            helm.link_down()
         self._terminating = False
         for task in tuple(self._tasks):
             task.cancel()
@@ -614,11 +602,15 @@ class Vehicle:
 
     # Machinery.
 
-    def select(self, mode: FlightMode) -> None:
-        if mode is not FlightMode.OFFBOARD:
-            self.offboard.end()
+    def select(self, mode: FlightMode, helm: Helm | None = None) -> None:
+        """This is what the vehicle does from now on. Whoever flew it by setpoints or sticks ends, but for `helm`."""
+        self._end_helms(helm)
         self._selected = mode
         self._changed()
+
+    def _end_helms(self, helm: Helm | None = None) -> list[asyncio.Task[None]]:
+        """Nobody flies by setpoints or sticks any more, but for `helm`; tasks that are about to end."""
+        return [task for one in self.helms if one is not helm for task in one.end()]
 
     def forget_mode(self) -> None:
         """What was chosen is over: until something else is, the vehicle holds."""
@@ -644,8 +636,7 @@ class Vehicle:
     def _let_go(self) -> list[asyncio.Task[None]]:
         """End what this vehicle does by itself; the tasks that are still about to end."""
         self._forget_takeoff()
-        self.offboard.end()
-        return self._cancel_background()
+        return [*self._end_helms(), *self._cancel_background()]
 
     def _forget_takeoff(self) -> None:
         self._pending_takeoff = None

@@ -1,4 +1,4 @@
-"""The I/O-free cores of services/: modes, texts, heights, the command desk, the offboard session."""
+"""The I/O-free cores of services/: modes, texts, heights, the command desk."""
 
 from __future__ import annotations
 
@@ -8,11 +8,10 @@ from typing import Any
 import pytest
 
 from anafi_mav.mavlink import dialect
-from anafi_mav.services import commands, offboard
+from anafi_mav.services import commands
 from anafi_mav.services.flavours import ARDUPILOT, PX4
 from anafi_mav.services.height import HeightReference
 from anafi_mav.services.modes import FlightMode
-from anafi_mav.services.offboard import SILENCE, Event, OffboardStream, State
 from anafi_mav.services.statustext import Severity, TextNumbers
 
 NAN = math.nan
@@ -198,6 +197,17 @@ def test_a_return_is_asked_for_anew_unless_another_client_has_taken_over() -> No
     assert desk.retransmission("a", command(id=20), 1.0) == dialect.MAV_RESULT_CANCELLED
 
 
+def test_offboard_that_has_ended_by_itself_is_entered_anew() -> None:
+    desk = commands.CommandDesk()
+    offboard = commands.Command(176, (1.0, 6.0, 0.0, NAN), NAN, NAN, NAN, None)
+    execution = desk.begin("a", offboard)
+    execution.result, execution.ended = dialect.MAV_RESULT_ACCEPTED, 0.0
+    assert desk.retransmission("a", offboard, 1.0, FlightMode.OFFBOARD) == dialect.MAV_RESULT_ACCEPTED
+    assert desk.retransmission("a", offboard, 1.0, FlightMode.HOLD) is None
+    desk.supersede("b")
+    assert desk.retransmission("a", offboard, 1.0, FlightMode.HOLD) == dialect.MAV_RESULT_CANCELLED
+
+
 def test_what_is_another_command() -> None:
     desk = commands.CommandDesk()
     desk.begin("a", command())
@@ -246,108 +256,3 @@ def test_command_int_scales_places_only() -> None:
     assert math.isnan(unset.x)
     assert math.isnan(unset.y)
     assert message(1000, 12, 0).x == 12
-
-
-def test_every_offboard_state_knows_its_events() -> None:
-    impossible = {(State.IDLE, Event.ENGAGE), (State.IDLE, Event.SILENCE)}
-    for state in State:
-        for event in Event:
-            assert ((state, event) in impossible) is (event not in offboard.TRANSITIONS[state])
-
-
-def attitude_target(mask: int, q: tuple[float, ...], thrust: float, yaw_rate: float = 0.0) -> object:
-    return dialect.MAVLink_set_attitude_target_message(0, 1, 1, mask, list(q), 0.0, 0.0, yaw_rate, thrust)
-
-
-def test_offboard_attitude() -> None:
-    # yaw 90 degrees, nothing else: q = (cos 45, 0, 0, sin 45)
-    half = math.sqrt(0.5)
-    setpoint = offboard.attitude_setpoint(attitude_target(7, (half, 0, 0, half), 0.75))
-    assert isinstance(setpoint, offboard.AttitudeSetpoint)
-    assert setpoint.yaw == pytest.approx(math.pi / 2)
-    assert setpoint.climb == pytest.approx(0.5)
-    # heading west of north by 170, target east by 90: the short way is counter-clockwise, -100 degrees
-    assert offboard.yaw_rate_towards(setpoint, math.radians(-170)) == pytest.approx(1.5 * math.radians(-100))
-
-
-@pytest.mark.parametrize(
-    ("mask", "thrust", "climb"), [(7, 0.5, 0.0), (7, 0.0, -1.0), (7, 1.0, 1.0), (7, NAN, 0.0), (7 | 64, 1.0, 0.0)]
-)
-def test_thrust_is_vertical_speed(mask: int, thrust: float, climb: float) -> None:
-    setpoint = offboard.attitude_setpoint(attitude_target(mask, (1, 0, 0, 0), thrust))
-    assert isinstance(setpoint, offboard.AttitudeSetpoint)
-    assert setpoint.climb == climb
-
-
-@pytest.mark.parametrize(
-    ("mask", "q", "reason"),
-    [
-        (128, (1, 0, 0, 0), "body rates alone"),
-        (7, (0, 0, 0, 0), "no rotation"),
-        (7, (NAN, 0, 0, 0), "no rotation"),
-        (7, (0, 1, 0, 0), "upside down"),
-        (7, (1.2, 0, 0, 0), "length 1"),
-        (7, (1e30, 0, 1e30, 0), "length 1"),
-    ],
-)
-def test_setpoints_that_cannot_be_flown(mask: int, q: tuple[float, ...], reason: str) -> None:
-    refusal = offboard.attitude_setpoint(attitude_target(mask, q, 0.5))
-    assert isinstance(refusal, str)
-    assert reason in refusal
-
-
-@pytest.mark.parametrize("thrust", [-5.0, -0.01, 1.01, 100.0])
-def test_thrust_of_another_unit_is_not_full_thrust(thrust: float) -> None:
-    assert offboard.attitude_setpoint(attitude_target(7, (1, 0, 0, 0), thrust)) == "thrust is not between 0 and 1"
-
-
-LEVEL = offboard.AttitudeSetpoint(0, 0, 0, 0, 0)
-NOSE_DOWN = offboard.AttitudeSetpoint(0, -0.1, 0, 0, 0)
-
-
-def test_an_offboard_session_ends_with_its_setpoints() -> None:
-    stream = OffboardStream()
-    assert stream.candidate("a", 0.0) is None
-    assert stream.receive("a", LEVEL, 10.0)
-    assert stream.candidate("a", 10.4) == "a"
-    assert stream.candidate("a", 10.0 + SILENCE) is None
-    stream.engage("a")
-    assert stream.receive("a", LEVEL, 10.4)
-    assert not stream.expire(10.4 + SILENCE - 0.01)
-    assert stream.expire(10.4 + SILENCE)
-    assert stream.state is State.IDLE
-    assert stream.setpoint is None
-    assert not stream.expire(99.0)
-
-
-def test_silence_of_a_stream_that_flies_nothing_changes_nothing() -> None:
-    stream = OffboardStream()
-    stream.receive("a", LEVEL, 0.0)
-    assert not stream.expire(5.0)
-    assert stream.state is State.IDLE
-
-
-def test_a_session_has_one_pilot_and_ends_with_him() -> None:
-    stream = OffboardStream()
-    stream.receive("a", LEVEL, 0.0)
-    stream.receive("b", NOSE_DOWN, 0.1)
-    assert stream.candidate("a", 0.2) == "a"  # who asks flies, not who sent last
-    assert stream.candidate("c", 0.2) == "b"
-    stream.engage("a")
-    assert stream.setpoint == LEVEL
-    assert not stream.receive("b", NOSE_DOWN, 0.3)
-    assert stream.setpoint == LEVEL
-    assert stream.deadline() == SILENCE
-    assert stream.expire(SILENCE)
-    assert stream.state is State.STREAMING  # b streams on, and flies nothing
-    assert stream.setpoint is None
-    assert not stream.expire(0.3 + SILENCE)
-    assert stream.state is State.IDLE
-
-
-def test_a_crowd_of_senders_is_bounded() -> None:
-    stream = OffboardStream()
-    for number in range(offboard.MAX_PILOTS):
-        assert stream.receive(number, LEVEL, 0.0)
-    assert not stream.receive("one more", LEVEL, 0.1)
-    assert stream.receive("one more", LEVEL, SILENCE)  # the others have fallen silent
