@@ -27,6 +27,8 @@ MAX_PACKET = 1400
 """Bytes of a packet sent, so that Wi-Fi and tunnels do not cut it."""
 MAX_PICTURE = 4 << 20
 """Bytes of a received picture: an ANAFI streams 5 Mbit/s, a whole second of it is 0.6 MB."""
+SMALLEST_FRAGMENT = 256
+"""Bytes that a fragment counts at least against `MAX_PICTURE`: many tiny ones cost memory too."""
 MAX_UNITS = 512
 """NAL units of a received picture; Parrot's encoders cut a picture into at most 45 slices."""
 
@@ -225,6 +227,7 @@ class PictureReceiver:
         self._units: list[bytes] = []
         self._size = 0
         self._fragments: list[bytes] | None = None
+        self._fragments_size = 0
         self._metadata: FrameMetadata | None = None
         self._parts = _Parts()
         self._complete = True
@@ -305,19 +308,18 @@ class PictureReceiver:
         if first:
             if self._fragments is not None:
                 self._drop("unit")
-            self._fragments = [bytes((payload[0] & 0xE0 | payload[1] & 0x1F,))]
+            self._fragments, self._fragments_size = [bytes((payload[0] & 0xE0 | payload[1] & 0x1F,))], 0
         elif self._fragments is None:
             self._drop("unit")
             return
-        self._size += len(payload)
-        if self._size > MAX_PICTURE:
+        self._fragments_size += max(len(payload), SMALLEST_FRAGMENT)
+        if self._size + self._fragments_size > MAX_PICTURE:
             self._fragments = None
             self._drop("oversized")
             return
         self._fragments.append(payload[2:])
         if last:
             unit, self._fragments = b"".join(self._fragments), None
-            self._size -= len(unit)
             self._unit(unit)
 
     def _unit(self, unit: bytes) -> None:

@@ -199,6 +199,8 @@ def parse_head(head: bytes) -> Message | Malformed:
         lines = head.decode().replace("\r\n", "\n").split("\n")
     except UnicodeDecodeError:
         return Malformed(Status.BAD_REQUEST, "not UTF-8")
+    if re.search(r"[\x00-\x08\x0a-\x1f\x7f]", "".join(lines)):
+        return Malformed(Status.BAD_REQUEST, "control characters")
     if len(lines) > MAX_HEADERS + 1:
         return Malformed(Status.ENTITY_TOO_LARGE, f"more than {MAX_HEADERS} headers")
     headers: list[tuple[str, str]] = []
@@ -216,7 +218,7 @@ def parse_head(head: bytes) -> Message | Malformed:
         if words[0] != VERSION or status is None or not 100 <= status <= 999:
             return Malformed(Status.BAD_REQUEST, "no status line")
         return Response(status, tuple(headers), reason=words[2])
-    if len(words) != 3 or not re.fullmatch(r"[A-Z_]{1,20}", words[0]) or not words[1]:
+    if len(words) != 3 or not re.fullmatch(r"[A-Z_]{1,20} [!-~]+", f"{words[0]} {words[1]}"):
         return Malformed(Status.BAD_REQUEST, "no request line")
     if words[2] != VERSION:
         return Malformed(Status.VERSION_NOT_SUPPORTED, "another version")

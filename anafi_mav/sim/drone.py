@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import ipaddress
-import math
 import os
 import random
 import time
@@ -48,6 +47,8 @@ SKYCONTROLLER_PORTS = 100
 SHUTDOWN_TIME, REBOOT_TIME = 1.0, 10.0
 """s from the order to reboot until the drone is gone, and until it is back. Assumed: an aircraft takes longer."""
 
+HIGHEST = 10_000.0
+"""m above or below the sea that a drone may stand at; the ground of the earth does not reach as far."""
 MAX_RATE = 200.0
 """Hz; the motion itself is not computed more often."""
 
@@ -90,8 +91,9 @@ class DroneSpec:
         except ValueError:
             raise ConfigError("address", f"expected an IPv4 address, got {self.address!r}") from None
         latitude, longitude, altitude = self.home
-        if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0 and math.isfinite(altitude)):
-            raise ConfigError("home", f"expected latitude, longitude (deg) and altitude (m), got {self.home}")
+        if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0 and abs(altitude) <= HIGHEST):
+            wanted = f"latitude, longitude (deg) and altitude (up to {HIGHEST:g} m)"
+            raise ConfigError("home", f"expected {wanted}, got {self.home}")
         for key in ("discovery_port", "handshake_port", "c2d_port", "http_port", "rtsp_port"):
             port = getattr(self, key)
             if port is not None and not 0 <= port < 65536:

@@ -151,7 +151,7 @@ def metadata(firmware: Firmware, stream: Stream) -> FrameMetadata:
         # What the user turns is pitch, and yaw where the gimbal has it.
         base_quat=Quaternion(*quaternion_from_euler(roll, 0.0, pose.yaw)),
         quat=Quaternion(*quaternion_from_euler(roll, pitch, yaw)),
-        exposure_time=seen.exposure * 1000.0 if picture else None,
+        exposure_time=_milliseconds(seen.exposure, model) if picture else None,
         iso_gain=seen.iso if picture else None,
         awb_r_gain=seen.gains[0] if picture else None,
         awb_b_gain=seen.gains[1] if picture else None,
@@ -161,6 +161,11 @@ def metadata(firmware: Firmware, stream: Stream) -> FrameMetadata:
         wifi=None if model.modern else WifiLink(goodput=GOODPUT, quality=QUALITY, rssi=RSSI),
         starfish=_STARFISH if model.modern else None,
     )
+
+
+def _milliseconds(exposure: float, model: Model) -> float | None:
+    """Version 3 counts to 256 ms; what an aircraft says beyond is not known, here it says nothing."""
+    return exposure * 1000.0 if model.modern or exposure < 0.25 else None
 
 
 _STARFISH = StarfishLink(

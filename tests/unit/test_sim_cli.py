@@ -168,8 +168,14 @@ async def test_its_log_is_lines_of_json(tmp_path: Path) -> None:
         ),
         (["--home", "Paris"], "--home: expected LAT,LON,ALT like 48.8789,2.3677,35, got 'Paris'"),
         (["--home", "1,2"], "--home: expected LAT,LON,ALT like 48.8789,2.3677,35, got '1,2'"),
-        (["--home", "91,0,0"], "--home: expected latitude, longitude (deg) and altitude (m), got (91.0, 0.0, 0.0)"),
-        (["--home", "nan,0,0"], "--home: expected latitude, longitude (deg) and altitude (m), got (nan, 0.0, 0.0)"),
+        (
+            ["--home", "91,0,0"],
+            "--home: expected latitude, longitude (deg) and altitude (up to 10000 m), got (91.0, 0.0, 0.0)",
+        ),
+        (
+            ["--home", "nan,0,0"],
+            "--home: expected latitude, longitude (deg) and altitude (up to 10000 m), got (nan, 0.0, 0.0)",
+        ),
         (["--speed", "0"], "--speed: expected a number from 0.1 to 20, got 0"),
         (["--speed", "nan"], "--speed: expected a number from 0.1 to 20, got 'nan'"),
         (["--seed", "x"], "--seed: expected a whole number, got 'x'"),
