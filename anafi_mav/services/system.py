@@ -38,6 +38,7 @@ from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.modes_service import ModesService
 from anafi_mav.services.node_status import NodeStatusService
 from anafi_mav.services.offboard_service import OffboardService
+from anafi_mav.services.orbit import OrbitService
 from anafi_mav.services.parameters import ParameterService
 from anafi_mav.services.plan_service import PlanService
 from anafi_mav.services.rally_service import RallyService
@@ -59,6 +60,7 @@ SERVICES: tuple[type[Service], ...] = (
     ModesService,
     GuidedService,
     MaintenanceService,
+    OrbitService,
     TelemetryService,
     ParameterService,
     LinkLossService,

@@ -437,7 +437,9 @@ class Vehicle:
     @property
     def goto(self) -> Goto | None:
         """Where the drone is on its way to by `go`; None when it is on no such way."""
-        return self._goto if self.drone.piloting.move is not None else None
+        goto = self._goto
+        on_the_way = goto is not None and self._selected is goto.mode and self.drone.piloting.move is not None
+        return goto if on_the_way else None
 
     async def go(self, goto: Goto, *, checked: bool = False) -> None:
         """Fly to a place, or change how it is being flown to. Returns when the drone is on its way.
