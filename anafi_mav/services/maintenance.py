@@ -21,6 +21,11 @@ from anafi_mav.services.vehicle import Refused
 _MAGNETOMETER, _HORIZON = 1.0, 2.0
 """param2 and param5 of MAV_CMD_PREFLIGHT_CALIBRATION that can be meant for an ANAFI (MAVLink common.xml)."""
 
+VERSION = 2
+"""Of the texts, and part of the first; MAVSDK believes no other."""
+
+_NO_SUCH = "an ANAFI has the magnetometer's and the gimbal's only"
+
 _RESTART = 1.0
 """param1 of MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN."""
 
@@ -57,7 +62,9 @@ class MaintenanceService(Service):
         elif wanted == {5: _HORIZON}:
             await self._on_ground(self._gimbal)
         else:
-            raise Refused("Calibration refused: an ANAFI has the magnetometer's and the gimbal's only", lasting=True)
+            # MAVSDK takes a refusal alone for a success; it believes the texts.
+            self._say(f"calibration failed: {_NO_SUCH}", Severity.ERROR)
+            raise Refused(f"Calibration refused: {_NO_SUCH}", lasting=True)
 
     async def _on_ground(self, work: Work) -> None:
         vehicle = self.host.vehicle
@@ -70,7 +77,7 @@ class MaintenanceService(Service):
         self, name: str, work: Callable[[], Awaitable[None]], undo: Callable[[], Awaitable[object]]
     ) -> None:
         """Run a calibration, with the texts of its beginning and its end; given up, it is undone."""
-        self._say(f"calibration started: {name}")
+        self._say(f"calibration started: {VERSION} {name}")
         try:
             await work()
         except asyncio.CancelledError:
@@ -81,7 +88,7 @@ class MaintenanceService(Service):
             self._say(f"calibration failed: {error}", Severity.ERROR)
             await self._undone(undo)
             raise
-        self._say(f"calibration done: {name.split()[-1]}")
+        self._say(f"calibration done: {name}")
 
     @staticmethod
     async def _undone(undo: Callable[[], Awaitable[object]]) -> None:
@@ -99,7 +106,7 @@ class MaintenanceService(Service):
             finally:
                 watching.cancel()
 
-        await self._told("2 mag", turn, element.abort_magnetometer)
+        await self._told("mag", turn, element.abort_magnetometer)
 
     async def _watch_axes(self) -> None:
         """Say which way to turn the drone, and how far it has come, whenever that changes."""
@@ -122,7 +129,7 @@ class MaintenanceService(Service):
 
     async def _gimbal(self) -> None:
         gimbal = self.host.drone.gimbal
-        await self._told("4 level", gimbal.calibrate, gimbal.cancel_calibration)
+        await self._told("level", gimbal.calibrate, gimbal.cancel_calibration)
 
     async def _reboot(self, command: Command) -> None:
         """MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: param1 1. Accepted when the drone falls silent over it."""
