@@ -268,8 +268,8 @@ class GuidedService(Service):
         """
         vehicle, home = self.host.vehicle, self.host.drone.home
         if command.params[0] == 1.0:
-            where, ato = vehicle.place, vehicle.drone.piloting.state.altitude
-            if where is None or ato is None:
+            where, ato = vehicle.place, 0.0  # below the drone, not where it flies
+            if where is None:
                 raise Refused("Home refused: the drone does not know where it is")
         else:
             where = place(command)

@@ -103,6 +103,8 @@ class RallyService(Service):
             self._rejected[point] = now + REJECTED_FOR
             self._chosen = None
             self.host.text(Severity.WARNING, f"Rally point {point.number} not used: {error}")
+            # Not at the next tick: a return in between would go to the custom home of some other day.
+            await self._restore()
         else:
             self._chosen = point
             self.host.text(Severity.NOTICE, f"Returns end at rally point {point.number}")
