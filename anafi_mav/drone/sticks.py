@@ -113,9 +113,10 @@ class Sticks:
 
     def command(self, position: Percent, now: float, said: float | None = None) -> None:
         """Hold this position until `HOLD_LIMIT` after it was `said` (None: now), then the sticks centre."""
+        if not self.active or position != self._position:  # the same said again leaves with the next repetition
+            self._next = max(now, self._paid_until - MIN_SPACING)
         self._position, self._remaining = position, None
         self._expires = (now if said is None else said) + HOLD_LIMIT
-        self._next = max(now, self._paid_until - MIN_SPACING)
 
     def centre(self, now: float) -> None:
         """Let go: centred from now on, for two seconds. The end of a deflection waits for nothing."""

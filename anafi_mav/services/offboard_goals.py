@@ -66,7 +66,7 @@ def resolve(setpoint: MotionSetpoint, vehicle: Vehicle, motion: Motion) -> Goal:
             )
         else:
             place = Place(x or 0.0, y or 0.0)
-        vehicle.check_place(place)
+        vehicle.check_place(place, start=vehicle.place)
         if motion.reference is not None:
             north, east = geo.offset(*motion.reference, place.latitude, place.longitude)
     return Goal(
@@ -104,7 +104,7 @@ def _from_vehicle(setpoint: MotionSetpoint, vehicle: Vehicle, motion: Motion) ->
     if here is not None:
         place = Place(*geo.destination(here.latitude, here.longitude, north, east))
         if north != 0.0 or east != 0.0:
-            vehicle.check_place(place)
+            vehicle.check_place(place, start=here)
     turn = motion.yaw if setpoint.body else 0.0
     along = motion.north * math.cos(turn) + motion.east * math.sin(turn)
     across = motion.east * math.cos(turn) - motion.north * math.sin(turn)

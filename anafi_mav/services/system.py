@@ -32,6 +32,7 @@ from anafi_mav.services.identity import IdentityService
 from anafi_mav.services.link_loss_service import LinkLossService
 from anafi_mav.services.logs import LogService
 from anafi_mav.services.maintenance import MaintenanceService
+from anafi_mav.services.manual_control import ManualControlService
 from anafi_mav.services.memory import Memory
 from anafi_mav.services.message_service import MessageService
 from anafi_mav.services.modes import FlightMode
@@ -69,6 +70,7 @@ SERVICES: tuple[type[Service], ...] = (
     FenceService,
     RallyService,
     OffboardService,
+    ManualControlService,
     TimeService,
     BannerService,
     WarningService,

@@ -23,6 +23,7 @@ from anafi_mav.services.fence_watch import FenceWatch, OutsideFence
 from anafi_mav.services.height import HeightReference
 from anafi_mav.services.helm import Helm
 from anafi_mav.services.link_loss import LossPolicy
+from anafi_mav.services.manual_flight import ManualFlight
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.offboard_flight import OffboardFlight
 from anafi_mav.services.place import Place as Place
@@ -151,7 +152,8 @@ class Vehicle:
         self._background: asyncio.Task[None] | None = None
         self._tasks: set[asyncio.Task[None]] = set()
         self.offboard = OffboardFlight(self, clock)
-        self.helms: tuple[Helm, ...] = (self.offboard,)
+        self.manual = ManualFlight(self, clock)
+        self.helms: tuple[Helm, ...] = (self.offboard, self.manual)
         """Who can fly the drone for as long as somebody keeps telling them how; one of them at a time."""
 
     # What the vehicle is.

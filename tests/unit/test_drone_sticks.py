@@ -88,8 +88,8 @@ def test_a_newer_setpoint_does_not_wait_for_the_rhythm() -> None:
 
 def test_setpoints_that_come_too_often_wait_and_the_newest_wins() -> None:
     sticks = Sticks()
-    for now in (1.0, 1.005):  # two may follow each other at once
-        sticks.command(Percent(10, 0, 0, 0), now)
+    for now, roll in ((1.0, 10), (1.005, 11)):  # two may follow each other at once
+        sticks.command(Percent(roll, 0, 0, 0), now)
         assert sticks.due(now) is not None
     sticks.command(Percent(20, 0, 0, 0), 1.010)
     sticks.command(Percent(30, 0, 0, 0), 1.015)
@@ -98,6 +98,22 @@ def test_setpoints_that_come_too_often_wait_and_the_newest_wins() -> None:
     pcmd = sticks.due(1.0201)
     assert pcmd is not None
     assert pcmd.roll == 30
+
+
+def test_the_same_said_again_leaves_with_the_repetition() -> None:
+    """A joystick that is held still is streamed fifty times a second; the drone hears it twenty times."""
+    sticks = Sticks()
+    sent = []
+    for number in range(50):
+        now = 3.0 + 0.02 * number
+        sticks.command(Percent(10, 0, 0, 0), now)
+        if (pcmd := sticks.due(now)) is not None:
+            sent.append(pcmd.roll)
+    assert sent == [10] * len(sent)
+    assert 17 <= len(sent) <= 20
+    # Each of them renewed it.
+    assert {p.roll for t, p in run(sticks, 4.0, 4.47)} == {10}
+    assert {p.roll for t, p in run(sticks, 4.49, 4.6)} == {0}
 
 
 def test_a_setpoint_that_is_not_renewed_becomes_centred_sticks() -> None:
