@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -27,8 +28,8 @@ Point = tuple[float, float]
 SMALLEST_AREA = 1.0
 """m². A polygon that encloses less is a line or a point: a slip, and nobody can be in it."""
 
-FINEST_STEP, STEPS = 0.25, 1000
-"""A way is looked at every so many m near a boundary, and at no more than about so many points."""
+SHORTEST = 0.01
+"""m of a way outside that count: two zones that meet leave no gap by rounding."""
 
 _RETURN_POINT = dialect.MAV_CMD_NAV_FENCE_RETURN_POINT
 _POLYGONS = {
@@ -57,6 +58,20 @@ class Circle:
         """How far inside the boundary a point is (m), negative outside. A circle around an unknown home is endless."""
         centre = home if self.centre is None else self.centre
         return math.inf if centre is None else self.radius - geo.distance(*centre, *point)
+
+    def crossings(self, start: Point, end: Point, home: Point | None) -> list[float]:
+        """Where the straight way from one point to another meets the boundary: shares of the way."""
+        centre = home if self.centre is None else self.centre
+        if centre is None:
+            return []
+        (n, e), (to_n, to_e) = geo.offset(*centre, *start), geo.offset(*centre, *end)
+        dn, de = to_n - n, to_e - e
+        # |start + t way|² = radius²
+        a, b, c = dn * dn + de * de, n * dn + e * de, n * n + e * e - self.radius * self.radius
+        root = b * b - a * c
+        if a == 0.0 or root < 0.0:
+            return []
+        return [t for t in ((-b - math.sqrt(root)) / a, (-b + math.sqrt(root)) / a) if 0.0 < t < 1.0]
 
 
 class Polygon:
@@ -94,6 +109,18 @@ class Polygon:
         )
         inside = int(np.count_nonzero(at > here[1])) % 2 == 1
         return distance if inside else -distance
+
+    def crossings(self, start: Point, end: Point, home: Point | None) -> list[float]:
+        """Where the straight way from one point to another meets the boundary: shares of the way."""
+        first, last = (np.array(geo.offset(*self._origin, *point)) for point in (start, end))
+        way = last - first
+        back = self._starts - first
+        cross = way[0] * self._sides[:, 1] - way[1] * self._sides[:, 0]
+        with np.errstate(divide="ignore", invalid="ignore"):  # parallel sides are met at their ends by their neighbours
+            along = (back[:, 0] * self._sides[:, 1] - back[:, 1] * self._sides[:, 0]) / cross
+            across = (back[:, 0] * way[1] - back[:, 1] * way[0]) / cross
+            meets = (along > 0.0) & (along < 1.0) & (across >= 0.0) & (across <= 1.0)
+        return [float(t) for t in along[meets]]
 
 
 Zone = Circle | Polygon
@@ -138,22 +165,22 @@ class Fence:
     def leaves(self, start: Point, end: Point, home: Point | None = None) -> Margin | None:
         """Where the straight way from one point to another is outside: the first such margin; None: nowhere.
 
-        From each point on, as far as its margin is there is nothing to find.
+        Between two boundaries that it crosses, a way is inside or outside as a whole.
         """
         if not self.zones:
             return None
         north, east = geo.offset(*start, *end)
         length = math.hypot(north, east)
-        finest = max(FINEST_STEP, length / STEPS)
-        travelled = 0.0
-        while True:
-            share = 1.0 if length == 0.0 else min(travelled / length, 1.0)
+        met = sorted(t for zone in self.zones for t in zone.crossings(start, end, home))
+        for before, after in pairwise((0.0, *met, 1.0)):
+            if (after - before) * length < SHORTEST and before > 0.0:
+                continue
+            share = (before + after) / 2.0
             margin = self.margin(geo.destination(*start, north * share, east * share), home)
             if margin.metres < 0.0:
                 return margin
-            if share >= 1.0:
-                return None
-            travelled += max(margin.metres, finest)
+        margin = self.margin(end, home)
+        return margin if margin.metres < 0.0 else None
 
 
 def fence_of(items: Iterable[PlanItem]) -> Fence:

@@ -39,8 +39,8 @@ SLACK = 1.0
 """m beyond floor or ceiling that are no breach yet: the barometer drifts, and climbs overshoot."""
 
 CALM = 2.0
-"""s without danger after which a vehicle that was about to leave no longer is. Where it is between two positions is an
-estimate, and each position corrects it."""
+"""s without danger until a vehicle that left, or was about to, is inside again. Where it is between two positions is an
+estimate, which each position corrects; and what a busy machine reads late looks like a way back."""
 
 RETRY = 2.0
 """s until an action that was not carried out is tried again."""
@@ -286,7 +286,7 @@ class FenceWatch:
         event, verdict = self._judge(zones, sight)
         if event is not Event.SAFE:
             self._calm_since = None
-        elif self.state is State.LEAVING:
+        elif self.state is not State.INSIDE:
             if self._calm_since is None:
                 self._calm_since = now
             if now - self._calm_since < CALM:

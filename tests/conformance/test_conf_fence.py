@@ -37,6 +37,9 @@ GEOFENCE = dialect.MAV_SYS_STATUS_GEOFENCE
 REPOSITION, ENABLE = dialect.MAV_CMD_DO_REPOSITION, dialect.MAV_CMD_DO_FENCE_ENABLE
 BRAKE = 17
 
+PITCH_STICK = 3
+"""Its axis at the Skycontroller (mapper.xml)."""
+
 FORWARD = -0.17
 """rad of pitch: more than the 10 degrees that are full tilt."""
 
@@ -204,6 +207,21 @@ async def test_conf_076_warned_and_nothing_else() -> None:
             before = w.drone.pose.north
             await w.client.heartbeat(lambda beat: beat.custom_mode == 0x00060000)
             assert w.drone.pose.north > before
+
+
+async def test_conf_076_the_pilot_at_the_skycontroller_has_the_last_word() -> None:
+    """He leans on his stick. The drone holds once, then his sticks are his again: he flies on, and is warned."""
+    async with world(speed=1.0, skycontroller=3) as w:
+        assert (await upload(w.client, square(PLACE, 20.0), FENCE)).type == TAKEN
+        await w.take_off()
+        pilot = w.drone.skycontroller
+        assert pilot is not None
+        mark = w.client.mark()
+        pilot.stick(PITCH_STICK, 60)
+        await said(w.client, "Fence ahead: ", since=mark, timeout=20.0)
+        await said(w.client, "Fence breach: ", since=mark, timeout=20.0)
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 24.0, 20.0)
+        assert len([text for text in texts(w.client, mark) if text.endswith(": hold")]) == 1
 
 
 @both

@@ -8,6 +8,7 @@ On the ellipsoid of WGS 84 (a = 6378137 m, 1/f = 298.257223563) 0.001 degrees ar
 from __future__ import annotations
 
 import math
+import time
 from dataclasses import replace
 from typing import Any
 
@@ -156,6 +157,42 @@ def test_ways() -> None:
     hollow = Fence([Polygon("U", INCLUSION, 0, [(LAT + n * 0.001, LON + e * 0.001) for n, e in u])])
     assert hollow.leaves((LAT, LON - 0.002), (LAT, LON + 0.002)) is not None
     assert hollow.leaves((LAT - 0.002, LON - 0.002), (LAT - 0.002, LON + 0.002)) is None
+
+
+def test_ways_between_groups() -> None:
+    """Two zones that touch or overlap let through what two that do not, do not."""
+    for gap, free in ((-5.0, True), (5.0, False)):
+        shift = 100.0 + gap
+        zones = [
+            Circle("one", INCLUSION, 1, (LAT, LON), 50.0),
+            Circle("two", INCLUSION, 2, geo.destination(LAT, LON, shift, 0.0), 50.0),
+        ]
+        fence = Fence(zones)
+        assert (fence.leaves((LAT, LON), geo.destination(LAT, LON, shift, 0.0)) is None) is free
+
+
+def test_a_way_is_looked_at_as_a_whole() -> None:
+    """A wall of a hand's breadth, ten kilometres away."""
+    wall = [(9000.0, -50.0), (9000.1, -50.0), (9000.1, 50.0), (9000.0, 50.0)]
+    zone = Polygon("wall", EXCLUSION, 0, [geo.destination(LAT, LON, *corner) for corner in wall])
+    fence = Fence([zone])
+    assert fence.leaves((LAT, LON), geo.destination(LAT, LON, 10_000.0, 0.0)) is not None
+    assert fence.leaves((LAT, LON), geo.destination(LAT, LON, 10_000.0, 2000.0)) is None
+    assert sorted(zone.crossings((LAT, LON), geo.destination(LAT, LON, 10_000.0, 0.0), None)) == pytest.approx(
+        [0.9, 0.90001], abs=1e-6
+    )
+
+
+def test_a_large_fence_is_looked_at_in_no_time() -> None:
+    """5000 corners, which is the most: a way along all of them takes milliseconds."""
+    turns = [2.0 * math.pi * n / 5000 for n in range(5000)]
+    corners = [(LAT + 0.01 * math.cos(t), LON + 0.015 * math.sin(t)) for t in turns]
+    fence = Fence([Polygon("round", INCLUSION, 0, corners)])
+    assert fence.margin((LAT, LON)).metres == pytest.approx(1100.0, abs=15.0)
+    began = time.process_time()
+    for _ in range(100):
+        assert fence.leaves((LAT - 0.009, LON), (LAT + 0.009, LON)) is None
+    assert time.process_time() - began < 3.0
 
 
 # Items.
@@ -319,9 +356,14 @@ def test_a_breach_is_acted_upon_once(action: Reaction) -> None:
         assert watch.look(sight(metres, orders=orders), now) is None
     assert watch.breaches == 1
     # Well inside it counts as back, and the next time is another time.
-    watch.look(sight(100.0 - BACK_INSIDE - 0.1), 7.0)
+    inside = sight(100.0 - BACK_INSIDE - 0.1, orders=7)
+    watch.look(inside, 7.0)
+    watch.look(sight(99.0, orders=7), 7.5)  # not yet
+    for now in (8.0, 8.0 + CALM):
+        assert watch.state is State.OUTSIDE
+        watch.look(inside, now)
     assert (watch.state, watch.verdict, watch.healthy) == (State.INSIDE, None, True)
-    assert watch.look(sight(103.0, orders=7), 8.0) is (None if action is Reaction.NONE else action)
+    assert watch.look(sight(103.0, orders=7), 11.0) is (None if action is Reaction.NONE else action)
     assert watch.breaches == 2
 
 
@@ -431,7 +473,8 @@ def test_an_action_that_failed_is_forgotten_inside() -> None:
     watch = watching()
     watch.look(sight(110.0), 0.0)
     watch.failed(0.0)
-    assert watch.look(sight(50.0), 10.0) is None
+    for now in (10.0, 10.0 + CALM):
+        assert watch.look(sight(50.0), now) is None
     assert watch.state is State.INSIDE
 
 

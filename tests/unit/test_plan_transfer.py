@@ -669,6 +669,91 @@ def test_two_clients_at_once_on_a_bad_link() -> None:
     assert [len(plans.transfers[kind].items) for kind in (FENCE, RALLY)] == [40, 25]
 
 
+# Nonsense.
+
+NUMBER = st.one_of(st.integers(-3, 8), st.integers(-(2**15), 2**16 - 1))
+KIND = st.sampled_from([MISSION, FENCE, FENCE, RALLY, ALL, 3, 254])
+WHOLE16 = st.integers(0, 2**16 - 1) | st.integers(0, 6)
+
+
+def some_message(draw: Any) -> Any:
+    """Any message of the mission protocol with anything in it."""
+    kind = draw(KIND)
+    real = st.floats(width=32)
+    match draw(st.integers(0, 8)):
+        case 0:
+            return count(draw(WHOLE16), kind)
+        case 1:
+            return clear(kind)
+        case 2:
+            short = st.integers(-(2**15), 2**15 - 1) | st.integers(-1, 4)
+            return partial(draw(short), draw(short), kind)
+        case 3:
+            return ask_list(kind)
+        case 4:
+            return ask(draw(WHOLE16), kind)
+        case 5:
+            return dialect.MAVLink_mission_request_message(1, 1, draw(WHOLE16), kind)
+        case 6:
+            return ack(draw(st.integers(0, 255)), kind)
+        case form:
+            make = dialect.MAVLink_mission_item_message if form == 7 else dialect.MAVLink_mission_item_int_message
+            xy = real if form == 7 else st.integers(-(2**31), 2**31 - 1)
+            fields = [draw(real) for _ in range(4)]
+            command = draw(st.sampled_from([5001, 5003, 666, 667]) | WHOLE16)
+            return make(
+                1, 1, draw(WHOLE16), draw(st.integers(0, 20)), command, 0, 1, *fields, draw(xy), draw(xy), draw(real),
+                kind,
+            )  # fmt: skip
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.data())
+def test_nothing_that_is_sent_raises_or_gets_stuck(data: st.DataObject) -> None:
+    """A list only ever changes by a commit that was stored, every answer goes to who asked, and when all fall silent
+    the desk comes to rest."""
+    plans, now = desk(), 0.0
+    clients = [ME, OTHER, peer(1, 0, ARDUPILOT, "c")]
+    waiting: list[Commit] = []
+
+    def take(effects: Any, asker: Peer | None) -> None:
+        for effect in effects:
+            if isinstance(effect, Commit):
+                waiting.append(effect)
+            if isinstance(effect, Reply):
+                message = effect.message
+                assert (message.target_system, message.target_component) == (effect.peer.sysid, effect.peer.compid)
+                message.pack(dialect.MAVLink(None, 1, 1))  # every field fits
+
+    for _ in range(data.draw(st.integers(1, 60))):
+        now += data.draw(st.sampled_from([0.0, 0.01, 0.3, 2.0, 10.0]))
+        before = {kind: transfer.items for kind, transfer in plans.transfers.items()}
+        step = data.draw(st.integers(0, 9))
+        if step == 0 and waiting:
+            commit = waiting.pop(0)
+            take(plans.stored(commit, now), None)
+            continue
+        if step == 1:
+            take(plans.expire(now), None)
+        elif step == 2:
+            gone = data.draw(st.sampled_from(clients))
+            plans.leave(lambda client, gone=gone: client == gone.client)  # type: ignore[misc]
+        else:
+            asker = data.draw(st.sampled_from(clients))
+            take(plans.receive(some_message(data.draw), asker, now), asker)
+        assert {kind: transfer.items for kind, transfer in plans.transfers.items()} == before
+    while waiting:
+        take(plans.stored(waiting.pop(0), now), None)
+    for _ in range(200):
+        if (deadline := plans.deadline()) is None:
+            break
+        take(plans.expire(deadline), None)
+        while waiting:
+            take(plans.stored(waiting.pop(0), deadline), None)
+    assert plans.deadline() is None
+    assert all(transfer.state is State.IDLE for transfer in plans.transfers.values())
+
+
 # Items.
 
 
