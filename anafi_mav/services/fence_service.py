@@ -86,8 +86,13 @@ class FenceService(Service):
         vehicle, drone = self.host.vehicle, self.host.drone
         state, place, home = drone.piloting.state, vehicle.place, vehicle.home
         velocity = (0.0, 0.0) if state.velocity is None else (state.velocity.north, state.velocity.east)
-        # A moveTo or a plan stops where it was told to, an orbit turns.
-        own_way = drone.piloting.move is not None or vehicle.mode in (FlightMode.MISSION, FlightMode.ORBIT)
+        # A move, a plan and a setpoint's position end at a place that was judged before; an orbit turns.
+        goal = vehicle.offboard.goal
+        own_way = (
+            drone.piloting.move is not None
+            or (goal is not None and goal.place is not None)
+            or vehicle.mode in (FlightMode.MISSION, FlightMode.ORBIT)
+        )
         return Sight(
             None if place is None else place.point,
             now - self._located,
