@@ -33,7 +33,6 @@ DEFAULT_INTERVALS: Mapping[int, float] = {
     mav.MAVLINK_MSG_ID_DISTANCE_SENSOR: 0.2,
     mav.MAVLINK_MSG_ID_SYSTEM_TIME: 1.0,
     mav.MAVLINK_MSG_ID_EKF_STATUS_REPORT: 1.0,
-    mav.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT: 1.0,
     mav.MAVLINK_MSG_ID_CURRENT_MODE: 2.0,
     mav.MAVLINK_MSG_ID_ORBIT_EXECUTION_STATUS: 0.8,
     mav.MAVLINK_MSG_ID_AVAILABLE_MODES_MONITOR: 3.3,
@@ -54,6 +53,7 @@ ON_REQUEST = frozenset(
         mav.MAVLINK_MSG_ID_ONBOARD_COMPUTER_STATUS,
         mav.MAVLINK_MSG_ID_HIGH_LATENCY2,
         mav.MAVLINK_MSG_ID_RANGEFINDER,
+        mav.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT,
         mav.MAVLINK_MSG_ID_ODOMETRY,
         *(id for id in mav.mavlink_map if 61400 <= id <= 61499),
     }
@@ -64,49 +64,44 @@ TELEMETRY = frozenset(DEFAULT_INTERVALS) | ON_REQUEST
 """Message ids that the next one of their kind makes worthless."""
 
 
+_NEVER = float("inf")
+
+MAX_GROUPS = 256
+"""Groups of messages that are asked about together, and of which it is remembered when one is due next."""
+
+
 class _Stream:
+    """One message on one channel."""
+
     __slots__ = ("interval", "next")
 
     def __init__(self, interval: float | None) -> None:
         self.interval = interval
-        self.next = -float("inf")
+        self.next = _NEVER if interval is None else -_NEVER
+
+    def due(self, now: float) -> bool:
+        """Whether it may leave now; if so, it counts as sent.
+
+        Times are kept on a grid, not from message to message, so that jitter of the source costs no rate: an
+        interval equal to the source's passes all but perhaps one of its messages.
+        """
+        interval = self.interval
+        if interval is None or now < self.next:
+            return False
+        late = now - self.next
+        # After a silence the grid begins anew; half an interval early, so that the next message may jitter.
+        self.next = self.next + interval if late <= interval else now + interval / 2
+        return True
 
 
-class Pace:
-    """How often a source has news: the mean of about its last eight pauses."""
+class _Lane(Generic[ChannelT]):
+    """One message on all channels, and when it is due next on one of them."""
 
-    __slots__ = ("_breaks", "_last", "interval")
+    __slots__ = ("streams", "until")
 
-    SHARE = 0.125
-    """Weight of the newest pause."""
-
-    BREAK = 4.0
-    """A pause so many times longer than the mean is a break and says nothing about the pace."""
-
-    NEW_PACE = 3
-    """So many breaks in a row are no breaks: the source has become slower."""
-
-    def __init__(self) -> None:
-        self._last: float | None = None
-        self._breaks = 0
-        self.interval: float | None = None
-        """s; None before there are two."""
-
-    def note(self, now: float) -> None:
-        """There is news."""
-        last, self._last = self._last, now
-        if last is None or now <= last:
-            return
-        pause, mean = now - last, self.interval
-        if mean is None:
-            self.interval = pause
-        elif pause <= self.BREAK * mean:
-            self.interval = mean + self.SHARE * (pause - mean)
-            self._breaks = 0
-        else:
-            self._breaks += 1
-            if self._breaks == self.NEW_PACE:
-                self.interval, self._breaks = pause, 0
+    def __init__(self, streams: list[tuple[ChannelT, _Stream]]) -> None:
+        self.streams = streams
+        self.until = -_NEVER
 
 
 class Streams(Generic[ChannelT]):
@@ -115,9 +110,12 @@ class Streams(Generic[ChannelT]):
     def __init__(self, defaults: Mapping[int, float] = DEFAULT_INTERVALS) -> None:
         self._defaults = dict(defaults)
         self._channels: WeakKeyDictionary[ChannelT, dict[int, _Stream]] = WeakKeyDictionary()
-        self._quiet: dict[int, tuple[Sequence[ChannelT], float]] = {}
-        """Message id -> the channels last asked about, and until when none of them is due: most questions of a fast
-        drone are answered by this alone."""
+        self._asked: Sequence[ChannelT] = ()
+        """The channels last asked about, to which the next two belong."""
+        self._lanes: dict[int, _Lane[ChannelT]] = {}
+        self._quiet: dict[tuple[int, ...], float] = {}
+        """Messages asked about together -> until when none of them is due: this alone answers most questions of a
+        fast drone."""
 
     def interval(self, channel: ChannelT, id: int) -> float | None:
         """Seconds between two messages on this channel; None: not streamed."""
@@ -133,45 +131,61 @@ class Streams(Generic[ChannelT]):
         # A client that says again what it has (QGroundControl does 35 times, for ArduPilot) must not get more by it.
         if known is None or known.interval != interval:
             streams[id] = _Stream(interval)
-            self._quiet.pop(id, None)
+            self._forget(id)
 
     def reset(self, channel: ChannelT, id: int) -> None:
         """Stream at the default interval again."""
-        self._channels.get(channel, {}).pop(id, None)
-        self._quiet.pop(id, None)
+        if self._channels.get(channel, {}).pop(id, None) is not None:
+            self._forget(id)
 
-    def due_on(self, channels: Sequence[ChannelT], id: int, now: float) -> list[ChannelT]:
-        """Those channels on which a message of this kind may leave now; it counts as sent there.
+    def due_on(
+        self, channels: Sequence[ChannelT], ids: tuple[int, ...], now: float
+    ) -> list[tuple[int, list[ChannelT]]]:
+        """Which of these messages may leave now, and on which of these channels; they count as sent there.
 
         A list of channels that has changed must be another object, as `Node.channels` is.
         """
-        asked, until = self._quiet.get(id, (None, 0.0))
-        if asked is channels and now < until:
+        if channels is not self._asked:
+            self._asked = channels
+            self._lanes.clear()
+            self._quiet.clear()
+        elif now < self._quiet.get(ids, -_NEVER):
             return []
-        due = [channel for channel in channels if self.due(channel, id, now)]
-        self._quiet[id] = (channels, min((self._next(channel, id) for channel in channels), default=now))
-        return due
-
-    def _next(self, channel: ChannelT, id: int) -> float:
-        stream = self._channels[channel][id]
-        return float("inf") if stream.interval is None else stream.next
+        found: list[tuple[int, list[ChannelT]]] = []
+        soonest = _NEVER
+        for id in ids:
+            lane = self._lanes.get(id) or self._new_lane(id)
+            if now >= lane.until:
+                due = [channel for channel, stream in lane.streams if stream.due(now)]
+                lane.until = min((stream.next for _, stream in lane.streams), default=_NEVER)
+                if due:
+                    found.append((id, due))
+            if lane.until < soonest:
+                soonest = lane.until
+        if len(self._quiet) >= MAX_GROUPS:
+            self._quiet.clear()
+        self._quiet[ids] = soonest
+        return found
 
     def due(self, channel: ChannelT, id: int, now: float) -> bool:
-        """Whether a message of this kind may leave now; if so, it counts as sent.
+        """Whether a message may leave now on this channel; if so, it counts as sent."""
+        self._forget(id)
+        return self._stream(channel, id).due(now)
 
-        Times are kept on a grid, not from message to message, so that jitter of the source costs no rate: an
-        interval equal to the source's passes all but perhaps one of its messages.
-        """
+    def _forget(self, id: int) -> None:
+        """Something about this message has changed."""
+        self._lanes.pop(id, None)
+        self._quiet.clear()
+
+    def _new_lane(self, id: int) -> _Lane[ChannelT]:
+        lane = self._lanes[id] = _Lane([(channel, self._stream(channel, id)) for channel in self._asked])
+        return lane
+
+    def _stream(self, channel: ChannelT, id: int) -> _Stream:
         streams = self._channels.get(channel)
         if streams is None:
             streams = self._channels.setdefault(channel, {})
         stream = streams.get(id)
         if stream is None:
             stream = streams[id] = _Stream(self._defaults.get(id))
-        interval = stream.interval
-        if interval is None or now < stream.next:
-            return False
-        late = now - stream.next
-        # After a silence the grid begins anew; half an interval early, so that the next message may jitter.
-        stream.next = stream.next + interval if late <= interval else now + interval / 2
-        return True
+        return stream

@@ -18,12 +18,18 @@ from anafi_mav.mavlink.base import (
     WRITE_AHEAD,
     Endpoint,
     EndpointUrl,
+    Outbox,
     Sink,
     reason,
 )
 from anafi_mav.mavlink.channel import Channel
 
 logger = logging.getLogger(__name__)
+
+MAX_DATAGRAM = 512
+"""Bytes of frames that share a datagram. Who reads into a smaller buffer loses the rest: gomavlib (mavp2p) has 512,
+mavlink-router 1120, MAVSDK 2048 (gomavlib pkg/frame/reader.go, mavlink-router endpoint.cpp, MAVSDK
+udp_connection.hpp). A frame has 280 at most."""
 
 PEER_SILENCE = 30.0
 """s after which a peer of `udpin` is gone: thirty heartbeats missed (MAVLink heartbeat.md: 1 Hz, four or five missed
@@ -89,7 +95,8 @@ class UdpOut(Endpoint):
 
     def __init__(self, url: EndpointUrl, sink: Sink, clock: Clock) -> None:
         super().__init__(url, sink, clock)
-        self.channel = Channel(url.text, self._write, flavour=url.flavour, datagrams=True)
+        self._outbox = Outbox(self._write, MAX_DATAGRAM)
+        self.channel = Channel(url.text, self._outbox.add, flavour=url.flavour, datagrams=True)
         self._transport: asyncio.DatagramTransport | None = None
         self._reopening: asyncio.Task[None] | None = None
         self._problem = ""
@@ -108,6 +115,7 @@ class UdpOut(Endpoint):
             self._reopening.cancel()
             await asyncio.wait([self._reopening])
             self._reopening = None
+        self._outbox.flush()
         transport, self._transport = self._transport, None
         await _shut(transport)
         if self.channel.is_open:
@@ -172,6 +180,7 @@ class UdpOut(Endpoint):
 @dataclass
 class _Peer:
     channel: Channel
+    outbox: Outbox
     heard: float
 
 
@@ -227,7 +236,8 @@ class UdpIn(Endpoint):
         peer = self._peers.get(address)
         if peer is None:
             # Not a peer before it has sent something true: garbage must not open channels.
-            channel = Channel(f"{self.url} from {address[0]}:{address[1]}", self._writer(address), datagrams=True)
+            outbox = Outbox(self._writer(address), MAX_DATAGRAM)
+            channel = Channel(f"{self.url} from {address[0]}:{address[1]}", outbox.add, datagrams=True)
             channel.flavour = self.parsed.flavour
             frames = channel.receive(data)
             if not frames:
@@ -236,7 +246,7 @@ class UdpIn(Endpoint):
             if not self._make_room(now):
                 self.counters["refused_peers"] += 1
                 return
-            self._peers[address] = _Peer(channel, now)
+            self._peers[address] = _Peer(channel, outbox, now)
             if self._is_paused:
                 channel.pause()
             self._sink.opened(channel)
@@ -257,9 +267,10 @@ class UdpIn(Endpoint):
         return True
 
     def _forget(self, address: Any) -> None:
-        channel = self._peers.pop(address).channel
-        channel.close()
-        self._sink.closed(channel)
+        peer = self._peers.pop(address)
+        peer.channel.close()
+        peer.outbox.flush()
+        self._sink.closed(peer.channel)
 
     def _writer(self, address: Any) -> Callable[[bytes], None]:
         def write(raw: bytes) -> None:

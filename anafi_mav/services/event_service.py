@@ -5,7 +5,7 @@ Texts for people go by STATUSTEXT as ever; what is said here is not said there, 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 from anafi_mav.drone import events as parrot
 from anafi_mav.drone.events import Message
@@ -80,9 +80,11 @@ class EventService(Service):
         self._armed, self._landed = self.host.vehicle.armed, self.host.vehicle.landed
         self._report, self._stale, self._next_report = None, True, 0.0
 
+    def hears(self) -> Collection[type[Message]]:
+        return _NEWS
+
     def on_event(self, message: Message, now: float) -> None:
-        if type(message) in _NEWS:
-            self._stale = True
+        self._stale = True
 
     def tick(self, now: float) -> None:
         self._tell_changes()

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 from anafi_mav.drone import events
@@ -26,6 +26,9 @@ from anafi_mav.services.vehicle import Refused, Vehicle
 
 LOOK_EVERY = 0.5
 """s between looks while the drone tells nothing new."""
+
+LOOK_SOONEST = 0.1
+"""s between looks for the sake of a new speed alone. An ANAFI tells it every 0.2 s."""
 
 MIRROR_EVERY = 1.0
 """s between looks whether the drone's own geofence has to change."""
@@ -66,11 +69,14 @@ class FenceService(Service):
         self._mirror.link_down()
         self._located = self._looked = self._mirrored = -math.inf
 
+    def hears(self) -> Collection[type[Message]]:
+        return (events.GpsLocationChanged, events.SpeedChanged, events.FlyingStateChanged)
+
     def on_event(self, message: Message, now: float) -> None:
         kind = type(message)
         if kind is events.GpsLocationChanged:
             self._located = self.host.clock.monotonic()
-        if kind in (events.GpsLocationChanged, events.SpeedChanged, events.FlyingStateChanged):
+        if kind is not events.SpeedChanged or now - self._looked >= LOOK_SOONEST:
             self._look(self.host.clock.monotonic())
 
     def tick(self, now: float) -> None:

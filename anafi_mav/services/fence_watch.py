@@ -13,6 +13,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import msgspec
+
 from anafi_mav import geo
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
@@ -131,8 +133,7 @@ class OutsideFence(AnafiMavError):
         """It will still be so when somebody asks again."""
 
 
-@dataclass(frozen=True)
-class Sight:
+class Sight(msgspec.Struct, frozen=True):
     """What the vehicle is seen to do."""
 
     place: Point | None

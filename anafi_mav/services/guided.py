@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 from anafi_mav import units
@@ -135,8 +135,11 @@ class GuidedService(Service):
     def link_down(self) -> None:
         self._paused = None
 
+    def hears(self) -> Collection[type[Message]]:
+        return (FlyingStateChanged,)
+
     def on_event(self, message: Message, now: float) -> None:
-        if isinstance(message, FlyingStateChanged) and not self.host.vehicle.in_air:
+        if not self.host.vehicle.in_air:
             self._paused = None  # the next flight's heights count from elsewhere
 
     @property

@@ -8,7 +8,7 @@ closes.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 from anafi_mav import units
 from anafi_mav.drone import events
@@ -126,6 +126,9 @@ class HighLatencyService(Service):
 
     def streams(self) -> Mapping[int, Stream]:
         return {dialect.MAVLINK_MSG_ID_HIGH_LATENCY2: Stream(self._build, flavoured=True)}
+
+    def hears(self) -> Collection[type[Message]]:
+        return (events.SpeedChanged,)
 
     def on_event(self, message: Message, now: float) -> None:
         if self._next and isinstance(message, events.SpeedChanged) and math.isfinite(message.speedZ):

@@ -8,16 +8,17 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 from anafi_mav.drone.events import Message
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
-from anafi_mav.mavlink.streams import Pace, Streams
+from anafi_mav.mavlink.streams import Streams
 from anafi_mav.services import data_streams
 from anafi_mav.services.commands import Command
 from anafi_mav.services.flavours import ARDUPILOT, flavour_of
+from anafi_mav.services.news import News
 from anafi_mav.services.service import Answer, Host, MessageHandler, Query, Request, Service
 from anafi_mav.services.stream import Stream, Times
 
@@ -34,7 +35,6 @@ other."""
 LOG_EVERY = 5.0
 """s before it is logged again that a message cannot be made."""
 
-
 FASTEST = 0.1
 """s between looks at messages that are repeated without news: a shorter interval is no shorter for them."""
 
@@ -45,8 +45,7 @@ LONGEST = 2**31 - 1
 class MessageService(Service):
     """What leaves by itself, and what leaves because somebody asked.
 
-    What is new is gathered until the end of the loop's turn: an ANAFI tells attitude, speed and height in one datagram,
-    and a message made of all three leaves once, with all three.
+    What is new is gathered until the end of the loop's turn (see `news`).
     """
 
     def __init__(self, host: Host) -> None:
@@ -54,14 +53,13 @@ class MessageService(Service):
         self._intervals: Streams[Channel] = Streams()
         self._table: Mapping[int, Stream] = {}
         self._requests: Mapping[int, Request] = {}
-        self._by_news: dict[type[Message], list[int]] = {}
-        self._repeated: list[int] = []
+        self._news = News()
+        self._events: set[type[Message]] = set()
+        """Those that are news for some message."""
+        self._repeated: tuple[int, ...] = ()
         self._on_change: list[int] = []
-        self._fresh: dict[int, float] = {}
-        """Message id -> when one of its fields became new, for what has not left yet."""
-        self._news_at: dict[int, float] = {}
-        """Message id -> when one of its fields became new last."""
-        self._paces: dict[int, Pace] = {}
+        self._changed_at = 0.0
+        """When the state changed last that the messages of `_on_change` tell."""
         self._linked_at = 0.0
         self._failed: dict[int, float] = {}
         """When it was last logged that a message cannot be made."""
@@ -70,12 +68,13 @@ class MessageService(Service):
         """What all services of the system send by themselves, and what they can be asked for."""
         self._table, self._requests = streams, requests
         for id, stream in streams.items():
+            self._news.register(id, (id,))
             for event in stream.news:
-                self._by_news.setdefault(event, []).append(id)
-            if stream.is_repeated:
-                self._repeated.append(id)
+                self._news.register(event, (id,))
+                self._events.add(event)
             if stream.on_change:
                 self._on_change.append(id)
+        self._repeated = tuple(id for id, stream in streams.items() if stream.is_repeated)
 
     def queries(self) -> Mapping[int, Query]:
         return {
@@ -96,66 +95,60 @@ class MessageService(Service):
         }
 
     def link_up(self) -> None:
-        self._linked_at = self.host.clock.monotonic()
+        self._linked_at = self._changed_at = self.host.clock.monotonic()
+        self._news.reset(self._linked_at)
 
     def link_down(self) -> None:
-        """A drone that comes back has told nothing yet."""
-        self._fresh.clear()
-        self._news_at.clear()
-        self._paces.clear()
+        self._news.reset(self.host.clock.monotonic())
+
+    def hears(self) -> Collection[type[Message]]:
+        return self._events
 
     def on_event(self, message: Message, now: float) -> None:
-        if (ids := self._by_news.get(type(message))) is not None:
-            self.news(ids, now)
-
-    def news(self, ids: Iterable[int], at: float) -> None:
-        """These messages have something new; they leave at the end of the loop's turn."""
-        if not self._fresh:
+        if self._news.note(type(message), now):
             asyncio.get_running_loop().call_soon(self._tell_news)
-        for id in ids:
-            self._fresh[id] = at
+
+    def news(self, id: int, at: float) -> None:
+        """This message has something new; it leaves at the end of the loop's turn."""
+        if self._news.note(id, at):
+            asyncio.get_running_loop().call_soon(self._tell_news)
 
     def wanted(self, id: int) -> bool:
         """Does anybody have a stream of this message?"""
         return any(self._intervals.interval(channel, id) is not None for channel in self.host.channels)
 
     def tick(self, now: float) -> None:
-        for id in self._repeated:
-            self._stream(id, now)
+        self._news.pass_time(now)
+        for id, due in self._intervals.due_on(self.host.channels, self._repeated, now):
+            self._leave(id, due, self._times(id))
 
     def state_changed(self) -> None:
         """They are told at once."""
-        now = self.host.clock.monotonic()
+        self._changed_at = self.host.clock.monotonic()
         for id in self._on_change:
-            self._news_at[id] = now
-            self._leave(id, self.host.channels)
+            self._leave(id, self.host.channels, self._times(id))
 
     # Streams.
 
     def _tell_news(self) -> None:
-        fresh, self._fresh = self._fresh, {}
-        for id, at in fresh.items():
-            self._news_at[id] = at
-            pace = self._paces.get(id)
-            if pace is None:
-                pace = self._paces[id] = Pace()
-            pace.note(at)
-            self._stream(id, at)
-
-    def _stream(self, id: int, now: float) -> None:
-        """Send a stream message to each channel on which it is due."""
-        if due := self._intervals.due_on(self.host.channels, id, now):
-            self._leave(id, due)
+        ids, at = self._news.take()
+        due = self._intervals.due_on(self.host.channels, ids, at)
+        if due:
+            times = self.host.times(at)
+            for id, channels in due:
+                self._leave(id, channels, times)
 
     def _times(self, id: int) -> Times:
         """When the newest of the fields of a message was true: what is old does not look new."""
         stream = self._table[id]
-        return self.host.times(self._news_at.get(id, self._linked_at) if stream.news or stream.on_change else None)
+        if not stream.news and not stream.on_change:
+            return self.host.times()
+        told = self._news.at(id) or self._linked_at
+        return self.host.times(max(told, self._changed_at) if stream.on_change else told)
 
-    def _leave(self, id: int, to: Sequence[Channel]) -> None:
+    def _leave(self, id: int, to: Sequence[Channel], times: Times) -> None:
         stream = self._table[id]
         try:
-            times = self._times(id)
             if stream.flavoured:
                 vehicle = self.host.vehicle
                 self.host.send_by_flavour(lambda flavour: stream.build(vehicle, times.for_flavour(flavour)), to)
@@ -245,5 +238,6 @@ class MessageService(Service):
 
     def _source(self, id: int) -> float:
         """The mean time (s) between two pieces of news for this message, as far as is known; 0: not by news alone."""
-        pace = self._paces.get(id)
-        return 0.0 if self._table[id].is_repeated or pace is None or pace.interval is None else pace.interval
+        if self._table[id].is_repeated:
+            return 0.0
+        return self._news.interval(id, self.host.clock.monotonic()) or 0.0

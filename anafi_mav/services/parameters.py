@@ -10,7 +10,7 @@ from __future__ import annotations
 import asyncio
 import struct
 from collections import deque
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import Any
 
 from anafi_mav.drone.events import Message
@@ -174,6 +174,9 @@ class ParameterService(Service):
 
     def channel_closed(self, channel: Channel) -> None:
         self._trickle.closed(channel)
+
+    def hears(self) -> Collection[type[Message]]:
+        return self._by_news.keys()
 
     def on_event(self, message: Message, now: float) -> None:
         for name, indices in self._by_news.get(type(message), {}).items():

@@ -7,7 +7,7 @@ sorts what arrives into them, and nothing else connects the two.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable, Coroutine, Hashable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Collection, Coroutine, Hashable, Mapping, Sequence
 from typing import Any, Protocol
 
 from anafi_mav.clock import Clock
@@ -132,6 +132,13 @@ class Service:
 
     def link_down(self) -> None:
         """The drone's link is gone: nothing that was asked for outlives it."""
+
+    def hears(self) -> Collection[type[Message]] | None:
+        """What `on_event` wants to be called with; None: everything. Read when the drone has connected.
+
+        A fleet's drones say thousands of things a second, and most services care for few of them.
+        """
+        return None
 
     def on_event(self, message: Message, now: float) -> None:
         """The drone said this; its states know it already."""

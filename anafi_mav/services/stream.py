@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+
+import msgspec
 
 from anafi_mav.drone.events import Message
 from anafi_mav.mavlink import dialect
@@ -11,8 +13,7 @@ from anafi_mav.services.flavours import PX4, Flavour
 from anafi_mav.services.vehicle import Vehicle
 
 
-@dataclass(frozen=True)
-class Times:
+class Times(msgspec.Struct, frozen=True):
     """When the fields of a message were true, since the gateway started; and for whom it is made."""
 
     boot_ns: int
@@ -29,7 +30,7 @@ class Times:
 
     def for_flavour(self, flavour: Flavour) -> Times:
         """The same moment, told to clients of another flavour."""
-        return replace(self, flavour=flavour)
+        return Times(self.boot_ns, flavour)
 
 
 Builder = Callable[[Vehicle, Times], "dialect.MAVLink_message | None"]

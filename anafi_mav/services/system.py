@@ -157,6 +157,16 @@ class System:
         self._ftp.take_tables(_joined(service.files() for service in self.services))
         self._handlers: dict[int, MessageHandler] = _joined(service.messages() for service in self.services)
         self._handlers[dialect.MAVLINK_MSG_ID_HEARTBEAT] = self._heard
+        self._ticking = [service for service in self.services if type(service).tick is not Service.tick]
+        self._updates: dict[type[Message], Callable[[], None]] = {
+            events.FlyingStateChanged: self.vehicle.on_flying_state,
+            events.GpsLocationChanged: self.vehicle.on_position,
+            events.FlightId: self.vehicle.on_position,
+            events.ReturnStateChanged: self.vehicle.on_return,
+        }
+        """What the vehicle makes of an event, before the services hear of it."""
+        self._listeners: dict[type[Message], tuple[Callable[[Message, float], None], ...]] = {}
+        """Whom each kind of event goes to, as far as it has come up on this connection."""
 
     # Link up, link down.
 
@@ -172,6 +182,7 @@ class System:
             self.text(Severity.WARNING, problem)
         for service in self.services:
             service.link_up()
+        self._listeners.clear()
         self._changed()
         self._next_heartbeat = self.clock.monotonic() + HEARTBEAT_EVERY
         self._ticker = asyncio.get_running_loop().create_task(self._tick())
@@ -223,7 +234,7 @@ class System:
 
     def news(self, id: int, at: float) -> None:
         """A streamed message has something new, true at a moment of the monotonic clock, that no event told of."""
-        self._messages.news((id,), at)
+        self._messages.news(id, at)
 
     def hush(self, channel: Channel, *, quiet: bool) -> None:
         """Say nothing of our own accord on this channel: only answers go there, until it is to be told all again."""
@@ -307,7 +318,7 @@ class System:
                 self._heartbeat()
             if now >= next_look:
                 next_look = now + LOOK_EVERY
-                for service in self.services:
+                for service in self._ticking:
                     try:
                         service.tick(now)
                     except Exception:  # the heartbeat goes on whatever happens to one service
@@ -317,17 +328,25 @@ class System:
     # What the drone reports.
 
     def _on_event(self, message: Message, now: float) -> None:
-        kind = type(message)
-        if kind is events.FlyingStateChanged:
-            self.vehicle.on_flying_state()
-        elif kind is events.GpsLocationChanged or kind is events.FlightId:
-            self.vehicle.on_position()
-        elif kind is events.ReturnStateChanged:
-            self.vehicle.on_return()
+        listeners = self._listeners.get(type(message))
+        if listeners is None:
+            listeners = self._listeners[type(message)] = self._listeners_of(type(message))
+        for listener in listeners:
+            listener(message, now)
+
+    def _listeners_of(self, kind: type[Message]) -> tuple[Callable[[Message, float], None], ...]:
+        """Who wants to know of such an event, in the order in which they are told."""
+        listeners: list[Callable[[Message, float], None]] = []
+        if (update := self._updates.get(kind)) is not None:
+            listeners.append(lambda message, now: update())
         for service in self.services:
-            service.on_event(message, now)
+            if type(service).on_event is not Service.on_event:
+                heard = service.hears()
+                if heard is None or kind in heard:
+                    listeners.append(service.on_event)
         if kind in CHANGES:
-            self._changed(force=True)
+            listeners.append(lambda message, now: self._changed(force=True))
+        return tuple(listeners)
 
     def _changed(self, *, force: bool = False) -> None:
         """Mode, armed state or health may have changed: clients wait for it, so tell them at once."""

@@ -6,7 +6,7 @@ itself, and nobody can talk it out of, is an alert, motors that were cut in the 
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Mapping
+from collections.abc import Collection, Hashable, Iterator, Mapping
 
 from anafi_mav.drone import Drone
 from anafi_mav.drone.alerts import Alerts, spoken
@@ -94,9 +94,11 @@ class WarningService(Service):
         self._told = frozenset()
         self._tell()
 
+    def hears(self) -> Collection[type[Message]]:
+        return _RELEVANT
+
     def on_event(self, message: Message, now: float) -> None:
-        if type(message) in _RELEVANT:
-            self._tell()
+        self._tell()
 
     def _tell(self) -> None:
         holding = list(standing(self.host.drone))

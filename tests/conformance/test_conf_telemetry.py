@@ -328,6 +328,7 @@ async def test_conf_155_nodes(flavour: str) -> None:
 async def test_distance_to_the_target_of_a_move() -> None:
     async with world() as w:
         await airborne(w, 5.0)
+        assert (await w.client.command(511, dialect.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT, 2e5)).result == ACCEPTED
         still = await w.client.wait("NAV_CONTROLLER_OUTPUT")
         assert still.wp_dist == 0
         place = geo.destination(*HOME[:2], 0.0, 60.0)

@@ -336,3 +336,53 @@ async def test_closing_ends_every_connection_and_frees_the_port() -> None:
     channel.send(ATTITUDE, 1, 1)
     assert channel.counters["dropped_frames"] == 1
     socket.create_server((host, 5760)).close()
+
+
+@pytest.mark.parametrize("scheme", ["udpout", "udpin"])
+async def test_frames_of_one_turn_share_datagrams(scheme: str) -> None:
+    """As few as a reader with 512 bytes can take; in their order, nothing waits for the next turn."""
+    host = loopback()
+    loop = asyncio.get_running_loop()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client:
+        client.setblocking(False)
+        client.bind((host, 0))
+        port = client.getsockname()[1] if scheme == "udpout" else udp_port(host)
+        async with desk(f"{scheme}://{host}:{port}") as d:
+            if scheme == "udpin":
+                await loop.sock_connect(client, (host, port))
+                await loop.sock_sendall(client, BEAT.pack(stock.MAVLink(None, 255, 190)))
+                await d.until(lambda: bool(d.node.channels))
+            parser = stock.MAVLink(None)
+            for first in (0, 40):
+                for number in range(first, first + 40):
+                    d.node.send(ATTITUDE if number % 2 else PING_OF[number % 256], sysid=7, compid=1)
+                sequence: list[int] = []
+                sizes: list[int] = []
+                while len(sequence) < 40:
+                    data = await asyncio.wait_for(loop.sock_recv(client, 2048), 2.0)
+                    sizes.append(len(data))
+                    sequence += [message.get_seq() for message in parser.parse_buffer(data)]
+                assert sequence == list(range(first, first + 40))
+                assert max(sizes) <= 512
+                assert len(sizes) <= 4  # of 40 frames with 40 and 26 bytes
+            d.node.send(ATTITUDE, sysid=7, compid=1)
+            data = await asyncio.wait_for(loop.sock_recv(client, 2048), 2.0)
+            assert len(data) == 12 + 28
+
+
+PING_OF = [dialect.MAVLink_ping_message(number, number, 1, 1) for number in range(256)]
+
+
+async def test_the_last_words_leave_before_a_socket_closes() -> None:
+    host = loopback()
+    loop = asyncio.get_running_loop()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client:
+        client.setblocking(False)
+        client.bind((host, 0))
+        async with desk(f"udpout://{host}:{client.getsockname()[1]}", f"tcpin://{host}:5760") as d:
+            stream = await Client().connect(5760, host)
+            await d.until(lambda: len(d.node.channels) == 2)
+            d.node.send(ATTITUDE, sysid=7, compid=1)
+        assert len(await asyncio.wait_for(loop.sock_recv(client, 2048), 2.0)) == 12 + 28
+        await stream.wait("ATTITUDE", since=0)
+        await stream.close()

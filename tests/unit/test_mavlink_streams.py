@@ -99,20 +99,51 @@ def test_a_channel_that_is_gone_is_forgotten() -> None:
     assert len(streams._channels) == 0
 
 
+def due_on(streams: Streams[Key], channels: list[Key], now: float) -> list[Key]:
+    """The channels on which ATTITUDE is due, of two messages of which the other never is."""
+    found = dict(streams.due_on(channels, (UNKNOWN, ATTITUDE), now))
+    assert UNKNOWN not in found
+    return found.get(ATTITUDE, [])
+
+
 def test_due_on_asks_each_channel_anew_when_something_changed() -> None:
     streams, one, other = Streams[Key](), Key(), Key()
     channels = [one]
-    assert streams.due_on(channels, ATTITUDE, 0.0) == [one]
-    assert streams.due_on(channels, ATTITUDE, 0.01) == []
+    assert due_on(streams, channels, 0.0) == [one]
+    assert due_on(streams, channels, 0.01) == []
     streams.set(one, ATTITUDE, 0.5)  # begins anew, whatever was left of the old interval
-    assert streams.due_on(channels, ATTITUDE, 0.02) == [one]
-    assert streams.due_on(channels, ATTITUDE, 0.2) == []
+    assert due_on(streams, channels, 0.02) == [one]
+    streams.set(one, ATTITUDE, 0.5)  # said again: nothing is new about that
+    assert due_on(streams, channels, 0.2) == []
     channels = [one, other]
-    assert streams.due_on(channels, ATTITUDE, 0.21) == [other]
-    assert streams.due_on(channels, ATTITUDE, 0.26) == [other]  # the grid begins half an interval early
-    assert streams.due_on(channels, ATTITUDE, 0.27) == [one]
+    assert due_on(streams, channels, 0.21) == [other]
+    assert due_on(streams, channels, 0.26) == [other]  # the grid begins half an interval early
+    assert due_on(streams, channels, 0.27) == [one]
     streams.set(other, ATTITUDE, None)
-    assert streams.due_on(channels, ATTITUDE, 9.0) == [one]
+    assert due_on(streams, channels, 9.0) == [one]
     streams.reset(other, ATTITUDE)
-    assert streams.due_on(channels, ATTITUDE, 9.0) == [other]
-    assert streams.due_on([], ATTITUDE, 9.0) == []
+    assert due_on(streams, channels, 9.0) == [other]
+    assert due_on(streams, [], 9.0) == []
+
+
+def test_groups_that_share_a_message_share_its_interval() -> None:
+    streams, one = Streams[Key]({ATTITUDE: 1.0, SYS_STATUS: 0.25}), Key()
+    channels = [one]
+    both, first = (ATTITUDE, SYS_STATUS), (ATTITUDE,)
+    assert streams.due_on(channels, both, 0.0) == [(ATTITUDE, [one]), (SYS_STATUS, [one])]
+    assert streams.due_on(channels, first, 0.1) == []
+    assert streams.due_on(channels, both, 0.2) == [(SYS_STATUS, [one])]  # its grid began half an interval early
+    assert streams.due_on(channels, first, 0.6) == [(ATTITUDE, [one])]
+    assert streams.due_on(channels, both, 0.7) == [(SYS_STATUS, [one])]
+    assert streams.due_on(channels, both, 0.71) == []
+    streams.set(one, ATTITUDE, 0.01)
+    assert streams.due_on(channels, both, 0.72) == [(ATTITUDE, [one])]
+    assert streams.due_on(channels, (), 0.73) == []
+
+
+def test_groups_are_bounded() -> None:
+    streams, one = Streams[Key](), Key()
+    channels = [one]
+    for number in range(1000):
+        streams.due_on(channels, (ATTITUDE, number), float(number))
+    assert len(streams._quiet) <= 256

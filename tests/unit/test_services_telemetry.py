@@ -12,7 +12,7 @@ from anafi_mav.drone.battery import BatteryState
 from anafi_mav.drone.link import LinkState
 from anafi_mav.drone.piloting_state import Attitude, PilotingState, Velocity
 from anafi_mav.mavlink import dialect
-from anafi_mav.mavlink.streams import DEFAULT_INTERVALS, ON_REQUEST, Pace
+from anafi_mav.mavlink.streams import DEFAULT_INTERVALS, ON_REQUEST
 from anafi_mav.services import (
     data_streams,
     telemetry_anafi,
@@ -22,6 +22,7 @@ from anafi_mav.services import (
 )
 from anafi_mav.services.flavours import ARDUPILOT, PX4, STANDARD
 from anafi_mav.services.flight_record import FlightRecord
+from anafi_mav.services.news import News
 from anafi_mav.services.shell import PROMPT, answer
 from anafi_mav.services.statustext import Severity, TextNumbers
 from anafi_mav.services.stream import Times
@@ -30,30 +31,65 @@ from anafi_mav.services.vehicle import Landed
 NOW = Times(1_234_567_890)
 
 
-def test_pace_is_the_mean_pause_of_a_source() -> None:
-    pace = Pace()
-    assert pace.interval is None
-    pace.note(10.0)
-    assert pace.interval is None
-    pace.note(10.2)
-    assert pace.interval == pytest.approx(0.2)
-    for number in range(2, 200):
-        pace.note(10.0 + 0.2 * number + (0.05 if number % 2 else 0.0))  # jitter
-    assert pace.interval == pytest.approx(0.2, rel=0.15)
+def bundled(news: News, sources: str, at: float) -> tuple[int, ...]:
+    """One turn of the loop in which these sources have news."""
+    assert [news.note(source, at) for source in sources] == [True] + [False] * (len(sources) - 1)
+    ids, when = news.take()
+    assert when == at
+    return ids
 
 
-def test_a_break_is_no_pace_but_three_are() -> None:
-    pace = Pace()
-    for now in (0.0, 0.2, 0.4, 60.4, 60.6):
-        pace.note(now)
-    assert pace.interval == pytest.approx(0.2)
-    for now in (61.6, 62.6):
-        pace.note(now)
-    assert pace.interval == pytest.approx(0.2)
-    pace.note(63.6)
-    assert pace.interval == pytest.approx(1.0)
-    pace.note(63.6)  # twice in one turn is once
-    assert pace.interval == pytest.approx(1.0)
+def registered() -> News:
+    """a makes 1 and 2 new, b makes 2 and 3 new, c makes 3 new."""
+    news = News()
+    news.register("a", (1, 2))
+    news.register("b", (2,))
+    news.register("b", (3, 2))
+    news.register("c", (3,))
+    news.reset(0.0)
+    return news
+
+
+def test_news_of_one_turn_is_one_bundle() -> None:
+    news = registered()
+    assert bundled(news, "ab", 1.0) == (1, 2, 3)
+    assert bundled(news, "b", 2.0) == (2, 3)
+    assert bundled(news, "aac", 3.0) == (1, 2, 3)
+    assert (news.at(1), news.at(2), news.at(3), news.at(4)) == (3.0, 3.0, 3.0, None)
+    assert bundled(news, "c", 4.0) == (3,)
+    assert (news.at(1), news.at(3)) == (3.0, 4.0)
+    assert news.take() == ((), 4.0)
+
+
+def test_how_often_a_message_is_new() -> None:
+    news = registered()
+    assert news.interval(1, 0.0) is None
+    for number in range(1, 51):  # ten seconds: all at 5 Hz in one turn, and b once a second in a turn of its own
+        bundled(news, "abc", 0.2 * number)
+        if number % 5 == 0:
+            bundled(news, "b", 0.2 * number + 0.01)
+        news.pass_time(0.2 * number)
+    assert news.interval(1, 10.0) == pytest.approx(0.2)
+    assert news.interval(2, 10.0) == pytest.approx(1 / 6)
+    for number in range(51, 200):  # from then on at 1 Hz, and after two windows nothing is left of the old pace
+        if number % 5 == 0:
+            bundled(news, "a", 0.2 * number)
+        news.pass_time(0.2 * number)
+    assert news.interval(1, 39.8) == pytest.approx(1.0, rel=0.1)
+    news.reset(40.0)
+    assert news.interval(1, 41.0) is None
+    assert news.at(1) is None
+
+
+def test_bundles_are_bounded() -> None:
+    news = News()
+    for source in range(600):
+        news.register(source, (source,))
+    news.reset(0.0)
+    for source in range(600):
+        news.note(source, 1.0)
+        assert news.take() == ((source,), 1.0)
+    assert len(news._bundles) <= 256
 
 
 def test_groups_of_ardupilot_have_what_we_stream() -> None:
@@ -62,16 +98,10 @@ def test_groups_of_ardupilot_have_what_we_stream() -> None:
     assert dialect.MAVLINK_MSG_ID_ATTITUDE in data_streams.members(dialect.MAV_DATA_STREAM_EXTRA1)
     assert list(data_streams.members(dialect.MAV_DATA_STREAM_RAW_CONTROLLER)) == []
     assert list(data_streams.members(99)) == []
-    # Heartbeat and home are in no group of ArduCopter's either, nor what only PX4's clients know.
-    left = {id for id in DEFAULT_INTERVALS if id not in everything}
-    assert left == {
-        dialect.MAVLINK_MSG_ID_HOME_POSITION,
-        dialect.MAVLINK_MSG_ID_CURRENT_MODE,
-        dialect.MAVLINK_MSG_ID_AVAILABLE_MODES_MONITOR,
-        dialect.MAVLINK_MSG_ID_CURRENT_EVENT_SEQUENCE,
-        dialect.MAVLINK_MSG_ID_ORBIT_EXECUTION_STATUS,
-        dialect.MAVLINK_MSG_ID_ATTITUDE_TARGET,
-        dialect.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED,
+    # Home is in no group of ArduCopter's either; all else that flows by itself is.
+    ours = {id for module in (telemetry_flight, telemetry_status, telemetry_link) for id in module.STREAMS}
+    assert {id for id in ours & DEFAULT_INTERVALS.keys() if id not in everything} == {
+        dialect.MAVLINK_MSG_ID_HOME_POSITION
     }
 
 

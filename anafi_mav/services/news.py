@@ -1,0 +1,105 @@
+"""What is new for which message, since when, and how often that happens. No I/O; time is handed in.
+
+An ANAFI tells attitude, speed and height in one datagram: what it tells in one turn of the loop is one bundle of news,
+so that a message made of all three leaves once, with all three.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterable
+
+WINDOW = 10.0
+"""s. How often something is news is counted over the present window and the one before."""
+
+MAX_BUNDLES = 256
+"""Different bundles that are remembered; a drone at work tells a dozen."""
+
+
+class _Bundle:
+    """Sources that had news in one turn."""
+
+    __slots__ = ("at", "before", "count", "ids")
+
+    def __init__(self, ids: tuple[int, ...]) -> None:
+        self.ids = ids
+        """The messages that they make new."""
+        self.at = 0.0
+        """When it came last."""
+        self.count = 0
+        """How often in this window."""
+        self.before = 0
+        """And in the one before."""
+
+
+class News:
+    """The news of one drone's messages. A source is anything hashable: a kind of event, the number of a message."""
+
+    def __init__(self) -> None:
+        self._ids: dict[Hashable, tuple[int, ...]] = {}
+        self._fresh: dict[Hashable, None] = {}
+        """The sources that had news in this turn, in their order."""
+        self._at = 0.0
+        self._bundles: dict[tuple[Hashable, ...], _Bundle] = {}
+        self._of: dict[int, list[_Bundle]] = {}
+        """The bundles that each message is in."""
+        self._since = self._window = 0.0
+        """When the window before this one began, and this one."""
+
+    def register(self, source: Hashable, ids: Iterable[int]) -> None:
+        """News from this source makes these messages new."""
+        self._ids[source] = tuple(dict.fromkeys((*self._ids.get(source, ()), *ids)))
+
+    @property
+    def sources(self) -> Iterable[Hashable]:
+        return self._ids.keys()
+
+    def reset(self, now: float) -> None:
+        """Nothing has been told yet."""
+        self._fresh = {}
+        self._bundles.clear()
+        self._of.clear()
+        self._since = self._window = now
+
+    def note(self, source: Hashable, at: float) -> bool:
+        """A registered source has news. True: the first in this turn, `take` is to be called at its end."""
+        first = not self._fresh
+        self._fresh[source] = None
+        self._at = at
+        return first
+
+    def take(self) -> tuple[tuple[int, ...], float]:
+        """The messages that have become new in this turn, and when; none if it was all forgotten meanwhile."""
+        if not self._fresh:
+            return (), self._at
+        key = tuple(self._fresh)
+        self._fresh = {}
+        bundle = self._bundles.get(key) or self._new_bundle(key)
+        bundle.count += 1
+        bundle.at = self._at
+        return bundle.ids, self._at
+
+    def at(self, id: int) -> float | None:
+        """When something was new for this message last; None: never."""
+        return max((bundle.at for bundle in self._of.get(id, ())), default=None)
+
+    def interval(self, id: int, now: float) -> float | None:
+        """Mean time (s) between two pieces of news for this message; None before there are two."""
+        count = sum(bundle.count + bundle.before for bundle in self._of.get(id, ()))
+        return (now - self._since) / count if count > 1 and now > self._since else None
+
+    def pass_time(self, now: float) -> None:
+        """To be called now and then: a new window begins when it is time."""
+        if now - self._window < WINDOW:
+            return
+        self._since, self._window = self._window, now
+        for bundle in self._bundles.values():
+            bundle.before, bundle.count = bundle.count, 0
+
+    def _new_bundle(self, key: tuple[Hashable, ...]) -> _Bundle:
+        if len(self._bundles) >= MAX_BUNDLES:
+            self.reset(self._at)
+        bundle = _Bundle(tuple(dict.fromkeys(id for source in key for id in self._ids.get(source, ()))))
+        self._bundles[key] = bundle
+        for id in bundle.ids:
+            self._of.setdefault(id, []).append(bundle)
+        return bundle
