@@ -33,6 +33,9 @@ if TYPE_CHECKING:
 SINGLE_WAIT = 2.0
 """s that a single setpoint may wait until what was under way has let go of the drone; then it is out of date."""
 
+HEARD = (events.AttitudeChanged, events.SpeedChanged, events.AltitudeChanged, events.GpsLocationChanged)
+"""What tells how the drone moves."""
+
 
 class _Course(NamedTuple):
     """A heading as it was asked for, and what it meant when it first arrived (rad from north)."""

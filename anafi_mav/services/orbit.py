@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 from anafi_mav import geo, units
@@ -205,8 +205,11 @@ class OrbitService(Service):
 
     # Flying.
 
+    def hears(self) -> Collection[type[Message]]:
+        return (events.SpeedChanged, events.AttitudeChanged)
+
     def on_event(self, message: Message, now: float) -> None:
-        if self._controller is not None and type(message) in (events.SpeedChanged, events.AttitudeChanged):
+        if self._controller is not None:
             self._fly(now)
 
     def _fly(self, now: float) -> None:
