@@ -339,13 +339,15 @@ changes nothing: it is ignored, refused or put off, as the module says.
 
 def states() -> str:
     """docs/states.md."""
-    from anafi_mav.services import fence_watch, ftp, offboard, plan_transfer
+    from anafi_mav.services import fence_watch, follow, ftp, manual_flight, offboard, plan_transfer
     from anafi_mav.sim import machine
 
     tables: list[tuple[str, Any]] = [
         ("Transfer of a mission, a fence or rally points", plan_transfer),
         ("The fence", fence_watch),
         ("Setpoints of a program", offboard),
+        ("Sticks of a ground station", manual_flight),
+        ("Following a target", follow),
         ("A session of MAVLink FTP", ftp),
         ("The simulated drone's flight", machine),
     ]

@@ -35,6 +35,7 @@ from anafi_mav.services.parameter_table import (
     YAW_RATE,
 )
 from anafi_mav.services.parameter_table_fence import FENCE_PX4
+from anafi_mav.services.parameter_table_follow import FOLLOW_PX4
 from anafi_mav.services.refusal import Refused
 from anafi_mav.services.service import Host
 from anafi_mav.services.vehicle import AUTO_DISARM
@@ -216,4 +217,4 @@ FACTS_PX4: tuple[Parameter, ...] = (
     ),
 )
 
-PX4_NAMES: tuple[Parameter, ...] = (*TWINS, *FENCE_PX4, *FACTS_PX4)
+PX4_NAMES: tuple[Parameter, ...] = (*TWINS, *FENCE_PX4, *FOLLOW_PX4, *FACTS_PX4)

@@ -35,6 +35,7 @@ from anafi_mav.services.parameter_codec import (
 from anafi_mav.services.parameter_table import NATIVE
 from anafi_mav.services.parameter_table_ardupilot import ARDUPILOT_NAMES
 from anafi_mav.services.parameter_table_fence import FENCE_NATIVE
+from anafi_mav.services.parameter_table_follow import FOLLOW_NATIVE
 from anafi_mav.services.parameter_table_px4 import PX4_NAMES
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
 from anafi_mav.services.statustext import Severity
@@ -50,7 +51,7 @@ MAX_WAITING = 512
 """Writes that wait for their turn: a whole list, from two clients. What comes beyond that comes again (1 s later)."""
 
 
-NATIVE_NAMES: tuple[Parameter, ...] = (*NATIVE, *FENCE_NATIVE)
+NATIVE_NAMES: tuple[Parameter, ...] = (*NATIVE, *FENCE_NATIVE, *FOLLOW_NATIVE)
 """What every client sees, whatever its flavour."""
 
 KEPT = tuple(parameter for parameter in NATIVE_NAMES if parameter.put is not None)

@@ -25,6 +25,7 @@ from anafi_mav.services.event_service import EventService
 from anafi_mav.services.fence_service import FenceService
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.flight_record import FlightRecordService
+from anafi_mav.services.follow_service import FollowService
 from anafi_mav.services.ftp_service import FtpService
 from anafi_mav.services.guided import GuidedService
 from anafi_mav.services.high_latency import HighLatencyService
@@ -71,6 +72,7 @@ SERVICES: tuple[type[Service], ...] = (
     RallyService,
     OffboardService,
     ManualControlService,
+    FollowService,
     TimeService,
     BannerService,
     WarningService,

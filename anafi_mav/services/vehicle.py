@@ -20,6 +20,7 @@ from anafi_mav.drone import Drone
 from anafi_mav.drone.events import AlertLevel, FlyingState, FlyingStateChanged, ForcedLandingReason, PlayingState
 from anafi_mav.errors import AnafiMavError, CommandRejected
 from anafi_mav.services.fence_watch import FenceWatch, OutsideFence
+from anafi_mav.services.follow_flight import FollowFlight
 from anafi_mav.services.height import HeightReference
 from anafi_mav.services.helm import Helm
 from anafi_mav.services.link_loss import LossPolicy
@@ -153,7 +154,8 @@ class Vehicle:
         self._tasks: set[asyncio.Task[None]] = set()
         self.offboard = OffboardFlight(self, clock)
         self.manual = ManualFlight(self, clock)
-        self.helms: tuple[Helm, ...] = (self.offboard, self.manual)
+        self.follow = FollowFlight(self, clock)
+        self.helms: tuple[Helm, ...] = (self.offboard, self.manual, self.follow)
         """Who can fly the drone for as long as somebody keeps telling them how; one of them at a time."""
 
     # What the vehicle is.
@@ -534,8 +536,10 @@ class Vehicle:
                 raise Refused("Mission refused: there is no mission")
             case FlightMode.TERMINATED:
                 await self.terminate()
-            case FlightMode.FOLLOW | FlightMode.ORBIT:
-                raise Refused(f"{mode.value} refused: it is begun by a command", lasting=True)
+            case FlightMode.FOLLOW:
+                await self.follow.engage()
+            case FlightMode.ORBIT:
+                raise Refused("Orbit refused: it is begun by a command", lasting=True)
 
     # What the drone reports.
 
