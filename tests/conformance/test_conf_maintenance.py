@@ -79,10 +79,23 @@ async def test_conf_129_a_calibration_is_cancelled(way: str) -> None:
         await w.drone.wait_log(lambda e: e.kind == "command" and e.name == asked and e.args["calibrate"] == 0)
 
 
-async def test_conf_148_reboot() -> None:
-    async with world() as w:
+@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+async def test_conf_148_reboot(flavour: str) -> None:
+    """Accepted, then silence, then a vehicle that says anew who it is."""
+    async with world(flavour=flavour) as w:
         for wrong in (2, 3, 0, math.nan):
             assert (await w.client.command(REBOOT, wrong)).result == DENIED
+        assert (await w.client.command(REBOOT, 1, timeout=15.0)).result == ACCEPTED
+        assert len(w.commands("common.Common.Reboot")) == 1
+        silent = w.client.mark()
+        beat = await w.client.heartbeat(lambda beat: True, since=silent, timeout=40.0)
+        assert not beat.base_mode & ARMED
+        at = next(at for at, m in w.client.received[silent:] if m.get_type() == "HEARTBEAT")
+        last = max(at for at, m in w.client.received[:silent] if m.get_type() == "HEARTBEAT")
+        assert at - last > 1.5  # a regular heartbeat was missing
+        mark = w.client.mark()
+        assert (await w.client.command(dialect.MAV_CMD_REQUEST_MESSAGE, 148)).result == ACCEPTED
+        await w.client.wait("AUTOPILOT_VERSION", since=mark)
 
 
 async def test_a_launch_by_hand() -> None:
