@@ -36,6 +36,9 @@ REACH = 500.0
 FASTEST = 20.0
 """m/s likewise."""
 
+BASELINE = 0.5
+"""s between two positions that a velocity is read off: two that come at once would make a rocket of a walker."""
+
 SLUGGISH = 0.1
 """The least share of a new position that is believed, however calm the target is to be."""
 
@@ -122,7 +125,10 @@ class Follower:
         """m above mean sea level, as last told."""
         self._place: tuple[float, float] | None = None
         self._velocity = (0.0, 0.0)
-        self._at = -math.inf
+        self._at = self._heard_at = -math.inf
+        self._raw = self._mark = (0.0, 0.0)
+        """The newest position as it was told, and the one that the velocity is read off against."""
+        self._raw_at = self._mark_at = -math.inf
         self._side: float | None = None
         """Direction (rad from north) from the target to where the drone belongs."""
         self._course: float | None = None
@@ -143,23 +149,47 @@ class Follower:
     ) -> None:
         """The target is there. Without a velocity its motion is read off its positions."""
         believed = max(SLUGGISH, 1.0 - self.settings.responsiveness)
-        elapsed = now - self._at
         expected = self.target(now)
-        if self._place is None or expected is None or elapsed > SILENCE:
-            self._place, self._velocity = (north, east), velocity or (0.0, 0.0)
-        elif elapsed > 0.0:
-            measured = velocity or ((north - self._place[0]) / elapsed, (east - self._place[1]) / elapsed)
-            self._velocity = (
-                self._velocity[0] + believed * (measured[0] - self._velocity[0]),
-                self._velocity[1] + believed * (measured[1] - self._velocity[1]),
-            )
+        heard_of, self.altitude = self._heard_at, altitude
+        self._heard_at = now
+        if self._place is None or expected is None or now - heard_of > SILENCE:
+            self._begin(north, east, velocity or (0.0, 0.0), now)
+        elif velocity is None and (north, east) == self._raw:
+            # MAVSDK says the last position again, right before the next one. Said for longer, the target stands.
+            if now - self._raw_at > FORESIGHT:
+                self._begin(north, east, (0.0, 0.0), now)
+        else:
+            self._raw, self._raw_at = (north, east), now
+            if velocity is None:
+                velocity = self._read_off(north, east, now)
+            if velocity is not None:
+                self._velocity = (
+                    self._velocity[0] + believed * (velocity[0] - self._velocity[0]),
+                    self._velocity[1] + believed * (velocity[1] - self._velocity[1]),
+                )
             self._place = (
                 expected[0] + believed * (north - expected[0]),
                 expected[1] + believed * (east - expected[1]),
             )
-        self.altitude, self._at = altitude, now
+            self._at = now
         if self.speed >= MOVING:
             self._course = math.atan2(self._velocity[1], self._velocity[0])
+
+    def _begin(self, north: float, east: float, velocity: tuple[float, float], now: float) -> None:
+        """What was known before counts for nothing."""
+        self._place = self._raw = self._mark = (north, east)
+        self._velocity = velocity
+        self._at = self._raw_at = self._mark_at = now
+
+    def _read_off(self, north: float, east: float, now: float) -> tuple[float, float] | None:
+        """The velocity (m/s) since the last mark; None while that is too young to tell."""
+        elapsed = now - self._mark_at
+        if elapsed < BASELINE:
+            return None
+        velocity = (north - self._mark[0]) / elapsed, (east - self._mark[1]) / elapsed
+        self._mark, self._mark_at = (north, east), now
+        share = min(1.0, FASTEST / max(math.hypot(*velocity), FASTEST))
+        return velocity[0] * share, velocity[1] * share
 
     def target(self, now: float) -> tuple[float, float] | None:
         """Where the target is believed to be (north, east); None before it has appeared."""

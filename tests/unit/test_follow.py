@@ -74,6 +74,29 @@ def test_a_target_that_tells_no_velocity_is_seen_to_move() -> None:
     assert wanted.y.velocity == pytest.approx(3.0)
 
 
+def test_a_position_that_is_said_twice_stops_nobody() -> None:
+    """MAVSDK repeats the last one each second, right before its user tells the next."""
+    follower = Follower(FollowSettings(responsiveness=0.0))
+    for second in range(8):
+        follower.see(1.5 * second, 0.0, None, None, float(second))
+        follower.see(1.5 * second, 0.0, None, None, second + 0.995)
+    assert follower.speed == pytest.approx(1.5)
+    assert follower.target(8.0) == pytest.approx((12.0, 0.0))
+    for tenth in range(20):
+        follower.see(10.5, 0.0, None, None, 8.0 + 0.1 * tenth)
+    assert follower.speed == 0.0
+    assert follower.target(10.0) == pytest.approx((10.5, 0.0))
+
+
+def test_two_positions_at_once_make_no_rocket() -> None:
+    follower = Follower(FollowSettings(responsiveness=0.0))
+    follower.see(0.0, 0.0, None, None, 0.0)
+    follower.see(1.5, 0.0, None, None, 0.005)
+    assert follower.speed == 0.0
+    follower.see(60.0, 0.0, None, None, 1.0)
+    assert follower.speed == pytest.approx(20.0)
+
+
 def test_the_drone_does_not_rush_round_a_target_that_turns() -> None:
     """It turns round: from behind to behind is half a circle, 25 m at 8 m distance and 5 m/s at most."""
     follower = following(tangential_speed=5.0)

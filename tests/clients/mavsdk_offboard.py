@@ -1,0 +1,174 @@
+"""MAVSDK's plugins offboard, manual_control and follow_me as their users write them.
+
+    mavsdk_offboard.py offboard|manual|follow URL
+
+It prints a line a step, and goes on with the step for a while: the test that runs it looks where the drone truly is.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from collections.abc import AsyncIterator, Awaitable, Callable
+from typing import Any
+
+from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
+from mavsdk.asyncio.plugins.action import ActionAsync
+from mavsdk.asyncio.plugins.follow_me import Config, FollowMeAsync, FollowMeError, TargetLocation
+from mavsdk.asyncio.plugins.manual_control import ManualControlAsync
+from mavsdk.asyncio.plugins.offboard import (
+    AccelerationNed,
+    Attitude,
+    AttitudeRate,
+    OffboardAsync,
+    OffboardError,
+    PositionGlobalYaw,
+    PositionNedYaw,
+    VelocityBodyYawspeed,
+    VelocityNedYaw,
+)
+from mavsdk.asyncio.plugins.telemetry import LandedState, TelemetryAsync
+
+HOME = (48.8789, 2.3677, 35.0)
+M = 1.0 / 111_226.0
+"""Degrees of latitude a metre, here."""
+
+
+def say(*words: object) -> None:
+    print(*words, flush=True)
+
+
+async def until(updates: AsyncIterator[Any], accept: Callable[[Any], bool]) -> None:
+    async def find() -> None:
+        async for update in updates:
+            if accept(update):
+                return
+
+    await asyncio.wait_for(find(), 60.0)
+
+
+async def tried(name: str, work: Awaitable[Any]) -> None:
+    """What became of something that may be refused."""
+    try:
+        await work
+        say("tried", name, "done")
+    except (OffboardError, FollowMeError) as error:
+        say("tried", name, error.result.name)
+
+
+async def held(name: str, seconds: float) -> None:
+    """Long enough to see what comes of it, and for the test to look."""
+    await asyncio.sleep(seconds)
+    say("held", name)
+    await asyncio.sleep(0.7)
+
+
+async def offboard(system: Any) -> None:
+    plugin, telemetry = OffboardAsync(system), TelemetryAsync(system)
+    await tried("start without setpoints", plugin.start())
+    await plugin.set_attitude_rate(AttitudeRate(0.0, 0.0, 20.0, 0.5))
+    await tried("start with rates", plugin.start())
+    await plugin.stop()
+    await plugin.set_attitude(Attitude(0.0, -6.0, 0.0, 0.6))
+    await tried("start", plugin.start())
+    await held("attitude", 2.5)
+    await plugin.set_velocity_ned(VelocityNedYaw(0.0, 2.0, 0.5, 90.0))
+    await held("velocity ned", 5.0)
+    await plugin.set_velocity_body(VelocityBodyYawspeed(2.0, 0.0, -0.5, 0.0))
+    await held("velocity body", 4.0)
+    await plugin.set_position_ned(PositionNedYaw(8.0, -6.0, -12.0, 0.0))
+    await until(
+        telemetry.subscribe_position_velocity_ned(),
+        lambda p: abs(p.position.north_m - 8.0) < 0.5 and abs(p.position.east_m + 6.0) < 0.5,
+    )
+    await held("position ned", 1.5)
+    for name, altitude, kind in (("relative", 9.0, 0), ("amsl", HOME[2] + 11.0, 1)):
+        place = PositionGlobalYaw(HOME[0] + 20.0 * M, HOME[1], altitude, 0.0, PositionGlobalYaw.AltitudeType(kind))
+        await plugin.set_position_global(place)
+        await until(telemetry.subscribe_position(), lambda p: abs(p.latitude_deg - HOME[0] - 20.0 * M) < 5e-6)
+        await held(f"position global {name}", 2.5)
+    await plugin.set_position_velocity_ned(PositionNedYaw(30.0, 0.0, -11.0, 0.0), VelocityNedYaw(0.0, 0.0, 0.0, 0.0))
+    await held("position and velocity", 6.0)
+    await plugin.set_acceleration_ned(AccelerationNed(0.0, 1.0, 0.0))
+    await held("acceleration", 2.0)
+    await plugin.stop()
+    await until(telemetry.subscribe_flight_mode(), lambda mode: mode.name == "HOLD")
+    say("stopped", await plugin.is_active())
+
+
+async def manual(system: Any) -> None:
+    plugin, telemetry = ManualControlAsync(system), TelemetryAsync(system)
+    sticks = [0.0, 0.0, 0.5, 0.0]
+
+    async def joystick() -> None:
+        while True:
+            await plugin.set_manual_control_input(*sticks)
+            await asyncio.sleep(0.05)
+
+    stream = asyncio.ensure_future(joystick())
+    await asyncio.sleep(0.3)
+    await plugin.start_position_control()
+    await until(telemetry.subscribe_flight_mode(), lambda mode: mode.name == "POSCTL")
+    for name, position in (
+        ("forward", (0.6, 0.0, 0.5, 0.0)),
+        ("right", (0.0, 0.6, 0.5, 0.0)),
+        ("up", (0.0, 0.0, 0.9, 0.0)),
+        ("clockwise", (0.0, 0.0, 0.5, 0.5)),
+    ):
+        sticks[:] = position
+        await held(name, 2.0)
+    stream.cancel()
+    await asyncio.sleep(1.0)
+    say("silent")
+    await asyncio.sleep(1.0)
+
+
+async def follow(system: Any) -> None:
+    plugin, telemetry = FollowMeAsync(system), TelemetryAsync(system)
+    config = await plugin.get_config()
+    say("config", config.follow_height_m, config.follow_distance_m, config.follow_angle_deg)
+    await plugin.set_config(
+        Config(
+            follow_height_m=10.0,
+            follow_distance_m=6.0,
+            responsiveness=0.1,
+            altitude_mode=Config.FollowAltitudeMode.CONSTANT,
+            max_tangential_vel_m_s=6.0,
+            follow_angle_deg=180.0,
+        )
+    )
+    await tried("start", plugin.start())
+    await until(telemetry.subscribe_flight_mode(), lambda mode: mode.name == "FOLLOW_ME")
+    say("following", await plugin.is_active())
+    for second in range(15):
+        await plugin.set_target_location(
+            TargetLocation(HOME[0] + (10.0 + 1.5 * second) * M, HOME[1], HOME[2], 1.5, 0.0, 0.0)
+        )
+        await asyncio.sleep(1.0)
+    say("held target", 10.0 + 1.5 * 15)
+    await asyncio.sleep(0.5)
+    await plugin.stop()
+    await until(telemetry.subscribe_flight_mode(), lambda mode: mode.name == "HOLD")
+    say("stopped")
+
+
+async def main(what: str, url: str) -> None:
+    configuration = Configuration.create_with_component_type(ComponentType.GROUND_STATION)
+    async with Mavsdk(configuration) as mavsdk:
+        await mavsdk.add_any_connection(url)
+        drone = await mavsdk.first_autopilot(timeout_s=30.0)
+        if drone is None:
+            raise SystemExit("no drone")
+        action, telemetry = ActionAsync(drone), TelemetryAsync(drone)
+        await until(telemetry.subscribe_health_all_ok(), bool)
+        await action.set_takeoff_altitude(8.0)
+        await action.arm()
+        await action.takeoff()
+        await until(telemetry.subscribe_landed_state(), lambda state: state == LandedState.IN_AIR)
+        await until(telemetry.subscribe_flight_mode(), lambda mode: mode.name == "HOLD")
+        say("up")
+        await {"offboard": offboard, "manual": manual, "follow": follow}[what](drone)
+
+
+if __name__ == "__main__":
+    asyncio.run(main(sys.argv[1], sys.argv[2]))

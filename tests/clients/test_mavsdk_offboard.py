@@ -1,0 +1,106 @@
+"""Unmodified MAVSDK: offboard, manual_control and follow_me, judged by where the simulated drone truly was."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import pytest
+from support.product import Process, program
+from support.setpoints import allow_speed
+from support.world import HOME, World, world
+
+from anafi_mav import geo
+from anafi_mav.sim.motion import Pose
+
+SCRIPT = Path(__file__).with_name("mavsdk_offboard.py")
+
+pytestmark = pytest.mark.timeout(240)
+
+
+@asynccontextmanager
+async def flown(what: str) -> AsyncIterator[tuple[World, Process]]:
+    async with (
+        world(speed=1.0) as w,
+        program(sys.executable, "-u", str(SCRIPT), what, f"tcpout://{w.address}:5760") as script,
+    ):
+        await script.line(lambda line: line == "up", timeout=60.0)
+        yield w, script
+
+
+async def held(w: World, script: Process, name: str) -> Pose:
+    """Where the drone truly is while the program still holds this step."""
+    await script.line(lambda line: line == f"held {name}", timeout=60.0)
+    return w.drone.pose
+
+
+async def test_mavsdk_offboard() -> None:
+    async with flown("offboard") as (w, script):
+        allow_speed(w)
+        pose = await held(w, script, "attitude")
+        assert [line for line in script.lines if line.startswith("tried")] == [
+            "tried start without setpoints NO_SETPOINT_SET",
+            "tried start with rates COMMAND_DENIED",
+            "tried start done",
+        ]
+        assert pose.vn > 1.0  # nose down
+        assert abs(pose.ve) < 0.3
+        assert pose.up > 8.5  # thrust above a half
+        pose = await held(w, script, "velocity ned")
+        assert (pose.vn, pose.ve, pose.vd) == pytest.approx((0.0, 2.0, 0.5), abs=0.3)
+        assert math.degrees(pose.yaw) == pytest.approx(90.0, abs=6.0)
+        pose = await held(w, script, "velocity body")
+        assert (pose.vn, pose.ve, pose.vd) == pytest.approx((0.0, 2.0, -0.5), abs=0.3)
+        pose = await held(w, script, "position ned")
+        assert (pose.north, pose.east, pose.up) == pytest.approx((8.0, -6.0, 12.0), abs=0.7)
+        assert abs(math.degrees(pose.yaw)) < 6.0
+        for name, height in (("relative", 9.0), ("amsl", 11.0)):
+            pose = await held(w, script, f"position global {name}")
+            assert geo.offset(*HOME[:2], *w.drone.firmware.place()) == pytest.approx((20.0, 0.0), abs=0.7)
+            assert pose.up == pytest.approx(height, abs=0.5)
+        pose = await held(w, script, "position and velocity")
+        assert (pose.north, pose.east, pose.up) == pytest.approx((30.0, 0.0, 11.0), abs=1.0)
+        pose = await held(w, script, "acceleration")
+        assert pose.ve > 0.8
+        assert abs(pose.vn) < 0.4
+        await script.line(lambda line: line.startswith("stopped"), timeout=20.0)
+        assert await script.end() == 0, script
+
+
+async def test_mavsdk_manual_control() -> None:
+    async with flown("manual") as (w, script):
+        pose = await held(w, script, "forward")
+        assert pose.vn > 0.8
+        assert abs(pose.ve) < 0.3
+        pose = await held(w, script, "right")
+        assert pose.ve > 0.8
+        pose = await held(w, script, "up")
+        assert pose.vd < -1.0
+        before = pose.yaw
+        pose = await held(w, script, "clockwise")
+        assert math.remainder(pose.yaw - before, 2.0 * math.pi) > 0.2
+        await script.line(lambda line: line == "silent", timeout=20.0)
+        assert {tuple(e.args[axis] for axis in ("roll", "pitch", "yaw", "gaz")) for e in w.commands(PCMD)[-5:]} == {
+            (0, 0, 0, 0)
+        }
+        assert await script.end() == 0, script
+
+
+PCMD = "ardrone3.Piloting.PCMD"
+
+
+async def test_mavsdk_follow_me() -> None:
+    async with flown("follow") as (w, script):
+        allow_speed(w)
+        line = await script.line(lambda line: line.startswith("held target"), timeout=90.0)
+        pose, target = w.drone.pose, float(line.split()[2])
+        assert script.lines[1:4] == ["config 8.0 8.0 180.0", "tried start done", "following True"]
+        assert target - pose.north == pytest.approx(6.0, abs=1.5)
+        assert pose.east == pytest.approx(0.0, abs=1.0)
+        assert pose.up == pytest.approx(10.0, abs=0.5)
+        assert pose.vn == pytest.approx(1.5, abs=0.5)
+        await script.line(lambda line: line == "stopped", timeout=30.0)
+        assert await script.end() == 0, script
