@@ -1,0 +1,103 @@
+"""A dronekit script that flies by setpoints and by channels: python dronekit_setpoints.py URL px4|ardupilot.
+
+It prints a line a step, and goes on with the step for a while: the test that runs it looks where the drone truly is.
+"""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+import dronekit
+from pymavlink import mavutil
+
+EVERY = 0.1
+VELOCITY_ONLY = 0b0000_1101_1100_0111
+POSITION_ONLY = 0b0000_1101_1111_1000
+
+
+def until(vehicle: Any, name: str, true: Callable[[Any], bool], timeout: float = 30.0) -> None:
+    """Wait for an attribute of the vehicle, by dronekit's own events."""
+    met = threading.Event()
+
+    def changed(_: Any, __: str, value: Any) -> None:
+        if true(value):
+            met.set()
+
+    where = vehicle.location if name.startswith("location.") else vehicle
+    name = name.removeprefix("location.")
+    where.add_attribute_listener(name, changed)
+    try:
+        if not true(getattr(where, name)) and not met.wait(timeout):
+            raise SystemExit(f"{name} did not become what was waited for: {getattr(where, name)}")
+    finally:
+        where.remove_attribute_listener(name, changed)
+
+
+def say(*words: object) -> None:
+    print(*words, flush=True)
+
+
+def repeated(do: Callable[[], None], seconds: float, name: str) -> None:
+    """A program's own loop, as the examples of dronekit have it; the step is told a moment before its end."""
+    end, told = time.monotonic() + seconds, False
+    while (left := end - time.monotonic()) > 0.0:
+        do()
+        if left < 0.7 and not told:
+            told = True
+            say("held", name)
+        time.sleep(EVERY)
+
+
+def set_mode(vehicle: Any, name: str) -> None:
+    vehicle.mode = dronekit.VehicleMode(name)
+    until(vehicle, "mode", lambda mode: mode.name == name)
+    say("mode", name)
+
+
+def main(url: str, flavour: str) -> None:
+    vehicle = dronekit.connect(url, wait_ready=True, timeout=30, heartbeat_timeout=30)
+    until(vehicle, "ekf_ok", bool)
+    if flavour == "ardupilot":
+        set_mode(vehicle, "GUIDED")
+    vehicle.armed = True
+    until(vehicle, "armed", bool)
+    vehicle.simple_takeoff(8)
+    until(vehicle, "location.global_relative_frame", lambda at: at is not None and at.alt is not None and at.alt > 7.7)
+    idle = "GUIDED" if flavour == "ardupilot" else "LOITER"
+    until(vehicle, "mode", lambda mode: mode.name == idle)
+    say("up")
+
+    def setpoint(frame: int, mask: int, at: tuple[float, ...], v: tuple[float, ...]) -> Callable[[], None]:
+        message = vehicle.message_factory.set_position_target_local_ned_encode(
+            0, 0, 0, frame, mask, *at, *v, 0, 0, 0, 0, 0
+        )
+        return lambda: vehicle.send_mavlink(message)
+
+    nowhere = (0.0, 0.0, 0.0)
+    north = setpoint(mavutil.mavlink.MAV_FRAME_LOCAL_NED, VELOCITY_ONLY, nowhere, (2.0, 0.0, 0.0))
+    if flavour == "px4":
+        repeated(north, 1.0, "setpoints before Offboard")
+        vehicle.mode = dronekit.VehicleMode("OFFBOARD")
+    repeated(north, 5.0, "velocity")
+    place = setpoint(mavutil.mavlink.MAV_FRAME_LOCAL_NED, POSITION_ONLY, (4.0, -5.0, -10.0), nowhere)
+    repeated(place, 9.0, "position")
+    until(vehicle, "mode", lambda mode: mode.name == idle)
+    say("idle", idle)
+
+    set_mode(vehicle, "LOITER" if flavour == "ardupilot" else "POSCTL")
+
+    def channels() -> None:
+        vehicle.channels.overrides = {"1": 1800, "2": 1500, "3": 1500, "4": 1500}
+
+    repeated(channels, 3.0, "channels")
+    vehicle.channels.overrides = {}
+    set_mode(vehicle, "RTL")
+    vehicle.close()
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], sys.argv[2])
