@@ -74,8 +74,17 @@ class _Table:
             self._said[report.nodeid] = dict(report.user_properties).get("flavours", [])
 
     def pytest_sessionfinish(self) -> None:
-        rows = [self._row(number) for number in sorted(ITEMS)]
+        kept = self._kept()
+        rows = [kept.get(number, "") if number not in self._reports else "" for number in sorted(ITEMS)]
+        rows = [row or self._row(number) for row, number in zip(rows, sorted(ITEMS), strict=True)]
         self._path.write_text(HEAD + "".join(rows), encoding="utf-8")
+
+    def _kept(self) -> dict[int, str]:
+        """The rows that are there: an item that this run has no test of keeps its own."""
+        if not self._path.exists():
+            return {}
+        lines = self._path.read_text(encoding="utf-8").splitlines(keepends=True)
+        return {int(found[1]): line for line in lines if (found := re.match(r"\| (\d+) \|", line))}
 
     def _row(self, number: int) -> str:
         item, reports = ITEMS[number], self._reports[number]
