@@ -31,16 +31,18 @@ COPTER = {"auto": 3, "guided": 4, "loiter": 5, "rtl": 6, "land": 9, "brake": 17}
 async def test_conf_027_copter_modes_by_command(name: str, parameters: tuple[float, ...]) -> None:
     async with world(flavour="ardupilot") as w:
         await w.take_off()
+        mark = w.client.mark()
         assert (await w.client.command(SET_MODE, *parameters)).result == ACCEPTED
-        await w.client.heartbeat(lambda beat: beat.custom_mode == COPTER[name], timeout=1.3)
+        await w.client.heartbeat(lambda beat: beat.custom_mode == COPTER[name], since=mark, timeout=1.3)
 
 
 @pytest.mark.parametrize(("flavour", "number"), [("px4", LAND), ("ardupilot", COPTER["land"])])
 async def test_conf_027_land_by_the_message(flavour: str, number: int) -> None:
     async with world(flavour=flavour) as w:
         await w.take_off()
+        mark = w.client.mark()
         w.client.send(dialect.MAVLink_set_mode_message(1, 1, number))
-        await w.client.heartbeat(lambda beat: beat.custom_mode == number, timeout=1.3)
+        await w.client.heartbeat(lambda beat: beat.custom_mode == number, since=mark, timeout=1.3)
         await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landed", 20.0)
 
 
