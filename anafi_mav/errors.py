@@ -58,6 +58,18 @@ class NotSupported(AnafiMavError):
         self.feature = feature
 
 
+class PlanError(AnafiMavError, ValueError):
+    """A flight plan is unusable: `source` names the file, `item` the item that is wrong, counted from 0 (None: none in
+    particular), `problem` says what it is in a clause."""
+
+    def __init__(self, source: str, problem: str, item: int | None = None) -> None:
+        where = f"{source}: " if item is None else f"{source}: item {item}: "
+        super().__init__(where + problem)
+        self.source = source
+        self.item = item
+        self.problem = problem
+
+
 class ConfigError(AnafiMavError, ValueError):
     """The configuration is unusable at `key_path` ("drones[0].sysid"); the text says what was expected there."""
 

@@ -1,1 +1,1 @@
-"""Flight plans: one neutral plan and its file formats. Nothing lives here yet; the room is kept for it."""
+"""Flight plans: one neutral `Plan` (`plan`), its file formats (`files`) and what of it these cannot hold (`Loss`)."""

@@ -1,0 +1,139 @@
+"""A flight plan in nobody's format: what QGroundControl, Mission Planner, MAVLink and Parrot mean, without their files.
+
+Items are MAVLink's (common.xml MAV_CMD), with one difference: the target of a DO_JUMP is the place of an item in
+`items`, counted from 0, whatever a file or a protocol counts from. None is "not set": null or nan in files.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+from pymavlink.dialects.v20 import common
+
+WAYPOINT = common.MAV_CMD_NAV_WAYPOINT
+DO_JUMP = common.MAV_CMD_DO_JUMP
+
+GLOBAL, MISSION, RELATIVE, GLOBAL_INT, RELATIVE_INT, TERRAIN, TERRAIN_INT = (
+    common.MAV_FRAME_GLOBAL,
+    common.MAV_FRAME_MISSION,
+    common.MAV_FRAME_GLOBAL_RELATIVE_ALT,
+    common.MAV_FRAME_GLOBAL_INT,
+    common.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT,
+    common.MAV_FRAME_GLOBAL_TERRAIN_ALT,
+    common.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT,
+)
+
+MAX_ITEMS = 5000
+"""Items of a plan, as many as a transfer carries."""
+
+MAX_BYTES = 16 * 1024 * 1024
+"""Of a file: a plan of 5000 items with a survey's drawing takes a few."""
+
+Params = tuple[float | None, float | None, float | None, float | None, float | None, float | None, float | None]
+
+
+@dataclass(frozen=True)
+class Item:
+    """One item of a mission."""
+
+    command: int
+    """MAV_CMD, or one of Parrot's own."""
+    frame: int
+    """MAV_FRAME."""
+    params: Params
+    """param1..param7; of an item with a place the last three are latitude (deg), longitude (deg), height (m)."""
+    autocontinue: bool = True
+    extra: str = field(default="", compare=False)
+    """What QGroundControl's editor keeps with the item, as JSON."""
+
+
+@dataclass(frozen=True)
+class Point:
+    """A place with a height (m), whose zero is said where it is used."""
+
+    latitude: float
+    longitude: float
+    height: float = 0.0
+
+
+@dataclass(frozen=True)
+class Polygon:
+    """A zone of a fence."""
+
+    inclusion: bool
+    corners: tuple[tuple[float, float], ...]
+    """(latitude, longitude)."""
+    group: int = 0
+    """Of inclusion zones: inside is what all zones of one group have in common."""
+
+
+@dataclass(frozen=True)
+class Circle:
+    """A zone of a fence."""
+
+    inclusion: bool
+    centre: tuple[float, float] | None
+    """None: home."""
+    radius: float
+    """m."""
+    group: int = 0
+
+
+@dataclass(frozen=True)
+class Block:
+    """Items that an editor made of something simpler, which it can go on editing."""
+
+    kind: str
+    """As QGroundControl names it: "survey", "CorridorScan", "StructureScan"."""
+    first: int
+    count: int
+    data: str
+    """As QGroundControl stores it, JSON."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """All that a file of any of the formats can say."""
+
+    items: tuple[Item, ...] = ()
+    home: Point | None = None
+    """Where the planner thought that it would begin; height above mean sea level."""
+    zones: tuple[Polygon | Circle, ...] = ()
+    breach_return: Point | None = None
+    """Height above home."""
+    rally: tuple[Point, ...] = ()
+    """Heights above home."""
+    cruise_speed: float | None = None
+    """m/s, of aeroplanes."""
+    hover_speed: float | None = None
+    """m/s, which the planner assumed."""
+    blocks: tuple[Block, ...] = ()
+    """In the order of their items, which they do not share."""
+    editor: str = field(default="", compare=False)
+    """What else QGroundControl's editor keeps, as JSON."""
+
+    def __post_init__(self) -> None:
+        # The order of zones means nothing, and QGroundControl keeps polygons and circles apart.
+        ordered = sorted(self.zones, key=lambda zone: isinstance(zone, Circle))
+        object.__setattr__(self, "zones", tuple(ordered))
+
+
+@dataclass(frozen=True)
+class Loss:
+    """Something of a plan that a format cannot hold."""
+
+    what: str
+    """A clause: "the heading is not set; written as 0, which is north"."""
+    item: int | None = None
+    """Of which item; None: of the plan."""
+
+    def __str__(self) -> str:
+        return self.what if self.item is None else f"item {self.item}: {self.what}"
+
+
+def shifted(item: Item, by: int) -> Item:
+    """The same item in a list that counts `by` more before it: only the target of a jump is a number of a list."""
+    target, two, three, four, five, six, seven = item.params
+    if item.command != DO_JUMP or target is None:
+        return item
+    return replace(item, params=(target + by, two, three, four, five, six, seven))
