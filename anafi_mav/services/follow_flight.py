@@ -75,6 +75,8 @@ class FollowFlight:
             raise Refused("Follow refused: the pilot at the Skycontroller flies")
         if vehicle.drone.piloting.limits is None:
             raise Refused("Follow refused: the drone has not reported what full tilt and speed are")
+        if vehicle.sticks_follow_camera:
+            raise Refused("Follow refused: the drone's piloting style makes its sticks relative to the camera")
         await vehicle.take_over()
         await vehicle.drone.piloting.cancel_return_home()
         if not vehicle.in_air or vehicle.returning:

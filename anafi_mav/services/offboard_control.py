@@ -34,8 +34,12 @@ TILT_LAG = 0.25
 """s that an ANAFI's tilt takes to follow its stick, near enough (10 rad/s, damping 0.9: anafi_ros paper IV)."""
 
 AIR_GAIN = 0.5
-"""Share of a surprise in the speed that is believed to be the air's doing, at each report: it is known after half a
+"""Share of a surprise in the speed that is believed to be the air's doing, at each look: it is known after half a
 second, and one odd report does not tilt the drone."""
+
+LOOK = 0.15
+"""s at least between two looks at what the air does: an ANAFI tells its speed every 0.2 s. The difference of two speeds
+that come faster is noise."""
 
 MOST_AIR = 8.0
 """m/s2 that the air may seem to push: as much as full tilt. More is a mistake of the estimate."""
@@ -145,6 +149,9 @@ class Motion:
         self._velocity = (0.0, 0.0, 0.0)
         self._push_then = (0.0, 0.0)
         """The push when the speed was last told."""
+        self._looked = (0.0, 0.0)
+        self._looked_at = -math.inf
+        self._pushed_north = self._pushed_east = 0.0
 
     def on_attitude(self, roll: float, pitch: float, yaw: float, now: float) -> None:
         """AttitudeChanged."""
@@ -159,18 +166,30 @@ class Motion:
         elapsed = now - self._velocity_at
         push = self.push()
         if 0.0 < elapsed < STALE:
-            then, before = self._push_then, self._velocity
-            surprise = tuple(
-                (new - old) / elapsed - (a + b) / 2.0 - air
-                for new, old, a, b, air in zip((north, east), before, then, push, self.air, strict=False)
-            )
-            air_north, air_east = (air + AIR_GAIN * more for air, more in zip(self.air, surprise, strict=True))
-            size = math.hypot(air_north, air_east)
-            shrink = min(1.0, MOST_AIR / size) if size > 0.0 else 1.0
-            self.air = (air_north * shrink, air_east * shrink)
+            before, then = self._velocity, self._push_then
             self.north += (north + before[0]) / 2.0 * elapsed
             self.east += (east + before[1]) / 2.0 * elapsed
+            # What the tilt has done since the last look (m/s).
+            self._pushed_north += (push[0] + then[0]) / 2.0 * elapsed
+            self._pushed_east += (push[1] + then[1]) / 2.0 * elapsed
+            if now - self._looked_at >= LOOK:
+                self._look(north, east, now)
+        else:
+            self._looked_at, self._looked = now, (north, east)
+            self._pushed_north = self._pushed_east = 0.0
         self._velocity, self._velocity_at, self._push_then = (north, east, down), now, push
+
+    def _look(self, north: float, east: float, now: float) -> None:
+        """What the speed has become beyond what the tilt made of it, the air has done."""
+        elapsed = now - self._looked_at
+        air_north, air_east = self.air
+        air_north += AIR_GAIN * ((north - self._looked[0] - self._pushed_north) / elapsed - air_north)
+        air_east += AIR_GAIN * ((east - self._looked[1] - self._pushed_east) / elapsed - air_east)
+        size = math.hypot(air_north, air_east)
+        shrink = min(1.0, MOST_AIR / size) if size > 0.0 else 1.0
+        self.air = (air_north * shrink, air_east * shrink)
+        self._looked_at, self._looked = now, (north, east)
+        self._pushed_north = self._pushed_east = 0.0
 
     def on_height(self, ato: float, now: float) -> None:
         """AltitudeChanged."""

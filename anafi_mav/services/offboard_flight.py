@@ -30,6 +30,9 @@ from anafi_mav.services.statustext import Severity
 if TYPE_CHECKING:
     from anafi_mav.services.vehicle import Vehicle
 
+WARN_AGAIN = 1.0
+"""m/s by which a velocity has to be higher than the last one whose tilt was worth a word."""
+
 SINGLE_WAIT = 2.0
 """s that a single setpoint may wait until what was under way has let go of the drone; then it is out of date."""
 
@@ -67,6 +70,8 @@ class OffboardFlight:
         self._afterwards = FlightMode.HOLD
         """The mode that silence ends in."""
         self._controller = Controller(self.motion)
+        self._warned_of = STILL
+        """m/s of velocity up to which it has been said whether MaxTilt is enough."""
         self._goal: Goal | None = None
         self._course = _Course(False, None, None)
         self._moves = OffboardMoves(vehicle, lambda text: self.complain(text))
@@ -138,8 +143,11 @@ class OffboardFlight:
     async def engage(self, client: Hashable) -> None:
         """Mode Offboard begins for this client; returns when its setpoints fly the drone, or raises `Refused`."""
         self._require_freedom("Offboard")
-        if self._stream.candidate(client, self._clock.monotonic()) is None:
+        candidate = self._stream.candidate(client, self._clock.monotonic())
+        if candidate is None:
             raise Refused("Offboard refused: no setpoints arrive")
+        if self._stream.state is State.ENGAGED and candidate == self._stream.pilot:
+            return  # it flies already, and goes on without a jolt
         await self._vehicle.take_over()
         await self._vehicle.drone.piloting.cancel_return_home()
         pilot = self._stream.candidate(client, self._clock.monotonic())
@@ -159,6 +167,8 @@ class OffboardFlight:
             raise Refused(f"{what} refused: the pilot at the Skycontroller flies")
         if vehicle.drone.piloting.limits is None:
             raise Refused(f"{what} refused: the drone has not reported what full tilt and speed are")
+        if vehicle.sticks_follow_camera:
+            raise Refused(f"{what} refused: the drone's piloting style makes its sticks relative to the camera")
 
     # ArduPilot's way.
 
@@ -254,6 +264,7 @@ class OffboardFlight:
         self._watch()  # the pilot's, which may be older than the newest of all
         self._controller = Controller(self.motion)
         self._goal, self._course = None, _Course(False, None, None)
+        self._warned_of = STILL
         self._vehicle.drone.piloting.hover()  # ends a moveTo or moveBy of ours, which would ignore sticks
         self._vehicle.select(mode, self)
         self._fly()
@@ -264,11 +275,16 @@ class OffboardFlight:
         limits = vehicle.drone.piloting.limits
         if setpoint is None or limits is None:
             return
+        reason = None
         if vehicle.drone.controller.pilot_flies:
             # He moved a stick. That he let go of it again does not give the drone back to the program.
+            reason = "the pilot at the Skycontroller flies"
+        elif vehicle.sticks_follow_camera:
+            reason = "the drone's sticks have become relative to the camera"
+        if reason is not None:
             self.end()
             vehicle.select(FlightMode.HOLD)
-            vehicle.text(Severity.WARNING, "Offboard ended: the pilot at the Skycontroller flies")
+            vehicle.text(Severity.WARNING, f"Offboard ended: {reason}")
             return
         now = self._clock.monotonic()
         if isinstance(setpoint, AttitudeSetpoint):
@@ -299,12 +315,14 @@ class OffboardFlight:
 
     def _motion_sticks(self, setpoint: MotionSetpoint, limits: Limits, now: float) -> PilotingCommand:
         speed = math.hypot(setpoint.velocity[0] or 0.0, setpoint.velocity[1] or 0.0)
-        needed = tilt_for(speed) * units.DEG_PER_RAD
-        if speed > STILL and needed > limits.tilt_deg:
-            self.complain(
-                f"MaxTilt of {limits.tilt_deg:.0f} degrees does not hold {speed:.1f} m/s against {WIND:g} m/s of wind, "
-                f"{math.ceil(needed)} would"
-            )
+        if speed > self._warned_of:
+            self._warned_of = speed + WARN_AGAIN
+            needed = tilt_for(speed) * units.DEG_PER_RAD
+            if needed > limits.tilt_deg:
+                self.complain(
+                    f"MaxTilt of {limits.tilt_deg:.0f} degrees does not hold {speed:.1f} m/s against {WIND:g} m/s of "
+                    f"wind, {math.ceil(needed)} would"
+                )
         located = self._vehicle.place is not None
         wanted = demand(setpoint, self._goal, self._course.yaw, located=located)
         sticks = self._controller.sticks(wanted, limits, now)

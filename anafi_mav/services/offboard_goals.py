@@ -61,9 +61,7 @@ def resolve(setpoint: MotionSetpoint, vehicle: Vehicle, motion: Motion) -> Goal:
         if setpoint.origin is Origin.LOCAL:
             if vehicle.origin is None:
                 raise Refused("Refused: no GPS fix so far, so the local frame has no origin")
-            place = Place(
-                *geo.destination(vehicle.origin.latitude, vehicle.origin.longitude, x or 0.0, y or 0.0),
-            )
+            place = _local_place(vehicle.origin, x, y, vehicle.place)
         else:
             place = Place(x or 0.0, y or 0.0)
         vehicle.check_place(place, start=vehicle.place)
@@ -78,6 +76,14 @@ def resolve(setpoint: MotionSetpoint, vehicle: Vehicle, motion: Motion) -> Goal:
         y=None if y is None else east,
         height=height,
     )
+
+
+def _local_place(origin: Place, x: float | None, y: float | None, here: Place | None) -> Place:
+    """A place of the local frame. Of a half that is not said the drone keeps its own."""
+    if (x is None or y is None) and here is not None:
+        north, east = geo.offset(origin.latitude, origin.longitude, here.latitude, here.longitude)
+        x, y = north if x is None else x, east if y is None else y
+    return Place(*geo.destination(origin.latitude, origin.longitude, x or 0.0, y or 0.0))
 
 
 def _from_vehicle(setpoint: MotionSetpoint, vehicle: Vehicle, motion: Motion) -> Goal:

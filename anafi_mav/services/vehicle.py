@@ -17,7 +17,14 @@ from typing import Any
 from anafi_mav import geo, units
 from anafi_mav.clock import Clock
 from anafi_mav.drone import Drone
-from anafi_mav.drone.events import AlertLevel, FlyingState, FlyingStateChanged, ForcedLandingReason, PlayingState
+from anafi_mav.drone.events import (
+    AlertLevel,
+    FlyingState,
+    FlyingStateChanged,
+    ForcedLandingReason,
+    PilotingStyleStyle,
+    PlayingState,
+)
 from anafi_mav.errors import AnafiMavError, CommandRejected
 from anafi_mav.services.fence_watch import FenceWatch, OutsideFence
 from anafi_mav.services.follow_flight import FollowFlight
@@ -245,6 +252,11 @@ class Vehicle:
         if home is not None:
             return Place(home.latitude, home.longitude)
         return self.place if self.on_ground else None
+
+    @property
+    def sticks_follow_camera(self) -> bool:
+        """What sticks mean depends on where the camera looks (piloting_style.xml): no loop closes over that."""
+        return self.drone.piloting.state.style == PilotingStyleStyle.CAMERA_OPERATED
 
     @property
     def enterable_modes(self) -> frozenset[FlightMode]:

@@ -34,7 +34,7 @@ from support.setpoints import (
 from support.world import HOLD, HOME, World, world
 
 from anafi_mav import geo
-from anafi_mav.arsdk.messages import ardrone3
+from anafi_mav.arsdk.messages import ardrone3, piloting_style
 
 REJECTED = dialect.MAV_RESULT_TEMPORARILY_REJECTED
 SET_MODE, GOTO = 176, 192
@@ -603,6 +603,36 @@ async def test_a_setpoint_does_not_overtake_a_newer_order() -> None:
         await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landed", 20.0)
 
 
+@both
+async def test_sticks_that_follow_the_camera_are_no_sticks_for_setpoints(flavour: str) -> None:
+    async with world(speed=1.0, flavour=flavour) as w:
+        await fly(w, flavour)
+        style = piloting_style.SetStyle(piloting_style.PilotingStyleStyle.CAMERA_OPERATED)
+        async with streaming(w.client, local(VELOCITY_ONLY, v=(2.0, 0.0, 0.0))):
+            await engage(w.client, flavour)
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["vn"] > 0.5, 10.0)
+            w.drone.firmware.receive(style, now())
+            await said(w.client, "relative to the camera")
+            began = now()
+            if flavour == "px4":
+                assert (await w.client.command(SET_MODE, 1, 6, 0)).result == REJECTED
+            await asyncio.sleep(0.5)
+        assert motion(w, began + 0.1) == []
+
+
+async def test_offboard_asked_for_again_does_not_interrupt_it() -> None:
+    async with world(speed=1.0) as w:
+        await w.take_off()
+        async with streaming(w.client, attitude(pitch=-0.1)):
+            await engage(w.client, "px4")
+            await w.drone.wait_log(lambda e: e.name.endswith(".PCMD") and e.args["pitch"] > 0, 5.0)
+            began = now()
+            for _ in range(3):
+                w.client.send(dialect.MAVLink_set_mode_message(1, 1, 0x00060000))
+                await asyncio.sleep(0.2)
+            assert {e.args["pitch"] for e in heard(w, "PCMD", since=began)} == {57}
+
+
 # One pilot.
 
 
@@ -652,3 +682,15 @@ async def test_what_is_flown_is_told_back() -> None:
         for _ in range(2):
             await w.client.wait("HEARTBEAT")
         assert w.client.since(mark, "ATTITUDE_TARGET") == []
+
+
+async def test_where_a_goto_leads_is_told_too() -> None:
+    async with world() as w:
+        await w.take_off()
+        place = geo.destination(*HOME[:2], 30.0, -10.0)
+        assert (await w.client.command(GOTO, -1, 1, 0, NAN, frame=6, x=place[0], y=place[1], z=9.0)).result == 0
+        told = await w.client.wait("POSITION_TARGET_GLOBAL_INT")
+        assert (told.lat_int / 1e7, told.lon_int / 1e7) == pytest.approx(place, abs=1e-6)
+        assert told.alt == pytest.approx(9.0)
+        near = await w.client.wait("POSITION_TARGET_LOCAL_NED")
+        assert (near.x, near.y, near.z) == pytest.approx((30.0, -10.0, -9.0), abs=0.1)

@@ -59,10 +59,15 @@ async def velocity_step(
     course: float = 0.0,
     yaw: float = 0.0,
     tilt: float = 35.0,
-    length: float = 8.0,
+    rate: float = 5.0,
 ) -> list[Figures]:
-    """Every model steps from a hover to `speed` m/s towards `course` (rad) with its nose to `yaw` (rad)."""
-    specs = [DroneSpec(model=model, address=loopback(), home=HOME, http_port=None) for model in MODELS]
+    """Every model steps from a hover to `speed` m/s towards `course` (rad) with its nose to `yaw` (rad).
+
+    `rate` is how often the drones tell how they move, Hz: five times on the aircraft.
+    """
+    specs = [
+        DroneSpec(model=model, address=loopback(), home=HOME, http_port=None, telemetry_rate=rate) for model in MODELS
+    ]
     address = loopback()
     config = Config(
         endpoints=(f"tcpin://{address}:5760",),
