@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from anafi_mav.arsdk.messages import camera
 from anafi_mav.arsdk.messages.camera import (
@@ -36,7 +36,7 @@ from anafi_mav.sim.storage import Place
 SHOT_TIME = 0.1
 """s from the button to the shot, and between the shots of a bracketing. Assumed."""
 SAVE_TIME = 0.3
-"""s from the last shot to the file on the card. Assumed."""
+"""s from a shot to its file on the card. Assumed."""
 BURST_REPORT = 0.1
 """s between two reports of a burst at least (Parrot's camera.xml)."""
 LAPSE_REPORT = 0.5
@@ -107,6 +107,17 @@ class Studio:
     scene: Callable[[], Scene]
 
 
+@dataclass(frozen=True)
+class _Shot:
+    """A picture on its way to the card."""
+
+    number: int
+    scene: Scene
+    date: str
+    due: float
+    """When it has arrived there."""
+
+
 @dataclass
 class _Shoot:
     """Photos that are being taken."""
@@ -117,10 +128,9 @@ class _Shoot:
     """When the next ones are due; a lapse knows only one ahead."""
     kinds: tuple[Kind, ...]
     interval: float = 0.0
-    taken: list[tuple[int, Scene, str]] = field(default_factory=list)
-    """Shots that are not on the card yet: number, scene, date."""
+    taken: list[_Shot] = field(default_factory=list)
+    """Shots that are not on the card yet."""
     count: int = 0
-    saved_at: float = math.inf
     last: tuple[float, float] | None = None
     """Where a GPS lapse took its last shot: m north, east."""
     next_report: float = 0.0
@@ -208,9 +218,7 @@ class Capture:
         if shoot is None or not shoot.open:
             return
         shoot.open = False
-        if shoot.count:
-            shoot.saved_at = time + SAVE_TIME
-        else:
+        if not shoot.count:
             self._shoot = None
             yield self._photo(PhotoResult.ERROR)
             yield self.photo_state()
@@ -246,6 +254,7 @@ class Capture:
         if shoot.count == 0:
             yield from self._press(shoot, time)
         if shoot.taken:
+            shoot.taken = [replace(shot, due=time) for shot in shoot.taken]
             yield from self._save(shoot, time)
         elif shoot.result is not None:
             yield shoot.result
@@ -258,8 +267,7 @@ class Capture:
             shoot.shots.append(time)
         while shoot.shots and time >= shoot.shots[0]:
             yield from self._press(shoot, shoot.shots.pop(0))
-        if time >= shoot.saved_at:
-            yield from self._save(shoot, time)
+        yield from self._save(shoot, time)
         if self._shoot is shoot and shoot.lapse and time >= shoot.next_report:
             shoot.next_report = max(shoot.next_report + LAPSE_REPORT, time)
             yield camera.NextPhotoDelay(shoot.mode, self._left(shoot, time))
@@ -268,43 +276,46 @@ class Capture:
         """A shot."""
         shoot.count += 1
         scene = self._studio.scene()
-        shoot.taken.append((shoot.count, scene, self._date(time)))
+        shoot.taken.append(_Shot(shoot.count, scene, self._date(time), time + SAVE_TIME))
         shoot.last = (scene.north, scene.east)
         if shoot.mode is CameraPhotoMode.TIME_LAPSE and not shoot.shots:
             shoot.shots.append(time + shoot.interval)
         last = not shoot.shots or shoot.lapse
-        if last and not shoot.open:
-            shoot.saved_at = time + SAVE_TIME
         told = shoot.mode is CameraPhotoMode.BURST and time >= shoot.told_at + BURST_REPORT - 1e-9
         if last or told:
             yield self._tell(shoot, PhotoResult.PHOTO_TAKEN, time)
 
     def _save(self, shoot: _Shoot, time: float) -> Iterable[Message]:
-        """Write what was taken."""
-        shoot.saved_at = math.inf
+        """Write what has arrived by `time`, and say so when nothing of it is on its way any more."""
+        arrived = [shot for shot in shoot.taken if shot.due <= time]
+        del shoot.taken[: len(arrived)]
+        written, full = self._write(shoot, arrived)
+        if full:
+            self._shoot = None
+            yield self._photo(PhotoResult.ERROR_NO_STORAGE_SPACE)
+            yield self.photo_state()
+        elif written if shoot.lapse else shoot.count and not (shoot.open or shoot.shots or shoot.taken):
+            yield self._tell(shoot, PhotoResult.PHOTO_SAVED, time)
+            if not shoot.lapse:
+                self._shoot = None
+                yield self.photo_state()
+
+    def _write(self, shoot: _Shoot, shots: list[_Shot]) -> tuple[bool, bool]:
+        """Whether anything was written, and whether this was the last for which there is room."""
         media, room = self._studio.media, self._studio.place.free
         written: list[Resource] = []
-        full = shoot.count >= MAX_RESOURCES
-        for number, scene, date in shoot.taken:
-            files = [media.develop(shoot.media, kind, number, scene, date) for kind in shoot.kinds]
+        full = bool(shots) and shots[-1].number >= MAX_RESOURCES
+        for shot in shots:
+            files = [media.develop(shoot.media, kind, shot.number, shot.scene, shot.date) for kind in shoot.kinds]
             size = sum(file.size for file in files)
             if size > room:
                 full = True
                 break
             room -= size
             written += files
-        shoot.taken.clear()
         if written:
             media.add(shoot.media, written)
-        if full:
-            self._shoot = None
-            yield self._photo(PhotoResult.ERROR_NO_STORAGE_SPACE)
-            yield self.photo_state()
-            return
-        yield self._tell(shoot, PhotoResult.PHOTO_SAVED, time)
-        if not shoot.lapse:
-            self._shoot = None
-            yield self.photo_state()
+        return bool(written), full
 
     def _way(self, shoot: _Shoot) -> float:
         """m since the last shot."""

@@ -47,9 +47,6 @@ NORTH, EAST = 9.0, 12.0
 """m from the take-off place to the target of the moveTo: 15 m away."""
 METRES_PER_DEGREE = 111_195.0
 
-PAUSE = 0.15
-"""s between two steps, so that who watches the drone can tell where one left it."""
-
 AT_START = (
     common.SettingsState.ProductNameChanged,
     common.SettingsState.ProductSerialHighChanged,
@@ -117,6 +114,7 @@ def moved(status: str) -> object:
 class Flight:
     def __init__(self, address: str) -> None:
         self.drone = olympe.Drone(address)
+        self.connected = False
         self.steps: dict[str, dict[str, object]] = {}
 
     @contextmanager
@@ -125,7 +123,14 @@ class Flight:
         self.steps[name] = entry
         yield entry
         entry["to"] = time.monotonic()
-        time.sleep(PAUSE)
+        if self.connected:
+            # A period of its telemetry passes, so that who watches the drone can tell where a step has left it.
+            self.hear(2)
+
+    def hear(self, times: int) -> None:
+        """So many words of the drone on its attitude."""
+        for _ in range(times):
+            self.drone(PilotingState.AttitudeChanged(_policy="wait", _timeout=5)).wait()
 
     def expect(self, name: str, expectation: object) -> None:
         """One expectation, waited for; what fails is described by Olympe."""
@@ -146,14 +151,13 @@ class Flight:
         with self.step(name) as entry:
             self.drone.piloting(roll, pitch, yaw, gaz, 0.5)
             flew = self.drone(PilotingState.FlyingStateChanged(state="flying", _policy="check_wait", _timeout=3)).wait()
-            time.sleep(0.6)
             still = self.drone(at_rest()).wait()
             entry["ok"] = bool(flew.success() and still.success())
 
     def fly(self) -> dict[str, object]:
         result: dict[str, object] = {"steps": self.steps}
         with self.step("connect") as entry:
-            entry["ok"] = bool(self.drone.connect())
+            entry["ok"] = self.connected = bool(self.drone.connect())
         if not entry["ok"]:
             return result
         result["missing"] = [message.fullName for message in AT_START if not self.known(message)]
@@ -197,7 +201,7 @@ class Flight:
         far = here[0] + 60 / METRES_PER_DEGREE
         flying = PilotingState.FlyingStateChanged(state="flying", _policy="check_wait", _timeout=5)
         self.expect("far", Piloting.moveTo(far, here[1], 5.0, "NONE", 0.0) >> flying)
-        time.sleep(0.3)  # a part of the way
+        self.hear(4)  # on a part of the way
         self.expect("cancel", Piloting.CancelMoveTo() >> moved("CANCELED") >> at_rest())
 
         with self.step("start_piloting") as entry:
@@ -229,6 +233,7 @@ class Flight:
         result["flights"] = self.state(SettingsState.MotorFlightsStatusChanged)
         with self.step("disconnect") as entry:
             entry["ok"] = bool(self.drone.disconnect())
+            self.connected = False
         return result
 
     def known(self, message: object) -> bool:

@@ -9,13 +9,13 @@ from __future__ import annotations
 import json
 import os
 import sys
-import time
 import urllib.request
 
 OUT = os.fdopen(os.dup(1), "w")
 os.dup2(2, 1)  # Olympe logs to stdout
 
 import olympe  # noqa: E402
+from olympe.features.media import indexing_state  # noqa: E402
 from olympe.messages import drone_manager, mapper, skyctrl  # noqa: E402
 from olympe.messages.ardrone3 import Piloting, PilotingEvent, PilotingState  # noqa: E402
 from olympe.messages.common import CommonState, SettingsState  # noqa: E402
@@ -69,9 +69,7 @@ def main() -> None:
         known["devices"] = json.loads(json.dumps(controller.get_state(devicemanager.Event.State), default=str))
 
     # The drone's web server, by whatever way Olympe has to it.
-    deadline = time.monotonic() + 8.0
-    while controller.http_proxy is None and time.monotonic() < deadline:
-        time.sleep(0.05)
+    controller.media(indexing_state(state="indexed")).wait(_timeout=8.0)
     proxy = controller.http_proxy
     if proxy is not None:
         with urllib.request.urlopen(f"http://{proxy.address}:{proxy.port}/api/v1/info/properties", timeout=5) as answer:

@@ -192,8 +192,7 @@ async def fly(client: Client, system: int) -> None:
     ack = await client.command(dialect.MAV_CMD_NAV_TAKEOFF, x=0.0, y=0.0, z=1.0 + 4.0 * system, target=(system, 1))
     assert ack.result == dialect.MAV_RESULT_ACCEPTED
     await mode(TAKEOFF, mark)
-    await mode(HOLD, mark)
-    await asyncio.sleep(0.5)
+    await mode(HOLD, client.mark())
 
 
 async def test_media_and_video_of_two_aircraft_with_one_address(spaces: tuple[str, str, str], tmp_path: Path) -> None:

@@ -399,6 +399,22 @@ def test_a_burst_tells_each_shot_but_not_too_often(bench: Bench) -> None:
     assert mediastore.Counters(0, 1, 0, 14) in told
 
 
+def test_the_files_of_a_burst_arrive_one_by_one(bench: Bench) -> None:
+    websocket: list[str] = []
+    bench.firmware.payload.media.notify = lambda name, data: websocket.append(name)
+    bench.send(camera.SetCameraMode(0, PHOTO))
+    bench.send(photo_mode(CameraPhotoMode.BURST))
+    bench.send(camera.TakePhoto(0))
+    bench.run(0.57)  # shots each 71 ms, the first at 71 ms, their files 0.3 s later
+    (media,) = bench.firmware.payload.media
+    assert [resource.number for resource in media.resources] == [1, 2, 3]
+    assert websocket == ["media_created", *["media_updated", "resource_created"] * 2]
+    assert photo_state(bench).state is State.ACTIVE
+    bench.run(0.8)
+    assert len(media.resources) == 14
+    assert photo_state(bench).state is State.INACTIVE
+
+
 @pytest.mark.parametrize(
     ("preset", "count"),
     [

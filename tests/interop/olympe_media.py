@@ -1,0 +1,49 @@
+"""Olympe's own media examples, as they are installed: ``olympe_media.py ADDRESS PORT drone|skycontroller FOLDER``.
+
+Knows nothing of this project. Each example takes a burst, downloads every file of it while it is being taken, compares
+them with the MD5 that the drone tells, counts them and deletes them. Prints one JSON object: the assertion that failed,
+if one did. Olympe's log goes to stderr.
+"""
+
+from __future__ import annotations
+
+import functools
+import json
+import os
+import sys
+import tempfile
+
+OUT = os.fdopen(os.dup(1), "w")
+os.dup2(2, 1)  # Olympe logs to stdout
+
+ADDRESS, PORT, VIA, FOLDER = sys.argv[1:5]
+os.environ |= {"DRONE_IP": ADDRESS, "DRONE_HTTP_PORT": PORT, "SKYCTRL_IP": ADDRESS}
+tempfile.tempdir = FOLDER
+
+import olympe  # noqa: E402
+from olympe.examples import media_ai, skyctrl_media  # noqa: E402
+
+
+def main() -> None:
+    olympe.log.update_config({"loggers": {name: {"level": "WARNING"} for name in ("olympe", "ulog", "urllib3")}})
+    # The example knows the address alone, and its web server to be on port 80.
+    olympe.SkyController4 = functools.partial(olympe.SkyController4, http_port=int(PORT))
+    # This example's own listener downloads the whole media again for each file of it that it is told of, and then finds
+    # that it has more files than the drone. The other example's downloads once.
+    media_ai.MediaEventListener = skyctrl_media.MediaEventListener
+    # It also says everything to the older camera feature first, which an Ai does not speak, and waits ten seconds.
+    media_ai.configure_photo_burst_mode = skyctrl_media.setup_photo_burst_mode
+    # Its other half, with a Media of one's own, cannot succeed: it asks the drone for what only that Media is told.
+    example = media_ai.test_media_ai_internal_media if VIA == "drone" else skyctrl_media.test_media
+    try:
+        example()
+        failed = None
+    except AssertionError as error:
+        failed = str(error)
+    print(json.dumps({"failed": failed}), file=OUT, flush=True)
+    # Olympe's own way out takes seconds.
+    os._exit(0)
+
+
+if __name__ == "__main__":
+    main()
