@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import importlib.util
+import itertools
 import json
 import math
 import re
@@ -75,7 +76,7 @@ class Record:
         poses = [entry["args"] for entry in self.during(step) if entry["kind"] == "pose"]
         rates = [
             math.remainder(after[axis] - before[axis], math.tau) / (after["time"] - before["time"])
-            for before, after in zip(poses, poses[1:], strict=False)
+            for before, after in itertools.pairwise(poses)
         ]
         return max(rates)
 
