@@ -65,10 +65,11 @@ class PlanItem(msgspec.Struct, frozen=True):
     @property
     def has_place(self) -> bool:
         """x and y are degrees times 1e7, not plain numbers."""
-        return _has_place(self.command, self.frame)
+        return has_place(self.command, self.frame)
 
 
-def _has_place(command: int, frame: int) -> bool:
+def has_place(command: int, frame: int) -> bool:
+    """x and y of an item are degrees times 1e7, not plain numbers."""
     entry = dialect.enums["MAV_CMD"].get(command)
     return frame != dialect.MAV_FRAME_MISSION and bool(getattr(entry, "has_location", False))
 
@@ -87,7 +88,7 @@ def item_of(message: Any) -> PlanItem | Fault:
     x: int | None = message.x
     y: int | None = message.y
     if message.get_msgId() == dialect.MAVLINK_MSG_ID_MISSION_ITEM:
-        scale = DEGREES if _has_place(message.command, message.frame) else 1.0
+        scale = DEGREES if has_place(message.command, message.frame) else 1.0
         x, y = _integer(message.x, scale), _integer(message.y, scale)
     if x is None:
         return Fault(dialect.MAV_MISSION_INVALID_PARAM5_X, f"{message.x:g} is no latitude")
