@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from anafi_mav import geo
 from anafi_mav.mavlink import dialect
+from anafi_mav.services.flavours import PX4, Flavour
 from anafi_mav.services.plan_items import Fault, PlanItem, place_fault
 from anafi_mav.services.plan_transfer import PlanKind
 
@@ -234,7 +235,7 @@ class FenceKind(PlanKind):
             return Fault(dialect.MAV_MISSION_INVALID_PARAM2, f"{second:g} is no inclusion group")
         return None if item.command == _HOME_CIRCLE else place_fault(item)
 
-    def check_plan(self, items: Sequence[PlanItem]) -> Fault | None:
+    def check_plan(self, items: Sequence[PlanItem], flavour: Flavour = PX4) -> Fault | None:
         number = 0
         return_points = 0
         while number < len(items):

@@ -1,7 +1,7 @@
 """The mission protocol on the wire: a desk of transfers (`plan_desk`, without I/O), its clock, its channels, its file.
 
 A plan is stored before its upload is acknowledged, and is what the vehicle goes by from then on: `Vehicle.fence` and
-`Vehicle.rally` take theirs. Missions are refused as a whole, by the same machine.
+`Vehicle.rally` take theirs.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from anafi_mav import units
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
@@ -18,9 +19,10 @@ from anafi_mav.services.commands import Command
 from anafi_mav.services.fence import FenceKind, summary
 from anafi_mav.services.flavours import flavour_of
 from anafi_mav.services.guided import fly_item, is_guided_item
+from anafi_mav.services.mission_kind import MissionKind, Version, offset
 from anafi_mav.services.plan_desk import MESSAGES, PlanDesk
-from anafi_mav.services.plan_items import Fault, PlanItem
-from anafi_mav.services.plan_transfer import Changed, Commit, Effect, Peer, PlanKind, Reply, Say
+from anafi_mav.services.plan_items import PlanItem
+from anafi_mav.services.plan_transfer import Changed, Commit, Effect, Peer, Reply, Say
 from anafi_mav.services.rally import RallyKind, Return
 from anafi_mav.services.service import Host, MessageHandler, Query, Service, client_of
 from anafi_mav.services.statustext import Severity
@@ -29,15 +31,10 @@ from anafi_mav.services.vehicle import Vehicle
 
 logger = logging.getLogger(__name__)
 
+NO_TOTAL = 0xFFFF
+"""`total` of a MISSION_CURRENT where there is no mission (common.xml)."""
+
 _ITEMS = (dialect.MAVLINK_MSG_ID_MISSION_ITEM, dialect.MAVLINK_MSG_ID_MISSION_ITEM_INT)
-
-
-class MissionKind(PlanKind):
-    """The list of mission items: always empty."""
-
-    mission_type = dialect.MAV_MISSION_TYPE_MISSION
-    name = "mission"
-    refusal = Fault(dialect.MAV_MISSION_UNSUPPORTED, "missions are not flown yet")
 
 
 @dataclass(frozen=True)
@@ -52,7 +49,7 @@ class PlanService(Service):
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
-        self._desk = PlanDesk([MissionKind(), FenceKind(), RallyKind()])
+        self._desk = PlanDesk([MissionKind(self._home_item, self._version), FenceKind(), RallyKind()])
         self._timer: asyncio.TimerHandle | None = None
 
     def capabilities(self) -> int:
@@ -72,7 +69,7 @@ class PlanService(Service):
         return {dialect.MAV_CMD_DO_SET_MISSION_CURRENT: self._set_current}
 
     def streams(self) -> Mapping[int, Stream]:
-        return {dialect.MAVLINK_MSG_ID_MISSION_CURRENT: Stream(self._mission_current, on_change=True)}
+        return {dialect.MAVLINK_MSG_ID_MISSION_CURRENT: Stream(self._mission_current, on_change=True, flavoured=True)}
 
     def link_up(self) -> None:
         memory = self.host.memory
@@ -151,13 +148,28 @@ class PlanService(Service):
         self._timer = None
         self._perform(self._desk.expire(self.host.clock.monotonic()))
 
+    # What missions need.
+
+    def _home_item(self) -> PlanItem:
+        """Home as an item; all zeros while it is not known."""
+        vehicle = self.host.vehicle
+        home = vehicle.home
+        x, y = (0, 0) if home is None else map(units.deg_e7, home.point)
+        z = vehicle.height.amsl(0.0)
+        return PlanItem(
+            dialect.MAV_CMD_NAV_WAYPOINT, dialect.MAV_FRAME_GLOBAL, (0.0, 0.0, 0.0, 0.0), x, y, 0.0 if z is None else z
+        )
+
+    def _version(self) -> Version:
+        return 1 if self.host.drone.flight_plan.version == 1 else 2
+
     # Plans in force.
 
     def _changed(self, kind: int) -> None:
         """Another plan is in force: the vehicle goes by it, everybody is told."""
         self._take(kind, self._desk.transfers[kind].items)
-        message = self._mission_current(self.host.vehicle, self.host.times())
-        self.host.send(message)
+        times = self.host.times()
+        self.host.send_by_flavour(lambda flavour: self._mission_current(self.host.vehicle, times.for_flavour(flavour)))
 
     def _take(self, kind: int, items: Sequence[PlanItem]) -> None:
         vehicle = self.host.vehicle
@@ -171,9 +183,16 @@ class PlanService(Service):
             vehicle.rally.take(items)
 
     def _mission_current(self, vehicle: Vehicle, times: Times) -> dialect.MAVLink_message:
-        """MISSION_CURRENT: no mission, and which fence and rally points there are."""
+        """MISSION_CURRENT: whether there is a mission, and which plans there are."""
         identities = [transfer.opaque_id for _, transfer in sorted(self._desk.transfers.items())]
-        return dialect.MAVLink_mission_current_message(0, 0, dialect.MISSION_STATE_NO_MISSION, 0, *identities)
+        total = len(self._desk.transfers[MissionKind.mission_type].items)
+        if total == 0:
+            return dialect.MAVLink_mission_current_message(
+                0, NO_TOTAL, dialect.MISSION_STATE_NO_MISSION, 0, *identities
+            )
+        return dialect.MAVLink_mission_current_message(
+            offset(times.flavour), total, dialect.MISSION_STATE_NOT_STARTED, 0, *identities
+        )
 
     # What needs a mission, and what needs none.
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.flavours import Flavour
+from anafi_mav.services.flavours import PX4, Flavour
 from anafi_mav.services.plan_items import Fault, PlanItem, item_float, item_int, item_of, opaque_id
 from anafi_mav.services.statustext import Severity
 
@@ -137,8 +137,8 @@ class PlanKind:
         """What is wrong with one item by itself."""
         return None
 
-    def check_plan(self, items: Sequence[PlanItem]) -> Fault | None:
-        """What is wrong with good items together."""
+    def check_plan(self, items: Sequence[PlanItem], flavour: Flavour = PX4) -> Fault | None:
+        """What is wrong with good items together; a reason numbers them as clients of this flavour do."""
         return None
 
     def shown(self, items: Sequence[PlanItem], flavour: Flavour) -> Sequence[PlanItem]:
@@ -148,6 +148,10 @@ class PlanKind:
     def taken(self, items: Sequence[PlanItem], flavour: Flavour) -> Sequence[PlanItem]:
         """The plan in a list that a client of this flavour sent; the inverse of `shown`."""
         return items
+
+    def always_shown(self, seq: int, flavour: Flavour) -> PlanItem | None:
+        """What stands at a place of the list even when it is empty; None: nothing."""
+        return None
 
 
 @dataclass
@@ -293,7 +297,7 @@ class PlanTransfer:
             self.state = TRANSITIONS[self.state][Event.ITEM]
             return [self._request(upload, now)]
         items = tuple(self.kind.taken(upload.items, peer.flavour))
-        fault = self.kind.check_plan(items)
+        fault = self.kind.check_plan(items, peer.flavour)
         if fault is not None:
             return self._refuse(fault)
         self.state = TRANSITIONS[self.state][Event.LAST_ITEM]
@@ -382,10 +386,11 @@ class PlanTransfer:
             items = download.items
             download.asked = now
             download.left.discard(seq)
-        if seq >= len(items):
+        item = items[seq] if seq < len(items) else self.kind.always_shown(seq, peer.flavour)
+        if item is None:
             return [self._ack(peer, dialect.MAV_MISSION_INVALID_SEQUENCE)]
         build = item_float if as_float else item_int
-        return [Reply(build(items[seq], seq, peer.sysid, peer.compid, self.kind.mission_type), peer)]
+        return [Reply(build(item, seq, peer.sysid, peer.compid, self.kind.mission_type), peer)]
 
     # Time.
 

@@ -1,4 +1,4 @@
-"""Conformance items 46, 47, 48 and 61 to 72 as far as fences and rally points go, in both flavours, over real sockets.
+"""Conformance items 46, 47, 48, 61 to 72 and 142: what all three lists have in common, in both flavours.
 
 Item 69 wants a position that is the same within 1e-6 degrees; a MISSION_ITEM carries single precision, which is coarser
 than that (1.9e-6 at 48.9°). Asked for is the nearest number that the message can carry.
@@ -43,6 +43,7 @@ from support.plans import (
     content,
     count,
     download,
+    mission,
     polygon,
     rally,
     send_count,
@@ -58,13 +59,15 @@ from anafi_mav.mavlink import dialect as newer
 from anafi_mav.sim import DroneSpec, Simulator
 
 both = pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
-lists = pytest.mark.parametrize("kind", [FENCE, RALLY])
+lists = pytest.mark.parametrize("kind", [MISSION, FENCE, RALLY])
 
 PLACE = (HOME[0], HOME[1])
 
 
 def a_plan(kind: int, size: int = 10, shift: float = 0.0) -> list[Item]:
     """Good items that can be told from those of another size or shift; far away, so that the drone may fly."""
+    if kind == MISSION:
+        return mission(HOME, size, shift)
     if kind == RALLY:
         return [
             rally(place, 20.0 + n + shift)
@@ -77,7 +80,7 @@ def a_plan(kind: int, size: int = 10, shift: float = 0.0) -> list[Item]:
 
 
 @both
-@pytest.mark.parametrize("kind", [MISSION, FENCE, RALLY])
+@lists
 async def test_conf_046_empty_lists(flavour: str, kind: int) -> None:
     async with world(flavour=flavour) as w:
         total = await count(w.client, kind, timeout=0.5)
@@ -261,6 +264,10 @@ BAD_ITEMS = [
     (RALLY, [Item(5100, *PLACE, z=float("inf"), frame=3)], INVALID_PARAM1 + 6, "item 0"),
     (FENCE, polygon([PLACE, PLACE, PLACE]), 5, "encloses nothing"),
     (FENCE, [Item(5000, *PLACE), Item(5000, *PLACE)], 5, "return point"),
+    (MISSION, [Item(16, *PLACE, z=20, frame=3), Item(211, 0.0, 0.0, p2=1, frame=2)], UNSUPPORTED, "item 1"),
+    (MISSION, [Item(16, *PLACE, z=20, frame=3), Item(16, *PLACE, z=20, frame=10)], UNSUPPORTED_FRAME, "item 1"),
+    (MISSION, [Item(16, *PLACE, z=20, frame=3), Item(16, 95.0, 2.0, z=20, frame=3)], INVALID_PARAM1 + 4, "item 1"),
+    (MISSION, [Item(16, *PLACE, z=20, frame=3), Item(16, 48.0, 190.0, z=20, frame=3)], INVALID_PARAM1 + 5, "item 1"),
 ]  # fmt: skip
 
 
@@ -268,7 +275,7 @@ BAD_ITEMS = [
 async def test_conf_066_items_that_cannot_be_kept(flavour: str) -> None:
     """Refused with the reason and the item, and what was there before stays."""
     async with world(flavour=flavour) as w:
-        for kind in (FENCE, RALLY):
+        for kind in (MISSION, FENCE, RALLY):
             assert (await upload(w.client, a_plan(kind), kind)).type == ACCEPTED
         for kind, items, result, words in BAD_ITEMS:
             mark = w.client.mark()
@@ -277,12 +284,10 @@ async def test_conf_066_items_that_cannot_be_kept(flavour: str) -> None:
             text = await w.client.wait("STATUSTEXT", lambda m: "refused" in m.text, since=mark)
             assert words in text.text or text.id > 0, text.text  # a longer one goes on in the next
             assert (await count(w.client, kind)).count == 10
-        assert (await upload(w.client, [Item(16, *PLACE)] * 3, MISSION)).type == UNSUPPORTED
-        assert (await count(w.client, MISSION)).count == 0
 
 
 @both
-@pytest.mark.parametrize("kind", [FENCE, RALLY])
+@lists
 async def test_conf_067_more_than_there_is_room_for(flavour: str, kind: int) -> None:
     async with world(flavour=flavour) as w:
         plan = a_plan(kind)
@@ -299,12 +304,12 @@ async def test_conf_067_more_than_there_is_room_for(flavour: str, kind: int) -> 
 async def test_conf_068_clearing(flavour: str) -> None:
     async with world(flavour=flavour) as w:
         for cleared in (FENCE, RALLY, MISSION, ALL):
-            for kind in (FENCE, RALLY):
+            for kind in (MISSION, FENCE, RALLY):
                 assert (await upload(w.client, a_plan(kind), kind)).type == ACCEPTED
             for _ in range(2):  # the second time there is nothing to clear
                 ack = await clear(w.client, cleared)
                 assert (ack.type, ack.mission_type, whole(ack).opaque_id) == (ACCEPTED, cleared, 0)
-            for kind in (FENCE, RALLY):
+            for kind in (MISSION, FENCE, RALLY):
                 assert (await count(w.client, kind)).count == (0 if cleared in (kind, ALL) else 10)
         assert (await upload(w.client, a_plan(FENCE), FENCE)).type == ACCEPTED
         mark = send_count(w.client, 0, FENCE)
@@ -383,8 +388,7 @@ def whole(message: Any) -> Any:
 def whole_ids(message: Any) -> dict[int, int]:
     """Which plans a MISSION_CURRENT names."""
     current = whole(message)
-    assert current.mission_id == 0
-    return {FENCE: current.fence_id, RALLY: current.rally_points_id}
+    return {MISSION: current.mission_id, FENCE: current.fence_id, RALLY: current.rally_points_id}
 
 
 @both
@@ -392,9 +396,9 @@ async def test_conf_071_opaque_ids(flavour: str) -> None:
     async with world(flavour=flavour) as w:
         client = w.client
         other = await w.connect(254)
-        seen: dict[int, set[int]] = {FENCE: set(), RALLY: set()}
-        ids = {FENCE: 0, RALLY: 0}
-        for kind, size in ((FENCE, 5), (RALLY, 5), (FENCE, 6), (RALLY, 7), (FENCE, 5)):
+        seen: dict[int, set[int]] = {MISSION: set(), FENCE: set(), RALLY: set()}
+        ids = {MISSION: 0, FENCE: 0, RALLY: 0}
+        for kind, size in ((FENCE, 5), (RALLY, 5), (FENCE, 6), (MISSION, 5), (RALLY, 7), (FENCE, 5), (MISSION, 6)):
             mark = other.mark()
             ack = await upload(client, a_plan(kind, size), kind)
             total = await count(client, kind)
@@ -404,16 +408,16 @@ async def test_conf_071_opaque_ids(flavour: str) -> None:
             # Everybody hears that something changed, at once.
             await other.wait("MISSION_CURRENT", lambda m: whole_ids(m) == ids, since=mark, timeout=0.5)
         assert len(seen[FENCE]) == 2  # the last one was the first one again
-        assert len(seen[RALLY]) == 2
+        assert len(seen[RALLY]) == len(seen[MISSION]) == 2
         await clear(client, FENCE)
-        await other.wait("MISSION_CURRENT", lambda m: whole_ids(m) == {FENCE: 0, RALLY: ids[RALLY]})
+        await other.wait("MISSION_CURRENT", lambda m: whole_ids(m) == {**ids, FENCE: 0})
 
 
 @both
 async def test_conf_072_there_is_no_current_item_without_a_mission(flavour: str) -> None:
     async with world(flavour=flavour) as w:
         current = await w.client.wait("MISSION_CURRENT")
-        assert (whole(current).seq, whole(current).total, whole(current).mission_state) == (0, 0, 1)
+        assert (whole(current).seq, whole(current).total, whole(current).mission_state) == (0, 0xFFFF, 1)
         assert (await w.client.command(224, 0, 0)).result == dialect.MAV_RESULT_DENIED
         mark = w.client.mark()
         w.client.send(dialect.MAVLink_mission_set_current_message(1, 1, 3))
@@ -439,6 +443,43 @@ async def test_conf_142_single_items_replaced(kind: int) -> None:
         mark = w.client.mark()
         w.client.send(dialect.MAVLink_mission_write_partial_list_message(1, 1, 9, 9, kind))
         assert (await w.client.wait("MISSION_ACK", since=mark)).type == UNSUPPORTED
+
+
+async def test_conf_069_home_is_item_0_to_ardupilots_clients_alone() -> None:
+    """One mission, two numberings: a jump names the same item to both, and no heading is 0 here and NaN there."""
+    plan = [*a_plan(MISSION, 3)[:2], Item(16, *PLACE, z=20.0, frame=3), Item(177, 0.0, 0.0, p1=2.0, p2=1.0, frame=2)]
+    async with world(flavour="ardupilot", also="px4") as w:
+        copter, px4 = w.client, await w.connect(port=5761)
+        assert (await upload(copter, plan, MISSION)).type == ACCEPTED
+        assert [content(item) for item in await download(copter, MISSION)] == [item.content for item in plan]
+        seen = await download(px4, MISSION)
+        assert [(m.command, m.x) for m in seen] == [(item.command, item.content[6]) for item in plan[1:]]
+        assert (seen[0].param4, seen[2].param1, seen[2].param2) == (10.0, 1.0, 1.0)
+        assert math.isnan(seen[1].param4)
+        assert whole(await count(px4, MISSION)).opaque_id == whole(await count(copter, MISSION)).opaque_id
+        # As they are, but for the home that one of them lists.
+        totals = [whole(await client.wait("MISSION_CURRENT")) for client in (copter, px4)]
+        assert [(m.seq, m.total, m.mission_state) for m in totals] == [(1, 3, 2), (0, 3, 2)]
+        assert (await upload(px4, plan[1:3], MISSION)).type == ACCEPTED
+        assert [content(item)[6] for item in await download(copter, MISSION)] == [i.content[6] for i in plan[:3]]
+
+
+async def test_conf_069_home_can_be_read_without_a_mission() -> None:
+    """dronekit reads it as item 0 and waits for ever without it; ArduCopter always has it."""
+    async with world(flavour="ardupilot") as w:
+        await w.client.wait("HOME_POSITION")
+        mark = w.client.mark()
+        w.client.send(dialect.MAVLink_mission_request_message(1, 1, 0, MISSION))
+        home = await w.client.wait("MISSION_ITEM", since=mark)
+        assert (home.seq, home.command, home.frame) == (0, 16, 0)
+        assert (home.x, home.y, home.z) == pytest.approx(HOME, abs=2e-6)
+        # Uploaded alone it is no mission; and a plan of PX4's kind has no such item.
+        assert (await upload(w.client, a_plan(MISSION, 1), MISSION)).type == ACCEPTED
+        assert (await count(w.client, MISSION)).count == 0
+    async with world(flavour="px4") as w:
+        mark = w.client.mark()
+        w.client.send(dialect.MAVLink_mission_request_message(1, 1, 0, MISSION))
+        assert (await w.client.wait("MISSION_ACK", since=mark)).type == INVALID_SEQUENCE
 
 
 @asynccontextmanager
@@ -471,17 +512,17 @@ async def test_conf_122_plans_outlive_the_gateway(tmp_path: Path) -> None:
     async with simulated() as drone:
         ids = {}
         async with gateway(drone) as client:
-            for kind in (FENCE, RALLY):
+            for kind in (MISSION, FENCE, RALLY):
                 ids[kind] = whole(await upload(client, a_plan(kind), kind)).opaque_id
         async with gateway(drone) as client:
             await client.wait("STATUSTEXT", lambda m: m.text.startswith("Fence: "), since=0)
-            for kind in (FENCE, RALLY):
+            for kind in (MISSION, FENCE, RALLY):
                 assert whole(await count(client, kind)).opaque_id == ids[kind]
                 wanted = [item.content for item in a_plan(kind)]
                 assert [content(item) for item in await download(client, kind)] == wanted
             await clear(client, FENCE)
         async with gateway(drone) as client:
-            assert [(await count(client, kind)).count for kind in (FENCE, RALLY)] == [0, 10]
+            assert [(await count(client, kind)).count for kind in (MISSION, FENCE, RALLY)] == [10, 0, 10]
         (file,) = (tmp_path / "state" / "anafi-mav").iterdir()
         async with gateway(drone, str(tmp_path / "elsewhere")) as client:
             assert (await count(client, RALLY)).count == 0

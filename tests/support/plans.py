@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import random
 import time
 from collections.abc import Sequence
@@ -67,6 +68,17 @@ def square(place: tuple[float, float], half: float, *, inclusion: bool = True) -
 
 def circle(place: tuple[float, float], radius: float, *, inclusion: bool = True) -> Item:
     return Item(5003 if inclusion else 5004, *place, p1=radius)
+
+
+def mission(home: tuple[float, float, float], size: int, shift: float = 0.0) -> list[Item]:
+    """A mission that can be told from one of another size or shift, as an ArduPilot client lists it: item 0 is home,
+    to others a first way point."""
+    turns = [2.0 * math.pi * n / max(size - 1, 1) for n in range(size - 1)]
+    circle = around(home[:2], *[(30.0 * math.cos(turn), 30.0 * math.sin(turn)) for turn in turns])
+    points = [
+        Item(16, *place, z=15.0 + n % 7 + shift, p4=10.0 * (n % 30 + 1), frame=3) for n, place in enumerate(circle)
+    ]
+    return [Item(16, *home), *points]
 
 
 def rally(place: tuple[float, float], height: float) -> Item:

@@ -25,7 +25,7 @@ class Kind(PlanKind):
     def check_item(self, item: PlanItem) -> Any:
         return Fault(dialect.MAV_MISSION_UNSUPPORTED, "nobody wants it") if item.command == 666 else None
 
-    def check_plan(self, items: Any) -> Any:
+    def check_plan(self, items: Any, flavour: Any = None) -> Any:
         return Fault(dialect.MAV_MISSION_INVALID, "it ends badly") if items and items[-1].command == 667 else None
 
 
