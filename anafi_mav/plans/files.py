@@ -9,7 +9,7 @@ import tempfile
 from pathlib import Path
 
 from anafi_mav.errors import PlanError
-from anafi_mav.plans import parrot, qgc_plan, waypoints
+from anafi_mav.plans import lines, parrot, qgc_plan, waypoints
 from anafi_mav.plans.plan import MAX_BYTES, Loss, Plan
 
 
@@ -26,20 +26,22 @@ SUFFIXES = {".plan": Format.QGC, ".waypoints": Format.WAYPOINTS, ".txt": Format.
 """By the ending of a file that is to be written. Of a `.mavlink` one has to say for which drone it is."""
 
 
-def load(path: Path, version: parrot.Version = 2) -> Plan:
-    """The plan in a file, whatever it is called. `version` is that of a Parrot file. Raises `PlanError`."""
+def load(path: Path, version: parrot.Version = 2, height: float | None = None) -> Plan:
+    """The plan in a file, whatever it is called. Raises `PlanError`.
+
+    `version` is that of a Parrot file, `height` (m above take-off) that of a line on a map: these files do not say.
+    """
     source = path.name
     try:
-        if path.stat().st_size > MAX_BYTES:
-            raise PlanError(source, f"it is larger than {MAX_BYTES // 2**20} MiB: no flight plan")
-        data = path.read_bytes()
+        with path.open("rb") as file:
+            data = file.read(MAX_BYTES + 1)
     except OSError as error:
         raise PlanError(source, error.strerror or str(error)) from error
-    return parse(data, source, version)
+    return parse(data, source, version, height)
 
 
-def parse(data: bytes, source: str, version: parrot.Version = 2) -> Plan:
-    """The plan in the content of a file. Raises `PlanError`."""
+def parse(data: bytes, source: str, version: parrot.Version = 2, height: float | None = None) -> Plan:
+    """The plan in the content of a file, as `load`. Raises `PlanError`."""
     if len(data) > MAX_BYTES:
         raise PlanError(source, f"it is larger than {MAX_BYTES // 2**20} MiB: no flight plan")
     try:
@@ -48,12 +50,16 @@ def parse(data: bytes, source: str, version: parrot.Version = 2) -> Plan:
         raise PlanError(source, "it is no text") from error
     first = text.split("\n", 1)[0].strip()
     if text.lstrip().startswith("{"):
+        if lines.is_geojson(text):
+            return lines.read_geojson(text, source, height)
         return qgc_plan.read(text, source)
+    if lines.is_kml(text):
+        return lines.read_kml(text, source, height)
     if first == waypoints.HEADER:
         return waypoints.read(text, source)
     if first.startswith("QGC WPL"):
         return parrot.read(text, source, version)
-    raise PlanError(source, "it is no QGroundControl plan, and does not begin with QGC WPL")
+    raise PlanError(source, "it is no QGroundControl plan, does not begin with QGC WPL, and is no KML or GeoJSON")
 
 
 def encode(plan: Plan, form: Format) -> tuple[bytes, list[Loss]]:

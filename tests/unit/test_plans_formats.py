@@ -163,7 +163,7 @@ WRONG: dict[str, tuple[Any, str]] = {
     ),
     "a rally point": (encoded(document(rallyPoints={"version": 2, "points": [[1]]})), "a rally point is no place"),
     "too many": (encoded(document(*[simple(1, 16)] * (MAX_ITEMS + 1))), f"more than {MAX_ITEMS} items"),
-    "text": (b"hello", "it is no QGroundControl plan, and does not begin with QGC WPL"),
+    "text": (b"hello", "it is no QGroundControl plan, does not begin with QGC WPL"),
     "binary": (bytes(range(256)), "it is no text"),
     "nothing": (b"", "it is no QGroundControl plan"),
     "columns": (b"QGC WPL 110\n0\t1\t0\t16\t0\n", "item 0: 5 columns, expected 12"),
