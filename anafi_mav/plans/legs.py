@@ -1,0 +1,431 @@
+"""Lines of the files that a drone flies, written one after the other: what `rules` write with.
+
+A leg is one file. What was set before it began and still holds (speed, region of interest, gimbal) is set anew in front
+of it, for nothing of one file holds in the next.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import NoReturn
+
+from pymavlink.dialects.v20 import common
+
+from anafi_mav import geo
+from anafi_mav.errors import PlanError
+from anafi_mav.plans import parrot
+from anafi_mav.plans.parrot import SET_STILL_MODE, SET_VIEW_MODE, Version
+from anafi_mav.plans.plan import (
+    GLOBAL,
+    GLOBAL_INT,
+    MISSION,
+    RELATIVE,
+    RELATIVE_INT,
+    TERRAIN,
+    TERRAIN_INT,
+    WAYPOINT,
+    Item,
+    Loss,
+    Params,
+    Plan,
+    Point,
+)
+from anafi_mav.units import DEG_PER_RAD, wrap_360
+
+ACCEPTANCE = 1.0
+"""m from a way point that names no radius: with Parrot's own 5 m one counts as reached that has not been flown over."""
+
+SAME_PLACE = 1.0
+"""m: to a point this near there is no direction to look in."""
+
+RECTILINEAR = 12.0
+"""Format of photos (Parrot's flight plan page): MAVLink has no word for it, and this is what the camera begins with."""
+
+SHORTEST_INTERVAL, SHORTEST_STEP = 2.0, 1.0
+"""s and m between photos (capability messages of the cameras, arsdk camera feature)."""
+
+ABSOLUTE, LOOK_AT_ROI = 0.0, 2.0
+"""Of SET_VIEW_MODE: each way point's own heading; a region of interest."""
+
+TIMELAPSE, GPSLAPSE = 0.0, 1.0
+"""Of SET_STILL_MODE."""
+
+_TARGETING = float(common.MAV_MOUNT_MODE_MAVLINK_TARGETING)
+
+
+class FaultKind(enum.Enum):
+    """What a mission is refused for, as MISSION_ACK tells it."""
+
+    COMMAND = "the drone cannot do it: UNSUPPORTED"
+    FRAME = "its height counts from what the drone does not know: UNSUPPORTED_FRAME"
+    PARAM = "a parameter: INVALID_PARAMn"
+    PLAN = "its place among the others: INVALID"
+
+
+@dataclass(frozen=True)
+class Fault:
+    """Why a mission is refused."""
+
+    item: int
+    reason: str
+    """A clause for people."""
+    kind: FaultKind
+    param: int | None = None
+    """1..7, with PARAM."""
+
+    def __str__(self) -> str:
+        return f"item {self.item}: {self.reason}"
+
+
+class Refused(Exception):
+    """Raised by a rule; `fault` is why."""
+
+    def __init__(self, fault: Fault) -> None:
+        super().__init__(str(fault))
+        self.fault = fault
+
+
+@dataclass(frozen=True)
+class Start:
+    """What is known when a mission begins."""
+
+    latitude: float
+    longitude: float
+    ato: float
+    """m above the take-off; 0 on the ground."""
+    flying: bool
+    takeoff_amsl: float | None = None
+    """m: the height of the take-off point above mean sea level. Without it items in such frames cannot be flown."""
+    heading: float = 0.0
+    """deg from north: version 1 has a heading in each way point, and keeps this one where nothing says another."""
+
+
+@dataclass(frozen=True)
+class Leg:
+    """A file that the drone flies by itself."""
+
+    content: bytes
+    origins: tuple[int, ...]
+    """For each line (the index that MissionItemExecuted tells): the item of the mission that it comes from."""
+    done: tuple[tuple[int, ...], ...]
+    """For each line: the items of the mission that are done when it is executed, in their order. An item that needs no
+    line, such as a label, is done with the line before it."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """An item that the gateway flies."""
+
+    item: int
+    done: tuple[int, ...]
+    """The items that are done with it: itself, and what needs no line before or after it."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What items have set, and holds until others set it otherwise."""
+
+    speed: tuple[float, float] | None = None
+    """Type and m/s."""
+    gimbal: tuple[float | None, float | None, float | None] | None = None
+    """Pitch (deg, up +), roll, yaw from the nose."""
+    roi: Point | None = None
+    """Height above take-off."""
+    beside: float | None = None
+    """deg: the nose points so much to the right of the way to each way point."""
+    view: tuple[float | None, float | None, float | None] | None = None
+    """Of SET_VIEW_MODE, where a mission has such items itself."""
+    still: tuple[float, float, float] | None = None
+    """Of SET_STILL_MODE, where a mission has such items itself: mode, step, format."""
+    photos: Item | None = None
+    """The item that began photos without end."""
+    video: Item | None = None
+
+
+class Pen:
+    """Writes legs; knows where the drone will be."""
+
+    def __init__(self, version: Version, start: Start, settings: Settings | None = None) -> None:
+        self.version = version
+        self.settings = settings or Settings()
+        self.place = Point(start.latitude, start.longitude, start.ato)
+        """Where the drone is by now; height above take-off."""
+        self.heading = start.heading
+        self.flying = start.flying
+        self.item = 0
+        """Number of the item that is being written."""
+        self.muted = False
+        """Only settings are taken; nothing is flown."""
+        self.parts: list[Leg | Step] = []
+        self.notes: dict[Loss, None] = {}
+        """A set that keeps its order: an item that is flown again says the same again."""
+        self.written = 0
+        """Lines and steps of all parts."""
+        self._amsl = start.takeoff_amsl
+        self._waiting: list[int] = []
+        self._lines: list[Item] = []
+        self._origins: list[int] = []
+        self._done: list[tuple[int, ...]] = []
+        self._rois: list[Point] = []
+        """Of this file, by their number in it."""
+        self._still: tuple[float, float, float] | None = None
+        """What this file has set."""
+
+    # -- what rules say
+
+    def say(self, what: str) -> None:
+        """Something of the item is not flown as the mission has it."""
+        self.notes[Loss(what, self.item)] = None
+
+    def refuse(self, reason: str, param: int | None = None, kind: FaultKind | None = None) -> NoReturn:
+        """The item cannot be flown."""
+        kind = kind or (FaultKind.COMMAND if param is None else FaultKind.PARAM)
+        raise Refused(Fault(self.item, reason, kind, param))
+
+    # -- parts
+
+    def finish(self) -> None:
+        """The present item has been written."""
+        if self.muted:
+            return
+        if self._done:
+            self._done[-1] += (self.item,)
+        elif not self.parts:
+            self._waiting.append(self.item)
+        else:
+            last = self.parts[-1]
+            if isinstance(last, Step):
+                self.parts[-1] = replace(last, done=(*last.done, self.item))
+            else:
+                self.parts[-1] = replace(last, done=(*last.done[:-1], (*last.done[-1], self.item)))
+
+    def step(self) -> None:
+        """The gateway flies the present item."""
+        if self.muted:
+            return
+        self.close()
+        self.written += 1
+        self.parts.append(Step(self.item, tuple(self._waiting)))
+        self._waiting.clear()
+
+    def close(self) -> None:
+        """What is flown next is another file."""
+        if self._lines:
+            content, lost = parrot.write(Plan(tuple(self._lines)), self.version)
+            if lost or len(self._lines) != len(content.splitlines()) - 1:
+                raise AssertionError(f"lines that version {self.version} cannot hold: {lost}")
+            self.parts.append(Leg(content, tuple(self._origins), tuple(self._done)))
+        self._lines, self._origins, self._done = [], [], []
+        self._rois, self._still = [], None
+
+    def line(self, command: int, *params: float | None, at: Point | None = None) -> None:
+        """One line; `params` from the first on."""
+        if self.muted:
+            return
+        if not self._lines:
+            self._open()
+        self._put(command, *params, at=at)
+
+    def _put(self, command: int, *params: float | None, at: Point | None = None) -> None:
+        one, two, three, four, five, six, seven = (*params, *(None,) * (7 - len(params)))
+        values: Params = (one, two, three, four, five, six, seven)
+        if at is not None:
+            values = (one, two, three, four, at.latitude, at.longitude, at.height)
+        self._lines.append(Item(command, MISSION if at is None else RELATIVE, values))
+        self._origins.append(self.item)
+        self._done.append(tuple(self._waiting))
+        self._waiting.clear()
+        self.written += 1
+
+    def _open(self) -> None:
+        """Before the first line of a file: the way up, and what holds."""
+        if not self.flying:
+            self.flying = True
+            self._put(common.MAV_CMD_NAV_TAKEOFF)
+        holds = self.settings
+        if holds.speed is not None:
+            self._put_speed(*holds.speed)
+        if holds.view is not None:
+            self._put_view(holds.view)
+        if holds.gimbal is not None:
+            self._put_gimbal(*holds.gimbal)
+        if holds.roi is not None:
+            self._put_roi(holds.roi)
+
+    def take_off(self, climb: Point | None) -> None:
+        """From the ground; `climb`: at once to there."""
+        if not self._lines:
+            self._open()
+        if climb is not None:
+            self.fly(climb, None, None)
+
+    # -- places
+
+    def height(self, item: Item) -> float | None:
+        """The height that an item names, above take-off."""
+        value = item.params[6]
+        if value is None:
+            return None
+        if item.frame in (RELATIVE, RELATIVE_INT):
+            return value
+        if item.frame in (TERRAIN, TERRAIN_INT):
+            self.refuse("its height is above the terrain, which the drone does not know", kind=FaultKind.FRAME)
+        if item.frame not in (GLOBAL, GLOBAL_INT):
+            self.refuse(f"frame {item.frame} is none of a place on earth", kind=FaultKind.FRAME)
+        if self._amsl is None:
+            problem = "its height is above mean sea level, and that of the take-off point is not known"
+            raise PlanError("mission", problem, self.item)
+        return value - self._amsl
+
+    def names_place(self, item: Item) -> bool:
+        """It names a place: neither nothing nor 0, 0, which is "here" (MAVLink mission.md, ArduPilot)."""
+        latitude, longitude = item.params[4:6]
+        if (latitude or 0.0, longitude or 0.0) == (0.0, 0.0):
+            return False
+        if latitude is None or not abs(latitude) <= 90.0:
+            self.refuse("it has no latitude" if latitude is None else f"{latitude:g} is no latitude", 5)
+        if longitude is None or not abs(longitude) <= 180.0:
+            self.refuse("it has no longitude" if longitude is None else f"{longitude:g} is no longitude", 6)
+        return True
+
+    def destination(self, item: Item) -> Point:
+        """Where an item flies to: what it does not say is as it is when it begins, also a height of 0 without place."""
+        latitude, longitude, height = item.params[4:]
+        if not self.names_place(item):
+            up = self.height(item) if height else None
+            return replace(self.place, height=self.place.height if up is None else up)
+        up = self.height(item)
+        return Point(latitude or 0.0, longitude or 0.0, self.place.height if up is None else up)
+
+    # -- lines
+
+    def fly(self, to: Point, heading: float | None, radius: float | None) -> None:
+        """Fly to a point; `heading` deg from north, None: as the drone is set to look."""
+        if self.muted:
+            return
+        if not self._lines:
+            self._open()
+        north, east = geo.offset(self.place.latitude, self.place.longitude, to.latitude, to.longitude)
+        moves = math.hypot(north, east) >= SAME_PLACE
+        bearing = wrap_360(math.atan2(east, north) * DEG_PER_RAD) if moves else self.heading
+        wanted = heading
+        if self.settings.roi is not None:
+            wanted = None
+        elif self.settings.beside is not None and moves:
+            wanted = wrap_360(bearing + self.settings.beside)
+        self.place = to
+        self.heading = bearing if wanted is None else wanted
+        number = self.heading if self.version == 1 else wanted
+        self._put(WAYPOINT, 0.0, radius or ACCEPTANCE, None, number, at=to)
+
+    def fly_on(self, to: Point, heading: float | None) -> None:
+        """Fly to a point unless the drone is there."""
+        if geo.distance(self.place.latitude, self.place.longitude, to.latitude, to.longitude) >= SAME_PLACE:
+            self.fly(to, heading, None)
+
+    def wait(self, seconds: float) -> None:
+        if seconds > 0.0:
+            self.line(common.MAV_CMD_NAV_DELAY, seconds)
+
+    def set_speed(self, kind: float, speed: float) -> None:
+        self._set(lambda: self._put_speed(kind, speed), replace(self.settings, speed=(kind, speed)))
+
+    def look_at(self, point: Point) -> None:
+        """Nose and camera look at a point from now on."""
+        self._set(lambda: self._put_roi(point), replace(self.settings, roi=point, beside=None))
+
+    def look_ahead(self) -> None:
+        """Back to what way points say."""
+        looked, self.settings = self.settings.roi, replace(self.settings, roi=None, beside=None)
+        if looked is None:
+            return
+        if self.version == 1:
+            self.line(SET_VIEW_MODE, *((self.settings.view or (ABSOLUTE, 0.0))[:2]))
+        else:
+            self.line(common.MAV_CMD_DO_SET_ROI_NONE)
+
+    def look_beside(self, angle: float) -> None:
+        self.settings = replace(self.settings, beside=angle)
+
+    def aim(self, pitch: float | None, roll: float | None = None, yaw: float | None = None) -> None:
+        """Turn the camera; what is None stays."""
+        was = self.settings.gimbal or (None, None, None)
+        pitch = was[0] if pitch is None else pitch
+        roll = was[1] if roll is None else roll
+        yaw = was[2] if yaw is None else yaw
+        self._set(lambda: self._put_gimbal(pitch, roll, yaw), replace(self.settings, gimbal=(pitch, roll, yaw)))
+
+    def view(self, mode: float, gimbal: float | None) -> None:
+        values = (mode, 0.0, gimbal)
+        self._set(lambda: self._put_view(values), replace(self.settings, roi=None, view=values))
+
+    def _set(self, put: Callable[[], None], settings: Settings) -> None:
+        """Set something; at the beginning of a file that is what `_open` does."""
+        if not self.muted and not self._lines:
+            self.settings = settings
+            self._open()
+            return
+        self.settings = settings
+        if not self.muted:
+            put()
+
+    def _put_speed(self, kind: float, speed: float) -> None:
+        if self.version == 1:
+            self._put(common.MAV_CMD_DO_CHANGE_SPEED, kind, speed)
+        else:
+            self._put(common.MAV_CMD_DO_CHANGE_SPEED, kind, speed, -1.0, 0.0)
+
+    def _put_view(self, values: tuple[float | None, float | None, float | None]) -> None:
+        self._put(SET_VIEW_MODE, *values[: 2 if self.version == 1 else 3])
+
+    def _put_gimbal(self, pitch: float | None, roll: float | None, yaw: float | None) -> None:
+        if self.version == 1:
+            if pitch is not None:  # that version has no word for "as it is"
+                self._put(common.MAV_CMD_DO_MOUNT_CONTROL, pitch)
+        else:
+            self._put(common.MAV_CMD_DO_MOUNT_CONTROL, pitch, roll, yaw, None, None, None, _TARGETING)
+
+    def _put_roi(self, point: Point) -> None:
+        if self.version == 2:
+            self._put(common.MAV_CMD_DO_SET_ROI_LOCATION, at=point)
+            return
+        if point not in self._rois:
+            self._rois.append(point)
+            self._put(common.MAV_CMD_DO_SET_ROI, float(common.MAV_ROI_LOCATION), at=point)
+        self._put(SET_VIEW_MODE, LOOK_AT_ROI, float(self._rois.index(point)))
+
+    # -- photos and video
+
+    def set_still(self, mode: float, step: float, form: float) -> None:
+        """How photos are taken from now on; the line stands before the first that needs it."""
+        self.settings = replace(self.settings, still=(mode, step, form))
+
+    def _still_mode(self, mode: float, step: float) -> None:
+        form = self.settings.still[2] if self.settings.still else RECTILINEAR
+        wanted = (mode, step, form)
+        if not self.muted and self._still != wanted:
+            self.line(SET_STILL_MODE, *wanted)
+            self._still = wanted
+
+    def photo(self) -> None:
+        """One."""
+        held = self._still or (TIMELAPSE, SHORTEST_INTERVAL, None)
+        self._still_mode(held[0], held[1])
+        self._photos(0.0, 1.0)
+
+    def photos_in_time(self, seconds: float, count: float) -> None:
+        """A photo every so often; a count of 0 is without end."""
+        self._still_mode(TIMELAPSE, seconds)
+        self._photos(seconds, count)
+
+    def photos_on_the_way(self, metres: float, count: float) -> None:
+        """A photo every so far."""
+        self._still_mode(GPSLAPSE, metres)
+        self._photos(0.0, count)
+
+    def _photos(self, interval: float, count: float) -> None:
+        sequence = 1.0 if self.version == 2 and count == 1.0 else None
+        self.line(common.MAV_CMD_IMAGE_START_CAPTURE, None, interval, count, sequence)

@@ -1,0 +1,287 @@
+"""From a mission to what the drone flies: files of Parrot's, and between them what the gateway flies itself.
+
+`examine` judges a mission when it is uploaded; `translate` writes the files when it begins. What each command becomes
+is the table of `rules`; how lines are written is `legs`; this is the way through the items, with its jumps.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from pymavlink.dialects.v20 import common
+
+from anafi_mav.errors import PlanError
+from anafi_mav.plans.legs import Fault, FaultKind, Leg, Pen, Refused, Settings, Start, Step
+from anafi_mav.plans.parrot import Version
+from anafi_mav.plans.plan import DO_JUMP, Item, Loss
+from anafi_mav.plans.rules import TABLE, Row, Verdict
+
+__all__ = [
+    "Cursor",
+    "Fault",
+    "FaultKind",
+    "Flight",
+    "Leg",
+    "Report",
+    "Start",
+    "Step",
+    "Verdict",
+    "examine",
+    "translate",
+]
+
+MAX_LINES = 2000
+"""Lines that are written at once: more than a battery flies, and a file of some 100 kB."""
+
+_ENDLESS = -1.0
+MAX_JUMPS = 0xFFFF
+"""Of a mission, those without end not counted: each is a turn of a loop here, and no battery flies so many."""
+
+
+@dataclass(frozen=True)
+class Report:
+    """What a mission is to a drone, known when it is uploaded."""
+
+    faults: tuple[Fault, ...]
+    """Not empty: it is refused."""
+    approximations: tuple[Loss, ...]
+    stepped: tuple[Loss, ...]
+    """Items that the gateway itself flies, and why; not empty: the mission stops where the gateway does."""
+
+
+@dataclass(frozen=True)
+class Cursor:
+    """Where a flight goes on that was too long to be written at once."""
+
+    item: int
+    jumps: tuple[tuple[int, int], ...]
+    """Item of a jump, and how often it was taken."""
+    settings: Settings
+
+
+@dataclass(frozen=True)
+class Flight:
+    """What is flown."""
+
+    parts: tuple[Leg | Step, ...]
+    notes: tuple[Loss, ...]
+    """What is not as the mission has it."""
+    rest: Cursor | None
+    """How it goes on when the parts have been flown: `translate` it with what is known then. None: it is over."""
+
+
+def examine(items: Sequence[Item], version: Version) -> Report:
+    """Can a drone of this version fly the mission?"""
+    faults = [*_wrong_items(items, version)]
+    if not faults:
+        faults += _wrong_ways(items)
+    if faults:
+        return Report(tuple(faults), (), ())
+    place = next((item.params for item in items if TABLE[item.command].moves and item.params[4]), None)
+    latitude, longitude = (0.0, 0.0) if place is None else (place[4] or 0.0, place[5] or 0.0)
+    start = Start(latitude, longitude, 0.0, flying=_way_up(items, 0) is None, takeoff_amsl=0.0)
+    try:
+        flight = _fly(items, version, start, Cursor(0, (), Settings()))
+    except _Endless as error:
+        return Report((Fault(error.item, "it goes round for ever and flies nowhere", FaultKind.PLAN),), (), ())
+    return Report((), flight.notes + _never(items), tuple(_stepped(items, flight)))
+
+
+def translate(items: Sequence[Item], version: Version, start: Start, first: int | Cursor = 0) -> Flight:
+    """Write what is flown from an item on, or from where another flight ended.
+
+    What items before `first` have set holds, and photos and videos that they began and did not end are begun. Raises
+    `PlanError` for what `examine` finds wrong, and when heights above mean sea level cannot be had.
+    """
+    wrong = [*_wrong_items(items, version)] or _wrong_ways(items)
+    if wrong:
+        raise PlanError("mission", wrong[0].reason, wrong[0].item)
+    cursor = first if isinstance(first, Cursor) else _cursor(items, version, start, first)
+    try:
+        return _fly(items, version, start, cursor)
+    except _Endless as error:
+        raise PlanError("mission", "it goes round for ever and flies nowhere", error.item) from None
+
+
+# What is wrong with it.
+
+
+def _wrong_items(items: Sequence[Item], version: Version) -> Iterator[Fault]:
+    """One fault an item, each by itself and after those before it in the list."""
+    pen = Pen(version, Start(0.0, 0.0, 0.0, flying=True, takeoff_amsl=0.0))
+    pen.muted = True
+    for pen.item, item in enumerate(items):
+        fault = _wrong_item(pen, item, len(items))
+        if fault is not None:
+            yield fault
+
+
+def _wrong_item(pen: Pen, item: Item, count: int) -> Fault | None:
+    row = TABLE.get(item.command)
+    if row is None or row.verdict is Verdict.REFUSED:
+        name = Row(item.command, Verdict.REFUSED, "").name
+        return Fault(pen.item, f"{name}: {row.how if row else 'no flight plan has it'}", FaultKind.COMMAND)
+    for number, value in enumerate(item.params, 1):
+        if value is not None and not math.isfinite(value):
+            return Fault(pen.item, f"{value} is no number", FaultKind.PARAM, number)
+    if not item.autocontinue:
+        return Fault(pen.item, "it waits to be continued, which the drone does not", FaultKind.COMMAND)
+    if item.command == DO_JUMP:
+        return _wrong_jump(pen.item, item, count)
+    assert row.write is not None, "what is not refused is written"
+    try:
+        row.write(pen, item)
+    except Refused as error:
+        return replace(error.fault, reason=f"{row.name}: {error.fault.reason}")
+    return None
+
+
+def _wrong_jump(number: int, item: Item, count: int) -> Fault | None:
+    target, often = item.params[:2]
+    if target is None or not target.is_integer() or not 0 <= target < count:
+        return Fault(number, "it jumps to an item that is not there", FaultKind.PARAM, 1)
+    if often is None or not often.is_integer() or not _ENDLESS <= often <= MAX_JUMPS:
+        times = "nobody knows how often" if often is None else f"{often:g} times"
+        return Fault(number, f"it jumps {times}", FaultKind.PARAM, 2)
+    return None
+
+
+def _wrong_ways(items: Sequence[Item]) -> list[Fault]:
+    """What no item is to blame for by itself."""
+    if not items:
+        return []
+    ways = _reached(items)
+    faults = []
+    if sum(max(item.params[1] or 0.0, 0.0) for item in items if item.command == DO_JUMP) > MAX_JUMPS:
+        last = max(number for number, item in enumerate(items) if item.command == DO_JUMP)
+        faults.append(Fault(last, f"the mission jumps more than {MAX_JUMPS} times", FaultKind.PARAM, 2))
+    for number, item in enumerate(items):
+        if item.command == common.MAV_CMD_NAV_LAND and number in ways:
+            after = next((other for other in range(number + 1, len(items)) if other not in ways), None)
+            if after is not None:
+                faults.append(Fault(after, f"item {number} lands, and that ends the plan", FaultKind.PLAN))
+                break
+    if not any(TABLE[items[number].command].moves for number in ways):
+        faults.append(Fault(0, "nothing of the mission flies", FaultKind.PLAN))
+    return faults
+
+
+def _reached(items: Sequence[Item]) -> set[int]:
+    """The items that are ever flown."""
+    reached: set[int] = set()
+    open_ways = [0]
+    while open_ways:
+        number = open_ways.pop()
+        if number in reached or number >= len(items):
+            continue
+        reached.add(number)
+        item = items[number]
+        if item.command == DO_JUMP and item.params[1] != 0.0:
+            open_ways.append(int(item.params[0] or 0.0))
+            if item.params[1] == _ENDLESS:
+                continue
+        if not TABLE[item.command].ends:
+            open_ways.append(number + 1)
+    return reached
+
+
+def _never(items: Sequence[Item]) -> tuple[Loss, ...]:
+    reached = _reached(items)
+    return tuple(Loss("it is never reached", number) for number in range(len(items)) if number not in reached)
+
+
+def _stepped(items: Sequence[Item], flight: Flight) -> Iterator[Loss]:
+    for number in sorted({part.item for part in flight.parts if isinstance(part, Step)}):
+        row = TABLE[items[number].command]
+        yield Loss(f"{row.name}: {row.how}", number)
+    if flight.rest is not None:
+        jumps = [number for number, item in enumerate(items) if item.command == DO_JUMP and item.params[1]]
+        what = f"flown in files of {MAX_LINES} lines"
+        yield Loss(f"{what}: the jump goes on for so long" if jumps else what, max(jumps) if jumps else None)
+
+
+# The way through it.
+
+
+def _cursor(items: Sequence[Item], version: Version, start: Start, first: int) -> Cursor:
+    """What holds at an item, from all that stand before it in the list."""
+    if not 0 <= first < len(items):
+        raise PlanError("mission", f"it has {len(items)} items", first)
+    pen = Pen(version, start)
+    pen.muted = True
+    for pen.item, item in enumerate(items[:first]):
+        write = TABLE[item.command].write
+        if write is not None:
+            write(pen, item)
+    return Cursor(first, (), pen.settings)
+
+
+class _Endless(Exception):
+    """A jump comes back to itself and nothing has been flown."""
+
+    def __init__(self, item: int) -> None:
+        super().__init__(item)
+        self.item = item
+
+
+def _fly(items: Sequence[Item], version: Version, start: Start, cursor: Cursor) -> Flight:
+    pen = Pen(version, start, cursor.settings)
+    jumps = dict(cursor.jumps)
+    seen: dict[int, int] = {}
+    """Jumps without end, and what had been written when they were taken last."""
+    index = cursor.item
+    if not start.flying and items:
+        _rise(pen, items, index)
+    while index < len(items) and pen.written < MAX_LINES:
+        item, pen.item = items[index], index
+        row = TABLE[item.command]
+        following = index + 1
+        if item.command == DO_JUMP:
+            target, often = int(item.params[0] or 0.0), item.params[1]
+            if often == _ENDLESS:
+                if seen.get(index) == pen.written:
+                    raise _Endless(index)
+                seen[index], following = pen.written, target
+            elif jumps.get(index, 0) < (often or 0.0):
+                jumps[index], following = jumps.get(index, 0) + 1, target
+        else:
+            if row.verdict is Verdict.STEPPED:
+                pen.step()
+            assert row.write is not None, "what is not refused is written"
+            row.write(pen, item)
+        pen.finish()
+        index = len(items) if row.ends else following
+    pen.close()
+    rest = Cursor(index, tuple(sorted(jumps.items())), pen.settings) if index < len(items) else None
+    return Flight(tuple(pen.parts), tuple(pen.notes), rest)
+
+
+def _way_up(items: Sequence[Item], first: int) -> int | None:
+    """The item that says how high to rise from the ground; None: there is nowhere to fly to."""
+    for number in range(first, len(items)):
+        row = TABLE[items[number].command]
+        if items[number].command == common.MAV_CMD_NAV_TAKEOFF or row.place:
+            return number
+        if row.ends:
+            return None
+    return None
+
+
+def _rise(pen: Pen, items: Sequence[Item], first: int) -> None:
+    """From the ground: without an item that takes off, straight up to the height of the first way point."""
+    pen.item = first
+    number = _way_up(items, first)
+    if number is None:
+        raise PlanError("mission", "on the ground it has nowhere to fly to", first)
+    if items[number].command == common.MAV_CMD_NAV_TAKEOFF:
+        if any(TABLE[item.command].moves for item in items[first:number]):
+            pen.say("the drone takes off first")
+        pen.take_off(None)
+        return
+    pen.item = number
+    there = pen.destination(items[number])
+    pen.say(f"no item takes off: the drone rises straight to {there.height:g} m first")
+    pen.item = first
+    pen.take_off(replace(pen.place, height=there.height))

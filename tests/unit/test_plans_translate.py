@@ -1,0 +1,290 @@
+"""From a mission to the drone's files: each line by hand, and the simulated drone's own reader as the referee."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from plan_samples import LAT, LON, action, waypoint
+
+from anafi_mav.errors import PlanError
+from anafi_mav.plans.parrot import Version
+from anafi_mav.plans.plan import DO_JUMP, GLOBAL, RELATIVE, TERRAIN, Item, Loss
+from anafi_mav.plans.translate import MAX_LINES, Fault, FaultKind, Flight, Leg, Start, Step, examine, translate
+from anafi_mav.sim import plan_file
+
+GROUND = Start(LAT, LON, 0.0, flying=False, takeoff_amsl=35.0, heading=30.0)
+AIR = Start(LAT, LON, 10.0, flying=True, takeoff_amsl=35.0, heading=30.0)
+
+VERSIONS: tuple[Version, ...] = (1, 2)
+
+
+def take_off(height: float | None, *place: float, heading: float | None = None) -> Item:
+    latitude, longitude = place or (None, None)
+    return Item(22, RELATIVE, (0.0, 0.0, 0.0, heading, latitude, longitude, height))
+
+
+def lines(flight: Flight, part: int = 0) -> list[str]:
+    """The lines of a file, without what is the same in all: number, current and autocontinue."""
+    leg = flight.parts[part]
+    assert isinstance(leg, Leg)
+    header, *rows = leg.content.decode().splitlines()
+    assert header == "QGC WPL 120"
+    found = []
+    for number, row in enumerate(rows):
+        words = row.split("\t")
+        assert (words[0], words[1], words[11]) == (str(number), "0", "1")
+        found.append(" ".join(words[2:11]))
+    assert len(leg.origins) == len(leg.done) == len(found)
+    return found
+
+
+def test_a_flight_of_version_1() -> None:
+    """0.0001 degrees of longitude are 7.335 m here, of latitude 11.12 m."""
+    items = [take_off(15.0), action(178, 1.0, 4.0, -1.0), waypoint(1, 0, 20.0, 3.0, 2.0, 0.0, 90.0),
+             waypoint(1, 1, 25.0), action(93, 10.0), action(20)]  # fmt: skip
+    flight = translate(items, 1, GROUND)
+    found = lines(flight)
+    # A heading that is not set is towards the way point: east, less half the convergence of the meridians.
+    heading = float(found[5].split()[5])
+    assert heading == pytest.approx(90.0, abs=1e-4)
+    assert found == [
+        "3 22 0.0 0.0 0.0 0.0 0.0 0.0 0.0",
+        f"3 16 0.0 1.0 0.0 30.0 {LAT} {LON} 15.0",
+        "3 178 1.0 4.0 0.0 0.0 0.0 0.0 0.0",
+        f"3 16 0.0 2.0 0.0 90.0 {LAT + 1e-4} {LON} 20.0",
+        "3 93 3.0 0.0 0.0 0.0 0.0 0.0 0.0",
+        f"3 16 0.0 1.0 0.0 {heading} {LAT + 1e-4} {LON + 1e-4} 25.0",
+        "3 93 10.0 0.0 0.0 0.0 0.0 0.0 0.0",
+        "3 20 0.0 0.0 0.0 0.0 0.0 0.0 0.0",
+    ]
+    (leg,) = flight.parts
+    assert isinstance(leg, Leg)
+    assert leg.origins == (0, 0, 1, 2, 2, 3, 4, 5)
+    assert leg.done == ((), (0,), (1,), (), (2,), (3,), (4,), (5,))
+    assert (flight.notes, flight.rest) == ((), None)
+    assert examine(items, 1).approximations == ()
+
+
+def test_a_flight_of_version_2() -> None:
+    items = [take_off(15.0), action(178, 1.0, 4.0, -1.0), waypoint(1, 0, 20.0, 3.0, 2.0, 0.0, 90.0),
+             waypoint(1, 1, 25.0), action(21)]  # fmt: skip
+    assert lines(translate(items, 2, GROUND)) == [
+        "3 22 nan nan nan nan nan nan nan",
+        f"3 16 0.0 1.0 nan nan {LAT} {LON} 15.0",
+        "2 178 1.0 4.0 -1.0 0.0 nan nan nan",
+        f"3 16 0.0 2.0 nan 90.0 {LAT + 1e-4} {LON} 20.0",
+        "2 93 3.0 nan nan nan nan nan nan",
+        f"3 16 0.0 1.0 nan nan {LAT + 1e-4} {LON + 1e-4} 25.0",
+        "3 21 nan nan nan nan nan nan nan",
+    ]
+
+
+def test_a_take_off_at_a_place_goes_up_and_then_over() -> None:
+    found = lines(translate([take_off(15.0, LAT, LON + 1e-4, heading=45.0), action(20)], 2, GROUND))
+    assert found[1:3] == [
+        f"3 16 0.0 1.0 nan 45.0 {LAT} {LON} 15.0",
+        f"3 16 0.0 1.0 nan 45.0 {LAT} {LON + 1e-4} 15.0",
+    ]
+
+
+def test_a_take_off_in_the_air_climbs_and_never_sinks() -> None:
+    assert lines(translate([take_off(15.0), waypoint(1, 0)], 2, AIR))[0] == f"3 16 0.0 1.0 nan nan {LAT} {LON} 15.0"
+    flight = translate([take_off(5.0), waypoint(1, 0)], 2, AIR)
+    assert len(lines(flight)) == 1
+    assert flight.parts[0].done == ((0, 1),)  # nothing was to be done for the take-off
+
+
+def test_without_a_take_off_it_is_put_in_front_and_told() -> None:
+    items = [action(178, 1.0, 4.0), waypoint(1, 0, 20.0)]
+    flight = translate(items, 1, GROUND)
+    assert [line.split()[1] for line in lines(flight)] == ["22", "16", "178", "16"]
+    assert lines(flight)[1] == f"3 16 0.0 1.0 0.0 30.0 {LAT} {LON} 20.0"  # straight up
+    assert flight.parts[0].done == ((), (), (0,), (1,))
+    assert flight.notes == (Loss("no item takes off: the drone rises straight to 20 m first", 1),)
+    assert examine(items, 1).approximations == flight.notes
+    in_the_air = translate(items, 1, AIR)
+    assert [line.split()[1] for line in lines(in_the_air)] == ["178", "16"]
+    assert in_the_air.notes == ()
+
+
+def test_on_the_ground_there_is_nothing_to_land() -> None:
+    assert examine([action(20)], 1).faults == ()
+    assert [line.split()[1] for line in lines(translate([action(20)], 1, AIR))] == ["20"]
+    with pytest.raises(PlanError, match="nowhere to fly to"):
+        translate([action(20)], 1, GROUND)
+
+
+def test_landing_at_a_place_goes_over_it_first() -> None:
+    land = Item(21, RELATIVE, (0.0, 0.0, 0.0, None, LAT, LON, 0.0))
+    assert lines(translate([waypoint(1, 0, 20.0), land], 2, AIR))[1:] == [
+        f"3 16 0.0 1.0 nan nan {LAT} {LON} 20.0",
+        "3 21 nan nan nan nan nan nan nan",
+    ]
+
+
+def test_heights_above_the_sea_count_from_the_take_off_point() -> None:
+    items = [waypoint(1, 0, 60.5, frame=GLOBAL)]
+    assert examine(items, 1).faults == ()
+    assert lines(translate(items, 1, AIR))[0].endswith(" 25.5")
+    with pytest.raises(PlanError, match="that of the take-off point is not known"):
+        translate(items, 1, replace(AIR, takeoff_amsl=None))
+    terrain = examine([waypoint(1, 0, 60.5, frame=TERRAIN)], 1).faults
+    assert [(fault.item, fault.kind) for fault in terrain] == [(0, FaultKind.FRAME)]
+
+
+def test_what_an_item_does_not_say_stays_as_it_is() -> None:
+    here = Item(16, RELATIVE, (5.0, 0.0, 0.0, None, None, None, None))
+    there = Item(16, RELATIVE, (0.0, 0.0, 0.0, None, LAT + 1e-4, LON, None))
+    zeros = Item(16, RELATIVE, (0.0,) * 7)
+    found = lines(translate([waypoint(0, 1, 20.0), here, there, zeros], 2, AIR))
+    places = [line.split()[6:] for line in found if line.split()[1] == "16"]
+    assert places == [
+        [str(LAT), str(LON + 1e-4), "20.0"], [str(LAT), str(LON + 1e-4), "20.0"],
+        [str(LAT + 1e-4), str(LON), "20.0"], [str(LAT + 1e-4), str(LON), "20.0"],
+    ]  # fmt: skip
+
+
+def test_jumps_are_written_out() -> None:
+    items = [waypoint(1, 0), waypoint(2, 0), action(DO_JUMP, 0.0, 2.0), action(20)]
+    flight = translate(items, 1, AIR)
+    (leg,) = flight.parts
+    assert isinstance(leg, Leg)
+    assert leg.origins == (0, 1, 0, 1, 0, 1, 3)
+    assert leg.done == ((0,), (1, 2), (0,), (1, 2), (0,), (1, 2), (3,))
+    assert examine(items, 1).stepped == ()
+
+
+def test_a_jump_without_end_is_flown_file_after_file() -> None:
+    items = [take_off(20.0), waypoint(1, 0), waypoint(2, 0), action(DO_JUMP, 1.0, -1.0), action(20)]
+    report = examine(items, 2)
+    assert report.faults == ()
+    assert report.approximations == (Loss("it is never reached", 4),)
+    assert report.stepped == (Loss(f"flown in files of {MAX_LINES} lines: the jump goes on for so long", 3),)
+    flight = translate(items, 2, AIR)
+    assert [len(lines(flight))] == [MAX_LINES]
+    assert flight.rest is not None
+    again = translate(items, 2, AIR, flight.rest)
+    assert lines(again)[:2] == lines(flight)[1:3]
+    assert again.rest is not None
+
+
+def test_a_loop_in_a_loop_counts_for_the_whole_mission() -> None:
+    """As in PX4 and ArduPilot: the inner jump is used up in the first round of the outer one."""
+    items = [waypoint(1, 0), action(DO_JUMP, 0.0, 2.0), waypoint(2, 0), action(DO_JUMP, 0.0, 1.0)]
+    (leg,) = translate(items, 1, AIR).parts
+    assert isinstance(leg, Leg)
+    assert leg.origins == (0, 0, 0, 2, 0, 2)
+
+
+def test_a_turn_in_place_is_flown_by_the_gateway() -> None:
+    items = [waypoint(1, 0), action(178, 0.0, 3.0), action(115, 90.0, 0.0, 0.0, 0.0), action(189), waypoint(1, 1)]
+    report = examine(items, 1)
+    assert [loss.item for loss in report.stepped] == [2]
+    flight = translate(items, 1, AIR)
+    first, step, last = flight.parts
+    assert isinstance(first, Leg)
+    assert isinstance(last, Leg)
+    assert first.done == ((0,), (1,))
+    assert step == Step(2, (2, 3))
+    assert lines(flight, 2)[0] == "3 178 0.0 3.0 0.0 0.0 0.0 0.0 0.0"  # a new file: what holds is set again
+    assert last.origins == (4, 4)
+    assert last.done == ((), (4,))
+
+
+def test_begin_in_the_middle() -> None:
+    items = [take_off(15.0), action(178, 1.0, 7.0), waypoint(1, 0, 20.0), waypoint(2, 0, 30.0), action(20)]
+    assert [line.split()[1] for line in lines(translate(items, 1, AIR, 3))] == ["178", "16", "20"]
+    flight = translate(items, 1, GROUND, 3)
+    found = lines(flight)
+    assert [line.split()[1] for line in found] == ["22", "178", "16", "16", "20"]
+    assert found[2].endswith(f"{LAT} {LON} 30.0")
+    assert flight.parts[0].origins == (3, 3, 3, 3, 4)
+    assert flight.parts[0].done == ((), (), (), (3,), (4,))
+    with pytest.raises(PlanError, match="it has 5 items"):
+        translate(items, 1, AIR, 5)
+
+
+WRONG = {
+    "unknown": (
+        [waypoint(0, 1), action(3000)],
+        Fault(1, "DO_VTOL_TRANSITION: no flight plan has it", FaultKind.COMMAND),
+    ),
+    "circle": (
+        [Item(18, RELATIVE, (1.0, 0.0, 5.0, 0.0, LAT, LON, 9.0))],
+        Fault(0, "NAV_LOITER_TURNS: The drone flies straight lines: draw the circle as way points.", FaultKind.COMMAND),
+    ),
+    "latitude": (
+        [Item(16, RELATIVE, (0.0, 0.0, 0.0, 0.0, 91.0, LON, 9.0))],
+        Fault(0, "NAV_WAYPOINT: 91 is no latitude", FaultKind.PARAM, 5),
+    ),
+    "longitude": (
+        [Item(16, RELATIVE, (0.0, 0.0, 0.0, 0.0, LAT, None, 9.0))],
+        Fault(0, "NAV_WAYPOINT: it has no longitude", FaultKind.PARAM, 6),
+    ),
+    "infinite": ([waypoint(0, 1, float("inf"))], Fault(0, "inf is no number", FaultKind.PARAM, 7)),
+    "frame": (
+        [waypoint(0, 1, frame=1)],
+        Fault(0, "NAV_WAYPOINT: frame 1 is none of a place on earth", FaultKind.FRAME),
+    ),
+    "waits": (
+        [replace(waypoint(0, 1), autocontinue=False)],
+        Fault(0, "it waits to be continued, which the drone does not", FaultKind.COMMAND),
+    ),
+    "speed": (
+        [waypoint(0, 1), action(178, 1.0, 0.0)],
+        Fault(1, "DO_CHANGE_SPEED: it says a speed of 0 m/s", FaultKind.PARAM, 2),
+    ),
+    "climbing": (
+        [waypoint(0, 1), action(178, 2.0, 1.0)],
+        Fault(1, "DO_CHANGE_SPEED: a flight plan has a speed over ground only, not one for climbing and sinking",
+              FaultKind.PARAM, 1),
+    ),
+    "clock": (
+        [waypoint(0, 1), action(93, -1.0, 12.0, 0.0, 0.0)],
+        Fault(1, "NAV_DELAY: it waits for a time of day, which the drone cannot", FaultKind.PARAM, 1),
+    ),
+    "jump": (
+        [waypoint(0, 1), action(DO_JUMP, 7.0, 1.0)],
+        Fault(1, "it jumps to an item that is not there", FaultKind.PARAM, 1),
+    ),
+    "jumps": ([waypoint(0, 1), action(DO_JUMP, 0.0, -2.0)], Fault(1, "it jumps -2 times", FaultKind.PARAM, 2)),
+    "too many jumps": (
+        [waypoint(0, 1), *[action(DO_JUMP, 0.0, 40000.0)] * 2],
+        Fault(2, "the mission jumps more than 65535 times", FaultKind.PARAM, 2),
+    ),
+    "for ever": (
+        [waypoint(0, 1), action(93, 0.0), action(DO_JUMP, 1.0, -1.0)],
+        Fault(2, "it goes round for ever and flies nowhere", FaultKind.PLAN),
+    ),
+    "after the landing": (
+        [waypoint(0, 1), action(21), action(189)],
+        Fault(2, "item 1 lands, and that ends the plan", FaultKind.PLAN),
+    ),
+    "nothing flies": ([action(178, 1.0, 4.0)], Fault(0, "nothing of the mission flies", FaultKind.PLAN)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize(("items", "fault"), WRONG.values(), ids=WRONG)
+def test_what_is_refused(items: list[Item], fault: Fault, version: Version) -> None:
+    assert examine(items, version).faults == (fault,)
+    with pytest.raises(PlanError):
+        translate(items, version, AIR)
+
+
+def test_an_empty_mission() -> None:
+    assert examine([], 1).faults == ()
+    with pytest.raises(PlanError):
+        translate([], 1, AIR)
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_the_simulated_drone_reads_what_is_written(version: Version) -> None:
+    items = [take_off(15.0), waypoint(1, 0, 20.0, 3.0), waypoint(1, 1e-3, 25.0), action(20)]
+    flight = translate(items, version, GROUND)
+    (leg,) = flight.parts
+    assert isinstance(leg, Leg)
+    read = plan_file.read(leg.content, version)
+    assert [int(item.command) for item in read] == [22, 16, 16, 93, 16, 20]
+    assert read[4].longitude == LON + 1e-7  # a centimetre is not lost
