@@ -230,7 +230,8 @@ class Pen:
         self._put(command, *params, at=at)
 
     def _put(self, command: int, *params: float | None, at: Point | None = None) -> None:
-        one, two, three, four, five, six, seven = (*params, *(None,) * (7 - len(params)))
+        unset: list[float | None] = [None] * (7 - len(params))
+        one, two, three, four, five, six, seven = [*params, *unset]
         values: Params = (one, two, three, four, five, six, seven)
         if at is not None:
             values = (one, two, three, four, at.latitude, at.longitude, at.height)

@@ -209,8 +209,8 @@ _FLIGHT = (
     Row(112, _NEARLY, "Delay: the drone waits where it is, not on the way.", _condition_delay, moves=True),
     Row(115, _STEPPED, "The gateway turns the drone: a flight plan turns on the way only.", _turn, moves=True),
     Row(DO_JUMP, _EXACT, "Written out as often as it jumps; what becomes too long, or has no end, is flown file after "
-        "file by the gateway (stepped). Its count is that of the whole mission: a loop in a loop is flown so often, not "
-        "so often each time, as in PX4 and ArduPilot."),
+        "file by the gateway (stepped). Its count is that of the whole mission: a loop in a loop is flown so often, "
+        "not so often each time, as in PX4 and ArduPilot."),
     Row(178, _NEARLY, "Speed. Other types than air and ground speed, -2 (the default) and differences are refused; a "
         "throttle is left out and said.", _speed),
     Row(189, _EXACT, "Nothing: a mark for aeroplanes that break off a landing.", _nothing),
