@@ -48,6 +48,8 @@ def parse(data: bytes, source: str, version: parrot.Version = 2, height: float |
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise PlanError(source, "it is no text") from error
+    if not text.strip():
+        raise PlanError(source, "it is empty")
     first = text.split("\n", 1)[0].strip()
     if text.lstrip().startswith("{"):
         if lines.is_geojson(text):

@@ -168,7 +168,8 @@ class _Reader:
         place = None if target is None else self._numbers.get(int(target))
         if place is None:
             self.item = number
-            raise _Trouble(f"it jumps to item {target}, which is not there")
+            where = "nowhere" if target is None else f"to doJumpId {target:g}, which is not there"
+            raise _Trouble(f"it jumps {where}")
         two, three, four, five, six, seven = rest
         params: Params = (float(place), two, three, four, five, six, seven)
         return Item(item.command, item.frame, params, item.autocontinue, item.extra)

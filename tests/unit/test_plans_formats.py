@@ -137,7 +137,10 @@ WRONG: dict[str, tuple[Any, str]] = {
     "a param": (encoded(document(simple(1, 16), simple(2, 16, params=["1"] * 7))), "item 1: params: 1 is no number"),
     "its command": (encoded(document(simple(1, 70000))), "item 0: 70000 is no command"),
     "its frame": (encoded(document(simple(1, 16, frame=-1))), "item 0: -1 is no frame"),
-    "a jump": (encoded(document(simple(1, 16), simple(2, 177, 9))), "item 1: it jumps to item 9.0, which is not there"),
+    "a jump": (
+        encoded(document(simple(1, 16), simple(2, 177, 9))),
+        "item 1: it jumps to doJumpId 9, which",
+    ),
     "a survey": (
         encoded(document({"type": "ComplexItem", "complexItemType": "survey", "TransectStyleComplexItem": {}})),
         "item 0: the survey stores no items",
@@ -165,7 +168,7 @@ WRONG: dict[str, tuple[Any, str]] = {
     "too many": (encoded(document(*[simple(1, 16)] * (MAX_ITEMS + 1))), f"more than {MAX_ITEMS} items"),
     "text": (b"hello", "it is no QGroundControl plan, does not begin with QGC WPL"),
     "binary": (bytes(range(256)), "it is no text"),
-    "nothing": (b"", "it is no QGroundControl plan"),
+    "nothing": (b"", "it is empty"),
     "columns": (b"QGC WPL 110\n0\t1\t0\t16\t0\n", "item 0: 5 columns, expected 12"),
     "a command": (b"QGC WPL 110\n0\t1\t0\tx\t0\t0\t0\t0\t0\t0\t0\t1\n", "item 0: 'x' is no command"),
     "a number": (b"QGC WPL 110\n0\t1\t0\t16\tinf\t0\t0\t0\t0\t0\t0\t1\n", "item 0: 'inf' is no number"),

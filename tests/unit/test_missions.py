@@ -1,0 +1,165 @@
+"""The sample missions of `missions/`: through every format and back, and the wrong ones."""
+
+from __future__ import annotations
+
+import json
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from anafi_mav.cli import main
+from anafi_mav.errors import PlanError
+from anafi_mav.plans import files, parrot
+from anafi_mav.plans.files import Format
+from anafi_mav.plans.plan import WAYPOINT, Item, Loss, Plan
+
+MISSIONS = Path(__file__).parents[2] / "missions"
+SAMPLES = sorted(MISSIONS.glob("*.plan"))
+WRONG = MISSIONS / "wrong"
+
+FORMS = (Format.WAYPOINTS, Format.PARROT_1, Format.PARROT_2)
+
+
+def test_there_are_samples_of_each_kind() -> None:
+    names = {path.stem for path in SAMPLES}
+    assert names >= {
+        "survey",
+        "corridor",
+        "structure",
+        "orbit",
+        "inspection",
+        "timelapse",
+        "panorama",
+        "delivery",
+        "loop",
+    }
+    kinds = {block.kind for path in SAMPLES for block in files.load(path).blocks}
+    assert kinds == {"survey", "CorridorScan", "StructureScan"}
+
+
+@pytest.mark.parametrize("path", SAMPLES, ids=lambda path: path.stem)
+def test_a_sample_is_written_as_it_was(path: Path) -> None:
+    data, losses = files.encode(files.load(path), Format.QGC)
+    assert losses == []
+    assert json.loads(data) == json.loads(path.read_bytes())
+
+
+def said(losses: list[Loss], item: int | None) -> str:
+    return "; ".join(loss.what for loss in losses if loss.item == item)
+
+
+def differences(before: Plan, after: Plan) -> set[str]:
+    """What of a plan, apart from its items, is not the same."""
+    pairs = {
+        "home": (before.home, after.home),
+        "fence": ((before.zones, before.breach_return), (after.zones, after.breach_return)),
+        "rally": (before.rally, after.rally),
+        "speeds": ((before.cruise_speed, before.hover_speed), (after.cruise_speed, after.hover_speed)),
+    }
+    return {name for name, (one, two) in pairs.items() if one != two}
+
+
+def same(before: Item, after: Item) -> bool:
+    """Not set, zero and -1 mean the same in a parameter that means nothing; no heading is not north."""
+    nothing = (None, 0.0, -1.0)
+    params = all(
+        one == two or (one in nothing and two in nothing and (before.command, number) != (WAYPOINT, 4))
+        for number, (one, two) in enumerate(zip(before.params, after.params, strict=True), 1)
+    )
+    return params and (before.command, before.autocontinue) == (after.command, after.autocontinue)
+
+
+@pytest.mark.parametrize("form", FORMS, ids=lambda form: form.name)
+@pytest.mark.parametrize("path", SAMPLES, ids=lambda path: path.stem)
+def test_a_sample_there_and_back_differs_as_its_losses_say(path: Path, form: Format) -> None:
+    """Each difference has a loss, and each loss is a difference."""
+    plan = files.load(path)
+    data, losses = files.encode(plan, form)
+    version: parrot.Version = 1 if form is Format.PARROT_1 else 2
+    again = files.parse(data, path.name, version)
+    of_plan = said(losses, None)
+    told = {"home": "home", "fence": "the fence", "rally": "rally point", "speeds": "speeds"}
+    assert differences(plan, again) == {name for name, words in told.items() if words in of_plan}
+    assert again.blocks == ()
+    left = list(again.items)
+    for number, item in enumerate(plan.items):
+        words = said(losses, number)
+        if "none such" in words or "no place" in words:
+            continue
+        kept = left.pop(0)
+        edited = "can no longer be edited" in words
+        assert same(item, kept) is (not words or (edited and words.count(";") == 0)), (number, words, item, kept)
+        assert kept.frame == item.frame or parrot.COMMANDS[version][item.command] < {5, 6, 7}
+    assert left == []
+    assert len([loss for loss in losses if "edited" in loss.what]) == len(plan.blocks)
+    # From there it goes through QGroundControl's format, and back to the same file.
+    through, _ = files.encode(again, Format.QGC)
+    assert files.parse(through, "x").items == again.items
+    assert files.encode(replace(files.parse(through, "x"), home=again.home), form)[0] == data
+
+
+WRONG_FILES = {
+    "cut-off.plan": "no JSON: Input data was truncated",
+    "empty.plan": "it is empty",
+    "packed.plan": "it is no text",
+    "letter.txt": "it is no QGroundControl plan, does not begin with QGC WPL, and is no KML or GeoJSON",
+    "other-json.plan": "it is no QGroundControl plan",
+    "other-version.plan": "the plan is of version 2, not 1",
+    "no-mission.plan": "mission is no object",
+    "items-no-list.plan": "mission.items is no list",
+    "item-no-object.plan": "item 2: an item is no object",
+    "item-type.plan": "item 1: an item of type 'Waypoint'",
+    "six-params.plan": "item 1: 6 params, expected 7",
+    "text-param.plan": "item 1: params: north is no number",
+    "command-number.plan": "item 1: 70000 is no command",
+    "frame-number.plan": "item 1: -1 is no frame",
+    "jump-nowhere.plan": "item 2: it jumps to doJumpId 9, which is not there",
+    "survey-without-items.plan": "item 1: the survey stores no items: save the plan with a newer QGroundControl",
+    "aeroplane-landing.plan": "item 1: items of type 'fwLandingPattern' are not for a multicopter, or not known",
+    "structure-version.plan": "item 1: the structure scan cannot be understood: its version is 2, not 3",
+    "fence-two-corners.plan": "a polygon of the fence has 2 corners",
+    "fence-no-radius.plan": "a circle of the fence has a radius of 0 m",
+    "fence-corner-nowhere.plan": "a corner is no place",
+    "rally-nowhere.plan": "a rally point is no place",
+    "columns.waypoints": "item 1: 11 columns, expected 12",
+    "command.waypoints": "item 1: 'takeoff' is no command",
+    "infinite.waypoints": "item 1: 'inf' is no number",
+    "comma.waypoints": "item 1: '48,8789' is no number",
+    "fence.waypoints": "item 0: the polygon that begins here has not its 4 corners",
+    "header.mavlink": "'QGC WPL one' is not the first line of a plan",
+    "command.mavlink": "item 1: command 530 is none of version 2",
+    "no-line.kml": "it has no lines, expected one",
+    "document-type.kml": "it declares a document type: no KML",
+    "swapped.geojson": "point 1 of its line is no place",
+}
+"""What cannot be read."""
+
+
+@pytest.mark.parametrize("name", WRONG_FILES)
+def test_a_wrong_file_is_one_line(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plan", "show", str(WRONG / name), "--model", "ai", "--height", "20"]) == 1
+    assert capsys.readouterr() == ("", f"anafi-mav: {name}: {WRONG_FILES[name]}\n")
+
+
+@pytest.mark.parametrize("content", [b"\0" * 4096, b"QGC WPL 110\n" + b"0\t1\t" * 4096, b'{"fileType":"Plan",' * 4096])
+def test_a_hundred_megabytes_are_refused_quickly(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "huge.plan"
+    with path.open("wb") as file:
+        for _ in range(100 * 2**20 // len(content) + 1):
+            file.write(content)
+    begun = time.process_time()
+    with pytest.raises(PlanError, match=r"^huge\.plan: it is larger than 16 MiB: no flight plan$"):
+        files.load(path)
+    assert time.process_time() - begun < 1.0
+
+
+def test_what_is_not_converted_leaves_the_old_file(tmp_path: Path) -> None:
+    """Nothing is half-stored: neither the file that was there is touched nor another one left behind."""
+    out = tmp_path / "out.plan"
+    out.write_text("the old one")
+    for name in WRONG_FILES:
+        assert main(["plan", "convert", str(WRONG / name), str(out), "--model", "ai", "--height", "20"]) == 1
+    assert out.read_text() == "the old one"
+    assert list(tmp_path.iterdir()) == [out]
