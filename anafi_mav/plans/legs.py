@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import enum
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NoReturn
 
@@ -53,6 +53,7 @@ ABSOLUTE, LOOK_AT_ROI = 0.0, 2.0
 TIMELAPSE, GPSLAPSE = 0.0, 1.0
 """Of SET_STILL_MODE."""
 
+_SET_ROI, _ROI_PLACE = common.MAV_CMD_DO_SET_ROI, float(common.MAV_ROI_LOCATION)
 _TARGETING = float(common.MAV_MOUNT_MODE_MAVLINK_TARGETING)
 
 
@@ -140,17 +141,25 @@ class Settings:
     """Of SET_VIEW_MODE, where a mission has such items itself."""
     still: tuple[float, float, float] | None = None
     """Of SET_STILL_MODE, where a mission has such items itself: mode, step, format."""
-    photos: Item | None = None
-    """The item that began photos without end."""
-    video: Item | None = None
+    photos: tuple[float, float] | None = None
+    """Photos that are taken without end: mode and step of SET_STILL_MODE."""
+    films: bool = False
 
 
 class Pen:
     """Writes legs; knows where the drone will be."""
 
-    def __init__(self, version: Version, start: Start, settings: Settings | None = None) -> None:
+    def __init__(
+        self, version: Version, start: Start, items: Sequence[Item] = (), settings: Settings | None = None
+    ) -> None:
+        """`items` is the whole mission, whose regions of interest are numbered."""
         self.version = version
         self.settings = settings or Settings()
+        self.films_again = False
+        """The first file begins the photos or the video that the settings have."""
+        self.regions = tuple(item for item in items if item.command == _SET_ROI and item.params[0] == _ROI_PLACE)
+        self.numbers_regions = any(item.command == SET_VIEW_MODE and item.params[0] == LOOK_AT_ROI for item in items)
+        """SET_ROI only numbers them, as in Parrot's version 1."""
         self.place = Point(start.latitude, start.longitude, start.ato)
         """Where the drone is by now; height above take-off."""
         self.heading = start.heading
@@ -165,6 +174,8 @@ class Pen:
         self.written = 0
         """Lines and steps of all parts."""
         self._amsl = start.takeoff_amsl
+        self._mode_wanted: int | None = None
+        """The item that set the camera's mode, until something is photographed."""
         self._waiting: list[int] = []
         self._lines: list[Item] = []
         self._origins: list[int] = []
@@ -255,6 +266,14 @@ class Pen:
             self._put_gimbal(*holds.gimbal)
         if holds.roi is not None:
             self._put_roi(holds.roi)
+        if self.films_again:
+            self.films_again = False
+            if holds.photos is not None:
+                mode, step = holds.photos
+                self.stop_photos()
+                self._many(mode, step, 0.0)
+            elif holds.films:
+                self._put(common.MAV_CMD_VIDEO_START_CAPTURE)
 
     def take_off(self, climb: Point | None) -> None:
         """From the ground; `climb`: at once to there."""
@@ -395,14 +414,77 @@ class Pen:
             return
         if point not in self._rois:
             self._rois.append(point)
-            self._put(common.MAV_CMD_DO_SET_ROI, float(common.MAV_ROI_LOCATION), at=point)
+            self._put(_SET_ROI, _ROI_PLACE, at=point)
         self._put(SET_VIEW_MODE, LOOK_AT_ROI, float(self._rois.index(point)))
 
     # -- photos and video
 
+    def want_mode(self) -> None:
+        """The present item is to set the camera's mode: the next photo or video does."""
+        self.end_modes()
+        self._mode_wanted = self.item
+
+    def end_modes(self) -> None:
+        """Nothing is photographed any more before the mode is set again, or before the end."""
+        if self._mode_wanted is not None:
+            what = "the camera's mode changes only with a photo or video, and none comes after it"
+            self.notes[Loss(what, self._mode_wanted)] = None
+        self._mode_wanted = None
+
     def set_still(self, mode: float, step: float, form: float) -> None:
         """How photos are taken from now on; the line stands before the first that needs it."""
         self.settings = replace(self.settings, still=(mode, step, form))
+
+    def photo(self) -> None:
+        """One."""
+        self._idle("photo")
+        mode, step = (TIMELAPSE, SHORTEST_INTERVAL) if self._still is None else self._still[:2]
+        self._still_mode(mode, step)
+        self._photos(0.0, 1.0)
+
+    def photos_in_time(self, seconds: float, count: float) -> None:
+        """A photo every so often; a count of 0 is without end."""
+        self._many(TIMELAPSE, seconds, count)
+
+    def photos_on_the_way(self, metres: float, count: float) -> None:
+        """A photo every so far."""
+        self._many(GPSLAPSE, metres, count)
+
+    def stop_photos(self) -> None:
+        self.settings = replace(self.settings, photos=None)
+        self.line(common.MAV_CMD_IMAGE_STOP_CAPTURE)
+
+    def film(self) -> None:
+        if self.settings.photos is not None:
+            self.refuse("photos are being taken, and the camera does one of the two", kind=FaultKind.PLAN)
+        self._mode_wanted = None
+        self.line(common.MAV_CMD_VIDEO_START_CAPTURE)
+        self.settings = replace(self.settings, films=True)
+
+    def stop_film(self) -> None:
+        self.settings = replace(self.settings, films=False)
+        self.line(common.MAV_CMD_VIDEO_STOP_CAPTURE)
+
+    def panorama(self, *params: float | None) -> None:
+        self._idle("panorama")
+        self.line(common.MAV_CMD_PANORAMA_CREATE, *params)
+
+    def _idle(self, what: str) -> None:
+        """Refuse what the camera cannot begin now."""
+        if self.settings.films:
+            self.refuse(f"a {what} while the video runs: the camera does one of the two", kind=FaultKind.PLAN)
+        if self.settings.photos is not None:
+            self.refuse(f"a {what} while photos are being taken: end them before", kind=FaultKind.PLAN)
+        self._mode_wanted = None
+
+    def _many(self, mode: float, step: float, count: float) -> None:
+        if self.settings.photos is not None:
+            self.stop_photos()
+        self._idle("photo")
+        self._still_mode(mode, step)
+        self._photos(step if mode == TIMELAPSE else 0.0, count)
+        if count == 0.0:
+            self.settings = replace(self.settings, photos=(mode, step))
 
     def _still_mode(self, mode: float, step: float) -> None:
         form = self.settings.still[2] if self.settings.still else RECTILINEAR
@@ -410,22 +492,6 @@ class Pen:
         if not self.muted and self._still != wanted:
             self.line(SET_STILL_MODE, *wanted)
             self._still = wanted
-
-    def photo(self) -> None:
-        """One."""
-        held = self._still or (TIMELAPSE, SHORTEST_INTERVAL, None)
-        self._still_mode(held[0], held[1])
-        self._photos(0.0, 1.0)
-
-    def photos_in_time(self, seconds: float, count: float) -> None:
-        """A photo every so often; a count of 0 is without end."""
-        self._still_mode(TIMELAPSE, seconds)
-        self._photos(seconds, count)
-
-    def photos_on_the_way(self, metres: float, count: float) -> None:
-        """A photo every so far."""
-        self._still_mode(GPSLAPSE, metres)
-        self._photos(0.0, count)
 
     def _photos(self, interval: float, count: float) -> None:
         sequence = 1.0 if self.version == 2 and count == 1.0 else None

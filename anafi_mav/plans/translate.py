@@ -16,7 +16,8 @@ from anafi_mav.errors import PlanError
 from anafi_mav.plans.legs import Fault, FaultKind, Leg, Pen, Refused, Settings, Start, Step
 from anafi_mav.plans.parrot import Version
 from anafi_mav.plans.plan import DO_JUMP, Item, Loss
-from anafi_mav.plans.rules import TABLE, Row, Verdict
+from anafi_mav.plans.row import Row, Verdict
+from anafi_mav.plans.rules import TABLE
 
 __all__ = [
     "Cursor",
@@ -59,6 +60,8 @@ class Cursor:
     jumps: tuple[tuple[int, int], ...]
     """Item of a jump, and how often it was taken."""
     settings: Settings
+    anew: bool = False
+    """Photos and videos that the settings have are begun."""
 
 
 @dataclass(frozen=True)
@@ -110,7 +113,7 @@ def translate(items: Sequence[Item], version: Version, start: Start, first: int 
 
 def _wrong_items(items: Sequence[Item], version: Version) -> Iterator[Fault]:
     """One fault an item, each by itself and after those before it in the list."""
-    pen = Pen(version, Start(0.0, 0.0, 0.0, flying=True, takeoff_amsl=0.0))
+    pen = Pen(version, Start(0.0, 0.0, 0.0, flying=True, takeoff_amsl=0.0), items)
     pen.muted = True
     for pen.item, item in enumerate(items):
         fault = _wrong_item(pen, item, len(items))
@@ -209,13 +212,13 @@ def _cursor(items: Sequence[Item], version: Version, start: Start, first: int) -
     """What holds at an item, from all that stand before it in the list."""
     if not 0 <= first < len(items):
         raise PlanError("mission", f"it has {len(items)} items", first)
-    pen = Pen(version, start)
+    pen = Pen(version, start, items)
     pen.muted = True
     for pen.item, item in enumerate(items[:first]):
         write = TABLE[item.command].write
         if write is not None:
             write(pen, item)
-    return Cursor(first, (), pen.settings)
+    return Cursor(first, (), pen.settings, anew=True)
 
 
 class _Endless(Exception):
@@ -227,7 +230,8 @@ class _Endless(Exception):
 
 
 def _fly(items: Sequence[Item], version: Version, start: Start, cursor: Cursor) -> Flight:
-    pen = Pen(version, start, cursor.settings)
+    pen = Pen(version, start, items, cursor.settings)
+    pen.films_again = cursor.anew
     jumps = dict(cursor.jumps)
     seen: dict[int, int] = {}
     """Jumps without end, and what had been written when they were taken last."""
@@ -254,6 +258,8 @@ def _fly(items: Sequence[Item], version: Version, start: Start, cursor: Cursor) 
         pen.finish()
         index = len(items) if row.ends else following
     pen.close()
+    if index >= len(items):
+        pen.end_modes()
     rest = Cursor(index, tuple(sorted(jumps.items())), pen.settings) if index < len(items) else None
     return Flight(tuple(pen.parts), tuple(pen.notes), rest)
 

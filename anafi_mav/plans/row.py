@@ -1,0 +1,57 @@
+"""What a row of the table of commands says; the rows are in `rules`."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from pymavlink.dialects.v20 import common
+
+from anafi_mav.plans.legs import Pen
+from anafi_mav.plans.parrot import SET_STILL_MODE, SET_VIEW_MODE
+from anafi_mav.plans.plan import Item
+
+
+class Verdict(enum.Enum):
+    """How a mission's item is flown."""
+
+    EXACT = "as the mission has it"
+    APPROXIMATED = "nearly, and the gateway says what is not"
+    STEPPED = "by the gateway itself, between two files"
+    REFUSED = "not at all: the mission is refused"
+
+
+Write = Callable[[Pen, Item], None]
+
+_NOTHING = frozenset({None, 0.0})
+
+
+@dataclass(frozen=True)
+class Row:
+    """One command."""
+
+    command: int
+    verdict: Verdict
+    how: str
+    """What it becomes, and which values are refused; or why it is."""
+    write: Write | None = None
+    moves: bool = False
+    """It flies, or takes its time."""
+    place: bool = False
+    """It flies to a place, with a height."""
+    ends: bool = False
+    """Nothing comes after it."""
+
+    @property
+    def name(self) -> str:
+        entry = common.enums["MAV_CMD"].get(self.command)
+        known = {SET_VIEW_MODE: "SET_VIEW_MODE", SET_STILL_MODE: "SET_STILL_CAPTURE_MODE"}.get(self.command)
+        return known or (f"command {self.command}" if entry is None else entry.name.removeprefix("MAV_CMD_"))
+
+
+def only(pen: Pen, item: Item, number: int, what: str, allowed: frozenset[float | None] = _NOTHING) -> None:
+    """Refuse the item when a parameter is set to what the drone cannot do."""
+    value = item.params[number - 1]
+    if value not in allowed:
+        pen.refuse(f"{what} ({value:g})", number)
