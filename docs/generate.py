@@ -369,10 +369,59 @@ def states() -> str:
     return "".join(parts)
 
 
+PLAN_TRANSLATION = """\
+# What a mission becomes
+
+<!-- Made by docs/generate.py from the table of anafi_mav/plans/rules.py. -->
+
+A drone flies a file of Parrot's, of version 1 (ANAFI 4K, Thermal, USA) or 2 (Ai). The mission is kept as it was
+uploaded; a translation of it flies.
+
+* **exact**: {exact}.
+* **approximated**: {approximated}.
+* **stepped**: {stepped}. The drone's own plan ends before
+  it and another one begins after it. Where the gateway or the link to the drone fails meanwhile, the drone hovers and
+  does not go on.
+* **refused**: {refused}, with the item and the reason. So is each command that is
+  not in the table.
+
+What holds for all of them:
+
+* Heights count from the take-off, or from mean sea level when the height of the take-off point is known; not from the
+  terrain. A place of 0, 0 or none is where the drone is then, a height that is not set the one that it has.
+* A way point counts as reached within {acceptance:g} m unless it names a radius. A heading that is not set is towards
+  the way point. Holding and loitering is a delay after it.
+* From the ground the drone takes off first, whatever the mission begins with; without an item that takes off it then
+  rises straight to the height of the first way point, which is said.
+* A mission that begins in its middle begins with the speed, region of interest, view and gimbal that the items
+  before have set, and with photos or a video that they have begun and not ended.
+* A file has at most {lines} lines. A longer mission is flown in several files (stepped).
+* An item that does not continue by itself, and one after a landing, are refused. What comes after a return or an
+  endless loop is never reached, which is said.
+* Photos are rectilinear unless SET_STILL_CAPTURE_MODE says otherwise: MAVLink has no word for it.
+
+| command | | how |
+|---|---|---|
+"""
+
+
+def plan_translation() -> str:
+    """docs/plan-translation.md."""
+    from anafi_mav.plans import legs, rules, translate
+    from anafi_mav.plans.row import Verdict
+
+    meanings = {verdict.name.lower(): verdict.value for verdict in Verdict}
+    parts = [PLAN_TRANSLATION.format(**meanings, acceptance=legs.ACCEPTANCE, lines=translate.MAX_LINES)]
+    for row in rules.TABLE.values():
+        parts.append(f"| {row.command} {row.name} | {row.verdict.name.lower()} | {row.how} |\n")
+    return "".join(parts)
+
+
 PAGES: dict[str, Callable[[], str]] = {
     "configuration.md": configuration,
     "dialect.md": dialect,
     "parameters.md": parameters,
+    "plan-translation.md": plan_translation,
     "seed.md": seed,
     "seed-mavlink.md": seed_mavlink,
     "silence.md": silence,

@@ -176,7 +176,8 @@ class Pen:
         self._amsl = start.takeoff_amsl
         self._mode_wanted: int | None = None
         """The item that set the camera's mode, until something is photographed."""
-        self._waiting: list[int] = []
+        self.waiting: list[int] = []
+        """Items that are done with what is written next, for nothing has been."""
         self._lines: list[Item] = []
         self._origins: list[int] = []
         self._done: list[tuple[int, ...]] = []
@@ -205,7 +206,7 @@ class Pen:
         if self._done:
             self._done[-1] += (self.item,)
         elif not self.parts:
-            self._waiting.append(self.item)
+            self.waiting.append(self.item)
         else:
             last = self.parts[-1]
             if isinstance(last, Step):
@@ -219,8 +220,8 @@ class Pen:
             return
         self.close()
         self.written += 1
-        self.parts.append(Step(self.item, tuple(self._waiting)))
-        self._waiting.clear()
+        self.parts.append(Step(self.item, tuple(self.waiting)))
+        self.waiting.clear()
 
     def close(self) -> None:
         """What is flown next is another file."""
@@ -248,8 +249,8 @@ class Pen:
             values = (one, two, three, four, at.latitude, at.longitude, at.height)
         self._lines.append(Item(command, MISSION if at is None else RELATIVE, values))
         self._origins.append(self.item)
-        self._done.append(tuple(self._waiting))
-        self._waiting.clear()
+        self._done.append(tuple(self.waiting))
+        self.waiting.clear()
         self.written += 1
 
     def _open(self) -> None:

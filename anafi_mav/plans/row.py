@@ -16,8 +16,8 @@ from anafi_mav.plans.plan import Item
 class Verdict(enum.Enum):
     """How a mission's item is flown."""
 
-    EXACT = "as the mission has it"
-    APPROXIMATED = "nearly, and the gateway says what is not"
+    EXACT = "as the mission has it; a value that is left out is named in the row, and said at upload"
+    APPROXIMATED = "nearly, which is said at upload"
     STEPPED = "by the gateway itself, between two files"
     REFUSED = "not at all: the mission is refused"
 

@@ -284,18 +284,18 @@ CAMERA = (
     Row(203, _EXACT, "One photo with param5 = 1, nothing with 0. Lens, zoom and focus are refused.", _digicam),
     Row(204, _EXACT, "Nothing, for the gimbal is always aimed by angles; param1 = 1 looks ahead. Other modes are "
         "refused.", _mount_mode),
-    Row(205, _NEARLY, "Gimbal. Version 1 refuses roll and yaw. Angles beyond -90 to 90 deg (Ai: -116 to 176) and "
+    Row(205, _EXACT, "Gimbal. Version 1 refuses roll and yaw. Angles beyond -90 to 90 deg (Ai: -116 to 176) and "
         "modes 3 to 6 are refused; param7 = 0 aims too, which is said.", _mount),
     Row(206, _NEARLY, "Photos by distance (GPS lapse), which begin with one: said if param3 is 0. With 0 m they end, "
         "and param3 = 1 then takes one more. Less than 1 m is refused; a shutter time is left out and said. "
         f"{_ONE_CAMERA}", _trigger_distance),
-    Row(214, _NEARLY, "Photos by time, which begin with one. Less than 2000 ms is refused; a shutter time is left out "
+    Row(214, _EXACT, "Photos by time, which begin with one. Less than 2000 ms is refused; a shutter time is left out "
         f"and said. {_ONE_CAMERA}", _trigger_interval),
     Row(530, _NEARLY, "Nothing: photos and videos of a plan set the mode themselves; it is said where none comes after "
         f"it. {_ONE_CAMERA}", _camera_mode),
     Row(531, _STEPPED, "The gateway zooms: a flight plan cannot. Other types than a range (2) are refused. "
         f"{_ONE_CAMERA}", _zoom, moves=True),
-    Row(1000, _NEARLY, "Gimbal. Speeds, a yaw from north and, in version 1, any yaw are refused; putting it away looks "
+    Row(1000, _EXACT, "Gimbal. Speeds, a yaw from north and, in version 1, any yaw are refused; putting it away looks "
         f"ahead, which is said. {_ONE_GIMBAL}", _pitch_yaw),
     Row(1001, _EXACT, f"Nothing: the flight plan aims the gimbal itself. {_ONE_GIMBAL}", _gimbal_owner),
     Row(2000, _EXACT, "Photos, with the still mode before them: one (param3 = 1), or every param2 s. Less than 2 s is "

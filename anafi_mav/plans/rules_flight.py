@@ -143,7 +143,7 @@ def _nothing(pen: Pen, item: Item) -> None:
 _EXACT, _NEARLY, _STEPPED, _REFUSED = Verdict.EXACT, Verdict.APPROXIMATED, Verdict.STEPPED, Verdict.REFUSED
 
 FLIGHT = (
-    Row(WAYPOINT, _NEARLY, "Way point, and a delay of param1 s. A param3 is left out and said: it is flown over.",
+    Row(WAYPOINT, _EXACT, "Way point, and a delay of param1 s. A param3 is left out and said: it is flown over.",
         _waypoint, moves=True, place=True),
     Row(17, _EXACT, "Way point, with which the plan ends: the drone hovers there.", _loiter, moves=True, place=True,
         ends=True),
@@ -151,10 +151,10 @@ FLIGHT = (
     Row(19, _EXACT, "Way point, and a delay of param1 s. A multicopter needs no radius to wait.", _loiter_time,
         moves=True, place=True),
     Row(20, _EXACT, "Return, with which the plan ends.", _return, moves=True, ends=True),
-    Row(21, _NEARLY, "Way point over its place at the height that the drone has there, if it names one, and landing, "
+    Row(21, _EXACT, "Way point over its place at the height that the drone has there, if it names one, and landing, "
         "with which the plan ends. param2 = 2 is refused, 1 is left out and said; so is a heading without a place.",
         _land, moves=True, ends=True),
-    Row(22, _NEARLY, "Take-off (nothing when it flies already), way point straight above at its height, and one at its "
+    Row(22, _EXACT, "Take-off (nothing when it flies already), way point straight above at its height, and one at its "
         "place if it names another. Without a height the drone rises as it does by itself, which is said.", _take_off,
         moves=True),
     Row(31, _EXACT, "Way point.", _loiter_to_height, moves=True, place=True),
@@ -164,7 +164,7 @@ FLIGHT = (
     Row(DO_JUMP, _EXACT, "Written out as often as it jumps; what becomes too long, or has no end, is flown file after "
         "file by the gateway (stepped). Its count is that of the whole mission: a loop in a loop is flown so often, "
         "not so often each time, as in PX4 and ArduPilot."),
-    Row(178, _NEARLY, "Speed. Other types than air and ground speed, -2 (the default) and differences are refused; a "
+    Row(178, _EXACT, "Speed. Other types than air and ground speed, -2 (the default) and differences are refused; a "
         "throttle is left out and said.", _speed),
     Row(189, _EXACT, "Nothing: a mark for aeroplanes that break off a landing.", _nothing),
 )  # fmt: skip

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 
 from pymavlink.dialects.v20 import common
 
@@ -69,10 +70,13 @@ class Flight:
     """What is flown."""
 
     parts: tuple[Leg | Step, ...]
+    """Empty when nothing is to be done, such as a take-off in the air."""
     notes: tuple[Loss, ...]
     """What is not as the mission has it."""
     rest: Cursor | None
     """How it goes on when the parts have been flown: `translate` it with what is known then. None: it is over."""
+    done: tuple[int, ...] = ()
+    """The items that are done before anything is flown; only where there are no parts, which else tell it."""
 
 
 def examine(items: Sequence[Item], version: Version) -> Report:
@@ -87,9 +91,15 @@ def examine(items: Sequence[Item], version: Version) -> Report:
     start = Start(latitude, longitude, 0.0, flying=_way_up(items, 0) is None, takeoff_amsl=0.0)
     try:
         flight = _fly(items, version, start, Cursor(0, (), Settings()))
-    except _Endless as error:
-        return Report((Fault(error.item, "it goes round for ever and flies nowhere", FaultKind.PLAN),), (), ())
-    return Report((), flight.notes + _never(items), tuple(_stepped(items, flight)))
+    except Refused as error:  # by what came before it on the way, which is not what stands before it
+        return Report((error.fault,), (), ())
+    flown = _reached(items) if flight.rest else {*flight.done, *chain(*map(_done, flight.parts))}
+    never = tuple(Loss("it is never reached", number) for number in range(len(items)) if number not in flown)
+    return Report((), flight.notes + never, tuple(_stepped(items, flight)))
+
+
+def _done(part: Leg | Step) -> Iterator[int]:
+    return chain(*part.done) if isinstance(part, Leg) else iter(part.done)
 
 
 def translate(items: Sequence[Item], version: Version, start: Start, first: int | Cursor = 0) -> Flight:
@@ -104,8 +114,8 @@ def translate(items: Sequence[Item], version: Version, start: Start, first: int 
     cursor = first if isinstance(first, Cursor) else _cursor(items, version, start, first)
     try:
         return _fly(items, version, start, cursor)
-    except _Endless as error:
-        raise PlanError("mission", "it goes round for ever and flies nowhere", error.item) from None
+    except Refused as error:
+        raise PlanError("mission", error.fault.reason, error.fault.item) from None
 
 
 # What is wrong with it.
@@ -133,12 +143,20 @@ def _wrong_item(pen: Pen, item: Item, count: int) -> Fault | None:
         return Fault(pen.item, "it waits to be continued, which the drone does not", FaultKind.COMMAND)
     if item.command == DO_JUMP:
         return _wrong_jump(pen.item, item, count)
+    try:
+        _write(pen, item)
+    except Refused as error:
+        return error.fault
+    return None
+
+
+def _write(pen: Pen, item: Item) -> None:
+    row = TABLE[item.command]
     assert row.write is not None, "what is not refused is written"
     try:
         row.write(pen, item)
     except Refused as error:
-        return replace(error.fault, reason=f"{row.name}: {error.fault.reason}")
-    return None
+        raise Refused(replace(error.fault, reason=f"{row.name}: {error.fault.reason}")) from None
 
 
 def _wrong_jump(number: int, item: Item, count: int) -> Fault | None:
@@ -172,7 +190,7 @@ def _wrong_ways(items: Sequence[Item]) -> list[Fault]:
 
 
 def _reached(items: Sequence[Item]) -> set[int]:
-    """The items that are ever flown."""
+    """The items that could ever be flown; a count that is used up may keep some from it."""
     reached: set[int] = set()
     open_ways = [0]
     while open_ways:
@@ -188,11 +206,6 @@ def _reached(items: Sequence[Item]) -> set[int]:
         if not TABLE[item.command].ends:
             open_ways.append(number + 1)
     return reached
-
-
-def _never(items: Sequence[Item]) -> tuple[Loss, ...]:
-    reached = _reached(items)
-    return tuple(Loss("it is never reached", number) for number in range(len(items)) if number not in reached)
 
 
 def _stepped(items: Sequence[Item], flight: Flight) -> Iterator[Loss]:
@@ -215,18 +228,9 @@ def _cursor(items: Sequence[Item], version: Version, start: Start, first: int) -
     pen = Pen(version, start, items)
     pen.muted = True
     for pen.item, item in enumerate(items[:first]):
-        write = TABLE[item.command].write
-        if write is not None:
-            write(pen, item)
+        if item.command != DO_JUMP:
+            _write(pen, item)
     return Cursor(first, (), pen.settings, anew=True)
-
-
-class _Endless(Exception):
-    """A jump comes back to itself and nothing has been flown."""
-
-    def __init__(self, item: int) -> None:
-        super().__init__(item)
-        self.item = item
 
 
 def _fly(items: Sequence[Item], version: Version, start: Start, cursor: Cursor) -> Flight:
@@ -246,22 +250,21 @@ def _fly(items: Sequence[Item], version: Version, start: Start, cursor: Cursor) 
             target, often = int(item.params[0] or 0.0), item.params[1]
             if often == _ENDLESS:
                 if seen.get(index) == pen.written:
-                    raise _Endless(index)
+                    pen.refuse("it goes round for ever and flies nowhere", kind=FaultKind.PLAN)
                 seen[index], following = pen.written, target
             elif jumps.get(index, 0) < (often or 0.0):
                 jumps[index], following = jumps.get(index, 0) + 1, target
         else:
             if row.verdict is Verdict.STEPPED:
                 pen.step()
-            assert row.write is not None, "what is not refused is written"
-            row.write(pen, item)
+            _write(pen, item)
         pen.finish()
         index = len(items) if row.ends else following
     pen.close()
     if index >= len(items):
         pen.end_modes()
     rest = Cursor(index, tuple(sorted(jumps.items())), pen.settings) if index < len(items) else None
-    return Flight(tuple(pen.parts), tuple(pen.notes), rest)
+    return Flight(tuple(pen.parts), tuple(pen.notes), rest, () if pen.parts else tuple(pen.waiting))
 
 
 def _way_up(items: Sequence[Item], first: int) -> int | None:

@@ -8,6 +8,7 @@ them so. 120 in the first line is Parrot's, see `parrot`.
 from __future__ import annotations
 
 import math
+from decimal import Decimal
 
 from pymavlink.dialects.v20 import common
 
@@ -64,10 +65,16 @@ def text_of(header: str, items: list[Item], current: int | None = 0) -> bytes:
     """A file of these items; `current` is the one that is marked."""
     lines = [header]
     for number, item in enumerate(items):
-        numbers = ["nan" if value is None else repr(float(value)) for value in item.params]
+        numbers = ["nan" if value is None else _decimal(value) for value in item.params]
         words = [number, int(number == current), item.frame, item.command, *numbers, int(item.autocontinue)]
         lines.append("\t".join(map(str, words)))
     return ("\n".join(lines) + "\n").encode()
+
+
+def _decimal(value: float) -> str:
+    """All digits that make the same number again, and no exponent: not every reader knows them."""
+    text = repr(float(value))
+    return format(Decimal(text), "f") if "e" in text else text
 
 
 def read(text: str, source: str) -> Plan:

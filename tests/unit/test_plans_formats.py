@@ -274,6 +274,12 @@ def test_parrots_file_as_the_simulated_drone_reads_it(version: parrot.Version) -
         assert math.isnan(items[0].p4)
 
 
+def test_numbers_have_all_digits_and_no_exponent() -> None:
+    """Readers that take `%f` only would stop at an e; six decimals of a degree are 0.11 m."""
+    data, _ = parrot.write(Plan((Item(16, RELATIVE, (0.0, 0.0, 0.0, 0.0, 48.878900123, -1.25e-05, 1e16)),)), 1)
+    assert data.split(b"\t")[8:11] == [b"48.878900123", b"-0.0000125", b"10000000000000000"]
+
+
 def test_formats_of_photos_in_version_1() -> None:
     """There they stand with IMAGE_START_CAPTURE; MAVLink has no word for them, Parrot's version 2 has a command."""
     lines = [

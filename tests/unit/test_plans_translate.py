@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from itertools import chain
+from random import Random
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from plan_samples import LAT, LON, action, waypoint
 
 from anafi_mav.errors import PlanError
 from anafi_mav.plans.parrot import Version
 from anafi_mav.plans.plan import DO_JUMP, GLOBAL, RELATIVE, TERRAIN, Item, Loss
+from anafi_mav.plans.row import Verdict
+from anafi_mav.plans.rules import TABLE
 from anafi_mav.plans.translate import MAX_LINES, Fault, FaultKind, Flight, Leg, Start, Step, examine, translate
 from anafi_mav.sim import plan_file
 
@@ -93,6 +100,11 @@ def test_a_take_off_in_the_air_climbs_and_never_sinks() -> None:
     flight = translate([take_off(5.0), waypoint(1, 0)], 2, AIR)
     assert len(lines(flight)) == 1
     assert flight.parts[0].done == ((0, 1),)  # nothing was to be done for the take-off
+
+
+def test_in_the_air_a_take_off_alone_is_nothing_to_do() -> None:
+    flight = translate([take_off(5.0)], 2, AIR)
+    assert (flight.parts, flight.done, flight.rest) == ((), (0,), None)
 
 
 def test_without_a_take_off_it_is_put_in_front_and_told() -> None:
@@ -288,3 +300,102 @@ def test_the_simulated_drone_reads_what_is_written(version: Version) -> None:
     read = plan_file.read(leg.content, version)
     assert [int(item.command) for item in read] == [22, 16, 16, 93, 16, 20]
     assert read[4].longitude == LON + 1e-7  # a centimetre is not lost
+
+
+QGROUNDCONTROL = (16, 17, 19, 20, 21, 22, 31, 93, 115, 4501, 177, 178, 179, 183, 187, 189, 195, 196, 197, 203, 204, 205,
+                  206, 211, 530, 2000, 2001, 2500, 2501, 1000)  # fmt: skip
+"""What it may put into a plan for a multicopter (PX4FirmwarePlugin.cc), and the gimbal of its surveys."""
+
+PARROT = (16, 20, 21, 22, 93, 112, 178, 195, 197, 201, 205, 206, 214, 2000, 2001, 2500, 2501, 2800, 50000, 50001)
+"""Its flight plan page."""
+
+
+def test_the_table_knows_what_is_put_into_plans() -> None:
+    assert set(QGROUNDCONTROL) | set(PARROT) | {531, 1001} <= set(TABLE)
+    assert all(TABLE[command].verdict is not Verdict.REFUSED for command in PARROT)
+    for row in TABLE.values():
+        assert row.how.endswith(".")
+        assert row.write is not None or row.verdict is Verdict.REFUSED or row.command == DO_JUMP
+
+
+@pytest.mark.parametrize("command", [row.command for row in TABLE.values() if row.verdict is Verdict.REFUSED])
+def test_what_the_table_refuses_is_refused(command: int) -> None:
+    (fault,) = examine([waypoint(0, 1), action(command)], 2).faults
+    assert (fault.item, fault.kind) == (1, FaultKind.COMMAND)
+    assert TABLE[command].how in fault.reason
+
+
+def mission(seed: int) -> list[Item]:
+    """A mission as people make them, always the same of the same number; now and then one that cannot be flown."""
+    random = Random(seed)
+    size = random.randint(1, 14)
+
+    def place(frame: int = RELATIVE, height: float = 20.0) -> tuple[int, float, float, float]:
+        return frame, LAT + random.uniform(-1e-3, 1e-3), LON + random.uniform(-1e-3, 1e-3), height
+
+    def nav(command: int, one: float) -> Item:
+        frame, *where = place(random.choice([RELATIVE, GLOBAL, 5, 6]), random.uniform(40.0, 60.0))
+        heading = random.choice([None, 0.0, 123.0])
+        return Item(command, frame, (one, random.choice([0.0, 2.0, None]), 0.0, heading, where[0], where[1], where[2]))
+
+    makers: list[Callable[[], Item]] = [
+        lambda: nav(16, random.choice([0.0, 2.5])), lambda: nav(19, 4.0), lambda: nav(31, 0.0), lambda: nav(22, 0.0),
+        lambda: action(20), lambda: nav(21, 0.0), lambda: action(93, 3.0), lambda: action(112, 2.0),
+        lambda: action(115, 90.0, 0.0, 1.0, random.choice([0.0, 1.0])), lambda: action(531, 2.0, 40.0),
+        lambda: action(178, 1.0, random.uniform(1.0, 10.0), -1.0), lambda: nav(195, 0.0), lambda: action(197),
+        lambda: action(196, 0.0, 0.0, 0.0, 0.0, -10.0, 0.0, 90.0), lambda: action(205, random.uniform(-90.0, 0.0)),
+        lambda: action(206, random.choice([0.0, 15.0]), 0.0, 1.0), lambda: action(214, 2500.0),
+        lambda: action(530, 0.0, 1.0),
+        lambda: action(1000, -45.0, 0.0), lambda: action(1001, -2.0), lambda: action(2000, 0.0, 0.0, 1.0),
+        lambda: action(2000, 0.0, 3.0, random.choice([0.0, 5.0])), lambda: action(2001), lambda: action(2500),
+        lambda: action(2501), lambda: action(2800, 360.0), lambda: action(189), lambda: action(50001, 1.0, 9.0, 13.0),
+        lambda: action(DO_JUMP, float(random.randrange(size)), float(random.randrange(-1, 4))),
+    ]  # fmt: skip
+    return [random.choice(makers)() for _ in range(size)]
+
+
+@settings(max_examples=120, deadline=None)
+@given(st.integers(0, 2**32), st.sampled_from(VERSIONS), st.booleans())
+def test_any_mission_is_refused_or_flown_whole(seed: int, version: Version, flying: bool) -> None:
+    """What cannot be flown is left out until the rest can; then each item that is reached is done, in its order."""
+    items = mission(seed)
+    report = examine(items, version)
+    while report.faults:
+        assert all(0 <= fault.item < len(items) for fault in report.faults)
+        items.pop(report.faults[0].item)
+        items = [item for item in items if item.command != DO_JUMP or (item.params[0] or 0.0) < len(items)]
+        report = examine(items, version)
+    if not items or not any(item.command in (16, 19, 22, 31) for item in items):
+        return
+    start = replace(AIR if flying or items[0].command in (20, 21) else GROUND, takeoff_amsl=30.0)
+    try:
+        flight = translate(items, version, start)
+    except PlanError as error:  # a return or a landing before all that flies
+        assert (start.flying, error.problem) == (False, "on the ground it has nowhere to fly to")  # noqa: PT017
+        return
+    done = [item for part in flight.parts for item in chain(*part.done if isinstance(part, Leg) else [part.done])]
+    assert bool(flight.parts) is not bool(flight.done)
+    done += flight.done
+    never = {loss.item for loss in report.approximations if loss.what == "it is never reached"}
+    assert not never & set(done)
+    if flight.rest is None:
+        assert never | set(done) == set(range(len(items)))
+    if not any(item.command == DO_JUMP for item in items):
+        assert done == sorted(done)
+        assert len(set(done)) == len(done)
+        assert {part.item for part in flight.parts if isinstance(part, Step)} == {loss.item for loss in report.stepped}
+    for part in flight.parts:
+        if isinstance(part, Leg):
+            read = plan_file.read(part.content, version)
+            assert len(read) == len(part.origins) == len(part.done)
+    commands = [
+        item.command for part in flight.parts if isinstance(part, Leg) for item in plan_file.read(part.content, version)
+    ]
+    assert commands.count(plan_file.Command.TAKEOFF) == (not start.flying)
+    assert start.flying or commands[0] is plan_file.Command.TAKEOFF
+
+
+def test_the_missions_of_the_property_test_are_flown_often_enough() -> None:
+    """Else it would show nothing."""
+    flown = [seed for seed in range(300) if not examine(mission(seed), 1).faults]
+    assert len(flown) > 30

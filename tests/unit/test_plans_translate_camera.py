@@ -275,6 +275,15 @@ def test_what_is_refused(items: list[Item], reason: str, kind: FaultKind, param:
         translate([GO, *items], version, AIR)
 
 
+def test_what_only_a_jump_brings_together_is_refused_too() -> None:
+    """The video is begun a second time with photos being taken, which the list does not show."""
+    items = [GO, action(2500), waypoint(2, 0), action(2501), action(206, 10.0), action(177, 1.0, 1.0)]
+    (fault,) = examine(items, 1).faults
+    assert (fault.item, fault.kind) == (1, FaultKind.PLAN)
+    with pytest.raises(PlanError, match="photos are being taken"):
+        translate(items, 1, AIR)
+
+
 def test_the_versions_differ_in_what_the_gimbal_can() -> None:
     tilted = [GO, action(205, 100.0)]
     turned = [GO, action(205, 0.0, 0.0, 20.0)]
