@@ -3,28 +3,32 @@
 from __future__ import annotations
 
 import argparse
+import importlib
+import logging
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
-from anafi_mav.cli import plan_files
+from anafi_mav.cli import plan_options
 
 
 class Action(NamedTuple):
-    """One thing to do with a plan."""
+    """One thing to do with a plan: the function of its name in a module of this folder."""
 
     purpose: str
     add_arguments: Callable[[argparse.ArgumentParser], None]
-    run: Callable[[argparse.Namespace], int]
+    module: str
 
 
 ACTIONS = {
-    "show": Action("print a plan as a table", plan_files.show_arguments, plan_files.show),
+    "show": Action("print a plan as a table", plan_options.show_arguments, "plan_files"),
     "convert": Action(
-        "write a plan in another format and tell what that cannot hold",
-        plan_files.convert_arguments,
-        plan_files.convert,
+        "write a plan in another format and tell what that cannot hold", plan_options.convert_arguments, "plan_files"
     ),
-    "plot": Action("draw a plan: a map, and its heights", plan_files.plot_arguments, plan_files.plot),
+    "plot": Action("draw a plan: a map, and its heights", plan_options.plot_arguments, "plan_files"),
+    "upload": Action("hand a plan to a vehicle", plan_options.upload_arguments, "plan_link"),
+    "download": Action(
+        "fetch mission, fence and rally points of a vehicle", plan_options.download_arguments, "plan_link"
+    ),
 }
 
 
@@ -38,4 +42,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Do it. Raises `PlanError` for a plan that is none, `ConfigError` for a wrong option."""
-    return ACTIONS[arguments.action].run(arguments)
+    logging.basicConfig(level=logging.ERROR)  # how an endpoint fares is told when it matters
+    module = importlib.import_module(f"anafi_mav.cli.{ACTIONS[arguments.action].module}")
+    return cast(Callable[[argparse.Namespace], int], getattr(module, arguments.action))(arguments)

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import sys
+from collections.abc import Callable, Iterator
 from typing import TextIO
 
 from rich.console import Console
+from rich.progress import Progress
 from rich.text import Text
 
 
@@ -18,6 +20,17 @@ def say(line: str, style: str = "") -> None:
 def complain(line: str, style: str = "red") -> None:
     """A line on stderr, with the program's name before it."""
     _write(sys.stderr, f"anafi-mav: {' '.join(line.split())}", style)
+
+
+@contextlib.contextmanager
+def progress(what: str, total: int | None) -> Iterator[Callable[[int, int], None]]:
+    """A bar while something is carried: call what it gives with how much of how much. On a terminal only."""
+    if not sys.stdout.isatty():
+        yield lambda done, of: None
+        return
+    with Progress(console=Console(file=sys.stdout), transient=True) as bar:
+        task = bar.add_task(what, total=total)
+        yield lambda done, of: bar.update(task, completed=done, total=of or None)
 
 
 def _write(stream: TextIO, line: str, style: str) -> None:

@@ -89,6 +89,11 @@ def zones_of(items: Sequence[Item], source: str) -> tuple[tuple[Polygon | Circle
     return tuple(zones), back
 
 
+def points_of(items: Sequence[Item], source: str) -> tuple[Point, ...]:
+    """The rally points that items describe. Raises `PlanError`."""
+    return tuple(Point(*_place(number, item, source), item.params[6] or 0.0) for number, item in enumerate(items))
+
+
 def _place(number: int, item: Item, source: str) -> tuple[float, float]:
     latitude, longitude = item.params[4:6]
     if latitude is None or longitude is None:

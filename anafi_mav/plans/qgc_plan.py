@@ -259,11 +259,11 @@ def write(plan: Plan) -> tuple[bytes, list[Loss]]:
     if plan.home is None:
         # QGroundControl wants one; a plan begins where its first place is.
         mission["plannedHomePosition"] = [*_first_place(plan.items), 0.0]
-        losses.append(Loss("there is no planned home; written as where the first place is, at sea level"))
+        losses.append(Loss("that there is no planned home: written as where the first place is, at sea level"))
     mission["cruiseSpeed"] = 15.0 if plan.cruise_speed is None else plan.cruise_speed
     mission["hoverSpeed"] = 5.0 if plan.hover_speed is None else plan.hover_speed
     if plan.hover_speed is None or plan.cruise_speed is None:
-        losses.append(Loss("no speeds are assumed; written as QGroundControl's 15 and 5 m/s"))
+        losses.append(Loss("that no speeds are assumed: written as QGroundControl's 15 and 5 m/s"))
     document = {
         "groundStation": "anafi-mav",
         **editor["file"],

@@ -13,7 +13,7 @@ from decimal import Decimal
 from pymavlink.dialects.v20 import common
 
 from anafi_mav.errors import PlanError
-from anafi_mav.plans.lists import fence_items, rally_items, zones_of
+from anafi_mav.plans.lists import fence_items, points_of, rally_items, zones_of
 from anafi_mav.plans.plan import GLOBAL, MAX_ITEMS, WAYPOINT, Item, Loss, Params, Plan, Point, shifted
 
 HEADER = "QGC WPL 110"
@@ -84,7 +84,7 @@ def read(text: str, source: str) -> Plan:
         zones, back = zones_of(items, source)
         return Plan(zones=zones, breach_return=back)
     if items and all(item.command in _RALLY for item in items):
-        return Plan(rally=tuple(_place(number, item, source) for number, item in enumerate(items)))
+        return Plan(rally=points_of(items, source))
     if not items or items[0].command != WAYPOINT:
         return Plan(tuple(items))
     first, *rest = items
@@ -93,13 +93,6 @@ def read(text: str, source: str) -> Plan:
     if latitude is not None and longitude is not None and (latitude, longitude) != (0.0, 0.0):
         home = Point(latitude, longitude, height or 0.0)
     return Plan(tuple(shifted(item, -1) for item in rest), home)
-
-
-def _place(number: int, item: Item, source: str) -> Point:
-    latitude, longitude, height = item.params[4:]
-    if latitude is None or longitude is None:
-        raise PlanError(source, "it has no place", number)
-    return Point(latitude, longitude, height or 0.0)
 
 
 def write(plan: Plan) -> tuple[bytes, list[Loss]]:

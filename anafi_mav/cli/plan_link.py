@@ -1,0 +1,213 @@
+"""`anafi-mav plan upload|download`: plans to and from any MAVLink vehicle."""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import contextlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from anafi_mav.cli import plan_files, plan_options
+from anafi_mav.cli.ground import Ground, Texts, connected
+from anafi_mav.cli.terminal import progress, say
+from anafi_mav.errors import AnafiMavError, PlanError
+from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.node import Inbound
+from anafi_mav.mavlink.plan_client import Download, Outcome, Upload
+from anafi_mav.plans import table
+from anafi_mav.plans.lists import fence_items, points_of, rally_items, zones_of
+from anafi_mav.plans.plan import GLOBAL, WAYPOINT, Item, Plan, Point, shifted
+from anafi_mav.services.mission_items import from_wire, to_wire
+from anafi_mav.services.plan_items import Fault, PlanItem, item_int, item_of
+
+MISSION, FENCE, RALLY = (
+    dialect.MAV_MISSION_TYPE_MISSION,
+    dialect.MAV_MISSION_TYPE_FENCE,
+    dialect.MAV_MISSION_TYPE_RALLY,
+)
+NAMES = {MISSION: "mission", FENCE: "fence", RALLY: "rally points"}
+
+
+class Refused(AnafiMavError):
+    """The vehicle did not take a list, or did not give it."""
+
+
+@dataclass(frozen=True)
+class Lists:
+    """A plan as the lists that a vehicle keeps."""
+
+    mission: tuple[Item, ...]
+    home: Point | None
+    fence: tuple[Item, ...]
+    rally: tuple[Item, ...]
+
+    @classmethod
+    def of(cls, plan: Plan) -> Lists:
+        return cls(plan.items, plan.home, tuple(fence_items(plan)), tuple(rally_items(plan)))
+
+    def wire(self, kind: int, source: str, *, with_home: bool) -> list[PlanItem]:
+        """One of them as messages carry it; with home as item 0 as an ArduPilot wants it. Raises `PlanError`."""
+        items = {MISSION: self.mission, FENCE: self.fence, RALLY: self.rally}[kind]
+        carried = []
+        for number, item in enumerate(items):
+            try:
+                mine = _without_none(shifted(item, int(kind == MISSION))) if with_home else item
+                carried.append(to_wire(mine))
+            except ValueError as error:
+                raise PlanError(source, str(error), number) from error
+        if with_home and kind == MISSION and items:
+            home = self.home or Point(0.0, 0.0)
+            carried.insert(
+                0, to_wire(Item(WAYPOINT, GLOBAL, (0.0, 0.0, 0.0, 0.0, home.latitude, home.longitude, home.height)))
+            )
+        return carried
+
+
+_HEADED = (dialect.MAV_CMD_NAV_WAYPOINT, dialect.MAV_CMD_NAV_TAKEOFF, dialect.MAV_CMD_NAV_LAND)
+
+
+def _without_none(item: Item) -> Item:
+    """ArduPilot has no word for "not set" but 0, and refuses NaN (AP_Mission.cpp sanity_check_params)."""
+    one, two, three, four, five, six, seven = (0.0 if value is None else value for value in item.params)
+    return replace(item, params=(one, two, three, four, five, six, seven))
+
+
+def _without_heading(item: Item) -> Item:
+    """Its 0 is no heading north: it knows none in a waypoint, a take-off or a landing."""
+    one, two, three, four, *place = item.params
+    if item.command not in _HEADED or four != 0.0:
+        return item
+    five, six, seven = place
+    return replace(item, params=(one, two, three, None, five, six, seven))
+
+
+def upload(arguments: argparse.Namespace) -> int:
+    """Hand it over. Raises `Refused` with the vehicle's reason."""
+    sysid, plan = plan_options.sysid_of(arguments), plan_options.load(arguments)
+    asyncio.run(_upload(arguments, sysid, plan))
+    return 0
+
+
+async def _upload(arguments: argparse.Namespace, sysid: int | None, plan: Plan) -> None:
+    async with connected(arguments.endpoint, sysid) as ground:
+        await give(ground, plan, arguments.file.name)
+
+
+async def give(ground: Ground, plan: Plan, source: str) -> None:
+    """Upload the lists that a plan has; others stay as the vehicle has them. Raises `Refused` and `PlanError`."""
+    lists = Lists.of(plan)
+    parts = {kind: lists.wire(kind, source, with_home=ground.first_item_is_home) for kind in NAMES}
+    if not any(parts.values()):
+        raise PlanError(source, "it is empty: nothing to upload")
+    with told(ground) as texts:
+        for kind, items in parts.items():
+            if items:
+                await give_list(ground, kind, items, texts)
+
+
+@contextlib.contextmanager
+def told(ground: Ground) -> Iterator[list[str]]:
+    """Print what the vehicle says meanwhile; also a list of it."""
+    said: list[str] = []
+    texts = Texts()
+
+    def hear(inbound: Inbound) -> None:
+        if isinstance(inbound.message, dialect.MAVLink_statustext_message):
+            text = texts.add(inbound.message)
+            if text:
+                said.append(text)
+                severe = inbound.message.severity <= dialect.MAV_SEVERITY_WARNING
+                say(f"system {inbound.sysid}: {text}", "yellow" if severe else "")
+
+    before, ground.on_message = ground.on_message, hear
+    try:
+        yield said
+    finally:
+        ground.on_message = before
+
+
+async def give_list(ground: Ground, kind: int, items: Sequence[PlanItem], said: Sequence[str] = ()) -> None:
+    """Upload one list. Raises `Refused`."""
+    sysid, compid = ground.target
+    transfer = Upload(
+        [lambda seq, item=item: item_int(item, seq, sysid, compid, kind) for item in items],  # type: ignore[misc]
+        sysid, compid, kind,
+    )  # fmt: skip
+    with progress(f"{NAMES[kind]} to system {sysid}", len(items)) as step:
+        await ground.run(transfer, step)
+    assert transfer.result is not None, "run ends with one"
+    count = table.count(len(items) - int(kind == MISSION and ground.first_item_is_home), "item")
+    if transfer.result.outcome is Outcome.UNCONFIRMED and await _has(ground, kind, items):
+        say(f"{NAMES[kind]}: {count} on system {sysid}; the acknowledgement was lost, they were read back")
+    elif transfer.result.outcome is Outcome.DONE:
+        say(f"{NAMES[kind]}: {count} on system {sysid}", "green")
+    else:
+        why = f"; system {sysid} said: {said[-1]}" if said else ""
+        raise Refused(f"{NAMES[kind]} not taken: {transfer.result.reason}{why}")
+
+
+async def _has(ground: Ground, kind: int, items: Sequence[PlanItem]) -> bool:
+    """Does the vehicle have these?"""
+    transfer = Download(*ground.target, kind)
+    await ground.run(transfer, lambda done, total: None)
+    there = [item_of(message) for message in transfer.items]
+    return transfer.result is not None and transfer.result.outcome is Outcome.DONE and _same(items, there)
+
+
+def _same(wanted: Sequence[PlanItem], there: Sequence[PlanItem | Fault]) -> bool:
+    def content(item: PlanItem | Fault) -> Any:
+        if isinstance(item, Fault):
+            return None
+        return from_wire(item)
+
+    return [content(item) for item in wanted] == [content(item) for item in there]
+
+
+def download(arguments: argparse.Namespace) -> int:
+    """Fetch mission, fence and rally points into one file. Raises `Refused`."""
+    sysid = plan_options.sysid_of(arguments)
+    plan_options.target_format(arguments.out, arguments.model)
+    plan = asyncio.run(_download(arguments, sysid))
+    plan_files.store(plan, arguments)
+    return 0
+
+
+async def _download(arguments: argparse.Namespace, sysid: int | None) -> Plan:
+    async with connected(arguments.endpoint, sysid) as ground:
+        return await take(ground)
+
+
+async def take(ground: Ground) -> Plan:
+    """What a vehicle has. Raises `Refused` when it does not give its mission; fence and rally points may lack."""
+    source = f"system {ground.target[0]}"
+    items = await _take_list(ground, MISSION, needed=True)
+    home = None
+    if ground.first_item_is_home and items:
+        first, *items = items
+        latitude, longitude, height = first.params[4:]
+        if latitude and longitude:
+            home = Point(latitude, longitude, height or 0.0)
+        items = [_without_heading(shifted(item, -1)) for item in items]
+    zones, back = zones_of(await _take_list(ground, FENCE), f"{source}: fence")
+    rally = points_of(await _take_list(ground, RALLY), f"{source}: rally points")
+    return Plan(tuple(items), home, zones, back, rally)
+
+
+async def _take_list(ground: Ground, kind: int, *, needed: bool = False) -> list[Item]:
+    sysid, compid = ground.target
+    transfer = Download(sysid, compid, kind)
+    with progress(f"{NAMES[kind]} from system {sysid}", None) as step:
+        await ground.run(transfer, step)
+    assert transfer.result is not None, "run ends with one"
+    if transfer.result.outcome is Outcome.DONE:
+        items = [item_of(message) for message in transfer.items]
+        for number, item in enumerate(items):
+            if isinstance(item, Fault):
+                raise Refused(f"{NAMES[kind]} of system {sysid}, item {number}: {item.reason}")
+        return [from_wire(item) for item in items if isinstance(item, PlanItem)]
+    if needed:
+        raise Refused(f"{NAMES[kind]} of system {sysid}: {transfer.result.reason}")
+    say(f"no {NAMES[kind]} from system {sysid}: {transfer.result.reason}", "yellow")
+    return []

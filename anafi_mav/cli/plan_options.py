@@ -1,0 +1,142 @@
+"""What the actions of `anafi-mav plan` are told, and the files that they are told of.
+
+Apart from the actions, so that a table of a file does not wait for MAVLink's dialect to be loaded.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from anafi_mav.cli import options
+from anafi_mav.errors import ConfigError
+from anafi_mav.plans import files, plot
+from anafi_mav.plans.files import Format
+from anafi_mav.plans.parrot import Version
+from anafi_mav.plans.plan import Plan
+
+VERSIONS: dict[str, Version] = {"4k": 1, "thermal": 1, "usa": 1, "ai": 2}
+"""Of Parrot's files, by the model that flies them."""
+
+PARROT = ".mavlink"
+
+MAX_HEIGHT = 1000.0
+"""m above take-off that a line may be flown at; the drones' own ceilings are far below."""
+
+
+ENDPOINT = "tcpout://127.0.0.1:5760"
+"""Where a gateway with the default configuration serves as many clients as come."""
+
+MAX_SYSID = 255
+
+
+def source_arguments(parser: argparse.ArgumentParser) -> None:
+    """The plan that is read, and what its file may leave open."""
+    parser.add_argument("file", type=Path, metavar="FILE", help=".plan, .waypoints, .mavlink, .kml or .geojson")
+    model_argument(parser)
+    parser.add_argument("--height", metavar="M", help="above take-off, of a line that was drawn on a map")
+
+
+def model_argument(parser: argparse.ArgumentParser) -> None:
+    """The drone that a Parrot file is for."""
+    parser.add_argument(
+        "--model",
+        metavar="MODEL",
+        help=f"the ANAFI that a .mavlink file is for: {', '.join(VERSIONS)}; the file itself does not say",
+    )
+
+
+def load(arguments: argparse.Namespace) -> Plan:
+    """The plan that the arguments name. Raises `PlanError` and `ConfigError`."""
+    model = version(arguments.model)
+    if model is None and arguments.file.suffix.lower() == PARROT:
+        raise ConfigError("--model", f"expected one of {', '.join(VERSIONS)}: a {PARROT} file does not say its drone")
+    height = None
+    if arguments.height is not None:
+        wanted = f"metres above take-off, up to {MAX_HEIGHT:g}"
+        height = options.number("--height", arguments.height, wanted)
+        if not 0.0 < height <= MAX_HEIGHT:
+            raise ConfigError("--height", f"expected {wanted}, got {arguments.height}")
+    return files.load(arguments.file, model or 2, height)
+
+
+def version(model: str | None) -> Version | None:
+    """Of the files that a model flies. Raises `ConfigError`."""
+    if model is None:
+        return None
+    if model not in VERSIONS:
+        raise ConfigError("--model", f"expected one of {', '.join(VERSIONS)}, got {model!r}")
+    return VERSIONS[model]
+
+
+def out_argument(parser: argparse.ArgumentParser) -> None:
+    """The file that is written."""
+    parser.add_argument("out", type=Path, metavar="OUT", help="its ending says the format")
+
+
+def target_format(path: Path, model: str | None) -> Format:
+    """What a file of this name is to be. Raises `ConfigError`."""
+    suffix = path.suffix.lower()
+    if suffix == PARROT:
+        found = version(model)
+        if found is None:
+            raise ConfigError("--model", f"expected one of {', '.join(VERSIONS)}, for a {PARROT} file is for one drone")
+        return Format.PARROT_1 if found == 1 else Format.PARROT_2
+    if suffix not in files.SUFFIXES:
+        endings = ", ".join([*files.SUFFIXES, PARROT])
+        raise ConfigError("OUT", f"expected a file that ends in one of {endings}, got {path.name!r}")
+    return files.SUFFIXES[suffix]
+
+
+def link_arguments(parser: argparse.ArgumentParser) -> None:
+    """Where the vehicle is."""
+    parser.add_argument(
+        "--endpoint",
+        default=ENDPOINT,
+        metavar="URL",
+        help="where the vehicle is (%(default)s)",
+    )
+    parser.add_argument("--sysid", metavar="N", help="its system id; left out: the only vehicle there is")
+
+
+def sysid_of(arguments: argparse.Namespace) -> int | None:
+    """Which vehicle, None: the only one. Raises `ConfigError`."""
+    if arguments.sysid is None:
+        return None
+    wanted = f"a system id from 1 to {MAX_SYSID}"
+    sysid = options.integer("--sysid", arguments.sysid, wanted)
+    if not 0 < sysid <= MAX_SYSID:
+        raise ConfigError("--sysid", f"expected {wanted}, got {sysid}")
+    return sysid
+
+
+def show_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of `anafi-mav plan show`."""
+    source_arguments(parser)
+
+
+def convert_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of `anafi-mav plan convert`."""
+    source_arguments(parser)
+    out_argument(parser)
+
+
+def plot_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of `anafi-mav plan plot`."""
+    source_arguments(parser)
+    parser.add_argument(
+        "-o", "--output", type=Path, required=True, metavar="FILE", help=f"one of {', '.join(plot.SUFFIXES)}"
+    )
+
+
+def upload_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of `anafi-mav plan upload`."""
+    source_arguments(parser)
+    link_arguments(parser)
+
+
+def download_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of `anafi-mav plan download`."""
+    out_argument(parser)
+    model_argument(parser)
+    link_arguments(parser)

@@ -1,0 +1,122 @@
+"""`anafi-mav plan upload` and `download` as they are called: with the gateway, and with a vehicle of somebody else."""
+
+from __future__ import annotations
+
+import ast
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from support.mav import Client
+from support.plans import download
+from support.product import Process, product, program
+from support.world import loopback
+
+from anafi_mav.plans import files
+from anafi_mav.plans.plan import Plan
+from anafi_mav.services.mission_items import as_carried, to_wire
+
+MISSIONS = Path(__file__).parents[2] / "missions"
+
+
+async def plan(*words: str | Path) -> Process:
+    """Run `anafi-mav plan` to its end."""
+    async with program(sys.executable, "-m", "anafi_mav", "plan", *map(str, words)) as held:
+        await held.end(timeout=90.0)
+        return held
+
+
+def fleet(address: str, drone: str, flavour: str = "px4") -> str:
+    return f"""
+        endpoints: ["tcpin://{address}:5760?flavour={flavour}", "tcpin://{address}:5761"]
+        drones: [{{name: alpha, sysid: 1, sim: {{address: {drone}}}}}]
+    """
+
+
+def carried(wanted: Plan) -> Plan:
+    """What a vehicle can give back of a plan: nothing of its editor, and no speeds."""
+    items = tuple(as_carried(item) for item in wanted.items)
+    return replace(wanted, items=items, blocks=(), cruise_speed=15.0, hover_speed=5.0)
+
+
+@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+async def test_a_plan_is_uploaded_and_fetched_again(tmp_path: Path, flavour: str) -> None:
+    """Mission, fence and rally points; what another client sees is what the file says."""
+    address = loopback()
+    url = f"tcpout://{address}:5760"
+    wanted = files.load(MISSIONS / "delivery.plan")
+    async with product(tmp_path, fleet(address, loopback(), flavour)):
+        up = await plan("upload", MISSIONS / "delivery.plan", "--endpoint", url)
+        assert up.process.returncode == 0, str(up)
+        assert "mission: 12 items on system 1" in up.lines
+        assert "fence: 2 items on system 1" in up.lines
+        assert "rally points: 1 item on system 1" in up.lines
+        other = await Client().connect(5761, address)
+        seen = await download(other, 0)
+        await other.close()
+        assert [(m.command, m.frame, m.x, m.y) for m in seen] == [
+            (item.command, item.frame, to_wire(item).x, to_wire(item).y) for item in wanted.items
+        ]
+        down = await plan("download", tmp_path / "down.plan", "--endpoint", url, "--sysid", "1")
+        assert down.process.returncode == 0, str(down)
+        got = files.load(tmp_path / "down.plan")
+        # An ArduPilot keeps home with the mission; of others it is not known.
+        assert replace(got, home=wanted.home) == carried(wanted)
+        assert (got.home == wanted.home) or flavour == "px4"
+        again = await plan("upload", tmp_path / "down.plan", "--endpoint", url)
+        assert again.process.returncode == 0, str(again)
+
+
+async def test_what_the_drone_cannot_fly_is_refused_with_its_words(tmp_path: Path) -> None:
+    address = loopback()
+    url = f"tcpout://{address}:5760"
+    async with product(tmp_path, fleet(address, loopback())):
+        first = await plan("upload", MISSIONS / "loop.plan", "--endpoint", url)
+        assert first.process.returncode == 0, str(first)
+        refused = await plan("upload", MISSIONS / "wrong" / "servo.plan", "--endpoint", url)
+        assert refused.process.returncode == 1
+        (line,) = refused.complaints
+        assert line.startswith("anafi-mav: mission not taken: UNSUPPORTED; system 1 said: ")
+        assert "item 2" in line
+        other = await Client().connect(5761, address)
+        assert len(await download(other, 0)) == len(files.load(MISSIONS / "loop.plan").items)  # the old one
+        await other.close()
+
+
+async def test_a_vehicle_of_somebody_else(tmp_path: Path) -> None:
+    """MAVSDK's own mission server takes every sample and gives it back."""
+    address = loopback()
+    url = f"udpin://{address}:14550"
+    script = Path(__file__).with_name("mavsdk_vehicle.py")
+    async with program(sys.executable, str(script), f"udpout://{address}:14550") as vehicle:
+        await vehicle.line(lambda line: line == "ready")
+        for path in sorted(MISSIONS.glob("*.plan"))[:3]:
+            mark = len(vehicle.lines)
+            wanted = replace(files.load(path), zones=(), breach_return=None, rally=())
+            files.save(wanted, tmp_path / "mission.plan", files.Format.QGC)
+            up = await plan("upload", tmp_path / "mission.plan", "--endpoint", url)
+            assert up.process.returncode == 0, (str(up), str(vehicle))
+            line = await vehicle.line(lambda line: line.startswith("mission "), since=mark)
+            got = ast.literal_eval(line.removeprefix("mission ").replace("nan", "None"))
+            expected = [to_wire(item) for item in wanted.items]
+            assert [(c, f, x, y) for _, f, c, _, _, _, _, x, y, _ in got] == [
+                (item.command, item.frame, item.x, item.y) for item in expected
+            ]
+
+
+async def test_where_nobody_is(tmp_path: Path) -> None:
+    out = tmp_path / "none.plan"
+    alone = await plan("download", out, "--endpoint", f"udpin://{loopback()}:0")
+    assert alone.process.returncode == 1
+    (line,) = alone.complaints
+    assert line.startswith("anafi-mav: no vehicle within 6 s on udpin://")
+    assert not out.exists()
+    wrong = await plan("download", out, "--endpoint", "udp:14550")
+    assert wrong.process.returncode == 2
+    assert wrong.complaints[0].startswith("anafi-mav: --endpoint: 'udp:14550': expected a URL")
+    number = await plan("upload", MISSIONS / "loop.plan", "--sysid", "300")
+    assert (number.process.returncode, number.complaints) == (
+        2,
+        ["anafi-mav: --sysid: expected a system id from 1 to 255, got 300"],
+    )
