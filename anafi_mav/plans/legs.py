@@ -54,6 +54,7 @@ TIMELAPSE, GPSLAPSE = 0.0, 1.0
 """Of SET_STILL_MODE."""
 
 _SET_ROI, _ROI_PLACE = common.MAV_CMD_DO_SET_ROI, float(common.MAV_ROI_LOCATION)
+_TAKE_TIME = frozenset({WAYPOINT, common.MAV_CMD_NAV_DELAY, common.MAV_CMD_PANORAMA_CREATE})
 _TARGETING = float(common.MAV_MOUNT_MODE_MAVLINK_TARGETING)
 
 
@@ -87,6 +88,10 @@ class Refused(Exception):
     def __init__(self, fault: Fault) -> None:
         super().__init__(str(fault))
         self.fault = fault
+
+
+class UnknownHeight(PlanError):
+    """A height above mean sea level cannot be had without that of the take-off point."""
 
 
 @dataclass(frozen=True)
@@ -173,6 +178,8 @@ class Pen:
         """A set that keeps its order: an item that is flown again says the same again."""
         self.written = 0
         """Lines and steps of all parts."""
+        self.flown = 0
+        """Of them, those that take their time."""
         self._amsl = start.takeoff_amsl
         self._mode_wanted: int | None = None
         """The item that set the camera's mode, until something is photographed."""
@@ -220,6 +227,7 @@ class Pen:
             return
         self.close()
         self.written += 1
+        self.flown += 1
         self.parts.append(Step(self.item, tuple(self.waiting)))
         self.waiting.clear()
 
@@ -252,6 +260,7 @@ class Pen:
         self._done.append(tuple(self.waiting))
         self.waiting.clear()
         self.written += 1
+        self.flown += command in _TAKE_TIME
 
     def _open(self) -> None:
         """Before the first line of a file: the way up, and what holds."""
@@ -298,7 +307,7 @@ class Pen:
             self.refuse(f"frame {item.frame} is none of a place on earth", kind=FaultKind.FRAME)
         if self._amsl is None:
             problem = "its height is above mean sea level, and that of the take-off point is not known"
-            raise PlanError("mission", problem, self.item)
+            raise UnknownHeight("mission", problem, self.item)
         return value - self._amsl
 
     def names_place(self, item: Item) -> bool:

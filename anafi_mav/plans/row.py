@@ -44,6 +44,12 @@ class Row:
     """Nothing comes after it."""
 
     @property
+    def why(self) -> str:
+        """The first sentence of `how`, as a clause."""
+        first = self.how.partition(". ")[0].rstrip(".")
+        return first[:1].lower() + first[1:]
+
+    @property
     def name(self) -> str:
         entry = common.enums["MAV_CMD"].get(self.command)
         known = {SET_VIEW_MODE: "SET_VIEW_MODE", SET_STILL_MODE: "SET_STILL_CAPTURE_MODE"}.get(self.command)

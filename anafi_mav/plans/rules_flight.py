@@ -24,6 +24,8 @@ def _waypoint(pen: Pen, item: Item) -> None:
         pen.refuse(f"it waits for {hold:g} s", 1)
     if (radius or 0.0) < 0.0:
         pen.refuse(f"a radius of {radius:g} m", 2)
+    if not pen.names_place(item):
+        pen.say("it names no place: it is where the drone is then")
     if beside:
         pen.say(f"it is flown over, not passed at {abs(beside):g} m")
     _fly(pen, item, heading, radius)

@@ -135,7 +135,7 @@ def _wrong_item(pen: Pen, item: Item, count: int) -> Fault | None:
     row = TABLE.get(item.command)
     if row is None or row.verdict is Verdict.REFUSED:
         name = Row(item.command, Verdict.REFUSED, "").name
-        return Fault(pen.item, f"{name}: {row.how if row else 'no flight plan has it'}", FaultKind.COMMAND)
+        return Fault(pen.item, f"{name}: {row.why if row else 'no flight plan has it'}", FaultKind.COMMAND)
     for number, value in enumerate(item.params, 1):
         if value is not None and not math.isfinite(value):
             return Fault(pen.item, f"{value} is no number", FaultKind.PARAM, number)
@@ -211,7 +211,7 @@ def _reached(items: Sequence[Item]) -> set[int]:
 def _stepped(items: Sequence[Item], flight: Flight) -> Iterator[Loss]:
     for number in sorted({part.item for part in flight.parts if isinstance(part, Step)}):
         row = TABLE[items[number].command]
-        yield Loss(f"{row.name}: {row.how}", number)
+        yield Loss(f"{row.name}: {row.why}", number)
     if flight.rest is not None:
         jumps = [number for number, item in enumerate(items) if item.command == DO_JUMP and item.params[1]]
         what = f"flown in files of {MAX_LINES} lines"
@@ -238,7 +238,7 @@ def _fly(items: Sequence[Item], version: Version, start: Start, cursor: Cursor) 
     pen.films_again = cursor.anew
     jumps = dict(cursor.jumps)
     seen: dict[int, int] = {}
-    """Jumps without end, and what had been written when they were taken last."""
+    """Jumps without end, and how much had been flown when they were taken last."""
     index = cursor.item
     if not start.flying and items:
         _rise(pen, items, index)
@@ -249,9 +249,9 @@ def _fly(items: Sequence[Item], version: Version, start: Start, cursor: Cursor) 
         if item.command == DO_JUMP:
             target, often = int(item.params[0] or 0.0), item.params[1]
             if often == _ENDLESS:
-                if seen.get(index) == pen.written:
+                if seen.get(index) == pen.flown:
                     pen.refuse("it goes round for ever and flies nowhere", kind=FaultKind.PLAN)
-                seen[index], following = pen.written, target
+                seen[index], following = pen.flown, target
             elif jumps.get(index, 0) < (often or 0.0):
                 jumps[index], following = jumps.get(index, 0) + 1, target
         else:

@@ -15,7 +15,7 @@ from typing import Any
 from anafi_mav import geo
 from anafi_mav.drone import Range
 from anafi_mav.errors import AnafiMavError
-from anafi_mav.services.fence import Circle, Point
+from anafi_mav.plans.zones import Circle, LatLon
 from anafi_mav.services.fence_watch import Reaction
 from anafi_mav.services.service import Host
 from anafi_mav.services.statustext import Severity
@@ -78,7 +78,7 @@ class FenceMirror:
         limit = NEAR if self._remembered() is None else FAR
         return True, circle.radius if away <= limit else None
 
-    def _takeoff_point(self) -> Point | None:
+    def _takeoff_point(self) -> LatLon | None:
         """The middle of the drone's geofence: where it took off, on the ground where it will."""
         vehicle = self._host.vehicle
         if vehicle.on_ground:

@@ -18,7 +18,8 @@ import msgspec
 from anafi_mav import geo
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.fence import Circle, Fence, Margin, Point, fence_of
+from anafi_mav.plans.zones import Circle, Fence, LatLon, Margin
+from anafi_mav.services.fence import fence_of
 from anafi_mav.services.plan_items import PlanItem
 
 REACTION = 0.6
@@ -136,7 +137,7 @@ class OutsideFence(AnafiMavError):
 class Sight(msgspec.Struct, frozen=True):
     """What the vehicle is seen to do."""
 
-    place: Point | None
+    place: LatLon | None
     """By the newest position, however old; None without a GPS fix."""
     age: float
     """Of that position, s."""
@@ -146,7 +147,7 @@ class Sight(msgspec.Struct, frozen=True):
     """m above the take-off point."""
     ceiling: float | None
     """m above the take-off point; the drone's own, which it keeps to by itself."""
-    home: Point | None
+    home: LatLon | None
     airborne: bool
     """Off the ground."""
     flying: bool
@@ -256,7 +257,7 @@ class FenceWatch:
         if self._has_floor and self.action is not Reaction.NONE and ato < self.floor:
             raise OutsideFence(f"{ato:.1f} m above take-off is below the fence's floor of {self.floor:g} m")
 
-    def check_place(self, place: Point | None, home: Point | None, start: Point | None = None) -> None:
+    def check_place(self, place: LatLon | None, home: LatLon | None, start: LatLon | None = None) -> None:
         """Raise `OutsideFence` unless a place is inside, and the straight way to it from `start`.
 
         From outside every way is good that ends inside. Of no place nothing can be said, so it is not inside either.

@@ -16,7 +16,8 @@ from msgspec.structs import replace
 
 from anafi_mav import geo
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.fence import Circle, Fence, FenceKind, Polygon, fence_of, summary
+from anafi_mav.plans.zones import Circle, Fence, Polygon
+from anafi_mav.services.fence import FenceKind, fence_of, summary
 from anafi_mav.services.fence_watch import (
     ARDUPILOT_ACTIONS,
     BACK_INSIDE,

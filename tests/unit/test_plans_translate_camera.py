@@ -259,7 +259,7 @@ WRONG = {
     "zoom": ([action(531, 1.0, 5.0)], "only a zoom range in percent can be flown", FaultKind.PARAM, 1),
     "tilt": ([action(205, -120.0)], "the camera tilts from", FaultKind.PARAM, 1),
     "nothing": ([action(2800, 0.0, 0.0)], "its angles are nothing", FaultKind.PARAM, 1),
-    "servo": ([action(183, 5.0, 1500.0)], "The drone has no actuator that a flight plan could move.",
+    "servo": ([action(183, 5.0, 1500.0)], "the drone has no actuator that a flight plan could move",
               FaultKind.COMMAND, None),
 }  # fmt: skip
 

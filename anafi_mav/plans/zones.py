@@ -1,0 +1,166 @@
+"""Zones on the ground, and where a way crosses their boundaries: what a fence is made of. No I/O, no clock.
+
+Inside means: in all inclusion zones of at least one group (param2 of the items; MAVLink common.xml
+MAV_CMD_NAV_FENCE_*), and in no exclusion zone. Every zone is looked at in a plane of its own, with distances and
+bearings from one of its corners along geodesics: exact to a centimetre over the ten kilometres that an ANAFI flies.
+A polygon that crosses itself is inside where a ray from the point crosses it an odd number of times.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from anafi_mav import geo
+
+LatLon = tuple[float, float]
+"""Latitude and longitude, deg."""
+
+SHORTEST = 0.01
+"""m of a way outside that count: two zones that meet leave no gap by rounding."""
+
+
+@dataclass(frozen=True)
+class Circle:
+    """A zone around a point, or around home where that is None."""
+
+    name: str
+    inclusion: bool
+    group: int
+    centre: LatLon | None
+    radius: float
+    """m."""
+
+    def depth(self, point: LatLon, home: LatLon | None) -> float:
+        """How far inside the boundary a point is (m), negative outside. A circle around an unknown home is endless."""
+        centre = home if self.centre is None else self.centre
+        return math.inf if centre is None else self.radius - geo.distance(*centre, *point)
+
+    def crossings(self, start: LatLon, end: LatLon, home: LatLon | None) -> list[float]:
+        """Where the straight way from one point to another meets the boundary: shares of the way."""
+        centre = home if self.centre is None else self.centre
+        if centre is None:
+            return []
+        (n, e), (to_n, to_e) = geo.offset(*centre, *start), geo.offset(*centre, *end)
+        dn, de = to_n - n, to_e - e
+        # |start + t way|² = radius²
+        a, b, c = dn * dn + de * de, n * dn + e * de, n * n + e * e - self.radius * self.radius
+        root = b * b - a * c
+        if a == 0.0 or root < 0.0:
+            return []
+        return [t for t in ((-b - math.sqrt(root)) / a, (-b + math.sqrt(root)) / a) if 0.0 < t < 1.0]
+
+
+class Polygon:
+    """A zone with straight sides."""
+
+    def __init__(self, name: str, inclusion: bool, group: int, corners: Sequence[LatLon]) -> None:
+        self.name, self.inclusion, self.group = name, inclusion, group
+        self.corners = tuple(corners)
+        self._origin = self.corners[0]
+        starts = geo.offsets(*self._origin, self.corners)
+        self._starts: npt.NDArray[Any] = starts
+        self._ends: npt.NDArray[Any] = np.roll(starts, -1, axis=0)
+        self._sides = self._ends - starts
+        self._squares = np.maximum(np.einsum("ij,ij->i", self._sides, self._sides), 1e-12)
+
+    @property
+    def area(self) -> float:
+        """m²."""
+        n, e = self._starts[:, 0], self._starts[:, 1]
+        return abs(float(n @ self._ends[:, 1] - e @ self._ends[:, 0])) / 2.0
+
+    def depth(self, point: LatLon, home: LatLon | None) -> float:
+        """How far inside the boundary a point is (m), negative outside."""
+        here = np.array(geo.offset(*self._origin, *point))
+        back = here - self._starts
+        along = np.clip(np.einsum("ij,ij->i", back, self._sides) / self._squares, 0.0, 1.0)
+        misses = back - along[:, None] * self._sides
+        distance = math.sqrt(float(np.min(np.einsum("ij,ij->i", misses, misses))))
+        # Sides that the ray from the point towards the east crosses.
+        below, above = self._starts[:, 0] <= here[0], self._ends[:, 0] <= here[0]
+        crossing = below != above
+        at = (
+            self._starts[crossing, 1]
+            + (here[0] - self._starts[crossing, 0]) / self._sides[crossing, 0] * (self._sides[crossing, 1])
+        )
+        inside = int(np.count_nonzero(at > here[1])) % 2 == 1
+        return distance if inside else -distance
+
+    def crossings(self, start: LatLon, end: LatLon, home: LatLon | None) -> list[float]:
+        """Where the straight way from one point to another meets the boundary: shares of the way."""
+        first, last = (np.array(geo.offset(*self._origin, *point)) for point in (start, end))
+        way = last - first
+        back = self._starts - first
+        cross = way[0] * self._sides[:, 1] - way[1] * self._sides[:, 0]
+        with np.errstate(divide="ignore", invalid="ignore"):  # parallel sides are met at their ends by their neighbours
+            along = (back[:, 0] * self._sides[:, 1] - back[:, 1] * self._sides[:, 0]) / cross
+            across = (back[:, 0] * way[1] - back[:, 1] * way[0]) / cross
+            meets = (along > 0.0) & (along < 1.0) & (across >= 0.0) & (across <= 1.0)
+        return [float(t) for t in along[meets]]
+
+
+Zone = Circle | Polygon
+
+
+@dataclass(frozen=True)
+class Margin:
+    """How far it is to the nearest boundary that matters."""
+
+    metres: float
+    """Positive inside; at least that far in every direction. Infinite without a fence."""
+    zone: str
+    """Which zone's, for people; empty without a fence."""
+
+
+NOWHERE = Margin(math.inf, "")
+
+
+class Fence:
+    """Zones together. `home` is the middle of a circle around home; while it is unknown there is no such circle."""
+
+    def __init__(self, zones: Iterable[Zone] = ()) -> None:
+        self.zones = tuple(zones)
+
+    def margin(self, point: LatLon, home: LatLon | None = None) -> Margin:
+        """How far inside the fence a point is."""
+        groups: dict[int, Margin] = {}
+        result = NOWHERE
+        for zone in self.zones:
+            depth = zone.depth(point, home)
+            if zone.inclusion:
+                if depth < groups.get(zone.group, NOWHERE).metres or zone.group not in groups:
+                    groups[zone.group] = Margin(depth, zone.name)
+            elif -depth < result.metres:
+                result = Margin(-depth, zone.name)
+        if groups:
+            best = max(groups.values(), key=lambda margin: margin.metres)
+            if best.metres < result.metres:
+                result = best
+        return result
+
+    def leaves(self, start: LatLon, end: LatLon, home: LatLon | None = None) -> Margin | None:
+        """Where the straight way from one point to another is outside: the first such margin; None: nowhere.
+
+        Between two boundaries that it crosses, a way is inside or outside as a whole.
+        """
+        if not self.zones:
+            return None
+        north, east = geo.offset(*start, *end)
+        length = math.hypot(north, east)
+        met = sorted(t for zone in self.zones for t in zone.crossings(start, end, home))
+        for before, after in pairwise((0.0, *met, 1.0)):
+            if (after - before) * length < SHORTEST and before > 0.0:
+                continue
+            share = (before + after) / 2.0
+            margin = self.margin(geo.destination(*start, north * share, east * share), home)
+            if margin.metres < 0.0:
+                return margin
+        margin = self.margin(end, home)
+        return margin if margin.metres < 0.0 else None
