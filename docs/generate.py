@@ -339,11 +339,12 @@ changes nothing: it is ignored, refused or put off, as the module says.
 
 def states() -> str:
     """docs/states.md."""
-    from anafi_mav.services import fence_watch, follow, ftp, manual_flight, offboard, plan_transfer
+    from anafi_mav.services import fence_watch, follow, ftp, manual_flight, mission_progress, offboard, plan_transfer
     from anafi_mav.sim import machine
 
     tables: list[tuple[str, Any]] = [
         ("Transfer of a mission, a fence or rally points", plan_transfer),
+        ("A mission", mission_progress),
         ("The fence", fence_watch),
         ("Setpoints of a program", offboard),
         ("Sticks of a ground station", manual_flight),

@@ -59,8 +59,10 @@ from anafi_mav.arsdk.messages.common import MavlinkType as MavlinkType
 from anafi_mav.arsdk.messages.common import MissionItemExecuted as MissionItemExecuted
 from anafi_mav.arsdk.messages.common import PlayError as PlayError
 from anafi_mav.arsdk.messages.common import PlayingState as PlayingState
+from anafi_mav.arsdk.messages.common import ReturnHomeOnDisconnectChanged as ReturnHomeOnDisconnectChanged
 from anafi_mav.arsdk.messages.common import Sensor as Sensor
 from anafi_mav.arsdk.messages.common import SensorsStatesListChanged as SensorsStatesListChanged
+from anafi_mav.arsdk.messages.flight_plan import WaypointSkipped as WaypointSkipped
 from anafi_mav.arsdk.messages.follow_me import Mode as FollowMeMode
 from anafi_mav.arsdk.messages.gimbal import Attitude as GimbalAttitudeChanged
 from anafi_mav.arsdk.messages.gimbal import Axis as Axis
@@ -185,6 +187,7 @@ __all__ = [
     "ReturnDelay",
     "ReturnEnding",
     "ReturnEndingAltitude",
+    "ReturnHomeOnDisconnectChanged",
     "ReturnMinAltitude",
     "ReturnStateChanged",
     "RthEndingBehavior",
@@ -201,5 +204,6 @@ __all__ = [
     "VertigoFinishAction",
     "VibrationLevelChanged",
     "WarningLevel",
+    "WaypointSkipped",
     "WindStateChanged",
 ]

@@ -144,6 +144,11 @@ class FlightPlan(Commanding[FlightPlanState]):
         """Of the file format that this drone flies: 1, or 2 on the Ai."""
         return 1 if self.state.missing is None and self.state.capabilities is None else 2
 
+    @property
+    def starts_anywhere(self) -> bool:
+        """A plan can begin in its middle, and it can be said at its start whether it goes on without a link."""
+        return SupportedCapabilities.START_AT_V2 in (self.state.capabilities or frozenset())
+
     # -- files
 
     async def upload(self, plan: bytes) -> str:
@@ -242,6 +247,12 @@ class FlightPlan(Commanding[FlightPlanState]):
     def _why(self) -> str:
         reasons = ", ".join(self.state.unavailable)
         return f"the flight plan cannot be flown: {reasons}" if reasons else "the drone cannot start the flight plan"
+
+    def suspend(self) -> None:
+        """Do not fly it any further: sent at once, not waited for. A start that was not answered is taken back."""
+        self._commander.call_off("something else flies", common.Stop)
+        if self.state.playing == PlayingState.PLAYING:
+            self._commander.halt_if_connected(common.Pause())
 
     async def pause(self, timeout: float = ANSWER_TIMEOUT) -> None:
         """Hover; `start` with the same plan goes on. Raises `CommandRejected` when no plan plays."""

@@ -22,6 +22,7 @@ from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.service import Action, Host, Service, client_of
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.targets import UnsupportedFrame, height, height_in_frame, place
+from anafi_mav.services.turns import DEG_PER_TURN, heading_of
 from anafi_mav.services.vehicle import FASTEST, SLOWEST, Goto, Place, Refused, Vehicle
 
 KEEP, DEFAULT = -1.0, -2.0
@@ -30,8 +31,6 @@ KEEP, DEFAULT = -1.0, -2.0
 _AIRSPEED, _GROUNDSPEED = 0.0, 1.0
 _UPWARDS, _DOWNWARDS = 2.0, 3.0
 """SPEED_TYPE."""
-
-DEG_PER_TURN = 360.0
 
 SLOWEST_TURN = 1.0
 """deg/s. A turn that is slower than this is a number in the wrong place, and would take for ever."""
@@ -43,21 +42,6 @@ _ITEM_GOTO, _ITEM_ALTITUDE = 2, 3
 def guided_mode(flavour: Flavour) -> FlightMode:
     """The mode that a vehicle is in when a client of this flavour has sent it somewhere."""
     return FlightMode.GUIDED if flavour.guided_setpoints else FlightMode.HOLD
-
-
-def heading_of(angle: float, way: float, relative: bool, now: float) -> float:
-    """How far to turn (deg, clockwise +) for a MAV_CMD_CONDITION_YAW, from a heading of `now` (deg).
-
-    `way` is 1 clockwise, -1 counter-clockwise, 0 the shorter one; a relative angle turns by `angle` that way.
-    """
-    if relative:
-        return -angle if way < 0 else angle
-    turn = units.wrap_pi((angle - now) * units.RAD_PER_DEG) * units.DEG_PER_RAD
-    if way > 0 and turn < 0:
-        return turn + DEG_PER_TURN
-    if way < 0 and turn > 0:
-        return turn - DEG_PER_TURN
-    return turn
 
 
 def is_guided_item(item: Any) -> bool:
@@ -119,6 +103,8 @@ class GuidedService(Service):
         super().__init__(host)
         self._paused: tuple[Goto, int] | None = None
         """Where the drone was going when it was told to pause, and the vehicle's count of orders then."""
+        self._mission_paused: int | None = None
+        """The vehicle's count of orders when a mission was paused."""
 
     def actions(self) -> Mapping[int, Action]:
         return {
@@ -133,20 +119,25 @@ class GuidedService(Service):
         }
 
     def link_down(self) -> None:
-        self._paused = None
+        self._paused = self._mission_paused = None
 
     def hears(self) -> Collection[type[Message]]:
         return (FlyingStateChanged,)
 
     def on_event(self, message: Message, now: float) -> None:
         if not self.host.vehicle.in_air:
-            self._paused = None  # the next flight's heights count from elsewhere
+            self._paused = self._mission_paused = None  # the next flight's heights count from elsewhere
 
     @property
     def _interrupted(self) -> Goto | None:
         """Where a pause stopped the drone; None when something else was ordered since."""
         goto, orders = self._paused or (None, 0)
         return goto if orders == self.host.vehicle.orders else None
+
+    @property
+    def _mission_interrupted(self) -> bool:
+        """A pause stopped a mission, and nothing else was ordered since."""
+        return self.host.vehicle.mission.paused and self._mission_paused == self.host.vehicle.orders
 
     async def _change_speed(self, command: Command) -> None:
         """MAV_CMD_DO_CHANGE_SPEED: param1 SPEED_TYPE, param2 m/s. A move that is under way changes its speed at once.
@@ -205,17 +196,22 @@ class GuidedService(Service):
             await vehicle.turn(turn * units.RAD_PER_DEG, rate if rate > 0.0 else None, guided_mode(command.flavour))
 
     async def _pause_or_continue(self, command: Command) -> None:
-        """MAV_CMD_DO_PAUSE_CONTINUE: param1 0 hovers, 1 goes on to where the pause stopped it.
+        """MAV_CMD_DO_PAUSE_CONTINUE: param1 0 hovers, 1 goes on to where the pause stopped it, or with its mission.
 
         Not after anybody has ordered anything else, or the drone has landed.
         """
         vehicle = self.host.vehicle
         if command.params[0] == 0.0:
             goto = vehicle.goto or self._interrupted
+            mission = vehicle.mission.flying or self._mission_interrupted
             await vehicle.hold(guided_mode(command.flavour))
             self._paused = None if goto is None else (goto, vehicle.orders)
+            self._mission_paused = vehicle.orders if mission else None
         elif command.params[0] == 1.0:
             goto = self._interrupted
+            if self._mission_interrupted:
+                await vehicle.set_mode(FlightMode.MISSION, command.client)
+                return
             if goto is None:
                 raise Refused("Continue refused: nothing was paused, or something else was ordered since")
             await vehicle.go(goto)

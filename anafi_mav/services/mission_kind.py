@@ -8,49 +8,43 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Literal
+from dataclasses import dataclass
 
 import msgspec
 
 from anafi_mav.mavlink import dialect
-from anafi_mav.plans.parrot import COMMANDS
-from anafi_mav.plans.plan import Item
+from anafi_mav.plans.parrot import Version
+from anafi_mav.plans.plan import Item, Loss
+from anafi_mav.plans.translate import FaultKind, Report, examine
 from anafi_mav.services.flavours import PX4, Flavour
-from anafi_mav.services.plan_items import (
-    AMSL_FRAMES,
-    DEGREES,
-    RELATIVE_FRAMES,
-    UNSET,
-    Fault,
-    PlanItem,
-)
+from anafi_mav.services.mission_items import from_wire
+from anafi_mav.services.plan_items import Fault, PlanItem
 from anafi_mav.services.plan_transfer import PlanKind
 
-Version = Literal[1, 2]
-
-_HEADED = (dialect.MAV_CMD_NAV_WAYPOINT, dialect.MAV_CMD_NAV_LAND, dialect.MAV_CMD_NAV_TAKEOFF)
+_HEADED = frozenset(
+    {
+        dialect.MAV_CMD_NAV_WAYPOINT,
+        dialect.MAV_CMD_NAV_LOITER_UNLIM,
+        dialect.MAV_CMD_NAV_LOITER_TIME,
+        dialect.MAV_CMD_NAV_LAND,
+        dialect.MAV_CMD_NAV_TAKEOFF,
+    }
+)
 """Items whose param4 is a heading, which ArduPilot's clients leave at 0 without meaning north."""
+
+
+_RESULTS = {
+    FaultKind.COMMAND: dialect.MAV_MISSION_UNSUPPORTED,
+    FaultKind.FRAME: dialect.MAV_MISSION_UNSUPPORTED_FRAME,
+    FaultKind.PLAN: dialect.MAV_MISSION_INVALID,
+}
+
+_NOTHING = Report((), (), ())
 
 
 def offset(flavour: Flavour) -> int:
     """What a client of this flavour calls our item 0."""
     return 1 if flavour.zero_home else 0
-
-
-def neutral(item: PlanItem) -> Item:
-    """An item as `plans` knows it."""
-    x: float | None = item.x
-    y: float | None = item.y
-    if item.x == UNSET:
-        x = None
-    elif item.has_place:
-        x = item.latitude
-    if item.y == UNSET:
-        y = None
-    elif item.has_place:
-        y = item.longitude
-    one, two, three, four, z = (None if math.isnan(value) else value for value in (*item.params, item.z))
-    return Item(item.command, item.frame, (one, two, three, four, x, y, z), bool(item.autocontinue))
 
 
 def _with_param(item: PlanItem, number: int, value: float) -> PlanItem:
@@ -67,6 +61,30 @@ def _shifted(item: PlanItem, by: int) -> PlanItem:
     return _with_param(item, 1, item.params[0] + by)
 
 
+@dataclass(frozen=True)
+class Examined:
+    """A mission, and what it is to the drone."""
+
+    items: Sequence[PlanItem]
+    neutral: tuple[Item, ...]
+    report: Report
+
+    def words(self) -> str:
+        """For people: what of it is flown, and how."""
+        report = self.report
+        words = f"Mission: {len(self.items)} items"
+        if report.stepped:
+            words += f"; some are flown by the gateway, {_some(report.stepped)}. Without it what follows is not flown"
+        if report.approximations:
+            words += f"; not exactly as it says: {_some(report.approximations)}"
+        return words
+
+
+def _some(losses: Sequence[Loss]) -> str:
+    more = f" and {len(losses) - 1} more" if len(losses) > 1 else ""
+    return f"{losses[0]}{more}"
+
+
 class MissionKind(PlanKind):
     """The list of mission items. `home` makes ArduPilot's item 0, `version` is of the file that the drone flies."""
 
@@ -76,9 +94,31 @@ class MissionKind(PlanKind):
     def __init__(self, home: Callable[[], PlanItem], version: Callable[[], Version]) -> None:
         self._home = home
         self._version = version
+        self._known = Examined((), (), _NOTHING)
 
-    def check_plan(self, items: Sequence[PlanItem], flavour: Flavour = PX4) -> Fault | None:
-        return _examine(items, self._version(), offset(flavour))
+    def examine(self, items: Sequence[PlanItem], flavour: Flavour = PX4) -> Fault | None:
+        """What is wrong with good items together; a reason numbers them as clients of this flavour do.
+
+        This is no `check_plan`: 5 000 items take half a second, which is for a thread.
+        """
+        known = self._known
+        if known.items is not items:
+            neutral = tuple(map(from_wire, items))
+            report = examine(neutral, self._version()) if items else _NOTHING
+            known = self._known = Examined(items, neutral, report)
+        if not known.report.faults:
+            return None
+        fault = known.report.faults[0]
+        result = _RESULTS.get(fault.kind)
+        if result is None:
+            result = dialect.MAV_MISSION_INVALID_PARAM1 - 1 + (fault.param or 1)
+        return Fault(result, f"item {fault.item + offset(flavour)}: {fault.reason}")
+
+    def examined(self, items: Sequence[PlanItem]) -> Examined:
+        """A mission as `examine` saw it."""
+        if self._known.items is not items:
+            self.examine(items)
+        return self._known
 
     def shown(self, items: Sequence[PlanItem], flavour: Flavour) -> Sequence[PlanItem]:
         if not items or not flavour.zero_home:
@@ -101,20 +141,3 @@ def _without_zero(item: PlanItem) -> PlanItem:
 
 def _with_zero(item: PlanItem) -> PlanItem:
     return _with_param(item, 4, 0.0) if item.command in _HEADED and math.isnan(item.params[3]) else item
-
-
-_FLOWN = frozenset(COMMANDS[1]) | frozenset(COMMANDS[2]) | {19, 115, 177, 530, 531, 1000, 1001}
-
-
-def _examine(items: Sequence[PlanItem], version: Version, first: int) -> Fault | None:
-    for number, item in enumerate(items, first):
-        if item.command not in _FLOWN:
-            return Fault(dialect.MAV_MISSION_UNSUPPORTED, f"item {number}: command {item.command} is not flown")
-        if item.frame not in (dialect.MAV_FRAME_MISSION, *AMSL_FRAMES, *RELATIVE_FRAMES):
-            return Fault(dialect.MAV_MISSION_UNSUPPORTED_FRAME, f"item {number}: frame {item.frame} is not flown")
-        if item.command == dialect.MAV_CMD_NAV_WAYPOINT and item.x != UNSET:
-            if not abs(item.x) <= 90 * DEGREES:
-                return Fault(dialect.MAV_MISSION_INVALID_PARAM5_X, f"item {number}: its latitude is none")
-            if not abs(item.y) <= 180 * DEGREES:
-                return Fault(dialect.MAV_MISSION_INVALID_PARAM6_Y, f"item {number}: its longitude is none")
-    return None

@@ -269,6 +269,15 @@ def _precise(drone: Drone) -> bool | None:
     return None if mode is None else mode == PreciseHomeMode.STANDARD
 
 
+MISSION_RETURN = _switch(
+    "ANF_MIS_RTH",
+    "A lost link ends a mission with a return home",
+    lambda drone: drone.flight_plan.state.returns_on_disconnect,
+    lambda drone: drone.flight_plan.set_returns_on_disconnect,
+    events.ReturnHomeOnDisconnectChanged,
+    group=HOME,
+    long="Off: the drone flies the file that it has to its end. So it does when the gateway dies.",
+)
 PRECISE_HOME = _switch(
     "ANF_RTH_PRECISE",
     "A return looks for the picture of the take-off place",
@@ -486,6 +495,7 @@ NATIVE: tuple[Parameter, ...] = (
     RETURN_ENDING,
     RETURN_DELAY,
     RETURN_BY_ITSELF,
+    MISSION_RETURN,
     PRECISE_HOME,
     HOME_TYPE,
     GIMBAL_SPEED,

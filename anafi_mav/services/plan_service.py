@@ -15,24 +15,19 @@ from anafi_mav import units
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
-from anafi_mav.services.commands import Command
+from anafi_mav.plans.parrot import Version
 from anafi_mav.services.fence import FenceKind, summary
 from anafi_mav.services.flavours import flavour_of
 from anafi_mav.services.guided import fly_item, is_guided_item
-from anafi_mav.services.mission_kind import MissionKind, Version, offset
+from anafi_mav.services.mission_kind import MissionKind
 from anafi_mav.services.plan_desk import MESSAGES, PlanDesk
 from anafi_mav.services.plan_items import PlanItem
-from anafi_mav.services.plan_transfer import Changed, Commit, Effect, Peer, Reply, Say
+from anafi_mav.services.plan_transfer import Changed, Commit, Effect, Peer, PlanKind, Reply, Say
 from anafi_mav.services.rally import RallyKind, Return
-from anafi_mav.services.service import Host, MessageHandler, Query, Service, client_of
+from anafi_mav.services.service import Host, MessageHandler, Service, client_of
 from anafi_mav.services.statustext import Severity
-from anafi_mav.services.stream import Stream, Times
-from anafi_mav.services.vehicle import Vehicle
 
 logger = logging.getLogger(__name__)
-
-NO_TOTAL = 0xFFFF
-"""`total` of a MISSION_CURRENT where there is no mission (common.xml)."""
 
 _ITEMS = (dialect.MAVLINK_MSG_ID_MISSION_ITEM, dialect.MAVLINK_MSG_ID_MISSION_ITEM_INT)
 
@@ -49,7 +44,8 @@ class PlanService(Service):
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
-        self._desk = PlanDesk([MissionKind(self._home_item, self._version), FenceKind(), RallyKind()])
+        self._mission = MissionKind(self._home_item, self._version)
+        self._desk = PlanDesk([self._mission, FenceKind(), RallyKind()])
         self._timer: asyncio.TimerHandle | None = None
 
     def capabilities(self) -> int:
@@ -60,31 +56,25 @@ class PlanService(Service):
         )
 
     def messages(self) -> Mapping[int, MessageHandler]:
-        return {
-            **dict.fromkeys(MESSAGES, self._receive),
-            dialect.MAVLINK_MSG_ID_MISSION_SET_CURRENT: lambda inbound: self._no_mission(),
-        }
-
-    def queries(self) -> Mapping[int, Query]:
-        return {dialect.MAV_CMD_DO_SET_MISSION_CURRENT: self._set_current}
-
-    def streams(self) -> Mapping[int, Stream]:
-        return {dialect.MAVLINK_MSG_ID_MISSION_CURRENT: Stream(self._mission_current, on_change=True, flavoured=True)}
+        return dict.fromkeys(MESSAGES, self._receive)
 
     def link_up(self) -> None:
         memory = self.host.memory
         for kind, transfer in self._desk.transfers.items():
             items = memory.plans.get(kind, ())
-            fault = transfer.kind.refusal if items else None
-            for number, item in enumerate(items):
-                fault = fault or transfer.kind.check_item(item)
-                if fault is not None:
-                    self.host.text(Severity.WARNING, f"{transfer.kind.name} in {memory.path}, item {number}: ignored")
-                    break
-            if fault is None and (fault := transfer.kind.check_plan(items)) is not None:
-                self.host.text(Severity.WARNING, f"{transfer.kind.name} in {memory.path}: ignored, {fault.reason}")
-            transfer.put(() if fault is not None else items)
-            self._take(kind, transfer.items)
+            wrong = self._wrong(transfer.kind, items)
+            if wrong is not None:
+                self.host.text(Severity.WARNING, f"{transfer.kind.name} in {memory.path}: ignored, {wrong}")
+            transfer.put(() if wrong is not None else items)
+            self._take(kind)
+
+    def _wrong(self, kind: PlanKind, items: Sequence[PlanItem]) -> str | None:
+        """Why a plan that was kept is not taken."""
+        for number, item in enumerate(items):
+            if (fault := kind.check_item(item)) is not None:
+                return f"item {number}: {fault.reason}"
+        fault = self._mission.examine(items) if kind is self._mission else kind.check_plan(items)
+        return None if fault is None else fault.reason
 
     def link_down(self) -> None:
         self._desk.reset()
@@ -127,6 +117,13 @@ class PlanService(Service):
         self.host.send(reply.message, reply.peer.channel)
 
     async def _store(self, commit: Commit) -> None:
+        mission = commit.plans.get(self._mission.mission_type)
+        if mission:
+            fault = await asyncio.to_thread(self._mission.examine, mission, commit.peer.flavour)
+            if fault is not None:
+                self.host.complain(f"Mission refused: {fault.reason}")
+                self._perform(self._desk.stored(commit, self.host.clock.monotonic(), fault))
+                return
         for kind, items in commit.plans.items():
             self.host.memory.put(kind, items)
         problem = await self.host.memory.save()
@@ -167,39 +164,23 @@ class PlanService(Service):
 
     def _changed(self, kind: int) -> None:
         """Another plan is in force: the vehicle goes by it, everybody is told."""
-        self._take(kind, self._desk.transfers[kind].items)
-        times = self.host.times()
-        self.host.send_by_flavour(lambda flavour: self._mission_current(self.host.vehicle, times.for_flavour(flavour)))
+        self._take(kind)
+        self.host.vehicle.mission.news()
 
-    def _take(self, kind: int, items: Sequence[PlanItem]) -> None:
-        vehicle = self.host.vehicle
-        if kind == FenceKind.mission_type:
-            if tuple(items) != vehicle.fence.items:
+    def _take(self, kind: int) -> None:
+        vehicle, transfer = self.host.vehicle, self._desk.transfers[kind]
+        items, identity = transfer.items, transfer.opaque_id
+        vehicle.plan_ids[kind] = identity
+        if kind == MissionKind.mission_type:
+            if identity != vehicle.mission.identity:
+                examined = self._mission.examined(items)
+                self.host.text(Severity.INFO, examined.words() if items else "No mission")
+                vehicle.mission.take(examined.neutral, identity)
+        elif kind == FenceKind.mission_type:
+            if items != vehicle.fence.items:
                 self.host.text(Severity.INFO, f"Fence: {summary(items)}" if items else "No fence")
             vehicle.fence.take(items)
         elif kind == RallyKind.mission_type:
-            if items and vehicle.rally.purpose is Return.HOME and tuple(items) != vehicle.rally.items:
+            if items and vehicle.rally.purpose is Return.HOME and items != vehicle.rally.items:
                 self.host.text(Severity.INFO, f"{len(items)} rally points kept and not used: RTL_TYPE says home")
             vehicle.rally.take(items)
-
-    def _mission_current(self, vehicle: Vehicle, times: Times) -> dialect.MAVLink_message:
-        """MISSION_CURRENT: whether there is a mission, and which plans there are."""
-        identities = [transfer.opaque_id for _, transfer in sorted(self._desk.transfers.items())]
-        total = len(self._desk.transfers[MissionKind.mission_type].items)
-        if total == 0:
-            return dialect.MAVLink_mission_current_message(
-                0, NO_TOTAL, dialect.MISSION_STATE_NO_MISSION, 0, *identities
-            )
-        return dialect.MAVLink_mission_current_message(
-            offset(times.flavour), total, dialect.MISSION_STATE_NOT_STARTED, 0, *identities
-        )
-
-    # What needs a mission, and what needs none.
-
-    def _no_mission(self) -> None:
-        self.host.complain("Current item refused: there is no mission")
-
-    def _set_current(self, inbound: Inbound, command: Command) -> int:
-        """MAV_CMD_DO_SET_MISSION_CURRENT."""
-        self._no_mission()
-        return dialect.MAV_RESULT_DENIED

@@ -36,6 +36,7 @@ from anafi_mav.services.maintenance import MaintenanceService
 from anafi_mav.services.manual_control import ManualControlService
 from anafi_mav.services.memory import Memory
 from anafi_mav.services.message_service import MessageService
+from anafi_mav.services.mission_service import MissionService
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.modes_service import ModesService
 from anafi_mav.services.node_status import NodeStatusService
@@ -68,6 +69,7 @@ SERVICES: tuple[type[Service], ...] = (
     LinkLossService,
     EventService,
     PlanService,
+    MissionService,
     FenceService,
     RallyService,
     OffboardService,

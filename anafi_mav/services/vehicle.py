@@ -32,6 +32,7 @@ from anafi_mav.services.height import HeightReference
 from anafi_mav.services.helm import Helm
 from anafi_mav.services.link_loss import LossPolicy
 from anafi_mav.services.manual_flight import ManualFlight
+from anafi_mav.services.mission_flight import MissionFlight
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.offboard_flight import OffboardFlight
 from anafi_mav.services.place import Place as Place
@@ -162,7 +163,10 @@ class Vehicle:
         self.offboard = OffboardFlight(self, clock)
         self.manual = ManualFlight(self, clock)
         self.follow = FollowFlight(self, clock)
-        self.helms: tuple[Helm, ...] = (self.offboard, self.manual, self.follow)
+        self.mission = MissionFlight(self)
+        self.plan_ids: dict[int, int] = {}
+        """Opaque ids of the plans that are in force, by MAV_MISSION_TYPE."""
+        self.helms: tuple[Helm, ...] = (self.offboard, self.manual, self.follow, self.mission)
         """Who can fly the drone for as long as somebody keeps telling them how; one of them at a time."""
 
     # What the vehicle is.
@@ -218,7 +222,7 @@ class Vehicle:
         if self.returning:
             return FlightMode.RETURN
         if state in _TAKING_OFF or (self._climbing and not self.on_ground):
-            return FlightMode.TAKEOFF
+            return FlightMode.MISSION if self.mission.flying else FlightMode.TAKEOFF
         if state in _AIRBORNE and self.drone.piloting.state.plan == PlayingState.PLAYING:
             return FlightMode.MISSION
         return self._selected
@@ -266,6 +270,8 @@ class Vehicle:
         modes |= {FlightMode.LAND, FlightMode.RETURN, FlightMode.OFFBOARD}
         if self.place is not None:
             modes.add(FlightMode.FOLLOW)
+        if self.mission.there:
+            modes.add(FlightMode.MISSION)
         return frozenset(modes)
 
     def prearm_problems(self) -> list[str]:
@@ -315,6 +321,8 @@ class Vehicle:
             height, _ = self._pending_takeoff
             self._forget_takeoff()
             self._start_background(self._take_off_and_report(height))
+        else:
+            self.mission.armed(client)
 
     async def disarm(self, *, force: bool) -> None:
         """Disarm on the ground. In the air only `force` with `allow_kill` does it: the motors stop, the drone falls."""
@@ -545,7 +553,7 @@ class Vehicle:
             case FlightMode.OFFBOARD:
                 await self.offboard.engage(client)
             case FlightMode.MISSION:
-                raise Refused("Mission refused: there is no mission")
+                await self.mission.engage(client)
             case FlightMode.TERMINATED:
                 await self.terminate()
             case FlightMode.FOLLOW:
@@ -564,11 +572,11 @@ class Vehicle:
         if state in _ON_GROUND and before is not None:
             self._armed = False
             self._forget_takeoff()
-            self._end_helms()
+            self._end_helms(self._ending_mission)
             self._end_climb()
             self._selected = FlightMode.HOLD
         elif state in _LANDING:
-            self._end_helms()
+            self._end_helms(self._ending_mission)
             self._end_climb()
         elif state in _TAKING_OFF and before in _ON_GROUND:
             self.height.take_off()
@@ -594,7 +602,7 @@ class Vehicle:
     def on_return(self) -> None:
         """The drone's return began, ended or changed: setpoints and the climb after a take-off never fight it."""
         if self.returning:
-            self._end_helms()
+            self._end_helms(self._ending_mission)
             self._end_climb()
         self._changed()
 
@@ -631,6 +639,11 @@ class Vehicle:
     def _end_helms(self, helm: Helm | None = None) -> list[asyncio.Task[None]]:
         """Nobody flies by setpoints or sticks any more, but for `helm`; tasks that are about to end."""
         return [task for one in self.helms if one is not helm for task in one.end()]
+
+    @property
+    def _ending_mission(self) -> Helm | None:
+        """The mission, where the landing or return that begins is its own."""
+        return self.mission if self.mission.ending else None
 
     def forget_mode(self) -> None:
         """What was chosen is over: until something else is, the vehicle holds."""

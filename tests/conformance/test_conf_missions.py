@@ -11,12 +11,299 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.mav import Client
-from support.plans import ACCEPTED, MISSION, UNSUPPORTED_FRAME, around
-from support.world import HOME, World, world
+from support.plans import ACCEPTED, MISSION, UNSUPPORTED_FRAME, Item, around, upload
+from support.world import ARMED, HOME, World, world
+
+from anafi_mav.mavlink import dialect as newer
 
 both = pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 
 PLACE = (HOME[0], HOME[1])
+
+
+MISSION_MODE = {"px4": 0x04040000, "ardupilot": 3}
+NOT_STARTED, ACTIVE, PAUSED, COMPLETE = 2, 3, 4, 5
+NAN = float("nan")
+
+
+def way(north: float, east: float, up: float, **more: float) -> Item:
+    """A way point so many m north and east of home, `up` above it."""
+    return Item(16, *around(PLACE, (north, east))[0], z=up, p4=NAN, frame=3, **more)  # type: ignore[arg-type]
+
+
+def takeoff(up: float) -> Item:
+    return Item(22, 0.0, 0.0, z=up, p4=NAN, frame=3)
+
+
+RTL, LAND = Item(20, 0.0, 0.0, frame=2), Item(21, 0.0, 0.0, p4=NAN, frame=3)
+
+ROUND = [takeoff(6.0), way(12.0, 0.0, 6.0), way(12.0, 15.0, 7.0), Item(93, 0.0, 0.0, p1=2.0, frame=2), RTL]
+"""Up, two way points, a wait, home."""
+
+
+def first(w: World) -> int:
+    """What the clients call the first item."""
+    return 1 if w.flavour == "ardupilot" else 0
+
+
+async def put(w: World, items: list[Item]) -> None:
+    """Upload a mission as clients of the flavour do, with home in front for ArduPilot's."""
+    listed = [Item(16, *HOME), *items] if first(w) else items
+    assert (await upload(w.client, listed, MISSION)).type == ACCEPTED
+
+
+async def start(w: World) -> None:
+    """From the ground, as the flavour's clients do it: PX4's by the mode, ArduPilot's by arming and MISSION_START."""
+    assert (await w.client.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)).result == dialect.MAV_RESULT_ACCEPTED
+    if first(w):
+        ack = await w.client.command(dialect.MAV_CMD_MISSION_START, 0, 0)
+    else:
+        ack = await w.client.command(dialect.MAV_CMD_DO_SET_MODE, 1, 4, 4)
+    assert ack.result == dialect.MAV_RESULT_ACCEPTED, ack
+
+
+def whole(message: Any) -> Any:
+    """The same message with the fields that pymavlink's own dialect does not have yet."""
+    (again,) = newer.MAVLink(None).parse_buffer(message.get_msgbuf())
+    return again
+
+
+def reached(w: World, since: int = 0) -> list[int]:
+    """The items that were told as reached, counted from 0."""
+    return [m.seq - first(w) for _, m in w.client.since(since, "MISSION_ITEM_REACHED")]
+
+
+async def state(
+    w: World, wanted: int, *, seq: int | None = None, since: int | None = None, timeout: float = 30.0
+) -> Any:
+    """Wait for a MISSION_CURRENT with a mission_state, and the current item counted from 0."""
+    return await w.client.wait(
+        "MISSION_CURRENT",
+        lambda m: whole(m).mission_state == wanted and seq in (None, m.seq - first(w)),
+        since=since,
+        timeout=timeout,
+    )
+
+
+def flown(w: World) -> list[str]:
+    """What the drone itself has begun, line by line of its files."""
+    return [entry.args["command"] for entry in w.drone.log if entry.name == "item"]
+
+
+async def mode(w: World, number: int, since: int | None = None) -> None:
+    await w.client.heartbeat(lambda beat: beat.custom_mode == number, since=since)
+
+
+async def said(w: World, words: str, since: int = 0) -> Any:
+    """Wait for a text with these words."""
+    return await w.client.wait("STATUSTEXT", lambda m: words in m.text, since=since)
+
+
+# Flown to the end.
+
+
+@both
+async def test_conf_049_073_a_mission_from_the_ground_to_its_end(flavour: str) -> None:
+    async with world(flavour=flavour, web=True) as w:
+        await put(w, ROUND)
+        await state(w, NOT_STARTED, seq=0, since=0)
+        mark = w.client.mark()
+        await start(w)
+        await mode(w, MISSION_MODE[flavour], since=mark)
+        for seq in (1, 2):
+            await state(w, ACTIVE, seq=seq, since=mark)
+        await said(w, "returns home", since=mark)  # what becomes of it without the gateway
+        end = await state(w, COMPLETE, since=mark)
+        assert whole(end).total == len(ROUND)
+        assert reached(w) == [0, 1, 2, 3, 4]
+        assert flown(w)[-3:] == ["waypoint", "delay", "return_to_launch"]
+        await mode(w, w.modes.returning, since=mark)
+        # It stays complete, and nothing of it is told again.
+        await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.idle, timeout=40.0)
+        await state(w, COMPLETE)
+        assert reached(w) == [0, 1, 2, 3, 4]
+
+
+@both
+@pytest.mark.parametrize("end", ["land", "hover"])
+async def test_conf_073_other_ends(flavour: str, end: str) -> None:
+    """One that lands is over when it lands; one without an end leaves the drone hovering at its last way point."""
+    async with world(flavour=flavour, web=True) as w:
+        await put(w, [takeoff(6.0), way(10.0, 5.0, 6.0), *([LAND] if end == "land" else [])])
+        mark = w.client.mark()
+        await start(w)
+        await state(w, COMPLETE, since=mark)
+        assert reached(w) == [0, 1, 2][: 3 if end == "land" else 2]
+        if end == "land":
+            await mode(w, w.modes.land, since=mark)
+            await w.client.heartbeat(lambda beat: not beat.base_mode & ARMED, since=mark, timeout=30.0)
+        else:
+            await mode(w, w.modes.idle, since=mark)
+            await settled(w, (10.0, 5.0, 6.0))
+        assert math.dist((w.drone.pose.north, w.drone.pose.east), (10.0, 5.0)) < 1.5
+
+
+async def test_conf_049_qgroundcontrols_order_the_mode_first_and_then_arm() -> None:
+    """SET_MODE while disarmed is shown within 1.3 s; arming begins it, another client's arming does not."""
+    async with world(web=True) as w:
+        other = await w.connect(254)
+        await put(w, ROUND)
+        mark = w.client.mark()
+        w.client.send(dialect.MAVLink_set_mode_message(1, 1, 0x04040000))
+        await w.client.heartbeat(lambda beat: beat.custom_mode == 0x04040000, since=mark, timeout=1.3)
+        assert (await other.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)).result == dialect.MAV_RESULT_ACCEPTED
+        assert (await other.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0)).result == dialect.MAV_RESULT_ACCEPTED
+        assert w.commands("common.Mavlink.Start") == []
+        w.client.send(dialect.MAVLink_set_mode_message(1, 1, 0x04040000))
+        await mode(w, 0x04040000)
+        assert (await w.client.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)).result == dialect.MAV_RESULT_ACCEPTED
+        await state(w, ACTIVE, seq=1, since=mark)
+        assert len(w.commands("common.Mavlink.Start")) == 1
+
+
+async def test_conf_049_a_mission_that_waits_for_arming_is_forgotten() -> None:
+    async with world(web=True, speed=1.0) as w:
+        await put(w, ROUND)
+        assert (await w.client.command(dialect.MAV_CMD_DO_SET_MODE, 1, 4, 4)).result == dialect.MAV_RESULT_ACCEPTED
+        await mode(w, 0x04040000)
+        await w.client.wait("STATUSTEXT", lambda m: "nobody armed" in m.text, timeout=12.0)
+        await mode(w, w.modes.hold)
+        assert (await w.client.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)).result == dialect.MAV_RESULT_ACCEPTED
+        assert (await w.client.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0)).result == dialect.MAV_RESULT_ACCEPTED
+        assert w.commands("common.Mavlink.Start") == []
+
+
+@both
+async def test_conf_049_refused_with_the_drones_reasons(flavour: str) -> None:
+    async with world(flavour=flavour, web=True) as w:
+        number = MISSION_MODE[flavour]
+        params = (1, number) if first(w) else (1, 4, 4)
+        ack = await w.client.command(dialect.MAV_CMD_DO_SET_MODE, *params)
+        assert ack.result == dialect.MAV_RESULT_TEMPORARILY_REJECTED
+        await said(w, "there is no mission")
+        await put(w, [takeoff(8.0), way(30.0, 0.0, 400.0)])
+        await w.take_off(5.0)
+        mark = w.client.mark()
+        ack = await w.client.command(dialect.MAV_CMD_DO_SET_MODE, *params)
+        assert ack.result == dialect.MAV_RESULT_DENIED
+        await said(w, f"item {1 + first(w)}: 400.0 m is above", since=mark)
+        await put(w, ROUND[:-1])
+        w.drone.faults.gps = False
+        await w.client.wait("GPS_RAW_INT", lambda m: m.fix_type < 3, timeout=10.0)
+        mark = w.client.mark()
+        ack = await w.client.command(dialect.MAV_CMD_MISSION_START, 0, 0)
+        assert ack.result == dialect.MAV_RESULT_TEMPORARILY_REJECTED
+        await said(w, "no GPS fix", since=mark)
+        assert flown(w) == [] == reached(w)
+
+
+# Stopped, and gone on with.
+
+
+@both
+async def test_conf_074_pause_and_resume_at_the_same_item(flavour: str) -> None:
+    async with world(flavour=flavour, web=True) as w:
+        await put(w, ROUND)
+        await start(w)
+        await state(w, ACTIVE, seq=2, since=0)
+        before, mark = reached(w), w.client.mark()
+        ack = await w.client.command(dialect.MAV_CMD_DO_PAUSE_CONTINUE, 0)
+        assert ack.result == dialect.MAV_RESULT_ACCEPTED
+        await state(w, PAUSED, seq=2, since=mark)
+        await mode(w, w.modes.hold, since=mark)
+        for _ in range(2):  # nothing goes on by itself
+            await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.hold, since=w.client.mark())
+        assert reached(w) == before
+        uploads = len(w.commands("common.Mavlink.Start"))
+        mark = w.client.mark()
+        ack = await w.client.command(dialect.MAV_CMD_DO_PAUSE_CONTINUE, 1)
+        assert ack.result == dialect.MAV_RESULT_ACCEPTED
+        await state(w, ACTIVE, seq=2, since=mark)
+        await mode(w, MISSION_MODE[flavour], since=mark)
+        await state(w, COMPLETE, since=mark)
+        assert reached(w) == [0, 1, 2, 3, 4]
+        starts = w.commands("common.Mavlink.Start")
+        assert len(starts) == uploads + 1
+        assert starts[-1].args["filepath"] == starts[0].args["filepath"], "the same file goes on"
+
+
+@both
+async def test_conf_074_paused_flown_elsewhere_and_resumed_by_the_mode(flavour: str) -> None:
+    """Hold, a goto, and mode Mission again: the mission goes on at the item that it was at."""
+    async with world(flavour=flavour, web=True) as w:
+        await put(w, ROUND)
+        await start(w)
+        await state(w, ACTIVE, seq=2, since=0)
+        assert (await w.client.command(192, -1, 1, 0)).result == dialect.MAV_RESULT_ACCEPTED
+        await state(w, PAUSED, seq=2)
+        x, y = around(PLACE, (5.0, 0.0))[0]
+        ack = await w.client.command(192, -1, 1, 0, frame=6, x=x, y=y, z=6.0)
+        assert ack.result == dialect.MAV_RESULT_ACCEPTED
+        await settled(w, (5.0, 0.0, 6.0))
+        await state(w, PAUSED, seq=2)
+        mark = w.client.mark()
+        params = (1, 3) if first(w) else (1, 4, 4)
+        assert (await w.client.command(dialect.MAV_CMD_DO_SET_MODE, *params)).result == dialect.MAV_RESULT_ACCEPTED
+        await state(w, ACTIVE, seq=2, since=mark)
+        await state(w, COMPLETE, since=mark)
+        assert reached(w) == [0, 1, 2, 3, 4]
+
+
+@both
+@pytest.mark.parametrize("order", ["land", "return", "goto"])
+async def test_conf_074_whatever_takes_over_pauses_it(flavour: str, order: str) -> None:
+    async with world(flavour=flavour, web=True) as w:
+        await put(w, ROUND)
+        await start(w)
+        await state(w, ACTIVE, seq=1, since=0)
+        await w.drone.wait_log(lambda e: e.name == "item" and e.args["command"] == "waypoint", timeout=20.0)
+        mark = w.client.mark()
+        if order == "land":
+            ack = await w.client.command(dialect.MAV_CMD_NAV_LAND)
+        elif order == "return":
+            ack = await w.client.command(dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH)
+        else:
+            x, y = around(PLACE, (0.0, -15.0))[0]
+            ack = await w.client.command(192, -1, 1, 0, frame=6, x=x, y=y, z=6.0)
+        assert ack.result == dialect.MAV_RESULT_ACCEPTED, ack
+        await state(w, PAUSED, since=mark)
+        if order == "goto":
+            await settled(w, (0.0, -15.0, 6.0))
+        elif order == "land":
+            await w.client.heartbeat(lambda beat: not beat.base_mode & ARMED, since=mark, timeout=40.0)
+        else:
+            await mode(w, w.modes.returning, since=mark)
+        assert set(reached(w)) <= {0, 1}
+        await state(w, PAUSED)
+        assert len(w.commands("common.Mavlink.Start")) == 1
+
+
+# The current item.
+
+
+@both
+async def test_conf_072_the_current_item(flavour: str) -> None:
+    """By message and by command, before the start and in the air; the drone goes there, and leaves out the others."""
+    async with world(flavour=flavour, web=True) as w:
+        await put(w, ROUND)
+        mark = w.client.mark()
+        w.client.send(dialect.MAVLink_mission_set_current_message(1, 1, 2 + first(w)))
+        await state(w, NOT_STARTED, seq=2, since=mark)
+        assert (await w.client.command(224, 1 + first(w), 0)).result == dialect.MAV_RESULT_ACCEPTED
+        await state(w, NOT_STARTED, seq=1)
+        for wrong in (len(ROUND) + first(w), 99):
+            assert (await w.client.command(224, wrong, 0)).result == dialect.MAV_RESULT_DENIED
+        mark = w.client.mark()
+        w.client.send(dialect.MAVLink_mission_set_current_message(1, 1, 77))
+        await said(w, "there is no item 77", since=mark)
+        await start(w)
+        await state(w, ACTIVE, seq=1, since=mark)
+        await w.drone.wait_log(lambda e: e.name == "item" and e.args["command"] == "waypoint", timeout=20.0)
+        mark = w.client.mark()
+        assert (await w.client.command(224, 3 + first(w), 0)).result == dialect.MAV_RESULT_ACCEPTED
+        await state(w, ACTIVE, seq=3, since=mark)
+        await state(w, COMPLETE, since=mark)
+        assert reached(w) == [3, 4], "what was not flown is not reached"
 
 
 # Items that are orders.

@@ -19,6 +19,9 @@ from support.mav import Client
 
 HOME = (48.8789, 2.3677, 35.0)
 
+WEB_PORT = 8080
+"""Of a drone's web server; each drone has an address of its own."""
+
 HOLD, LAND, RETURN, TAKEOFF = 0x03040000, 0x06040000, 0x05040000, 0x02040000
 POSITION, OFFBOARD = 0x00030000, 0x00060000
 ARMED = dialect.MAV_MODE_FLAG_SAFETY_ARMED
@@ -121,18 +124,20 @@ async def world(
     also: str | None = None,
     model: str = "4k",
     drone_address: str | None = None,
+    web: bool = False,
 ) -> AsyncIterator[World]:
     """One simulated drone, one gateway with a TCP endpoint, and its clients, connected and ready.
 
     With `flavour` the endpoint shows that autopilot. `also` is the flavour of a second endpoint, at port 5761.
-    A drone at the same `drone_address` as an earlier one has the same serial number.
+    With `web` the drone has its web server, which takes flight plans. A drone at the same `drone_address` as an earlier
+    one has the same serial number.
     """
     drone_address, address = drone_address or loopback(), loopback()
     spec = DroneSpec(
         model=model,
         address=drone_address,
         home=HOME,
-        http_port=None,
+        http_port=WEB_PORT if web else None,
         telemetry_rate=telemetry_rate,
         skycontroller=skycontroller,
     )
@@ -141,7 +146,7 @@ async def world(
             f"tcpin://{address}:5760?flavour={flavour}",
             *([f"tcpin://{address}:5761?flavour={also}"] if also else []),
         ),
-        drones=(DroneConfig(name="alpha", sysid=sysid, address=drone_address),),
+        drones=(DroneConfig(name="alpha", sysid=sysid, address=drone_address, http_port=WEB_PORT),),
         allow_kill=allow_kill,
     )
     flavours.note(*config.endpoints)

@@ -8,7 +8,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 PAYLOAD = "camera, gimbal and media over MAVLink"
-MISSIONS = "missions over MAVLink"
 
 
 class Reach(NamedTuple):
@@ -26,6 +25,7 @@ _ANAFI = "conformance/test_anafi_messages.py::"
 _MAINTENANCE = "conformance/test_conf_maintenance.py::"
 _TWIN = "conformance/test_conf_params.py::test_a_twin_and_its_native_are_one_value"
 _PARAMETER = "conformance/test_conf_params.py::test_native_settings_reach_the_drone"
+_MISSIONS = "conformance/test_conf_missions.py::"
 _SAFETY = "conformance/test_safety.py::"
 
 REACHED: dict[str, Reach] = {
@@ -101,10 +101,16 @@ REACHED: dict[str, Reach] = {
     "drone/reboot": Reach("`MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN`", _MAINTENANCE + "test_conf_148_reboot"),
     "drone/rth": Reach("`MAV_CMD_NAV_RETURN_TO_LAUNCH`, mode Return", _FLIGHT + "test_conf_025_return"),
     "drone/takeoff": Reach("`MAV_CMD_NAV_TAKEOFF`, mode Takeoff", _FLIGHT + "test_conf_021_takeoff_relative"),
-    "flightplan/pause": Reach("", waits=MISSIONS),
-    "flightplan/start": Reach("", waits=MISSIONS),
-    "flightplan/stop": Reach("", waits=MISSIONS),
-    "flightplan/upload": Reach("", waits=MISSIONS),
+    "flightplan/pause": Reach(
+        "`MAV_CMD_DO_PAUSE_CONTINUE`, mode Hold", _MISSIONS + "test_conf_074_pause_and_resume_at_the_same_item"
+    ),
+    "flightplan/start": Reach(
+        "mode Mission, `MAV_CMD_MISSION_START`", _MISSIONS + "test_conf_049_073_a_mission_from_the_ground_to_its_end"
+    ),
+    "flightplan/stop": Reach("`MAV_CMD_DO_SET_MISSION_CURRENT`", _MISSIONS + "test_conf_072_the_current_item"),
+    "flightplan/upload": Reach(
+        "mission protocol", "conformance/test_conf_plans.py::test_conf_047_upload_and_download_are_equal"
+    ),
     "gimbal/calibrate": Reach(
         "`MAV_CMD_PREFLIGHT_CALIBRATION`, `MAV_CMD_GIMBAL_REQUEST_AXIS_CALIBRATION`",
         _MAINTENANCE + "test_conf_130_the_gimbal",

@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-from seed_mavlink import MISSIONS, PAYLOAD, REACHED
+from seed_mavlink import PAYLOAD, REACHED
 from seed_rows import ROWS
 
 TESTS = Path(__file__).parents[1]
@@ -31,6 +31,5 @@ def test_a_row_is_reached_or_waits_for_its_issue(name: str) -> None:
         assert reach.mavlink
         assert function in functions(file)
     else:
-        camera_or_plan = name.partition("/")[0] in ("camera", "gimbal", "storage", "flightplan")
-        assert camera_or_plan
-        assert reach.waits in (PAYLOAD, MISSIONS) or name == "storage/download_folder"
+        assert name.partition("/")[0] in ("camera", "gimbal", "storage")
+        assert reach.waits == PAYLOAD or name == "storage/download_folder"

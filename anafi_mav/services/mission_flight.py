@@ -1,0 +1,553 @@
+"""Flies a mission: the shell around the cores `mission_progress` and `plans.translate`.
+
+What the drone can fly by itself it flies from a file (`Leg`); what it cannot, the gateway flies between two files
+(`Step`). The drone says which line it has executed, and nothing else counts. Whatever takes the drone over stops the
+mission, and nothing but a client's word lets it go on.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import functools
+import hashlib
+from collections.abc import Callable, Coroutine, Hashable, Sequence
+from typing import TYPE_CHECKING, Any
+
+from anafi_mav.drone import events
+from anafi_mav.drone.events import FlyingState, ForcedLandingReason, Message, PlayingState
+from anafi_mav.errors import AnafiMavError, CommandRejected, LinkLost, PlanError
+from anafi_mav.plans.plan import Item
+from anafi_mav.plans.translate import Cursor, Leg, Start, Step, translate
+from anafi_mav.services.mission_path import check_path, lines_of
+from anafi_mav.services.mission_progress import Progress, State
+from anafi_mav.services.mission_record import Record
+from anafi_mav.services.mission_steps import fly_step
+from anafi_mav.services.mission_words import refusal
+from anafi_mav.services.modes import FlightMode
+from anafi_mav.services.refusal import Refused
+from anafi_mav.services.statustext import Severity
+from anafi_mav.units import DEG_PER_RAD
+
+if TYPE_CHECKING:
+    from anafi_mav.services.vehicle import Vehicle
+
+ARM_WAIT = 10.0
+"""s that a mission waits for somebody to arm: QGroundControl chooses the mode first and arms when it is shown."""
+
+END_WAIT = 2.0
+"""s within which a drone whose plan has ended with a landing or a return has begun it."""
+
+MAX_FILES = 16
+"""Files on the drone that are remembered; it keeps more, and one that is forgotten is uploaded again."""
+
+_LANDING = (FlyingState.LANDING, FlyingState.EMERGENCY_LANDING)
+
+
+class MissionFlight:
+    """The mission of one vehicle; its `Helm` while it is flown."""
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        self.progress = Progress()
+        self.identity = 0
+        """The opaque id of the mission."""
+        self.news: Callable[[], None] = lambda: None
+        """Says that MISSION_CURRENT has changed."""
+        self.reached: Callable[[int], None] = lambda item: None
+        """Says that an item is done."""
+        self.say: Callable[[Severity, Callable[[int], str]], None] = lambda severity, text: None
+        """A text to everybody; it is made from what they call item 0."""
+        self.first_number: Callable[[Hashable], int] = lambda client: 0
+        """What a client calls item 0."""
+        self.spawn: Callable[[Coroutine[Any, Any, None]], asyncio.Task[None]] | None = None
+        """Runs something until the link goes down."""
+        self.remember: Callable[[Record | None], None] = lambda record: None
+        """Keeps what is needed to know the drone's plan again."""
+        self._vehicle = vehicle
+        self._parts: list[Leg | Step] = []
+        """What is flown, and what follows."""
+        self._rest: Cursor | None = None
+        self._next: int | None = None
+        """The item after the part that is flown, where that is not flown without another word."""
+        self._uid = ""
+        """Of the file that the drone flies, or flew last."""
+        self._whole: tuple[Leg, str] | None = None
+        """The file that was uploaded last, and its name."""
+        self._starting: tuple[Leg, int] | None = None
+        """What the drone is asked to begin, and after which line."""
+        self._files: dict[bytes, str] = {}
+        """Files on the drone, by what is in them."""
+        self._pending: Hashable = None
+        """Who has chosen the mission on the ground and has to arm now."""
+        self._pending_timer: asyncio.TimerHandle | None = None
+        self._beginning = False
+        """Taken over by ourselves."""
+        self._running: asyncio.Task[None] | None = None
+        """What the gateway does between two files."""
+        self._end_timer: asyncio.TimerHandle | None = None
+
+    # What clients ask for.
+
+    def take(self, items: Sequence[Item], identity: int) -> None:
+        """Another mission was uploaded, or none any more. One that is flown is stopped: it is not the mission now."""
+        if identity == self.identity:
+            return
+        self.identity = identity
+        if self.progress.state is State.ACTIVE:
+            self._stop("another mission was uploaded" if items else "it was cleared")
+            self._suspend()
+            self._vehicle.select(FlightMode.HOLD)
+        self.progress.take(items)
+        self._parts, self._rest, self._next = [], None, None
+        self._forget_pending()
+        self.remember(None)
+
+    async def engage(self, client: Hashable, item: int | None = None) -> None:
+        """Mode Mission begins, or goes on where it was stopped, or at an item; returns when the drone flies it.
+
+        On the ground and disarmed it waits until this client arms. Raises `Refused`, or what the drone refused.
+        """
+        progress, vehicle = self.progress, self._vehicle
+        if progress.state is State.NONE:
+            raise Refused("Mission refused: there is no mission")
+        if progress.state is State.ACTIVE and item is None:
+            return  # it is flown, and goes on without a jolt
+        self._require_freedom()
+        if vehicle.armed:
+            await self._begin(progress.first if item is None else item, self.first_number(client))
+            return
+        if problems := vehicle.prearm_problems():
+            raise Refused("PreArm: " + "; ".join(problems))
+        await vehicle.take_over()
+        vehicle.select(FlightMode.MISSION, self)
+        self._pending = client
+        self._pending_timer = asyncio.get_running_loop().call_later(ARM_WAIT, self._lapsed)
+
+    async def choose(self, client: Hashable, item: int) -> None:
+        """Make an item the current one; a mission that is flown goes on there."""
+        if self.progress.state is State.NONE:
+            raise Refused("Current item refused: there is no mission")
+        if not 0 <= item < len(self.progress.items):
+            number = item + self.first_number(client)
+            raise Refused(f"Current item refused: there is no item {number}", lasting=True)
+        if self.progress.state is State.ACTIVE:
+            await self.engage(client, item)
+        else:
+            self.progress.choose(item)
+            self.news()
+
+    def armed(self, client: Hashable) -> None:
+        """A client has armed: what waited for that begins."""
+        if self._pending is not None and self._pending == client:
+            self._forget_pending()
+            self._run(self._begin_and_report(self.first_number(client)))
+
+    @property
+    def there(self) -> bool:
+        """There is a mission."""
+        return self.progress.state is not State.NONE
+
+    @property
+    def flying(self) -> bool:
+        """It is flown."""
+        return self.progress.state is State.ACTIVE
+
+    @property
+    def paused(self) -> bool:
+        """It was begun and stopped."""
+        return self.progress.state is State.PAUSED
+
+    @property
+    def ending(self) -> bool:
+        """A landing or a return that begins now is the plan's own."""
+        return self.progress.ending
+
+    # The beginning.
+
+    def _require_freedom(self) -> None:
+        vehicle = self._vehicle
+        if vehicle.flying_state in _LANDING:
+            raise Refused("Mission refused: the drone is landing")
+        if vehicle.returning_by_itself:
+            raise Refused("Mission refused: the drone returns home by itself")
+        if vehicle.drone.controller.pilot_flies:
+            raise Refused("Mission refused: the pilot at the Skycontroller flies")
+        if not vehicle.in_air and not vehicle.on_ground:
+            raise Refused("Mission refused: the drone is neither on the ground nor flying yet")
+
+    def _start(self) -> Start:
+        """Where the flight begins."""
+        vehicle = self._vehicle
+        state, place, amsl = vehicle.drone.piloting.state, vehicle.place, vehicle.height.ato(0.0)
+        if place is None:
+            raise Refused("Mission refused: no GPS fix")
+        if vehicle.in_air and state.altitude is None:
+            raise Refused("Mission refused: the drone's height is not known")
+        return Start(
+            place.latitude,
+            place.longitude,
+            (state.altitude or 0.0) if vehicle.in_air else 0.0,
+            flying=vehicle.in_air,
+            takeoff_amsl=None if amsl is None else -amsl,
+            heading=0.0 if state.attitude is None else state.attitude.yaw * DEG_PER_RAD % 360.0,
+        )
+
+    def _resumes(self, item: int) -> bool:
+        """The drone has the rest of what is to be flown in its memory."""
+        progress, plan = self.progress, self._vehicle.drone.flight_plan.state
+        paused = plan.playing == PlayingState.PAUSED and plan.uid == self._uid
+        whole = progress.leg is not None and self._next is None
+        return progress.state is State.PAUSED and paused and whole and item == progress.current
+
+    async def _begin(self, item: int, number: int) -> None:
+        """Fly from an item on. Nothing is disturbed before all is known to be good. `number` is of the first item."""
+        vehicle, progress, plan = self._vehicle, self.progress, self._vehicle.drone.flight_plan
+        items, resumes, uid = progress.items, self._resumes(item), self._uid
+        if resumes:
+            parts, rest, line = self._parts, self._rest, progress.line
+        else:
+            parts, rest, line = *await self._translated(item, number), -1
+        await check_path(vehicle, parts, line, number)
+        if not resumes and isinstance(parts[0], Leg):
+            parts[0], uid, line = await self._file(parts[0])
+        self._beginning = True
+        try:
+            await vehicle.take_over()
+            if vehicle.in_air:
+                await vehicle.drone.piloting.stop()
+                await vehicle.drone.piloting.cancel_return_home()
+            if not resumes and plan.state.playing not in (None, PlayingState.STOPPED):
+                await plan.stop()
+        finally:
+            self._beginning = False
+        self._require_freedom()
+        if progress.items is not items or not vehicle.armed:
+            raise Refused("Mission refused: something else has happened meanwhile")
+        vehicle.select(FlightMode.MISSION, self)
+        self._parts, self._rest = parts, rest
+        if not resumes:
+            self._next = None
+        head = parts[0]
+        try:
+            if isinstance(head, Leg):
+                await self._play(head, uid, line)
+            else:
+                progress.fly(head.item)
+                self._run(self._go_on())
+        except BaseException:
+            if progress.state is not State.ACTIVE:
+                vehicle.select(FlightMode.HOLD)
+            raise
+        self._announce(resumes)
+
+    async def _translated(self, first: int | Cursor, number: int) -> tuple[list[Leg | Step], Cursor | None]:
+        """What is flown from an item on, and how it goes on after that."""
+        start, version = self._start(), self._vehicle.drone.flight_plan.version
+        try:
+            flight = await asyncio.to_thread(translate, self.progress.items, 1 if version == 1 else 2, start, first)
+        except PlanError as error:
+            where = "" if error.item is None else f"item {error.item + number}: "
+            raise Refused(f"Mission refused: {where}{error.problem}") from error
+        if not flight.parts:
+            raise Refused("Mission refused: nothing of it is left to fly")
+        return [*flight.parts], flight.rest
+
+    async def _file(self, leg: Leg) -> tuple[Leg, str, int]:
+        """The file on the drone that begins with this leg, its name, and the line before the leg.
+
+        An Ai begins in the middle of a file that it has; the others, and where something was set before that holds
+        still, get one of their own.
+        """
+        plan = self._vehicle.drone.flight_plan
+        if self._whole is not None and plan.starts_anywhere:
+            whole, uid = self._whole
+            line = len(whole.origins) - len(leg.origins) - 1
+            if line >= 0 and lines_of(whole)[line + 1 :] == lines_of(leg) and await self._has(uid):
+                return whole, uid, line
+        digest = hashlib.sha256(leg.content).digest()
+        uid = self._files.pop(digest, "")
+        if not uid or not await self._has(uid):
+            uid = await plan.upload(leg.content)
+        self._files[digest] = uid
+        while len(self._files) > MAX_FILES:
+            del self._files[next(iter(self._files))]
+        self._whole = leg, uid
+        return leg, uid, -1
+
+    async def _has(self, uid: str) -> bool:
+        try:
+            await self._vehicle.drone.flight_plan.get(uid)
+        except CommandRejected:
+            return False
+        return True
+
+    async def _play(self, leg: Leg, uid: str, line: int) -> None:
+        """Begin a file, or go on with it; returns when the drone flies it."""
+        plan = self._vehicle.drone.flight_plan
+        goes_on = plan.state.returns_on_disconnect is False if plan.starts_anywhere else None
+        self._uid, self._starting = uid, (leg, line)
+        try:
+            await plan.start(uid, line + 1 if plan.starts_anywhere else 0, continue_on_disconnect=goes_on)
+            if self._starting is not None:
+                self.progress.begin(leg, line)
+        except CommandRejected as error:
+            raise CommandRejected(refusal(plan.state, error)) from error
+        finally:
+            self._starting = None
+        self._keep()
+        self.news()
+
+    async def _begin_and_report(self, number: int) -> None:
+        """The beginning that waited for arming: its command was answered long ago, so failures are texts."""
+        try:
+            await self._begin(self.progress.first, number)
+        except AnafiMavError as error:
+            self._vehicle.text(Severity.ERROR, str(error))
+
+    def _announce(self, resumes: bool) -> None:
+        """What is flown, and what happens to it without the gateway."""
+        progress, stepped = self.progress, len(self._parts) > 1 or self._rest is not None
+        stepped = stepped or isinstance(self._parts[0], Step)
+        returns = self._vehicle.drone.flight_plan.state.returns_on_disconnect
+        alone = {None: "does as it is set", True: "returns home", False: "flies on"}[returns]
+        if stepped and returns is not True:
+            alone = "flies to the end of its file and hovers"
+        verb, current = "goes on" if resumes else "begins", progress.current
+        self.say(
+            Severity.INFO,
+            lambda first: f"Mission {verb} at item {current + first}; without link or gateway the drone {alone}",
+        )
+
+    # From part to part.
+
+    async def _go_on(self) -> None:
+        """Fly what follows: the steps that come next, and then the file behind them."""
+        progress = self.progress
+        try:
+            while self._parts or self._rest is not None:
+                if not self._parts:
+                    assert self._rest is not None
+                    rest, self._rest = self._rest, None
+                    self._parts, self._rest = await self._translated(rest, 0)
+                    await check_path(self._vehicle, self._parts, -1, 0)
+                head = self._parts[0]
+                if isinstance(head, Leg):
+                    leg, uid, line = await self._file(head)
+                    self._parts[0] = leg
+                    await self._play(leg, uid, line)
+                    return  # it says itself when it ends
+                progress.fly(head.item)
+                self.news()
+                await fly_step(self._vehicle, progress.items[head.item])
+                for item in head.done:
+                    self.reached(item)
+                del self._parts[0]
+        except AnafiMavError as error:
+            self._break_off(str(error))
+        else:
+            self._finish()
+
+    def _leg_over(self) -> None:
+        """The drone has flown a whole file."""
+        del self._parts[:1]
+        if self._next is not None:
+            following, self._next = self._next, None
+            self.progress.current = following
+            self._break_off("after a lost link it does not go on by itself")
+            self.progress.choose(following)
+            self.news()
+        elif self._parts or self._rest is not None:
+            self._run(self._go_on())
+        else:
+            self._finish()
+
+    def _finish(self) -> None:
+        self.progress.finish()
+        self.remember(None)
+        self.say(Severity.INFO, lambda first: "Mission complete")
+        self._vehicle.select(FlightMode.HOLD)
+        self.news()
+
+    def _break_off(self, why: str) -> None:
+        """It does not go on, and nobody asked for that."""
+        self._stop(why)
+        self._vehicle.select(FlightMode.HOLD)
+
+    def _stop(self, why: str) -> None:
+        progress = self.progress
+        progress.stop()
+        current, severity = progress.current, Severity.WARNING if why else Severity.INFO
+        reason = f": {why}" if why else ""
+        if not self._beginning:
+            self.say(severity, lambda first: f"Mission paused at item {current + first}{reason}")
+        self._cancel_end_timer()
+        self._keep()
+        self.news()
+
+    def _run(self, work: Coroutine[Any, Any, None]) -> None:
+        assert self.spawn is not None, "set by the service, without which nobody asks for a mission"
+        task = self._running = self.spawn(work)
+
+        def done(ended: asyncio.Task[None]) -> None:
+            if self._running is ended:
+                self._running = None
+
+        task.add_done_callback(done)
+
+    # What the drone says.
+
+    def on_event(self, message: Message) -> None:
+        """The drone told of its plan."""
+        match message:
+            case events.MavlinkFilePlayingStateChanged():
+                self._on_playing(message)
+            case events.MissionItemExecuted():
+                self._executed(message.idx)
+            case events.WaypointSkipped():
+                item = self.progress.skip(message.item)
+                if item is not None:
+                    self.say(Severity.WARNING, lambda first: f"Mission: item {item + first} was out of reach")
+
+    def _on_playing(self, message: events.MavlinkFilePlayingStateChanged) -> None:
+        progress = self.progress
+        if message.state == PlayingState.PLAYING:
+            if self._starting is not None:
+                (leg, line), self._starting = self._starting, None
+                progress.begin(leg, line)
+                self.news()
+            elif message.filepath != self._uid:
+                if progress.state is State.ACTIVE:
+                    self._break_off("the drone flies another plan")
+            elif progress.state is State.PAUSED and progress.leg is not None:
+                # Not by us, but it flies, and who looks at the mission has to see that.
+                self._vehicle.select(FlightMode.MISSION, self)
+                progress.begin(progress.leg, progress.line)
+                self.say(Severity.NOTICE, lambda first: "Mission goes on: somebody else has continued it")
+                self.news()
+        elif self._starting is None and progress.state is State.ACTIVE and progress.leg is not None:
+            if progress.leg_done:
+                self._leg_over()
+            elif progress.ending and progress.at_last_line and message.state == PlayingState.STOPPED:
+                self._cancel_end_timer()
+                late = functools.partial(self._look_for_end, last=True)
+                self._end_timer = asyncio.get_running_loop().call_later(END_WAIT, late)
+                self._look_for_end()
+            else:
+                self._break_off("the drone has stopped it")
+
+    def _executed(self, line: int) -> None:
+        done = self.progress.executed(line)
+        for item in done:
+            self.reached(item)
+        if done:
+            self._keep()
+        self.news()
+
+    def on_vehicle(self) -> None:
+        """Landing, return or flying state have changed."""
+        if self._end_timer is not None:
+            self._look_for_end()
+
+    def _look_for_end(self, *, last: bool = False) -> None:
+        """The plan's last line lands or returns, and the drone has not said that it has executed it: has it begun?
+
+        A landing or a return of another cause is none of the mission's.
+        """
+        vehicle, progress = self._vehicle, self.progress
+        forced = vehicle.drone.alerts.state.forced_landing not in (None, ForcedLandingReason.NONE)
+        down = vehicle.flying_state in (FlyingState.LANDING, FlyingState.LANDED)
+        if progress.at_last_line and not forced and (down or (vehicle.returning and not vehicle.returning_by_itself)):
+            self._cancel_end_timer()
+            self._executed(progress.line + 1)
+            self._leg_over()
+        elif last:
+            self._break_off("the drone has stopped it")
+
+    # Helm.
+
+    def end(self) -> list[asyncio.Task[None]]:
+        """Something else flies now: the mission is paused."""
+        self._forget_pending()
+        ended = []
+        if self._running is not None and self._running is not asyncio.current_task():
+            self._running.cancel()
+            ended.append(self._running)
+            self._running = None
+        if self.progress.state is State.ACTIVE:
+            self._stop("")
+            self._suspend()
+        return ended
+
+    def _suspend(self) -> None:
+        """The drone is not to fly its file any more. A landing or a return of its own is not disturbed."""
+        vehicle = self._vehicle
+        if vehicle.flying_state not in _LANDING and not vehicle.returning:
+            with contextlib.suppress(LinkLost):
+                vehicle.drone.flight_plan.suspend()
+
+    def _lapsed(self) -> None:
+        self._forget_pending()
+        self._vehicle.select(FlightMode.HOLD)
+        self._vehicle.text(Severity.WARNING, "Mission not begun: nobody armed")
+
+    def _forget_pending(self) -> None:
+        self._pending = None
+        if self._pending_timer is not None:
+            self._pending_timer.cancel()
+            self._pending_timer = None
+
+    def _cancel_end_timer(self) -> None:
+        if self._end_timer is not None:
+            self._end_timer.cancel()
+            self._end_timer = None
+
+    # The link.
+
+    def link_down(self) -> None:
+        """The drone may fly on with the file that it has. What the gateway flies itself ends here."""
+        self._forget_pending()
+        self._cancel_end_timer()
+        self._starting, self._running = None, None
+        following = self._parts[1:]
+        if following:
+            self._next = following[0].item if isinstance(following[0], Step) else following[0].origins[0]
+        elif self._rest is not None:
+            self._next = self._rest.item
+        self._parts, self._rest = self._parts[:1], None
+        if self.progress.state is State.ACTIVE:
+            self.progress.stop()
+
+    def link_up(self, record: Record | None) -> None:
+        """The drone is back, or it is another gateway's: is it our mission that it flies?"""
+        progress, plan = self.progress, self._vehicle.drone.flight_plan.state
+        if progress.leg is None and record is not None and record.mission == self.identity:
+            leg = record.leg
+            if plan.uid != record.uid or any(item >= len(progress.items) for item in leg.origins):
+                return
+            self._uid, self._parts, self._next = record.uid, [leg], record.next
+            progress.begin(leg, record.line)
+            progress.stop()
+        if progress.state is not State.PAUSED or progress.leg is None or plan.uid != self._uid:
+            return
+        if plan.playing == PlayingState.PLAYING:
+            progress.begin(progress.leg, progress.line)
+            self._vehicle.select(FlightMode.MISSION, self)
+            current = progress.current
+            self.say(
+                Severity.NOTICE, lambda first: f"Mission: the drone flies it, at item {current + first} or a later one"
+            )
+        self.news()
+
+    def _keep(self) -> None:
+        """Remember what the drone flies, so that another run of the gateway knows it again."""
+        leg = self.progress.leg
+        if leg is not None:
+            following = self._parts[1] if len(self._parts) > 1 else None
+            after = self._next
+            if isinstance(following, Step):
+                after = following.item
+            elif following is not None:
+                after = following.origins[0]
+            elif self._rest is not None:
+                after = self._rest.item
+            self.remember(Record.of(self.identity, self._uid, leg, self.progress.line, after))

@@ -1,0 +1,77 @@
+"""Where the files of a mission lead, and whether the drone may fly there: what is judged is what is flown."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from anafi_mav.mavlink import dialect
+from anafi_mav.plans.translate import Leg, Step
+from anafi_mav.services.fence_watch import OutsideFence
+from anafi_mav.services.place import Place
+from anafi_mav.services.refusal import Refused
+
+if TYPE_CHECKING:
+    from anafi_mav.services.vehicle import Vehicle
+
+BREATH = 20
+"""Way points after which others get their turn: a large polygon takes a while."""
+
+_COMMAND, _LATITUDE, _LONGITUDE, _HEIGHT = 3, 8, 9, 10
+"""Columns of a line (arsdk.md §3.3, Parrot's flight plan page)."""
+
+
+@dataclass(frozen=True)
+class WayPoint:
+    """One that a file leads to."""
+
+    item: int
+    """Of the mission."""
+    place: Place
+    ato: float
+    """m above the take-off point."""
+
+
+def lines_of(leg: Leg) -> list[str]:
+    """The lines of a file without its first and without their numbers."""
+    return [line.split("\t", 1)[-1] for line in leg.content.decode().splitlines()[1:]]
+
+
+def way_points(leg: Leg, after: int = -1) -> Iterator[WayPoint]:
+    """Where the lines after one of them lead to. All heights are above take-off: the translation writes no others."""
+    lines = leg.content.decode().splitlines()[1:]
+    for line, item in zip(lines[after + 1 :], leg.origins[after + 1 :], strict=False):
+        columns = line.split("\t")
+        if int(columns[_COMMAND]) == dialect.MAV_CMD_NAV_WAYPOINT:
+            place = Place(float(columns[_LATITUDE]), float(columns[_LONGITUDE]))
+            yield WayPoint(item, place, float(columns[_HEIGHT]))
+
+
+async def check_path(vehicle: Vehicle, parts: Sequence[Leg | Step], after: int, number: int) -> None:
+    """Raise `Refused` when a way point, or the straight way to it, is where the drone may not be.
+
+    `after` is the line of the first file after which it is flown, `number` what the first item is called.
+    """
+    where, seen = vehicle.place, 0
+    for part in parts:
+        if isinstance(part, Leg):
+            for point in way_points(part, after):
+                _check(vehicle, where, point, number)
+                where, seen = point.place, seen + 1
+                if seen % BREATH == 0:
+                    await asyncio.sleep(0)
+        after = -1
+
+
+def _check(vehicle: Vehicle, start: Place | None, point: WayPoint, number: int) -> None:
+    ceiling = vehicle.drone.piloting.state.max_altitude
+    try:
+        vehicle.check_place(point.place, start=start)
+        if ceiling is not None and point.ato > ceiling.current:
+            raise Refused(f"{point.ato:.1f} m is above the drone's ceiling of {ceiling.current:g} m", lasting=True)
+        vehicle.fence.check_height(point.ato)
+    except (Refused, OutsideFence) as error:
+        reason = str(error).removeprefix("Goto refused: ")
+        raise Refused(f"Mission refused: item {point.item + number}: {reason}", lasting=True) from error

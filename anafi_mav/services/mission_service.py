@@ -1,0 +1,174 @@
+"""Missions as clients order and follow them: mode and commands, MISSION_CURRENT, MISSION_ITEM_REACHED.
+
+The list itself is `plan_service`'s, how it is flown `mission_flight`'s. Conformance A4, B2, C5 and items 49, 72 to 74,
+122. Commands: MAVLink common.xml MAV_CMD_MISSION_START, MAV_CMD_DO_SET_MISSION_CURRENT.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Hashable, Mapping
+
+from anafi_mav.drone import events
+from anafi_mav.drone.events import Message
+from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.channel import Channel
+from anafi_mav.mavlink.node import Inbound
+from anafi_mav.services.commands import Command
+from anafi_mav.services.flavours import flavour_of
+from anafi_mav.services.mission_kind import offset
+from anafi_mav.services.mission_progress import MAVLINK_STATES, State
+from anafi_mav.services.mission_record import Record
+from anafi_mav.services.modes import FlightMode
+from anafi_mav.services.refusal import Refused
+from anafi_mav.services.service import Action, Host, MessageHandler, Service, client_of
+from anafi_mav.services.statustext import Severity
+from anafi_mav.services.stream import Stream, Times
+from anafi_mav.services.vehicle import Vehicle
+
+NO_TOTAL = 0xFFFF
+"""`total` of a MISSION_CURRENT where there is no mission (common.xml)."""
+
+KEEP = -1.0
+"""The item of a MAV_CMD_DO_SET_MISSION_CURRENT that changes none."""
+
+SAVE_EVERY = 5.0
+"""s between two writings of how far a mission is: enough to know the drone's plan again, easy on a memory card."""
+
+IN_MISSION_MODE, NOT_IN_MISSION_MODE = 1, 2
+"""`mission_mode` of MISSION_CURRENT (common.xml)."""
+
+RECORD = "mission"
+"""What the record is called in the drone's file."""
+
+
+class MissionService(Service):
+    """The mission of one system."""
+
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self._flight = host.vehicle.mission
+        self._flight.news = self._tell
+        self._flight.reached = self._tell_reached
+        self._flight.say = self._say
+        self._flight.first_number = _first_number
+        self._flight.spawn = host.spawn
+        self._flight.remember = self._remember
+        self._saved = -math.inf
+        self._unsaved = False
+
+    def messages(self) -> Mapping[int, MessageHandler]:
+        return {dialect.MAVLINK_MSG_ID_MISSION_SET_CURRENT: self._set_current}
+
+    def actions(self) -> Mapping[int, Action]:
+        return {
+            dialect.MAV_CMD_MISSION_START: self._start,
+            dialect.MAV_CMD_DO_SET_MISSION_CURRENT: self._choose,
+        }
+
+    def streams(self) -> Mapping[int, Stream]:
+        return {dialect.MAVLINK_MSG_ID_MISSION_CURRENT: Stream(self._current, on_change=True, flavoured=True)}
+
+    def link_up(self) -> None:
+        self._flight.link_up(Record.read(self.host.memory.settings.get(RECORD)))
+
+    def hears(self) -> Collection[type[Message]]:
+        return (events.MavlinkFilePlayingStateChanged, events.MissionItemExecuted, events.WaypointSkipped)
+
+    def on_event(self, message: Message, now: float) -> None:
+        self._flight.on_event(message)
+
+    def state_changed(self) -> None:
+        self._flight.on_vehicle()
+
+    def tick(self, now: float) -> None:
+        if self._unsaved and now - self._saved >= SAVE_EVERY:
+            self._unsaved, self._saved = False, now
+            self.host.spawn(self._save())
+
+    # Orders.
+
+    async def _start(self, command: Command) -> None:
+        """MAV_CMD_MISSION_START: the mission begins or goes on, as by its mode. Only the whole of it."""
+        if any(value not in (0.0, KEEP) and not math.isnan(value) for value in command.params[:2]):
+            raise Refused("Mission refused: a part of it cannot be started, set the current item first", lasting=True)
+        await self.host.vehicle.set_mode(FlightMode.MISSION, command.client)
+
+    async def _choose(self, command: Command) -> None:
+        """MAV_CMD_DO_SET_MISSION_CURRENT: param1 the item, -1 none; param2 1 begins anew after the end."""
+        item, anew = command.params[:2]
+        flight = self._flight
+        if not flight.there:
+            raise Refused("Current item refused: there is no mission", lasting=True)
+        if not (math.isnan(item) or item == int(item)):
+            raise Refused("Current item refused: param1 is the number of an item", lasting=True)
+        if math.isnan(item) or item == KEEP:
+            if anew == 1.0:
+                await flight.choose(command.client, 0)
+            return
+        await flight.choose(command.client, _ours(int(item), command.client))
+
+    def _set_current(self, inbound: Inbound) -> None:
+        """MISSION_SET_CURRENT: MISSION_CURRENT answers it, or a text."""
+        client = client_of(inbound)
+        self.host.act(client, self._flight.choose(client, _ours(inbound.message.seq, client)))
+
+    # What is told.
+
+    def _current(self, vehicle: Vehicle, times: Times) -> dialect.MAVLink_message:
+        """MISSION_CURRENT."""
+        progress, ids = vehicle.mission.progress, vehicle.plan_ids
+        there = progress.state is not State.NONE
+        mode = IN_MISSION_MODE if vehicle.mode is FlightMode.MISSION else NOT_IN_MISSION_MODE
+        return dialect.MAVLink_mission_current_message(
+            progress.current + offset(times.flavour) if there else 0,
+            len(progress.items) if there else NO_TOTAL,
+            MAVLINK_STATES[progress.state],
+            mode if there else 0,
+            ids.get(dialect.MAV_MISSION_TYPE_MISSION, 0),
+            ids.get(dialect.MAV_MISSION_TYPE_FENCE, 0),
+            ids.get(dialect.MAV_MISSION_TYPE_RALLY, 0),
+        )
+
+    def _tell(self) -> None:
+        times = self.host.times()
+        self.host.send_by_flavour(lambda flavour: self._current(self.host.vehicle, times.for_flavour(flavour)))
+
+    def _tell_reached(self, item: int) -> None:
+        self.host.send_by_flavour(lambda flavour: dialect.MAVLink_mission_item_reached_message(item + offset(flavour)))
+
+    def _say(self, severity: Severity, text: Callable[[int], str]) -> None:
+        """To each what counts items as they do."""
+        firsts = {offset(flavour_of(channel)) for channel in self.host.channels}
+        if len(firsts) <= 1:
+            self.host.text(severity, text(*firsts or (0,)))
+            return
+        for channel in self.host.channels:
+            self.host.text(severity, text(offset(flavour_of(channel))), channel)
+
+    # What outlives the gateway.
+
+    def _remember(self, record: Record | None) -> None:
+        settings = self.host.memory.settings
+        if record is None:
+            if settings.pop(RECORD, None) is None:
+                return
+        else:
+            settings[RECORD] = record.written
+        self._unsaved = True
+
+    async def _save(self) -> None:
+        if (problem := await self.host.memory.save()) is not None:
+            self.host.complain(problem)
+
+
+def _first_number(client: Hashable) -> int:
+    """What a client calls the first item."""
+    channel = client[0] if isinstance(client, tuple) else None
+    return offset(flavour_of(channel)) if isinstance(channel, Channel) else 0
+
+
+def _ours(number: int, client: Hashable) -> int:
+    """An item by the number that a client gives it; ArduPilot's home, which it begins with, is the first."""
+    first = _first_number(client)
+    return max(number - first, 0) if number >= 0 else number
