@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
-from anafi_mav.cli.plan_options import load, target_format, version
+from anafi_mav.cli.plan_options import PARROT, load, target_format, version
 from anafi_mav.cli.terminal import say
 from anafi_mav.errors import ConfigError
 from anafi_mav.plans import files, table
 from anafi_mav.plans import plot as drawing
+from anafi_mav.plans.files import Format
 from anafi_mav.plans.plan import Plan
+from anafi_mav.plans.twin import twin
 
 
 def show(arguments: argparse.Namespace) -> int:
@@ -24,17 +27,25 @@ def show(arguments: argparse.Namespace) -> int:
 def convert(arguments: argparse.Namespace) -> int:
     """Write it anew. What is lost by that is no error: it is said."""
     target_format(arguments.out, arguments.model)
-    store(load(arguments), arguments)
+    store(load(arguments), arguments, arguments.file)
     return 0
 
 
-def store(plan: Plan, arguments: argparse.Namespace) -> None:
-    """Write a plan to `arguments.out` and say what that does not hold. Raises `PlanError` and `ConfigError`."""
-    form = target_format(arguments.out, arguments.model)
-    losses = files.save(plan, arguments.out, form)
+def store(plan: Plan, arguments: argparse.Namespace, source: Path) -> None:
+    """Write a plan to `arguments.out` and say what that does not hold. Raises `PlanError` and `ConfigError`.
+
+    A drone gets what it can fly, translated, unless it is one of its own files already.
+    """
+    out, form = arguments.out, target_format(arguments.out, arguments.model)
+    model = version(arguments.model)
+    if form in (Format.PARROT_1, Format.PARROT_2) and model is not None and source.suffix.lower() != PARROT:
+        data, losses = twin(plan, model, source.name)
+    else:
+        data, losses = files.encode(plan, form)
+    files.put(data, out)
     for loss in losses:
         say(f"not kept: {loss}", "yellow")
-    say(f"{arguments.out.name}: {table.summary(files.load(arguments.out, version(arguments.model) or 2))}")
+    say(f"{out.name}: {table.summary(files.parse(data, out.name, model or 2))}")
 
 
 def plot(arguments: argparse.Namespace) -> int:

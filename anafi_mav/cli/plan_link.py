@@ -7,6 +7,7 @@ import asyncio
 import contextlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 from anafi_mav.cli import plan_files, plan_options
@@ -170,7 +171,7 @@ def download(arguments: argparse.Namespace) -> int:
     sysid = plan_options.sysid_of(arguments)
     plan_options.target_format(arguments.out, arguments.model)
     plan = asyncio.run(_download(arguments, sysid))
-    plan_files.store(plan, arguments)
+    plan_files.store(plan, arguments, Path("the vehicle's plan"))
     return 0
 
 

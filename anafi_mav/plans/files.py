@@ -80,6 +80,12 @@ def encode(plan: Plan, form: Format) -> tuple[bytes, list[Loss]]:
 def save(plan: Plan, path: Path, form: Format) -> list[Loss]:
     """Write a file, replacing what was there as a whole; what of the plan it does not hold. Raises `PlanError`."""
     data, losses = encode(plan, form)
+    put(data, path)
+    return losses
+
+
+def put(data: bytes, path: Path) -> None:
+    """Write the content of a file whole or not at all. Raises `PlanError`."""
     try:
         handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
         try:
@@ -93,4 +99,3 @@ def save(plan: Plan, path: Path, form: Format) -> list[Loss]:
             raise
     except OSError as error:
         raise PlanError(path.name, error.strerror or str(error)) from error
-    return losses

@@ -13,7 +13,9 @@ from anafi_mav.cli import main
 from anafi_mav.errors import PlanError
 from anafi_mav.plans import files, parrot
 from anafi_mav.plans.files import Format
+from anafi_mav.plans.path import place_of
 from anafi_mav.plans.plan import WAYPOINT, Item, Loss, Plan
+from anafi_mav.sim import plan_file
 
 MISSIONS = Path(__file__).parents[2] / "missions"
 SAMPLES = sorted(MISSIONS.glob("*.plan"))
@@ -163,3 +165,81 @@ def test_what_is_not_converted_leaves_the_old_file(tmp_path: Path) -> None:
         assert main(["plan", "convert", str(WRONG / name), str(out), "--model", "ai", "--height", "20"]) == 1
     assert out.read_text() == "the old one"
     assert list(tmp_path.iterdir()) == [out]
+
+
+GATEWAYS = {"inspection": 8}
+"""Samples that a gateway has to fly, and the first item for which it has to."""
+
+TWINS = [(path, version) for path in SAMPLES if path.stem not in GATEWAYS for version in (1, 2)]
+
+
+@pytest.mark.parametrize(("path", "version"), TWINS, ids=lambda value: getattr(value, "stem", None))
+def test_a_samples_twin_is_current(path: Path, version: parrot.Version, tmp_path: Path) -> None:
+    """Made anew by the command that made it (missions/README.md); the drone's own reader takes it as it is meant."""
+    kept, made = path.with_name(f"{path.stem}.v{version}.mavlink"), tmp_path / "twin.mavlink"
+    model = "4k" if version == 1 else "ai"
+    assert main(["plan", "convert", str(path), str(made), "--model", model]) == 0
+    one, two = files.load(kept, version).items, files.load(made, version).items
+    assert [(item.command, item.frame) for item in one] == [(item.command, item.frame) for item in two]
+    for before, after in zip(one, two, strict=True):
+        assert before.params == pytest.approx(after.params, abs=1e-7)
+    read = plan_file.read(kept.read_bytes(), version)
+    ways = [item for item in read if item.command == plan_file.Command.WAYPOINT]
+    places = [(item.latitude, item.longitude) for item in ways]
+    wanted = [place_of(item) for item in files.load(path).items if item.command == WAYPOINT]
+    assert [place for place in wanted if place is not None and place not in places] == []
+    assert all(0.0 < item.altitude <= 30.0 for item in ways)
+
+
+def test_a_twin_of_what_a_gateway_flies_is_none(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for name, item in GATEWAYS.items():
+        out = tmp_path / "out.mavlink"
+        assert main(["plan", "convert", str(MISSIONS / f"{name}.plan"), str(out), "--model", "4k"]) == 1
+        said = capsys.readouterr().err
+        assert said == f"anafi-mav: {name}.plan: item {item}: a gateway has to fly it: no file for the drone alone\n"
+        assert not out.exists()
+
+
+def test_every_wrong_file_is_expected() -> None:
+    assert {path.name for path in WRONG.iterdir()} == {*WRONG_FILES, *WRONG_MISSIONS}
+
+
+WRONG_MISSIONS = {
+    "servo.plan": (2, "DO_SET_SERVO"),
+    "terrain.plan": (1, ""),
+    "latitude.plan": (1, ""),
+    "negative-hold.plan": (1, "-5 s"),
+    "no-speed.plan": (1, "0 m/s"),
+    "relative-speed.plan": (1, "not how fast"),
+    "circles.plan": (1, "straight lines"),
+    "time-of-day.plan": (2, "time of day"),
+    "after-landing.plan": (3, "lands"),
+    "round-and-round.plan": (2, "for ever"),
+    "nothing-flies.plan": (0, "nothing of the mission flies"),
+    "waits.plan": (1, "waits to be continued"),
+    "jump-too-far.waypoints": (2, "not there"),
+    "beyond-fence.plan": (1, ""),
+    "too-high.plan": (1, ""),
+    "too-fast.plan": (1, ""),
+    "too-far.plan": (1, ""),
+    "below-ground.plan": (1, ""),
+}
+"""What can be read and cannot be flown."""
+
+NOT_WITHOUT_LIMITS = ("beyond-fence.plan", "too-high.plan", "too-fast.plan", "too-far.plan", "below-ground.plan")
+"""What only the drone's limits and the fence forbid."""
+
+
+@pytest.mark.parametrize("name", [name for name in WRONG_MISSIONS if name not in NOT_WITHOUT_LIMITS])
+@pytest.mark.parametrize("model", ["4k", "ai"])
+def test_a_wrong_mission_becomes_no_file(
+    name: str, model: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    item, words = WRONG_MISSIONS[name]
+    out = tmp_path / "out.mavlink"
+    assert main(["plan", "convert", str(WRONG / name), str(out), "--model", model]) == 1
+    said = capsys.readouterr().err
+    assert said.startswith(f"anafi-mav: {name}: item {item}: ")
+    assert words in said
+    assert said.count("\n") == 1
+    assert not out.exists()
