@@ -167,6 +167,8 @@ MAY_MOVE: dict[int, Callable[[Parameters], bool]] = {
     dialect.MAV_CMD_DO_REPOSITION: lambda p: abs(p[3]) < 1.0 and all(math.isnan(v) for v in p[4:]),
     # An angle to turn to, or by.
     dialect.MAV_CMD_CONDITION_YAW: lambda p: abs(p[0]) <= 360.0,
+    # All default: a circle around where the drone is. Its yaw behaviour and its angle may be given.
+    dialect.MAV_CMD_DO_ORBIT: lambda p: all(math.isnan(v) for v in (*p[:2], *p[4:])),
 }
 """The commands that move the drone with parameters like these, and with which of them."""
 

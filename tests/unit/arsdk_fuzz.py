@@ -14,8 +14,8 @@ from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.arsdk.transport import MAX_QUEUED, Delivered, Event, Garbage, Received, Role, Transport, Undelivered
 from anafi_mav.arsdk.wire import Bits, Blob, Buffer, Message, MessageId, Scalar, Text, UnknownMessage
 
-WARM_UP = 4000
-"""Frames until everything that may be kept is: a split command begun on each queue, every counter once."""
+WARM_UP = 20_000
+"""Frames until everything that may be kept is: a long split command begun on each queue, every counter once."""
 
 assert tables.__doc__  # every message is declared
 

@@ -16,7 +16,7 @@ from anafi_mav.errors import RemoteProtocolError
 
 KEPT = 64_000
 """Bytes that may be more at the end than after the warm-up. The few things that are kept are full or nearly so by then;
-a leak of the smallest object there is, one for every frame, is ten times this."""
+a leak of the smallest object there is, one for every frame, is four times this."""
 
 
 @pytest.mark.parametrize("version", [1, 2, 3])
