@@ -16,15 +16,17 @@ from typing import Any
 
 from anafi_mav import geo, units
 from anafi_mav.clock import Clock
-from anafi_mav.drone import Drone
+from anafi_mav.drone import Drone, Position
 from anafi_mav.drone.events import (
     AlertLevel,
+    AltitudeChanged,
     FlyingState,
     FlyingStateChanged,
     ForcedLandingReason,
     PilotingStyleStyle,
     PlayingState,
 )
+from anafi_mav.drone.moves import MoveEnd
 from anafi_mav.errors import AnafiMavError, CommandRejected
 from anafi_mav.services.fence_watch import FenceWatch, OutsideFence
 from anafi_mav.services.follow_flight import FollowFlight
@@ -50,6 +52,15 @@ ARM_WAIT = 10.0
 
 CLIMB_WAIT = 15.0
 """s for the drone to hover after it took off, before the climb to the asked height is given up."""
+
+ALTITUDE_WAIT = 3.0
+"""s for the drone to tell its height, which it does five times a second."""
+
+CLIMBS = 3
+"""Moves to the height of a take-off: the second and third mend what the first, begun or ended in a gust, has missed."""
+
+CLOSE_ENOUGH = 0.2
+"""m from the height of a take-off that are no reason for another move."""
 
 SLOWEST, FASTEST = 0.1, 100.0
 """m/s. A speed beyond these is a number in the wrong place, or in another unit. Within them the drone limits itself."""
@@ -142,6 +153,8 @@ class Vehicle:
         self.orders = 0
         """Counts who took the vehicle over."""
         self._goto: Goto | None = None
+        self._arrived: tuple[Place, Position | None] | None = None
+        """Where the last move ended well, and the drone's newest GPS location then."""
         self.intended: FlightMode | None = None
         """The mode that a client last asked for by name or number."""
         self._clock = clock
@@ -440,7 +453,8 @@ class Vehicle:
         speed: float | None = None,
         mode: FlightMode = FlightMode.HOLD,
     ) -> None:
-        """Go to a place, height (m above take-off) and heading (rad); None keeps what is. Returns when it moves.
+        """Go to a place, height (m above take-off) and heading (rad); None keeps what is, a place that is being flown
+        to too (as PX4 does). Returns when it moves.
 
         `speed` (m/s over ground) counts for this move only. `mode` is Hold or Guided.
         """
@@ -456,7 +470,16 @@ class Vehicle:
             ato = present
         else:
             self.check_height(ato)
-        await self.go(Goto(place or here, ato, yaw, speed, mode), checked=place is None)
+        kept = self._standing or here if self.goto is None else self.goto.place
+        await self.go(Goto(place or kept, ato, yaw, speed, mode), checked=place is None)
+
+    @property
+    def _standing(self) -> Place | None:
+        """Where the drone is by having arrived there, as long as its GPS location is from before: that comes once a
+        second only, and to keep it would lead the drone back by some metres."""
+        if self._arrived is None or self.drone.gps.state.location is not self._arrived[1]:
+            return None
+        return self._arrived[0]
 
     @property
     def goto(self) -> Goto | None:
@@ -494,6 +517,12 @@ class Vehicle:
         except BaseException:
             self._goto = before  # a refused one must not be flown by the next change of height or speed
             raise
+        if (move := self.drone.piloting.move) is not None:
+            move.ended.add_done_callback(lambda ended: self._on_arrival(goto.place, ended))
+
+    def _on_arrival(self, place: Place, ended: asyncio.Future[MoveEnd]) -> None:
+        if not ended.cancelled() and ended.result() is MoveEnd.DONE:
+            self._arrived = place, self.drone.gps.state.location
 
     async def turn(self, angle: float, rate_dps: float | None, mode: FlightMode) -> None:
         """Turn by `angle` (rad, clockwise +) where the drone hovers, at `rate_dps` (None: the drone's own).
@@ -669,6 +698,7 @@ class Vehicle:
     def _let_go(self) -> list[asyncio.Task[None]]:
         """End what this vehicle does by itself; the tasks that are still about to end."""
         self._forget_takeoff()
+        self._arrived = None
         return [*self._end_helms(), *self._cancel_background()]
 
     def _forget_takeoff(self) -> None:
@@ -724,12 +754,13 @@ class Vehicle:
         try:
             if not self.in_air:
                 await self.drone.expect(FlyingStateChanged, lambda m: m.state in _AIRBORNE, CLIMB_WAIT)
-            present = self.drone.piloting.state.altitude
-            if present is None:
-                raise CommandRejected("the drone does not report its height")
-            if not self.in_air or self.returning:
-                raise CommandRejected("the drone does something else now")
-            if abs(height - present) > 0.1:
+            for _ in range(CLIMBS):
+                # What it told last is from while it rose.
+                present = (await self.drone.expect(AltitudeChanged, lambda m: True, ALTITUDE_WAIT)).altitude
+                if not self.in_air or self.returning:
+                    raise CommandRejected("the drone does something else now")
+                if abs(height - present) <= CLOSE_ENOUGH:
+                    break
                 await self.drone.piloting.move_by(0.0, 0.0, present - height, 0.0)
         except AnafiMavError as error:
             self.text(Severity.ERROR, f"Climb to {height:g} m given up: {error}")

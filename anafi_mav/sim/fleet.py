@@ -54,11 +54,8 @@ class Simulator:
         """
         if not specs:
             raise ConfigError("drones", "expected at least one")
-        if not 0.0 < speed <= 100.0:
-            raise ConfigError("speed", f"expected more than 0 and at most 100, got {speed:g}")
-        self._speed = speed
         self._period = TURN if all(spec.telemetry_rate <= 0.5 / TURN for spec in specs) else FAST_TURN
-        self._most_steps = math.ceil(MAX_TURN * self._period * speed / STEP)
+        self.speed = speed
         self._motion = Motion([MODELS[spec.model].airframe for spec in specs])
         self._file = None if log is None else LogFile(log)
         self._task: asyncio.Task[None] | None = None
@@ -80,6 +77,18 @@ class Simulator:
         self._scenarios = scenarios or {}
         for scenario in self._scenarios.values():
             scenario.check_drones({spec.address for spec in specs})
+
+    @property
+    def speed(self) -> float:
+        """How much faster than the clock the world runs; it can be changed at any time."""
+        return self._speed
+
+    @speed.setter
+    def speed(self, speed: float) -> None:
+        if not 0.0 < speed <= 100.0:
+            raise ConfigError("speed", f"expected more than 0 and at most 100, got {speed:g}")
+        self._speed = speed
+        self._most_steps = math.ceil(MAX_TURN * self._period * speed / STEP)
 
     async def __aenter__(self) -> Simulator:
         await self.start()

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.mav import NAN, Client
-from support.setpoints import allow_speed, fly, heard, idle_mode, motion, said, streaming
+from support.setpoints import allow_speed, heard, idle_mode, motion, said, streaming
 from support.world import HOLD, HOME, World, world
 
 from anafi_mav import geo
@@ -68,7 +68,7 @@ async def write(w: World, name: str, value: float, kind: int = 9) -> None:
 async def test_conf_107_a_target_leads(flavour: str) -> None:
     """It walks to the north-east; the drone comes behind it, as high and as far as it is told, and looks at it."""
     async with world(speed=1.0, flavour=flavour) as w:
-        await fly(w, flavour)
+        await w.take_off(8.0)
         allow_speed(w)
         prefix = ("FLW_TGT_HT", "FLW_TGT_DST") if flavour == "px4" else ("ANF_FOLLOW_HT", "ANF_FOLLOW_DST")
         await write(w, prefix[0], 10.0)
@@ -95,7 +95,7 @@ async def test_conf_107_a_target_leads(flavour: str) -> None:
 @both
 async def test_a_target_that_falls_silent_is_hovered_for(flavour: str) -> None:
     async with world(speed=1.0, flavour=flavour) as w:
-        await fly(w, flavour)
+        await w.take_off(8.0)
         assert await follow(w.client, flavour) == 0
         async with streaming(w.client, target(40.0, 0.0), 0.5) as sent:
             await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["vn"] > 1.0, 10.0)
@@ -137,7 +137,7 @@ async def test_conf_107_denied_on_the_ground_and_without_gps(flavour: str) -> No
     async with world(flavour=flavour) as w:
         assert await follow(w.client, flavour) == REJECTED
         await said(w.client, "Follow refused: take off first")
-        await fly(w, flavour)
+        await w.take_off(8.0)
         w.drone.faults.gps = False
         await w.client.wait("GPS_RAW_INT", lambda m: m.fix_type < 2)
         assert await follow(w.client, flavour) == REJECTED

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
-from support.setpoints import COPTER_GUIDED, earth, fly, heard, motion, said, streaming, texts
+from support.setpoints import COPTER_GUIDED, earth, heard, motion, said, streaming, texts
 from support.world import HOLD, HOME, POSITION, World, world
 
 from anafi_mav import geo
@@ -48,7 +48,7 @@ def stick(entry: Any) -> tuple[int, int, int, int]:
 @both
 async def test_conf_104_axes_and_silence(flavour: str) -> None:
     async with world(speed=1.0, flavour=flavour) as w:
-        await fly(w, flavour)
+        await w.take_off(8.0)
         await by_sticks(w, flavour)
         for message, expected in [
             (manual(x=600), (0, 60, 0, 0)),
@@ -77,7 +77,7 @@ async def test_conf_104_axes_and_silence(flavour: str) -> None:
 @both
 async def test_the_drone_goes_where_the_stick_points(flavour: str) -> None:
     async with world(speed=1.0, flavour=flavour) as w:
-        await fly(w, flavour)
+        await w.take_off(8.0)
         await by_sticks(w, flavour)
         async with streaming(w.client, manual(x=700, y=700, z=600, r=0), 0.04):
             await asyncio.sleep(2.0)
@@ -94,7 +94,7 @@ async def test_the_drone_goes_where_the_stick_points(flavour: str) -> None:
 async def test_a_joystick_on_the_table_ends_nothing(flavour: str) -> None:
     """It is streamed all the time once it is enabled; a goto goes on, and nothing is sent for it."""
     async with world(speed=1.0, flavour=flavour) as w:
-        await fly(w, flavour)
+        await w.take_off(8.0)
         async with streaming(w.client, manual(), 0.04):
             place = geo.destination(*HOME[:2], 12.0, 0.0)
             ack = await w.client.command(GOTO, -1, 1, 0, math.nan, frame=6, x=place[0], y=place[1], z=8.0)
@@ -113,7 +113,7 @@ async def test_a_joystick_on_the_table_ends_nothing(flavour: str) -> None:
 @both
 async def test_a_stick_flies_in_mode_position_only(flavour: str) -> None:
     async with world(speed=1.0, flavour=flavour) as w:
-        await fly(w, flavour)
+        await w.take_off(8.0)
         began, mark = now(), w.client.mark()
         async with streaming(w.client, manual(x=1000, z=0), 0.04):
             await said(w.client, "mode Position", mark)
@@ -136,7 +136,7 @@ async def test_a_throttle_that_rests_at_its_end_is_not_worth_a_word(flavour: str
 @pytest.mark.parametrize("order", ["land", "return"])
 async def test_sticks_do_not_fight_a_landing_or_a_return(flavour: str, order: str) -> None:
     async with world(speed=1.0, flavour=flavour) as w:
-        await fly(w, flavour, 4.0)
+        await w.take_off(4.0)
         await by_sticks(w, flavour)
         async with streaming(w.client, manual(x=800, z=900), 0.04):
             await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 2.0, 10.0)

@@ -21,7 +21,6 @@ from support.setpoints import (
     attitude,
     earth,
     engage,
-    fly,
     heard,
     idle_mode,
     local,
@@ -77,7 +76,7 @@ async def test_conf_105_refused_without_setpoints() -> None:
 async def test_conf_105_silence_of_sticks(flavour: str, setpoint: Any) -> None:
     """The sticks are level within half a second of the last setpoint, and mode Hold shows within a second."""
     async with world(speed=1.0, flavour=flavour) as w:
-        await fly(w, flavour)
+        await w.take_off(8.0)
         async with streaming(w.client, setpoint) as sent:
             await engage(w.client, flavour)
             await w.drone.wait_log(lambda e: e.name.endswith(".PCMD") and e.args["pitch"] > 0, 5.0)
@@ -103,7 +102,7 @@ async def test_conf_105_silence_of_sticks(flavour: str, setpoint: Any) -> None:
 async def test_conf_105_silence_of_a_move(flavour: str, setpoint: Any, command: str, cancels: str) -> None:
     """A move whose sender dies ends in a hover within half a second."""
     async with world(speed=1.0, flavour=flavour) as w:
-        await fly(w, flavour)
+        await w.take_off(8.0)
         async with streaming(w.client, setpoint) as sent:
             await engage(w.client, flavour)
             await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 3.0, 10.0)
@@ -121,7 +120,7 @@ async def test_conf_105_silence_of_a_move(flavour: str, setpoint: Any, command: 
 
 async def test_setpoints_of_ardupilots_clients_fly_in_guided_only() -> None:
     async with world(flavour="ardupilot") as w:
-        await fly(w, "ardupilot")
+        await w.take_off(8.0)
         assert (await w.client.command(SET_MODE, 1, 17)).result == 0  # Brake
         began = now()
         async with streaming(w.client, local(POSITION_ONLY, at=(20.0, 0.0, -8.0))):
@@ -132,7 +131,7 @@ async def test_setpoints_of_ardupilots_clients_fly_in_guided_only() -> None:
 
 async def test_setpoints_of_px4s_clients_do_not_fly_in_guided() -> None:
     async with world(flavour="ardupilot", also="px4") as w:
-        await fly(w, "ardupilot")
+        await w.take_off(8.0)
         other = await w.connect(sysid=250, port=5761)
         await other.wait("HEARTBEAT")
         began = now()
@@ -145,7 +144,7 @@ async def test_setpoints_of_px4s_clients_do_not_fly_in_guided() -> None:
 async def test_a_setpoint_that_comes_is_flown_at_once(flavour: str) -> None:
     """Not at the next of the 20 per second, and not at the drone's next report."""
     async with world(speed=1.0, flavour=flavour) as w:
-        await fly(w, flavour)
+        await w.take_off(8.0)
         pitch = [-0.1]
         async with streaming(w.client, lambda: attitude(pitch=pitch[0]), every=0.2):
             await engage(w.client, flavour)
@@ -203,7 +202,7 @@ async def flown_to(w: World, setpoint: Any, flavour: str, place: tuple[float, fl
 @both
 async def test_conf_106_positions(flavour: str) -> None:
     async with world(flavour=flavour) as w:
-        await fly(w, flavour)
+        await w.take_off(8.0)
         await turn_to(w, LOOKS_EAST)
         for setpoint, place in PLACES:
             await flown_to(w, setpoint, flavour, place)
@@ -216,7 +215,7 @@ async def test_conf_106_positions(flavour: str) -> None:
 @both
 async def test_conf_106_offsets(flavour: str) -> None:
     async with world(flavour=flavour) as w:
-        await fly(w, flavour)
+        await w.take_off(8.0)
         await turn_to(w, LOOKS_EAST)
         for setpoint, (north, east, up) in OFFSETS:
             pose = w.drone.pose
@@ -227,7 +226,7 @@ async def test_conf_106_offsets(flavour: str) -> None:
 async def test_conf_106_velocities(flavour: str) -> None:
     """What is wanted (x, y) in each frame, and where it leads (north, east) with the nose to the east."""
     async with world(speed=1.0, flavour=flavour) as w:
-        await fly(w, flavour)
+        await w.take_off(8.0)
         allow_speed(w)
         await turn_to(w, LOOKS_EAST)
         for frame, (x, y), (north, east) in [
@@ -253,7 +252,7 @@ async def test_conf_106_velocities(flavour: str) -> None:
 async def test_conf_106_headings(flavour: str) -> None:
     """In the frames of the body a heading counts from where the nose is, and repeating it turns no further."""
     async with world(speed=1.0, flavour=flavour) as w:
-        await fly(w, flavour)
+        await w.take_off(8.0)
         w.drone.firmware.receive(ardrone3.MaxRotationSpeed(90.0), now())
         await w.client.wait("ATTITUDE")
         for setpoint, heading in [
@@ -285,7 +284,7 @@ async def test_conf_106_headings(flavour: str) -> None:
 @both
 async def test_conf_106_yaw_rates(flavour: str) -> None:
     async with world(speed=1.0, flavour=flavour) as w:
-        await fly(w, flavour)
+        await w.take_off(8.0)
         for frame, rate in ((1, 0.5), (8, -0.5), (12, 0.3)):
             async with streaming(w.client, local(VELOCITY_ONLY & ~NO_YAW_RATE, frame, yaw_rate=rate)):
                 await engage(w.client, flavour)
@@ -301,7 +300,7 @@ async def test_conf_106_yaw_rates(flavour: str) -> None:
 @both
 async def test_conf_106_other_frames_are_refused(flavour: str) -> None:
     async with world(flavour=flavour) as w:
-        await fly(w, flavour)
+        await w.take_off(8.0)
         began = now()
         for frame in (0, 2, 3, 4, 5, 6, 10, 11, 13, 20, 255):
             mark = w.client.mark()
@@ -328,7 +327,7 @@ async def test_conf_106_a_global_setpoint_above_terrain_is_refused() -> None:
 @both
 async def test_a_velocity_and_a_height(flavour: str) -> None:
     async with world(speed=1.0, flavour=flavour) as w:
-        await fly(w, flavour)
+        await w.take_off(8.0)
         allow_speed(w)
         mask = NO_ACCELERATION | NO_YAW | NO_YAW_RATE | 0x003 | 0x020  # x and y as velocities, z as a position
         async with streaming(w.client, local(mask, at=(0.0, 0.0, -11.0), v=(0.0, 3.0, 9.0))):
@@ -460,7 +459,7 @@ WRONG = [
 @both
 async def test_conf_106_what_may_not_be_flown(flavour: str) -> None:
     async with world(flavour=flavour) as w:
-        await fly(w, flavour)
+        await w.take_off(8.0)
         w.drone.firmware.receive(ardrone3.NoFlyOverMaxDistance(1), now())
         await w.client.wait("ATTITUDE")
         began = now()
@@ -507,7 +506,7 @@ async def test_full_tilt_of_ten_degrees_does_not_hold_five_metres_a_second() -> 
 async def test_thrust_does_not_stop_a_landing(flavour: str, how: str) -> None:
     """A positive gaz would cancel it (ardrone3.xml 1-0-3)."""
     async with world(speed=1.0, flavour=flavour) as w:
-        await fly(w, flavour, 4.0)
+        await w.take_off(4.0)
         async with streaming(w.client, attitude(thrust=1.0)):
             await engage(w.client, flavour)
             await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["up"] > 4.5, 10.0)
@@ -526,7 +525,7 @@ async def test_thrust_does_not_stop_a_landing(flavour: str, how: str) -> None:
 @both
 async def test_velocities_do_not_fight_the_drones_own_return(flavour: str) -> None:
     async with world(speed=1.0, flavour=flavour) as w:
-        await fly(w, flavour)
+        await w.take_off(8.0)
         async with streaming(w.client, local(VELOCITY_ONLY, v=(3.0, 0.0, 0.0))):
             await engage(w.client, flavour)
             await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 3.0, 10.0)
@@ -543,7 +542,7 @@ async def test_velocities_do_not_fight_the_drones_own_return(flavour: str) -> No
 async def test_a_single_offset_is_flown_to_its_end() -> None:
     """QGroundControl's "change altitude" for ArduPilot is one message; silence does not end it."""
     async with world(speed=1.0, flavour="ardupilot") as w:
-        await fly(w, "ardupilot")
+        await w.take_off(8.0)
         began = now()
         w.client.send(local(POSITION_ONLY | 0x003, 7, at=(0.0, 0.0, -4.0)))
         await arrived(w, began)
@@ -556,7 +555,7 @@ async def test_a_single_offset_is_flown_to_its_end() -> None:
 async def test_a_single_place_is_flown_to_its_end() -> None:
     """Mission Planner's "fly to here" is one SET_POSITION_TARGET_GLOBAL_INT."""
     async with world(flavour="ardupilot") as w:
-        await fly(w, "ardupilot")
+        await w.take_off(8.0)
         began = now()
         w.client.send(earth(POSITION_ONLY, 6, 20.0, 10.0, 12.0))
         await arrived(w, began)
@@ -565,7 +564,7 @@ async def test_a_single_place_is_flown_to_its_end() -> None:
 
 async def test_a_second_setpoint_makes_a_stream_whose_silence_ends_it() -> None:
     async with world(speed=1.0, flavour="ardupilot") as w:
-        await fly(w, "ardupilot")
+        await w.take_off(8.0)
         setpoint = local(POSITION_ONLY, at=(60.0, 0.0, -8.0))
         w.client.send(setpoint)
         await w.drone.wait_log(lambda e: e.name.endswith("moveToChanged") and e.args["status"] == 0, 5.0)
@@ -578,7 +577,7 @@ async def test_a_second_setpoint_makes_a_stream_whose_silence_ends_it() -> None:
 
 async def test_another_order_ends_a_single_setpoint() -> None:
     async with world(speed=1.0, flavour="ardupilot") as w:
-        await fly(w, "ardupilot")
+        await w.take_off(8.0)
         w.client.send(local(POSITION_ONLY, at=(60.0, 0.0, -8.0)))
         await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["vn"] > 1.0, 10.0)
         assert (await w.client.command(SET_MODE, 1, 17)).result == 0
@@ -590,7 +589,7 @@ async def test_another_order_ends_a_single_setpoint() -> None:
 async def test_a_setpoint_does_not_overtake_a_newer_order() -> None:
     """Both in one segment: the landing is flown."""
     async with world(flavour="ardupilot") as w:
-        await fly(w, "ardupilot")
+        await w.take_off(8.0)
         client = w.client
         data = local(POSITION_ONLY, at=(20.0, 0.0, -8.0)).pack(client._out)
         client._out.seq = (client._out.seq + 1) % 256
@@ -606,7 +605,7 @@ async def test_a_setpoint_does_not_overtake_a_newer_order() -> None:
 @both
 async def test_sticks_that_follow_the_camera_are_no_sticks_for_setpoints(flavour: str) -> None:
     async with world(speed=1.0, flavour=flavour) as w:
-        await fly(w, flavour)
+        await w.take_off(8.0)
         style = piloting_style.SetStyle(piloting_style.PilotingStyleStyle.CAMERA_OPERATED)
         async with streaming(w.client, local(VELOCITY_ONLY, v=(2.0, 0.0, 0.0))):
             await engage(w.client, flavour)
@@ -640,7 +639,7 @@ async def test_offboard_asked_for_again_does_not_interrupt_it() -> None:
 async def test_setpoints_have_one_pilot(flavour: str) -> None:
     async with world(speed=1.0, flavour=flavour) as w:
         other = await w.connect(sysid=250)
-        await fly(w, flavour)
+        await w.take_off(8.0)
         async with streaming(w.client, local(VELOCITY_ONLY, v=(2.0, 0.0, 0.0))):
             await engage(w.client, flavour)
             await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["vn"] > 0.5, 10.0)

@@ -69,19 +69,6 @@ def attitude(pitch: float = 0.0, thrust: float = 0.5) -> Any:
     return dialect.MAVLink_set_attitude_target_message(0, 1, 1, 0b111, q, 0.0, 0.0, 0.0, thrust)
 
 
-async def fly(w: World, flavour: str, height: float = 8.0) -> None:
-    """Arm, and take off; ArduPilot's clients do it in mode Guided."""
-    if flavour == "px4":
-        await w.take_off(height)
-        return
-    client = w.client
-    assert (await client.command(dialect.MAV_CMD_DO_SET_MODE, 1, COPTER_GUIDED)).result == 0
-    assert (await client.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)).result == 0
-    assert (await client.command(dialect.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, x=0, y=0, z=height)).result == 0
-    await w.drone.wait_log(lambda e: e.name.endswith("moveByEnd"), 20.0)
-    await client.heartbeat(lambda beat: beat.custom_mode == COPTER_GUIDED)
-
-
 async def engage(client: Client, flavour: str) -> None:
     """What makes the setpoints fly that are being sent: a mode for PX4, nothing for ArduPilot in Guided."""
     if flavour == "px4":

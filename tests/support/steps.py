@@ -16,7 +16,7 @@ from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
 from anafi_mav.sim.model import MODELS
 from anafi_mav.sim.wind import WindSpec
 from support.mav import Client
-from support.world import HOLD, HOME, TAKEOFF, loopback
+from support.world import HOLD, HOME, TAKE_OFF_SPEED, TAKEOFF, loopback
 
 VELOCITY_ONLY = 0x9C7
 """SET_POSITION_TARGET type mask: velocity and yaw, nothing else."""
@@ -82,7 +82,9 @@ async def velocity_step(
                 drone.firmware.receive(ardrone3.MaxTilt(tilt), now)
                 drone.firmware.receive(ardrone3.MaxDistance(1000.0), now)
                 drone.wind.spec = wind
+            simulator.speed = TAKE_OFF_SPEED
             await asyncio.gather(*(_take_off(client, number + 1) for number in range(len(specs))))
+            simulator.speed = 1.0
             wanted = [0.0, 0.0]
             stream = asyncio.ensure_future(_stream(client, len(specs), wanted, yaw))
             try:

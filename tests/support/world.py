@@ -26,6 +26,9 @@ HOLD, LAND, RETURN, TAKEOFF = 0x03040000, 0x06040000, 0x05040000, 0x02040000
 POSITION, OFFBOARD = 0x00030000, 0x00060000
 ARMED = dialect.MAV_MODE_FLAG_SAFETY_ARMED
 
+TAKE_OFF_SPEED = 8.0
+"""Simulated seconds in one for take-offs that only lead to what is tested."""
+
 
 @dataclass(frozen=True)
 class Modes:
@@ -88,7 +91,15 @@ class World:
         return client
 
     async def take_off(self, height: float = 5.0) -> None:
-        """Arm, take off, and wait until the vehicle holds at the height."""
+        """Arm, take off, and wait until the vehicle holds at the height. Time flies as well until then."""
+        speed = self.simulator.speed
+        self.simulator.speed = max(speed, TAKE_OFF_SPEED)
+        try:
+            await self._take_off(height)
+        finally:
+            self.simulator.speed = speed
+
+    async def _take_off(self, height: float) -> None:
         client = self.client
         if self.flavour == "ardupilot":
             ack = await client.command(dialect.MAV_CMD_DO_SET_MODE, 1, self.modes.hold)
