@@ -707,7 +707,7 @@ def some_message(draw: Any) -> Any:
             )  # fmt: skip
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(st.data())
 def test_nothing_that_is_sent_raises_or_gets_stuck(data: st.DataObject) -> None:
     """A list only ever changes by a commit that was stored, every answer goes to who asked, and when all fall silent
