@@ -408,11 +408,11 @@ What holds for all of them:
 
 def plan_translation() -> str:
     """docs/plan-translation.md."""
-    from anafi_mav.plans import legs, rules, translate
+    from anafi_mav.plans import pen, rules, translate
     from anafi_mav.plans.row import Verdict
 
     meanings = {verdict.name.lower(): verdict.value for verdict in Verdict}
-    parts = [PLAN_TRANSLATION.format(**meanings, acceptance=legs.ACCEPTANCE, lines=translate.MAX_LINES)]
+    parts = [PLAN_TRANSLATION.format(**meanings, acceptance=pen.ACCEPTANCE, lines=translate.MAX_LINES)]
     for row in rules.TABLE.values():
         parts.append(f"| {row.command} {row.name} | {row.verdict.name.lower()} | {row.how} |\n")
     return "".join(parts)

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from pymavlink.dialects.v20 import common
 
-from anafi_mav.plans.legs import Pen
 from anafi_mav.plans.parrot import SET_STILL_MODE, SET_VIEW_MODE
+from anafi_mav.plans.pen import Pen
 from anafi_mav.plans.plan import Item
 
 

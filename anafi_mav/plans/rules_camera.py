@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pymavlink.dialects.v20 import common
 
-from anafi_mav.plans.legs import SHORTEST_INTERVAL, SHORTEST_STEP, Pen
 from anafi_mav.plans.parrot import SET_STILL_MODE, SET_VIEW_MODE
+from anafi_mav.plans.pen import SHORTEST_INTERVAL, SHORTEST_STEP, Pen
 from anafi_mav.plans.plan import Item, Point
 from anafi_mav.plans.row import Row, Verdict, only
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from pymavlink.dialects.v20 import common
 
-from anafi_mav.plans.legs import Pen
+from anafi_mav.plans.pen import Pen
 from anafi_mav.plans.plan import DO_JUMP, WAYPOINT, Item, Point
 from anafi_mav.plans.row import Row, Verdict
 from anafi_mav.units import wrap_360

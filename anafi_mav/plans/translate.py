@@ -1,7 +1,7 @@
 """From a mission to what the drone flies: files of Parrot's, and between them what the gateway flies itself.
 
 `examine` judges a mission when it is uploaded; `translate` writes the files when it begins. What each command becomes
-is the table of `rules`; how lines are written is `legs`; this is the way through the items, with its jumps.
+is the table of `rules`; how lines are written is `pen`; this is the way through the items, with its jumps.
 """
 
 from __future__ import annotations
@@ -14,8 +14,9 @@ from itertools import chain
 from pymavlink.dialects.v20 import common
 
 from anafi_mav.errors import PlanError
-from anafi_mav.plans.legs import Fault, FaultKind, Leg, Pen, Refused, Settings, Start, Step
+from anafi_mav.plans.legs import Fault, FaultKind, Leg, Refused, Settings, Start, Step
 from anafi_mav.plans.parrot import Version
+from anafi_mav.plans.pen import Pen
 from anafi_mav.plans.plan import DO_JUMP, Item, Loss
 from anafi_mav.plans.row import Row, Verdict
 from anafi_mav.plans.rules import TABLE

@@ -228,6 +228,22 @@ def test_a_camera_mode_that_nothing_comes_of_is_told() -> None:
     )
 
 
+def test_photos_that_are_stopped_twice_are_stopped_once() -> None:
+    """QGroundControl ends photos by both commands."""
+    items = [
+        GO,
+        action(206, 10.0, 0.0, 1.0),
+        waypoint(2, 0),
+        action(206, 0.0),
+        action(2001),
+        waypoint(3, 0),
+        action(2001),
+    ]
+    flight = translate(items, 1, AIR)
+    assert [row[0] for row in told(items, 1)] == [16, 50001, 2000, 16, 2001, 16]
+    assert flight.parts[0].done[-2:] == ((3, 4), (5, 6))
+
+
 def test_a_panorama() -> None:
     assert told([GO, action(2800, 360.0, 30.0, 20.0, 10.0)], 2)[1] == (2800, 360.0, 30.0, 20.0, 10.0)
     assert told([GO, action(2800, 360.0)], 1)[1] == (2800, 360.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
