@@ -15,6 +15,7 @@ _NO_ACTUATOR = "The drone has no actuator that a flight plan could move."
 _REFUSED = tuple(
     Row(command, Verdict.REFUSED, why)
     for command, why in {
+        82: "The drone flies straight lines: draw the curve as way points.",
         114: "A flight plan cannot begin something on the way to a way point: draw one there.",
         179: "A flight plan cannot say where home is: set it before.",
         181: _NO_ACTUATOR,

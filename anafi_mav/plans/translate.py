@@ -82,12 +82,11 @@ class Flight:
 
 def examine(items: Sequence[Item], version: Version) -> Report:
     """Can a drone of this version fly the mission?"""
-    faults = [*_wrong_items(items, version)]
-    if not faults:
-        faults += _wrong_ways(items)
+    faults, said = _judged(items, version)
+    faults = faults or _wrong_ways(items)
     if faults:
         return Report(tuple(faults), (), ())
-    place = next((item.params for item in items if TABLE[item.command].moves and item.params[4]), None)
+    place = next((item.params for item in items if TABLE[item.command].place and item.params[4]), None)
     latitude, longitude = (0.0, 0.0) if place is None else (place[4] or 0.0, place[5] or 0.0)
     start = Start(latitude, longitude, 0.0, flying=_way_up(items, 0) is None, takeoff_amsl=0.0)
     try:
@@ -95,8 +94,10 @@ def examine(items: Sequence[Item], version: Version) -> Report:
     except Refused as error:  # by what came before it on the way, which is not what stands before it
         return Report((error.fault,), (), ())
     flown = _reached(items) if flight.rest else {*flight.done, *chain(*map(_done, flight.parts))}
-    never = tuple(Loss("it is never reached", number) for number in range(len(items)) if number not in flown)
-    return Report((), flight.notes + never, tuple(_stepped(items, flight)))
+    never = [Loss("it is never reached", number) for number in range(len(items)) if number not in flown]
+    # Of a long mission, only the beginning has been flown here.
+    notes = dict.fromkeys([*flight.notes, *(loss for loss in said if flight.rest and loss.item in flown), *never])
+    return Report((), tuple(notes), tuple(_stepped(items, flown, flight)))
 
 
 def _done(part: Leg | Step) -> Iterator[int]:
@@ -109,7 +110,7 @@ def translate(items: Sequence[Item], version: Version, start: Start, first: int 
     What items before `first` have set holds, and photos and videos that they began and did not end are begun. Raises
     `PlanError` for what `examine` finds wrong, and when heights above mean sea level cannot be had.
     """
-    wrong = [*_wrong_items(items, version)] or _wrong_ways(items)
+    wrong = _judged(items, version)[0] or _wrong_ways(items)
     if wrong:
         raise PlanError("mission", wrong[0].reason, wrong[0].item)
     cursor = first if isinstance(first, Cursor) else _cursor(items, version, start, first)
@@ -122,14 +123,17 @@ def translate(items: Sequence[Item], version: Version, start: Start, first: int 
 # What is wrong with it.
 
 
-def _wrong_items(items: Sequence[Item], version: Version) -> Iterator[Fault]:
-    """One fault an item, each by itself and after those before it in the list."""
+def _judged(items: Sequence[Item], version: Version) -> tuple[list[Fault], list[Loss]]:
+    """Each item by itself, after those that stand before it: at most one fault of each, and what is left out."""
     pen = Pen(version, Start(0.0, 0.0, 0.0, flying=True, takeoff_amsl=0.0), items)
     pen.muted = True
+    faults = []
     for pen.item, item in enumerate(items):
         fault = _wrong_item(pen, item, len(items))
         if fault is not None:
-            yield fault
+            faults.append(fault)
+    pen.end_modes()
+    return faults, list(pen.notes)
 
 
 def _wrong_item(pen: Pen, item: Item, count: int) -> Fault | None:
@@ -209,10 +213,11 @@ def _reached(items: Sequence[Item]) -> set[int]:
     return reached
 
 
-def _stepped(items: Sequence[Item], flight: Flight) -> Iterator[Loss]:
-    for number in sorted({part.item for part in flight.parts if isinstance(part, Step)}):
+def _stepped(items: Sequence[Item], flown: set[int], flight: Flight) -> Iterator[Loss]:
+    for number in sorted(flown):
         row = TABLE[items[number].command]
-        yield Loss(f"{row.name}: {row.why}", number)
+        if row.verdict is Verdict.STEPPED:
+            yield Loss(f"{row.name}: {row.why}", number)
     if flight.rest is not None:
         jumps = [number for number, item in enumerate(items) if item.command == DO_JUMP and item.params[1]]
         what = f"flown in files of {MAX_LINES} lines"

@@ -181,6 +181,25 @@ def test_a_jump_without_end_is_flown_file_after_file() -> None:
     assert again.rest is not None
 
 
+def test_a_long_mission_is_flown_file_after_file_and_told_of_to_its_end() -> None:
+    items = [take_off(20.0), *[waypoint(number % 9, 0) for number in range(MAX_LINES)]]
+    items += [action(112, 5.0), action(115, 90.0, 0.0, 0.0, 0.0), action(20), action(189)]
+    report = examine(items, 2)
+    assert [(loss.item, loss.what[:9]) for loss in report.approximations] == [
+        (MAX_LINES + 1, "the drone"), (MAX_LINES + 4, "it is nev"),
+    ]  # fmt: skip
+    assert [loss.item for loss in report.stepped] == [MAX_LINES + 2, None]
+    done: list[int] = []
+    flight = translate(items, 2, GROUND)
+    done += chain(*flight.parts[0].done)  # type: ignore[arg-type]
+    assert flight.rest is not None
+    flight = translate(items, 2, AIR, flight.rest)
+    assert flight.rest is None
+    for part in flight.parts:
+        done += chain(*part.done) if isinstance(part, Leg) else part.done
+    assert done == list(range(MAX_LINES + 4))
+
+
 def test_a_loop_in_a_loop_counts_for_the_whole_mission() -> None:
     """As in PX4 and ArduPilot: the inner jump is used up in the first round of the outer one."""
     items = [waypoint(1, 0), action(DO_JUMP, 0.0, 2.0), waypoint(2, 0), action(DO_JUMP, 0.0, 1.0)]
