@@ -22,7 +22,7 @@ COMMANDS = {
     "run": "be the gateway: real and simulated drones become MAVLink systems (the default)",
     "sim": "simulated drones alone, on Parrot's own wire protocol",
     "discover": "look for drones and Skycontrollers on every network interface; prints a configuration",
-    "plan": "show, convert and draw flight plans",
+    "plan": "check, convert, show and draw flight plans; upload, download and fly them",
     "info": "connect to one drone and tell what it is, what it has and what its limits are",
 }
 """Name of a command, which is the name of its module in this folder, and what it does."""

@@ -20,6 +20,7 @@ class Action(NamedTuple):
 
 
 ACTIONS = {
+    "check": Action("say what would go wrong with a plan on a drone", plan_options.check_arguments, "plan_files"),
     "show": Action("print a plan as a table", plan_options.show_arguments, "plan_files"),
     "convert": Action(
         "write a plan in another format and tell what that cannot hold", plan_options.convert_arguments, "plan_files"

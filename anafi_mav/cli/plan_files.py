@@ -1,16 +1,19 @@
-"""`anafi-mav plan show|convert|plot`: plans as files, without a drone."""
+"""`anafi-mav plan check|convert|show|plot`: plans as files, without a drone."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
 
-from anafi_mav.cli.plan_options import PARROT, load, target_format, version
+from anafi_mav.cli.plan_options import PARROT, limits, load, target_format, version
 from anafi_mav.cli.terminal import say
 from anafi_mav.errors import ConfigError
 from anafi_mav.plans import files, table
 from anafi_mav.plans import plot as drawing
+from anafi_mav.plans.check import Severity
+from anafi_mav.plans.check import check as lint
 from anafi_mav.plans.files import Format
+from anafi_mav.plans.models import MODELS
 from anafi_mav.plans.plan import Plan
 from anafi_mav.plans.twin import twin
 
@@ -22,6 +25,28 @@ def show(arguments: argparse.Namespace) -> int:
     for line in table.lines(plan) if plan.items else ():
         say(line)
     return 0
+
+
+def check(arguments: argparse.Namespace) -> int:
+    """Say what would go wrong with it; 1 when it would."""
+    if version(arguments.model) is None:
+        raise ConfigError("--model", f"expected the drone that is to fly it, one of {', '.join(MODELS)}")
+    model, plan, name = MODELS[arguments.model], load(arguments), arguments.file.name
+    findings = lint(plan, model, limits(arguments))
+    for problem in findings.problems:
+        style = "red" if problem.severity is Severity.ERROR else "yellow"
+        say(f"{name}: {problem.severity.value}: {problem}", style)
+    if findings.errors:
+        return 1
+    way = "" if findings.distance is None else f", {findings.distance:.0f} m"
+    time = "" if findings.seconds is None else f" in about {_time(findings.seconds)}"
+    say(f"{name}: an {model.name} flies it{way}{time}", "green")
+    return 0
+
+
+def _time(seconds: float) -> str:
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes} min {rest} s" if minutes else f"{rest} s"
 
 
 def convert(arguments: argparse.Namespace) -> int:

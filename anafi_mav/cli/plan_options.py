@@ -11,12 +11,11 @@ from pathlib import Path
 from anafi_mav.cli import options
 from anafi_mav.errors import ConfigError
 from anafi_mav.plans import files, plot
+from anafi_mav.plans.check import Limits
 from anafi_mav.plans.files import Format
+from anafi_mav.plans.models import MODELS
 from anafi_mav.plans.parrot import Version
 from anafi_mav.plans.plan import Plan
-
-VERSIONS: dict[str, Version] = {"4k": 1, "thermal": 1, "usa": 1, "ai": 2}
-"""Of Parrot's files, by the model that flies them."""
 
 PARROT = ".mavlink"
 
@@ -26,6 +25,9 @@ MAX_HEIGHT = 1000.0
 
 ENDPOINT = "tcpout://127.0.0.1:5760"
 """Where a gateway with the default configuration serves as many clients as come."""
+
+FAR = 10_000.0
+"""m: more is no setting of a drone."""
 
 MAX_SYSID = 255
 
@@ -42,7 +44,7 @@ def model_argument(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--model",
         metavar="MODEL",
-        help=f"the ANAFI that a .mavlink file is for: {', '.join(VERSIONS)}; the file itself does not say",
+        help=f"the ANAFI that a .mavlink file is for: {', '.join(MODELS)}; the file itself does not say",
     )
 
 
@@ -50,7 +52,7 @@ def load(arguments: argparse.Namespace) -> Plan:
     """The plan that the arguments name. Raises `PlanError` and `ConfigError`."""
     model = version(arguments.model)
     if model is None and arguments.file.suffix.lower() == PARROT:
-        raise ConfigError("--model", f"expected one of {', '.join(VERSIONS)}: a {PARROT} file does not say its drone")
+        raise ConfigError("--model", f"expected one of {', '.join(MODELS)}: a {PARROT} file does not say its drone")
     height = None
     if arguments.height is not None:
         wanted = f"metres above take-off, up to {MAX_HEIGHT:g}"
@@ -64,9 +66,9 @@ def version(model: str | None) -> Version | None:
     """Of the files that a model flies. Raises `ConfigError`."""
     if model is None:
         return None
-    if model not in VERSIONS:
-        raise ConfigError("--model", f"expected one of {', '.join(VERSIONS)}, got {model!r}")
-    return VERSIONS[model]
+    if model not in MODELS:
+        raise ConfigError("--model", f"expected one of {', '.join(MODELS)}, got {model!r}")
+    return MODELS[model].version
 
 
 def out_argument(parser: argparse.ArgumentParser) -> None:
@@ -80,12 +82,48 @@ def target_format(path: Path, model: str | None) -> Format:
     if suffix == PARROT:
         found = version(model)
         if found is None:
-            raise ConfigError("--model", f"expected one of {', '.join(VERSIONS)}, for a {PARROT} file is for one drone")
+            raise ConfigError("--model", f"expected one of {', '.join(MODELS)}, for a {PARROT} file is for one drone")
         return Format.PARROT_1 if found == 1 else Format.PARROT_2
     if suffix not in files.SUFFIXES:
         endings = ", ".join([*files.SUFFIXES, PARROT])
         raise ConfigError("OUT", f"expected a file that ends in one of {endings}, got {path.name!r}")
     return files.SUFFIXES[suffix]
+
+
+def check_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of `anafi-mav plan check`."""
+    usual = Limits()
+    source_arguments(parser)
+    parser.add_argument(
+        "--max-altitude",
+        default=f"{usual.max_altitude:g}",
+        metavar="M",
+        help="what the drone is set to, above take-off (%(default)s)",
+    )
+    parser.add_argument("--max-distance", metavar="M", help="of the drone's own geofence; left out: it is off")
+    parser.add_argument(
+        "--return-height",
+        default=f"{usual.return_height:g}",
+        metavar="M",
+        help="that the drone returns home at, above take-off (%(default)s)",
+    )
+
+
+def limits(arguments: argparse.Namespace) -> Limits:
+    """What the drone is set to. Raises `ConfigError`."""
+
+    def metres(flag: str, text: str) -> float:
+        wanted = f"metres, above 0 and up to {FAR:g}"
+        value = options.number(flag, text, wanted)
+        if not 0.0 < value <= FAR:
+            raise ConfigError(flag, f"expected {wanted}, got {text}")
+        return value
+
+    return Limits(
+        metres("--max-altitude", arguments.max_altitude),
+        None if arguments.max_distance is None else metres("--max-distance", arguments.max_distance),
+        metres("--return-height", arguments.return_height),
+    )
 
 
 def link_arguments(parser: argparse.ArgumentParser) -> None:

@@ -52,6 +52,8 @@ def test_a_line_becomes_a_plan(tmp_path: Path, capsys: pytest.CaptureFixture[str
     ("words", "said"),
     [
         (["show", "{}", "--height", "0"], "--height: expected metres above take-off, up to 1000, got 0"),
+        (["check", "{}"], "--model: expected the drone that is to fly it, one of 4k, thermal, usa, ai"),
+        (["check", "{}", "--model", "4k", "--max-altitude", "0"], "--max-altitude: expected metres, above 0 and up to"),
         (["show", "{}", "--height", "nan"], "--height: expected metres above take-off, up to 1000, got 'nan'"),
         (["show", "{}", "--model", "bebop"], "--model: expected one of 4k, thermal, usa, ai, got 'bebop'"),
         (["show", "x.mavlink"], "--model: expected one of 4k, thermal, usa, ai: a .mavlink file does not say"),
@@ -101,3 +103,14 @@ def test_plot_without_matplotlib(
     assert main(["plan", "plot", str(flight), "-o", "x.png"]) == 2
     said = capsys.readouterr().err
     assert said == "anafi-mav: plot: expected matplotlib to be installed: pip install 'anafi-mav[plots]'\n"
+
+
+def test_check_knows_how_the_drone_is_set(flight: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plan", "check", str(flight), "--model", "4k"]) == 0
+    assert capsys.readouterr().out.splitlines()[-1].startswith("flight.plan: an ANAFI 4K flies it, ")
+    assert main(["plan", "check", str(flight), "--model", "4k", "--max-altitude", "22"]) == 1
+    assert (
+        capsys.readouterr().out.splitlines()[-1] == "flight.plan: error: item 8: 25 m is higher than the limit of 22 m"
+    )
+    assert main(["plan", "check", str(flight), "--model", "4k", "--max-distance", "15"]) == 1
+    assert "flight.plan: error: item 5: " in capsys.readouterr().out
