@@ -187,7 +187,7 @@ def _wrong_ways(items: Sequence[Item]) -> list[Fault]:
         if item.command == common.MAV_CMD_NAV_LAND and number in ways:
             after = next((other for other in range(number + 1, len(items)) if other not in ways), None)
             if after is not None:
-                faults.append(Fault(after, f"item {number} lands, and that ends the plan", FaultKind.PLAN))
+                faults.append(Fault(after, "a landing stands before it, which ends the plan", FaultKind.PLAN))
                 break
     if not any(TABLE[items[number].command].moves for number in ways):
         faults.append(Fault(0, "nothing of the mission flies", FaultKind.PLAN))

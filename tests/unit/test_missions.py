@@ -214,7 +214,7 @@ WRONG_MISSIONS = {
     "relative-speed.plan": "item 1: DO_CHANGE_SPEED: it says how much faster, not how fast",
     "circles.plan": "item 1: NAV_LOITER_TURNS: the drone flies straight lines: draw the circle as way points",
     "time-of-day.plan": "item 2: NAV_DELAY: it waits for a time of day, which the drone cannot",
-    "after-landing.plan": "item 3: item 2 lands, and that ends the plan",
+    "after-landing.plan": "item 3: a landing stands before it, which ends the plan",
     "round-and-round.plan": "item 2: it goes round for ever and flies nowhere",
     "nothing-flies.plan": "item 0: nothing of the mission flies",
     "waits.plan": "item 1: it waits to be continued, which the drone does not",

@@ -167,7 +167,7 @@ WRONG = {
     "too-fast": "item 1: 40 m/s is more than the 15 that an ANAFI 4K flies",
     "too-far": "item 1: it is 60.0 km from home, where no setting lets the drone fly",
     "round-and-round": "item 2: it goes round for ever and flies nowhere",
-    "after-landing": "item 3: item 2 lands, and that ends the plan",
+    "after-landing": "item 3: a landing stands before it, which ends the plan",
 }
 
 

@@ -294,7 +294,7 @@ WRONG = {
     ),
     "after the landing": (
         [waypoint(0, 1), action(21), action(189)],
-        Fault(2, "item 1 lands, and that ends the plan", FaultKind.PLAN),
+        Fault(2, "a landing stands before it, which ends the plan", FaultKind.PLAN),
     ),
     "nothing flies": ([action(178, 1.0, 4.0)], Fault(0, "nothing of the mission flies", FaultKind.PLAN)),
 }  # fmt: skip
