@@ -92,15 +92,16 @@ class MissionFlight:
         """Another mission was uploaded, or none any more. One that is flown is stopped: it is not the mission now."""
         if identity == self.identity:
             return
-        self.identity = identity
+        known, self.identity = self.identity != 0, identity
         if self.progress.state is State.ACTIVE:
             self._stop("another mission was uploaded" if items else "it was cleared")
             self._suspend()
             self._vehicle.select(FlightMode.HOLD)
         self.progress.take(items)
         self._parts, self._rest, self._next = [], None, None
-        self._forget_pending()
-        self.remember(None)
+        self._drop_pending()
+        if known:  # else it has just been read, and what was kept of it has not been looked at
+            self.remember(None)
 
     async def engage(self, client: Hashable, item: int | None = None) -> None:
         """Mode Mission begins, or goes on where it was stopped, or at an item; returns when the drone flies it.
@@ -432,6 +433,8 @@ class MissionFlight:
                 late = functools.partial(self._look_for_end, last=True)
                 self._end_timer = asyncio.get_running_loop().call_later(END_WAIT, late)
                 self._look_for_end()
+            elif self._vehicle.drone.controller.pilot_flies:
+                self._break_off("the pilot at the Skycontroller flies")
             else:
                 self._break_off("the drone has stopped it")
 
@@ -467,7 +470,7 @@ class MissionFlight:
 
     def end(self) -> list[asyncio.Task[None]]:
         """Something else flies now: the mission is paused."""
-        self._forget_pending()
+        self._drop_pending()
         ended = []
         if self._running is not None and self._running is not asyncio.current_task():
             self._running.cancel()
@@ -489,6 +492,12 @@ class MissionFlight:
         self._forget_pending()
         self._vehicle.select(FlightMode.HOLD)
         self._vehicle.text(Severity.WARNING, "Mission not begun: nobody armed")
+
+    def _drop_pending(self) -> None:
+        """What waits to be armed will not begin: the mode must not say that it does."""
+        if self._pending is not None:
+            self._forget_pending()
+            self._vehicle.forget_mode()
 
     def _forget_pending(self) -> None:
         self._pending = None
@@ -521,21 +530,23 @@ class MissionFlight:
         """The drone is back, or it is another gateway's: is it our mission that it flies?"""
         progress, plan = self.progress, self._vehicle.drone.flight_plan.state
         if progress.leg is None and record is not None and record.mission == self.identity:
-            leg = record.leg
-            if plan.uid != record.uid or any(item >= len(progress.items) for item in leg.origins):
+            leg, plays = record.leg, plan.uid == record.uid
+            if any(item >= len(progress.items) for item in leg.origins) or not (plays or self._vehicle.in_air):
                 return
             self._uid, self._parts, self._next = record.uid, [leg], record.next
             progress.begin(leg, record.line)
             progress.stop()
-        if progress.state is not State.PAUSED or progress.leg is None or plan.uid != self._uid:
+        if progress.state is not State.PAUSED or progress.leg is None:
             return
-        if plan.playing == PlayingState.PLAYING:
+        current, mine = progress.current, plan.uid == self._uid
+        if mine and plan.playing == PlayingState.PLAYING:
             progress.begin(progress.leg, progress.line)
             self._vehicle.select(FlightMode.MISSION, self)
-            current = progress.current
-            self.say(
-                Severity.NOTICE, lambda first: f"Mission: the drone flies it, at item {current + first} or a later one"
-            )
+            how = "the drone flies it"
+            self.say(Severity.NOTICE, lambda first: f"Mission: {how}, at item {current + first} or a later one")
+        else:
+            how = "the drone flies it no more"
+            self.say(Severity.NOTICE, lambda first: f"Mission: {how}, paused at item {current + first}")
         self.news()
 
     def _keep(self) -> None:

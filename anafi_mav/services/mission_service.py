@@ -72,6 +72,9 @@ class MissionService(Service):
     def link_up(self) -> None:
         self._flight.link_up(Record.read(self.host.memory.settings.get(RECORD)))
 
+    def link_down(self) -> None:
+        self._flight.link_down()  # before anybody is told that something has ended: the drone may fly on
+
     def hears(self) -> Collection[type[Message]]:
         return (events.MavlinkFilePlayingStateChanged, events.MissionItemExecuted, events.WaypointSkipped)
 
@@ -156,6 +159,9 @@ class MissionService(Service):
         else:
             settings[RECORD] = record.written
         self._unsaved = True
+        if not self._flight.flying:  # the gateway may be about to end
+            self._saved = -math.inf
+            self.tick(self.host.clock.monotonic())
 
     async def _save(self) -> None:
         if (problem := await self.host.memory.save()) is not None:

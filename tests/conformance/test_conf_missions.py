@@ -11,93 +11,32 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.mav import Client
-from support.plans import ACCEPTED, MISSION, UNSUPPORTED_FRAME, Item, around, upload
-from support.world import ARMED, HOME, World, world
-
-from anafi_mav.mavlink import dialect as newer
+from support.missions import (
+    ACTIVE,
+    COMPLETE,
+    LAND,
+    MISSION_MODE,
+    NOT_STARTED,
+    PAUSED,
+    PLACE,
+    ROUND,
+    first,
+    flown,
+    mode,
+    put,
+    reached,
+    said,
+    settled,
+    start,
+    state,
+    takeoff,
+    way,
+    whole,
+)
+from support.plans import ACCEPTED, FENCE, MISSION, UNSUPPORTED_FRAME, around, square, upload
+from support.world import ARMED, world
 
 both = pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
-
-PLACE = (HOME[0], HOME[1])
-
-
-MISSION_MODE = {"px4": 0x04040000, "ardupilot": 3}
-NOT_STARTED, ACTIVE, PAUSED, COMPLETE = 2, 3, 4, 5
-NAN = float("nan")
-
-
-def way(north: float, east: float, up: float, **more: float) -> Item:
-    """A way point so many m north and east of home, `up` above it."""
-    return Item(16, *around(PLACE, (north, east))[0], z=up, p4=NAN, frame=3, **more)  # type: ignore[arg-type]
-
-
-def takeoff(up: float) -> Item:
-    return Item(22, 0.0, 0.0, z=up, p4=NAN, frame=3)
-
-
-RTL, LAND = Item(20, 0.0, 0.0, frame=2), Item(21, 0.0, 0.0, p4=NAN, frame=3)
-
-ROUND = [takeoff(6.0), way(12.0, 0.0, 6.0), way(12.0, 15.0, 7.0), Item(93, 0.0, 0.0, p1=2.0, frame=2), RTL]
-"""Up, two way points, a wait, home."""
-
-
-def first(w: World) -> int:
-    """What the clients call the first item."""
-    return 1 if w.flavour == "ardupilot" else 0
-
-
-async def put(w: World, items: list[Item]) -> None:
-    """Upload a mission as clients of the flavour do, with home in front for ArduPilot's."""
-    listed = [Item(16, *HOME), *items] if first(w) else items
-    assert (await upload(w.client, listed, MISSION)).type == ACCEPTED
-
-
-async def start(w: World) -> None:
-    """From the ground, as the flavour's clients do it: PX4's by the mode, ArduPilot's by arming and MISSION_START."""
-    assert (await w.client.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)).result == dialect.MAV_RESULT_ACCEPTED
-    if first(w):
-        ack = await w.client.command(dialect.MAV_CMD_MISSION_START, 0, 0)
-    else:
-        ack = await w.client.command(dialect.MAV_CMD_DO_SET_MODE, 1, 4, 4)
-    assert ack.result == dialect.MAV_RESULT_ACCEPTED, ack
-
-
-def whole(message: Any) -> Any:
-    """The same message with the fields that pymavlink's own dialect does not have yet."""
-    (again,) = newer.MAVLink(None).parse_buffer(message.get_msgbuf())
-    return again
-
-
-def reached(w: World, since: int = 0) -> list[int]:
-    """The items that were told as reached, counted from 0."""
-    return [m.seq - first(w) for _, m in w.client.since(since, "MISSION_ITEM_REACHED")]
-
-
-async def state(
-    w: World, wanted: int, *, seq: int | None = None, since: int | None = None, timeout: float = 30.0
-) -> Any:
-    """Wait for a MISSION_CURRENT with a mission_state, and the current item counted from 0."""
-    return await w.client.wait(
-        "MISSION_CURRENT",
-        lambda m: whole(m).mission_state == wanted and seq in (None, m.seq - first(w)),
-        since=since,
-        timeout=timeout,
-    )
-
-
-def flown(w: World) -> list[str]:
-    """What the drone itself has begun, line by line of its files."""
-    return [entry.args["command"] for entry in w.drone.log if entry.name == "item"]
-
-
-async def mode(w: World, number: int, since: int | None = None) -> None:
-    await w.client.heartbeat(lambda beat: beat.custom_mode == number, since=since)
-
-
-async def said(w: World, words: str, since: int = 0) -> Any:
-    """Wait for a text with these words."""
-    return await w.client.wait("STATUSTEXT", lambda m: words in m.text, since=since)
-
 
 # Flown to the end.
 
@@ -197,6 +136,19 @@ async def test_conf_049_refused_with_the_drones_reasons(flavour: str) -> None:
         assert flown(w) == [] == reached(w)
 
 
+async def test_conf_049_items_outside_the_fence_are_refused_when_it_begins() -> None:
+    """Also the straight way to one: nothing is armed, uploaded or flown."""
+    async with world(web=True) as w:
+        assert (await upload(w.client, square(PLACE, 20.0), FENCE)).type == ACCEPTED
+        await put(w, [takeoff(6.0), way(10.0, 0.0, 6.0), way(40.0, 0.0, 6.0)])
+        assert (await w.client.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)).result == dialect.MAV_RESULT_ACCEPTED
+        mark = w.client.mark()
+        ack = await w.client.command(dialect.MAV_CMD_MISSION_START, 0, 0)
+        assert ack.result == dialect.MAV_RESULT_DENIED
+        await said(w, "Mission refused: item 2", since=mark)
+        assert w.commands("common.Mavlink.Start") == []
+
+
 # Stopped, and gone on with.
 
 
@@ -278,6 +230,42 @@ async def test_conf_074_whatever_takes_over_pauses_it(flavour: str, order: str) 
         assert len(w.commands("common.Mavlink.Start")) == 1
 
 
+async def test_conf_074_another_mission_stops_the_one_that_is_flown() -> None:
+    async with world(web=True) as w:
+        await put(w, ROUND)
+        await start(w)
+        await state(w, ACTIVE, seq=1, since=0)
+        await w.drone.wait_log(lambda e: e.name == "item" and e.args["command"] == "waypoint", timeout=20.0)
+        mark = w.client.mark()
+        await put(w, ROUND)  # the same again changes nothing
+        await state(w, ACTIVE)
+        await put(w, [takeoff(6.0), way(0.0, 9.0, 6.0)])
+        await state(w, NOT_STARTED, seq=0, since=mark)
+        await said(w, "another mission", since=mark)
+        await mode(w, w.modes.idle, since=mark)
+        assert len(w.commands("common.Mavlink.Start")) == 1
+        assert len(w.commands("common.Mavlink.Pause")) == 1
+
+
+async def test_conf_074_the_pilot_at_the_skycontroller_takes_over() -> None:
+    """His stick pauses the mission, and it does not go on when he lets go."""
+    async with world(web=True, skycontroller=3, speed=1.0) as w:
+        await put(w, ROUND)
+        await start(w)
+        await w.drone.wait_log(lambda e: e.name == "item" and e.args["command"] == "waypoint", timeout=20.0)
+        pilot = w.drone.skycontroller
+        assert pilot is not None
+        mark = w.client.mark()
+        pilot.stick(1, -50)
+        await state(w, PAUSED, since=mark)
+        await said(w, "Mission paused", since=mark)
+        pilot.stick(1, 0)
+        for _ in range(4):  # longer than he keeps the drone after his last touch
+            await mode(w, w.modes.idle, since=w.client.mark())
+        await state(w, PAUSED)
+        assert len(w.commands("common.Mavlink.Start")) == 1
+
+
 # The current item.
 
 
@@ -306,6 +294,22 @@ async def test_conf_072_the_current_item(flavour: str) -> None:
         assert reached(w) == [3, 4], "what was not flown is not reached"
 
 
+async def test_conf_072_an_ai_begins_in_the_middle_of_the_file_that_it_has() -> None:
+    async with world(web=True, model="ai") as w:
+        await put(w, [takeoff(6.0), way(12.0, 0.0, 6.0), way(12.0, 12.0, 6.0), way(0.0, 12.0, 6.0)])
+        await start(w)
+        await w.drone.wait_log(lambda e: e.name == "item" and e.args["command"] == "waypoint", timeout=20.0)
+        mark = w.client.mark()
+        assert (await w.client.command(224, 3, 0)).result == dialect.MAV_RESULT_ACCEPTED
+        await state(w, ACTIVE, seq=3, since=mark)
+        await state(w, COMPLETE, since=mark)
+        before, again = w.commands("flight_plan.start_at_v2")
+        assert before.args["flightplan_id"] == again.args["flightplan_id"]
+        assert (before.args["item"], again.args["item"]) == (0, 4), "lines: the take-off has two"
+        assert reached(w)[-1] == 3
+        assert 2 not in reached(w)
+
+
 # Items that are orders.
 
 
@@ -318,13 +322,6 @@ async def order(client: Client, current: int, x: float, y: float, z: float, *, f
     else:
         client.send(dialect.MAVLink_mission_item_message(*fields, x, y, z, MISSION))
     return await client.wait("MISSION_ACK", since=mark)
-
-
-async def settled(w: World, wanted: tuple[float, float, float]) -> None:
-    """Wait until the drone itself is at a place, m north, east and up of where it took off."""
-    await w.drone.wait_log(
-        lambda entry: math.dist((w.drone.pose.north, w.drone.pose.east, w.drone.pose.up), wanted) < 0.7, timeout=30.0
-    )
 
 
 @both

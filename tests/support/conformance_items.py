@@ -20,7 +20,6 @@ class Item(NamedTuple):
 
 
 _LATER_CAMERA = "camera and gimbal components"
-_MISSIONS = "missions"
 
 ITEMS: dict[int, Item] = {
     1: Item("heartbeat at 1 Hz from component 1, type quadrotor, the flavour's autopilot, custom mode flag"),
@@ -121,7 +120,7 @@ ITEMS: dict[int, Item] = {
     119: Item("MAVProxy on ArduPilot's flavour", COPTER, "missions"),
     120: Item("Mission Planner's sequences on ArduPilot's flavour", COPTER, "missions, camera"),
     121: Item("two vehicles, two ground stations: no answer goes astray", NEITHER),
-    122: Item("plans outlive the gateway and a lost link", NEITHER, _MISSIONS),
+    122: Item("plans outlive the gateway and a lost link, a mission that is flown goes on", NEITHER),
     125: Item("COMPONENT_METADATA, general.json, parameter.json", NEITHER),
     126: Item("EVENT, REQUEST_EVENT, arming report", NEITHER),
     127: Item("RUN_PREARM_CHECKS", NEITHER),

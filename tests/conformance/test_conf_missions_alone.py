@@ -1,0 +1,169 @@
+"""Conformance item 122: missions when the link or the gateway is gone, and those that need the gateway all the time."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+import time
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import pytest
+from support.missions import (
+    ACTIVE,
+    COMPLETE,
+    PAUSED,
+    mode,
+    put,
+    reached,
+    said,
+    settled,
+    start,
+    state,
+    takeoff,
+    way,
+    whole,
+)
+from support.params import write
+from support.plans import Item
+from support.product import Process, program
+from support.world import HOME, WEB_PORT, World, loopback, world
+
+from anafi_mav.config import Config, DroneConfig
+from anafi_mav.gateway import Gateway
+from anafi_mav.sim import DroneSpec, Simulator
+
+INT32 = 6
+FAR = [takeoff(6.0), way(8.0, 0.0, 6.0), way(600.0, 0.0, 6.0), way(600.0, 8.0, 6.0)]
+"""Its third item takes longer than a link is lost here."""
+
+TURN = Item(115, 0.0, 0.0, p1=90.0, frame=2)
+"""East, in place: no flight plan of Parrot's can say that."""
+
+
+async def lost_and_back(w: World) -> None:
+    """The link is lost, the vehicle disappears, and both come back."""
+    w.drone.faults.mute = True
+    down = time.monotonic()
+    while not w.client.received[-1][0] < time.monotonic() - 2.0:  # the system is gone when its heartbeat is
+        assert time.monotonic() < down + 10.0
+        await asyncio.sleep(0.1)
+    w.drone.faults.mute = False
+    await w.client.heartbeat(lambda beat: True, timeout=20.0)
+
+
+async def test_conf_122_the_drone_flies_on_while_the_link_is_lost() -> None:
+    """Afterwards it is the same system, home and mission, it is active, and nothing was told that was not flown."""
+    async with world(web=True, speed=1.5) as w:
+        await put(w, FAR)
+        assert (await write(w.client, "ANF_MIS_RTH", 0, INT32)).param_id == "ANF_MIS_RTH"
+        await start(w)
+        await said(w, "the drone flies on")
+        before = whole(await state(w, ACTIVE, seq=2, since=0))
+        home = await w.client.wait("HOME_POSITION", since=0)
+        await lost_and_back(w)
+        after = whole(await state(w, ACTIVE, seq=2))
+        assert after.mission_id == before.mission_id != 0
+        assert after.get_srcSystem() == before.get_srcSystem() == 1
+        again = await w.client.wait("HOME_POSITION")
+        assert (again.latitude, again.longitude, again.altitude) == (home.latitude, home.longitude, home.altitude)
+        await mode(w, 0x04040000)
+        assert reached(w) == [0, 1]
+        # And it obeys.
+        mark = w.client.mark()
+        await w.client.command(192, -1, 1, 0)
+        await state(w, PAUSED, seq=2, since=mark)
+
+
+async def test_conf_122_the_drone_returns_when_the_link_is_lost() -> None:
+    """The factory's setting: what it does is told at the start, and the mission is paused afterwards."""
+    async with world(web=True, speed=1.5) as w:
+        await put(w, FAR)
+        await start(w)
+        await said(w, "the drone returns home")
+        await state(w, ACTIVE, seq=2, since=0)
+        await lost_and_back(w)
+        mark = w.client.mark()
+        await state(w, PAUSED, seq=2, since=mark)
+        assert reached(w) == [0, 1]
+        assert len(w.commands("common.Mavlink.Start")) == 1
+
+
+@asynccontextmanager
+async def gateway(config: Path) -> AsyncIterator[Process]:
+    """`anafi-mav run` alone, without a simulator of its own."""
+    async with program(sys.executable, "-m", "anafi_mav", "run", "-c", str(config)) as process:
+        await process.line(lambda line: line.startswith("ready"))
+        yield process
+
+
+async def test_conf_122_a_gateway_that_was_killed_knows_the_drones_plan_again(tmp_path: Path) -> None:
+    drone, address = loopback(), loopback()
+    spec = DroneSpec(address=drone, home=HOME, http_port=WEB_PORT)
+    config = tmp_path / "fleet.yaml"
+    config.write_text(
+        f"endpoints: ['tcpin://{address}:5760']\nstate: {tmp_path / 'state'}\n"
+        f"drones: [{{name: alpha, sysid: 1, address: {drone}, http_port: {WEB_PORT}}}]\n"
+    )
+    async with Simulator([spec], speed=1.5, seed=1) as simulator:
+        async with gateway(config) as running:
+            w = World(simulator, None, address)  # type: ignore[arg-type]
+            await w.connect()
+            await put(w, FAR)
+            await write(w.client, "ANF_MIS_RTH", 0, INT32)
+            await start(w)
+            before = whole(await state(w, ACTIVE, seq=2, since=0))
+            await asyncio.sleep(6.0)  # how far it is has been written by then
+            running.process.kill()
+            await running.process.wait()
+            await w.client.close()
+        again = Config(
+            endpoints=(f"tcpin://{address}:5760",),
+            drones=(DroneConfig(name="alpha", sysid=1, address=drone, http_port=WEB_PORT),),
+            state=str(tmp_path / "state"),
+        )
+        async with Gateway(again) as here:
+            w = World(simulator, here, address)
+            await w.connect()
+            await w.client.heartbeat(lambda beat: True, since=0, timeout=30.0)
+            after = whole(await state(w, ACTIVE, seq=2))
+            assert after.mission_id == before.mission_id != 0
+            await mode(w, 0x04040000)
+            assert reached(w) == []
+            await w.client.command(192, -1, 1, 0)
+            await state(w, PAUSED, seq=2)
+            await w.client.close()
+    assert len(w.commands("common.Mavlink.Start")) == 1
+
+
+# What the gateway flies itself.
+
+
+async def test_items_that_the_gateway_flies_between_two_files() -> None:
+    async with world(web=True) as w:
+        await put(w, [takeoff(6.0), way(10.0, 0.0, 6.0), TURN, way(10.0, 10.0, 6.0)])
+        await said(w, "some are flown by the gateway")
+        await start(w)
+        await state(w, COMPLETE, since=0)
+        assert reached(w) == [0, 1, 2, 3]
+        (turn,) = [entry for entry in w.commands("ardrone3.Piloting.moveBy") if entry.args["dPsi"]]
+        first, second = w.commands("common.Mavlink.Start")
+        assert first.t < turn.t < second.t
+        assert first.args["filepath"] != second.args["filepath"]
+        await settled(w, (10.0, 10.0, 6.0))
+
+
+@pytest.mark.parametrize("returns", [0, 1])
+async def test_without_the_gateway_what_it_flies_and_what_follows_is_not_flown(returns: int) -> None:
+    """The drone may fly its first file to the end while the link is lost; the turn behind it is nobody's then."""
+    async with world(web=True, speed=1.5) as w:
+        await put(w, [takeoff(6.0), way(40.0, 0.0, 6.0), TURN, way(40.0, 10.0, 6.0)])
+        await write(w.client, "ANF_MIS_RTH", returns, INT32)
+        await start(w)
+        await w.drone.wait_log(lambda e: e.name == "item" and e.args["command"] == "waypoint", timeout=20.0)
+        await lost_and_back(w)
+        await state(w, PAUSED, timeout=40.0)
+        assert 2 not in reached(w)
+        assert len(w.commands("common.Mavlink.Start")) == 1
+        assert [entry for entry in w.commands("ardrone3.Piloting.moveBy") if entry.args["dPsi"]] == []

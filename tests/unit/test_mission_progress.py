@@ -1,0 +1,136 @@
+"""How far a mission is: by hand, line after line, and what it keeps of itself."""
+
+from __future__ import annotations
+
+import pytest
+
+from anafi_mav.plans.plan import Item
+from anafi_mav.plans.translate import Leg
+from anafi_mav.services.mission_progress import TRANSITIONS, Event, Progress, State
+from anafi_mav.services.mission_record import Record
+
+IMPOSSIBLE = {
+    (State.NONE, Event.CHOOSE),
+    (State.NONE, Event.BEGIN),
+    (State.NONE, Event.STOP),
+    (State.NONE, Event.FINISH),
+    (State.READY, Event.STOP),
+    (State.READY, Event.FINISH),
+    (State.ACTIVE, Event.CHOOSE),
+    (State.PAUSED, Event.STOP),
+    (State.PAUSED, Event.FINISH),
+    (State.COMPLETE, Event.STOP),
+    (State.COMPLETE, Event.FINISH),
+}
+
+
+def test_every_state_knows_its_events() -> None:
+    for state in State:
+        for event in Event:
+            assert ((state, event) in IMPOSSIBLE) is (event not in TRANSITIONS[state]), (state, event)
+
+
+def item(command: int) -> Item:
+    return Item(command, 3, (None, None, None, None, 48.0, 2.0, 10.0))
+
+
+ITEMS = [item(command) for command in (22, 178, 16, 1001, 16, 20)]
+# Take-off and the way up are two lines of item 0; item 3 has no line and is done with the line before it.
+LEG = Leg(b"QGC WPL 120\n" + b"x\n" * 6, (0, 0, 1, 2, 4, 5), ((), (0,), (1,), (2, 3), (4,), (5,)))
+
+
+def flying() -> Progress:
+    progress = Progress()
+    progress.take(ITEMS)
+    assert (progress.state, progress.current, progress.first) == (State.READY, 0, 0)
+    progress.begin(LEG)
+    return progress
+
+
+def test_line_after_line() -> None:
+    progress = flying()
+    told = [(progress.executed(line), progress.current) for line in range(6)]
+    assert told == [((), 0), ((0,), 1), ((1,), 2), ((2, 3), 4), ((4,), 5), ((5,), 5)]
+    assert progress.leg_done
+    progress.finish()
+    assert (progress.state, progress.first) == (State.COMPLETE, 0)
+
+
+def test_what_was_told_before_or_is_no_line_says_nothing() -> None:
+    progress = flying()
+    assert progress.executed(1) == (0,)
+    for line in (1, 0, -1, 6, 4_000_000_000):
+        assert progress.executed(line) == ()
+    assert (progress.line, progress.current) == (1, 1)
+
+
+def test_lines_that_were_never_told_are_not_claimed() -> None:
+    """The link was away while items 1 to 3 may have been flown."""
+    progress = flying()
+    progress.executed(1)
+    assert progress.executed(4) == (4,)
+    assert progress.current == 5
+
+
+def test_an_item_that_was_left_out_is_not_done_and_what_needs_no_line_behind_it_is() -> None:
+    progress = flying()
+    progress.executed(2)
+    assert progress.skip(3) == 2
+    assert progress.executed(3) == (3,)
+    assert progress.skip(9) is None
+
+
+def test_nothing_is_done_while_it_is_not_flown() -> None:
+    progress = flying()
+    progress.executed(1)
+    progress.stop()
+    assert progress.executed(2) == ()
+    assert (progress.state, progress.current) == (State.PAUSED, 1)
+    progress.begin(LEG, progress.line)
+    assert progress.executed(2) == (1,)
+
+
+def test_the_end_that_is_the_plans_own() -> None:
+    progress = flying()
+    seen = []
+    for line in range(6):
+        seen.append((progress.ending, progress.at_last_line))
+        progress.executed(line)
+    assert seen == [(False, False)] * 5 + [(True, True)]
+    assert not progress.ending, "done"
+
+
+def test_choosing_an_item() -> None:
+    progress = flying()
+    progress.executed(3)
+    progress.stop()
+    progress.choose(1)
+    assert (progress.state, progress.current, progress.leg) == (State.PAUSED, 1, None)
+    for wrong in (-1, 6):
+        with pytest.raises(ValueError, match="no item"):
+            progress.choose(wrong)
+    progress.begin(LEG, 5)
+    progress.finish()
+    progress.choose(4)
+    assert (progress.state, progress.first) == (State.READY, 4)
+
+
+def test_another_mission() -> None:
+    progress = flying()
+    progress.executed(3)
+    progress.take(ITEMS[:2])
+    assert (progress.state, progress.current, progress.leg) == (State.READY, 0, None)
+    progress.take([])
+    assert progress.state is State.NONE
+
+
+def test_what_is_kept_is_read_again_and_nothing_else() -> None:
+    record = Record.of(77, "abc", LEG, 2, None)
+    again = Record.read(record.written)
+    assert again == record
+    assert again.leg == LEG
+    good = record.written
+    for key, wrong in [("line", 6), ("line", -2), ("origins", [0, 0]), ("done", "x"), ("uid", 3), ("more", 1)]:
+        assert Record.read({**good, key: wrong}) is None, key
+    assert Record.read({**good, "origins": [0, 0, 1, -2, 4, 5]}) is None
+    assert Record.read(None) is None
