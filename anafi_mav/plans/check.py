@@ -222,7 +222,7 @@ class _Follower:
                 self._move(back)
                 self.seconds += back.height / SINK
                 self._landed = True
-            case common.MAV_CMD_NAV_DELAY:
+            case common.MAV_CMD_NAV_DELAY | common.MAV_CMD_CONDITION_DELAY:
                 self.seconds += one or 0.0
             case common.MAV_CMD_DO_CHANGE_SPEED:
                 self._speed = two or self._speed

@@ -53,7 +53,8 @@ TIMELAPSE, GPSLAPSE = 0.0, 1.0
 """Of SET_STILL_MODE."""
 
 _SET_ROI, _ROI_PLACE = common.MAV_CMD_DO_SET_ROI, float(common.MAV_ROI_LOCATION)
-_TAKE_TIME = frozenset({WAYPOINT, common.MAV_CMD_NAV_DELAY, common.MAV_CMD_PANORAMA_CREATE})
+_DELAY = {1: common.MAV_CMD_CONDITION_DELAY, 2: common.MAV_CMD_NAV_DELAY}
+_TAKE_TIME = frozenset({WAYPOINT, *_DELAY.values(), common.MAV_CMD_PANORAMA_CREATE})
 _TARGETING = float(common.MAV_MOUNT_MODE_MAVLINK_TARGETING)
 
 
@@ -266,7 +267,8 @@ class Pen:
 
     def wait(self, seconds: float) -> None:
         if seconds > 0.0:
-            self.line(common.MAV_CMD_NAV_DELAY, seconds)
+            # GroundSDK, which made the flight plans of version 1, knows CONDITION_DELAY only (MavlinkCommand.java).
+            self.line(_DELAY[self.version], seconds)
 
     def set_speed(self, kind: float, speed: float) -> None:
         self._set(lambda: self._put_speed(kind, speed), replace(self.settings, speed=(kind, speed)))

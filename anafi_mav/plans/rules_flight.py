@@ -160,7 +160,7 @@ FLIGHT = (
         "place if it names another. Without a height the drone rises as it does by itself, which is said.", _take_off,
         moves=True),
     Row(31, _EXACT, "Way point.", _loiter_to_height, moves=True, place=True),
-    Row(93, _EXACT, "Delay. Waiting for a time of day is refused.", _delay, moves=True),
+    Row(93, _EXACT, "Delay: CONDITION_DELAY in version 1. Waiting for a time of day is refused.", _delay, moves=True),
     Row(112, _NEARLY, "Delay: the drone waits where it is, not on the way.", _condition_delay, moves=True),
     Row(115, _STEPPED, "The gateway turns the drone: a flight plan turns on the way only.", _turn, moves=True),
     Row(DO_JUMP, _EXACT, "Written out as often as it jumps; what becomes too long, or has no end, is flown file after "

@@ -60,9 +60,9 @@ def test_a_flight_of_version_1() -> None:
         f"3 16 0.0 1.0 0.0 30.0 {LAT} {LON} 15.0",
         "3 178 1.0 4.0 0.0 0.0 0.0 0.0 0.0",
         f"3 16 0.0 2.0 0.0 90.0 {LAT + 1e-4} {LON} 20.0",
-        "3 93 3.0 0.0 0.0 0.0 0.0 0.0 0.0",
+        "3 112 3.0 0.0 0.0 0.0 0.0 0.0 0.0",
         f"3 16 0.0 1.0 0.0 {heading} {LAT + 1e-4} {LON + 1e-4} 25.0",
-        "3 93 10.0 0.0 0.0 0.0 0.0 0.0 0.0",
+        "3 112 10.0 0.0 0.0 0.0 0.0 0.0 0.0",
         "3 20 0.0 0.0 0.0 0.0 0.0 0.0 0.0",
     ]
     (leg,) = flight.parts
@@ -321,7 +321,7 @@ def test_the_simulated_drone_reads_what_is_written(version: Version) -> None:
     (leg,) = flight.parts
     assert isinstance(leg, Leg)
     read = plan_file.read(leg.content, version)
-    assert [int(item.command) for item in read] == [22, 16, 16, 93, 16, 20]
+    assert [int(item.command) for item in read] == [22, 16, 16, {1: 112, 2: 93}[version], 16, 20]
     assert read[4].longitude == LON + 1e-7  # a centimetre is not lost
 
 

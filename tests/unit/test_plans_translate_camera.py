@@ -131,7 +131,18 @@ def test_mavsdks_items(version: Version) -> None:
         action(214, 2000.0, 0.0), action(2001, 0.0), action(20),
     ]  # fmt: skip
     found = read(items, version)
-    assert [int(item.command) for item in found] == [16, 178, 205, 93, 2500, 2501, 50001, 2000, 2001, 20]
+    assert [int(item.command) for item in found] == [
+        16,
+        178,
+        205,
+        112 if version == 1 else 93,
+        2500,
+        2501,
+        50001,
+        2000,
+        2001,
+        20,
+    ]
     interval = found[7].p1 if version == 1 else found[7].p2
     assert interval == 2.0
 
