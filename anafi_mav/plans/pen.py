@@ -358,8 +358,9 @@ class Pen:
     def photo(self) -> None:
         """One."""
         self._idle("photo")
-        mode, step = (TIMELAPSE, SHORTEST_INTERVAL) if self._still is None else self._still[:2]
-        self._still_mode(mode, step)
+        # A count of 1 without an interval is one photo in the still mode that holds (StartPhotoCaptureCommand.java).
+        held = self._still is not None and self._still[0] == TIMELAPSE
+        self._still_mode(TIMELAPSE, self._still[1] if held and self._still else SHORTEST_INTERVAL)
         self._photos(0.0, 1.0)
 
     def photos_in_time(self, seconds: float, count: float) -> None:

@@ -111,15 +111,15 @@ def test_a_survey_as_qgroundcontrol_writes_it(version: Version) -> None:
         Loss("no item takes off: the drone rises straight to 20 m first", 2),
     )
     found = read(items, version)
-    assert [int(item.command) for item in found] == [205, 16, 50001, 2000, 16, 2001, 2000]
+    assert [int(item.command) for item in found] == [205, 16, 50001, 2000, 16, 2001, 50001, 2000]
     assert found[0].p1 == -90.0
     assert (found[2].p1, found[2].p2) == (1.0, 25.0)
     counts = [item.p2 if version == 1 else item.p3 for item in found if item.command is Command.START_PHOTO]
     assert counts == [0.0, 1.0]
     (leg,) = translate(items, version, AIR).parts
     assert isinstance(leg, Leg)
-    assert leg.origins == (1, 2, 3, 3, 4, 5, 5)
-    assert leg.done == ((0, 1), (2,), (), (3,), (4,), (), (5,))
+    assert leg.origins == (1, 2, 3, 3, 4, 5, 5, 5)
+    assert leg.done == ((0, 1), (2,), (), (3,), (4,), (), (), (5,))
 
 
 @pytest.mark.parametrize("version", VERSIONS)
