@@ -109,8 +109,10 @@ async def test_conf_057_current_mode(flavour: str) -> None:
         assert first.custom_mode == second.custom_mode == hold
 
 
-async def test_conf_058_the_monitor_tells_when_the_list_has_changed() -> None:
-    async with world() as w:
+@pytest.mark.parametrize("flavour", FLAVOURS)
+async def test_conf_058_the_monitor_tells_when_the_list_has_changed(flavour: str) -> None:
+    stop, home = ("Hold", "Return") if flavour == "px4" else ("Brake", "RTL")
+    async with world(flavour=flavour) as w:
         selectable = {
             m.mode_name: m.properties & newer.MAV_MODE_PROPERTY_NOT_USER_SELECTABLE for m in await modes(w, 0)
         }
@@ -124,7 +126,7 @@ async def test_conf_058_the_monitor_tells_when_the_list_has_changed() -> None:
             m.mode_name: m.properties & newer.MAV_MODE_PROPERTY_NOT_USER_SELECTABLE for m in await modes(w, 0)
         }
         assert selectable["Follow"] != 0
-        assert selectable["Hold"] == selectable["Return"] == 0
+        assert selectable[stop] == selectable[home] == 0
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
