@@ -12,8 +12,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support import flavours
+from support import fair_clock, flavours
 from support.conformance_items import ITEMS
+
+fair_clock.install()
 
 _NUMBER = re.compile(r"test_conf_(\d{3})")
 
@@ -34,6 +36,11 @@ the item does not concern it; items that do not depend on the flavour have one c
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--conformance", metavar="FILE", default=None, help="write the conformance table of this run")
+
+
+def pytest_asyncio_loop_factories() -> dict[str, Any]:
+    """The loops that tests run in."""
+    return {"fair": fair_clock.fair_loop}
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -83,7 +83,8 @@ async def test_conf_105_silence_of_sticks(flavour: str, setpoint: Any) -> None:
         mark, last = w.client.mark(), sent[-1]
         await w.client.heartbeat(lambda beat: beat.custom_mode == idle_mode(flavour), since=mark)
         assert now() - last < 1.0
-        await w.drone.wait_log(lambda e: e.name.endswith(".PCMD"), 5.0, since=now())  # which are repeated
+        # Zeros are repeated.
+        await w.drone.wait_log(lambda e: e.name.endswith(".PCMD") and e.args["pitch"] == 0, 5.0, since=now())
         leaning = [e.t for e in heard(w, "PCMD") if e.args["pitch"] != 0]
         level = [e.t for e in heard(w, "PCMD") if e.args["pitch"] == 0 and e.t > leaning[-1]]
         assert level[0] - last <= HOVER_WITHIN

@@ -1,0 +1,71 @@
+"""A clock that stands still while a busy machine lets this process wait: seconds of it are seconds that we had.
+
+Gateway, simulator and client of a test live in one process and one event loop, so they can share a clock. On a machine
+that is shared with others a process may not get to run for half a second, and then everything in it is late at once:
+setpoints, the watch over their silence, and the test that measures both. What is measured by this clock says something
+about our code, whoever else is on the machine.
+
+Not counted is the time in which the loop was ready to run and did not: lateness of the selector beyond its timeout, and
+of callbacks what they did not spend on a processor, if they did not wait for anything (the kernel counts voluntary
+switches). So code of ours that computes for too long, sleeps or blocks is as late as it is.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import resource
+import selectors
+import time
+from typing import Any
+
+LATE = 0.0012
+"""s that a selector may be late in the course of things: epoll knows milliseconds."""
+
+INTERRUPTED = 0.0001
+"""s of callbacks that are interrupted in the course of things."""
+
+_real = time.monotonic
+_lost = 0.0
+
+
+def fair() -> float:
+    """`time.monotonic` without what was lost."""
+    return _real() - _lost
+
+
+def lost() -> float:
+    """s that the machine let this process wait."""
+    return _lost
+
+
+class FairSelector(selectors.DefaultSelector):
+    """Notes what is lost before and after it waits."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._left = self._state()
+
+    @staticmethod
+    def _state() -> tuple[float, float, int]:
+        return _real(), time.thread_time(), resource.getrusage(resource.RUSAGE_THREAD).ru_nvcsw
+
+    def select(self, timeout: float | None = None) -> Any:
+        global _lost
+        (left, worked, waited), (now, working, waiting) = self._left, self._state()
+        if waited == waiting:
+            _lost += max(0.0, (now - left) - (working - worked) - INTERRUPTED)
+        ready = super().select(timeout)
+        if timeout is not None:
+            _lost += max(0.0, _real() - now - max(timeout, 0.0) - LATE)
+        self._left = self._state()
+        return ready
+
+
+def fair_loop() -> asyncio.AbstractEventLoop:
+    """A loop that notes what is lost."""
+    return asyncio.SelectorEventLoop(FairSelector())
+
+
+def install() -> None:
+    """From here on `time.monotonic`, which event loops read, is the fair clock."""
+    time.monotonic = fair
