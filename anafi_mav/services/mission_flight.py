@@ -194,14 +194,18 @@ class MissionFlight:
         )
 
     def _resumes(self, item: int) -> bool:
-        """The drone has the rest of what is to be flown in its memory."""
+        """The drone hovers, with the rest of what is to be flown in its memory."""
         progress, plan = self.progress, self._vehicle.drone.flight_plan.state
         paused = plan.playing == PlayingState.PAUSED and plan.uid == self._uid
         whole = progress.leg is not None and self._next is None
-        return progress.state is State.PAUSED and paused and whole and item == progress.current
+        same = progress.state is State.PAUSED and item == progress.current
+        return same and whole and paused and self._vehicle.in_air
 
-    async def _begin(self, item: int, number: int) -> None:
-        """Fly from an item on. Nothing is disturbed before all is known to be good. `number` is of the first item."""
+    async def _begin(self, item: int, number: int, *, waited: bool = False) -> None:
+        """Fly from an item on. Nothing is disturbed before all is known to be good. `number` is of the first item.
+
+        `waited`: the drone was taken over when the mode was chosen, and has stood since.
+        """
         vehicle, progress, plan = self._vehicle, self.progress, self._vehicle.drone.flight_plan
         items, resumes, uid = progress.items, self._resumes(item), self._uid
         if resumes:
@@ -213,7 +217,8 @@ class MissionFlight:
             parts[0], uid, line = await self._file(parts[0])
         self._beginning = True
         try:
-            await vehicle.take_over()
+            if not waited:
+                await vehicle.take_over()
             if vehicle.in_air:
                 await vehicle.drone.piloting.stop()
                 await vehicle.drone.piloting.cancel_return_home()
@@ -301,7 +306,7 @@ class MissionFlight:
     async def _begin_and_report(self, number: int) -> None:
         """The beginning that waited for arming: its command was answered long ago, so failures are texts."""
         try:
-            await self._begin(self.progress.first, number)
+            await self._begin(self.progress.first, number, waited=True)
         except AnafiMavError as error:
             self._vehicle.text(Severity.ERROR, str(error))
 

@@ -103,7 +103,7 @@ class MissionService(Service):
         flight = self._flight
         if not flight.there:
             raise Refused("Current item refused: there is no mission", lasting=True)
-        if not (math.isnan(item) or item == int(item)):
+        if math.isinf(item) or (not math.isnan(item) and item != int(item)):
             raise Refused("Current item refused: param1 is the number of an item", lasting=True)
         if math.isnan(item) or item == KEEP:
             if anew == 1.0:

@@ -36,6 +36,8 @@ from support.missions import (
 from support.plans import ACCEPTED, FENCE, MISSION, UNSUPPORTED_FRAME, around, square, upload
 from support.world import ARMED, world
 
+from anafi_mav.mavlink import dialect as newer
+
 both = pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 
 # Flown to the end.
@@ -80,6 +82,40 @@ async def test_conf_073_other_ends(flavour: str, end: str) -> None:
             await mode(w, w.modes.idle, since=mark)
             await settled(w, (10.0, 5.0, 6.0))
         assert math.dist((w.drone.pose.north, w.drone.pose.east), (10.0, 5.0)) < 1.5
+
+
+@both
+async def test_conf_027_059_mode_mission_by_every_way(flavour: str) -> None:
+    """It is offered when there is a mission; asked for again while it is flown it changes nothing, whoever asks."""
+    async with world(flavour=flavour, web=True) as w:
+        other = await w.connect(254)
+        number = MISSION_MODE[flavour]
+        monitor = await w.client.wait("AVAILABLE_MODES_MONITOR")
+        await put(w, [takeoff(6.0), way(60.0, 0.0, 6.0)])
+        await w.client.wait("AVAILABLE_MODES_MONITOR", lambda m: m.seq != monitor.seq)
+        await w.take_off(5.0)
+        commands = [
+            (dialect.MAV_CMD_DO_SET_MODE, 1, *((number,) if first(w) else (4, 4))),
+            (dialect.MAV_CMD_DO_SET_MODE, 1, 0x04040000),
+            (newer.MAV_CMD_DO_SET_STANDARD_MODE, newer.MAV_STANDARD_MODE_MISSION),
+            (dialect.MAV_CMD_MISSION_START, 0, 0),
+            None,
+        ]
+        for starts, command in enumerate(commands, 1):
+            mark = w.client.mark()
+            if command is None:
+                w.client.send(dialect.MAVLink_set_mode_message(1, 1, number))
+            else:
+                assert (await w.client.command(*command)).result == dialect.MAV_RESULT_ACCEPTED, command
+            await mode(w, number, since=mark)
+            await state(w, ACTIVE, since=mark)
+            ack = await other.command(newer.MAV_CMD_DO_SET_STANDARD_MODE, newer.MAV_STANDARD_MODE_MISSION)
+            assert ack.result == dialect.MAV_RESULT_ACCEPTED
+            assert len(w.commands("common.Mavlink.Start")) == starts
+            mark = w.client.mark()
+            assert (await other.command(192, -1, 1, 0)).result == dialect.MAV_RESULT_ACCEPTED
+            await state(w, PAUSED, since=mark)
+            await mode(w, w.modes.hold, since=mark)
 
 
 async def test_conf_049_qgroundcontrols_order_the_mode_first_and_then_arm() -> None:
@@ -279,7 +315,7 @@ async def test_conf_072_the_current_item(flavour: str) -> None:
         await state(w, NOT_STARTED, seq=2, since=mark)
         assert (await w.client.command(224, 1 + first(w), 0)).result == dialect.MAV_RESULT_ACCEPTED
         await state(w, NOT_STARTED, seq=1)
-        for wrong in (len(ROUND) + first(w), 99):
+        for wrong in (len(ROUND) + first(w), 99, math.inf, 1.5, -7):
             assert (await w.client.command(224, wrong, 0)).result == dialect.MAV_RESULT_DENIED
         mark = w.client.mark()
         w.client.send(dialect.MAVLink_mission_set_current_message(1, 1, 77))
