@@ -1,4 +1,4 @@
-"""`anafi-mav plan`: flight plans as files (`plan_files`) and on vehicles (`plan_link`)."""
+"""`anafi-mav plan`: flight plans as files (`plan_files`) and on vehicles (`plan_link`, `plan_fly`)."""
 
 from __future__ import annotations
 
@@ -29,6 +29,9 @@ ACTIONS = {
     "upload": Action("hand a plan to a vehicle", plan_options.upload_arguments, "plan_link"),
     "download": Action(
         "fetch mission, fence and rally points of a vehicle", plan_options.download_arguments, "plan_link"
+    ),
+    "fly": Action(
+        "hand a plan to a vehicle, begin it and follow it; starts the motors", plan_options.upload_arguments, "plan_fly"
     ),
 }
 

@@ -17,9 +17,8 @@ from anafi_mav.errors import AnafiMavError, PlanError
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.mavlink.plan_client import Download, Outcome, Upload
-from anafi_mav.plans import table
 from anafi_mav.plans.lists import fence_items, points_of, rally_items, zones_of
-from anafi_mav.plans.plan import GLOBAL, WAYPOINT, Item, Plan, Point, shifted
+from anafi_mav.plans.plan import GLOBAL, WAYPOINT, Item, Plan, Point, counted, shifted
 from anafi_mav.services.mission_items import from_wire, to_wire
 from anafi_mav.services.plan_items import Fault, PlanItem, item_int, item_of
 
@@ -139,7 +138,7 @@ async def give_list(ground: Ground, kind: int, items: Sequence[PlanItem], said: 
     with progress(f"{NAMES[kind]} to system {sysid}", len(items)) as step:
         await ground.run(transfer, step)
     assert transfer.result is not None, "run ends with one"
-    count = table.count(len(items) - int(kind == MISSION and ground.first_item_is_home), "item")
+    count = counted(len(items) - int(kind == MISSION and ground.first_item_is_home), "item")
     if transfer.result.outcome is Outcome.UNCONFIRMED and await _has(ground, kind, items):
         say(f"{NAMES[kind]}: {count} on system {sysid}; the acknowledgement was lost, they were read back")
     elif transfer.result.outcome is Outcome.DONE:

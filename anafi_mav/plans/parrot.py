@@ -14,7 +14,7 @@ from typing import Literal
 from pymavlink.dialects.v20 import common
 
 from anafi_mav.errors import PlanError
-from anafi_mav.plans.plan import GLOBAL, GLOBAL_INT, MISSION, RELATIVE, RELATIVE_INT, Item, Loss, Params, Plan
+from anafi_mav.plans.plan import GLOBAL, GLOBAL_INT, MISSION, RELATIVE, RELATIVE_INT, Item, Loss, Params, Plan, counted
 from anafi_mav.plans.waypoints import editor_losses, rows, text_of
 
 Version = Literal[1, 2]
@@ -143,9 +143,9 @@ def write(plan: Plan, version: Version) -> tuple[bytes, list[Loss]]:
     if plan.home is not None:
         losses.append(Loss("the planned home: the drone returns to where it took off"))
     if plan.zones or plan.breach_return:
-        losses.append(Loss(f"the fence of {len(plan.zones)} zones"))
+        losses.append(Loss(f"the fence of {counted(len(plan.zones), 'zone')}"))
     if plan.rally:
-        losses.append(Loss(f"{len(plan.rally)} rally points"))
+        losses.append(Loss(counted(len(plan.rally), "rally point")))
     return text_of(HEADER, written, current=None), losses + editor_losses(plan)
 
 

@@ -137,3 +137,8 @@ def shifted(item: Item, by: int) -> Item:
     if item.command != DO_JUMP or target is None:
         return item
     return replace(item, params=(target + by, two, three, four, five, six, seven))
+
+
+def counted(number: int, what: str) -> str:
+    """So many of them, in words: "1 item", "2 items"."""
+    return f"{number} {what}{'' if number == 1 else 's'}"

@@ -12,9 +12,9 @@ from typing import Any
 
 from anafi_mav import geo
 from anafi_mav.errors import PlanError
-from anafi_mav.plans import path, table
+from anafi_mav.plans import path
 from anafi_mav.plans.path import Stop
-from anafi_mav.plans.plan import Circle, Plan
+from anafi_mav.plans.plan import Circle, Plan, counted
 
 SUFFIXES = (".png", ".svg", ".pdf")
 """Kinds of pictures, by the ending of the file."""
@@ -103,7 +103,7 @@ def _profile(axes: Any, stops: list[Stop]) -> None:
         axes.plot(*zip(*known, strict=True), "o-", color="tab:blue", markersize=4, linewidth=1.5)
     axes.set_ylim(bottom=min(0.0, *(height for _, height in known), 0.0))
     unknown = len(stops) - len(known)
-    left = f"; of {table.count(unknown, 'place')} it is not known" if unknown else ""
+    left = f"; of {counted(unknown, 'place')} it is not known" if unknown else ""
     axes.set_xlabel("way, m")
     axes.set_ylabel("height, m")
     axes.set_title(f"height above take-off{left}", fontsize=9)

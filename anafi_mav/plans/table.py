@@ -10,7 +10,18 @@ from pymavlink.dialects.v20 import common
 from anafi_mav import geo
 from anafi_mav.plans import path
 from anafi_mav.plans.parrot import SET_STILL_MODE, SET_VIEW_MODE
-from anafi_mav.plans.plan import DO_JUMP, GLOBAL, GLOBAL_INT, RELATIVE, RELATIVE_INT, TERRAIN, TERRAIN_INT, Item, Plan
+from anafi_mav.plans.plan import (
+    DO_JUMP,
+    GLOBAL,
+    GLOBAL_INT,
+    RELATIVE,
+    RELATIVE_INT,
+    TERRAIN,
+    TERRAIN_INT,
+    Item,
+    Plan,
+    counted,
+)
 
 _FRAMES = {RELATIVE: "", RELATIVE_INT: "", GLOBAL: " AMSL", GLOBAL_INT: " AMSL"} | dict.fromkeys(
     (TERRAIN, TERRAIN_INT), " above ground"
@@ -74,7 +85,7 @@ def name_of(command: int) -> str:
 
 def summary(plan: Plan) -> str:
     """What is in a plan, in one line."""
-    parts = [count(len(plan.items), "item")]
+    parts = [counted(len(plan.items), "item")]
     if plan.home is not None:
         parts.append(f"home {_place((plan.home.latitude, plan.home.longitude))} at {plan.home.height:g} m AMSL")
     stops = list(path.way(plan))
@@ -84,9 +95,9 @@ def summary(plan: Plan) -> str:
     if heights:
         parts.append(f"up to {max(heights):g} m high")
     if plan.zones:
-        parts.append(f"a fence of {count(len(plan.zones), 'zone')}")
+        parts.append(f"a fence of {counted(len(plan.zones), 'zone')}")
     if plan.rally:
-        parts.append(count(len(plan.rally), "rally point"))
+        parts.append(counted(len(plan.rally), "rally point"))
     parts += [f"items {block.first} to {block.first + block.count - 1} are a {block.kind}" for block in plan.blocks]
     return ", ".join(parts)
 
@@ -142,7 +153,3 @@ def _words(item: Item, placed: bool) -> Iterator[str]:
 
 def _place(place: tuple[float, float]) -> str:
     return f"{place[0]:.7f}, {place[1]:.7f}"
-
-
-def count(number: int, what: str) -> str:
-    return f"{number} {what}{'' if number == 1 else 's'}"

@@ -14,7 +14,7 @@ from pymavlink.dialects.v20 import common
 
 from anafi_mav.errors import PlanError
 from anafi_mav.plans.lists import fence_items, points_of, rally_items, zones_of
-from anafi_mav.plans.plan import GLOBAL, MAX_ITEMS, WAYPOINT, Item, Loss, Params, Plan, Point, shifted
+from anafi_mav.plans.plan import GLOBAL, MAX_ITEMS, WAYPOINT, Item, Loss, Params, Plan, Point, counted, shifted
 
 HEADER = "QGC WPL 110"
 
@@ -103,13 +103,13 @@ def write(plan: Plan) -> tuple[bytes, list[Loss]]:
         first = Item(WAYPOINT, GLOBAL, (0.0, 0.0, 0.0, 0.0, home.latitude, home.longitude, home.height))
         data = text_of(HEADER, [first, *(shifted(item, 1) for item in plan.items)])
         if plan.zones or plan.breach_return:
-            losses.append(Loss(f"the fence of {len(plan.zones)} zones: a file of its own would hold it"))
+            losses.append(Loss(f"the fence of {counted(len(plan.zones), 'zone')}: a file of its own would hold it"))
         if plan.rally:
-            losses.append(Loss(f"{len(plan.rally)} rally points: a file of their own would hold them"))
+            losses.append(Loss(f"{counted(len(plan.rally), 'rally point')}: a file of their own would hold them"))
     else:
         data = text_of(HEADER, fence_items(plan) if plan.zones else rally_items(plan))
         if plan.zones and plan.rally:
-            losses.append(Loss(f"{len(plan.rally)} rally points: a file of their own would hold them"))
+            losses.append(Loss(f"{counted(len(plan.rally), 'rally point')}: a file of their own would hold them"))
         if plan.home is not None:
             losses.append(Loss("the planned home"))
     return data, losses + editor_losses(plan)

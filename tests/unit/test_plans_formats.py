@@ -325,7 +325,7 @@ def test_what_parrots_format_cannot_hold() -> None:
         "item 3: param3 of 3 means nothing to the drone",
         "item 3: that it waits to be continued",
         "the planned home: the drone returns to where it took off",
-        "1 rally points",
+        "1 rally point",
     ]
     assert len(data.splitlines()) == 2
 
@@ -391,12 +391,12 @@ def test_any_plan_through_the_waypoint_format(plan: Plan) -> None:
     if plan.items:
         assert again.items == plan.items
         assert ("the fence" in said) is bool(plan.zones or plan.breach_return)
-        assert ("rally points" in said) is bool(plan.rally)
+        assert ("rally point" in said) is bool(plan.rally)
         if plan.home is not None and (plan.home.latitude, plan.home.longitude) != (0.0, 0.0):
             assert again.home == plan.home
     elif plan.zones:
         assert again.zones == plan.zones
-        assert ("rally points" in said) is bool(plan.rally)
+        assert ("rally point" in said) is bool(plan.rally)
     elif plan.rally:
         assert again.rally == plan.rally
     assert ("speeds" in said) is not (plan.hover_speed is plan.cruise_speed is None)
