@@ -104,6 +104,11 @@ class Camera2:
         """It is at work for the card."""
         return self._capture.busy
 
+    @property
+    def shots(self) -> int:
+        """Pictures that have been taken of what is being photographed."""
+        return self._capture.shots
+
     def optics(self, id: int) -> Optics:
         """What its picture is taken with."""
         config, at_work = self._config, self._camera

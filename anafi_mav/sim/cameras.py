@@ -38,6 +38,11 @@ class Cameras:
         return any(capture.busy for capture in self._captures.values())
 
     @property
+    def shots(self) -> int:
+        """Pictures that have been taken of what is being photographed."""
+        return self._active.shots
+
+    @property
     def _active(self) -> Capture:
         return next(capture for capture in self._captures.values() if capture.camera.active)
 

@@ -184,6 +184,11 @@ class Capture:
         """It takes photos until somebody stops it."""
         return self._shoot is not None and self._shoot.lapse
 
+    @property
+    def shots(self) -> int:
+        """Pictures that have been taken of what is being photographed."""
+        return 0 if self._shoot is None else self._shoot.count
+
     # -- photos
 
     def _refusal(self) -> PhotoResult | None:

@@ -107,6 +107,8 @@ class FlightPlan:
         self._roi: tuple[float, float, float] | None = None
         self._still: tuple[float, float] = (0.0, 0.0)
         self._panning: Panorama | None = None
+        self._photos = 0
+        """How many are to be taken before photographing ends by itself; 0: it does not."""
 
     # -- what others ask
 
@@ -195,6 +197,7 @@ class FlightPlan:
         self._items, self._index, self._goes_on = items, item, goes_on
         self._begun, self._progress, self._began = False, None, time
         self._speed, self._view, self._roi, self._still = CRUISE, 0, None, (0.0, 0.0)
+        self._photos = 0
         self._rois = [self._point(found) for found in items if found.command is Command.SET_ROI and found.p1 == 3]
         self._legs = self._way_in(pose) if self._model.modern and not on_ground else []
         self._set(PlayingState.PLAYING)
@@ -272,6 +275,9 @@ class FlightPlan:
     def tick(self, time: float, pose: Pose, arrived: bool) -> None:
         """Go on; called while it plays and the drone flies."""
         self._time = time
+        if self._photos and self._operator.shots >= self._photos:
+            self._photos = 0
+            self._operator.operate(camera.StopPhoto(0))
         if self._legs:
             self._fly_in(pose, time)
             return
@@ -460,6 +466,7 @@ class FlightPlan:
             mode = camera.CameraPhotoMode.GPS_LAPSE if gps else camera.CameraPhotoMode.TIME_LAPSE
             step = interval if interval > 0.0 else self._still[1]
         self._photograph(mode, step)
+        self._photos = int(self._count(item)) if self._count(item) > 1 else 0
 
     def _trigger(self, item: Item, pose: Pose, time: float) -> None:
         if not item.p1 > 0.0:
@@ -470,6 +477,7 @@ class FlightPlan:
             self._photograph(camera.CameraPhotoMode.TIME_LAPSE, item.p1 / 1000.0)
 
     def _photograph(self, mode: camera.CameraPhotoMode, step: float) -> None:
+        self._photos = 0
         self._operator.operate(camera.SetCameraMode(0, camera.CameraCameraMode.PHOTO))
         self._operator.operate(
             camera.SetPhotoMode(
@@ -485,6 +493,7 @@ class FlightPlan:
         self._operator.operate(camera.TakePhoto(0))
 
     def _stop_photo(self, item: Item, pose: Pose, time: float) -> None:
+        self._photos = 0
         self._operator.operate(camera.StopPhoto(0))
 
     def _start_video(self, item: Item, pose: Pose, time: float) -> None:

@@ -58,6 +58,11 @@ class Operator:
     def camera_busy(self) -> bool:
         return self._payload.cameras.busy
 
+    @property
+    def shots(self) -> int:
+        """Pictures that have been taken of what is being photographed."""
+        return self._payload.cameras.shots
+
     def panorama_begin(self, kind: str, count: int) -> None:
         """`count` pictures of one media will be taken; `kind` in the words of the web server, or empty."""
         self._note("payload", {"panorama": kind, "count": count})

@@ -305,6 +305,18 @@ def test_photos_and_videos() -> None:
     ]
 
 
+@pytest.mark.parametrize("model", ["4k", "ai"])
+def test_so_many_photos_and_no_more(model: str) -> None:
+    """One every 2 s until there are three, although the plan waits for 12 s."""
+    photos = line(2000, 2, 3, 12) if model == "4k" else line(2000, 0, 2, 3)
+    flight = Flight(photos, line(93, 12), model=model, flying=True)
+    flight.play()
+    flight.bench.run(1.0)
+    (media,) = flight.bench.firmware.payload.media
+    assert len({resource.number for resource in media.resources}) == 3
+    assert flight.bench.firmware.operator.camera_busy is False
+
+
 def test_a_panorama_turns_once_round() -> None:
     flight = Flight(line(2800, 360, 0, 60), flying=True)
     before = flight.bench.body.heading
