@@ -11,6 +11,9 @@ from rich.console import Console
 from rich.progress import Progress
 from rich.text import Text
 
+_bars: list[Progress] = []
+"""Bars on the screen: what is said meanwhile is printed above them."""
+
 
 def say(line: str, style: str = "") -> None:
     """A line on stdout. `style` is rich's."""
@@ -29,13 +32,18 @@ def progress(what: str, total: int | None) -> Iterator[Callable[[int, int], None
         yield lambda done, of: None
         return
     with Progress(console=Console(file=sys.stdout), transient=True) as bar:
+        _bars.append(bar)
         task = bar.add_task(what, total=total)
-        yield lambda done, of: bar.update(task, completed=done, total=of or None)
+        try:
+            yield lambda done, of: bar.update(task, completed=done, total=of or None)
+        finally:
+            _bars.remove(bar)
 
 
 def _write(stream: TextIO, line: str, style: str) -> None:
     with contextlib.suppress(OSError):  # the reader may be gone (`anafi-mav | head`): no reason to end a flight
         if stream.isatty():
-            Console(file=stream).print(Text(line, style), soft_wrap=True)
+            console = _bars[-1].console if _bars and stream is sys.stdout else Console(file=stream)
+            console.print(Text(line, style), soft_wrap=True)
         else:
             print(line, file=stream, flush=True)
