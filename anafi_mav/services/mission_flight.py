@@ -10,16 +10,16 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import functools
-import hashlib
 from collections.abc import Callable, Coroutine, Hashable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from anafi_mav.drone import events
 from anafi_mav.drone.events import FlyingState, ForcedLandingReason, Message, PlayingState
-from anafi_mav.errors import AnafiMavError, CommandRejected, LinkLost, PlanError
+from anafi_mav.errors import AnafiMavError, CommandRejected, LinkLost
 from anafi_mav.plans.plan import Item
-from anafi_mav.plans.translate import Cursor, Leg, Start, Step, translate
-from anafi_mav.services.mission_path import check_path, lines_of
+from anafi_mav.plans.translate import Cursor, Leg, Step
+from anafi_mav.services.mission_files import FilesOnDrone
+from anafi_mav.services.mission_path import check_path, lay_out
 from anafi_mav.services.mission_progress import Progress, State
 from anafi_mav.services.mission_record import Record
 from anafi_mav.services.mission_steps import fly_step
@@ -27,7 +27,6 @@ from anafi_mav.services.mission_words import refusal
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.refusal import Refused
 from anafi_mav.services.statustext import Severity
-from anafi_mav.units import DEG_PER_RAD
 
 if TYPE_CHECKING:
     from anafi_mav.services.vehicle import Vehicle
@@ -37,9 +36,6 @@ ARM_WAIT = 10.0
 
 END_WAIT = 2.0
 """s within which a drone whose plan has ended with a landing or a return has begun it."""
-
-MAX_FILES = 16
-"""Files on the drone that are remembered; it keeps more, and one that is forgotten is uploaded again."""
 
 _LANDING = (FlyingState.LANDING, FlyingState.EMERGENCY_LANDING)
 
@@ -71,12 +67,9 @@ class MissionFlight:
         """The item after the part that is flown, where that is not flown without another word."""
         self._uid = ""
         """Of the file that the drone flies, or flew last."""
-        self._whole: tuple[Leg, str] | None = None
-        """The file that was uploaded last, and its name."""
         self._starting: tuple[Leg, int] | None = None
         """What the drone is asked to begin, and after which line."""
-        self._files: dict[bytes, str] = {}
-        """Files on the drone, by what is in them."""
+        self._files = FilesOnDrone(vehicle.drone.flight_plan)
         self._pending: Hashable = None
         """Who has chosen the mission on the ground and has to arm now."""
         self._pending_timer: asyncio.TimerHandle | None = None
@@ -176,23 +169,6 @@ class MissionFlight:
         if not vehicle.in_air and not vehicle.on_ground:
             raise Refused("Mission refused: the drone is neither on the ground nor flying yet")
 
-    def _start(self) -> Start:
-        """Where the flight begins."""
-        vehicle = self._vehicle
-        state, place, amsl = vehicle.drone.piloting.state, vehicle.place, vehicle.height.ato(0.0)
-        if place is None:
-            raise Refused("Mission refused: no GPS fix")
-        if vehicle.in_air and state.altitude is None:
-            raise Refused("Mission refused: the drone's height is not known")
-        return Start(
-            place.latitude,
-            place.longitude,
-            (state.altitude or 0.0) if vehicle.in_air else 0.0,
-            flying=vehicle.in_air,
-            takeoff_amsl=None if amsl is None else -amsl,
-            heading=0.0 if state.attitude is None else state.attitude.yaw * DEG_PER_RAD % 360.0,
-        )
-
     def _resumes(self, item: int) -> bool:
         """The drone hovers, with the rest of what is to be flown in its memory."""
         progress, plan = self.progress, self._vehicle.drone.flight_plan.state
@@ -211,10 +187,10 @@ class MissionFlight:
         if resumes:
             parts, rest, line = self._parts, self._rest, progress.line
         else:
-            parts, rest, line = *await self._translated(item, number), -1
+            parts, rest, line = *await lay_out(vehicle, items, item, number), -1
         await check_path(vehicle, parts, line, number)
         if not resumes and isinstance(parts[0], Leg):
-            parts[0], uid, line = await self._file(parts[0])
+            parts[0], uid, line = await self._files.beginning_with(parts[0])
         self._beginning = True
         try:
             if not waited:
@@ -245,47 +221,6 @@ class MissionFlight:
                 vehicle.select(FlightMode.HOLD)
             raise
         self._announce(resumes)
-
-    async def _translated(self, first: int | Cursor, number: int) -> tuple[list[Leg | Step], Cursor | None]:
-        """What is flown from an item on, and how it goes on after that."""
-        start, version = self._start(), self._vehicle.drone.flight_plan.version
-        try:
-            flight = await asyncio.to_thread(translate, self.progress.items, 1 if version == 1 else 2, start, first)
-        except PlanError as error:
-            where = "" if error.item is None else f"item {error.item + number}: "
-            raise Refused(f"Mission refused: {where}{error.problem}") from error
-        if not flight.parts:
-            raise Refused("Mission refused: nothing of it is left to fly")
-        return [*flight.parts], flight.rest
-
-    async def _file(self, leg: Leg) -> tuple[Leg, str, int]:
-        """The file on the drone that begins with this leg, its name, and the line before the leg.
-
-        An Ai begins in the middle of a file that it has; the others, and where something was set before that holds
-        still, get one of their own.
-        """
-        plan = self._vehicle.drone.flight_plan
-        if self._whole is not None and plan.starts_anywhere:
-            whole, uid = self._whole
-            line = len(whole.origins) - len(leg.origins) - 1
-            if line >= 0 and lines_of(whole)[line + 1 :] == lines_of(leg) and await self._has(uid):
-                return whole, uid, line
-        digest = hashlib.sha256(leg.content).digest()
-        uid = self._files.pop(digest, "")
-        if not uid or not await self._has(uid):
-            uid = await plan.upload(leg.content)
-        self._files[digest] = uid
-        while len(self._files) > MAX_FILES:
-            del self._files[next(iter(self._files))]
-        self._whole = leg, uid
-        return leg, uid, -1
-
-    async def _has(self, uid: str) -> bool:
-        try:
-            await self._vehicle.drone.flight_plan.get(uid)
-        except CommandRejected:
-            return False
-        return True
 
     async def _play(self, leg: Leg, uid: str, line: int) -> None:
         """Begin a file, or go on with it; returns when the drone flies it."""
@@ -334,11 +269,11 @@ class MissionFlight:
                 if not self._parts:
                     assert self._rest is not None
                     rest, self._rest = self._rest, None
-                    self._parts, self._rest = await self._translated(rest, 0)
+                    self._parts, self._rest = await lay_out(self._vehicle, progress.items, rest, 0)
                     await check_path(self._vehicle, self._parts, -1, 0)
                 head = self._parts[0]
                 if isinstance(head, Leg):
-                    leg, uid, line = await self._file(head)
+                    leg, uid, line = await self._files.beginning_with(head)
                     self._parts[0] = leg
                     await self._play(leg, uid, line)
                     return  # it says itself when it ends
@@ -376,8 +311,9 @@ class MissionFlight:
 
     def _break_off(self, why: str) -> None:
         """It does not go on, and nobody asked for that."""
-        self._stop(why)
-        self._vehicle.select(FlightMode.HOLD)
+        if self.progress.state is State.ACTIVE:
+            self._stop(why)
+            self._vehicle.select(FlightMode.HOLD)
 
     def _stop(self, why: str) -> None:
         progress = self.progress

@@ -57,7 +57,7 @@ async def test_conf_049_073_a_mission_from_the_ground_to_its_end(flavour: str) -
         end = await state(w, COMPLETE, since=mark)
         assert whole(end).total == len(ROUND)
         assert reached(w) == [0, 1, 2, 3, 4]
-        assert flown(w)[-3:] == ["waypoint", "delay", "return_to_launch"]
+        assert flown(w)[-3:] == ["waypoint", "condition_delay", "return_to_launch"]
         await mode(w, w.modes.returning, since=mark)
         # It stays complete, and nothing of it is told again.
         await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.idle, timeout=40.0)

@@ -41,6 +41,9 @@ FAR = [takeoff(6.0), way(8.0, 0.0, 6.0), way(600.0, 0.0, 6.0), way(600.0, 8.0, 6
 TURN = Item(115, 0.0, 0.0, p1=90.0, frame=2)
 """East, in place: no flight plan of Parrot's can say that."""
 
+ZOOM = Item(531, 0.0, 0.0, p1=2.0, p2=50.0, frame=2)
+"""Half of what the camera can."""
+
 
 async def lost_and_back(w: World) -> None:
     """The link is lost, the vehicle disappears, and both come back."""
@@ -142,14 +145,16 @@ async def test_conf_122_a_gateway_that_was_killed_knows_the_drones_plan_again(tm
 
 async def test_items_that_the_gateway_flies_between_two_files() -> None:
     async with world(web=True) as w:
-        await put(w, [takeoff(6.0), way(10.0, 0.0, 6.0), TURN, way(10.0, 10.0, 6.0)])
+        await put(w, [takeoff(6.0), way(10.0, 0.0, 6.0), TURN, ZOOM, way(10.0, 10.0, 6.0)])
         await said(w, "some are flown by the gateway")
         await start(w)
         await state(w, COMPLETE, since=0)
-        assert reached(w) == [0, 1, 2, 3]
+        assert reached(w) == [0, 1, 2, 3, 4]
         (turn,) = [entry for entry in w.commands("ardrone3.Piloting.moveBy") if entry.args["dPsi"]]
         first, second = w.commands("common.Mavlink.Start")
-        assert first.t < turn.t < second.t
+        (zoom,) = w.commands("camera.set_zoom_target")
+        assert first.t < turn.t < zoom.t < second.t
+        assert zoom.args["target"] == 2.0, "from 1 to 3"
         assert first.args["filepath"] != second.args["filepath"]
         await settled(w, (10.0, 10.0, 6.0))
 
