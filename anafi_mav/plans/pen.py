@@ -55,6 +55,18 @@ TIMELAPSE, GPSLAPSE = 0.0, 1.0
 _SET_ROI, _ROI_PLACE = common.MAV_CMD_DO_SET_ROI, float(common.MAV_ROI_LOCATION)
 _DELAY = {1: common.MAV_CMD_CONDITION_DELAY, 2: common.MAV_CMD_NAV_DELAY}
 _TAKE_TIME = frozenset({WAYPOINT, *_DELAY.values(), common.MAV_CMD_PANORAMA_CREATE})
+_SETS = frozenset(
+    {
+        common.MAV_CMD_DO_CHANGE_SPEED,
+        common.MAV_CMD_DO_MOUNT_CONTROL,
+        common.MAV_CMD_DO_SET_ROI_LOCATION,
+        common.MAV_CMD_DO_SET_ROI_NONE,
+        SET_VIEW_MODE,
+        SET_STILL_MODE,
+    }
+)
+"""Commands that are the same wherever they are done."""
+
 _TARGETING = float(common.MAV_MOUNT_MODE_MAVLINK_TARGETING)
 
 
@@ -97,6 +109,8 @@ class Pen:
         self._lines: list[Item] = []
         self._origins: list[int] = []
         self._done: list[tuple[int, ...]] = []
+        self._began, self._began_heading = self.place, self.heading
+        """Where the drone is when this file begins."""
         self._rois: list[Point] = []
         """Of this file, by their number in it."""
         self._still: tuple[float, float, float] | None = None
@@ -143,12 +157,30 @@ class Pen:
     def close(self) -> None:
         """What is flown next is another file."""
         if self._lines:
+            self._stay()
             content, lost = parrot.write(Plan(tuple(self._lines)), self.version)
             if lost or len(self._lines) != len(content.splitlines()) - 1:
                 raise AssertionError(f"lines that version {self.version} cannot hold: {lost}")
             self.parts.append(Leg(content, tuple(self._origins), tuple(self._done)))
         self._lines, self._origins, self._done = [], [], []
         self._rois, self._still = [], None
+
+    def _stay(self) -> None:
+        """Put in front of a file for an Ai in the air that it is to be here.
+
+        Before anything else it goes to above its first way point (Parrot's flight plan page): what stands before that
+        one would be done there.
+        """
+        commands = [line.command for line in self._lines]
+        if self.version == 1 or commands[0] == common.MAV_CMD_NAV_TAKEOFF or WAYPOINT not in commands:
+            return
+        if not all(command in _SETS for command in commands[: commands.index(WAYPOINT)]):
+            here = self._began
+            values: Params = (0.0, ACCEPTANCE, None, self._began_heading, here.latitude, here.longitude, here.height)
+            self._lines.insert(0, Item(WAYPOINT, RELATIVE, values))
+            self._origins.insert(0, self._origins[0])
+            self._done.insert(0, ())
+            self.written += 1
 
     def line(self, command: int, *params: float | None, at: Point | None = None) -> None:
         """One line; `params` from the first on."""
@@ -173,6 +205,7 @@ class Pen:
 
     def _open(self) -> None:
         """Before the first line of a file: the way up, and what holds."""
+        self._began, self._began_heading = self.place, self.heading
         if not self.flying:
             self.flying = True
             self._put(common.MAV_CMD_NAV_TAKEOFF)

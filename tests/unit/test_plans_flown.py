@@ -105,9 +105,15 @@ def test_a_survey() -> None:
     assert flown.bench.firmware.operator.tilt == pytest.approx(-90.0, abs=1.0)
 
 
-def test_an_inspection_between_whose_files_the_gateway_zooms() -> None:
-    flown = Flown("inspection", "4k")
+@pytest.mark.parametrize("model", ["4k", "ai"])
+def test_an_inspection_between_whose_files_the_gateway_zooms(model: str) -> None:
+    flown = Flown("inspection", model)
     check(flown)
+    where = 0
+    for number, item in enumerate(flown.items):  # a photo is taken at the way point before it
+        where = number if item.command == WAYPOINT else where
+        if item.command == 2000:
+            assert math.dist(flown.seen[number][:3], flown.seen[where][:3]) < WITHIN, number
     assert photos(flown.bench) == sum(item.command == 2000 for item in flown.items)
     headings = [number for number, item in enumerate(flown.items) if item.command == WAYPOINT and item.params[3]]
     assert headings

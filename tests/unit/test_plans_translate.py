@@ -120,6 +120,12 @@ def test_without_a_take_off_it_is_put_in_front_and_told() -> None:
     assert in_the_air.notes == ()
 
 
+def test_a_way_point_below_the_take_off_is_not_sunk_to_first() -> None:
+    flight = translate([waypoint(1, 0, -5.0)], 1, GROUND)
+    assert [line.split()[1] for line in lines(flight)] == ["22", "16"]
+    assert flight.notes == (Loss("no item takes off", 0),)
+
+
 def test_on_the_ground_there_is_nothing_to_land() -> None:
     assert examine([action(20)], 1).faults == ()
     assert [line.split()[1] for line in lines(translate([action(20)], 1, AIR))] == ["20"]

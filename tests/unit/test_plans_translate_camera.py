@@ -217,6 +217,28 @@ def test_zooming_is_flown_by_the_gateway() -> None:
     assert [loss.item for loss in examine(items, 1).stepped] == [2]
 
 
+def test_an_ai_takes_a_photo_where_it_is_to_be_taken() -> None:
+    """It begins a file by going to above its first way point: a photo before that one is kept here by a way point."""
+    items = [GO, action(531, 2.0, 40.0), action(2000, 0.0, 0.0, 1.0), waypoint(5, 0)]
+    first, step, last = translate(items, 2, AIR).parts
+    assert step == Step(1, (1,))
+    assert isinstance(first, Leg)
+    assert isinstance(last, Leg)
+    assert [row.command for row in plan_file.read(first.content, 2)] == [16]
+    rows = plan_file.read(last.content, 2)
+    assert [row.command for row in rows] == [16, 50001, 2000, 16]
+    assert (rows[0].latitude, rows[0].altitude) == (LAT + 1e-4, 20.0)
+    assert rows[0].p4 == pytest.approx(0.0, abs=1e-6)  # it has flown north
+    assert last.done == ((), (), (2,), (3,))
+    # Nothing has to be kept here when only settings stand before the way point, nor on the others.
+    (leg,) = translate([action(178, 1.0, 4.0), GO], 2, AIR).parts
+    assert isinstance(leg, Leg)
+    assert [row.command for row in plan_file.read(leg.content, 2)] == [178, 16]
+    last = translate(items, 1, AIR).parts[2]
+    assert isinstance(last, Leg)
+    assert [row.command for row in plan_file.read(last.content, 1)] == [50001, 2000, 16]
+
+
 def test_beginning_in_the_middle_begins_what_runs_there() -> None:
     """As PX4 does when it resumes a survey: else it would be flown without a photo, and nobody would know."""
     items = [action(205, -90.0), roi(), GO, action(206, 25.0, 0.0, 1.0), waypoint(2, 0), action(206, 0.0)]
