@@ -18,6 +18,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from pymavlink.generator.mavcrc import x25crc
 from support.mav import NAN
+from support.missions import ROUND, put
 from support.world import World, world
 
 from anafi_mav.mavlink import dialect as newer
@@ -202,6 +203,17 @@ async def test_commands_with_numbers_that_make_no_sense(flavour: str, mistakes: 
                 assert w.drone.flying_state.name in ("HOVERING", "FLYING"), id
         beats = [at for at, _ in w.client.since(mark, "HEARTBEAT")]
         assert max(b - a for a, b in itertools.pairwise(beats)) < LOST
+        assert mistakes == []
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+async def test_commands_about_a_mission_with_numbers_that_make_no_sense(flavour: str, mistakes: list[str]) -> None:
+    async with world(flavour=flavour, web=True) as w:
+        await put(w, ROUND)
+        began = w.drone.log[-1].t
+        for id in (dialect.MAV_CMD_MISSION_START, dialect.MAV_CMD_DO_SET_MISSION_CURRENT):
+            await each(w, id, began, lambda p: False)  # nobody arms
+        assert w.drone.flying_state.name == "LANDED"
         assert mistakes == []
 
 
