@@ -15,6 +15,9 @@ from anafi_mav.arsdk.wire import Message, UnknownMessage
 from anafi_mav.clock import Clock
 from anafi_mav.drone import Drone
 
+STICK_PERIOD = 0.05
+"""s between two PCMD of a controller, as Parrot's send them."""
+
 MessageT = TypeVar("MessageT", bound=Message)
 
 STATES: list[Message] = [
@@ -102,8 +105,16 @@ class ScriptedDevice:
         """When they came."""
         return [now for now, message in self.received if isinstance(message, kind)]
 
-    async def until(self, kind: type[MessageT], count: int = 1, timeout: float = 3.0) -> MessageT:
-        """Wait for the `count`th command of this kind."""
+    async def quiet(self, kind: type[Message] = Message) -> None:
+        """Three periods of the sticks in which no command of this kind may come: a timer each, so that however late the
+        machine is, the loop has run whatever was due before, and the last one for what that has put on the wire."""
+        before = len(self.got(kind))
+        for _ in range(4):
+            await asyncio.sleep(STICK_PERIOD)
+        assert self.got(kind)[before:] == []
+
+    async def until(self, kind: type[MessageT], count: int = 1, timeout: float = 10.0) -> MessageT:
+        """Wait for the `count`th command of this kind. `timeout` in s only ends what hangs."""
 
         async def wait() -> MessageT:
             while len(self.got(kind)) < count:

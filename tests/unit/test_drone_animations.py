@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import AsyncIterator
 
 import pytest
 from scripted_device import STATES, ScriptedDevice
@@ -13,6 +12,7 @@ from simulated import connected, take_off
 from anafi_mav.arsdk.messages import animation, ardrone3, common
 from anafi_mav.arsdk.messages.animation import AnimationState, Indicator, Mode, PlayMode, Type
 from anafi_mav.arsdk.messages.ardrone3 import PoiMode
+from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone import Drone
 from anafi_mav.errors import CommandRejected, CommandTimeout, LocalProtocolError, NotSupported
 
@@ -95,27 +95,17 @@ async def test_a_photo_panorama_is_in_the_store() -> None:
 
 
 @pytest.fixture
-async def device() -> AsyncIterator[ScriptedDevice]:
-    async with ScriptedDevice() as device:
-        device.script[common.AllStates] = lambda _: [
-            *STATES,
-            animation.Availability(1 << Type.VERTIGO | 1 << Type.DRONIE),
-            animation.State(Type.NONE, 0),
-            # One mode, two figures, as an Ai tells it.
-            animation.Capabilities(Mode.MANUAL, 1 << Type.VERTIGO | 1 << Type.CANDLE | 1 << Type.DRONIE, 3),
-            animation.Info(Type.VERTIGO, 0, 1),
-            animation.Info(Type.CANDLE, 1 << Indicator.DRONE_GPS | 1 << Indicator.DRONE_BATTERY, 2),
-            common.AllStatesChanged(),
-        ]
-        yield device
-
-
-@pytest.fixture
-async def drone(device: ScriptedDevice) -> AsyncIterator[Drone]:
-    drone = device.drone()
-    await drone.connect()
-    yield drone
-    await drone.close()
+def states() -> list[Message]:
+    """What the device tells at the start."""
+    return [
+        *STATES,
+        animation.Availability(1 << Type.VERTIGO | 1 << Type.DRONIE),
+        animation.State(Type.NONE, 0),
+        # One mode, two figures, as an Ai tells it.
+        animation.Capabilities(Mode.MANUAL, 1 << Type.VERTIGO | 1 << Type.CANDLE | 1 << Type.DRONIE, 3),
+        animation.Info(Type.VERTIGO, 0, 1),
+        animation.Info(Type.CANDLE, 1 << Indicator.DRONE_GPS | 1 << Indicator.DRONE_BATTERY, 2),
+    ]
 
 
 async def test_what_it_reported(drone: Drone) -> None:

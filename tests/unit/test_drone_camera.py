@@ -10,7 +10,6 @@ from scripted_device import STATES, ScriptedDevice
 from simulated import connected
 
 from anafi_mav.arsdk.messages import camera as old
-from anafi_mav.arsdk.messages import common
 from anafi_mav.arsdk.messages.proto import antiflicker as mains
 from anafi_mav.arsdk.messages.proto import camera2 as new
 from anafi_mav.arsdk.wire import Message
@@ -169,18 +168,9 @@ OLD: list[Message] = [
 
 
 @pytest.fixture
-async def device() -> AsyncIterator[ScriptedDevice]:
-    async with ScriptedDevice() as device:
-        device.script[common.AllStates] = lambda _: [*STATES, *OLD, common.AllStatesChanged()]
-        yield device
-
-
-@pytest.fixture
-async def drone(device: ScriptedDevice) -> AsyncIterator[Drone]:
-    drone = device.drone()
-    await drone.connect()
-    yield drone
-    await drone.close()
+def states() -> list[Message]:
+    """What the device tells at the start."""
+    return [*STATES, *OLD]
 
 
 async def test_the_state_of_an_older_camera(device: ScriptedDevice, drone: Drone) -> None:

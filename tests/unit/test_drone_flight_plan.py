@@ -12,6 +12,7 @@ from simulated import Pair, connected, take_off
 from anafi_mav.arsdk.messages import common
 from anafi_mav.arsdk.messages import flight_plan as modern
 from anafi_mav.arsdk.messages.common import FlightPlanComponent, MavlinkType, PlayingState
+from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone import Drone
 from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, NotSupported, RemoteProtocolError
 
@@ -114,15 +115,13 @@ async def test_return_on_disconnect() -> None:
 
 
 @pytest.fixture
-async def device() -> AsyncIterator[ScriptedDevice]:
-    async with ScriptedDevice() as device:
-        device.script[common.AllStates] = lambda _: [
-            *STATES,
-            common.MavlinkFilePlayingStateChanged(PlayingState.STOPPED, "", MavlinkType.FLIGHT_PLAN),
-            common.ComponentStateListChanged(FlightPlanComponent.GPS, 1),
-            common.AllStatesChanged(),
-        ]
-        yield device
+def states() -> list[Message]:
+    """What the device tells at the start."""
+    return [
+        *STATES,
+        common.MavlinkFilePlayingStateChanged(PlayingState.STOPPED, "", MavlinkType.FLIGHT_PLAN),
+        common.ComponentStateListChanged(FlightPlanComponent.GPS, 1),
+    ]
 
 
 async def test_a_start_without_an_answer_is_taken_back(device: ScriptedDevice) -> None:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator
 
 import pytest
 from scripted_device import STATES, ScriptedDevice
 from simulated import connected
 
-from anafi_mav.arsdk.messages import common, gimbal
+from anafi_mav.arsdk.messages import gimbal
 from anafi_mav.arsdk.messages.gimbal import (
     Axis,
     ControlMode,
@@ -45,18 +44,9 @@ REPORTED: list[Message] = [
 
 
 @pytest.fixture
-async def device() -> AsyncIterator[ScriptedDevice]:
-    async with ScriptedDevice() as device:
-        device.script[common.AllStates] = lambda _: [*STATES, *REPORTED, common.AllStatesChanged()]
-        yield device
-
-
-@pytest.fixture
-async def drone(device: ScriptedDevice) -> AsyncIterator[Drone]:
-    drone = device.drone()
-    await drone.connect()
-    yield drone
-    await drone.close()
+def states() -> list[Message]:
+    """What the device tells at the start."""
+    return [*STATES, *REPORTED]
 
 
 async def test_the_state(drone: Drone) -> None:

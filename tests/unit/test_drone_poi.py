@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import AsyncIterator
 
 import pytest
 from scripted_device import STATES, ScriptedDevice
@@ -13,6 +12,7 @@ from simulated import connected, take_off
 from anafi_mav.arsdk.messages import ardrone3, common, controller_info, follow_me
 from anafi_mav.arsdk.messages.ardrone3 import PoiMode, PoiStatus
 from anafi_mav.arsdk.messages.common import CalibrationAxis
+from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone import Drone, Position
 from anafi_mav.drone.camera_words import CameraMode
 from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, LocalProtocolError, NotSupported
@@ -21,26 +21,16 @@ PLACE = (48.8795, 2.3680, 3.0)
 
 
 @pytest.fixture
-async def device() -> AsyncIterator[ScriptedDevice]:
-    async with ScriptedDevice() as device:
-        device.script[common.AllStates] = lambda _: [
-            *STATES,
-            ardrone3.PilotedPOIV2(500.0, 500.0, 500.0, PoiMode.LOCKED_GIMBAL, PoiStatus.AVAILABLE),
-            follow_me.State(follow_me.Mode.NONE, follow_me.Behavior.IDLE, follow_me.Animation.NONE, 0),
-            # All but image detection (6) and drone high enough (5) are there: a bit is an input that is ok.
-            follow_me.ModeInfo(follow_me.Mode.LOOK_AT, 0b1_1001_1111, 0b1_1111_1111),
-            common.MagnetoCalibrationStartedChanged(0),
-            common.AllStatesChanged(),
-        ]
-        yield device
-
-
-@pytest.fixture
-async def drone(device: ScriptedDevice) -> AsyncIterator[Drone]:
-    drone = device.drone()
-    await drone.connect()
-    yield drone
-    await drone.close()
+def states() -> list[Message]:
+    """What the device tells at the start."""
+    return [
+        *STATES,
+        ardrone3.PilotedPOIV2(500.0, 500.0, 500.0, PoiMode.LOCKED_GIMBAL, PoiStatus.AVAILABLE),
+        follow_me.State(follow_me.Mode.NONE, follow_me.Behavior.IDLE, follow_me.Animation.NONE, 0),
+        # All but image detection (6) and drone high enough (5) are there: a bit is an input that is ok.
+        follow_me.ModeInfo(follow_me.Mode.LOOK_AT, 0b1_1001_1111, 0b1_1111_1111),
+        common.MagnetoCalibrationStartedChanged(0),
+    ]
 
 
 @pytest.mark.parametrize("model", ["4k", "ai"])

@@ -4,7 +4,7 @@ against a device that answers as each test says, and goes deaf when it says so."
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import Awaitable, Callable
 from typing import Any
 
 import pytest
@@ -34,22 +34,9 @@ OTHERS: list[Message] = [
 
 
 @pytest.fixture
-async def device() -> AsyncIterator[ScriptedDevice]:
-    async with ScriptedDevice() as device:
-        device.script[common.AllStates] = lambda _: [*STATES, *OTHERS, common.AllStatesChanged()]
-        yield device
-
-
-@pytest.fixture
-async def drone(device: ScriptedDevice) -> AsyncIterator[Drone]:
-    drone = device.drone()
-    await drone.connect()
-    yield drone
-    await drone.close()
-    await asyncio.sleep(0)
-    assert not drone._commander._open, "somebody still waits for an answer"
-    assert not drone._commander.halting
-    assert not drone._commander.begins
+def states() -> list[Message]:
+    """What the device tells at the start."""
+    return [*STATES, *OTHERS]
 
 
 def deaf(device: ScriptedDevice, deaf: bool = True) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import Awaitable, Callable
 from typing import Any
 
 import pytest
@@ -119,18 +119,9 @@ VERBS: list[tuple[Callable[[Drone], Awaitable[Any]], Message, Message, Any]] = [
 
 
 @pytest.fixture
-async def device() -> AsyncIterator[ScriptedDevice]:
-    async with ScriptedDevice() as device:
-        yield device
-
-
-@pytest.fixture
-async def drone(device: ScriptedDevice) -> AsyncIterator[Drone]:
-    device.script[common.AllSettings] = lambda _: [*SETTINGS, *REPORTED, common.AllSettingsChanged()]
-    drone = device.drone()
-    await drone.connect()
-    yield drone
-    await drone.close()
+def settings() -> list[Message]:
+    """What the device tells of its settings at the start."""
+    return [*SETTINGS, *REPORTED]
 
 
 @pytest.mark.parametrize("case", VERBS, ids=[command.NAME for _, command, _, _ in VERBS])
@@ -144,6 +135,7 @@ async def test_a_verb_returns_what_the_drone_confirms(
 
 
 async def test_what_was_never_reported_is_not_supported(device: ScriptedDevice) -> None:
+    device.script[common.AllSettings] = lambda _: [*SETTINGS, common.AllSettingsChanged()]
     drone = device.drone()
     with pytest.raises(LinkLost):
         await drone.home.set_precise(True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator
 
 import pytest
 from scripted_device import STATES, ScriptedDevice
@@ -51,12 +50,6 @@ NEW: list[Message] = [
         ),
     ),
 ]
-
-
-@pytest.fixture
-async def device() -> AsyncIterator[ScriptedDevice]:
-    async with ScriptedDevice() as device:
-        yield device
 
 
 async def connect(device: ScriptedDevice, reported: list[Message]) -> Drone:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import AsyncIterator
 from datetime import datetime
 
 import pytest
@@ -32,23 +31,6 @@ from anafi_mav.errors import (
 
 SHORT = 0.3
 """s to wait for a drone that is meant to stay silent."""
-
-
-@pytest.fixture
-async def device() -> AsyncIterator[ScriptedDevice]:
-    async with ScriptedDevice() as device:
-        yield device
-
-
-@pytest.fixture
-async def drone(device: ScriptedDevice) -> AsyncIterator[Drone]:
-    drone = device.drone()
-    await drone.connect()
-    yield drone
-    await drone.close()
-    await asyncio.sleep(0)
-    assert not drone._commander._open, "somebody still waits for an answer"
-    assert not drone._commander._waiting
 
 
 async def reported(drone: Drone, device: ScriptedDevice, *events: Message) -> None:
@@ -333,8 +315,8 @@ async def test_no_stick_moves_from_the_order_to_land_on(drone: Drone, device: Sc
     drone.piloting.pilot(PilotingCommand(climb_mps=1.0))
     drone.piloting.hover()
     assert drone.piloting.sticks_blocked == "the drone is in the state landing"
-    await asyncio.sleep(0.15)  # three periods in which nothing may come
     assert len(device.got(ardrone3.PCMD)) == before
+    await device.quiet(ardrone3.PCMD)
 
 
 async def test_emergency(drone: Drone, device: ScriptedDevice) -> None:
@@ -695,7 +677,7 @@ async def test_hover_repeats_zero_for_two_seconds(drone: Drone, device: Scripted
     times = device.times(ardrone3.PCMD)
     assert len(zeros(device)) == 40
     assert times[40] - times[1] == pytest.approx(1.95, abs=0.1)
-    await asyncio.sleep(0.15)  # three periods in which nothing may come
+    await device.quiet(ardrone3.PCMD)
     assert len(device.got(ardrone3.PCMD)) == 41
 
 
@@ -798,7 +780,7 @@ async def test_hover_leaves_a_return_that_the_drone_began(
     drone.piloting.hover()
     drone.piloting.pilot(PilotingCommand(roll_deg=5.0))
     assert drone.piloting.sticks_blocked is not None
-    await asyncio.sleep(0.15)
+    await device.quiet()
     assert device.received == []
 
 
@@ -843,9 +825,7 @@ async def test_a_move_ends_the_zeros_of_hover(drone: Drone, device: ScriptedDevi
     drone.piloting.hover()
     await device.until(ardrone3.PCMD, 2)
     await drone.piloting.move_to(48.0, 2.0, 15.0)
-    before = len(device.got(ardrone3.PCMD))
-    await asyncio.sleep(0.15)  # three periods in which nothing may come
-    assert len(device.got(ardrone3.PCMD)) == before
+    await device.quiet(ardrone3.PCMD)
 
 
 async def test_stop_waits_for_the_end_of_what_was_running(drone: Drone, device: ScriptedDevice) -> None:

@@ -1,0 +1,48 @@
+"""The drone of the unit tests, connected over real sockets to a device that does what a test tells it."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+
+import pytest
+from scripted_device import SETTINGS, STATES, ScriptedDevice
+
+from anafi_mav.arsdk.messages import common
+from anafi_mav.arsdk.wire import Message
+from anafi_mav.drone import Drone
+
+
+@pytest.fixture
+def states() -> list[Message]:
+    """What the device tells of its states at the start; a module that wants more says so in its own."""
+    return STATES
+
+
+@pytest.fixture
+def settings() -> list[Message]:
+    """And of its settings."""
+    return SETTINGS
+
+
+@pytest.fixture
+async def device(states: list[Message], settings: list[Message]) -> AsyncIterator[ScriptedDevice]:
+    async with ScriptedDevice() as device:
+        device.script[common.AllStates] = lambda _: [*states, common.AllStatesChanged()]
+        device.script[common.AllSettings] = lambda _: [*settings, common.AllSettingsChanged()]
+        yield device
+
+
+@pytest.fixture
+async def drone(device: ScriptedDevice) -> AsyncIterator[Drone]:
+    """Connected; when a test is over nobody may wait for anything any more."""
+    drone = device.drone()
+    await drone.connect()
+    yield drone
+    await drone.close()
+    await asyncio.sleep(0)
+    commander = drone._commander
+    assert not commander._open, "somebody still waits for an answer"
+    assert not commander._waiting
+    assert not commander.halting
+    assert not commander.begins
