@@ -1,26 +1,17 @@
-"""A flight written against Parrot's Olympe alone, as any of its users would write it: ``olympe_flight.py ADDRESS``.
+"""A flight written against Parrot's Olympe alone, as any of its users would write it. Knows nothing of this project.
 
-Knows nothing of this project. Prints one JSON object: what each step of the flight came to, when it began and ended
-(the machine's monotonic clock), and what Olympe believes of the drone. Olympe's log goes to stderr.
+It says what each step of the flight came to, when it began and ended, and what Olympe believes of the drone.
 """
 
 from __future__ import annotations
 
-import json
 import math
-import os
-import sys
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 
-OUT = os.fdopen(os.dup(1), "w")
-os.dup2(2, 1)  # Olympe logs to stdout
-
-import olympe  # noqa: E402
-from olympe.messages import (  # noqa: E402
+from olympe_base import LIMIT, Visit, plain  # isort: skip
+from olympe.messages import (
     battery,
     camera,
+    camera2,
     common,
     follow_me,
     gimbal,
@@ -28,8 +19,9 @@ from olympe.messages import (  # noqa: E402
     move,
     rth,
     user_storage,
+    user_storage_v2,
 )
-from olympe.messages.ardrone3 import (  # noqa: E402
+from olympe.messages.ardrone3 import (
     GPSSettingsState,
     GPSState,
     Piloting,
@@ -83,84 +75,42 @@ AT_START = (
     gimbal.relative_attitude_bounds,
     gimbal.max_speed,
     gimbal.calibration_state,
-    camera.camera_states,
-    camera.camera_capabilities,
-    camera.recording_capabilities,
     mediastore.state,
-    user_storage.info,
     follow_me.target_is_controller,
 )
 """What anafi_ros asks Olympe for as soon as `connect` has returned; a state that has not come raises there."""
 
 
-def plain(value: object) -> object:
-    """Enums as their names, keyed states as a list, for JSON."""
-    if isinstance(value, dict):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, int | float | str | bool) or value is None:
-        return value
-    return getattr(value, "_name_", str(value))
-
-
 def at_rest() -> object:
     """The drone hovers, now or soon. Expectations are used up by their success, hence one for each use."""
-    return PilotingState.FlyingStateChanged(state="hovering", _policy="check_wait", _timeout=15)
+    return PilotingState.FlyingStateChanged(state="hovering", _policy="check_wait", _timeout=LIMIT)
 
 
 def moved(status: str) -> object:
-    return PilotingState.moveToChanged(status=status, _timeout=30)
+    return PilotingState.moveToChanged(status=status, _timeout=LIMIT)
 
 
-class Flight:
-    def __init__(self, address: str) -> None:
-        self.drone = olympe.Drone(address)
-        self.connected = False
-        self.steps: dict[str, dict[str, object]] = {}
-
-    @contextmanager
-    def step(self, name: str) -> Iterator[dict[str, object]]:
-        entry: dict[str, object] = {"ok": False, "from": time.monotonic()}
-        self.steps[name] = entry
-        yield entry
-        entry["to"] = time.monotonic()
-        if self.connected:
-            # A period of its telemetry passes, so that who watches the drone can tell where a step has left it.
-            self.hear(2)
-
-    def hear(self, times: int) -> None:
-        """So many words of the drone on its attitude."""
-        for _ in range(times):
-            self.drone(PilotingState.AttitudeChanged(_policy="wait", _timeout=5)).wait()
-
-    def expect(self, name: str, expectation: object) -> None:
-        """One expectation, waited for; what fails is described by Olympe."""
-        with self.step(name) as entry:
-            waited = self.drone(expectation).wait()
-            entry["ok"] = bool(waited.success())
-            if not entry["ok"]:
-                entry["explained"] = str(waited.explain())
-
+class Flight(Visit):
     def last(self, message: object) -> object:
         return plain(dict(self.drone.get_last_event(message).args))
 
-    def state(self, message: object) -> object:
-        return plain(dict(self.drone.get_state(message)))
+    def of_the_model(self) -> tuple[object, ...]:
+        """The same of cameras and card, of which an Ai speaks otherwise."""
+        if self.model == "ai":
+            return (camera2.Event.CameraList, camera2.Event.State, user_storage_v2.info)
+        return (camera.camera_states, camera.camera_capabilities, camera.recording_capabilities, user_storage.info)
 
     def sticks(self, name: str, roll: int, pitch: int, yaw: int, gaz: int) -> None:
-        """Hold the sticks for half a second; the drone has to fly, and to hover when they are back."""
         with self.step(name) as entry:
-            self.drone.piloting(roll, pitch, yaw, gaz, 0.5)
-            flew = self.drone(PilotingState.FlyingStateChanged(state="flying", _policy="check_wait", _timeout=3)).wait()
-            still = self.drone(at_rest()).wait()
-            entry["ok"] = bool(flew.success() and still.success())
+            entry["ok"] = self.hold(roll, pitch, yaw, gaz)
 
-    def fly(self) -> dict[str, object]:
-        result: dict[str, object] = {"steps": self.steps}
-        with self.step("connect") as entry:
-            entry["ok"] = self.connected = bool(self.drone.connect())
-        if not entry["ok"]:
-            return result
-        result["missing"] = [message.fullName for message in AT_START if not self.known(message)]
+    def fly(self) -> None:
+        self.begin("flight")
+        self.settles = True
+        result = self.result
+        result["missing"] = [
+            message.fullName for message in (*AT_START, *self.of_the_model()) if not self.known(message)
+        ]
         result["known"] = {
             "name": self.state(common.SettingsState.ProductNameChanged),
             "serial_high": self.state(common.SettingsState.ProductSerialHighChanged),
@@ -179,12 +129,14 @@ class Flight:
         result["clamped"] = self.state(PilotingSettingsState.MaxTiltChanged)
         self.expect("back", PilotingSettings.MaxTilt(20))
 
-        self.expect("take off", Piloting.TakeOff() >> PilotingState.FlyingStateChanged(state="hovering", _timeout=15))
+        self.expect(
+            "take off", Piloting.TakeOff() >> PilotingState.FlyingStateChanged(state="hovering", _timeout=LIMIT)
+        )
         result["home"] = home = self.state(GPSSettingsState.HomeChanged)
         assert isinstance(home, dict)
         here = home["latitude"], home["longitude"]
 
-        self.expect("moveBy", Piloting.moveBy(5, 0, -1, 0, _timeout=20) >> at_rest())
+        self.expect("moveBy", Piloting.moveBy(5, 0, -1, 0, _timeout=LIMIT) >> at_rest())
         result["moveBy"] = self.last(PilotingEvent.moveByEnd)
 
         latitude = here[0] + NORTH / METRES_PER_DEGREE
@@ -196,10 +148,10 @@ class Flight:
             move.extended_move_to(*here, 4.0, "heading_during", 90.0, 4, 2, 60) >> moved("DONE") >> at_rest(),
         )
         turn = math.pi / 2
-        self.expect("extended_move_by", move.extended_move_by(4, 2, -1, turn, 3, 1, 60, _timeout=20) >> at_rest())
+        self.expect("extended_move_by", move.extended_move_by(4, 2, -1, turn, 3, 1, 60, _timeout=LIMIT) >> at_rest())
         result["extended_move_by"] = self.last(PilotingEvent.moveByEnd)
         far = here[0] + 60 / METRES_PER_DEGREE
-        flying = PilotingState.FlyingStateChanged(state="flying", _policy="check_wait", _timeout=5)
+        flying = PilotingState.FlyingStateChanged(state="flying", _policy="check_wait", _timeout=LIMIT)
         self.expect("far", Piloting.moveTo(far, here[1], 5.0, "NONE", 0.0) >> flying)
         self.hear(4)  # on a part of the way
         self.expect("cancel", Piloting.CancelMoveTo() >> moved("CANCELED") >> at_rest())
@@ -224,33 +176,11 @@ class Flight:
         )
         self.expect(
             "NavigateHome",
-            Piloting.NavigateHome(1) >> rth.state("available", "finished", _timeout=60) >> at_rest(),
+            Piloting.NavigateHome(1) >> rth.state("available", "finished", _timeout=LIMIT) >> at_rest(),
         )
         result["rth"] = self.state(rth.state)
-        landed = PilotingState.FlyingStateChanged(state="landed", _timeout=60)
-        counted = SettingsState.MotorFlightsStatusChanged(nbFlights=1, _policy="check_wait", _timeout=60)
+        landed = PilotingState.FlyingStateChanged(state="landed", _timeout=LIMIT)
+        counted = SettingsState.MotorFlightsStatusChanged(nbFlights=1, _policy="check_wait", _timeout=LIMIT)
         self.expect("land", Piloting.Landing() >> (landed & counted))
         result["flights"] = self.state(SettingsState.MotorFlightsStatusChanged)
-        with self.step("disconnect") as entry:
-            entry["ok"] = bool(self.drone.disconnect())
-            self.connected = False
-        return result
-
-    def known(self, message: object) -> bool:
-        try:
-            return bool(self.drone.get_state(message))
-        except (KeyError, RuntimeError):
-            return False
-
-
-def main() -> None:
-    olympe.log.update_config({"loggers": {"olympe": {"level": "WARNING"}, "ulog": {"level": "WARNING"}}})
-    flight = Flight(sys.argv[1])
-    result = flight.fly()
-    print(json.dumps(result), file=OUT, flush=True)
-    # Olympe's own way out takes seconds.
-    os._exit(0)
-
-
-if __name__ == "__main__":
-    main()
+        self.settles = False

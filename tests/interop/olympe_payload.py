@@ -1,23 +1,13 @@
-"""Camera, gimbal, card and media, against Parrot's Olympe alone: ``olympe_payload.py ADDRESS PORT FOLDER MODEL``.
-
-Knows nothing of this project. Prints one JSON object: what each step came to and what Olympe believes. Downloads go
-to FOLDER; MODEL (4k, thermal, usa, ai) only says what is worth asking for. Olympe's log goes to stderr.
-"""
+"""Camera, gimbal, card and media, against Parrot's Olympe alone. Knows nothing of this project."""
 
 from __future__ import annotations
 
 import hashlib
-import json
-import os
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
-OUT = os.fdopen(os.dup(1), "w")
-os.dup2(2, 1)  # Olympe logs to stdout
-
-import olympe  # noqa: E402
-from olympe.features.media import (  # noqa: E402
+from olympe_base import LIMIT, Visit, plain  # isort: skip
+from olympe.features.media import (
     delete_all_media,
     delete_media,
     download_media,
@@ -26,21 +16,8 @@ from olympe.features.media import (  # noqa: E402
     media_created,
     resource_created,
 )
-from olympe.messages import camera, camera2, gimbal, mediastore, thermal, user_storage, user_storage_v2  # noqa: E402
-
-LIMIT = 10.0
-"""s for anything."""
-
-
-def plain(value: object) -> object:
-    """Enums as their names, for JSON."""
-    if isinstance(value, dict):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    if isinstance(value, int | float | str | bool) or value is None:
-        return value
-    return getattr(value, "_name_", str(value))
+from olympe.messages import camera, camera2, common, gimbal, mediastore, thermal, user_storage, user_storage_v2
+from olympe.messages.common import CalibrationState
 
 
 def attempt(call: Callable[[], object]) -> str:
@@ -51,35 +28,14 @@ def attempt(call: Callable[[], object]) -> str:
         return f"NameError: {error}"
 
 
-class Visit:
-    def __init__(self, address: str, port: str, folder: Path, model: str) -> None:
-        self.drone = olympe.Drone(address, http_port=int(port))
-        self.folder = folder
-        self.model = model
-        self.zoom_max = 32.0 if model == "usa" else 3.0
-        self.steps: dict[str, dict[str, object]] = {}
-        self.result: dict[str, object] = {"steps": self.steps}
-
-    def expect(self, name: str, expectation: object) -> bool:
-        """One expectation of the drone, waited for; what fails is described by Olympe."""
-        return self._wait(name, self.drone(expectation))
-
-    def ask(self, name: str, expectation: object) -> bool:
-        """One expectation of its media."""
-        return self._wait(name, self.drone.media(expectation))
-
-    def _wait(self, name: str, scheduled: object) -> bool:
-        waited = scheduled.wait(_timeout=LIMIT)  # type: ignore[attr-defined]
-        ok = bool(waited.success())
-        self.steps[name] = {"ok": ok} if ok else {"ok": ok, "explained": str(waited.explain())}
-        return ok
-
-    def state(self, message: object) -> object:
-        return plain(dict(self.drone.get_state(message)))
+class Payload(Visit):
+    folder: Path
+    """Where downloads go."""
 
     # -- the older cameras
 
     def set_camera(self) -> None:
+        furthest = 32.0 if self.model == "usa" else 3.0
         self.expect("ev", camera.set_ev_compensation(0, "ev_1_00"))
         self.expect("white balance", camera.set_white_balance(0, "custom", "t_5500"))
         self.expect("antiflicker", camera.set_antiflicker_mode("mode_60hz"))
@@ -89,9 +45,7 @@ class Visit:
         self.expect("zoom speed", camera.set_max_zoom_speed(0, 2.0))
         self.expect("zoom quality", camera.set_zoom_velocity_quality_degradation(0, 1))
         self.expect("zoom", camera.set_zoom_target(0, "level", 2.0) & camera.zoom_level(cam_id=0, level=2.0))
-        self.expect(
-            "zoom in", camera.set_zoom_target(0, "velocity", 1.0) & camera.zoom_level(cam_id=0, level=self.zoom_max)
-        )
+        self.expect("zoom in", camera.set_zoom_target(0, "velocity", 1.0) & camera.zoom_level(cam_id=0, level=furthest))
         self.expect("zoom back", camera.reset_zoom(0) & camera.zoom_level(cam_id=0, level=1.0))
         self.expect("streaming", camera.set_streaming_mode(0, "high_reliability"))
         self.expect("autorecord", camera.set_autorecord(0, "inactive"))
@@ -115,7 +69,7 @@ class Visit:
         self.expect("start a lapse", camera.take_photo(0) & saved)
         self.expect("stop the lapse", camera.stop_photo(0))
         self.expect("too early a photo", camera.set_camera_mode(0, "recording"))
-        bad = camera.photo_progress(result="error_bad_state", _policy="wait", _timeout=3)
+        bad = camera.photo_progress(result="error_bad_state", _policy="wait", _timeout=LIMIT)
         self.expect("no photo while recording is set", camera.take_photo(0, _no_expect=True) & bad)
 
     def photo(self, name: str) -> None:
@@ -126,8 +80,8 @@ class Visit:
         saved = self.drone(camera.photo_progress(result="photo_saved", _policy="wait", _timeout=LIMIT))
         idle = camera.photo_state(cam_id=0, state="inactive", _policy="wait", _timeout=LIMIT)
         self.expect(name, camera.take_photo(0) >> idle)
-        ok = all(bool(one.wait(_timeout=LIMIT).success()) for one in (saved, told, files))
-        self.steps[f"{name}, told"] = {"ok": ok}
+        ok = all(self.heard(one) for one in (saved, told, files))
+        self.say(f"{name}, told", ok)
         self.result[name] = saved.received_events().last().args["media_id"] if ok else None
 
     def record(self) -> None:
@@ -151,7 +105,7 @@ class Visit:
         done = event.Photo(type="stop", stop_reason="capture_done", _policy="wait", _timeout=LIMIT)
         told = self.drone.media(media_created(_timeout=LIMIT))
         self.expect("photo", command.StartPhoto(camera_id=0) & done)
-        self.steps["photo, told"] = {"ok": bool(told.wait(_timeout=LIMIT).success())}
+        self.say("photo, told", self.heard(told))
         configure("burst", photo_mode="burst", photo_burst_value="14_over_1s")
         done = event.Photo(type="stop", stop_reason="capture_done", _policy="wait", _timeout=LIMIT)
         self.expect("photos of a burst", command.StartPhoto(camera_id=0) & done)
@@ -170,9 +124,6 @@ class Visit:
         self.expect("zoom", command.SetZoomTarget(camera_id=0, control_mode="level", target=2.0) & level)
         state = self.drone.get_state(event.State)[0]
         self.result["config"] = {name: plain(state["config"][name]) for name in ("camera_mode", "ev_compensation")}
-
-    def state_of(self, message: object) -> object:
-        return plain(dict(self.drone.get_state(message)[0]))
 
     def look(self, name: str, pitch: float, speed: float) -> None:
         """Up or down, at so many degrees per second; until it looks there."""
@@ -201,6 +152,20 @@ class Visit:
         self.result["offsets"] = self.state_of(gimbal.offsets)
         self.result["axes"] = str(self.drone.get_state(gimbal.gimbal_capabilities)[0]["axes"])
 
+    def calibrate_compass(self) -> None:
+        """As somebody turns the drone about each axis, in Olympe's words; all is asked for beforehand."""
+        wait = {"_policy": "wait", "_timeout": LIMIT}
+        turned = {
+            axis: self.drone(CalibrationState.MagnetoCalibrationAxisToCalibrateChanged(axis=axis, **wait))
+            for axis in ("xAxis", "yAxis", "zAxis", "none")
+        }
+        done = CalibrationState.MagnetoCalibrationStateChanged(1, 1, 1, 0, **wait)
+        over = self.drone(done >> CalibrationState.MagnetoCalibrationStartedChanged(started=0, **wait))
+        self.expect("calibrate the compass", common.Calibration.MagnetoCalibration(1, _timeout=LIMIT))
+        for axis, scheduled in turned.items():
+            self.say(f"axis to calibrate: {axis}", self.heard(scheduled))
+        self.say("compass calibrated", self.heard(over))
+
     def see_warmth(self) -> None:
         self.expect("blended", thermal.set_mode("blended"))
         self.expect("rendering", thermal.set_rendering("blended", 0.25))
@@ -226,8 +191,8 @@ class Visit:
         listed = media.list_media()
         self.result["media"] = {id: plain(media.media_info(id)._asdict()) for id in listed}
         for id in listed:
-            self.ask(f"download {id}", download_media(id, integrity_check=True))
-            self.ask(f"thumbnails {id}", download_media_thumbnail(id))
+            self.download(id)
+        self.ask("thumbnails of a burst", download_media_thumbnail("10000002"))
         files = [file for file in sorted(self.folder.iterdir()) if file.suffix in (".JPG", ".DNG", ".MP4")]
         self.result["files"] = {file.name: hashlib.md5(file.read_bytes()).hexdigest() for file in files}
         self.result["thumbnails"] = sorted(file.name for file in (self.folder / "thumbnails").glob("*.JPG"))
@@ -235,11 +200,18 @@ class Visit:
         if listed:
             # Either is over with the drone's word that they are removed, which takes them off Olympe's list too.
             self.ask("delete one", delete_media(listed[0]))
-            self.steps["it is gone"] = {"ok": listed[0] not in media.list_media()}
+            self.say("it is gone", listed[0] not in media.list_media())
         self.ask("delete all", delete_all_media())
-        self.steps["all are gone"] = {"ok": media.list_media() == []}
+        self.say("all are gone", media.list_media() == [])
         gone = mediastore.counters(photo_media_count=0, video_media_count=0, _policy="check_wait", _timeout=LIMIT)
         self.expect("and not counted", gone)
+
+    def download(self, id: str) -> None:
+        """It gives the machine's own disk two seconds, which a busy machine may need for a burst: up to three times."""
+        with self.step(f"download {id}") as entry:
+            for _ in range(3):
+                if self._wait(entry, self.drone.media(download_media(id, integrity_check=True))):
+                    return
 
     def format(self) -> None:
         if self.model == "ai":
@@ -259,11 +231,9 @@ class Visit:
         self.result["plans"] = attempt(plans.download_all)
         self.result["plan again"] = attempt(lambda: plans.download(self.result["plan"]))
 
-    def visit(self) -> dict[str, object]:
-        ok = bool(self.drone.connect())
-        self.steps["connect"] = {"ok": ok}
-        if not ok:
-            return self.result
+    def use_payload(self, folder: Path) -> None:
+        self.begin("payload")
+        self.folder = folder
         if self.model == "ai":
             self.use_camera2()
         else:
@@ -273,20 +243,7 @@ class Visit:
         if self.model in ("thermal", "usa"):
             self.see_warmth()
         self.look_around()
+        self.calibrate_compass()
         self.fetch()
         self.format()
         self.plans()
-        self.steps["disconnect"] = {"ok": bool(self.drone.disconnect())}
-        return self.result
-
-
-def main() -> None:
-    olympe.log.update_config({"loggers": {"olympe": {"level": "WARNING"}, "ulog": {"level": "WARNING"}}})
-    result = Visit(sys.argv[1], sys.argv[2], Path(sys.argv[3]), sys.argv[4]).visit()
-    print(json.dumps(result), file=OUT, flush=True)
-    # Olympe's own way out takes seconds.
-    os._exit(0)
-
-
-if __name__ == "__main__":
-    main()

@@ -1,28 +1,13 @@
-"""A flight plan and a point of interest, flown with Parrot's Olympe alone: ``olympe_plan.py ADDRESS PORT MODEL``.
-
-Knows nothing of this project. Prints one JSON object: which expectations came true, the plan's name. Olympe's log
-goes to stderr.
-"""
+"""A flight plan and a point of interest, flown with Parrot's Olympe alone. Knows nothing of this project."""
 
 from __future__ import annotations
 
-import json
-import os
-import sys
-
-OUT = os.fdopen(os.dup(1), "w")
-os.dup2(2, 1)  # Olympe logs to stdout
-
-import olympe  # noqa: E402
-from olympe.messages.ardrone3.Piloting import Landing, StartPilotedPOIV2, StopPilotedPOI, TakeOff  # noqa: E402
-from olympe.messages.ardrone3.PilotingState import FlyingStateChanged  # noqa: E402
-from olympe.messages.common.FlightPlanEvent import StartingErrorEvent  # noqa: E402
-from olympe.messages.common.FlightPlanState import ComponentStateListChanged  # noqa: E402
-from olympe.messages.common.Mavlink import Pause, Start, Stop  # noqa: E402
-from olympe.messages.common.MavlinkState import MavlinkFilePlayingStateChanged, MissionItemExecuted  # noqa: E402
-
-LIMIT = 60.0
-"""s for anything."""
+from olympe_base import LIMIT, Visit  # isort: skip
+from olympe.messages.ardrone3.Piloting import Landing, StartPilotedPOIV2, StopPilotedPOI, TakeOff
+from olympe.messages.common.FlightPlanEvent import StartingErrorEvent
+from olympe.messages.common.FlightPlanState import ComponentStateListChanged
+from olympe.messages.common.Mavlink import Pause, Start, Stop
+from olympe.messages.common.MavlinkState import MavlinkFilePlayingStateChanged, MissionItemExecuted
 
 PLAN = b"""QGC WPL 120
 0\t0\t3\t22\t0\t0\t0\t0\t0\t0\t0\t1
@@ -36,19 +21,7 @@ PLAN = b"""QGC WPL 120
 """
 
 
-class Flight:
-    def __init__(self, address: str, port: str, model: str) -> None:
-        self.drone = olympe.Drone(address, http_port=int(port))
-        self.type = "flightPlanV2" if model == "ai" else "flightPlan"
-        self.steps: dict[str, dict[str, object]] = {}
-        self.result: dict[str, object] = {"steps": self.steps}
-
-    def expect(self, name: str, expectation: object) -> bool:
-        waited = self.drone(expectation).wait(_timeout=LIMIT)
-        ok = bool(waited.success())
-        self.steps[name] = {"ok": ok} if ok else {"ok": ok, "explained": str(waited.explain())}
-        return ok
-
+class Plan(Visit):
     def upload(self) -> str:
         """Its HTTP gives up after half a second, which a busy machine may need: up to three times."""
         for attempt in range(3):
@@ -59,46 +32,34 @@ class Flight:
                     raise
         raise AssertionError("three attempts")
 
-    def fly(self) -> dict[str, object]:
-        ok = bool(self.drone.connect())
-        self.steps["connect"] = {"ok": ok}
-        if not ok:
-            return self.result
+    def play_plan(self) -> None:
+        self.begin("plan")
+        type = "flightPlanV2" if self.model == "ai" else "flightPlan"
         uid = self.upload()
         self.expect(
             "an unknown file is refused",
-            Start(filepath="nothing", type=self.type, _no_expect=True) >> StartingErrorEvent(_timeout=LIMIT)
+            Start(filepath="nothing", type=type, _no_expect=True) >> StartingErrorEvent(_timeout=LIMIT)
             & ComponentStateListChanged(component="Mavlink_File", State=0, _policy="check_wait", _timeout=LIMIT),
         )
-        self.expect("start", Start(filepath=uid, type=self.type))
-        self.expect("on the way", MissionItemExecuted(idx=0, _policy="wait", _timeout=LIMIT))
+        # Asked for beforehand: what comes quickly is not missed by a slow listener.
+        executed = {
+            item: self.drone(MissionItemExecuted(idx=item, _policy="wait", _timeout=LIMIT)) for item in (0, 1, 2, 6, 7)
+        }
+        self.expect("start", Start(filepath=uid, type=type))
+        self.say("on the way", self.heard(executed[0]))
         self.expect("pause", Pause())
-        self.expect("hover", FlyingStateChanged(state="hovering", _policy="check_wait", _timeout=LIMIT))
-        self.expect("go on", Start(filepath=uid, type=self.type))
-        for item in (1, 2, 6):  # 7, the landing, begins at once: too soon for a wait that comes after 6
-            self.expect(f"item {item}", MissionItemExecuted(idx=item, _policy="wait", _timeout=LIMIT))
+        self.flying_state("hover", "hovering")
+        self.expect("go on", Start(filepath=uid, type=type))
+        for item in (1, 2, 6, 7):
+            self.say(f"item {item}", self.heard(executed[item]))
         stopped = MavlinkFilePlayingStateChanged(state="stopped", _policy="check_wait", _timeout=LIMIT)
         self.expect("the end", stopped)
-        self.expect("landed", FlyingStateChanged(state="landed", _policy="check_wait", _timeout=LIMIT))
+        self.flying_state("landed", "landed")
         self.expect("take-off", TakeOff())
-        self.expect("in the air", FlyingStateChanged(state="hovering", _policy="check_wait", _timeout=LIMIT))
+        self.flying_state("in the air", "hovering")
         self.expect("point of interest", StartPilotedPOIV2(48.8789, 2.3680, 0.0, "locked_gimbal"))
         self.expect("no more", StopPilotedPOI())
-        self.expect("start anew", Start(filepath=uid, type=self.type))
+        self.expect("start anew", Start(filepath=uid, type=type))
         self.expect("stop", Stop())
         self.expect("landing", Landing())
-        self.expect("on the ground", FlyingStateChanged(state="landed", _policy="check_wait", _timeout=LIMIT))
-        self.steps["disconnect"] = {"ok": bool(self.drone.disconnect())}
-        return self.result
-
-
-def main() -> None:
-    olympe.log.update_config({"loggers": {"olympe": {"level": "WARNING"}, "ulog": {"level": "WARNING"}}})
-    result = Flight(*sys.argv[1:4]).fly()
-    print(json.dumps(result), file=OUT, flush=True)
-    # Olympe's own way out takes seconds.
-    os._exit(0)
-
-
-if __name__ == "__main__":
-    main()
+        self.flying_state("on the ground", "landed")

@@ -2,61 +2,37 @@
 
 from __future__ import annotations
 
-import asyncio
 import hashlib
-import importlib.util
 import json
-import re
-import sys
 from pathlib import Path
 
 import pytest
+from support import olympe
 from support.process import simulator_process
 from support.world import loopback
 
-SCRIPT = Path(__file__).with_name("olympe_media.py")
-
-PORT = 8080
-"""Of the simulator's web server: Olympe is told, so nobody needs the right to listen on 80."""
-
 HARMLESS = {
-    r"ulog - pomp - timer \S+: missed \d+ events": "the machine is busy, so one of Olympe's timers came late",
     r"backend - __call__ - Unhandled exception|Traceback \(most recent call last\)": "Olympe's own way out of a mux:"
     " its `_tx_cb` asks a client that is gone (seen with skyctrl_media alone; the line below it is asked for)",
 }
 """Lines at WARNING and above that Olympe writes without the drone's fault."""
 
-pytestmark = pytest.mark.skipif(
-    importlib.util.find_spec("olympe") is None,
-    reason="Olympe is not installed: package parrot-olympe exists for x86-64 Linux, Python < 3.12",
-)
+pytestmark = olympe.needed
 
 
 @pytest.mark.parametrize("via", ["drone", "skycontroller"])
+@pytest.mark.timeout(240)
 async def test_olympes_media_examples(via: str, tmp_path: Path) -> None:
     address, log, downloads = loopback(), tmp_path / "sim.jsonl", tmp_path / "downloads"
     downloads.mkdir()
+    port = str(olympe.HTTP_PORT)
     controller = ("--skycontroller", "4") if via == "skycontroller" else ()
-    async with simulator_process(address, log, "--model", "ai", "--http-port", str(PORT), "--seed", "1", *controller):
-        process = await asyncio.create_subprocess_exec(
-            *(sys.executable, str(SCRIPT), address, str(PORT), via, str(downloads)),
-            stdout=asyncio.subprocess.PIPE,
-            stderr=asyncio.subprocess.PIPE,
-        )
-        try:
-            out, told = await asyncio.wait_for(process.communicate(), 100.0)
-        finally:
-            if process.returncode is None:
-                process.kill()
-                await process.wait()
-    err = told.decode()
-    assert out, err
-    assert json.loads(out) == {"failed": None}, err
-
-    complaints = [line for line in err.splitlines() if re.search(r"\[(WARNING|ERROR|CRITICAL)\]|Traceback", line)]
-    assert [line for line in complaints if not any(re.search(known, line) for known in HARMLESS)] == []
+    async with simulator_process(address, log, "--model", "ai", "--http-port", port, "--seed", "1", *controller):
+        report, err = await olympe.run("olympe_media.py", address, port, via, str(downloads), timeout=200.0)
+    assert report == {"failed": None}, err
+    told = olympe.complaints(err, HARMLESS)
+    assert not told, "\n".join(told)
     assert err.count("Traceback") == err.count("AttributeError: 'NoneType' object has no attribute 'connected'")
-    assert "unknown message" not in err.lower()
 
     files = sorted(downloads.glob("*/*.JPG"))
     assert [file.name for file in files] == [f"1000000100{number:02}.JPG" for number in range(1, 15)]

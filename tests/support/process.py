@@ -40,7 +40,7 @@ async def start_simulator(address: str, log: Path, *arguments: str) -> Simulator
         stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.PIPE,
     )  # fmt: skip
     assert process.stdout is not None
-    while not (line := await asyncio.wait_for(process.stdout.readline(), 30.0)).startswith(b"ready"):
+    while not (line := await asyncio.wait_for(process.stdout.readline(), 100.0)).startswith(b"ready"):
         assert line, "the simulator ended before it was ready"
     return SimulatorProcess(process, log)
 

@@ -1,0 +1,72 @@
+"""Parrot's Olympe does everything at the simulated models, directly and through a Skycontroller, in one connection."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from check_controller import check_controller
+from check_flight import check_flight
+from check_look import check_look
+from check_payload import BROKEN, check_payload
+from check_plan import check_plan
+from support import olympe
+
+SPEED = "5"
+"""Simulated seconds per second."""
+
+HARMLESS = {
+    r"olympe\.flightplan - step - |Traceback \(most recent call last\)": "what BROKEN is about; they are counted",
+}
+"""Lines at WARNING and above that Olympe writes without the drone's fault."""
+
+UNHEARD = {
+    "c1671000050000008201020801": "arsdk.microhard.Command.GetState, said to every Skycontroller: the radio of another",
+}
+"""Payloads of the commands of Olympe that are nothing to the simulated aircraft and controllers."""
+
+pytestmark = olympe.needed
+
+
+# The controllers are those that Parrot sells with the models, and the fourth in front of an older one. Olympe's wire
+# format is the newest, or the one that the drone asks for.
+@pytest.mark.parametrize(
+    ("model", "kind", "version"),
+    [
+        ("4k", "Drone", 3),
+        ("thermal", "Drone", 2),
+        ("usa", "Drone", 1),
+        ("ai", "Drone", 3),
+        ("4k", "SkyController3", 3),
+        ("thermal", "SkyController3", 3),
+        ("usa", "SkyController3", 3),
+        ("usa", "SkyController4", 3),
+        ("ai", "SkyController4", 3),
+    ],
+)
+@pytest.mark.timeout(240)
+async def test_olympe_does_everything(model: str, kind: str, version: int, tmp_path: Path) -> None:
+    # The telemetry is as frequent as the simulator logs where the drone is.
+    options = ("--protocol", str(version), "--speed", SPEED, "--telemetry-rate", "10")
+    report, err, log = await olympe.visit("olympe_visit.py", kind, model, tmp_path, timeout=200.0, options=options)
+
+    assert olympe.failed(report["connection"]["steps"]) == {}
+    assert olympe.failed(report["end"]["steps"]) == {}
+    # Nor did Olympe say anything that the simulator has no word for: such a command is logged by its numbers.
+    unheard = {entry["args"]["payload"] for entry in log if entry["kind"] == "command" and entry["name"][0].isdigit()}
+    assert unheard <= (set() if kind == "Drone" else set(UNHEARD)), unheard
+    assert next(entry["args"]["version"] for entry in log if entry["kind"] == "session") == version
+
+    if kind == "Drone":
+        check_flight(report["flight"], model, log)
+    else:
+        check_controller(report["controller"], kind, model, log)
+    # Without the right to listen on 554 nobody looks through a Skycontroller 3.
+    if kind != "SkyController3" or olympe.rtsp_of_a_skycontroller_3():
+        check_look(report["look"], model, log)
+    check_payload(report["payload"], model, tmp_path / "downloads", log)
+    check_plan(report["plan"], log)
+
+    told = olympe.complaints(err, olympe.HARMLESS_WITH_VIDEO, HARMLESS)
+    assert not told, "\n".join(told)
+    assert err.count("Traceback") == err.count(BROKEN)

@@ -1,0 +1,125 @@
+"""Parrot's Olympe as a process of its own: what its scripts report, and what Olympe complains of."""
+
+from __future__ import annotations
+
+import asyncio
+import importlib.util
+import json
+import re
+import socket
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from support.process import simulator_process
+from support.world import loopback
+
+SCRIPTS = Path(__file__).parents[1] / "interop"
+
+HTTP_PORT, RTSP_PORT = 8080, 8554
+"""Of the simulator where Olympe can be told, so that nobody needs the right to listen on 80 and 554."""
+
+needed = pytest.mark.skipif(
+    importlib.util.find_spec("olympe") is None,
+    reason="Olympe is not installed: package parrot-olympe exists for x86-64 Linux, Python < 3.12",
+)
+
+HARMLESS = {
+    r"ulog - pomp - timer \S+: missed \d+ events": "the machine is busy, so one of Olympe's timers came late",
+    r"stop_piloting - Unable to stop piloting interface": "Olympe 8.5 never returns the result of its own stop",
+    r"ulog - mux - mux_channel_ip_disconnected err=2": "the web server closed what Olympe has just closed itself",
+    r"olympe\.media - _aconnect - Unable to connect to the media websocket \(timeout\)": (
+        "it gives a connection half a second, which a busy machine may need, and then tries again"
+    ),
+    r"olympe\.media - _adownload - Resource '\S+' disk i/o timedout": "the machine is busy; the script asks again",
+    r"ulog - arsdk - (net|mux) ping failures: 1$|ulog - arsdk - .*ping payload mismatch": (
+        "the machine is busy, so the answer to one ping came after the next had gone out"
+    ),
+}
+"""Lines at WARNING and above that Olympe writes without the drone's fault, whatever it does."""
+
+HARMLESS_WITH_VIDEO = {
+    r"Video output files won't open for stream": "the pictures are looked at and not written to a file",
+    r"VideoDecoder#\d+: coded video media format H264/AVCC not supported": (
+        "pdraw offers its decoder the stream in both forms, and the decoder takes the other"
+    ),
+    r"_media_removed - Received removed event from unknown ID": (
+        "pdraw tells of the stream in the form that nobody asked for"
+    ),
+    r"ulog - pomp - event \S+ is still attached to loop": "Olympe destroys the queue of a stream before its event",
+    r"mbuf_base_frame_queue_deinit:\d+: pomp_evt_destroy err=16": "the same",
+    r"tskt_impl - packet timestamping failed, fall back to current ts": "the machine is busy; the time is good enough",
+    r"pdraw_dmxstrm - .*recvFrameCb: demuxer is not started": "a picture came while pdraw was about to begin or to end",
+    r"pdraw_dmxstrm - EVT:STREAM;event='\w+';.*status=0;": "pdraw's record of what went well",
+}
+
+
+def complaints(err: str, *harmless: dict[str, str]) -> list[str]:
+    """The lines of Olympe's log at WARNING and above for which nobody knows a reason, and messages it cannot read."""
+    known = [pattern for patterns in (HARMLESS, *harmless) for pattern in patterns]
+    told = [
+        line
+        for line in err.splitlines()
+        if re.search(r"\[(WARNING|ERROR|CRITICAL)\]|Traceback|[Uu]nknown message", line)
+    ]
+    return [line for line in told if not any(re.search(pattern, line) for pattern in known)]
+
+
+async def run(script: str, *arguments: str, timeout: float) -> tuple[Any, str]:
+    """What a script of `interop` reports, and Olympe's own log. `timeout` in s only ends what hangs."""
+    process = await asyncio.create_subprocess_exec(
+        sys.executable,
+        *(str(SCRIPTS / script), *arguments),
+        stdout=asyncio.subprocess.PIPE,
+        stderr=asyncio.subprocess.PIPE,
+    )
+    try:
+        out, err = await asyncio.wait_for(process.communicate(), timeout)
+    finally:
+        if process.returncode is None:
+            process.kill()
+            await process.wait()
+    assert out, err.decode()
+    return json.loads(out), err.decode()
+
+
+async def visit(
+    script: str, kind: str, model: str, folder: Path, *arguments: str, timeout: float, options: tuple[str, ...]
+) -> tuple[Any, str, list[dict[str, Any]]]:
+    """The script against a simulated drone of its own: what it reports, Olympe's log, and the simulator's.
+
+    `kind` is Olympe's class: Drone, or the Skycontroller that stands in front of the drone.
+    """
+    address, log, downloads = loopback(), folder / "sim.jsonl", folder / "downloads"
+    downloads.mkdir()
+    http, rtsp = str(HTTP_PORT), str(RTSP_PORT if kind != "SkyController3" else rtsp_of_a_skycontroller_3())
+    if kind != "Drone":
+        options += ("--skycontroller", kind[-1])
+    ports = ("--http-port", http, *(("--rtsp-port", rtsp) if rtsp != "0" else ()))
+    async with simulator_process(address, log, "--model", model, "--seed", "1", *ports, *options):
+        report, err = await run(script, address, kind, model, http, rtsp, str(downloads), *arguments, timeout=timeout)
+    return report, err, [json.loads(line) for line in log.read_text().splitlines()]
+
+
+def rtsp_of_a_skycontroller_3() -> int:
+    """Olympe asks it for video at port 554 and nowhere else; 0 where this user may not open that."""
+    with socket.socket() as probe:
+        try:
+            probe.bind((loopback(), 554))
+        except PermissionError:
+            return 0
+    return 554
+
+
+def failed(steps: dict[str, dict[str, Any]]) -> dict[str, object]:
+    """What did not come true, and what Olympe says of it."""
+    return {name: step.get("explained") for name, step in steps.items() if not step["ok"]}
+
+
+def during(log: list[dict[str, Any]], report: dict[str, Any]) -> list[dict[str, Any]]:
+    """What the simulator logged while a part of a visit lasted."""
+    first = min(step["from"] for step in report["steps"].values())
+    last = max(step["to"] for step in report["steps"].values())
+    return [entry for entry in log if first <= entry["t"] <= last]
