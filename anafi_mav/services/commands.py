@@ -29,6 +29,7 @@ PROGRESS_AFTER, PROGRESS_EVERY = 0.3, 0.8
 
 _MODE_COMMANDS = (dialect.MAV_CMD_DO_SET_MODE, dialect.MAV_CMD_DO_SET_STANDARD_MODE)
 _STOPPING_MODES = (*HOVERING, FlightMode.LAND)
+_LAPSING = (FlightMode.OFFBOARD, FlightMode.FOLLOW, FlightMode.MISSION)
 _STOPPING = (
     dialect.MAV_CMD_NAV_LAND,
     dialect.MAV_CMD_DO_FLIGHTTERMINATION,
@@ -62,7 +63,9 @@ class Command:
 
     @property
     def mode(self) -> FlightMode | None:
-        """The mode that DO_SET_MODE or DO_SET_STANDARD_MODE names; None for one that we do not have."""
+        """The mode that DO_SET_MODE or DO_SET_STANDARD_MODE names or MISSION_START means; None: we have none such."""
+        if self.id == dialect.MAV_CMD_MISSION_START:
+            return FlightMode.MISSION
         if self.id == dialect.MAV_CMD_DO_SET_STANDARD_MODE:
             return mode_of_standard(self.params[0])
         return self.flavour.mode_of_parameters(self.params[1], self.params[2])
@@ -96,8 +99,8 @@ class Command:
 
     @property
     def lapses(self) -> bool:
-        """It asks for a mode that ends when nobody says any more how to fly: asked for again, it begins again."""
-        return self.id == dialect.MAV_CMD_DO_SET_MODE and self.mode in (FlightMode.OFFBOARD, FlightMode.FOLLOW)
+        """It asks for a mode that ends without another order: asked for again, it begins again, or is refused."""
+        return self.id in (*_MODE_COMMANDS, dialect.MAV_CMD_MISSION_START) and self.mode in _LAPSING
 
     def same_as(self, other: Command) -> bool:
         """Equal, with NaN equal to NaN."""

@@ -34,6 +34,7 @@ from support.missions import (
     whole,
 )
 from support.plans import ACCEPTED, FENCE, MISSION, UNSUPPORTED_FRAME, around, square, upload
+from support.trouble import return_by_itself
 from support.world import ARMED, world
 
 from anafi_mav.mavlink import dialect as newer
@@ -281,6 +282,26 @@ async def test_conf_074_another_mission_stops_the_one_that_is_flown() -> None:
         await mode(w, w.modes.idle, since=mark)
         assert len(w.commands("common.Mavlink.Start")) == 1
         assert len(w.commands("common.Mavlink.Pause")) == 1
+
+
+@both
+async def test_conf_074_a_return_that_the_drone_begins_is_not_fought(flavour: str) -> None:
+    """The battery sends it home in mid-mission: paused, nothing is sent against it, and the mission does not begin."""
+    async with world(flavour=flavour, web=True) as w:
+        await put(w, [takeoff(6.0), way(60.0, 0.0, 6.0), way(60.0, 5.0, 6.0)])
+        await start(w)
+        await w.drone.wait_log(lambda e: e.name == "item" and e.args["command"] == "waypoint", timeout=20.0)
+        mark, before = w.client.mark(), len(w.drone.log)
+        return_by_itself(w)
+        await mode(w, w.modes.returning, since=mark)
+        await state(w, PAUSED, since=mark)
+        ack = await w.client.command(dialect.MAV_CMD_MISSION_START, 0, 0)
+        assert ack.result == dialect.MAV_RESULT_TEMPORARILY_REJECTED
+        await said(w, "returns home by itself", since=mark)
+        await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.returning, since=w.client.mark())
+        sent = {e.name for e in list(w.drone.log)[before:] if e.kind == "command"}
+        assert not {name for name in sent if name.rpartition(".")[2] in ("Pause", "Stop", "Start", "Abort", "moveTo")}
+        assert set(reached(w)) <= {0}
 
 
 async def test_conf_074_the_pilot_at_the_skycontroller_takes_over() -> None:

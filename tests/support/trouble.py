@@ -71,6 +71,7 @@ def on_command(w: World, command: str, do: Callable[[], Any]) -> asyncio.Future[
 def return_by_itself(w: World) -> None:
     """The battery sends the drone home."""
     firmware = w.drone.firmware
+    firmware.flight_plan.stop(hover=True)  # the firmware breaks a plan off before it returns
     assert firmware.homing.request(StateReason.LOW_BATTERY, firmware.pose, False)
 
 
