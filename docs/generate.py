@@ -396,6 +396,8 @@ What holds for all of them:
   rises straight to the height of the first way point, which is said.
 * A mission that begins in its middle begins with the speed, region of interest, view and gimbal that the items
   before have set, and with photos or a video that they have begun and not ended.
+* An Ai that flies begins a file by going to above its first way point. What a mission does before that one, such as a
+  photo, is kept where it belongs by a way point there in front.
 * A file has at most {lines} lines. A longer mission is flown in several files (stepped).
 * An item that does not continue by itself, and one after a landing, are refused. What comes after a return or an
   endless loop is never reached, which is said.
