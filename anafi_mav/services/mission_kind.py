@@ -69,20 +69,26 @@ class Examined:
     neutral: tuple[Item, ...]
     report: Report
 
-    def words(self) -> str:
-        """For people: what of it is flown, and how."""
+    def words(self, first: int) -> str:
+        """For people who call the first item `first`: what of it is flown, and how."""
+        if not self.items:
+            return "No mission"
         report = self.report
         words = f"Mission: {len(self.items)} items"
         if report.stepped:
-            words += f"; some are flown by the gateway, {_some(report.stepped)}. Without it what follows is not flown"
+            words += (
+                f"; some are flown by the gateway, {_some(report.stepped, first)}. Without it what follows is not flown"
+            )
         if report.approximations:
-            words += f"; not exactly as it says: {_some(report.approximations)}"
+            words += f"; not exactly as it says: {_some(report.approximations, first)}"
         return words
 
 
-def _some(losses: Sequence[Loss]) -> str:
+def _some(losses: Sequence[Loss], first: int) -> str:
+    loss = losses[0]
+    where = "" if loss.item is None else f"item {loss.item + first}: "
     more = f" and {len(losses) - 1} more" if len(losses) > 1 else ""
-    return f"{losses[0]}{more}"
+    return f"{where}{loss.what}{more}"
 
 
 class MissionKind(PlanKind):

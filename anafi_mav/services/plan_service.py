@@ -174,7 +174,7 @@ class PlanService(Service):
         if kind == MissionKind.mission_type:
             if identity != vehicle.mission.identity:
                 examined = self._mission.examined(items)
-                self.host.text(Severity.INFO, examined.words() if items else "No mission")
+                vehicle.mission.say(Severity.INFO, examined.words)
                 vehicle.mission.take(examined.neutral, identity)
         elif kind == FenceKind.mission_type:
             if items != vehicle.fence.items:

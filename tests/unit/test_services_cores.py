@@ -208,6 +208,24 @@ def test_offboard_that_has_ended_by_itself_is_entered_anew() -> None:
     assert desk.retransmission("a", offboard, 1.0, FlightMode.HOLD) == dialect.MAV_RESULT_CANCELLED
 
 
+@pytest.mark.parametrize(
+    "mission",
+    [
+        commands.Command(300, (0.0, 0.0, NAN, NAN), NAN, NAN, NAN, None),
+        commands.Command(176, (1.0, 4.0, 4.0, NAN), NAN, NAN, NAN, None),
+        commands.Command(262, (6.0, NAN, NAN, NAN), NAN, NAN, NAN, None),
+    ],
+)
+def test_a_mission_that_is_not_flown_any_more_is_not_confirmed_again(mission: commands.Command) -> None:
+    desk = commands.CommandDesk()
+    execution = desk.begin("a", mission)
+    execution.result, execution.ended = dialect.MAV_RESULT_ACCEPTED, 0.0
+    assert desk.retransmission("a", mission, 1.0, FlightMode.MISSION) == dialect.MAV_RESULT_ACCEPTED
+    assert desk.retransmission("a", mission, 1.0, FlightMode.RETURN) is None
+    desk.supersede("b")
+    assert desk.retransmission("a", mission, 1.0, FlightMode.HOLD) == dialect.MAV_RESULT_CANCELLED
+
+
 def test_what_is_another_command() -> None:
     desk = commands.CommandDesk()
     desk.begin("a", command())
