@@ -41,6 +41,7 @@ async def _fly(arguments: argparse.Namespace, sysid: int | None, plan: Plan) -> 
             say("arming")
             await ground.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
         await ground.command(dialect.MAV_CMD_MISSION_START)
+        follower.begin()
         say("begun; Ctrl-C ends this program, not the flight", "green")
         try:
             await follower.follow()
@@ -61,7 +62,7 @@ class Follower:
         self._reached: set[int] = set()
         self._state = dialect.MISSION_STATE_UNKNOWN
         self._begun = False
-        """It was flown: what was told before may be of another mission."""
+        """What was told before may be of another mission."""
         self._armed = False
         self._heard = asyncio.get_running_loop().time()
         self._problem: AnafiMavError | None = None
@@ -71,6 +72,10 @@ class Follower:
     def where(self) -> str:
         """The item that is flown."""
         return "its beginning" if self._current is None else self._name(self._current)
+
+    def begin(self) -> None:
+        """The vehicle has accepted to fly it."""
+        self._begun = True
 
     async def follow(self) -> None:
         """Until it is complete. Raises `Ended` and `LinkLost`."""
@@ -110,8 +115,6 @@ class Follower:
 
     def _tell_current(self, message: Any) -> None:
         number, state = message.seq - self._first, message.mission_state
-        if state == dialect.MISSION_STATE_ACTIVE:
-            self._begun = True
         if state != self._state:
             if state == dialect.MISSION_STATE_PAUSED and self._begun:
                 say(f"paused at {self._name(number)}: it goes on when the vehicle is told so", "yellow")

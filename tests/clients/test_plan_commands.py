@@ -123,6 +123,7 @@ async def test_where_nobody_is(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.timeout(240)
 async def test_a_plan_is_flown_and_followed(tmp_path: Path) -> None:
     address = loopback()
     config = fleet(address, loopback()).replace("sim: {", "sim: {speed: 4, ")
@@ -151,6 +152,7 @@ async def test_a_plan_is_flown_and_followed(tmp_path: Path) -> None:
         assert items[-1] == "return_to_launch"
 
 
+@pytest.mark.timeout(240)
 async def test_who_stops_following_leaves_the_flight_alone(tmp_path: Path) -> None:
     address = loopback()
     url = f"tcpout://{address}:5760"
