@@ -34,3 +34,31 @@ async def test_conf_117_dronekit(tmp_path: Path) -> None:
         await p.flying_state("landed")
         assert [line for line in script.lines if line.startswith("mode ")] == ["mode BRAKE", "mode LOITER", "mode RTL"]
         assert len(p.entries("command", "rth.return_to_home")) == 1
+
+
+@pytest.mark.timeout(180)
+async def test_conf_075_117_dronekit_missions(tmp_path: Path) -> None:
+    """Up, down and flown; what the drone did is from its own log."""
+    address = loopback()
+    config = f"""
+        endpoints: ["tcpin://{address}:5760?flavour=ardupilot"]
+        drones: [{{name: alpha, sysid: 1, sim: {{address: {loopback()}, home: {list(HOME)}, speed: 3}}}}]
+    """
+    words = (sys.executable, "-u", str(SCRIPT.with_name("dronekit_mission.py")), f"tcp:{address}:5760")
+    async with product(tmp_path, config) as p, program(*words, str(HOME[0]), str(HOME[1])) as script:
+        await script.line(lambda line: line == "landed", timeout=150.0)
+        said = dict(line.split(" ", 1) for line in script.lines if " " in line)
+        assert said["read"] == said["sent"]
+        assert said["home"] == f"{HOME[0]} {HOME[1]} {HOME[2]:.0f}"
+        assert said["end"] == str(len(said["sent"].split("), (")))  # counted from home
+        await p.flying_state("landed")
+        track = [entry["args"] for entry in p.entries("pose")]
+        for place in ((HOME[0] + 0.00018, HOME[1], 6.0), (HOME[0], HOME[1] + 0.0001, 9.0)):
+            flat = [(geo.distance(*place[:2], at["lat"], at["lon"]), abs(at["ato"] - place[2])) for at in track]
+            assert min(max(pair) for pair in flat) < 2.0
+        names = [entry["args"]["command"] for entry in p.entries("plan", "item")]
+        lines = [name.removeprefix("condition_") for name in names]
+        assert lines[-7:] == [
+            "waypoint", "delay", "set_still_mode", "start_photo", "change_speed", "waypoint", "return_to_launch",
+        ]  # fmt: skip
+        assert len(p.entries("command", "Piloting.TakeOff")) == 1  # dronekit's own, the mission's is in the air

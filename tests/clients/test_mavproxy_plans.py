@@ -1,4 +1,4 @@
-"""Unmodified MAVProxy without a terminal: its `fence` and `rally`, in both flavours (conformance D1, 76, 77, 119)."""
+"""Unmodified MAVProxy without a terminal: its `fence`, `rally` and `wp` (conformance D1, 76, 77, 119, 142)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support.plans import FENCE, RALLY, Item, circle, download, rally, square, upload
+from support.plans import FENCE, MISSION, RALLY, Item, around, circle, download, rally, square, upload
 from support.product import Process, program
 from support.world import HOME, World, world
 
@@ -39,10 +39,10 @@ async def typed(mavproxy: Process, command: str, pattern: str, timeout: float = 
 
 
 async def listed(mavproxy: Process, what: str) -> list[int]:
-    """The commands that `fence list` or `rally list` prints."""
+    """The commands that `fence list`, `rally list` or `wp list` prints."""
     since = len(mavproxy.lines)
-    await typed(mavproxy, f"{what} list", rf"Saved {what} items to ")
-    rows = [re.search(r"\b(5\d{3}) \d+ -?\d+\.\d{10} ", line) for line in mavproxy.lines[since:]]
+    await typed(mavproxy, f"{what} list", r"^Saved \d+ waypoints to |Saved \w+ items to ")
+    rows = [re.search(r"\b(\d+) \d+ -?\d+\.\d{10} ", line) for line in mavproxy.lines[since:]]
     return [int(row[1]) for row in rows if row is not None]
 
 
@@ -61,7 +61,7 @@ async def changed(w: World, kind: int, command: str, mavproxy: Process) -> list[
 def ids(message: Any) -> dict[int, int]:
     """Which fence and rally points there are, by MISSION_CURRENT: fields that pymavlink's own dialect has not yet."""
     (whole,) = newer.MAVLink(None).parse_buffer(message.get_msgbuf())
-    return {FENCE: whole.fence_id, RALLY: whole.rally_points_id}
+    return {MISSION: whole.mission_id, FENCE: whole.fence_id, RALLY: whole.rally_points_id}
 
 
 def same(seen: list[Any], wanted: list[Item]) -> bool:
@@ -123,3 +123,58 @@ async def test_conf_119_fence_and_rally(flavour: str, tmp_path: Path) -> None:
             assert [m.z for m in rest] == [heights[0], heights[2]]
             assert await changed(w, RALLY, "rally clear", mavproxy) == []
             assert not [line for line in mavproxy.lines if re.search("Traceback|ERROR|fence breach", line)], mavproxy
+
+
+@pytest.mark.timeout(180)
+async def test_conf_119_142_missions(tmp_path: Path) -> None:
+    """From a file, listed, edited in place, saved, its current item set, flown, and cleared."""
+    async with world(flavour="ardupilot", web=True) as w:
+        words = (sys.executable, "-u", MAVPROXY, f"--master=tcp:{w.address}:5760", f"--state-basedir={tmp_path}")
+        async with program(*words, stdin=asyncio.subprocess.PIPE, env={"HOME": str(tmp_path)}) as mavproxy:
+            await mavproxy.line(lambda line: "online system 1" in line)
+            await mavproxy.line(lambda line: re.search(r"Received \d+ parameters", line) is not None, timeout=30.0)
+
+            north, corner = around(PLACE, (15.0, 0.0), (15.0, 12.0))
+            wanted = [
+                Item(16, *HOME),
+                Item(22, *PLACE, z=6.0, frame=3),
+                Item(178, 0.0, 0.0, p1=1.0, p2=4.0, frame=3),
+                Item(16, *north, z=6.0, frame=3),
+                Item(205, 0.0, 0.0, p1=-60.0, z=2.0, frame=3),
+                Item(2000, 0.0, 0.0, p3=1.0, frame=3),
+                Item(16, *corner, z=6.0, p1=1.0, frame=3),
+                Item(20, 0.0, 0.0, frame=3),
+            ]
+            command = f"wp load {waypoint_file(tmp_path / 'way.txt', wanted)}"
+            assert same(await changed(w, MISSION, command, mavproxy), wanted)
+            await mavproxy.line(lambda line: "Loaded 8 waypoints in" in line)
+            assert await listed(mavproxy, "wp") == [item.command for item in wanted]
+
+            # Edited in place, by MISSION_WRITE_PARTIAL_LIST: one item, two items, a parameter.
+            edited = await changed(w, MISSION, "wp changealt 6 9", mavproxy)
+            assert [m.z for m in edited] == [item.z if seq != 6 else 9.0 for seq, item in enumerate(wanted)]
+            edited = await changed(w, MISSION, "wp param 6 1 2", mavproxy)
+            assert [m.param1 for m in edited] == [item.p1 if seq != 6 else 2.0 for seq, item in enumerate(wanted)]
+            edited = await changed(w, MISSION, "wp remove 5", mavproxy)
+            assert [m.command for m in edited] == [16, 22, 178, 16, 205, 16, 20]
+            await typed(mavproxy, f"wp save {tmp_path / 'again.txt'}", "^Saved 7 waypoints to ")
+            again = (tmp_path / "again.txt").read_text().splitlines()[1:]
+            assert [line.split("\t")[3] for line in again] == ["16", "22", "178", "16", "205", "16", "20"]
+
+            # The current item, and the flight from there.
+            mark = w.client.mark()
+            mavproxy.say("wp set 5")
+            await w.client.wait("MISSION_CURRENT", lambda m: m.seq == 5, since=mark)
+            mavproxy.say("wp set 1")
+            await w.client.wait("MISSION_CURRENT", lambda m: m.seq == 1, since=mark)
+            for word, ack in (("arm throttle", "COMPONENT_ARM_DISARM"), ("mode auto", "DO_SET_MODE")):
+                await typed(mavproxy, word, f"Got COMMAND_ACK: {ack}: ACCEPTED")
+            await mavproxy.line(lambda line: re.search(r"Mode AUTO", line) is not None)
+            reached = [
+                (await w.client.wait("MISSION_ITEM_REACHED", lambda m, n=n: m.seq == n, since=mark, timeout=40.0)).seq
+                for n in range(1, 7)
+            ]
+            assert reached == [1, 2, 3, 4, 5, 6]
+            assert [entry.args["command"] for entry in w.drone.log if entry.name == "item"][-1] == "return_to_launch"
+            assert await changed(w, MISSION, "wp clear", mavproxy) == []
+            assert not [line for line in mavproxy.lines if re.search("Traceback|ERROR", line)], mavproxy
