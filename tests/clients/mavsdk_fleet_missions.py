@@ -1,0 +1,61 @@
+"""Missions for a whole fleet by MAVSDK's plugin mission_raw: each system flies its file, all of them at once.
+
+    mavsdk_fleet_missions.py URL FILE ...
+
+The first file is for system 1, the next for system 2 and so on.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from pathlib import Path
+from typing import Any
+
+from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
+from mavsdk.asyncio.plugins.action import ActionAsync
+from mavsdk.asyncio.plugins.mission_raw import MissionRawAsync
+from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
+
+
+def say(*words: object) -> None:
+    print(*words, flush=True)
+
+
+async def systems(mavsdk: Mavsdk, wanted: int) -> dict[int, Any]:
+    """The systems by their ids, once all are there."""
+    while True:
+        found = {await system.get_system_id(): system for system in await mavsdk.get_systems()}
+        if set(found) >= set(range(1, wanted + 1)):
+            return found
+        await asyncio.sleep(0.2)
+
+
+async def fly(number: int, system: Any, path: Path) -> None:
+    mission, telemetry, action = MissionRawAsync(system), TelemetryAsync(system), ActionAsync(system)
+    async for health in telemetry.subscribe_health():
+        if health.is_armable and health.is_global_position_ok and health.is_home_position_ok:
+            break
+    items = (await mission.import_qgroundcontrol_mission(str(path))).mission_items
+    await mission.upload_mission(items)
+    say("uploaded", number, len(items))
+    await action.arm()
+    await mission.start_mission()
+    say("started", number)
+    async for progress in mission.subscribe_mission_progress():
+        if progress.total and progress.current == progress.total:
+            break
+    say("finished", number)
+
+
+async def main(url: str, paths: list[Path]) -> None:
+    configuration = Configuration.create_with_component_type(ComponentType.GROUND_STATION)
+    async with Mavsdk(configuration) as mavsdk:
+        await mavsdk.add_any_connection(url)
+        found = await systems(mavsdk, len(paths))
+        await asyncio.gather(*[fly(number, found[number], path) for number, path in enumerate(paths, start=1)])
+        say("done")
+
+
+if __name__ == "__main__":
+    asyncio.run(main(sys.argv[1], [Path(word) for word in sys.argv[2:]]))
