@@ -53,7 +53,7 @@ def check_media(report: dict[str, Any], folder: Path, seconds: float, *, thermal
     assert [one["photo_mode"] for one in media.values()][:3] == ["single", "burst", "timelapse"]
     videos = [one for one in media.values() if one["type"] == "video"]
     assert [one["thermal"] for one in videos] == [False, True][: 1 + thermal]
-    assert seconds >= 2.0, "a gimbal went down 60 degrees at 30 degrees per second"
+    assert seconds > 1.5, "a gimbal went down 60 degrees at 30 degrees per second; poses tell half a second"
     assert videos[0]["duration"] / 1000.0 == pytest.approx(seconds, abs=1.0)
     assert len(media["10000002"]["resources"]) == 14
     names = [name for one in media.values() for name in one["resources"]]

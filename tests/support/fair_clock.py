@@ -7,7 +7,8 @@ about our code, whoever else is on the machine.
 
 Not counted is the time in which the loop was ready to run and did not: lateness of the selector beyond its timeout, and
 of callbacks what they did not spend on a processor, if they did not wait for anything (the kernel counts voluntary
-switches). So code of ours that computes for too long, sleeps or blocks is as late as it is.
+switches). Nor what the machine below a virtual one has stolen from its processors meanwhile, which the kernel counts as
+work of whoever it was stolen from. So code of ours that computes for too long, sleeps or blocks is as late as it is.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import asyncio
 import resource
 import selectors
 import time
+from pathlib import Path
 from typing import Any
 
 LATE = 0.0012
@@ -23,6 +25,14 @@ LATE = 0.0012
 
 INTERRUPTED = 0.0001
 """s of callbacks that are interrupted in the course of things."""
+
+LONG = 0.02
+"""s of callbacks after which it is looked whether time was stolen; the kernel counts that in hundredths of a second."""
+
+LOOK_EVERY = 0.25
+"""s after which it is looked anyway, so that what is found is of now."""
+
+TICK = 0.01
 
 _real = time.monotonic
 _lost = 0.0
@@ -38,12 +48,22 @@ def lost() -> float:
     return _lost
 
 
+def stolen() -> list[float]:
+    """s that were stolen from each processor; nothing where the system does not tell."""
+    try:
+        lines = Path("/proc/stat").read_text(encoding="ascii").splitlines()
+    except OSError:
+        return []
+    return [int(line.split()[8]) * TICK for line in lines if line.startswith("cpu") and line[3].isdecimal()]
+
+
 class FairSelector(selectors.DefaultSelector):
     """Notes what is lost before and after it waits."""
 
     def __init__(self) -> None:
         super().__init__()
         self._left = self._state()
+        self._stolen, self._looked = stolen(), _real()
 
     @staticmethod
     def _state() -> tuple[float, float, int]:
@@ -52,8 +72,14 @@ class FairSelector(selectors.DefaultSelector):
     def select(self, timeout: float | None = None) -> Any:
         global _lost
         (left, worked, waited), (now, working, waiting) = self._left, self._state()
-        if waited == waiting:
-            _lost += max(0.0, (now - left) - (working - worked) - INTERRUPTED)
+        missed = (now - left) - (working - worked) - INTERRUPTED if waited == waiting else 0.0
+        missed = max(missed, 0.0)
+        if now - left > LONG or now - self._looked > LOOK_EVERY:
+            before, self._stolen, self._looked = self._stolen, stolen(), now
+            if now - left > LONG:
+                most = max((b - a for a, b in zip(before, self._stolen, strict=True)), default=0.0)
+                missed = min(now - left, max(missed, most))
+        _lost += missed
         ready = super().select(timeout)
         if timeout is not None:
             _lost += max(0.0, _real() - now - max(timeout, 0.0) - LATE)

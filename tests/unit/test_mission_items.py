@@ -66,4 +66,4 @@ def test_any_item_comes_back_and_then_stays(plan: Plan) -> None:
                 step = 0.5e-7 if to_wire(item).has_place else 0.5
                 assert after == pytest.approx(before, abs=step * 1.001)
             else:
-                assert after == pytest.approx(before, rel=1e-7, abs=1e-38)
+                assert after == pytest.approx(before, rel=2.0**-23, abs=1e-38)
