@@ -56,11 +56,8 @@ CLIMB_WAIT = 15.0
 ALTITUDE_WAIT = 3.0
 """s for the drone to tell its height, which it does five times a second."""
 
-CLIMBS = 3
-"""Moves to the height of a take-off: the second and third mend what the first, begun or ended in a gust, has missed."""
-
-CLOSE_ENOUGH = 0.2
-"""m from the height of a take-off that are no reason for another move."""
+CLOSE_ENOUGH = 0.1
+"""m from the height of a take-off that are no reason for a move."""
 
 SLOWEST, FASTEST = 0.1, 100.0
 """m/s. A speed beyond these is a number in the wrong place, or in another unit. Within them the drone limits itself."""
@@ -754,13 +751,11 @@ class Vehicle:
         try:
             if not self.in_air:
                 await self.drone.expect(FlyingStateChanged, lambda m: m.state in _AIRBORNE, CLIMB_WAIT)
-            for _ in range(CLIMBS):
-                # What it told last is from while it rose.
-                present = (await self.drone.expect(AltitudeChanged, lambda m: True, ALTITUDE_WAIT)).altitude
-                if not self.in_air or self.returning:
-                    raise CommandRejected("the drone does something else now")
-                if abs(height - present) <= CLOSE_ENOUGH:
-                    break
+            # What it told last is from while it rose.
+            present = (await self.drone.expect(AltitudeChanged, timeout=ALTITUDE_WAIT)).altitude
+            if not self.in_air or self.returning:
+                raise CommandRejected("the drone does something else now")
+            if abs(height - present) > CLOSE_ENOUGH:
                 await self.drone.piloting.move_by(0.0, 0.0, present - height, 0.0)
         except AnafiMavError as error:
             self.text(Severity.ERROR, f"Climb to {height:g} m given up: {error}")

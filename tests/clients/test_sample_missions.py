@@ -136,10 +136,11 @@ def check(log: Log, plan: Plan) -> None:
         assert closest < WITHIN, (number, closest)
 
     def stays() -> bool:
-        """A way point where the drone is: an Ai begins a file over its first one, whatever stands in front of that."""
+        """A way point where the drone is, as near as way points are passed: an Ai begins a file over its first one,
+        whatever stands in front of that."""
         began, name = lines[position]
         points = [at for t, at in track if began <= t <= lines[position + 1][0]]
-        return name == "waypoint" and all(math.dist(points[0], at) < 1.0 for at in points)
+        return name == "waypoint" and all(math.dist(points[0], at) < WITHIN for at in points)
 
     for number, item in enumerate(wanted):
         names = LINES[item.command]

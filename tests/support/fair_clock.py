@@ -16,6 +16,7 @@ from __future__ import annotations
 import asyncio
 import resource
 import selectors
+import threading
 import time
 from pathlib import Path
 from typing import Any
@@ -36,16 +37,20 @@ TICK = 0.01
 
 _real = time.monotonic
 _lost = 0.0
+_newest = 0.0
+_began: tuple[float, float, int] | None = None
+"""Of the callbacks that are running: the fair time then, the work done until then, and in which thread."""
 
 
 def fair() -> float:
-    """`time.monotonic` without what was lost."""
-    return _real() - _lost
-
-
-def lost() -> float:
-    """s that the machine let this process wait."""
-    return _lost
+    """`time.monotonic` without what was lost; never steps back. While callbacks run it is their work that counts."""
+    global _newest
+    if _began is not None and _began[2] == threading.get_ident() and asyncio._get_running_loop() is not None:
+        now = _began[0] + time.thread_time() - _began[1]
+    else:
+        now = _real() - _lost
+    _newest = max(_newest, now)
+    return _newest
 
 
 def stolen() -> list[float]:
@@ -70,20 +75,24 @@ class FairSelector(selectors.DefaultSelector):
         return _real(), time.thread_time(), resource.getrusage(resource.RUSAGE_THREAD).ru_nvcsw
 
     def select(self, timeout: float | None = None) -> Any:
-        global _lost
+        global _lost, _began
         (left, worked, waited), (now, working, waiting) = self._left, self._state()
-        missed = (now - left) - (working - worked) - INTERRUPTED if waited == waiting else 0.0
-        missed = max(missed, 0.0)
+        took = now - left
+        if waited == waiting:
+            took = min(took, working - worked + INTERRUPTED)
         if now - left > LONG or now - self._looked > LOOK_EVERY:
             before, self._stolen, self._looked = self._stolen, stolen(), now
             if now - left > LONG:
                 most = max((b - a for a, b in zip(before, self._stolen, strict=True)), default=0.0)
-                missed = min(now - left, max(missed, most))
-        _lost += missed
+                took = max(0.0, min(took, now - left - most))
+        _lost += now - left - took
+        _began = None
+        fair()  # what waits for a time is not to be early
         ready = super().select(timeout)
+        self._left = (back, working, _) = self._state()
         if timeout is not None:
-            _lost += max(0.0, _real() - now - max(timeout, 0.0) - LATE)
-        self._left = self._state()
+            _lost += max(0.0, back - now - max(timeout, 0.0) - LATE)
+        _began = max(_newest, back - _lost), working, threading.get_ident()
         return ready
 
 
