@@ -6,16 +6,20 @@ pytest tests/conformance tests/clients --conformance=docs/conformance.md
 from __future__ import annotations
 
 import re
+import signal
 from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from support import fair_clock, flavours
+from support import clock, flavours
 from support.conformance_items import ITEMS
 
-fair_clock.install()
+clock.install()
+
+# A shell starts what runs in its background with SIGINT ignored, and the programs that tests start would inherit that.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 _NUMBER = re.compile(r"test_conf_(\d{3})")
 
@@ -39,8 +43,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_asyncio_loop_factories() -> dict[str, Any]:
-    """The loops that tests run in."""
-    return {"fair": fair_clock.fair_loop}
+    """The loops that tests run in: of one kind."""
+    return {"quick": clock.Loop}
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import ast
+import signal
 import sys
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from support.flavours import both
 from support.mav import Client
 from support.plans import download
 from support.product import Process, product, program
@@ -40,7 +42,7 @@ def carried(wanted: Plan) -> Plan:
     return replace(wanted, items=items, blocks=(), cruise_speed=15.0, hover_speed=5.0)
 
 
-@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+@both
 async def test_a_plan_is_uploaded_and_fetched_again(tmp_path: Path, flavour: str) -> None:
     """Mission, fence and rally points; what another client sees is what the file says."""
     address = loopback()
@@ -149,6 +151,36 @@ async def test_a_plan_is_flown_and_followed(tmp_path: Path) -> None:
         items = [entry["args"]["command"] for entry in p.entries("plan", "item")]
         assert items.count("start_photo") == 3
         assert items[-1] == "return_to_launch"
+
+
+@pytest.mark.timeout(240)
+async def test_who_stops_following_leaves_the_flight_alone(tmp_path: Path) -> None:
+    address = loopback()
+    url = f"tcpout://{address}:5760"
+    async with product(tmp_path, fleet(address, loopback())) as p:
+        words = (sys.executable, "-m", "anafi_mav", "plan", "fly", str(MISSIONS / "orbit.plan"), "--endpoint", url)
+        async with program(*words) as flight:
+            await flight.line(lambda line: line.startswith("at item 2 "), timeout=90.0)
+            other = await Client().connect(5761, address)
+            mark = len(flight.lines)
+            assert (await other.command(193, 0)).result == 0
+            await flight.line(lambda line: line.startswith("paused at item 2 NAV_WAYPOINT"), since=mark)
+            assert (await other.command(193, 1)).result == 0
+            await flight.line(lambda line: line == "goes on", since=mark)
+            flight.process.send_signal(signal.SIGINT)
+            assert await flight.end() == 130
+            assert flight.lines[-1].startswith("the flight goes on without this program, at item ")
+            assert flight.complaints == []
+            await other.wait("MISSION_ITEM_REACHED", lambda m: m.seq >= 2, since=0, timeout=60.0)
+            assert [entry["args"]["state"] for entry in p.entries("plan", "plan")][-1] == "playing"
+            # On the ground again the flight is over before the mission is.
+            async with program(*words) as second:
+                await second.line(lambda line: line.startswith("begun"), timeout=90.0)
+                assert (await other.command(21, timeout=60.0)).result == 0
+                await second.line(lambda line: line.startswith("paused at "))
+                assert await second.end(timeout=90.0) == 1
+                assert "the flight is over and the mission is not" in second.complaints[-1]
+            await other.close()
 
 
 async def test_nothing_to_fly(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import os
+import select
 import signal
 import socket
 import sys
@@ -27,7 +28,7 @@ from anafi_mav.cli.sim import Fleet
 from anafi_mav.config import Config, load
 from anafi_mav.sim.wind import WindSpec
 
-pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="processes are looked up in /proc")
+pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="it waits for processes by pidfd")
 
 
 def fleet(address: str, drone: str) -> str:
@@ -38,20 +39,16 @@ def fleet(address: str, drone: str) -> str:
     """
 
 
-def runs(pid: int) -> bool:
-    try:
-        status = Path(f"/proc/{pid}/stat").read_text()
-    except (FileNotFoundError, ProcessLookupError):
-        return False
-    return status.rpartition(")")[2].split()[0] not in "ZX"
-
-
 async def gone(pid: int, timeout: float = 10.0) -> None:
-    """Wait until this process runs no more. (Nobody may have collected its exit status: it is then a zombie.)"""
-    deadline = time.monotonic() + timeout
-    while runs(pid):
-        assert time.monotonic() < deadline, f"process {pid} still runs"
-        await asyncio.sleep(0.02)  # it is not our child: there is nothing to wait on
+    """Wait until a process that is not our child runs no more."""
+    try:
+        process = os.pidfd_open(pid)
+    except ProcessLookupError:
+        return
+    try:
+        assert (await asyncio.to_thread(select.select, [process], [], [], timeout))[0], f"process {pid} still runs"
+    finally:
+        os.close(process)
 
 
 def free(address: str, port: int, kind: socket.SocketKind = socket.SOCK_STREAM) -> bool:
