@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from support.flavours import both
 from support.product import program
 from support.setpoints import allow_speed
 from support.world import world
@@ -14,7 +15,7 @@ SCRIPT = Path(__file__).with_name("dronekit_setpoints.py")
 
 
 @pytest.mark.timeout(180)
-@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+@both
 async def test_conf_118_setpoints(flavour: str) -> None:
     async with world(speed=1.0, flavour=flavour) as w:
         words = (sys.executable, "-u", str(SCRIPT), f"tcp:{w.address}:5760", flavour)

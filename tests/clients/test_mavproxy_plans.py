@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from support.flavours import both
 from support.plans import FENCE, MISSION, RALLY, Item, around, circle, download, rally, square, upload
 from support.product import Process, program
 from support.world import HOME, World, world
@@ -79,7 +80,7 @@ def same(seen: list[Any], wanted: list[Item]) -> bool:
 
 
 @pytest.mark.timeout(180)
-@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+@both
 async def test_conf_119_fence_and_rally(flavour: str, tmp_path: Path) -> None:
     async with world(flavour=flavour) as w:
         words = (sys.executable, "-u", MAVPROXY, f"--master=tcp:{w.address}:5760", f"--state-basedir={tmp_path}")

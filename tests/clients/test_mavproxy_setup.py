@@ -12,6 +12,7 @@ import zlib
 from pathlib import Path
 
 import pytest
+from support.flavours import both
 from support.params import fetch
 from support.product import Process, program
 from support.world import World, world
@@ -63,7 +64,7 @@ async def setup(w: World, mavproxy: Process, flavour: str, folder: Path) -> None
 
 
 @pytest.mark.timeout(180)
-@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+@both
 async def test_conf_114_mavproxy_param_and_ftp(flavour: str, tmp_path: Path) -> None:
     async with world(flavour=flavour) as w:
         # HOME: no start-up script of whoever runs the tests.

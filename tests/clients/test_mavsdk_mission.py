@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from support.flavours import both
 from support.plans import ACCEPTED, MISSION, download, mission, upload
 from support.product import Process, program
 from support.world import HOME, World, world
@@ -55,7 +56,7 @@ async def test_conf_116_a_mission_of_mavsdks_own_kind() -> None:
 
 
 @pytest.mark.timeout(180)
-@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+@both
 async def test_conf_116_raw_missions(flavour: str) -> None:
     """What QGroundControl has stored is imported, uploaded and read back; somebody else's upload is told."""
     async with world(flavour=flavour, web=True) as w, program(*script(w, *SAMPLES)) as mavsdk:

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from support.flavours import both
 from support.plans import FENCE, RALLY, download
 from support.product import Process, program
 from support.world import HOME, world
@@ -19,7 +20,7 @@ def said(script: Process, words: str) -> list[str]:
 
 
 @pytest.mark.timeout(180)
-@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+@both
 async def test_conf_076_077_mavsdk(flavour: str) -> None:
     async with world(flavour=flavour) as w:
         place = (HOME[0], HOME[1])

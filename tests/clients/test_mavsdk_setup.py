@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from support.flavours import both
 from support.params import fetch
 from support.product import Process, program
 from support.world import world
@@ -19,7 +20,7 @@ def said(script: Process, word: str) -> list[str]:
 
 
 @pytest.mark.timeout(180)
-@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+@both
 async def test_conf_116_mavsdk_param_ftp_metadata_events(flavour: str, tmp_path: Path) -> None:
     async with world(flavour=flavour) as w:
         count = len(await fetch(w.client))

@@ -15,6 +15,7 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.flavours import both
 from support.mav import NAN, Client
 from support.plans import ACCEPTED as TAKEN
 from support.plans import FENCE, RALLY, Item, around, circle, clear, content, download, rally, square, upload
@@ -24,8 +25,6 @@ from anafi_mav import geo
 from anafi_mav.config import Config, DroneConfig
 from anafi_mav.gateway import Gateway
 from anafi_mav.units import quaternion_from_euler
-
-both = pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 
 PLACE = (HOME[0], HOME[1])
 ACCEPTED, REJECTED, DENIED = (

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.flavours import both
 from support.mav import NAN, Client
 from support.setpoints import allow_speed, heard, idle_mode, motion, said, streaming
 from support.world import HOLD, HOME, World, world
@@ -19,8 +20,6 @@ from anafi_mav.arsdk.messages import ardrone3
 SET_MODE = 176
 PX4_FOLLOW, COPTER_FOLLOW = 0x08040000, 23
 REJECTED = dialect.MAV_RESULT_TEMPORARILY_REJECTED
-
-both = pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 
 
 def now() -> float:

@@ -9,9 +9,9 @@ import struct
 import time
 import zlib
 
-import pytest
 from MAVProxy.modules.lib.param_ftp import ftp_param_decode
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.flavours import both
 from support.ftp import (
     ACK,
     BURST,
@@ -30,8 +30,6 @@ from support.ftp import (
 )
 from support.params import fetch, value_of
 from support.world import world
-
-both = pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 
 
 @both

@@ -7,7 +7,8 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
-from support.world import HOLD, HOME, World, world
+from support.flavours import both
+from support.world import HOME, World, world
 
 from anafi_mav import geo, units
 
@@ -73,8 +74,9 @@ async def test_conf_021_take_off_heights_of_arducopter(parameters: dict[str, Any
 # -- speed, height, heading, pause
 
 
-async def test_conf_082_the_speed_of_a_move_that_is_under_way() -> None:
-    async with world() as w:
+@both
+async def test_conf_082_the_speed_of_a_move_that_is_under_way(flavour: str) -> None:
+    async with world(flavour=flavour) as w:
         await w.take_off(10.0)
         await go_north(w)
         assert len(sent(w, "ardrone3.Piloting.moveTo")) == 1
@@ -91,8 +93,9 @@ async def test_conf_082_the_speed_of_a_move_that_is_under_way() -> None:
         assert len(sent(w, "ardrone3.Piloting.moveTo")) == 2
 
 
-async def test_conf_082_a_speed_counts_for_later_moves_too() -> None:
-    async with world() as w:
+@both
+async def test_conf_082_a_speed_counts_for_later_moves_too(flavour: str) -> None:
+    async with world(flavour=flavour) as w:
         assert (await w.client.command(SPEED, 0, 4.0, 0, 0)).result == ACCEPTED
         assert (await w.client.command(SPEED, 2, 1.5, 0, 0)).result == ACCEPTED
         await w.take_off(5.0)
@@ -104,8 +107,9 @@ async def test_conf_082_a_speed_counts_for_later_moves_too() -> None:
 @pytest.mark.parametrize(
     "parameters", [(1, 0.0, -1), (1, -3.0, -1), (1, math.inf, -1), (7, 3.0, -1), (1, 3.0, 50.0), (math.inf, 3.0, -1)]
 )
-async def test_conf_082_speeds_that_make_no_sense(parameters: tuple[float, ...]) -> None:
-    async with world() as w:
+@both
+async def test_conf_082_speeds_that_make_no_sense(flavour: str, parameters: tuple[float, ...]) -> None:
+    async with world(flavour=flavour) as w:
         assert (await w.client.command(SPEED, *parameters)).result == DENIED
 
 
@@ -232,11 +236,14 @@ async def test_conf_080_no_region_of_interest_on_the_ground() -> None:
 
 
 @pytest.mark.parametrize("frame", [GLOBAL, RELATIVE, None])
-async def test_conf_083_set_home(frame: int | None) -> None:
-    async with world() as w:
+@both
+async def test_conf_083_set_home(flavour: str, frame: int | None) -> None:
+    """PX4 takes z as AMSL in every frame, and MAVSDK counts on it (conformance B1); ArduPilot goes by the frame."""
+    z = 3.0 if (flavour, frame) == ("ardupilot", RELATIVE) else HOME[2] + 3.0
+    async with world(flavour=flavour) as w:
         await w.take_off(5.0)
         mark = w.client.mark()
-        ack = await w.client.command(SET_HOME, 0, frame=frame, x=NORTH_60[0], y=NORTH_60[1], z=HOME[2] + 3.0)
+        ack = await w.client.command(SET_HOME, 0, frame=frame, x=NORTH_60[0], y=NORTH_60[1], z=z)
         assert ack.result == ACCEPTED
         near = 40 if frame is None else 1  # 1e-7 deg; a COMMAND_LONG has single precision
         told = await w.client.wait(
@@ -247,8 +254,9 @@ async def test_conf_083_set_home(frame: int | None) -> None:
         assert custom["altitude"] == pytest.approx(3.0, abs=0.01)
 
 
-async def test_conf_083_set_home_here_and_nowhere() -> None:
-    async with world() as w:
+@both
+async def test_conf_083_set_home_here_and_nowhere(flavour: str) -> None:
+    async with world(flavour=flavour) as w:
         await w.take_off(5.0)
         await go_north(w)
         await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 30.0, 30.0)
@@ -262,4 +270,4 @@ async def test_conf_083_set_home_here_and_nowhere() -> None:
         )
         assert (await w.client.command(SET_HOME, 0, x=0.0, y=0.0, z=HOME[2])).result == DENIED
         assert (await w.client.command(SET_HOME, 0)).result == DENIED
-        assert (await w.client.heartbeat(lambda beat: True)).custom_mode == HOLD
+        assert (await w.client.heartbeat(lambda beat: True)).custom_mode == w.modes.hold

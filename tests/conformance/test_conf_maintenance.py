@@ -6,6 +6,7 @@ import math
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.flavours import both
 from support.world import ARMED, World, world
 
 from anafi_mav.mavlink import dialect as newer
@@ -23,7 +24,7 @@ def texts(w: World, mark: int) -> list[str]:
     return [m.text for _, m in w.client.since(mark, "STATUSTEXT") if m.text.startswith("[cal]")]
 
 
-@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+@both
 async def test_conf_130_the_magnetometer(flavour: str) -> None:
     async with world(flavour=flavour) as w:
         mark = w.client.mark()
@@ -79,7 +80,7 @@ async def test_conf_129_a_calibration_is_cancelled(way: str) -> None:
         await w.drone.wait_log(lambda e: e.kind == "command" and e.name == asked and e.args["calibrate"] == 0)
 
 
-@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+@both
 async def test_conf_148_reboot(flavour: str) -> None:
     """Accepted, then silence, then a vehicle that says anew who it is."""
     async with world(flavour=flavour) as w:

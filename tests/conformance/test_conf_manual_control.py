@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.flavours import both
 from support.setpoints import COPTER_GUIDED, earth, heard, motion, said, streaming, texts
 from support.world import HOLD, HOME, POSITION, World, world
 
@@ -15,8 +16,6 @@ from anafi_mav import geo
 
 SET_MODE, GOTO = 176, 192
 COPTER_LOITER = 5
-
-both = pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 
 CENTRED_WITHIN = 0.5
 """s of silence until the sticks are centred."""

@@ -9,8 +9,8 @@ import struct
 import zlib
 from typing import Any
 
-import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.flavours import both
 from support.ftp import Ftp
 from support.mav import Client
 from support.params import fetch, value_of, write
@@ -19,8 +19,6 @@ from support.world import HOME, world
 
 from anafi_mav import geo
 from anafi_mav.mavlink import dialect as newer  # the stock dialect has never heard of events
-
-both = pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 
 ACCEPTED, TEMPORARILY_REJECTED = 0, 1
 RUN_PREARM_CHECKS, ARM = 401, 400

@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.flavours import both
 from support.mav import Client
 from support.missions import (
     ACTIVE,
@@ -38,8 +39,6 @@ from support.trouble import return_by_itself
 from support.world import ARMED, world
 
 from anafi_mav.mavlink import dialect as newer
-
-both = pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 
 # Flown to the end.
 

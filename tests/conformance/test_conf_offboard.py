@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.flavours import both
 from support.setpoints import (
     NO_ACCELERATION,
     NO_POSITION,
@@ -38,8 +39,6 @@ from anafi_mav.arsdk.messages import ardrone3, piloting_style
 REJECTED = dialect.MAV_RESULT_TEMPORARILY_REJECTED
 SET_MODE, GOTO = 176, 192
 NAN = math.nan
-
-both = pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 
 HOVER_WITHIN = 0.5
 """s after the last setpoint within which the drone has been told to hover (the issue)."""

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.flavours import both
 from support.mav import NAN
 from support.world import HOLD, HOME, World, world
 
@@ -75,8 +76,9 @@ async def test_conf_078_orbit(flavour: str, frame: int, z: float, radius: float)
         )
 
 
-async def test_conf_079_execution_status() -> None:
-    async with world() as w:
+@both
+async def test_conf_079_execution_status(flavour: str) -> None:
+    async with world(flavour=flavour) as w:
         await w.take_off(10.0)
         assert w.client.since(0, "ORBIT_EXECUTION_STATUS") == []
         z = HOME[2] + 12.0
@@ -88,7 +90,7 @@ async def test_conf_079_execution_status() -> None:
         assert (told.radius, told.frame, told.z) == (-10.0, GLOBAL, pytest.approx(z, abs=0.1))
         assert (told.x, told.y) == (round(CENTRE[0] * 1e7), round(CENTRE[1] * 1e7))
         assert w.client.since(mark, "ORBIT_EXECUTION_STATUS")
-        assert (await w.client.command(dialect.MAV_CMD_DO_SET_MODE, 1, HOLD)).result == ACCEPTED
+        assert (await w.client.command(dialect.MAV_CMD_DO_SET_MODE, 1, w.modes.hold)).result == ACCEPTED
         mark = w.client.mark()
         for _ in range(2):
             await w.client.wait("HEARTBEAT")

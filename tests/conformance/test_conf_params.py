@@ -16,6 +16,7 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.flavours import both
 from support.ftp import Ftp
 from support.lines import SerialClient, pseudo_terminal
 from support.mav import Client
@@ -35,9 +36,6 @@ DOES_NOT_EXIST, OUT_OF_RANGE, READ_ONLY, TYPE_MISMATCH = 1, 2, 5, 7
 
 def words(text: str) -> list[str]:
     return text.split()
-
-
-both = pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 
 
 # conformance A5: absent, QGroundControl complains or demands a setup

@@ -18,6 +18,7 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.flavours import both
 from support.mav import Client
 from support.plans import (
     ACCEPTED,
@@ -58,7 +59,6 @@ from anafi_mav.gateway import Gateway
 from anafi_mav.mavlink import dialect as newer
 from anafi_mav.sim import DroneSpec, Simulator
 
-both = pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 lists = pytest.mark.parametrize("kind", [MISSION, FENCE, RALLY])
 
 PLACE = (HOME[0], HOME[1])

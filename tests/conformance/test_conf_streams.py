@@ -6,6 +6,7 @@ import math
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.flavours import both
 from support.mav import NAN, Client
 from support.world import world
 
@@ -13,8 +14,6 @@ from anafi_mav.mavlink import dialect as newer
 
 ACCEPTED, DENIED, UNSUPPORTED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_DENIED, dialect.MAV_RESULT_UNSUPPORTED
 SET, GET = dialect.MAV_CMD_SET_MESSAGE_INTERVAL, dialect.MAV_CMD_GET_MESSAGE_INTERVAL
-
-both = pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 
 STATES = [
     "SYS_STATUS",

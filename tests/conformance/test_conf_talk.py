@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.flavours import both
 from support.mav import Client
 from support.world import World, world
 
@@ -18,7 +19,6 @@ from anafi_mav.arsdk.messages.generic import ListFlags
 from anafi_mav.mavlink import dialect as newer
 
 ACCEPTED, UNSUPPORTED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_UNSUPPORTED
-both = pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 WHOLE = 1 << ListFlags.FIRST | 1 << ListFlags.LAST
 
 

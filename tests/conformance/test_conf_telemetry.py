@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.flavours import both
 from support.mav import NAN, Client
 from support.world import HOME, World, world
 
@@ -17,8 +18,6 @@ from anafi_mav.mavlink import dialect as newer
 ACCEPTED, UNSUPPORTED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_UNSUPPORTED
 ON_GROUND, IN_AIR = dialect.MAV_LANDED_STATE_ON_GROUND, dialect.MAV_LANDED_STATE_IN_AIR
 GYRO, ACCEL, MAG, GPS, RECEIVER, PREARM = 1, 2, 4, 32, 0x10000, 0x10000000
-
-both = pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 
 
 async def airborne(w: World, height: float) -> None:

@@ -1,10 +1,15 @@
-"""Which flavours the running test has opened an endpoint of; tests/conftest.py notes it beside the result."""
+"""The autopilots that an endpoint can show: a mark for tests of both, and which of them a test has spoken to."""
 
 from __future__ import annotations
 
 import re
 
+import pytest
+
+both = pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+
 SHOWN: set[str] = set()
+"""Of what endpoints were opened; tests/conftest.py notes it beside the result."""
 
 _ENDPOINT = re.compile(r"(?:udpout|udpin|tcpin|tcpout|serial)://[^\s\"',\]?]+(?:\?flavour=(\w+))?")
 
