@@ -24,11 +24,11 @@ def say(*words: object) -> None:
 
 async def systems(mavsdk: Mavsdk, wanted: int) -> dict[int, Any]:
     """The systems by their ids, once all are there."""
-    while True:
+    async for _ in mavsdk.on_new_system():
         found = {await system.get_system_id(): system for system in await mavsdk.get_systems()}
         if set(found) >= set(range(1, wanted + 1)):
             return found
-        await asyncio.sleep(0.2)
+    raise AssertionError("no more systems")
 
 
 async def fly(number: int, system: Any, path: Path) -> None:
@@ -51,8 +51,8 @@ async def fly(number: int, system: Any, path: Path) -> None:
 async def main(url: str, paths: list[Path]) -> None:
     configuration = Configuration.create_with_component_type(ComponentType.GROUND_STATION)
     async with Mavsdk(configuration) as mavsdk:
-        await mavsdk.add_any_connection(url)
-        found = await systems(mavsdk, len(paths))
+        # In this order: it is told of systems that are new from when it listens.
+        found, _ = await asyncio.gather(systems(mavsdk, len(paths)), mavsdk.add_any_connection(url))
         await asyncio.gather(*[fly(number, found[number], path) for number, path in enumerate(paths, start=1)])
         say("done")
 
