@@ -186,14 +186,16 @@ class _Download:
 
 @dataclass
 class _Done:
-    """A transfer that ended with an acknowledgement."""
+    """A transfer that ended, with an acknowledgement or without."""
 
     peer: Peer
     at: float
     last: int
-    """The last item it brought; -1 for none."""
+    """The last item it brought, which is acknowledged again when it comes again; -1 for none."""
     echoes: int = 0
     due: float = 0.0
+    result: int = dialect.MAV_MISSION_ACCEPTED
+    """Of the acknowledgement: a refusal can be lost as well, and is to be heard, not another one."""
 
 
 class PlanTransfer:
@@ -288,7 +290,7 @@ class PlanTransfer:
         item = item_of(message)
         fault = item if isinstance(item, Fault) else self.kind.check_item(item)
         if fault is not None:
-            return self._refuse(Fault(fault.result, f"item {message.seq}: {fault.reason}"))
+            return self._refuse(Fault(fault.result, f"item {message.seq}: {fault.reason}"), now)
         assert isinstance(item, PlanItem)
         upload.items[upload.expected : upload.expected + 1] = [item]
         if upload.expected < upload.last:
@@ -299,7 +301,7 @@ class PlanTransfer:
         items = tuple(self.kind.taken(upload.items, peer.flavour))
         fault = self.kind.check_plan(items, peer.flavour)
         if fault is not None:
-            return self._refuse(fault)
+            return self._refuse(fault, now)
         self.state = TRANSITIONS[self.state][Event.LAST_ITEM]
         self._upload = None
         self._committing = _Done(peer, now, upload.last, ECHOES if upload.lossy else 0)
@@ -330,12 +332,13 @@ class PlanTransfer:
             return []  # the link was lost meanwhile
         self.state = TRANSITIONS[self.state][Event.STORED]
         done, self._committing = self._committing, None
+        if done is not None:
+            done.at, done.due = now, now + REQUEST_EVERY
+            done.result = dialect.MAV_MISSION_ACCEPTED if fault is None else fault.result
+            self._done = done
         if fault is not None:
             return []
         self.put(items)
-        if done is not None:
-            done.at, done.due = now, now + REQUEST_EVERY
-            self._done = done
         return [Changed(self.kind.mission_type)]
 
     def cancel(self, peer: Peer) -> list[Effect]:
@@ -416,7 +419,7 @@ class PlanTransfer:
         if upload is None and done is not None and done.echoes > 0 and now >= done.due:
             done.echoes -= 1
             done.due = now + REQUEST_EVERY
-            return [self._ack(done.peer, dialect.MAV_MISSION_ACCEPTED)]
+            return [self._ack(done.peer, done.result)]
         return []
 
     # Machinery.
@@ -461,12 +464,14 @@ class PlanTransfer:
         text = f"{self.kind.name.capitalize()} refused: {fault.reason}"
         return [self._ack(peer, fault.result), Say(Severity.WARNING, text)]
 
-    def _refuse(self, fault: Fault) -> list[Effect]:
+    def _refuse(self, fault: Fault, now: float) -> list[Effect]:
         """The upload ends, the old plan stays."""
-        assert self._upload is not None
-        peer = self._upload.peer
+        upload = self._upload
+        assert upload is not None
         self._end(Event.REFUSE)
-        return self._deny(fault, peer)
+        echoes = ECHOES if upload.lossy else 0
+        self._done = _Done(upload.peer, now, upload.expected, echoes, now + REQUEST_EVERY, fault.result)
+        return self._deny(fault, upload.peer)
 
     def _end(self, event: Event) -> None:
         self.state = TRANSITIONS[self.state][event]
@@ -483,9 +488,7 @@ class PlanTransfer:
             return [self._ack(peer, dialect.MAV_MISSION_ERROR)]
         if seq != done.last:
             return []
-        return [
-            self._ack(peer, dialect.MAV_MISSION_ACCEPTED)
-        ]  # the client has not heard it: it says its last item again
+        return [self._ack(peer, done.result)]  # the client has not heard it: it says its last item again
 
     def _forget_done(self, peer: Peer) -> None:
         """The client goes on to something else: nothing late of its last transfer must meet it."""

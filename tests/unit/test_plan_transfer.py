@@ -238,7 +238,7 @@ def test_refused_items_and_plans() -> None:
     effects = plans.receive(item(1, an_item(1, 666)), ME, 1.0)
     assert [m.type for m in replies(effects)] == [UNSUPPORTED]
     assert texts(effects) == ["Fence refused: item 1: nobody wants it"]
-    assert plans.receive(item(1), ME, 1.1) == []  # a copy on its way when it was refused
+    assert plans.receive(item(0), ME, 1.1) == []  # a copy on its way when it was refused
     plans.receive(count(1), ME, 2.0)
     effects = plans.receive(item(0, an_item(0, 667)), ME, 2.0)
     assert [m.type for m in replies(effects)] == [dialect.MAV_MISSION_INVALID]
@@ -596,6 +596,41 @@ def test_the_last_item_again_is_acknowledged_again() -> None:
     assert plans.receive(item(0), ME, 0.5) == []
     assert replies(plans.receive(item(1), OTHER, 0.5))[0].type == ERROR
     assert replies(plans.receive(item(1), ME, RECENT + 0.5))[0].type == ERROR
+
+
+@pytest.mark.parametrize("at_fault", ["item", "plan", "plan, found in a thread"])
+def test_a_refusal_that_was_lost_is_the_answer_again(at_fault: str) -> None:
+    """Same result and no second text, also with the link as it is repeated; another upload has nothing of it."""
+    plans = desk()
+    uploaded(plans, 1)
+    plans.receive(count(3), ME, 1.0)
+    plans.receive(item(0), ME, 1.0)
+    plans.expire(1.0 + REQUEST_EVERY)  # something was lost
+    last = 1 if at_fault == "item" else 2
+    if at_fault != "item":
+        plans.receive(item(1), ME, 1.3)
+    command = {"item": 666, "plan": 667}.get(at_fault, 5001)
+    effects = plans.receive(item(last, an_item(last, command)), ME, 1.3)
+    result = UNSUPPORTED if at_fault == "item" else dialect.MAV_MISSION_INVALID
+    if command == 5001:
+        effects = plans.stored(commit_of(effects), 1.3, Fault(result, "said by who found it"))
+    else:
+        assert len(texts(effects)) == 1
+    assert [m.type for m in replies(effects)] == [result]
+    again = plans.receive(item(last), ME, 1.4)
+    assert ([m.type for m in replies(again)], texts(again)) == ([result], [])
+    assert plans.receive(item(0), ME, 1.4) == []
+    assert [m.type for m in replies(plans.receive(item(last), OTHER, 1.4))] == [ERROR]
+    repeated: list[Any] = []
+    while (deadline := plans.deadline()) is not None:
+        repeated += plans.expire(deadline)
+    assert ([m.type for m in replies(repeated)], texts(repeated)) == ([result] * ECHOES, [])
+    assert plans.transfers[FENCE].items == items(1)
+    assert plans.transfers[FENCE].state is State.IDLE
+    plans.receive(count(2), ME, 4.0)
+    assert uploaded_rest(plans, 0, 2) == items(2)
+    assert [m.type for m in replies(plans.receive(item(1), ME, 4.1))] == [ACCEPTED]
+    assert [m.type for m in replies(plans.receive(item(1), ME, 4.1 + RECENT))] == [ERROR]
 
 
 # Bad links.
