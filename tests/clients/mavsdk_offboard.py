@@ -88,7 +88,12 @@ async def offboard(system: Any) -> None:
         await until(telemetry.subscribe_position(), lambda p: abs(p.latitude_deg - HOME[0] - 20.0 * M) < 5e-6)
         await held(f"position global {name}", 2.5)
     await plugin.set_position_velocity_ned(PositionNedYaw(30.0, 0.0, -11.0, 0.0), VelocityNedYaw(0.0, 0.0, 0.0, 0.0))
-    await held("position and velocity", 6.0)
+    # At rest: an acceleration is flown on from the speed that there is.
+    await until(
+        telemetry.subscribe_position_velocity_ned(),
+        lambda p: abs(p.position.north_m - 30.0) < 0.5 and abs(p.velocity.north_m_s) < 0.15,
+    )
+    await held("position and velocity", 0.0)
     await plugin.set_acceleration_ned(AccelerationNed(0.0, 1.0, 0.0))
     await held("acceleration", 2.0)
     await plugin.stop()

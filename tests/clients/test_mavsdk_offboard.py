@@ -96,11 +96,13 @@ async def test_mavsdk_follow_me() -> None:
     async with flown("follow") as (w, script):
         allow_speed(w)
         line = await script.line(lambda line: line.startswith("held target"), timeout=90.0)
-        pose, target = w.drone.pose, float(line.split()[2])
+        pose, target, time = w.drone.pose, float(line.split()[2]), w.drone.firmware.time
         assert script.lines[1:4] == ["config 8.0 8.0 180.0", "tried start done", "following True"]
         assert target - pose.north == pytest.approx(6.0, abs=1.5)
         assert pose.east == pytest.approx(0.0, abs=1.0)
         assert pose.up == pytest.approx(10.0, abs=0.5)
-        assert pose.vn == pytest.approx(1.5, abs=0.5)
+        # As fast as its target, over some of its steps: when they come is up to the machine.
+        before = next(e.args for e in w.drone.log if e.kind == "pose" and e.args["time"] >= time - 5.0)
+        assert (pose.north - before["north"]) / (time - before["time"]) == pytest.approx(1.5, abs=0.5)
         await script.line(lambda line: line == "stopped", timeout=30.0)
         assert await script.end() == 0, script

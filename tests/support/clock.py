@@ -85,6 +85,8 @@ class Selector(selectors.DefaultSelector):
         self._stolen, self._looked = stolen(), _real()
         self.in_threads = 0
         """Works in threads that the loop waits for."""
+        self.processes: list[asyncio.SubprocessTransport] = []
+        """Those whose end the loop has not been told of: a thread may have collected it already."""
 
     @staticmethod
     def _state() -> tuple[float, float, int]:
@@ -116,7 +118,8 @@ class Selector(selectors.DefaultSelector):
 
     def _alone(self) -> bool:
         """Whether nobody but the loop itself can bring anything about."""
-        return not self.in_threads and childless()
+        self.processes = [process for process in self.processes if process.get_returncode() is None]
+        return not self.in_threads and not self.processes and childless()
 
     def _look(self) -> Any:
         """What is ready by itself."""
@@ -128,7 +131,7 @@ class Selector(selectors.DefaultSelector):
 
 
 class Loop(asyncio.SelectorEventLoop):
-    """Counts its works in threads, whose end it has to wait for in earnest."""
+    """Knows its processes and works in threads, whose ends it has to wait for in earnest."""
 
     def __init__(self) -> None:
         self._waits = Selector()
@@ -139,6 +142,11 @@ class Loop(asyncio.SelectorEventLoop):
         self._waits.in_threads += 1
         work.add_done_callback(self._ended)
         return work
+
+    async def subprocess_exec(self, *args: Any, **options: Any) -> Any:
+        transport, protocol = await super().subprocess_exec(*args, **options)
+        self._waits.processes.append(transport)
+        return transport, protocol
 
     def _ended(self, work: object) -> None:
         self._waits.in_threads -= 1
