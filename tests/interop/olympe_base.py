@@ -130,6 +130,10 @@ class Visit:
         except (KeyError, RuntimeError, ValueError):
             return False
 
+    def comes_to_know(self, message: Any) -> bool:
+        """It is known, or told soon: Olympe asks for some of it itself when it is connected."""
+        return self.known(message) or bool(self.drone(message(_policy="check_wait", _timeout=LIMIT)).wait().success())
+
     def flying_state(self, name: str, state: str) -> bool:
         """It is now, or will be."""
         return self.expect(name, PilotingState.FlyingStateChanged(state=state, _policy="check_wait", _timeout=LIMIT))

@@ -109,7 +109,7 @@ class Flight(Visit):
         self.settles = True
         result = self.result
         result["missing"] = [
-            message.fullName for message in (*AT_START, *self.of_the_model()) if not self.known(message)
+            message.fullName for message in (*AT_START, *self.of_the_model()) if not self.comes_to_know(message)
         ]
         result["known"] = {
             "name": self.state(common.SettingsState.ProductNameChanged),
