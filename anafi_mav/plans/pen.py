@@ -54,7 +54,7 @@ TIMELAPSE, GPSLAPSE = 0.0, 1.0
 
 _SET_ROI, _ROI_PLACE = common.MAV_CMD_DO_SET_ROI, float(common.MAV_ROI_LOCATION)
 _DELAY = {1: common.MAV_CMD_CONDITION_DELAY, 2: common.MAV_CMD_NAV_DELAY}
-_TAKE_TIME = frozenset({WAYPOINT, *_DELAY.values(), common.MAV_CMD_PANORAMA_CREATE})
+_TAKE_TIME = frozenset({*_DELAY.values(), common.MAV_CMD_PANORAMA_CREATE})
 _SETS = frozenset(
     {
         common.MAV_CMD_DO_CHANGE_SPEED,
@@ -98,7 +98,9 @@ class Pen:
         self.written = 0
         """Lines and steps of all parts."""
         self.flown = 0
-        """Of them, those that take their time."""
+        """Of them, those that take their time: ways to another place, waits, turns, panoramas."""
+        self.photographed = 0
+        """Lines that take photos; how long they take, nobody says."""
         self._amsl = start.takeoff_amsl
         self._stopped = False
         """No photo has been taken since they were stopped."""
@@ -108,7 +110,7 @@ class Pen:
         """Items that are done with what is written next, for nothing has been."""
         self._lines: list[Item] = []
         self._origins: list[int] = []
-        self._done: list[tuple[int, ...]] = []
+        self._done: list[list[int]] = []
         self._began, self._began_heading = self.place, self.heading
         """Where the drone is when this file begins."""
         self._rois: list[Point] = []
@@ -134,7 +136,7 @@ class Pen:
         if self.muted:
             return
         if self._done:
-            self._done[-1] += (self.item,)
+            self._done[-1].append(self.item)
         elif not self.parts:
             self.waiting.append(self.item)
         else:
@@ -150,7 +152,6 @@ class Pen:
             return
         self.close()
         self.written += 1
-        self.flown += 1
         self.parts.append(Step(self.item, tuple(self.waiting)))
         self.waiting.clear()
 
@@ -161,7 +162,7 @@ class Pen:
             content, lost = parrot.write(Plan(tuple(self._lines)), self.version)
             if lost or len(self._lines) != len(content.splitlines()) - 1:
                 raise AssertionError(f"lines that version {self.version} cannot hold: {lost}")
-            self.parts.append(Leg(content, tuple(self._origins), tuple(self._done)))
+            self.parts.append(Leg(content, tuple(self._origins), tuple(map(tuple, self._done))))
         self._lines, self._origins, self._done = [], [], []
         self._rois, self._still = [], None
 
@@ -179,7 +180,7 @@ class Pen:
             values: Params = (0.0, ACCEPTANCE, None, self._began_heading, here.latitude, here.longitude, here.height)
             self._lines.insert(0, Item(WAYPOINT, RELATIVE, values))
             self._origins.insert(0, self._origins[0])
-            self._done.insert(0, ())
+            self._done.insert(0, [])
             self.written += 1
 
     def line(self, command: int, *params: float | None, at: Point | None = None) -> None:
@@ -198,10 +199,11 @@ class Pen:
             values = (one, two, three, four, at.latitude, at.longitude, at.height)
         self._lines.append(Item(command, MISSION if at is None else RELATIVE, values))
         self._origins.append(self.item)
-        self._done.append(tuple(self.waiting))
+        self._done.append([*self.waiting])
         self.waiting.clear()
         self.written += 1
         self.flown += command in _TAKE_TIME
+        self.photographed += command == common.MAV_CMD_IMAGE_START_CAPTURE
 
     def _open(self) -> None:
         """Before the first line of a file: the way up, and what holds."""
@@ -282,6 +284,7 @@ class Pen:
             self._open()
         north, east = geo.offset(self.place.latitude, self.place.longitude, to.latitude, to.longitude)
         moves = math.hypot(north, east) >= SAME_PLACE
+        self.flown += math.hypot(north, east, to.height - self.place.height) > max(radius or 0.0, ACCEPTANCE)
         bearing = wrap_360(math.atan2(east, north) * DEG_PER_RAD) if moves else self.heading
         wanted = heading
         if self.settings.roi is not None:
@@ -297,6 +300,14 @@ class Pen:
         """Fly to a point unless the drone is there."""
         if geo.distance(self.place.latitude, self.place.longitude, to.latitude, to.longitude) >= SAME_PLACE:
             self.fly(to, heading, None)
+
+    def turn(self, angle: float, *, relative: bool) -> None:
+        """The gateway turns the nose: by so many deg, clockwise +, or to so many from north."""
+        if self.muted:
+            return
+        heading = wrap_360(self.heading + angle if relative else angle)
+        self.flown += bool(angle) if relative else heading != self.heading
+        self.heading = heading
 
     def wait(self, seconds: float) -> None:
         if seconds > 0.0:

@@ -9,7 +9,6 @@ from pymavlink.dialects.v20 import common
 from anafi_mav.plans.pen import Pen
 from anafi_mav.plans.plan import DO_JUMP, WAYPOINT, Item, Point
 from anafi_mav.plans.row import Row, Verdict
-from anafi_mav.units import wrap_360
 
 # What flies.
 
@@ -113,8 +112,7 @@ def _turn(pen: Pen, item: Item) -> None:
                    1 if angle is None else 4)  # fmt: skip
     if way not in (None, -1.0, 0.0, 1.0):
         pen.refuse(f"{way:g} is no direction to turn in", 3)
-    if not pen.muted:
-        pen.heading = wrap_360(pen.heading + (-angle if way == -1.0 else angle) if relative else angle)
+    pen.turn(-angle if relative and way == -1.0 else angle, relative=bool(relative))
 
 
 # What sets.
@@ -145,8 +143,9 @@ def _nothing(pen: Pen, item: Item) -> None:
 _EXACT, _NEARLY, _STEPPED, _REFUSED = Verdict.EXACT, Verdict.APPROXIMATED, Verdict.STEPPED, Verdict.REFUSED
 
 FLIGHT = (
-    Row(WAYPOINT, _EXACT, "Way point, and a delay of param1 s. A param3 is left out and said: it is flown over.",
-        _waypoint, moves=True, place=True),
+    Row(WAYPOINT, _EXACT, "Way point, and a delay of param1 s. A param3 is left out and said: it is flown over. No "
+        "place, or 0, 0, is where the drone is then, which is said; half a place is refused.", _waypoint, moves=True,
+        place=True),
     Row(17, _EXACT, "Way point, with which the plan ends: the drone hovers there.", _loiter, moves=True, place=True,
         ends=True),
     Row(18, _REFUSED, "The drone flies straight lines: draw the circle as way points."),
@@ -165,7 +164,9 @@ FLIGHT = (
     Row(115, _STEPPED, "The gateway turns the drone: a flight plan turns on the way only.", _turn, moves=True),
     Row(DO_JUMP, _EXACT, "Written out as often as it jumps; what becomes too long, or has no end, is flown file after "
         "file by the gateway (stepped). Its count is that of the whole mission: a loop in a loop is flown so often, "
-        "not so often each time, as in PX4 and ArduPilot."),
+        "not so often each time, as in PX4 and ArduPilot. One without end in which the drone neither goes to another "
+        "place, nor waits, turns or makes a panorama, is refused: photos are not waited for; so is one that goes round "
+        "very often for nothing."),
     Row(178, _EXACT, "Speed. Other types than air and ground speed, -2 (the default) and differences are refused; a "
         "throttle is left out and said.", _speed),
     Row(189, _EXACT, "Nothing: a mark for aeroplanes that break off a landing.", _nothing),

@@ -38,6 +38,13 @@ __all__ = [
 MAX_LINES = 2000
 """Lines that are written at once: more than a battery flies, and a file of some 100 kB."""
 
+MAX_VISITS = 20_000
+"""Items that are looked at for that, each turn of a loop anew: many may need no line."""
+
+MAX_IDLE = 100
+"""Items, beyond twice those of the mission, that may come one after the other in loops without anything being flown or
+photographed: what they set has been set by then."""
+
 _ENDLESS = -1.0
 MAX_JUMPS = 0xFFFF
 """Of a mission, those without end not counted: each is a turn of a loop here, and no battery flies so many."""
@@ -83,7 +90,7 @@ class Flight:
 def examine(items: Sequence[Item], version: Version) -> Report:
     """Can a drone of this version fly the mission?"""
     faults, said = _judged(items, version)
-    faults = faults or _wrong_ways(items)
+    faults = faults or _wrong_ways(items, version)
     if faults:
         return Report(tuple(faults), (), ())
     place = next((item.params for item in items if TABLE[item.command].place and item.params[4]), None)
@@ -110,7 +117,7 @@ def translate(items: Sequence[Item], version: Version, start: Start, first: int 
     What items before `first` have set holds, and photos and videos that they began and did not end are begun. Raises
     `PlanError` for what `examine` finds wrong, and when heights above mean sea level cannot be had.
     """
-    wrong = _judged(items, version)[0] or _wrong_ways(items)
+    wrong = _judged(items, version)[0] or _wrong_ways(items, version)
     if wrong:
         raise PlanError("mission", wrong[0].reason, wrong[0].item)
     cursor = first if isinstance(first, Cursor) else _cursor(items, version, start, first)
@@ -174,7 +181,7 @@ def _wrong_jump(number: int, item: Item, count: int) -> Fault | None:
     return None
 
 
-def _wrong_ways(items: Sequence[Item]) -> list[Fault]:
+def _wrong_ways(items: Sequence[Item], version: Version) -> list[Fault]:
     """What no item is to blame for by itself."""
     if not items:
         return []
@@ -191,7 +198,48 @@ def _wrong_ways(items: Sequence[Item]) -> list[Fault]:
                 break
     if not any(TABLE[items[number].command].moves for number in ways):
         faults.append(Fault(0, "nothing of the mission flies", FaultKind.PLAN))
+    for loop in _endless(items, ways):
+        if not _flies(items, version, loop):
+            last = max(number for number in loop if items[number].command == DO_JUMP)
+            faults.append(Fault(last, "it goes round for ever and flies nowhere", FaultKind.PLAN))
     return faults
+
+
+def _endless(items: Sequence[Item], ways: set[int]) -> Iterator[list[int]]:
+    """The loops without end, each from one of its items round to it: where a flight stays when all counts are used."""
+    walks: dict[int, int] = {}
+    """Items that were come by, and on which walk."""
+    for start in sorted(ways):
+        number = start
+        while number < len(items) and number not in walks:
+            walks[number] = start
+            number = _after(items, number)
+        if walks.get(number) != start:
+            continue  # it ended, or has come to where another walk was
+        loop = [number]
+        while (following := _after(items, loop[-1])) != number:
+            loop.append(following)
+        yield loop
+
+
+def _after(items: Sequence[Item], number: int) -> int:
+    """The item that follows one for good."""
+    item = items[number]
+    if item.command == DO_JUMP and item.params[1] == _ENDLESS:
+        return int(item.params[0] or 0.0)
+    return len(items) if TABLE[item.command].ends else number + 1
+
+
+def _flies(items: Sequence[Item], version: Version, loop: Sequence[int]) -> bool:
+    """Something of a loop takes its time. The first turn leads to where the second begins."""
+    pen = Pen(version, Start(0.0, 0.0, 0.0, flying=True, takeoff_amsl=0.0), items)
+    before = 0
+    for _ in range(2):
+        before = pen.flown
+        for pen.item in loop:
+            if TABLE[items[pen.item].command].moves:
+                _write(pen, items[pen.item])
+    return pen.flown > before
 
 
 def _reached(items: Sequence[Item]) -> set[int]:
@@ -243,22 +291,24 @@ def _fly(items: Sequence[Item], version: Version, start: Start, cursor: Cursor) 
     pen = Pen(version, start, items, cursor.settings)
     pen.films_again = cursor.anew
     jumps = dict(cursor.jumps)
-    seen: dict[int, int] = {}
-    """Jumps without end, and how much had been flown when they were taken last."""
-    index = cursor.item
+    index, visits, busy, lively = cursor.item, 0, 0, 0
+    """`busy`: what has been flown and photographed by then, and `lively`: when it became more."""
     if not start.flying and items:
         _rise(pen, items, index)
-    while index < len(items) and pen.written < MAX_LINES:
+    while index < len(items) and pen.written < MAX_LINES and visits < MAX_VISITS:
         item, pen.item = items[index], index
         row = TABLE[item.command]
         following = index + 1
+        visits += 1
+        if pen.flown + pen.photographed > busy:
+            busy, lively = pen.flown + pen.photographed, visits
         if item.command == DO_JUMP:
             target, often = int(item.params[0] or 0.0), item.params[1]
             if often == _ENDLESS:
-                if seen.get(index) == pen.flown:
-                    pen.refuse("it goes round for ever and flies nowhere", kind=FaultKind.PLAN)
-                seen[index], following = pen.flown, target
+                following = target
             elif jumps.get(index, 0) < (often or 0.0):
+                if visits - lively > 2 * len(items) + MAX_IDLE:
+                    pen.refuse("it goes round and round and flies nowhere", kind=FaultKind.PLAN)
                 jumps[index], following = jumps.get(index, 0) + 1, target
         else:
             if row.verdict is Verdict.STEPPED:

@@ -11,7 +11,7 @@ import pytest
 from support.flavours import both
 from support.mav import Client
 from support.missions import first, takeoff, way
-from support.plans import MISSION, REQUESTS, UNSUPPORTED, Item, send_count, send_item
+from support.plans import MISSION, REQUESTS, UNSUPPORTED, Item, download, send_count, send_item, upload
 from support.world import HOME, World, world
 
 INVALID = 5
@@ -19,6 +19,9 @@ INVALID = 5
 SERVO = [takeoff(6.0), way(10.0, 0.0, 6.0), Item(183, 0.0, 0.0, p1=1.0, p2=1500.0, frame=2)]
 NOTHING = [Item(178, 0.0, 0.0, p1=1.0, p2=4.0, p3=-1.0, frame=2), Item(189, 0.0, 0.0, frame=2)]
 """No item of it flies."""
+
+ROUND_AND_ROUND = [takeoff(6.0), Item(178, 0.0, 0.0, p1=1.0, p2=4.0, p3=-1.0, frame=2)]
+"""Nothing of what a jump back to its last item repeats flies."""
 
 
 class AckLost(Client):
@@ -46,6 +49,19 @@ async def without_its_ack(w: World, items: list[Item]) -> tuple[AckLost, list[It
         await client.wait(REQUESTS, lambda m, seq=seq: m.seq == seq, since=mark)  # type: ignore[misc]
         send_item(client, item, seq, MISSION)
     return client, listed
+
+
+@both
+@pytest.mark.parametrize("often", [-1.0, 60000.0])
+async def test_conf_066_a_loop_in_which_nothing_is_flown_is_refused_at_upload(flavour: str, often: float) -> None:
+    async with world(flavour=flavour) as w:
+        jump = Item(177, 0.0, 0.0, p1=1.0 + first(w), p2=often, frame=2)
+        listed = [*([Item(16, *HOME)] if first(w) else []), *ROUND_AND_ROUND, jump]
+        assert (await upload(w.client, listed, MISSION)).type == INVALID
+        how = "for ever" if often < 0.0 else "and round"
+        words = f"Mission refused: item {2 + first(w)}: it goes round {how} and flies nowhere"
+        await w.client.wait("STATUSTEXT", lambda m: m.text == words[:50], since=0)
+        assert len(await download(w.client, MISSION)) == 0
 
 
 @both

@@ -209,6 +209,7 @@ WRONG_MISSIONS = {
     "servo.plan": "item 2: DO_SET_SERVO: the drone has no actuator that a flight plan could move",
     "terrain.plan": "item 1: NAV_WAYPOINT: its height is above the terrain, which the drone does not know",
     "latitude.plan": "item 1: NAV_WAYPOINT: 148.879 is no latitude",
+    "waypoint-nowhere.plan": "item 1: NAV_WAYPOINT: it has no longitude",
     "negative-hold.plan": "item 1: NAV_WAYPOINT: it waits for -5 s",
     "no-speed.plan": "item 1: DO_CHANGE_SPEED: it says a speed of 0 m/s",
     "relative-speed.plan": "item 1: DO_CHANGE_SPEED: it says how much faster, not how fast",

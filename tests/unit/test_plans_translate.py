@@ -298,12 +298,90 @@ WRONG = {
         [waypoint(0, 1), action(178, 1.0, 4.0), action(DO_JUMP, 1.0, -1.0)],
         Fault(2, "it goes round for ever and flies nowhere", FaultKind.PLAN),
     ),
+    "for ever at one way point": (
+        [take_off(8.0), waypoint(0, 1), action(DO_JUMP, 1.0, -1.0)],
+        Fault(2, "it goes round for ever and flies nowhere", FaultKind.PLAN),
+    ),
+    "for ever with way points that are as wide as the way between them": (
+        [waypoint(0, 1, 20.0, 0.0, 40.0), waypoint(0, 4, 20.0, 0.0, 40.0), action(DO_JUMP, 0.0, -1.0)],
+        Fault(2, "it goes round for ever and flies nowhere", FaultKind.PLAN),
+    ),
+    "for ever after more than is written at once": (
+        [take_off(8.0), *[waypoint(n % 2 * 5, 1) for n in range(2 * MAX_LINES)], action(178, 1.0, 4.0),
+         action(DO_JUMP, 2.0 * MAX_LINES + 1.0, -1.0)],
+        Fault(2 * MAX_LINES + 2, "it goes round for ever and flies nowhere", FaultKind.PLAN),
+    ),
+    "for ever when the count is used up": (
+        [waypoint(0, 1), action(178, 1.0, 4.0), action(DO_JUMP, 0.0, 3.0), action(DO_JUMP, 1.0, -1.0)],
+        Fault(3, "it goes round for ever and flies nowhere", FaultKind.PLAN),
+    ),
+    "very often": (
+        [take_off(8.0), waypoint(0, 1), action(189), action(DO_JUMP, 2.0, 65535.0)],
+        Fault(3, "it goes round and round and flies nowhere", FaultKind.PLAN),
+    ),
+    "very often with a region": (
+        [take_off(8.0), Item(195, RELATIVE, (0.0, 0.0, 0.0, None, LAT, LON, 9.0)), action(197),
+         action(DO_JUMP, 1.0, 2000.0)],
+        Fault(3, "it goes round and round and flies nowhere", FaultKind.PLAN),
+    ),
     "after the landing": (
         [waypoint(0, 1), action(21), action(189)],
         Fault(2, "a landing stands before it, which ends the plan", FaultKind.PLAN),
     ),
     "nothing flies": ([action(178, 1.0, 4.0)], Fault(0, "nothing of the mission flies", FaultKind.PLAN)),
 }  # fmt: skip
+
+
+IDLE = {
+    "speed": [action(178, 1.0, 4.0)],
+    "region": [Item(195, RELATIVE, (0.0, 0.0, 0.0, None, LAT, LON, 9.0)), action(197)],
+    "gimbal": [action(1000, -45.0, 0.0)],
+    "take-off": [take_off(8.0)],
+    "no wait": [action(93, 0.0)],
+    "photo": [action(2000, 0.0, 0.0, 1.0)],
+    "photos": [action(2000, 0.0, 3.0, 0.0), action(2001)],
+    "video": [action(2500), action(2501)],
+    "zoom": [action(531, 2.0, 40.0)],
+    "turned already": [action(115, 90.0, 0.0, 0.0, 0.0)],
+    "no place": [Item(16, RELATIVE, (0.0, 0.0, 0.0, None, 0.0, 0.0, 0.0))],
+}
+BUSY = {
+    "wait": [action(93, 0.5)],
+    "wait at no place": [Item(16, RELATIVE, (3.0, 0.0, 0.0, None, 0.0, 0.0, 0.0))],
+    "turn": [action(115, 90.0, 0.0, 1.0, 1.0)],
+    "two turns": [action(115, 90.0, 0.0, 0.0, 0.0), action(115, 0.0, 0.0, 0.0, 0.0)],
+    "panorama": [action(2800, 360.0)],
+    "up and down": [waypoint(0, 1, 20.0), waypoint(0, 1, 25.0)],
+}
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize("what", [*IDLE, *BUSY])
+def test_loops_without_end_in_which_something_or_nothing_is_flown(what: str, version: Version) -> None:
+    """A photo is nothing: that the drone waits until it is taken, nobody says."""
+    items = [take_off(8.0), *{**IDLE, **BUSY}[what]]
+    report = examine([*items, action(DO_JUMP, 1.0, -1.0)], version)
+    idle = Fault(len(items), "it goes round for ever and flies nowhere", FaultKind.PLAN)
+    assert report.faults == ((idle,) if what in IDLE else ())
+
+
+def test_a_few_photos_of_one_place_are_a_loop_with_an_end() -> None:
+    flight = translate([waypoint(0, 1), action(2000, 0.0, 0.0, 1.0), action(DO_JUMP, 1.0, 300.0)], 2, AIR)
+    assert len([line for line in lines(flight) if line.startswith("2 2000 ")]) == 301
+
+
+def test_a_loop_of_many_items_that_need_no_line() -> None:
+    """It is cut by the items that are come by, not by its lines: 2000 of them were ten million items."""
+    items = [waypoint(0, 1), waypoint(5, 1), *[action(189)] * 4000, action(DO_JUMP, 0.0, -1.0)]
+    flight = translate(items, 1, AIR)
+    (leg,) = flight.parts
+    assert isinstance(leg, Leg)
+    assert len(leg.origins) == 10
+    assert flight.rest is not None
+    again = translate(items, 1, AIR, flight.rest)
+    assert isinstance(again.parts[0], Leg)
+    assert again.parts[0].origins == leg.origins
+    assert again.rest is not None
 
 
 @pytest.mark.parametrize("version", VERSIONS)
