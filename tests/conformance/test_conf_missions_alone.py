@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import asyncio
 import json
+import math
+import signal
 import sys
 import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 from support.missions import (
     ACTIVE,
     COMPLETE,
     PAUSED,
+    flown,
     mode,
     put,
     reached,
@@ -49,12 +53,7 @@ ZOOM = Item(531, 0.0, 0.0, p1=2.0, p2=50.0, frame=2)
 async def lost_and_back(w: World) -> None:
     """The link is lost, the vehicle disappears, and both come back."""
     w.drone.faults.mute = True
-    beats = 0
-    with pytest.raises(AssertionError, match="no such"):
-        while True:
-            await w.client.heartbeat(lambda beat: True, timeout=2.0)
-            beats += 1
-    assert beats < 10
+    await w.client.silence("HEARTBEAT", 2.0)  # the system is gone when its heartbeat is
     w.drone.faults.mute = False
     await w.client.heartbeat(lambda beat: True, timeout=20.0)
 
@@ -104,26 +103,34 @@ async def gateway(config: Path) -> AsyncIterator[Process]:
         yield process
 
 
+def fleet(folder: Path, drone: str, address: str) -> Path:
+    """A configuration file of one drone."""
+    config = folder / "fleet.yaml"
+    config.write_text(
+        f"endpoints: ['tcpin://{address}:5760']\nstate: {folder / 'state'}\n"
+        f"drones: [{{name: alpha, sysid: 1, address: {drone}, http_port: {WEB_PORT}}}]\n"
+    )
+    return config
+
+
+def kept(folder: Path) -> list[Any]:
+    """What is on the disk of the missions that are flown."""
+    found = [json.loads(path.read_text())["settings"].get("mission") for path in folder.glob("*.json")]
+    return [record for record in found if record is not None]
+
+
 async def written(folder: Path, item: int) -> None:
     """Until it is on the disk that this item of the mission is flown. Nobody tells: it is another process's file."""
     limit = time.monotonic() + 30.0
-    while time.monotonic() < limit:
-        for path in folder.glob("*.json"):
-            record = json.loads(path.read_text())["settings"].get("mission")
-            if record is not None and record["origins"][record["line"] + 1] == item:
-                return
+    while not any(record["origins"][record["line"] + 1] == item for record in kept(folder)):
+        assert time.monotonic() < limit, f"item {item} is never written to {folder}"
         await asyncio.sleep(0.05)
-    raise AssertionError(f"item {item} is never written to {folder}")
 
 
 async def test_conf_122_a_gateway_that_was_killed_knows_the_drones_plan_again(tmp_path: Path) -> None:
     drone, address = loopback(), loopback()
     spec = DroneSpec(address=drone, home=HOME, http_port=WEB_PORT)
-    config = tmp_path / "fleet.yaml"
-    config.write_text(
-        f"endpoints: ['tcpin://{address}:5760']\nstate: {tmp_path / 'state'}\n"
-        f"drones: [{{name: alpha, sysid: 1, address: {drone}, http_port: {WEB_PORT}}}]\n"
-    )
+    config = fleet(tmp_path, drone, address)
     async with Simulator([spec], speed=6.0, seed=1) as simulator:
         async with gateway(config) as running:
             w = World(simulator, None, address)  # type: ignore[arg-type]
@@ -153,6 +160,75 @@ async def test_conf_122_a_gateway_that_was_killed_knows_the_drones_plan_again(tm
             await state(w, PAUSED, seq=2)
             await w.client.close()
     assert len(w.commands("common.Mavlink.Start")) == 1
+
+
+@pytest.mark.parametrize("returns", [0, 1])
+@pytest.mark.parametrize("model", ["4k", "ai"])
+async def test_conf_122_a_gateway_that_ends_pauses_the_mission(model: str, returns: int) -> None:
+    """Also of a drone that would fly it on without a link: it is told to pause, hovers, and flies home as it does
+    without anybody."""
+    drone, address = loopback(), loopback()
+    spec = DroneSpec(model=model, address=drone, home=HOME, http_port=WEB_PORT)
+    config = Config(
+        endpoints=(f"tcpin://{address}:5760",),
+        drones=(DroneConfig(name="alpha", sysid=1, address=drone, http_port=WEB_PORT),),
+    )
+    async with Simulator([spec], speed=1.5, seed=1) as simulator:
+        async with Gateway(config) as running:
+            w = World(simulator, running, address)
+            await w.connect()
+            assert await running.ready(10.0)
+            await put(w, FAR)
+            await write(w.client, "ANF_MIS_RTH", returns, INT32)
+            await start(w)
+            await state(w, ACTIVE, seq=2, since=0)
+            (sentence,) = running.drones_in_air()
+            assert sentence == "alpha is in the air: it will hover and fly home 60 s after it lost the link"
+            begun = flown(w)
+            await w.client.close()
+        log = w.drone.log
+        (paused, *_) = w.commands("common.Mavlink.Pause")
+        gone = await w.drone.wait_log(lambda e: e.kind == "session" and e.name == "lost", timeout=20.0)
+        assert paused.t < gone.t
+        simulator.speed = 30.0
+        there = w.drone.pose
+        assert math.hypot(there.vn, there.ve) < 0.5
+        home = await w.drone.wait_log(
+            lambda e: e.kind == "state" and e.args["to"] == "flying", timeout=60.0, since=gone.t
+        )
+        assert math.dist((w.drone.pose.north, w.drone.pose.east), (there.north, there.east)) < 0.5
+        assert home.t - gone.t == pytest.approx(60.0 / 30.0, abs=0.2)
+        assert flown(w) == begun
+        assert [e.args["state"] for e in log if e.name == "plan" and e.t < gone.t] == ["playing", "paused"]
+
+
+async def test_conf_122_ctrl_c_pauses_the_mission(tmp_path: Path) -> None:
+    """The first asks and changes nothing; with the second the program ends, and the drone hovers before it is alone."""
+    drone, address = loopback(), loopback()
+    spec = DroneSpec(address=drone, home=HOME, http_port=WEB_PORT)
+    async with Simulator([spec], speed=6.0, seed=1) as simulator:
+        async with gateway(fleet(tmp_path, drone, address)) as running:
+            w = World(simulator, None, address)  # type: ignore[arg-type]
+            await w.connect()
+            await put(w, FAR)
+            await write(w.client, "ANF_MIS_RTH", 0, INT32)
+            await start(w)
+            await state(w, ACTIVE, seq=2, since=0)
+            simulator.speed = 1.5
+            running.process.send_signal(signal.SIGINT)
+            await running.line(lambda line: line.startswith("Ctrl-C once more"))
+            assert [line for line in running.lines if "it will hover" in line]
+            await state(w, ACTIVE, seq=2)
+            assert w.commands("common.Mavlink.Pause") == []
+            running.process.send_signal(signal.SIGINT)
+            assert await running.end() == 0
+            await w.client.close()
+        (paused, *_) = w.commands("common.Mavlink.Pause")
+        gone = await w.drone.wait_log(lambda e: e.kind == "session" and e.name == "lost", timeout=20.0)
+        assert paused.t < gone.t
+        assert math.hypot(w.drone.pose.vn, w.drone.pose.ve) < 0.5
+        assert [e.args["state"] for e in w.drone.log if e.name == "plan" and e.t < gone.t] == ["playing", "paused"]
+        assert [record["origins"][record["line"] + 1] for record in kept(tmp_path / "state")] == [2]
 
 
 # What the gateway flies itself.

@@ -7,6 +7,7 @@ the stock one has never heard of.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import math
 import time
 from collections.abc import Callable
@@ -107,6 +108,14 @@ class Client:
                 told = (*kinds, "STATUSTEXT", "COMMAND_ACK")
                 seen = [str(m) for _, m in self.received[start:] if m.get_type() in told]
                 raise AssertionError(f"no such {kind} within {timeout} s; seen: {seen[-8:]}") from None
+
+    async def silence(self, kind: str, seconds: float, *, timeout: float = 20.0) -> None:
+        """Wait until nothing of a kind has come for so long."""
+        deadline = time.monotonic() + timeout
+        with contextlib.suppress(AssertionError):
+            while time.monotonic() < deadline:
+                await self.wait(kind, timeout=seconds)
+        assert time.monotonic() < deadline, f"{kind} does not end"
 
     async def command(
         self,
