@@ -10,7 +10,7 @@ import sys
 from typing import Any
 
 import dronekit
-from dronekit_flight import until
+from dronekit_base import say, until
 
 RELATIVE, WAYPOINT, RETURN, TAKEOFF, DELAY, SPEED, PHOTO = 3, 16, 20, 22, 93, 178, 2000
 
@@ -28,7 +28,7 @@ def main(url: str, latitude: float, longitude: float) -> None:
     commands = vehicle.commands
     commands.download()
     commands.wait_ready()
-    print("there were", commands.count, flush=True)
+    say("there were", commands.count)
     commands.clear()
     north = latitude + 0.00018
     rows = [
@@ -46,10 +46,10 @@ def main(url: str, latitude: float, longitude: float) -> None:
     commands.upload()
     commands.download()
     commands.wait_ready()
-    print("sent", [shape(command) for command in wanted], flush=True)
-    print("read", [shape(commands[number]) for number in range(commands.count)], flush=True)
+    say("sent", [shape(command) for command in wanted])
+    say("read", [shape(commands[number]) for number in range(commands.count)])
     home = vehicle.home_location
-    print("home", round(home.lat, 5), round(home.lon, 5), round(home.alt), flush=True)
+    say("home", round(home.lat, 5), round(home.lon, 5), round(home.alt))
     vehicle.mode = dronekit.VehicleMode("GUIDED")
     until(vehicle, "mode", lambda mode: mode.name == "GUIDED")
     vehicle.armed = True
@@ -59,12 +59,12 @@ def main(url: str, latitude: float, longitude: float) -> None:
     commands.next = 1
     vehicle.mode = dronekit.VehicleMode("AUTO")
     until(vehicle, "mode", lambda mode: mode.name == "AUTO")
-    print("auto", flush=True)
+    say("auto")
     until(vehicle, "mode", lambda mode: mode.name == "RTL", 60.0)
-    print("end", commands.next, flush=True)
+    say("end", commands.next)
     vehicle.mode = dronekit.VehicleMode("LAND")
     until(vehicle, "armed", lambda armed: not armed, 60.0)
-    print("landed", flush=True)
+    say("landed")
     vehicle.close()
 
 

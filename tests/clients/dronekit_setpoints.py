@@ -1,6 +1,6 @@
 """A dronekit script that flies by setpoints and by channels: python dronekit_setpoints.py URL px4|ardupilot.
 
-It prints a line a step, and goes on with the step for a while: the test that runs it looks where the drone truly is.
+It prints a line a step, and goes on with the step until the test has looked where the drone truly is.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from collections.abc import Callable
 from typing import Any
 
 import dronekit
+from dronekit_base import say, until
 from pymavlink import mavutil
 
 EVERY = 0.1
@@ -19,37 +20,21 @@ VELOCITY_ONLY = 0b0000_1101_1100_0111
 POSITION_ONLY = 0b0000_1101_1111_1000
 
 
-def until(vehicle: Any, name: str, true: Callable[[Any], bool], timeout: float = 30.0) -> None:
-    """Wait for an attribute of the vehicle, by dronekit's own events."""
-    met = threading.Event()
-
-    def changed(_: Any, __: str, value: Any) -> None:
-        if true(value):
-            met.set()
-
-    where = vehicle.location if name.startswith("location.") else vehicle
-    name = name.removeprefix("location.")
-    where.add_attribute_listener(name, changed)
-    try:
-        if not true(getattr(where, name)) and not met.wait(timeout):
-            raise SystemExit(f"{name} did not become what was waited for: {getattr(where, name)}")
-    finally:
-        where.remove_attribute_listener(name, changed)
-
-
-def say(*words: object) -> None:
-    print(*words, flush=True)
-
-
 def repeated(do: Callable[[], None], seconds: float, name: str) -> None:
-    """A program's own loop, as the examples of dronekit have it; the step is told a moment before its end."""
-    end, told = time.monotonic() + seconds, False
-    while (left := end - time.monotonic()) > 0.0:
+    """A program's own loop, as the examples of dronekit have it; after some time, until the test has looked."""
+    due: float | None = time.monotonic() + seconds
+    looked = threading.Event()
+
+    def look() -> None:
+        sys.stdin.readline()
+        looked.set()
+
+    while not looked.wait(EVERY):
         do()
-        if left < 0.7 and not told:
-            told = True
+        if due is not None and time.monotonic() > due:
+            due = None
             say("held", name)
-        time.sleep(EVERY)
+            threading.Thread(target=look, daemon=True).start()
 
 
 def set_mode(vehicle: Any, name: str) -> None:

@@ -9,37 +9,15 @@ from __future__ import annotations
 
 import asyncio
 import sys
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator
 from typing import Any
 
-from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
-from mavsdk.asyncio.plugins.action import ActionAsync, ActionError, OrbitYawBehavior
+from mavsdk.asyncio.plugins.action import ActionAsync, OrbitYawBehavior
 from mavsdk.asyncio.plugins.calibration import CalibrationAsync, CalibrationError
 from mavsdk.asyncio.plugins.telemetry import LandedState, TelemetryAsync
+from mavsdk_base import connected, say, tried, until
 
 HOME = (48.8789, 2.3677, 35.0)
-
-
-def say(*words: object) -> None:
-    print(*words, flush=True)
-
-
-async def until(updates: AsyncIterator[Any], accept: Callable[[Any], bool]) -> None:
-    async def find() -> None:
-        async for update in updates:
-            if accept(update):
-                return
-
-    await asyncio.wait_for(find(), 60.0)
-
-
-async def tried(name: str, work: Awaitable[Any]) -> None:
-    """What became of something that may be refused."""
-    try:
-        await work
-        say("tried", name, "done")
-    except ActionError as error:
-        say("tried", name, error.result.name)
 
 
 async def calibrated(name: str, steps: AsyncIterator[Any]) -> None:
@@ -58,12 +36,7 @@ async def calibrated(name: str, steps: AsyncIterator[Any]) -> None:
 
 
 async def main(url: str) -> None:
-    configuration = Configuration.create_with_component_type(ComponentType.GROUND_STATION)
-    async with Mavsdk(configuration) as mavsdk:
-        await mavsdk.add_any_connection(url)
-        drone = await mavsdk.first_autopilot(timeout_s=30.0)
-        if drone is None:
-            raise SystemExit("no drone")
+    async with connected(url) as drone:
         action, telemetry, calibration = ActionAsync(drone), TelemetryAsync(drone), CalibrationAsync(drone)
         await until(telemetry.subscribe_health_all_ok(), bool)
         await calibrated("magnetometer", calibration.calibrate_magnetometer())

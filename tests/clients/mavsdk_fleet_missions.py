@@ -12,14 +12,11 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
+from mavsdk.asyncio import Mavsdk
 from mavsdk.asyncio.plugins.action import ActionAsync
 from mavsdk.asyncio.plugins.mission_raw import MissionRawAsync
 from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
-
-
-def say(*words: object) -> None:
-    print(*words, flush=True)
+from mavsdk_base import ground_station, say
 
 
 async def systems(mavsdk: Mavsdk, wanted: int) -> dict[int, Any]:
@@ -49,8 +46,7 @@ async def fly(number: int, system: Any, path: Path) -> None:
 
 
 async def main(url: str, paths: list[Path]) -> None:
-    configuration = Configuration.create_with_component_type(ComponentType.GROUND_STATION)
-    async with Mavsdk(configuration) as mavsdk:
+    async with ground_station() as mavsdk:
         # In this order: it is told of systems that are new from when it listens.
         found, _ = await asyncio.gather(systems(mavsdk, len(paths)), mavsdk.add_any_connection(url))
         await asyncio.gather(*[fly(number, found[number], path) for number, path in enumerate(paths, start=1)])

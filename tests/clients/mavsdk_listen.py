@@ -13,13 +13,13 @@ from collections.abc import Awaitable, Callable
 from enum import Enum
 from typing import Any
 
-from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
 from mavsdk.asyncio.plugins.action import ActionAsync
 from mavsdk.asyncio.plugins.info import InfoAsync
 from mavsdk.asyncio.plugins.log_files import LogFilesAsync
 from mavsdk.asyncio.plugins.shell import ShellAsync
 from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
 from mavsdk.plugins.shell import Device
+from mavsdk_base import connected
 
 SUBSCRIPTIONS = [
     "position",
@@ -105,10 +105,7 @@ async def first(telemetry: TelemetryAsync, name: str, accept: Callable[[Any], bo
 
 
 async def main(url: str) -> None:
-    configuration = Configuration.create_with_component_type(ComponentType.GROUND_STATION)
-    async with Mavsdk(configuration) as mavsdk:
-        await mavsdk.add_any_connection(url)
-        drone = await mavsdk.first_autopilot(timeout_s=30.0)
+    async with connected(url) as drone:
         telemetry, info, action = TelemetryAsync(drone), InfoAsync(drone), ActionAsync(drone)
         await asyncio.wait_for(first(telemetry, "health_all_ok", lambda ok: ok), 30.0)
         for name in RATES:

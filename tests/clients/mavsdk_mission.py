@@ -14,18 +14,15 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from mavsdk.asyncio import Autopilot, ComponentType, Configuration, Mavsdk
+from mavsdk.asyncio import Autopilot
 from mavsdk.asyncio.plugins.action import ActionAsync
 from mavsdk.asyncio.plugins.mission import MissionAsync, MissionError, MissionItem, MissionPlan
 from mavsdk.asyncio.plugins.mission_raw import MissionItem as RawItem
 from mavsdk.asyncio.plugins.mission_raw import MissionRawAsync, MissionRawError
 from mavsdk.asyncio.plugins.telemetry import FlightMode, TelemetryAsync
+from mavsdk_base import connected, say, until
 
 Camera, Vehicle = MissionItem.CameraAction, MissionItem.VehicleAction
-
-
-def say(*words: object) -> None:
-    print(*words, flush=True)
 
 
 def plan(latitude: float, longitude: float) -> MissionPlan:
@@ -67,16 +64,11 @@ async def follow(mission: MissionAsync) -> None:
 
 
 async def item(mission: MissionAsync, number: int) -> None:
-    async for progress in mission.subscribe_mission_progress():
-        if progress.current >= number:
-            return
+    await until(mission.subscribe_mission_progress(), lambda progress: progress.current >= number)
 
 
 async def mode(telemetry: TelemetryAsync, wanted: FlightMode) -> None:
-    async for mode in telemetry.subscribe_flight_mode():
-        if mode == wanted:
-            say("mode", mode.name)
-            return
+    say("mode", (await until(telemetry.subscribe_flight_mode(), lambda mode: mode == wanted)).name)
 
 
 async def fly(drone: Any, latitude: float, longitude: float) -> None:
@@ -102,9 +94,7 @@ async def fly(drone: Any, latitude: float, longitude: float) -> None:
     following.cancel()
     await mode(telemetry, FlightMode.RETURN_TO_LAUNCH)
     await action.land()
-    async for in_air in telemetry.subscribe_in_air():
-        if not in_air:
-            break
+    await until(telemetry.subscribe_in_air(), lambda in_air: not in_air)
     say("landed")
     await mission.set_current_mission_item(2)
     say("current", (await mission.mission_progress()).current)
@@ -164,12 +154,7 @@ async def changes(mission: MissionRawAsync) -> None:
 
 
 async def main(url: str, latitude: float, longitude: float, paths: list[str]) -> None:
-    configuration = Configuration.create_with_component_type(ComponentType.GROUND_STATION)
-    async with Mavsdk(configuration) as mavsdk:
-        await mavsdk.add_any_connection(url)
-        drone = await mavsdk.first_autopilot(timeout_s=30.0)
-        if drone is None:
-            raise SystemExit("no drone")
+    async with connected(url) as drone:
         if paths:
             await raw(drone, paths)
         else:

@@ -2,65 +2,34 @@
 
     mavsdk_offboard.py offboard|manual|follow URL
 
-It prints a line a step, and goes on with the step for a while: the test that runs it looks where the drone truly is.
+It prints a line a step, and goes on with the step until the test has looked where the drone truly is.
 """
 
 from __future__ import annotations
 
 import asyncio
 import sys
-from collections.abc import AsyncIterator, Awaitable, Callable
 from typing import Any
 
-from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
 from mavsdk.asyncio.plugins.action import ActionAsync
-from mavsdk.asyncio.plugins.follow_me import Config, FollowMeAsync, FollowMeError, TargetLocation
+from mavsdk.asyncio.plugins.follow_me import Config, FollowMeAsync, TargetLocation
 from mavsdk.asyncio.plugins.manual_control import ManualControlAsync
 from mavsdk.asyncio.plugins.offboard import (
     AccelerationNed,
     Attitude,
     AttitudeRate,
     OffboardAsync,
-    OffboardError,
     PositionGlobalYaw,
     PositionNedYaw,
     VelocityBodyYawspeed,
     VelocityNedYaw,
 )
 from mavsdk.asyncio.plugins.telemetry import LandedState, TelemetryAsync
+from mavsdk_base import connected, held, say, tried, until
 
 HOME = (48.8789, 2.3677, 35.0)
 M = 1.0 / 111_226.0
 """Degrees of latitude a metre, here."""
-
-
-def say(*words: object) -> None:
-    print(*words, flush=True)
-
-
-async def until(updates: AsyncIterator[Any], accept: Callable[[Any], bool]) -> None:
-    async def find() -> None:
-        async for update in updates:
-            if accept(update):
-                return
-
-    await asyncio.wait_for(find(), 60.0)
-
-
-async def tried(name: str, work: Awaitable[Any]) -> None:
-    """What became of something that may be refused."""
-    try:
-        await work
-        say("tried", name, "done")
-    except (OffboardError, FollowMeError) as error:
-        say("tried", name, error.result.name)
-
-
-async def held(name: str, seconds: float) -> None:
-    """Long enough to see what comes of it, and for the test to look."""
-    await asyncio.sleep(seconds)
-    say("held", name)
-    await asyncio.sleep(0.7)
 
 
 async def offboard(system: Any) -> None:
@@ -93,7 +62,7 @@ async def offboard(system: Any) -> None:
         telemetry.subscribe_position_velocity_ned(),
         lambda p: abs(p.position.north_m - 30.0) < 0.5 and abs(p.velocity.north_m_s) < 0.15,
     )
-    await held("position and velocity", 0.0)
+    await held("position and velocity")
     await plugin.set_acceleration_ned(AccelerationNed(0.0, 1.0, 0.0))
     await held("acceleration", 2.0)
     await plugin.stop()
@@ -111,7 +80,7 @@ async def manual(system: Any) -> None:
             await asyncio.sleep(0.05)
 
     stream = asyncio.ensure_future(joystick())
-    await asyncio.sleep(0.3)
+    await asyncio.sleep(0.3)  # the sticks have to be there before they may fly
     await plugin.start_position_control()
     await until(telemetry.subscribe_flight_mode(), lambda mode: mode.name == "POSCTL")
     for name, position in (
@@ -123,9 +92,7 @@ async def manual(system: Any) -> None:
         sticks[:] = position
         await held(name, 2.0)
     stream.cancel()
-    await asyncio.sleep(1.0)
-    say("silent")
-    await asyncio.sleep(1.0)
+    await held("still", 1.0)
 
 
 async def follow(system: Any) -> None:
@@ -150,20 +117,15 @@ async def follow(system: Any) -> None:
             TargetLocation(HOME[0] + (10.0 + 1.5 * second) * M, HOME[1], HOME[2], 1.5, 0.0, 0.0)
         )
         await asyncio.sleep(1.0)
-    say("held target", 10.0 + 1.5 * 15)
-    await asyncio.sleep(0.5)
+    say("target", 10.0 + 1.5 * 15)
+    await held("following")
     await plugin.stop()
     await until(telemetry.subscribe_flight_mode(), lambda mode: mode.name == "HOLD")
     say("stopped")
 
 
 async def main(what: str, url: str) -> None:
-    configuration = Configuration.create_with_component_type(ComponentType.GROUND_STATION)
-    async with Mavsdk(configuration) as mavsdk:
-        await mavsdk.add_any_connection(url)
-        drone = await mavsdk.first_autopilot(timeout_s=30.0)
-        if drone is None:
-            raise SystemExit("no drone")
+    async with connected(url) as drone:
         action, telemetry = ActionAsync(drone), TelemetryAsync(drone)
         await until(telemetry.subscribe_health_all_ok(), bool)
         await action.set_takeoff_altitude(8.0)

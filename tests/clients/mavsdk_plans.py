@@ -12,7 +12,6 @@ import sys
 import time
 from typing import Any
 
-from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
 from mavsdk.asyncio.plugins.geofence import (
     Circle,
     FenceType,
@@ -23,12 +22,9 @@ from mavsdk.asyncio.plugins.geofence import (
     Polygon,
 )
 from mavsdk.asyncio.plugins.mission_raw import MissionItem, MissionRawAsync, MissionRawError
+from mavsdk_base import connected, say
 
 FENCE, RALLY = 1, 2
-
-
-def say(*words: object) -> None:
-    print(*words, flush=True)
 
 
 def shape(data: GeofenceData) -> str:
@@ -106,12 +102,7 @@ async def raw(mission: MissionRawAsync, latitude: float, longitude: float) -> No
 
 
 async def main(url: str, latitude: float, longitude: float) -> None:
-    configuration = Configuration.create_with_component_type(ComponentType.GROUND_STATION)
-    async with Mavsdk(configuration) as mavsdk:
-        await mavsdk.add_any_connection(url)
-        drone = await mavsdk.first_autopilot(timeout_s=30.0)
-        if drone is None:
-            raise SystemExit("no drone")
+    async with connected(url) as drone:
         await fences(GeofenceAsync(drone), latitude, longitude)
         await raw(MissionRawAsync(drone), latitude, longitude)
         say("done")

@@ -13,15 +13,11 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
 from mavsdk.asyncio.plugins.component_metadata import ComponentMetadataAsync, MetadataType
 from mavsdk.asyncio.plugins.events import EventsAsync
 from mavsdk.asyncio.plugins.ftp import FtpAsync, FtpError
 from mavsdk.asyncio.plugins.param import ParamAsync, ParamError
-
-
-def say(*words: object) -> None:
-    print(*words, flush=True)
+from mavsdk_base import connected, say
 
 
 async def parameters(param: ParamAsync, flavour: str) -> None:
@@ -111,12 +107,7 @@ async def watch(events: EventsAsync) -> None:
 
 
 async def main(url: str, folder: Path, flavour: str) -> None:
-    configuration = Configuration.create_with_component_type(ComponentType.GROUND_STATION)
-    async with Mavsdk(configuration) as mavsdk:
-        await mavsdk.add_any_connection(url)
-        drone = await mavsdk.first_autopilot(timeout_s=30.0)
-        if drone is None:
-            raise SystemExit("no drone")
+    async with connected(url) as drone:
         await parameters(ParamAsync(drone), flavour)
         await transfers(FtpAsync(drone), folder)
         await described(ComponentMetadataAsync(drone))

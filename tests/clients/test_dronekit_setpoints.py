@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import sys
+from asyncio.subprocess import PIPE
 from pathlib import Path
 
 import pytest
 from support.flavours import both
 from support.product import program
-from support.setpoints import allow_speed
+from support.setpoints import allow_speed, held
 from support.world import world
 
 SCRIPT = Path(__file__).with_name("dronekit_setpoints.py")
@@ -19,18 +20,17 @@ SCRIPT = Path(__file__).with_name("dronekit_setpoints.py")
 async def test_conf_118_setpoints(flavour: str) -> None:
     async with world(speed=1.0, flavour=flavour) as w:
         words = (sys.executable, "-u", str(SCRIPT), f"tcp:{w.address}:5760", flavour)
-        async with program(*words) as script:
+        async with program(*words, stdin=PIPE) as script:
             await script.line(lambda line: line == "up", timeout=90.0)
             allow_speed(w)
-            await script.line(lambda line: line == "held velocity", timeout=30.0)
-            pose = w.drone.pose
+            if flavour == "px4":
+                await held(w, script, "setpoints before Offboard")
+            pose = await held(w, script, "velocity")
             assert (pose.vn, pose.ve, pose.vd) == pytest.approx((2.0, 0.0, 0.0), abs=0.3)
-            await script.line(lambda line: line == "held position", timeout=30.0)
-            pose = w.drone.pose
+            pose = await held(w, script, "position")
             assert (pose.north, pose.east, pose.up) == pytest.approx((4.0, -5.0, 10.0), abs=0.7)
             await script.line(lambda line: line.startswith("idle"), timeout=30.0)
-            await script.line(lambda line: line == "held channels", timeout=30.0)
-            assert w.drone.pose.ve > 1.0
+            assert (await held(w, script, "channels")).ve > 1.0
             await script.line(lambda line: line == "mode RTL", timeout=30.0)
             assert len(w.commands("rth.return_to_home")) == 1
             assert await script.end() == 0, script

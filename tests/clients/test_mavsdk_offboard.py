@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import math
 import sys
+from asyncio.subprocess import PIPE
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
 
 import pytest
 from support.product import Process, program
-from support.setpoints import allow_speed
+from support.setpoints import allow_speed, held
 from support.world import HOME, World, world
 
 from anafi_mav import geo
-from anafi_mav.sim.motion import Pose
 
 SCRIPT = Path(__file__).with_name("mavsdk_offboard.py")
 
@@ -25,16 +25,10 @@ pytestmark = pytest.mark.timeout(240)
 async def flown(what: str) -> AsyncIterator[tuple[World, Process]]:
     async with (
         world(speed=1.0) as w,
-        program(sys.executable, "-u", str(SCRIPT), what, f"tcpout://{w.address}:5760") as script,
+        program(sys.executable, "-u", str(SCRIPT), what, f"tcpout://{w.address}:5760", stdin=PIPE) as script,
     ):
         await script.line(lambda line: line == "up", timeout=60.0)
         yield w, script
-
-
-async def held(w: World, script: Process, name: str) -> Pose:
-    """Where the drone truly is while the program still holds this step."""
-    await script.line(lambda line: line == f"held {name}", timeout=60.0)
-    return w.drone.pose
 
 
 async def test_mavsdk_offboard() -> None:
@@ -82,7 +76,7 @@ async def test_mavsdk_manual_control() -> None:
         before = pose.yaw
         pose = await held(w, script, "clockwise")
         assert math.remainder(pose.yaw - before, 2.0 * math.pi) > 0.2
-        await script.line(lambda line: line == "silent", timeout=20.0)
+        await held(w, script, "still")
         assert {tuple(e.args[axis] for axis in ("roll", "pitch", "yaw", "gaz")) for e in w.commands(PCMD)[-5:]} == {
             (0, 0, 0, 0)
         }
@@ -95,8 +89,8 @@ PCMD = "ardrone3.Piloting.PCMD"
 async def test_mavsdk_follow_me() -> None:
     async with flown("follow") as (w, script):
         allow_speed(w)
-        line = await script.line(lambda line: line.startswith("held target"), timeout=90.0)
-        pose, target, time = w.drone.pose, float(line.split()[2]), w.drone.firmware.time
+        pose, time = await held(w, script, "following"), w.drone.firmware.time
+        target = next(float(line.split()[1]) for line in script.lines if line.startswith("target"))
         assert script.lines[1:4] == ["config 8.0 8.0 180.0", "tried start done", "following True"]
         assert target - pose.north == pytest.approx(6.0, abs=1.5)
         assert pose.east == pytest.approx(0.0, abs=1.0)

@@ -5,12 +5,12 @@ before a timer is due, and nothing is on its way between their sockets (the loop
 before `send` returns), then nothing can happen until that timer: the clock is set to it, and the loop goes on at once.
 A minute of flight takes as long as its computations do, on any machine, with the timers in the order they are due.
 
-As soon as somebody else is there, a child process or work in a thread, the clock runs like everybody's. Never counted
-is the time in which the loop was ready to run and did not, because the machine is shared: of the selector what it is
-late, of callbacks what they did not spend on a processor, if they did not wait for anything (the kernel counts
-voluntary switches), and what the machine below a virtual one has stolen from its processors meanwhile, which the kernel
-counts as work of whoever it was stolen from. So code of ours that computes for too long, sleeps or blocks is as late as
-it is.
+Not counted either is the time in which callbacks were ready to run and did not, because the machine is shared: what
+they did not spend on a processor, if they did not wait for anything (the kernel counts voluntary switches), and what
+the machine below a virtual one has stolen from its processors meanwhile, which the kernel counts as work of whoever it
+was stolen from. So code of ours that computes for too long, sleeps or blocks is as late as it is.
+
+As soon as somebody else is there, a child process or work in a thread, the clock runs like theirs.
 """
 
 from __future__ import annotations
@@ -24,9 +24,6 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
-
-LATE = 0.0012
-"""s that a selector may be late in the course of things: epoll knows milliseconds."""
 
 INTERRUPTED = 0.0001
 """s of callbacks that are interrupted in the course of things."""
@@ -77,7 +74,7 @@ def childless() -> bool:
 
 
 class Selector(selectors.DefaultSelector):
-    """Notes what is lost before and after it waits, and does not wait when there is nothing to wait for."""
+    """Notes what is lost before it waits, and does not wait when there is nothing to wait for."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -94,6 +91,23 @@ class Selector(selectors.DefaultSelector):
 
     def select(self, timeout: float | None = None) -> Any:
         global _lost, _began
+        alone = self._alone()
+        if alone:
+            _lost += self._waited()
+        _began = None
+        now()  # what waits for a time is not to be early
+        here = _real()
+        quick = alone and timeout is not None and timeout > 0.0
+        ready = self._look() if quick else super().select(timeout)
+        self._left = (back, working, _) = self._state()
+        if quick and not ready:
+            _lost += back - here - timeout
+        if alone:
+            _began = max(_newest, back - _lost), working, threading.get_ident()
+        return ready
+
+    def _waited(self) -> float:
+        """s of the callbacks' time that were none of theirs."""
         (left, worked, waited), (here, working, waiting) = self._left, self._state()
         took = here - left
         if waited == waiting:
@@ -103,18 +117,7 @@ class Selector(selectors.DefaultSelector):
             if here - left > LONG:
                 most = max((b - a for a, b in zip(before, self._stolen, strict=True)), default=0.0)
                 took = max(0.0, min(took, here - left - most))
-        _lost += here - left - took
-        _began = None
-        now()  # what waits for a time is not to be early
-        quick = timeout is not None and timeout > 0.0 and self._alone()
-        ready = self._look() if quick else super().select(timeout)
-        self._left = (back, working, _) = self._state()
-        if quick and not ready:
-            _lost += back - here - timeout
-        elif timeout is not None:
-            _lost += max(0.0, back - here - max(timeout, 0.0) - LATE)
-        _began = max(_newest, back - _lost), working, threading.get_ident()
-        return ready
+        return here - left - took
 
     def _alone(self) -> bool:
         """Whether nobody but the loop itself can bring anything about."""

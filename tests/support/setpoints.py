@@ -13,7 +13,9 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from anafi_mav import geo
 from anafi_mav.arsdk.messages import ardrone3
+from anafi_mav.sim.motion import Pose
 from support.mav import Client
+from support.product import Process
 from support.world import HOLD, HOME, OFFBOARD, World
 
 COPTER_BRAKE, COPTER_GUIDED = 17, 4
@@ -162,3 +164,11 @@ async def said(client: Client, part: str, mark: int = 0) -> None:
     """Wait until a text with this part has come."""
     while not any(part in text for text in texts(client, mark)):
         await client.wait("STATUSTEXT")
+
+
+async def held(w: World, script: Process, name: str) -> Pose:
+    """Where the drone truly is while a program holds a step; it may go on then."""
+    await script.line(lambda line: line == f"held {name}", timeout=60.0)
+    pose = w.drone.pose
+    script.say("next")
+    return pose
