@@ -96,6 +96,16 @@ class MissionFlight:
         if known:  # else it has just been read, and what was kept of it has not been looked at
             self.remember(None)
 
+    def taken_again(self) -> None:
+        """The same mission was uploaded once more. One that is flown goes on undisturbed; else it is a new one."""
+        if self.progress.state is State.ACTIVE:
+            current = self.progress.current
+            self.say(Severity.INFO, lambda first: f"Mission: the same again, it goes on at item {current + first}")
+            return
+        self.progress.take(self.progress.items)
+        self._parts, self._rest, self._next = [], None, None
+        self.remember(None)
+
     async def engage(self, client: Hashable, item: int | None = None) -> None:
         """Mode Mission begins, or goes on where it was stopped, or at an item; returns when the drone flies it.
 

@@ -163,7 +163,10 @@ class PlanService(Service):
     # Plans in force.
 
     def _changed(self, kind: int) -> None:
-        """Another plan is in force: the vehicle goes by it, everybody is told."""
+        """A plan was uploaded: the vehicle goes by it, everybody is told."""
+        mission = self.host.vehicle.mission
+        if kind == MissionKind.mission_type and self._desk.transfers[kind].opaque_id == mission.identity:
+            mission.taken_again()
         self._take(kind)
         self.host.vehicle.mission.news()
 

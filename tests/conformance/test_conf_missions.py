@@ -266,23 +266,6 @@ async def test_conf_074_whatever_takes_over_pauses_it(flavour: str, order: str) 
         assert len(w.commands("common.Mavlink.Start")) == 1
 
 
-async def test_conf_074_another_mission_stops_the_one_that_is_flown() -> None:
-    async with world(web=True) as w:
-        await put(w, ROUND)
-        await start(w)
-        await state(w, ACTIVE, seq=1, since=0)
-        await w.drone.wait_log(lambda e: e.name == "item" and e.args["command"] == "waypoint", timeout=20.0)
-        mark = w.client.mark()
-        await put(w, ROUND)  # the same again changes nothing
-        await state(w, ACTIVE)
-        await put(w, [takeoff(6.0), way(0.0, 9.0, 6.0)])
-        await state(w, NOT_STARTED, seq=0, since=mark)
-        await said(w, "another mission", since=mark)
-        await mode(w, w.modes.idle, since=mark)
-        assert len(w.commands("common.Mavlink.Start")) == 1
-        assert len(w.commands("common.Mavlink.Pause")) == 1
-
-
 @both
 async def test_conf_074_a_return_that_the_drone_begins_is_not_fought(flavour: str) -> None:
     """The battery sends it home in mid-mission: paused, nothing is sent against it, and the mission does not begin."""

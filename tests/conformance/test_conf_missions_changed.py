@@ -5,13 +5,44 @@ What is flown is taken from the simulator's own log.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.flavours import both
 from support.mav import Client
-from support.missions import first, takeoff, way
-from support.plans import MISSION, REQUESTS, UNSUPPORTED, Item, download, send_count, send_item, upload
+from support.missions import (
+    ACTIVE,
+    COMPLETE,
+    NO_MISSION,
+    NOT_STARTED,
+    PAUSED,
+    first,
+    mode,
+    put,
+    reached,
+    said,
+    settled,
+    start,
+    state,
+    takeoff,
+    way,
+    whole,
+)
+from support.plans import (
+    ACCEPTED,
+    CANCELLED,
+    MISSION,
+    REQUESTS,
+    UNSUPPORTED,
+    Item,
+    clear,
+    download,
+    send_count,
+    send_item,
+    upload,
+)
 from support.world import HOME, World, world
 
 INVALID = 5
@@ -81,3 +112,118 @@ async def test_conf_066_a_refusal_that_was_lost_is_heard_when_the_last_item_come
         await client.heartbeat(lambda beat: True, since=client.mark())
         texts = [m.text for _, m in client.since(0, "STATUSTEXT") if "refused" in m.text]
         assert len(texts) == 1, texts
+
+
+# While one is flown.
+
+CORNERS = [takeoff(6.0), way(14.0, 0.0, 6.0), way(14.0, 14.0, 6.0), way(0.0, 14.0, 6.0)]
+
+
+async def on_the_way(w: World, item: int) -> None:
+    """CORNERS are flown, and the drone is on the way to a corner."""
+    await put(w, CORNERS)
+    await start(w)
+    await state(w, ACTIVE, seq=item, since=0)
+
+
+def pauses(w: World) -> list[str]:
+    """What the drone was told against its plan, and how it plays."""
+    names = ("Pause", "Stop", "moveBy", "moveTo", "PCMD")
+    told = [e.name for e in w.drone.log if e.kind == "command" and e.name.rpartition(".")[2] in names]
+    return [*told, *(e.args["state"] for e in w.drone.log if e.name == "plan")]
+
+
+@both
+async def test_conf_074_the_same_mission_again_disturbs_nothing(flavour: str) -> None:
+    """From two clients, in mid-flight: the drone hears nothing of it, and flies each line of its one file once."""
+    async with world(flavour=flavour, web=True) as w:
+        await on_the_way(w, 2)
+        before, heard = pauses(w), len(w.commands("common.Mavlink.Start"))
+        other = await w.connect(254)
+        mark = w.client.mark()
+        for client in (w.client, other):
+            listed = [Item(16, *HOME), *CORNERS] if first(w) else CORNERS
+            assert (await upload(client, listed, MISSION)).type == ACCEPTED
+            await said(w, f"the same again, it goes on at item {2 + first(w)}"[:40], since=mark)
+        assert pauses(w) == before
+        told = await state(w, ACTIVE, seq=2, since=w.client.mark())
+        await state(w, COMPLETE, since=mark)
+        assert len(w.commands("common.Mavlink.Start")) == heard == 1
+        assert pauses(w) == [*before, "stopped"]
+        assert [e.args["index"] for e in w.drone.log if e.name == "item"] == [0, 1, 2, 3, 4]
+        assert reached(w) == [0, 1, 2, 3]
+        assert whole(told).mission_id == whole(await state(w, COMPLETE)).mission_id != 0
+        await settled(w, (0.0, 14.0, 6.0))
+
+
+@both
+async def test_conf_074_the_same_mission_again_after_its_end_is_a_new_one(flavour: str) -> None:
+    """A program that uploads, starts and waits for the end must not take the last end for this one's."""
+    async with world(flavour=flavour, web=True) as w:
+        await on_the_way(w, 2)
+        assert (await w.client.command(192, -1, 1, 0)).result == dialect.MAV_RESULT_ACCEPTED
+        await state(w, PAUSED, seq=2)
+        mark = w.client.mark()
+        await put(w, CORNERS)
+        await state(w, NOT_STARTED, seq=0, since=mark)
+        for _ in range(2):
+            mark, flights = w.client.mark(), len(w.commands("common.Mavlink.Start"))
+            assert (await w.client.command(dialect.MAV_CMD_MISSION_START, 0, 0)).result == dialect.MAV_RESULT_ACCEPTED
+            await state(w, ACTIVE, seq=1, since=mark)
+            await state(w, COMPLETE, since=mark)
+            assert reached(w, mark) == [0, 1, 2, 3]
+            assert len(w.commands("common.Mavlink.Start")) == flights + 1
+            mark = w.client.mark()
+            await put(w, CORNERS)
+            await state(w, NOT_STARTED, seq=0, since=mark)
+
+
+@both
+@pytest.mark.parametrize("how", ["another", "one item", "cleared"])
+async def test_conf_074_another_mission_stops_the_one_that_is_flown(flavour: str, how: str) -> None:
+    """The drone is paused, hovers where it is, and flies nothing of either until somebody says so."""
+    async with world(flavour=flavour, web=True) as w:
+        await on_the_way(w, 2)
+        mark = w.client.mark()
+        if how == "cleared":
+            assert (await clear(w.client, MISSION)).type == ACCEPTED
+            await said(w, "it was cleared", since=mark)
+            await state(w, NO_MISSION, since=mark)
+        else:
+            await put(
+                w, [takeoff(6.0), way(0.0, 9.0, 6.0)] if how == "another" else [*CORNERS[:-1], way(0.0, 9.0, 6.0)]
+            )
+            await said(w, f"Mission paused at item {2 + first(w)}: another mission"[:50], since=mark)
+            await state(w, NOT_STARTED, seq=0, since=mark)
+        await mode(w, w.modes.idle, since=mark)
+        (paused,) = w.commands("common.Mavlink.Pause")
+        await w.drone.wait_log(lambda e: e.kind == "state" and e.args["event"] == "at_rest", since=paused.t)
+        there = w.drone.pose
+        for _ in range(3):
+            await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.idle, since=w.client.mark())
+        here = w.drone.pose
+        assert math.dist((there.north, there.east, there.up), (here.north, here.east, here.up)) < 0.3
+        assert pauses(w) == ["common.Mavlink.Pause", "playing", "paused"]
+        if how != "cleared":
+            assert (await w.client.command(dialect.MAV_CMD_MISSION_START, 0, 0)).result == dialect.MAV_RESULT_ACCEPTED
+            await settled(w, (0.0, 9.0, 6.0))
+
+
+@both
+@pytest.mark.parametrize("how", ["refused", "given up", "refused in the thread"])
+async def test_conf_063_an_upload_that_fails_does_not_touch_the_flight(flavour: str, how: str) -> None:
+    async with world(flavour=flavour, web=True) as w:
+        await on_the_way(w, 1)
+        before, mark = pauses(w), w.client.mark()
+        home = [Item(16, *HOME)] if first(w) else []
+        if how == "given up":
+            send_count(w.client, 9, MISSION)
+            await w.client.wait(REQUESTS, since=mark)
+            w.client.send(dialect.MAVLink_mission_ack_message(1, 1, CANCELLED, MISSION))
+        else:
+            bad = SERVO if how == "refused" else [*ROUND_AND_ROUND, Item(177, 0.0, 0.0, p1=1.0, p2=-1.0, frame=2)]
+            assert (await upload(w.client, [*home, *bad], MISSION)).type in (UNSUPPORTED, INVALID)
+        await state(w, COMPLETE, since=mark)
+        assert pauses(w) == [*before, "stopped"]
+        assert reached(w) == [0, 1, 2, 3]
+        assert len(await download(w.client, MISSION)) == len(CORNERS) + first(w)

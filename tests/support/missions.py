@@ -14,7 +14,7 @@ from support.world import HOME, World
 PLACE = (HOME[0], HOME[1])
 
 MISSION_MODE = {"px4": 0x04040000, "ardupilot": 3}
-NOT_STARTED, ACTIVE, PAUSED, COMPLETE = 2, 3, 4, 5
+NO_MISSION, NOT_STARTED, ACTIVE, PAUSED, COMPLETE = 1, 2, 3, 4, 5
 NAN = float("nan")
 
 
