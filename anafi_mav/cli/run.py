@@ -13,7 +13,7 @@ from typing import Any
 
 import msgspec
 
-from anafi_mav.cli import options
+from anafi_mav.cli import heap, options
 from anafi_mav.cli.addresses import Ports, Reservations, spot
 from anafi_mav.cli.child import SimulatorProcess
 from anafi_mav.cli.terminal import complain, say
@@ -57,6 +57,7 @@ def run(arguments: argparse.Namespace) -> int:
     config = configuration(arguments.config, arguments.drone, arguments.endpoint, arguments.allow_kill)
     for remark in remarks(config):
         complain(f"warning: {remark}", "yellow")
+    heap.settle()
     asyncio.run(_run(config, arguments.sim_log.absolute() if arguments.sim_log else None))
     return 0
 

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import msgspec
 
-from anafi_mav.cli import options, sim_validate
+from anafi_mav.cli import heap, options, sim_validate
 from anafi_mav.cli.options import integer, number
 from anafi_mav.cli.terminal import say
 from anafi_mav.errors import ConfigError
@@ -183,6 +183,7 @@ def _scenarios(fleet: Fleet) -> dict[str, Scenario]:
 
 async def _run(fleet: Fleet, log: Path | None, stdin_watch: bool) -> None:
     scenarios = _scenarios(fleet)
+    heap.settle()
     stop = asyncio.Event()
     loop = asyncio.get_running_loop()
     for signum in (signal.SIGINT, signal.SIGTERM):

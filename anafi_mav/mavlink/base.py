@@ -101,7 +101,9 @@ class Endpoint(ABC):
 class Outbox:
     """The frames of one turn of the loop leave together: a fleet's telemetry is thousands of small ones a second.
 
-    `limit` bytes at most go at once; the frame that would exceed them begins the next lot.
+    `limit` bytes at most go at once; the frame that would exceed them begins the next lot. What answers something that
+    has just been read does not wait for the next turn: whoever reads does so `with` the outbox, and at the end of that
+    block everything leaves.
     """
 
     def __init__(self, write: Callable[[bytes], None], limit: int) -> None:
@@ -110,6 +112,15 @@ class Outbox:
         self._frames: list[bytes] = []
         self._size = 0
         self._due: asyncio.Handle | None = None
+        self._held = False
+
+    def __enter__(self) -> None:
+        self._held = True
+
+    def __exit__(self, *_: object) -> None:
+        self._held = False
+        if self._frames:
+            self.flush()
 
     def add(self, raw: bytes) -> None:
         """A frame, to leave when this turn is over."""
@@ -117,7 +128,7 @@ class Outbox:
             self._give()
         self._frames.append(raw)
         self._size += len(raw)
-        if self._due is None:
+        if self._due is None and not self._held:
             self._due = asyncio.get_running_loop().call_soon(self.flush)
 
     def flush(self) -> None:
@@ -163,7 +174,8 @@ class StreamPeer(asyncio.Protocol):
         self._sink.opened(self.channel)
 
     def data_received(self, data: bytes) -> None:
-        self._sink.received(self.channel, self.channel.receive(data))
+        with self._outbox:
+            self._sink.received(self.channel, self.channel.receive(data))
 
     def pause_writing(self) -> None:
         self.channel.pause()

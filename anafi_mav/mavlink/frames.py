@@ -1,8 +1,8 @@
 """MAVLink frames without I/O: messages into version 2 frames, any bytes into messages.
 
 Going out, a message is packed once (`pack`) and framed per channel (`frame`), for only the sequence number and with it
-the checksum differ. Coming in, `Parser` finds frames of version 1 and 2 between whatever else arrives and has the
-generated dialect decode them. Next floor: `channel`.
+the checksum differ. Coming in, `Parser` finds frames of version 1 and 2 between whatever else arrives and makes
+messages of them (`unpack`). Next floor: `channel`.
 """
 
 from __future__ import annotations
@@ -12,16 +12,17 @@ import re
 import struct
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
 from operator import attrgetter
 from typing import Any, NamedTuple
 
 import fastcrc
+import msgspec
 
 from anafi_mav.errors import LocalProtocolError
 from anafi_mav.mavlink import dialect
 
 MAGIC_1, MAGIC_2 = 0xFE, 0xFD
+_MAGICS = (MAGIC_1, MAGIC_2)
 HEADER_1, HEADER_2 = 6, 10
 """Bytes before the payload (MAVLink serialization.md §packet_format)."""
 CHECKSUM, SIGNATURE = 2, 13
@@ -108,8 +109,54 @@ def _payload_packer(kind: type[dialect.MAVLink_message]) -> Callable[[Any], byte
     return _packers[kind]
 
 
-@dataclass(frozen=True)
-class Received:
+_Reader = Callable[[bytes], dict[str, Any]]
+_readers: dict[int, _Reader] = {}
+"""One per message id, made when it first arrives."""
+
+
+def unpack(id: int, payload: bytes) -> dialect.MAVLink_message:
+    """The message in a payload of any length: what is not there is zero, what is too much is newer than our dialect.
+
+    `id` is one of the dialect's. pymavlink's own decoder tests the checksum a second time and sorts the fields anew for
+    each frame; this one knows each class's fields once, and gives the same message.
+    """
+    message: dialect.MAVLink_message = object.__new__(dialect.mavlink_map[id])
+    message.__dict__ = (_readers.get(id) or _reader(id))(payload)
+    return message
+
+
+def _reader(id: int) -> _Reader:
+    """A function from a payload to the attributes of a message with this id."""
+    kind: Any = dialect.mavlink_map[id]
+    size, unpacker, names = kind.unpacker.size, kind.unpacker.unpack_from, tuple(kind.ordered_fieldnames)
+    codes = [code for _, code in re.findall(r"(\d*)([a-zA-Z])", kind.unpacker.format)]
+    plain = all(length == 1 for length in kind.lengths) and not {"c", "s"}.intersection(codes)
+    attributes = vars(kind(*([0] * len(names)))) if plain else {}
+
+    def read_numbers(payload: bytes) -> dict[str, Any]:
+        result = attributes.copy()
+        result.update(zip(names, unpacker(payload.ljust(size, b"\0")), strict=True))
+        return result
+
+    def read_any(payload: bytes) -> dict[str, Any]:
+        flat = unpacker(payload.ljust(size, b"\0"))
+        values: list[Any] = []
+        for order in kind.orders:
+            first, length = starts[order], kind.lengths[order]
+            value = flat[first]
+            if isinstance(value, bytes):
+                values.append(value.rstrip(b"\0"))
+            else:
+                values.append(value if length == 1 else list(flat[first : first + length]))
+        message: dialect.MAVLink_message = kind(*values)
+        return vars(message)
+
+    starts = [sum(kind.lengths[:order]) for order in range(len(kind.lengths))]
+    _readers[id] = read_numbers if plain else read_any
+    return _readers[id]
+
+
+class Received(msgspec.Struct, frozen=True):
     """One frame that arrived whole."""
 
     message: Any
@@ -142,7 +189,6 @@ class Parser:
         self._pending = b""
         self._sources: dict[tuple[int, int], int] = {}
         """Who has sent a good frame -> the number of the last one."""
-        self._decoder = dialect.MAVLink(None)
 
     def receive(self, data: bytes) -> list[Received]:
         """The frames that end in `data`; the beginning of another is kept for the next call."""
@@ -154,13 +200,13 @@ class Parser:
     def receive_datagram(self, data: bytes) -> list[Received]:
         """The frames in `data`, which is a whole: a frame that does not end in it is none."""
         self._pending = b""
-        found: list[Received] = []
-        while data:
+        found, end = self._scan(data, whole=True)
+        while end < len(data):
+            # What looked like a beginning is given up by one byte, too: a real frame may be in it.
+            self.counters["garbage_bytes"] += 1
+            data = data[end + 1 :]
             more, end = self._scan(data, whole=True)
             found += more
-            # What looked like a beginning is given up by one byte, too: a real frame may be in it.
-            self.counters["garbage_bytes"] += end < len(data)
-            data = data[end + 1 :]
         return found
 
     def _scan(self, buffer: bytes, *, whole: bool) -> tuple[list[Received], int]:
@@ -168,12 +214,12 @@ class Parser:
         found: list[Received] = []
         position, size = 0, len(buffer)
         while position < size:
-            start = _NEXT_MAGIC.search(buffer, position)
-            if start is None:
-                self.counters["garbage_bytes"] += size - position
-                return found, size
-            self.counters["garbage_bytes"] += start.start() - position
-            position = start.start()
+            if buffer[position] not in _MAGICS:
+                start = _NEXT_MAGIC.search(buffer, position)
+                next_position = size if start is None else start.start()
+                self.counters["garbage_bytes"] += next_position - position
+                position = next_position
+                continue
             length = self._length(buffer, position, size)
             if length is None:
                 return found, position
@@ -184,7 +230,7 @@ class Parser:
             if received is not None and received.message is None:
                 if end == size and not whole:
                     return found, position
-                if end < size and buffer[end] not in (MAGIC_1, MAGIC_2):
+                if end < size and buffer[end] not in _MAGICS:
                     received = None
                 else:
                     self.counters["unknown_frames"] += 1
@@ -211,29 +257,28 @@ class Parser:
             return 0
         if size < position + HEADER_2:
             return None
-        id = int.from_bytes(buffer[position + 7 : position + 10], "little")
-        if id not in dialect.mavlink_map and (buffer[position + 5], buffer[position + 6]) not in self._sources:
+        id = buffer[position + 7] | buffer[position + 8] << 8 | buffer[position + 9] << 16
+        if id not in _EXTRA and (buffer[position + 5], buffer[position + 6]) not in self._sources:
             return 0
         return HEADER_2 + buffer[position + 1] + CHECKSUM + (SIGNATURE if flags else 0)
 
     def _decode(self, raw: bytes) -> Received | None:
         """The message in a frame of the right length; None if the checksum says that it is none."""
         if raw[0] == MAGIC_1:
-            seq, sysid, compid, id = raw[2], raw[3], raw[4], raw[5]
+            _, size, seq, sysid, compid, id = raw[:HEADER_1]
+            begin, flags, compatible = HEADER_1, 0, 0
         else:
-            seq, sysid, compid, id = raw[4], raw[5], raw[6], int.from_bytes(raw[7:10], "little")
+            _, size, flags, compatible, seq, sysid, compid, low, middle, high = raw[:HEADER_2]
+            begin, id = HEADER_2, low | middle << 8 | high << 16
         extra = _EXTRA.get(id)
         if extra is None:
             return Received(None, id, sysid, compid, raw)
-        end = len(raw) - CHECKSUM - (SIGNATURE if raw[0] == MAGIC_2 and raw[2] & SIGNED else 0)
-        if _crc(raw[1:end] + extra) != int.from_bytes(raw[end : end + CHECKSUM], "little"):
+        end = begin + size
+        if _crc(raw[1:end] + extra) != raw[end] | raw[end + 1] << 8:
             self.counters["bad_checksums"] += 1
             return None
-        try:
-            message = self._decoder.decode(bytearray(raw))
-        except dialect.MAVError:  # not reached as far as we know; a peer must not be able to raise
-            self.counters["bad_checksums"] += 1
-            return None
+        message = unpack(id, raw[begin:end])
+        message._header = dialect.MAVLink_header(id, flags, compatible, size, seq, sysid, compid)
         self.counters["frames"] += 1
         source = (sysid, compid)
         last = self._sources.get(source)

@@ -12,8 +12,9 @@ import asyncio
 import logging
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from typing import Any
+
+import msgspec
 
 from anafi_mav.clock import Clock, SystemClock
 from anafi_mav.errors import ConfigError
@@ -29,8 +30,7 @@ message_logger = logging.getLogger("anafi_mav.message")
 """Every message that reaches our services, decoded."""
 
 
-@dataclass(frozen=True)
-class Inbound:
+class Inbound(msgspec.Struct, frozen=True):
     """A message for our services: addressed to one of our systems, or to everybody."""
 
     message: Any

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 from collections import Counter, OrderedDict
 from collections.abc import Hashable
-from dataclasses import dataclass
 from typing import Generic, TypeVar
+
+import msgspec
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.frames import MAX_SOURCES, Received
@@ -25,8 +26,7 @@ RING_FRAMES = 512
 """Frames remembered for that: what some busy systems send in half a second. With more traffic the window is shorter."""
 
 
-@dataclass(frozen=True)
-class Route(Generic[KeyT]):
+class Route(msgspec.Struct, Generic[KeyT], frozen=True):
     """Where a message goes."""
 
     ours: bool
@@ -68,11 +68,10 @@ class Router(Generic[KeyT]):
 
     def heard_on(self, sysid: int, compid: int | None = None) -> list[KeyT]:
         """The channels on which this system, or this component of it, has been heard."""
-        return [
-            channel
-            for channel, sources in self._channels.items()
-            if any(source[0] == sysid and compid in (None, source[1]) for source in sources)
-        ]
+        channels = self._channels.items()
+        if compid is not None:
+            return [channel for channel, sources in channels if (sysid, compid) in sources]
+        return [channel for channel, sources in channels if any(source[0] == sysid for source in sources)]
 
     def route(self, channel: KeyT, received: Received, now: float) -> Route[KeyT]:
         """Where a frame from this channel goes; its source is learned."""
@@ -86,11 +85,12 @@ class Router(Generic[KeyT]):
         target, component = targets(received.message)
         ours = received.message is not None and (target == 0 or target in self._own)
         destinations = self._destinations(target, component, received.id)
-        forward = tuple(other for other in destinations if other != channel)
-        if forward and self._is_repeated(received.raw, now):
-            self.counters["rings"] += 1
-            forward = ()
-        self.counters["forwarded"] += len(forward)
+        forward = tuple([other for other in destinations if other != channel])
+        if forward:
+            if self._is_repeated(received.raw, now):
+                self.counters["rings"] += 1
+                forward = ()
+            self.counters["forwarded"] += len(forward)
         return Route(ours, forward)
 
     def _destinations(self, target: int, component: int, id: int) -> list[KeyT]:

@@ -142,7 +142,8 @@ class UdpOut(Endpoint):
             self._transport.sendto(raw)
 
     def _received(self, data: bytes, address: Any) -> None:
-        self._sink.received(self.channel, self.channel.receive(data))
+        with self._outbox:
+            self._sink.received(self.channel, self.channel.receive(data))
 
     def _paused(self, paused: bool) -> None:
         if paused:
@@ -246,7 +247,7 @@ class UdpIn(Endpoint):
             if not self._make_room(now):
                 self.counters["refused_peers"] += 1
                 return
-            self._peers[address] = _Peer(channel, outbox, now)
+            peer = self._peers[address] = _Peer(channel, outbox, now)
             if self._is_paused:
                 channel.pause()
             self._sink.opened(channel)
@@ -255,7 +256,8 @@ class UdpIn(Endpoint):
             frames = channel.receive(data)
             if frames:
                 peer.heard = now
-        self._sink.received(channel, frames)
+        with peer.outbox:
+            self._sink.received(channel, frames)
 
     def _make_room(self, now: float) -> bool:
         if len(self._peers) < MAX_PEERS:

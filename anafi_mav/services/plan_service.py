@@ -47,6 +47,8 @@ class PlanService(Service):
         self._mission = MissionKind(self._home_item, self._version)
         self._desk = PlanDesk([self._mission, FenceKind(), RallyKind()])
         self._timer: asyncio.TimerHandle | None = None
+        self._due = 0.0
+        """When the timer ends."""
 
     def capabilities(self) -> int:
         return (
@@ -132,14 +134,19 @@ class PlanService(Service):
         self._perform(self._desk.stored(commit, self.host.clock.monotonic()))
 
     def _set_timer(self) -> None:
-        """Come back when something is to be said again."""
+        """Come back when something is to be said again.
+
+        A timer that ends too early is let run, for the deadline goes on with each item of an upload; it looks again.
+        """
+        deadline = self._desk.deadline()
         if self._timer is not None:
+            if deadline is not None and self._due <= deadline:
+                return
             self._timer.cancel()
             self._timer = None
-        deadline = self._desk.deadline()
         if deadline is not None:
             delay = max(deadline - self.host.clock.monotonic(), 0.0)
-            self._timer = asyncio.get_running_loop().call_later(delay, self._expire)
+            self._timer, self._due = asyncio.get_running_loop().call_later(delay, self._expire), deadline
 
     def _expire(self) -> None:
         self._timer = None

@@ -1,9 +1,10 @@
-"""An upload of 1 000 mission items by MAVSDK: to the gateway, and to MAVSDK's own mission_raw server.
+"""An upload of 1 000 mission items by MAVSDK: to the gateway, to MAVSDK's own mission_raw server, to bare servers.
 
     .venv/bin/python tests/bench/missions.py [ITEMS] [ROUNDS]
 
-One MAVSDK client uploads the same items to either, in turns, over UDP on the loopback; each of the three is a process
-of its own. A figure is the time that `upload_mission` takes.
+One MAVSDK client uploads the same items to each, in turns, over UDP on the loopback; each is a process of its own. A
+figure is the time that `upload_mission` takes. The floor is what Python takes for the round trips alone: two servers
+that answer with bytes made beforehand (`bare_vehicle.py`).
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from pathlib import Path
 
 from common import loopback, machine, product, quantile
 
+BARE = Path(__file__).parent / "bare_vehicle.py"
 SERVER = Path(__file__).parents[1] / "clients" / "mavsdk_vehicle.py"
 
 
@@ -27,17 +29,25 @@ def main() -> None:
     print(machine(), flush=True)
     with ExitStack() as stack:
         ours, theirs, drone = f"{loopback()}:14550", f"{loopback()}:14550", loopback()
+        urls = {"gateway": ours, "MAVSDK's server": theirs}
         config = Path(stack.enter_context(tempfile.TemporaryDirectory())) / "fleet.yaml"
         config.write_text(
             f'endpoints: ["udpout://{ours}"]\ndrones: [{{name: alpha, sysid: 1, sim: {{address: {drone}}}}}]\n'
         )
         stack.enter_context(product("run", "-c", str(config)))
-        words = [sys.executable, str(SERVER), f"udpout://{theirs}"]
-        server = stack.enter_context(subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL))
-        stack.callback(server.terminate)
-        times: dict[str, list[float]] = {"gateway": [], "MAVSDK's server": []}
+        servers = [[str(SERVER), f"udpout://{theirs}"]]
+        for kind, title in (("asyncio", "bare asyncio"), ("blocking", "bare socket")):
+            host = loopback()
+            urls[title] = f"{host}:14550"
+            servers.append([str(BARE), host, "14550", str(items), kind])
+        for words in servers:
+            server = stack.enter_context(
+                subprocess.Popen([sys.executable, *words], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            )
+            stack.callback(server.terminate)
+        times: dict[str, list[float]] = {name: [] for name in urls}
         for _ in range(rounds):
-            for name, url in (("gateway", ours), ("MAVSDK's server", theirs)):
+            for name, url in urls.items():
                 words = [sys.executable, __file__, "--upload", f"udpin://{url}", str(items)]
                 run = subprocess.run(
                     words, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, timeout=300, check=True
@@ -48,8 +58,10 @@ def main() -> None:
             f"{name}: {items} items in {quantile(taken, 0.5):.3f} s "
             f"(median of {rounds}, {min(taken):.3f} to {max(taken):.3f})"
         )
-    ratio = quantile(times["gateway"], 0.5) / quantile(times["MAVSDK's server"], 0.5)
-    print(f"ratio of the gateway to MAVSDK's server: {ratio:.2f}")
+    medians = {name: quantile(taken, 0.5) for name, taken in times.items()}
+    theirs_too = medians.pop("MAVSDK's server")
+    for name, median in medians.items():
+        print(f"ratio of {name} to MAVSDK's server: {median / theirs_too:.2f}")
 
 
 async def upload(url: str, count: int) -> float:
