@@ -471,6 +471,8 @@ class SimulatedDrone:
         session.send(end)
 
     def _emit(self, message: Message) -> None:
+        if message.NAME in self.faults.untold:
+            return
         if message.BUFFER is not Buffer.NON_ACK:
             self.log.add_message(self._clock(), "event", message)
         if self.skycontroller is not None:

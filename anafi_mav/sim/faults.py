@@ -61,6 +61,8 @@ class Faults:
     """Further lines of the take-off checklist that prevent it."""
     storage_full: bool = False
     """No room for a photo more."""
+    untold: frozenset[str] = frozenset()
+    """Names of events that this firmware does not send, at once: what is not written down another one may not tell."""
 
     def __setattr__(self, name: str, value: object) -> None:
         object.__setattr__(self, name, value)

@@ -1,0 +1,120 @@
+"""Conformance items 73 and 74: how plans end whose drone does not say that it has executed their last line.
+
+Parrot does not write down whether a plan that lands or returns tells its last line before it stops. The simulator does;
+here it does not, and what is its own end and what is not has to be seen from what the drone does then.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from support.flavours import both
+from support.missions import (
+    ACTIVE,
+    COMPLETE,
+    LAND,
+    PAUSED,
+    RTL,
+    first,
+    mode,
+    put,
+    reached,
+    said,
+    start,
+    state,
+    takeoff,
+    way,
+)
+from support.plans import Item
+from support.trouble import return_by_itself
+from support.world import ARMED, World, world
+
+from anafi_mav.arsdk.messages import common
+
+WAIT = Item(93, 0.0, 0.0, p1=2.0, frame=2)
+
+
+def while_it_waits(w: World, do: Callable[[], Any]) -> asyncio.Future[Any]:
+    """Do something in the moment in which the drone begins to wait, in the line before the last."""
+
+    def heard(entry: Any) -> bool:
+        if entry.name != "item" or not entry.args["command"].endswith("delay"):
+            return False
+        do()
+        return True
+
+    return asyncio.ensure_future(w.drone.wait_log(heard, 40.0))
+
+
+def waited(w: World) -> None:
+    """The drone says that it has executed the line before the last, and no more of its lines."""
+    w.drone._emit(common.MissionItemExecuted(len(w.drone.firmware.flight_plan._items) - 2))
+    w.drone.faults.untold = frozenset({common.MissionItemExecuted.NAME})
+
+
+def told_after(w: World, entry: Any) -> list[str]:
+    """What the drone was told to do after that."""
+    return [e.name for e in w.drone.log if e.kind == "command" and e.t > entry.t]
+
+
+async def to_the_last_line(w: World, last: Item, do: Callable[[], Any] = lambda: None) -> tuple[int, Any]:
+    """Fly a mission to its last line, where something else may happen; a mark before it, and the drone's last word."""
+    await put(w, [takeoff(6.0), way(9.0, 0.0, 6.0), WAIT, last])
+
+    def there() -> None:
+        waited(w)
+        do()
+
+    ending = while_it_waits(w, there)
+    await start(w)
+    await state(w, ACTIVE, seq=1, since=0)
+    mark = w.client.mark()
+    return mark, await ending
+
+
+@both
+@pytest.mark.parametrize("model", ["4k", "ai"])
+@pytest.mark.parametrize("last", [LAND, RTL], ids=["land", "return"])
+async def test_conf_073_an_end_that_the_drone_does_not_tell(flavour: str, model: str, last: Item) -> None:
+    """It lands, or returns: that was the plan's last item. Nothing is sent against it."""
+    async with world(flavour=flavour, model=model, web=True) as w:
+        mark, entry = await to_the_last_line(w, last)
+        await state(w, COMPLETE, since=mark)
+        assert reached(w) == [0, 1, 2, 3]
+        await mode(w, w.modes.land if last is LAND else w.modes.returning, since=mark)
+        if last is LAND:
+            await w.client.heartbeat(lambda beat: not beat.base_mode & ARMED, since=mark, timeout=40.0)
+        else:
+            await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.idle, timeout=40.0)
+        assert told_after(w, entry) == []
+        lines = [e.args["idx"] for e in w.drone.log if e.name == common.MissionItemExecuted.NAME]
+        assert lines == [*range(len(w.drone.firmware.flight_plan._items) - 1)]
+        assert reached(w) == [0, 1, 2, 3]
+
+
+@both
+@pytest.mark.parametrize("last", [LAND, RTL], ids=["land", "return"])
+async def test_conf_074_a_plan_that_is_stopped_before_its_landing_is_paused(flavour: str, last: Item) -> None:
+    """Somebody else stops it there and the drone hovers: nothing has landed or returned, so nothing is complete."""
+    async with world(flavour=flavour, web=True) as w:
+        stop = w.drone.firmware.flight_plan.stop
+        mark, entry = await to_the_last_line(w, last, lambda: stop(hover=True))
+        await state(w, PAUSED, seq=3, since=mark)
+        await said(w, f"Mission paused at item {3 + first(w)}: the drone has stopped"[:50], since=mark)
+        await mode(w, w.modes.idle, since=mark)
+        assert reached(w) == [0, 1, 2]
+        assert told_after(w, entry) == []
+        assert w.drone.pose.up > 5.0
+
+
+@both
+async def test_conf_074_a_return_of_the_batterys_at_the_last_line_is_not_the_plans(flavour: str) -> None:
+    async with world(flavour=flavour, web=True) as w:
+        mark, entry = await to_the_last_line(w, RTL, lambda: return_by_itself(w))
+        await state(w, PAUSED, seq=3, since=mark)
+        await mode(w, w.modes.returning, since=mark)
+        assert reached(w) == [0, 1, 2]
+        assert told_after(w, entry) == []
