@@ -75,6 +75,8 @@ format stands there instead of in param3 of SET_STILL_MODE.
 
 _NOTHING_WITHOUT_A_PLACE = (common.MAV_CMD_NAV_WAYPOINT, common.MAV_CMD_DO_SET_ROI_LOCATION)
 
+_FLOAT_FRAMES = {RELATIVE_INT: RELATIVE, GLOBAL_INT: GLOBAL}
+
 _UNSET = frozenset({None, 0.0, -1.0})
 """Of a parameter that means nothing, what is no loss: zero, and the -1 of "unchanged"."""
 
@@ -100,10 +102,16 @@ def read(text: str, source: str, version: Version) -> Plan:
 
 
 def _kept(params: Params, known: frozenset[int]) -> Params:
-    one, two, three, four, five, six, seven = (
-        value if number in known else None for number, value in enumerate(params, 1)
+    one, two, three, four, five, six, seven = params
+    return (
+        one if 1 in known else None,
+        two if 2 in known else None,
+        three if 3 in known else None,
+        four if 4 in known else None,
+        five if 5 in known else None,
+        six if 6 in known else None,
+        seven if 7 in known else None,
     )
-    return one, two, three, four, five, six, seven
 
 
 def _photo_of_version_1(item: Item, before: list[Item]) -> list[Item]:
@@ -156,7 +164,7 @@ def _held(number: int, item: Item, version: Version, losses: list[Loss]) -> Item
         losses.append(Loss(f"command {item.command}: version {version} has none such", number))
         return None
     placed = known >= _PLACE
-    frame = {RELATIVE_INT: RELATIVE, GLOBAL_INT: GLOBAL}.get(item.frame, item.frame)
+    frame = _FLOAT_FRAMES.get(item.frame, item.frame)
     if placed and not (frame == RELATIVE or (frame == GLOBAL and version == 2)):
         if item.params[4] is not None and item.params[5] is not None:
             losses.append(Loss(f"its height is in frame {item.frame}: version {version} has none such", number))

@@ -65,9 +65,9 @@ def text_of(header: str, items: list[Item], current: int | None = 0) -> bytes:
     """A file of these items; `current` is the one that is marked."""
     lines = [header]
     for number, item in enumerate(items):
-        numbers = ["nan" if value is None else _decimal(value) for value in item.params]
-        words = [number, int(number == current), item.frame, item.command, *numbers, int(item.autocontinue)]
-        lines.append("\t".join(map(str, words)))
+        numbers = "\t".join(["nan" if value is None else _decimal(value) for value in item.params])
+        head = f"{number}\t{int(number == current)}\t{item.frame}\t{item.command}"
+        lines.append(f"{head}\t{numbers}\t{int(item.autocontinue)}")
     return ("\n".join(lines) + "\n").encode()
 
 

@@ -16,6 +16,9 @@ from anafi_mav.services.plan_items import DEGREES, UNSET, PlanItem, has_place
 
 LARGEST = float(np.finfo(np.float32).max)
 
+EXACT = 2.0**24
+"""Whole numbers below it are the same in single precision."""
+
 
 def to_wire(item: Item) -> PlanItem:
     """An item as it travels. Raises `ValueError` for a number that MISSION_ITEM_INT cannot carry."""
@@ -64,4 +67,6 @@ def _integer(value: float | None, placed: bool) -> int:
 
 
 def _shortest(value: float) -> float | None:
+    if value.is_integer() and abs(value) < EXACT:
+        return value
     return None if math.isnan(value) else float(str(np.float32(value)))

@@ -112,10 +112,8 @@ class PlanDesk:
 
     def deadline(self) -> float | None:
         """When `expire` has something to do; None: never."""
-        return min(
-            (deadline for transfer in self.transfers.values() if (deadline := transfer.deadline()) is not None),
-            default=None,
-        )
+        deadlines = [transfer.deadline() for transfer in self.transfers.values()]
+        return min([deadline for deadline in deadlines if deadline is not None], default=None)
 
     def expire(self, now: float) -> list[Effect]:
         """Time has passed."""

@@ -9,7 +9,6 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 from anafi_mav import units
 from anafi_mav.mavlink import dialect
@@ -32,8 +31,7 @@ logger = logging.getLogger(__name__)
 _ITEMS = (dialect.MAVLINK_MSG_ID_MISSION_ITEM, dialect.MAVLINK_MSG_ID_MISSION_ITEM_INT)
 
 
-@dataclass(frozen=True)
-class _ChannelPeer(Peer):
+class _ChannelPeer(Peer, frozen=True):
     """A client and the way to it."""
 
     channel: Channel

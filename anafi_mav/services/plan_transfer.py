@@ -14,6 +14,8 @@ from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
+import msgspec
+
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.flavours import PX4, Flavour
 from anafi_mav.services.plan_items import Fault, PlanItem, item_float, item_int, item_of, opaque_id
@@ -76,8 +78,7 @@ TRANSITIONS: dict[State, dict[Event, State]] = {
 """What is not here does not happen: `PlanTransfer` ignores, refuses or defers it."""
 
 
-@dataclass(frozen=True)
-class Peer:
+class Peer(msgspec.Struct, frozen=True):
     """A client, told apart from others by `client` and addressed exactly (conformance R11)."""
 
     client: Hashable
@@ -86,8 +87,7 @@ class Peer:
     flavour: Flavour
 
 
-@dataclass(frozen=True)
-class Reply:
+class Reply(msgspec.Struct, frozen=True):
     """Send this to one client."""
 
     message: dialect.MAVLink_message

@@ -28,6 +28,22 @@ def test_without_a_place_the_same_fields_are_plain_numbers() -> None:
     assert from_wire(wire).params == (-30.0, None, 0.0, 0.0, 7.0, None, 2.0)
 
 
+@pytest.mark.parametrize(
+    ("single", "shortest"),
+    [
+        (0.30000001192092896, "0.3"),
+        (-0.0, "-0.0"),
+        (16777215.0, "16777215.0"),
+        (-16777216.0, "-16777216.0"),
+        (33554436.0, "33554436.0"),
+        (99999997952.0, "100000000000.0"),
+        (math.inf, "inf"),
+    ],
+)
+def test_numbers_come_back_as_short_as_they_mean_the_same(single: float, shortest: str) -> None:
+    assert repr(from_wire(PlanItem(205, MISSION, (single, 0.0, 0.0, 0.0), 0, 0, 0.0)).params[0]) == shortest
+
+
 @pytest.mark.parametrize("params", [(1e39,), (0, 0, 0, 0, 3e9), (0, 0, 0, 0, 0, -3e9)])
 def test_what_a_message_cannot_carry(params: tuple[float, ...]) -> None:
     with pytest.raises(ValueError, match="too large a number"):
