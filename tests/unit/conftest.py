@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import AsyncIterator
 
 import pytest
@@ -35,14 +34,5 @@ async def device(states: list[Message], settings: list[Message]) -> AsyncIterato
 
 @pytest.fixture
 async def drone(device: ScriptedDevice) -> AsyncIterator[Drone]:
-    """Connected; when a test is over nobody may wait for anything any more."""
-    drone = device.drone()
-    await drone.connect()
-    yield drone
-    await drone.close()
-    await asyncio.sleep(0)
-    commander = drone._commander
-    assert not commander._open, "somebody still waits for an answer"
-    assert not commander._waiting
-    assert not commander.halting
-    assert not commander.begins
+    async with device.connected() as drone:
+        yield drone

@@ -26,6 +26,17 @@ T = TypeVar("T")
 
 LAT, LON = 48.8789, 2.3677
 
+PARROTS_EXAMPLE = b"""QGC WPL 120
+0 1 3 22   15.0 0.0 0.0 nan  48.878601 2.366549 15.0 1
+1 0 3 16   0.0 0.0 0.0 0.0   48.879000 2.366549 20.0 1
+2 0 2 2000 0.0 1.0 1.0 1.0   0.0 0.0 0.0 1
+3 0 2 93   10.0 0.0 0.0 0.0  0.0 0.0 0.0 1
+4 0 2 2001 0.0 0.0 0.0 0.0   0.0 0.0 0.0 1
+5 0 3 16   0.0 0.0 0.0 0.0   48.879139 2.367296 0.0 1
+6 0 3 21   0.0 0.0 0.0 nan   48.879139 2.367296 0.0 1
+"""
+"""The example of Parrot's developer pages, with its blanks."""
+
 
 def waypoint(north: float, east: float, height: float = 20.0, *params: float | None, frame: int = RELATIVE) -> Item:
     """A waypoint so many 1e-4 degrees from the middle."""

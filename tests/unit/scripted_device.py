@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Sequence
+from collections.abc import AsyncIterator, Callable, Sequence
+from contextlib import asynccontextmanager
 from typing import Any, TypeVar
 
 from anafi_mav.arsdk.device import DeviceServer, DeviceSession
@@ -76,6 +77,20 @@ class ScriptedDevice:
             name="scripted",
             clock=clock,
         )
+
+    @asynccontextmanager
+    async def connected(self) -> AsyncIterator[Drone]:
+        """A drone of ours, connected; at the end nobody may wait for anything any more."""
+        drone = self.drone()
+        await drone.connect()
+        yield drone
+        await drone.close()
+        await asyncio.sleep(0)
+        commander = drone._commander
+        assert not commander._open, "somebody still waits for an answer"
+        assert not commander._waiting
+        assert not commander.halting
+        assert not commander.begins
 
     @property
     def session(self) -> DeviceSession:

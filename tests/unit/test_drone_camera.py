@@ -353,10 +353,8 @@ async def ai() -> AsyncIterator[ScriptedDevice]:
 
 @pytest.fixture
 async def ai_drone(ai: ScriptedDevice) -> AsyncIterator[Drone]:
-    drone = ai.drone()
-    await drone.connect()
-    yield drone
-    await drone.close()
+    async with ai.connected() as drone:
+        yield drone
 
 
 async def test_the_cameras_of_an_ai_are_asked_for(ai: ScriptedDevice, ai_drone: Drone) -> None:

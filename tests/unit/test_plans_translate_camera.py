@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from plan_samples import LAT, LON, action, waypoint
+from plan_samples import LAT, LON, PARROTS_EXAMPLE, action, waypoint
 
 from anafi_mav.errors import PlanError
 from anafi_mav.plans import files, parrot
@@ -42,20 +42,9 @@ def roi(latitude: float | None = LAT, longitude: float | None = LON, height: flo
     return Item(command, frame, (mode, 0.0, 0.0, 0.0, latitude, longitude, height))
 
 
-SAMPLE = b"""QGC WPL 120
-0 1 3 22   15.0 0.0 0.0 nan  48.878601 2.366549 15.0 1
-1 0 3 16   0.0 0.0 0.0 0.0   48.879000 2.366549 20.0 1
-2 0 2 2000 0.0 1.0 1.0 1.0   0.0 0.0 0.0 1
-3 0 2 93   10.0 0.0 0.0 0.0  0.0 0.0 0.0 1
-4 0 2 2001 0.0 0.0 0.0 0.0   0.0 0.0 0.0 1
-5 0 3 16   0.0 0.0 0.0 0.0   48.879139 2.367296 0.0 1
-6 0 3 21   0.0 0.0 0.0 nan   48.879139 2.367296 0.0 1
-"""
-
-
 def test_parrots_own_example() -> None:
     """Parrot's flight plan page: it says with words what it does, and so does its translation."""
-    items = list(files.parse(SAMPLE, "sample.mavlink", 2).items)
+    items = list(files.parse(PARROTS_EXAMPLE, "sample.mavlink", 2).items)
     start = Start(48.878601, 2.366549, 0.0, flying=False, heading=30.0)
     assert told(items, 2, start) == [
         (22,),

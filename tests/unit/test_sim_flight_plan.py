@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
+from plan_samples import PARROTS_EXAMPLE
 from sim_bench import HOME, Bench
 
 from anafi_mav import geo
@@ -19,17 +20,6 @@ from anafi_mav.sim.states import all_states
 S = FlyingState
 NAN = math.nan
 V1, V2 = MavlinkType.FLIGHT_PLAN, MavlinkType.FLIGHT_PLAN_V2
-
-# The sample of Parrot's developer pages, with its blanks.
-SAMPLE = b"""QGC WPL 120
-0 1 3 22   15.0 0.0 0.0 nan  48.878601 2.366549 15.0 1
-1 0 3 16   0.0 0.0 0.0 0.0   48.879000 2.366549 20.0 1
-2 0 2 2000 0.0 1.0 1.0 1.0   0.0 0.0 0.0 1
-3 0 2 93   10.0 0.0 0.0 0.0  0.0 0.0 0.0 1
-4 0 2 2001 0.0 0.0 0.0 0.0   0.0 0.0 0.0 1
-5 0 3 16   0.0 0.0 0.0 0.0   48.879139 2.367296 0.0 1
-6 0 3 21   0.0 0.0 0.0 nan   48.879139 2.367296 0.0 1
-"""
 
 
 def line(command: int, *p: float, at: tuple[float, float, float] | None = None, frame: int = 3) -> str:
@@ -48,12 +38,12 @@ def text(*lines: str) -> bytes:
 
 
 def test_the_sample_of_parrots_pages() -> None:
-    items = read(SAMPLE, 2)
+    items = read(PARROTS_EXAMPLE, 2)
     assert [item.command for item in items] == [22, 16, 2000, 93, 2001, 16, 21]
     assert items[1][2:] == (0.0, 0.0, 0.0, 0.0, 48.879, 2.366549, 20.0)
     assert math.isnan(items[0].p4)
     assert (items[2].frame, items[3].p1) == (Frame.MISSION, 10.0)
-    assert len(read(SAMPLE, 1)) == 7
+    assert len(read(PARROTS_EXAMPLE, 1)) == 7
     assert read(text(line(16, at=(0.0, 0.0, 5.0))).replace(b"120", b"110"), 1)[0].altitude == 5.0
 
 
