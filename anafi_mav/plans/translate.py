@@ -7,7 +7,7 @@ is the table of `rules`; how lines are written is `pen`; this is the way through
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 
@@ -111,8 +111,16 @@ def _done(part: Leg | Step) -> Iterator[int]:
     return chain(*part.done) if isinstance(part, Leg) else iter(part.done)
 
 
-def translate(items: Sequence[Item], version: Version, start: Start, first: int | Cursor = 0) -> Flight:
+def translate(
+    items: Sequence[Item],
+    version: Version,
+    start: Start,
+    first: int | Cursor = 0,
+    jumps: Mapping[int, int] | None = None,
+) -> Flight:
     """Write what is flown from an item on, or from where another flight ended.
+
+    `jumps` are items that jump, and how often they have when it begins at an item.
 
     What items before `first` have set holds, and photos and videos that they began and did not end are begun. Raises
     `PlanError` for what `examine` finds wrong, and when heights above mean sea level cannot be had.
@@ -120,7 +128,7 @@ def translate(items: Sequence[Item], version: Version, start: Start, first: int 
     wrong = _judged(items, version)[0] or _wrong_ways(items, version)
     if wrong:
         raise PlanError("mission", wrong[0].reason, wrong[0].item)
-    cursor = first if isinstance(first, Cursor) else _cursor(items, version, start, first)
+    cursor = first if isinstance(first, Cursor) else _cursor(items, version, start, first, jumps or {})
     try:
         return _fly(items, version, start, cursor)
     except Refused as error:
@@ -275,7 +283,7 @@ def _stepped(items: Sequence[Item], flown: set[int], flight: Flight) -> Iterator
 # The way through it.
 
 
-def _cursor(items: Sequence[Item], version: Version, start: Start, first: int) -> Cursor:
+def _cursor(items: Sequence[Item], version: Version, start: Start, first: int, jumps: Mapping[int, int]) -> Cursor:
     """What holds at an item, from all that stand before it in the list."""
     if not 0 <= first < len(items):
         raise PlanError("mission", f"it has {len(items)} items", first)
@@ -284,7 +292,7 @@ def _cursor(items: Sequence[Item], version: Version, start: Start, first: int) -
     for pen.item, item in enumerate(items[:first]):
         if item.command != DO_JUMP:
             _write(pen, item)
-    return Cursor(first, (), pen.settings, anew=True)
+    return Cursor(first, tuple(sorted(jumps.items())), pen.settings, anew=True)
 
 
 def _fly(items: Sequence[Item], version: Version, start: Start, cursor: Cursor) -> Flight:

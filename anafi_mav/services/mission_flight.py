@@ -118,7 +118,8 @@ class MissionFlight:
             return  # it is flown, and goes on without a jolt
         self._require_freedom()
         if vehicle.armed:
-            await self._begin(progress.first if item is None else item, self.first_number(client))
+            chosen = item is not None
+            await self._begin(progress.first if item is None else item, self.first_number(client), anew=chosen)
             return
         if problems := vehicle.prearm_problems():
             raise Refused("PreArm: " + "; ".join(problems))
@@ -187,17 +188,19 @@ class MissionFlight:
         same = progress.state is State.PAUSED and item == progress.current
         return same and whole and paused and self._vehicle.in_air
 
-    async def _begin(self, item: int, number: int, *, waited: bool = False) -> None:
+    async def _begin(self, item: int, number: int, *, anew: bool = False, waited: bool = False) -> None:
         """Fly from an item on. Nothing is disturbed before all is known to be good. `number` is of the first item.
 
+        `anew`: loops have all their turns before them, else those that were not flown when it was stopped.
         `waited`: the drone was taken over when the mode was chosen, and has stood since.
         """
         vehicle, progress, plan = self._vehicle, self.progress, self._vehicle.drone.flight_plan
         items, resumes, uid = progress.items, self._resumes(item), self._uid
+        jumps = {} if anew else progress.jumps
         if resumes:
             parts, rest, line = self._parts, self._rest, progress.line
         else:
-            parts, rest, line = *await lay_out(vehicle, items, item, number), -1
+            parts, rest, line = *await lay_out(vehicle, items, item, number, jumps), -1
         await check_path(vehicle, parts, line, number)
         if not resumes and isinstance(parts[0], Leg):
             parts[0], uid, line = await self._files.beginning_with(parts[0])
@@ -218,7 +221,7 @@ class MissionFlight:
         vehicle.select(FlightMode.MISSION, self)
         self._parts, self._rest = parts, rest
         if not resumes:
-            self._next = None
+            self._next, progress.jumps = None, {**jumps}
         head = parts[0]
         try:
             if isinstance(head, Leg):
@@ -290,6 +293,7 @@ class MissionFlight:
                 progress.fly(head.item)
                 self.news()
                 await fly_step(self._vehicle, progress.items[head.item])
+                progress.did(head.done)
                 for item in head.done:
                     self.reached(item)
                 del self._parts[0]
@@ -305,7 +309,7 @@ class MissionFlight:
             following, self._next = self._next, None
             self.progress.current = following
             self._break_off("after a lost link it does not go on by itself")
-            self.progress.choose(following)
+            self.progress.choose(following, anew=False)
             self.news()
         elif self._parts or self._rest is not None:
             self._run(self._go_on())
@@ -486,6 +490,7 @@ class MissionFlight:
                 return
             self._uid, self._parts, self._next = record.uid, [leg], record.next
             progress.begin(leg, record.line)
+            progress.jumps = dict(record.jumps)
             progress.stop()
         if progress.state is not State.PAUSED or progress.leg is None:
             return
@@ -512,4 +517,5 @@ class MissionFlight:
                 after = following.origins[0]
             elif self._rest is not None:
                 after = self._rest.item
-            self.remember(Record.of(self.identity, self._uid, leg, self.progress.line, after))
+            line, jumps = self.progress.line, self.progress.jumps
+            self.remember(Record.of(self.identity, self._uid, leg, line, after, jumps))

@@ -6,7 +6,7 @@ What is judged is what is flown: the lines of the files.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -58,15 +58,16 @@ def _start(vehicle: Vehicle) -> Start:
 
 
 async def lay_out(
-    vehicle: Vehicle, items: Sequence[Item], first: int | Cursor, number: int
+    vehicle: Vehicle, items: Sequence[Item], first: int | Cursor, number: int, jumps: Mapping[int, int] | None = None
 ) -> tuple[list[Leg | Step], Cursor | None]:
     """What is flown from an item on, from where the drone is, and how it goes on after that. Raises `Refused`.
 
-    `number` is what the first item is called. In a thread: 5 000 items take half a second.
+    `number` is what the first item is called, `jumps` how often which jump was taken before. In a thread: 5 000 items
+    take half a second.
     """
     start, version = _start(vehicle), vehicle.drone.flight_plan.version
     try:
-        flight = await asyncio.to_thread(translate, items, 1 if version == 1 else 2, start, first)
+        flight = await asyncio.to_thread(translate, items, 1 if version == 1 else 2, start, first, {**(jumps or {})})
     except PlanError as error:
         where = "" if error.item is None else f"item {error.item + number}: "
         raise Refused(f"Mission refused: {where}{error.problem}") from error

@@ -10,7 +10,7 @@ import enum
 from collections.abc import Sequence
 
 from anafi_mav.mavlink import dialect
-from anafi_mav.plans.plan import Item
+from anafi_mav.plans.plan import DO_JUMP, Item
 from anafi_mav.plans.translate import Leg
 
 ENDINGS = (dialect.MAV_CMD_NAV_LAND, dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH)
@@ -85,6 +85,8 @@ class Progress:
         """The file that the drone flies, or flew last; None: none since the mission or its current item was chosen."""
         self.line = -1
         """Of it, the one that was executed last."""
+        self.jumps: dict[int, int] = {}
+        """Items that jump, and how often each was done since the mission or its current item was chosen."""
         self._skipped: set[int] = set()
         """Lines that the drone has left out."""
 
@@ -116,15 +118,20 @@ class Progress:
         self.state = TRANSITIONS[self.state][Event.TAKE if items else Event.CLEAR]
         self.items = tuple(items)
         self._forget()
-        self.current = 0
+        self.current, self.jumps = 0, {}
 
-    def choose(self, item: int) -> None:
-        """Begin there next time. Our own wrong arguments raise: `item` is one of the mission's, which does not fly."""
+    def choose(self, item: int, *, anew: bool = True) -> None:
+        """Begin there next time, with loops that have all their turns before them unless it goes on like that anyway.
+
+        Our own wrong arguments raise: `item` is one of the mission's, which does not fly.
+        """
         if not 0 <= item < len(self.items):
             raise ValueError(f"the mission has no item {item}")
         self.state = TRANSITIONS[self.state][Event.CHOOSE]
         self._forget()
         self.current = item
+        if anew:
+            self.jumps = {}
 
     def begin(self, leg: Leg | None, line: int = -1) -> None:
         """It is flown: by this file, of which `line` was executed last, or (None) by the gateway for now."""
@@ -147,6 +154,13 @@ class Progress:
     def finish(self) -> None:
         """Nothing is left of it."""
         self.state = TRANSITIONS[self.state][Event.FINISH]
+        self.jumps = {}
+
+    def did(self, items: Sequence[int]) -> None:
+        """Items are done: jumps among them count."""
+        for item in items:
+            if self.items[item].command == DO_JUMP:
+                self.jumps[item] = self.jumps.get(item, 0) + 1
 
     def skip(self, line: int) -> int | None:
         """The drone leaves a line out; the item that this spoils."""
@@ -165,6 +179,8 @@ class Progress:
         leg = self.leg
         if self.state is not State.ACTIVE or leg is None or not self.line < line < len(leg.origins):
             return ()
+        for passed in leg.done[self.line + 1 : line + 1]:
+            self.did(passed)
         self.line = line
         done = leg.done[line]
         if line in self._skipped:

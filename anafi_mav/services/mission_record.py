@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from itertools import chain
 from typing import Any
 
 import msgspec
@@ -24,10 +26,12 @@ class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Executed last; -1 for none."""
     next: int | None
     """The item that follows the file, when the gateway has to begin it."""
+    jumps: tuple[tuple[int, int], ...] = ()
+    """Items that jump, and how often each was done by then."""
 
     @classmethod
-    def of(cls, mission: int, uid: str, leg: Leg, line: int, following: int | None) -> Self:
-        return cls(mission, uid, leg.content.decode(), leg.origins, leg.done, line, following)
+    def of(cls, mission: int, uid: str, leg: Leg, line: int, following: int | None, jumps: Mapping[int, int]) -> Self:
+        return cls(mission, uid, leg.content.decode(), leg.origins, leg.done, line, following, tuple(jumps.items()))
 
     @classmethod
     def read(cls, kept: Any) -> Self | None:
@@ -38,8 +42,8 @@ class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             return None
         lines = len(record.content.splitlines()) - 1
         sound = len(record.origins) == len(record.done) == lines and -1 <= record.line < lines
-        items = (*record.origins, *(item for done in record.done for item in done), record.next or 0)
-        return record if sound and min(items) >= 0 else None
+        numbers = chain(record.origins, *record.done, *record.jumps, [record.next or 0])
+        return record if sound and min(numbers) >= 0 else None
 
     @property
     def written(self) -> Any:

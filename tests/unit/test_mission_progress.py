@@ -56,6 +56,34 @@ def test_line_after_line() -> None:
     assert (progress.state, progress.first) == (State.COMPLETE, 0)
 
 
+JUMP = Item(177, 2, (1.0, 3.0, None, None, None, None, None))
+
+
+def test_turns_of_loops_are_counted() -> None:
+    """With each line that has the jump, also when the drone's word for it was lost; a chosen item begins them anew."""
+    progress = Progress()
+    progress.take([*ITEMS[:3], JUMP])
+    progress.begin(Leg(b"", (1, 2, 1, 2, 1, 2), ((1,), (2, 3), (1,), (2, 3), (1,), (2, 3))))
+    progress.executed(0)
+    assert progress.jumps == {}
+    progress.executed(1)
+    assert progress.jumps == {3: 1}
+    progress.executed(4)  # 2 and 3 were not heard
+    assert progress.jumps == {3: 2}
+    progress.executed(3)
+    assert progress.jumps == {3: 2}
+    progress.stop()
+    progress.choose(1, anew=False)
+    assert progress.jumps == {3: 2}
+    progress.choose(1)
+    assert progress.jumps == {}
+    progress.fly(1)
+    progress.did((1, 3))
+    assert progress.jumps == {3: 1}
+    progress.finish()
+    assert progress.jumps == {}
+
+
 def test_what_was_told_before_or_is_no_line_says_nothing() -> None:
     progress = flying()
     assert progress.executed(1) == (0,)
@@ -125,11 +153,15 @@ def test_another_mission() -> None:
 
 
 def test_what_is_kept_is_read_again_and_nothing_else() -> None:
-    record = Record.of(77, "abc", LEG, 2, None)
+    record = Record.of(77, "abc", LEG, 2, None, {3: 2})
     again = Record.read(record.written)
     assert again == record
     assert again.leg == LEG
+    assert dict(again.jumps) == {3: 2}
     good = record.written
+    earlier = {key: value for key, value in good.items() if key != "jumps"}
+    assert Record.read(earlier) == Record.of(77, "abc", LEG, 2, None, {})
+    assert Record.read({**good, "jumps": [[3, -1]]}) is None
     for key, wrong in [("line", 6), ("line", -2), ("origins", [0, 0]), ("done", "x"), ("uid", 3), ("more", 1)]:
         assert Record.read({**good, key: wrong}) is None, key
     assert Record.read({**good, "origins": [0, 0, 1, -2, 4, 5]}) is None
