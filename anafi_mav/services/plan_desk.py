@@ -30,6 +30,8 @@ _WRITING = frozenset(
     }
 )
 
+_BEGINNING = _WRITING | {dialect.MAVLINK_MSG_ID_MISSION_REQUEST_LIST}
+
 MESSAGES = (
     *_WRITING,
     dialect.MAVLINK_MSG_ID_MISSION_ITEM,
@@ -53,6 +55,10 @@ class PlanDesk:
 
     def receive(self, message: Any, peer: Peer, now: float) -> list[Effect]:
         """A message of `MESSAGES` from a client."""
+        if message.get_msgId() in _BEGINNING:
+            for kind, transfer in self.transfers.items():
+                if kind != message.mission_type:
+                    transfer.gone_on(peer)
         if message.get_msgId() in _WRITING and (self._waiting or self._storing(message.mission_type)):
             if len(self._waiting) >= MAX_WAITING:
                 return [_ack(peer, dialect.MAV_MISSION_ERROR, message.mission_type)]

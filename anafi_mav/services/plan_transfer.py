@@ -19,16 +19,11 @@ import msgspec
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.flavours import PX4, Flavour
 from anafi_mav.services.plan_items import Fault, PlanItem, item_float, item_int, item_of, opaque_id
+from anafi_mav.services.plan_requests import REQUEST_EVERY, Requests
 from anafi_mav.services.statustext import Severity
 
 MAX_ITEMS = 5000
 """Items of a list: more than any client sends, small enough to be checked and stored at once."""
-
-REQUEST_EVERY = 0.25
-"""s after which the expected item is requested again: QGroundControl gives up after 1.5 s without a word."""
-
-MAX_TRIES = 20
-"""Requests of one item. With a quarter lost each way an item fails to come 20 times in a row once in 15 million."""
 
 PATIENCE = 1.5
 """s of silence after which a client no longer keeps others away (the "1500 ms others" of conformance C5)."""
@@ -36,7 +31,7 @@ PATIENCE = 1.5
 RECENT = 5.0
 """s after which a transfer is history: what comes late of it is answered as if it had never been."""
 
-ECHOES = 5
+ECHOES = 6
 """How often the final acknowledgement is repeated, `REQUEST_EVERY` apart, after a transfer that lost something:
 clients wait 1.5 to 2.5 s for it and do not ask. One that lost nothing is acknowledged once, for a repetition could
 meet the client's next transfer."""
@@ -159,12 +154,8 @@ class _Upload:
     peer: Peer
     items: list[PlanItem]
     """The list as it will be: for a partial one with the items that stay."""
-    expected: int
-    last: int
+    requests: Requests
     heard: float
-    due: float
-    """When to request the expected item again."""
-    tries: int = 0
     as_float: bool = False
     """The form of the newest request, which sticks while it is answered."""
     lossy: bool = False
@@ -233,7 +224,7 @@ class PlanTransfer:
             return self._deny(
                 Fault(dialect.MAV_MISSION_NO_SPACE, f"{count} items are more than {self.kind.capacity}"), peer
             )
-        return self._begin(_Upload(peer, [], 0, count - 1, now, now), now)
+        return self._begin(_Upload(peer, [], Requests(0, count - 1), now), now)
 
     def partial(self, first: int, last: int, peer: Peer, now: float) -> list[Effect]:
         """MISSION_WRITE_PARTIAL_LIST: some items are replaced, or one follows the last. ArduPilot has it, PX4 not.
@@ -252,7 +243,7 @@ class PlanTransfer:
             return self._deny(fault, peer)
         if first >= self.kind.capacity:
             return self._deny(Fault(dialect.MAV_MISSION_NO_SPACE, f"it has {first} items already"), peer)
-        return self._begin(_Upload(peer, items, first, last, now, now), now)
+        return self._begin(_Upload(peer, items, Requests(first, last), now), now)
 
     def _begin(self, upload: _Upload, now: float) -> list[Effect]:
         if self._busy(upload.peer, now):
@@ -260,6 +251,15 @@ class PlanTransfer:
         effects: list[Effect] = []
         old = self._upload
         if old is not None and old.peer.client == upload.peer.client:
+            before, after = old.requests, upload.requests
+            if before.expected == before.first and (before.first, before.last, old.items) == (
+                after.first,
+                after.last,
+                upload.items,
+            ):
+                # A copy. The first item has been requested, and will be again: the client need not hear of it twice.
+                before.tries, old.heard, old.lossy = 1, now, True
+                return []
             upload.as_float = old.as_float
             upload.lossy = True  # it says the same again, or begins anew because something was lost
         elif old is not None:
@@ -284,7 +284,7 @@ class PlanTransfer:
         if peer.client != upload.peer.client:
             return [self._ack(peer, dialect.MAV_MISSION_DENIED)]
         upload.heard = now
-        if message.seq != upload.expected:
+        if message.seq != upload.requests.expected:
             upload.lossy = True
             return []
         item = item_of(message)
@@ -292,10 +292,8 @@ class PlanTransfer:
         if fault is not None:
             return self._refuse(Fault(fault.result, f"item {message.seq}: {fault.reason}"), now)
         assert isinstance(item, PlanItem)
-        upload.items[upload.expected : upload.expected + 1] = [item]
-        if upload.expected < upload.last:
-            upload.expected += 1
-            upload.tries = 0
+        upload.items[message.seq : message.seq + 1] = [item]
+        if upload.requests.came():
             self.state = TRANSITIONS[self.state][Event.ITEM]
             return [self._request(upload, now)]
         items = tuple(self.kind.taken(upload.items, peer.flavour))
@@ -304,7 +302,7 @@ class PlanTransfer:
             return self._refuse(fault, now)
         self.state = TRANSITIONS[self.state][Event.LAST_ITEM]
         self._upload = None
-        self._committing = _Done(peer, now, upload.last, ECHOES if upload.lossy else 0)
+        self._committing = _Done(peer, now, upload.requests.last, ECHOES if upload.lossy else 0)
         return [Commit({self.kind.mission_type: items}, peer, self.kind.mission_type)]
 
     def clear(self, peer: Peer, now: float) -> list[Effect]:
@@ -400,20 +398,20 @@ class PlanTransfer:
     def deadline(self) -> float | None:
         """When `expire` has something to do; None: never."""
         if self._upload is not None:
-            return self._upload.due
+            return self._upload.requests.due
         return self._done.due if self._done is not None and self._done.echoes > 0 else None
 
     def expire(self, now: float) -> list[Effect]:
         """Time has passed."""
         upload, done = self._upload, self._done
-        if upload is not None and now >= upload.due:
+        if upload is not None and now >= upload.requests.due:
             upload.lossy = True
-            if upload.tries >= MAX_TRIES:
+            if upload.requests.in_vain:
                 self._end(Event.SILENCE)
                 return [
                     self._ack(upload.peer, dialect.MAV_MISSION_OPERATION_CANCELLED),
-                    Say(Severity.WARNING, f"{self.kind.name.capitalize()} upload given up: item {upload.expected} "
-                        "does not come"),
+                    Say(Severity.WARNING, f"{self.kind.name.capitalize()} upload given up: "
+                        f"item {upload.requests.expected} does not come"),
                 ]  # fmt: skip
             return [self._request(upload, now)]
         if upload is None and done is not None and done.echoes > 0 and now >= done.due:
@@ -430,15 +428,13 @@ class PlanTransfer:
         MAVSDK knows MISSION_REQUEST_INT alone, dronekit MISSION_REQUEST alone. A flavour says which one its clients
         know; a client of component 0, which is pymavlink's default, may be either, so each try takes the other form.
         """
-        if upload.tries > 0 and upload.peer.compid == 0 and not upload.peer.flavour.float_plans:
+        requests, peer = upload.requests, upload.peer
+        if requests.between_tries and requests.tries > 0 and peer.compid == 0 and not peer.flavour.float_plans:
             upload.as_float = not upload.as_float
-        upload.tries += 1
-        upload.due = now + REQUEST_EVERY
         kind = (
             dialect.MAVLink_mission_request_message if upload.as_float else dialect.MAVLink_mission_request_int_message
         )
-        peer = upload.peer
-        return Reply(kind(peer.sysid, peer.compid, upload.expected, self.kind.mission_type), peer)
+        return Reply(kind(peer.sysid, peer.compid, requests.again(now), self.kind.mission_type), peer)
 
     def _ack(self, peer: Peer, result: int) -> Reply:
         identity = self.opaque_id if result == dialect.MAV_MISSION_ACCEPTED else 0
@@ -470,7 +466,7 @@ class PlanTransfer:
         assert upload is not None
         self._end(Event.REFUSE)
         echoes = ECHOES if upload.lossy else 0
-        self._done = _Done(upload.peer, now, upload.expected, echoes, now + REQUEST_EVERY, fault.result)
+        self._done = _Done(upload.peer, now, upload.requests.expected, echoes, now + REQUEST_EVERY, fault.result)
         return self._deny(fault, upload.peer)
 
     def _end(self, event: Event) -> None:
@@ -489,6 +485,12 @@ class PlanTransfer:
         if seq != done.last:
             return []
         return [self._ack(peer, done.result)]  # the client has not heard it: it says its last item again
+
+    def gone_on(self, peer: Peer) -> None:
+        """The client begins with another list, so it has heard of this one. MAVSDK takes an acknowledgement of any list
+        for one of that which it transfers."""
+        if self._done is not None and self._done.peer.client == peer.client:
+            self._done.echoes = 0
 
     def _forget_done(self, peer: Peer) -> None:
         """The client goes on to something else: nothing late of its last transfer must meet it."""

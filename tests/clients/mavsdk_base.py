@@ -45,6 +45,14 @@ async def until(updates: AsyncIterator[Any], accept: Callable[[Any], bool] = lam
     return await asyncio.wait_for(find(), LIMIT)
 
 
+def fields(item: Any) -> tuple[object, ...]:
+    """All that an item of mission_raw says."""
+    return (
+        item.seq, item.frame, item.command, item.current, item.autocontinue, item.param1, item.param2, item.param3,
+        item.param4, item.x, item.y, item.z, item.mission_type,
+    )  # fmt: skip
+
+
 async def held(name: str, seconds: float = 0.0) -> None:
     """Go on with a step for so long that something comes of it, and until the test has looked and said so."""
     await asyncio.sleep(seconds)

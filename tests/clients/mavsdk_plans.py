@@ -10,7 +10,6 @@ from __future__ import annotations
 import asyncio
 import sys
 import time
-from typing import Any
 
 from mavsdk.asyncio.plugins.geofence import (
     Circle,
@@ -22,7 +21,7 @@ from mavsdk.asyncio.plugins.geofence import (
     Polygon,
 )
 from mavsdk.asyncio.plugins.mission_raw import MissionItem, MissionRawAsync, MissionRawError
-from mavsdk_base import connected, say
+from mavsdk_base import connected, fields, say
 
 FENCE, RALLY = 1, 2
 
@@ -56,13 +55,6 @@ async def fences(geofence: GeofenceAsync, latitude: float, longitude: float) -> 
     say("fence kept", shape(await geofence.download_geofence()))
     await geofence.clear_geofence()
     say("fence cleared", shape(await geofence.download_geofence()))
-
-
-def fields(item: Any) -> tuple[object, ...]:
-    return (
-        item.seq, item.frame, item.command, item.current, item.autocontinue, item.param1, item.param2, item.param3,
-        item.param4, item.x, item.y, item.z, item.mission_type,
-    )  # fmt: skip
 
 
 def rally_points(count: int, latitude: float, longitude: float) -> list[MissionItem]:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from support.flavours import both
 from support.plans import ACCEPTED, MISSION, download, mission, upload
-from support.product import Process, program
+from support.product import program
 from support.world import HOME, World, world
 
 from anafi_mav.plans import files
@@ -16,11 +16,6 @@ from anafi_mav.services.mission_items import to_wire
 
 SCRIPT = Path(__file__).with_name("mavsdk_mission.py")
 SAMPLES = sorted((Path(__file__).parents[2] / "missions").glob("*.plan"))
-
-
-def said(script: Process, words: str) -> list[str]:
-    """What followed these words, line by line."""
-    return [line.removeprefix(words).strip() for line in script.lines if line.startswith(words + " ")]
 
 
 def script(w: World, *paths: Path) -> tuple[str, ...]:
@@ -33,15 +28,15 @@ async def test_conf_116_a_mission_of_mavsdks_own_kind() -> None:
     """Up, down, flown, held, gone on with and finished; the drone did what the items say, in their order."""
     async with world(web=True) as w, program(*script(w)) as mavsdk:
         await mavsdk.line(lambda line: line == "done", timeout=150.0)
-        assert said(mavsdk, "read") == said(mavsdk, "sent")
-        assert said(mavsdk, "mode") == ["MISSION", "HOLD", "MISSION", "RETURN_TO_LAUNCH"]
-        assert said(mavsdk, "finished") == ["False", "True"]
-        counted = [tuple(map(int, line.split())) for line in said(mavsdk, "progress")]
+        assert mavsdk.said("read") == mavsdk.said("sent")
+        assert mavsdk.said("mode") == ["MISSION", "HOLD", "MISSION", "RETURN_TO_LAUNCH"]
+        assert mavsdk.said("finished") == ["False", "True"]
+        counted = [tuple(map(int, line.split())) for line in mavsdk.said("progress")]
         assert [number for number, total in counted] == sorted(number for number, total in counted)
         assert {number for number, total in counted} >= {1, 2, 3, 4}
         assert {total for number, total in counted} == {4}
-        assert said(mavsdk, "current") == ["2"]
-        assert len(said(mavsdk, "no item")) == len(said(mavsdk, "left")) == 1
+        assert mavsdk.said("current") == ["2"]
+        assert len(mavsdk.said("no item")) == len(mavsdk.said("left")) == 1
 
         # What the drone itself has done: the way point that it was held on the way to is begun twice.
         names = [entry.args["command"] for entry in w.drone.log if entry.name == "item"]
@@ -61,7 +56,7 @@ async def test_conf_116_raw_missions(flavour: str) -> None:
     """What QGroundControl has stored is imported, uploaded and read back; somebody else's upload is told."""
     async with world(flavour=flavour, web=True) as w, program(*script(w, *SAMPLES)) as mavsdk:
         await mavsdk.line(lambda line: line == "yours", timeout=120.0)
-        found = {name: words for name, *words in map(str.split, said(mavsdk, "import"))}
+        found = {name: words for name, *words in map(str.split, mavsdk.said("import"))}
         assert set(found) == {path.name for path in SAMPLES}
         for name, words in found.items():
             if name in ("corridor.plan", "structure.plan"):  # survey items that MAVSDK's reader does not know
@@ -77,5 +72,5 @@ async def test_conf_116_raw_missions(flavour: str) -> None:
         ours = mission(HOME, 7)
         assert (await upload(other, ours, MISSION)).type == ACCEPTED
         await mavsdk.line(lambda line: line == "done", timeout=30.0)
-        assert said(mavsdk, "changed to") == said(mavsdk, "kept") == ["7"]
-        assert said(mavsdk, "refused") == ["UNSUPPORTED"]
+        assert mavsdk.said("changed to") == mavsdk.said("kept") == ["7"]
+        assert mavsdk.said("refused") == ["UNSUPPORTED"]

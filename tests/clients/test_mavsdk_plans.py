@@ -8,15 +8,10 @@ from pathlib import Path
 import pytest
 from support.flavours import both
 from support.plans import FENCE, RALLY, download
-from support.product import Process, program
+from support.product import program
 from support.world import HOME, world
 
 SCRIPT = Path(__file__).with_name("mavsdk_plans.py")
-
-
-def said(script: Process, words: str) -> list[str]:
-    """What followed these words, line by line."""
-    return [line.removeprefix(words).strip() for line in script.lines if line.startswith(words + " ")]
 
 
 @pytest.mark.timeout(180)
@@ -27,14 +22,14 @@ async def test_conf_076_077_mavsdk(flavour: str) -> None:
         words = (sys.executable, "-u", str(SCRIPT), f"tcpout://{w.address}:5760", *map(str, place))
         async with program(*words) as script:
             await script.line(lambda line: line == "done", timeout=120.0)
-            (sent,) = said(script, "fence sent")
+            (sent,) = script.said("fence sent")
             assert sent.count("INCLUSION") == sent.count("EXCLUSION") == 1
-            assert said(script, "fence read") == said(script, "fence kept") == [sent]
-            assert said(script, "fence cleared") == ["[] []"]
-            assert len(said(script, "fence refused")) == len(said(script, "raw refused")) == 1
-            assert said(script, "raw fence") == ["True"]
-            assert said(script, "raw rally") == ["5 True", "1000 True"]
-            assert said(script, "raw kept") == ["3"]
+            assert script.said("fence read") == script.said("fence kept") == [sent]
+            assert script.said("fence cleared") == ["[] []"]
+            assert len(script.said("fence refused")) == len(script.said("raw refused")) == 1
+            assert script.said("raw fence") == ["True"]
+            assert script.said("raw rally") == ["5 True", "1000 True"]
+            assert script.said("raw kept") == ["3"]
 
         # And another client reads the same.
         circles = await download(w.client, FENCE)

@@ -8,15 +8,10 @@ from pathlib import Path
 import pytest
 from support.flavours import both
 from support.params import fetch
-from support.product import Process, program
+from support.product import program
 from support.world import world
 
 SCRIPT = Path(__file__).with_name("mavsdk_setup.py")
-
-
-def said(script: Process, word: str) -> list[str]:
-    """What followed this word, line by line."""
-    return [line.removeprefix(word).strip() for line in script.lines if line.split(" ", 1)[0] == word]
 
 
 @pytest.mark.timeout(180)
@@ -32,29 +27,29 @@ async def test_conf_116_mavsdk_param_ftp_metadata_events(flavour: str, tmp_path:
         async with program(*words, env=env) as script:
             await script.line(lambda line: line == "done", timeout=90.0)
 
-            assert said(script, "parameters") == [str(count)]
-            before, after, at_last = said(script, "height")
+            assert script.said("parameters") == [str(count)]
+            before, after, at_last = script.said("height")
             assert (after, at_last) == ("41.5", "41.5")
             assert before != after
             name = "rth.set_min_altitude" if flavour == "px4" else "ardrone3.PilotingSettings.MaxAltitude"
             assert [list(entry.args.values()) for entry in w.commands(name)] == [[41.5]]
-            assert said(script, "whole") == ["4001" if flavour == "px4" else "2000"]
-            assert len(said(script, "refused")) == 1
+            assert script.said("whole") == ["4001" if flavour == "px4" else "2000"]
+            assert len(script.said("refused")) == 1
 
-            listed = said(script, "listed")[0].split()
+            listed = script.said("listed")[0].split()
             assert {"general.json.xz", "parameter.json", "parameter.json.xz", "events.json.xz"} <= set(listed)
-            burst, read = said(script, "downloaded")
+            burst, read = script.said("downloaded")
             assert burst == read
             assert int(burst.split()[1]) == count
-            assert said(script, "identical") == ["True", "True"]
-            assert said(script, "missing") == ["FILE_DOES_NOT_EXIST"]
-            assert said(script, "upload") == ["FILE_PROTECTED"]
-            assert said(script, "remove") == ["FILE_PROTECTED"]
-            assert sorted(said(script, "metadata")) == ["events 1", f"parameter {count}"]
+            assert script.said("identical") == ["True", "True"]
+            assert script.said("missing") == ["FILE_DOES_NOT_EXIST"]
+            assert script.said("upload") == ["FILE_PROTECTED"]
+            assert script.said("remove") == ["FILE_PROTECTED"]
+            assert sorted(script.said("metadata")) == ["events 1", f"parameter {count}"]
 
             # Health and arming checks, as QGroundControl's own library reads them.
             await script.line(lambda line: line.startswith("report"), timeout=20.0)
-            assert "can_arm=True problems=[] errors=[]" in said(script, "report")[-1]
+            assert "can_arm=True problems=[] errors=[]" in script.said("report")[-1]
             w.drone.faults.magneto_required = True
             line = await script.line(
                 lambda line: line.startswith("report") and "Magnetometer calibration required" in line

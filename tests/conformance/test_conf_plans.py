@@ -19,6 +19,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.flavours import both
+from support.lossy import lossy_link
 from support.mav import Client
 from support.plans import (
     ACCEPTED,
@@ -37,7 +38,6 @@ from support.plans import (
     UNSUPPORTED,
     UNSUPPORTED_FRAME,
     Item,
-    LossyClient,
     around,
     circle,
     clear,
@@ -52,7 +52,7 @@ from support.plans import (
     square,
     upload,
 )
-from support.world import HOME, World, loopback, world
+from support.world import HOME, UDP_PORT, loopback, world
 
 from anafi_mav.config import Config, DroneConfig
 from anafi_mav.gateway import Gateway
@@ -117,23 +117,16 @@ async def test_conf_048_answers_go_to_who_asked(flavour: str) -> None:
             assert targets == {(client.sysid, client.compid)}
 
 
-async def lossy(w: World, loss: float, seed: int) -> LossyClient:
-    client = LossyClient(loss, seed)
-    await client.connect(5760, w.address)
-    w.clients.append(client)
-    return client
-
-
 @both
 async def test_conf_061_a_quarter_of_everything_lost(flavour: str) -> None:
-    """The 500 items of this are in tests/unit/test_plan_transfer.py in virtual time: they take two minutes."""
-    async with world(flavour=flavour) as w:
-        client = await lossy(w, 0.25, seed=4)
-        plan = a_plan(RALLY, 40)
+    """tests/clients/test_lossy_missions.py has 500 items."""
+    async with world(flavour=flavour, udp=True) as w, lossy_link((w.address, UDP_PORT), 0.25) as link:
+        client, plan = w.take(Client(254).connect_udp(*link.address)), a_plan(RALLY, 40)
         ack = await upload(client, plan, RALLY, timeout=10.0, repeat=0.5)
         assert ack.type == ACCEPTED
         items = await download(client, RALLY, tries=20, patience=0.1)
         assert [content(item) for item in items] == [item.content for item in plan]
+        link.check(80)
 
 
 def requests(client: Client) -> list[tuple[float, Any]]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
+import socket
 import time
 from collections.abc import Callable
 from typing import Any
@@ -34,11 +35,20 @@ class Client:
         self._out = dialect.MAVLink(None, sysid, compid)
         self._news = asyncio.Event()
         self._writer: asyncio.StreamWriter | None = None
+        self._socket: socket.socket | None = None
         self._task: asyncio.Task[None] | None = None
 
     async def connect(self, port: int, host: str = "127.0.0.1") -> Client:
         reader, self._writer = await asyncio.open_connection(host, port)
         self._task = asyncio.get_running_loop().create_task(self._read(reader))
+        return self
+
+    def connect_udp(self, host: str, port: int) -> Client:
+        """It is heard of when it has said something."""
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.setblocking(False)
+        self._socket.connect((host, port))
+        asyncio.get_running_loop().add_reader(self._socket, lambda end: self.feed(end.recv(65536)), self._socket)
         return self
 
     async def _read(self, reader: asyncio.StreamReader) -> None:
@@ -63,8 +73,14 @@ class Client:
             self._task.cancel()
         if self._writer is not None:
             self._writer.close()
+        if self._socket is not None:
+            asyncio.get_running_loop().remove_reader(self._socket)
+            self._socket.close()
 
     def send_raw(self, data: bytes) -> None:
+        if self._socket is not None:
+            self._socket.send(data)
+            return
         assert self._writer is not None
         self._writer.write(data)
 

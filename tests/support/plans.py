@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import random
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -176,20 +175,3 @@ async def clear(client: Client, kind: int) -> Any:
     mark = client.mark()
     client.send(dialect.MAVLink_mission_clear_all_message(1, 1, kind))
     return await client.wait("MISSION_ACK", lambda m: m.mission_type == kind, since=mark)
-
-
-class LossyClient(Client):
-    """A client at the other end of a bad link: of every message in either direction some are lost."""
-
-    def __init__(self, loss: float, seed: int, sysid: int = 255, compid: int = 190) -> None:
-        super().__init__(sysid, compid)
-        self._loss, self._random = loss, random.Random(seed)
-
-    def send(self, message: Any) -> None:
-        if self._random.random() >= self._loss:
-            super().send(message)
-
-    def feed(self, data: bytes) -> None:
-        before = self.mark()
-        super().feed(data)
-        self.received[before:] = [entry for entry in self.received[before:] if self._random.random() >= self._loss]

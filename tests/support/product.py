@@ -83,6 +83,10 @@ class Process:
         except asyncio.TimeoutError:
             raise AssertionError(f"no such line within {timeout} s: {self}") from None
 
+    def said(self, words: str) -> list[str]:
+        """What followed these words on stdout, line by line."""
+        return [line.removeprefix(words).strip() for line in self.lines if line.startswith(words + " ")]
+
     def say(self, line: str) -> None:
         """A line to its stdin."""
         assert self.process.stdin is not None

@@ -22,6 +22,8 @@ HOME = (48.8789, 2.3677, 35.0)
 WEB_PORT = 8080
 """Of a drone's web server; each drone has an address of its own."""
 
+UDP_PORT = 14550
+
 HOLD, LAND, RETURN, TAKEOFF = 0x03040000, 0x06040000, 0x05040000, 0x02040000
 POSITION, OFFBOARD = 0x00030000, 0x00060000
 ARMED = dialect.MAV_MODE_FLAG_SAFETY_ARMED
@@ -86,7 +88,10 @@ class World:
         return self.clients[0]
 
     async def connect(self, sysid: int = 255, compid: int = 190, port: int = 5760) -> Client:
-        client = await Client(sysid, compid).connect(port, self.address)
+        return self.take(await Client(sysid, compid).connect(port, self.address))
+
+    def take(self, client: Client) -> Client:
+        """A client that has come by another way; it is closed at the end."""
         self.clients.append(client)
         return client
 
@@ -136,10 +141,12 @@ async def world(
     model: str = "4k",
     drone_address: str | None = None,
     web: bool = False,
+    udp: bool = False,
 ) -> AsyncIterator[World]:
     """One simulated drone, one gateway with a TCP endpoint, and its clients, connected and ready.
 
     With `flavour` the endpoint shows that autopilot. `also` is the flavour of a second endpoint, at port 5761.
+    With `udp` there is another one that waits at UDP_PORT.
     With `web` the drone has its web server, which takes flight plans. A drone at the same `drone_address` as an earlier
     one has the same serial number.
     """
@@ -156,6 +163,7 @@ async def world(
         endpoints=(
             f"tcpin://{address}:5760?flavour={flavour}",
             *([f"tcpin://{address}:5761?flavour={also}"] if also else []),
+            *([f"udpin://{address}:{UDP_PORT}?flavour={flavour}"] if udp else []),
         ),
         drones=(DroneConfig(name="alpha", sysid=sysid, address=drone_address, http_port=WEB_PORT),),
         allow_kill=allow_kill,
