@@ -9,12 +9,11 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import functools
 from collections.abc import Callable, Coroutine, Hashable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from anafi_mav.drone import events
-from anafi_mav.drone.events import FlyingState, ForcedLandingReason, Message, PlayingState
+from anafi_mav.drone.events import FlyingState, Message, PlayingState
 from anafi_mav.errors import AnafiMavError, CommandRejected, LinkLost
 from anafi_mav.plans.plan import Item
 from anafi_mav.plans.translate import Cursor, Leg, Step
@@ -23,6 +22,7 @@ from anafi_mav.services.mission_path import check_path, lay_out
 from anafi_mav.services.mission_progress import Progress, State
 from anafi_mav.services.mission_record import Record
 from anafi_mav.services.mission_steps import fly_step
+from anafi_mav.services.mission_waits import ArmWait, EndWatch
 from anafi_mav.services.mission_words import refusal
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.refusal import Refused
@@ -30,12 +30,6 @@ from anafi_mav.services.statustext import Severity
 
 if TYPE_CHECKING:
     from anafi_mav.services.vehicle import Vehicle
-
-ARM_WAIT = 10.0
-"""s that a mission waits for somebody to arm: QGroundControl chooses the mode first and arms when it is shown."""
-
-END_WAIT = 2.0
-"""s within which a drone whose plan has ended with a landing or a return has begun it."""
 
 _LANDING = (FlyingState.LANDING, FlyingState.EMERGENCY_LANDING)
 
@@ -70,14 +64,12 @@ class MissionFlight:
         self._starting: tuple[Leg, int] | None = None
         """What the drone is asked to begin, and after which line."""
         self._files = FilesOnDrone(vehicle.drone.flight_plan)
-        self._pending: Hashable = None
-        """Who has chosen the mission on the ground and has to arm now."""
-        self._pending_timer: asyncio.TimerHandle | None = None
+        self._arming = ArmWait(self._lapsed)
         self._beginning = False
         """Taken over by ourselves."""
         self._running: asyncio.Task[None] | None = None
         """What the gateway does between two files."""
-        self._end_timer: asyncio.TimerHandle | None = None
+        self._end_watch = EndWatch(vehicle, self.progress, self._ended)
 
     # What clients ask for.
 
@@ -125,8 +117,7 @@ class MissionFlight:
             raise Refused("PreArm: " + "; ".join(problems))
         await vehicle.take_over()
         vehicle.select(FlightMode.MISSION, self)
-        self._pending = client
-        self._pending_timer = asyncio.get_running_loop().call_later(ARM_WAIT, self._lapsed)
+        self._arming.begin(client)
 
     async def choose(self, client: Hashable, item: int) -> None:
         """Make an item the current one; a mission that is flown goes on there."""
@@ -143,8 +134,7 @@ class MissionFlight:
 
     def armed(self, client: Hashable) -> None:
         """A client has armed: what waited for that begins."""
-        if self._pending is not None and self._pending == client:
-            self._forget_pending()
+        if self._arming.ends_with(client):
             self._run(self._begin_and_report(self.first_number(client)))
 
     @property
@@ -336,7 +326,7 @@ class MissionFlight:
         reason = f": {why}" if why else ""
         if not self._beginning:
             self.say(severity, lambda first: f"Mission paused at item {current + first}{reason}")
-        self._cancel_end_timer()
+        self._end_watch.end()
         self._keep()
         self.news()
 
@@ -384,10 +374,7 @@ class MissionFlight:
             if progress.leg_done:
                 self._leg_over()
             elif progress.ending and progress.at_last_line and message.state == PlayingState.STOPPED:
-                self._cancel_end_timer()
-                late = functools.partial(self._look_for_end, last=True)
-                self._end_timer = asyncio.get_running_loop().call_later(END_WAIT, late)
-                self._look_for_end()
+                self._end_watch.begin()
             elif self._vehicle.drone.controller.pilot_flies:
                 self._break_off("the pilot at the Skycontroller flies")
             else:
@@ -403,22 +390,14 @@ class MissionFlight:
 
     def on_vehicle(self) -> None:
         """Landing, return or flying state have changed."""
-        if self._end_timer is not None:
-            self._look_for_end()
+        self._end_watch.look()
 
-    def _look_for_end(self, *, last: bool = False) -> None:
-        """The plan's last line lands or returns, and the drone has not said that it has executed it: has it begun?
-
-        A landing or a return of another cause is none of the mission's.
-        """
-        vehicle, progress = self._vehicle, self.progress
-        forced = vehicle.drone.alerts.state.forced_landing not in (None, ForcedLandingReason.NONE)
-        down = vehicle.flying_state in (FlyingState.LANDING, FlyingState.LANDED)
-        if progress.at_last_line and not forced and (down or (vehicle.returning and not vehicle.returning_by_itself)):
-            self._cancel_end_timer()
-            self._executed(progress.line + 1)
+    def _ended(self, begun: bool) -> None:
+        """The drone has stopped its plan, and then begun to land or to return as the last line says, or it has not."""
+        if begun:
+            self._executed(self.progress.line + 1)
             self._leg_over()
-        elif last:
+        else:
             self._break_off("the drone has stopped it")
 
     # Helm.
@@ -444,33 +423,20 @@ class MissionFlight:
                 vehicle.drone.flight_plan.suspend()
 
     def _lapsed(self) -> None:
-        self._forget_pending()
         self._vehicle.select(FlightMode.HOLD)
         self._vehicle.text(Severity.WARNING, "Mission not begun: nobody armed")
 
     def _drop_pending(self) -> None:
         """What waits to be armed will not begin: the mode must not say that it does."""
-        if self._pending is not None:
-            self._forget_pending()
+        if self._arming.end():
             self._vehicle.forget_mode()
-
-    def _forget_pending(self) -> None:
-        self._pending = None
-        if self._pending_timer is not None:
-            self._pending_timer.cancel()
-            self._pending_timer = None
-
-    def _cancel_end_timer(self) -> None:
-        if self._end_timer is not None:
-            self._end_timer.cancel()
-            self._end_timer = None
 
     # The link.
 
     def link_down(self) -> None:
         """The drone may fly on with the file that it has. What the gateway flies itself ends here."""
-        self._forget_pending()
-        self._cancel_end_timer()
+        self._arming.end()
+        self._end_watch.end()
         self._starting, self._running = None, None
         following = self._parts[1:]
         if following:
