@@ -18,11 +18,12 @@ COUNT = 500
 
 BAD = 0.25
 
-MAVSDKS_BEST = 0.1
-"""The highest loss, in steps of a twentieth, with which more than 99.9 % of such uploads by MAVSDK succeed, by the way
-it counts, also on a busy machine: 99.995 %. With 15 % it is 99.94 %, but 93 % where the gateway is 60 ms late on
-average, for MAVSDK's half seconds go on. With a quarter lost it is 97.7 %, and 99.9 % cannot be: it says its first
-message five times, and once in a thousand uploads all five are lost. tests/bench/lossy_uploads.py has the figures."""
+MAVSDKS_SHARE = 0.1
+"""By the way MAVSDK counts, 99.995 % of such uploads succeed. With 15 % lost, the highest loss in steps of a twentieth
+that leaves more than 99.9 %, it is 99.94 %; but it counts half seconds without a request, which go on when the gateway
+is late, and on a machine with seven times as much to do as it can one of nine such uploads ended in a timeout. With a
+quarter lost it is 97.7 %, and 99.9 % cannot be: it says its first message five times, and once in a thousand uploads
+all five are lost. tests/bench/lossy_uploads.py has the figures."""
 
 MAVSDKS_OWN = 0.05
 """What MAVSDK's own test of lossy transfers loses. It asks for an item five times, so 99.6 % of such downloads succeed,
@@ -47,7 +48,7 @@ async def holds_what_mavsdk_sent(w: World) -> None:
 
 @pytest.mark.timeout(240)
 async def test_conf_061_500_items_by_mavsdk_on_a_bad_link() -> None:
-    async with world(udp=True) as w, lossy_link((w.address, UDP_PORT), MAVSDKS_BEST) as link:
+    async with world(udp=True) as w, lossy_link((w.address, UDP_PORT), MAVSDKS_SHARE) as link:
         assert "tried upload done" in await by_mavsdk(w, link, "up")
         link.check(COUNT)
         await holds_what_mavsdk_sent(w)
