@@ -241,13 +241,14 @@ def _after(items: Sequence[Item], number: int) -> int:
 def _flies(items: Sequence[Item], version: Version, loop: Sequence[int]) -> bool:
     """Something of a loop takes its time. The first turn leads to where the second begins."""
     pen = Pen(version, Start(0.0, 0.0, 0.0, flying=True, takeoff_amsl=0.0), items)
-    before = 0
-    for _ in range(2):
+    for turn in range(2):
         before = pen.flown
         for pen.item in loop:
             if TABLE[items[pen.item].command].moves:
                 _write(pen, items[pen.item])
-    return pen.flown > before
+            if turn and pen.flown > before:
+                return True
+    return False
 
 
 def _reached(items: Sequence[Item]) -> set[int]:
