@@ -8,14 +8,12 @@ import asyncio
 import itertools
 import random
 import time
-from pathlib import Path
 from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.mav import NAN, Client
 from support.params import fetch
-from support.product import product
 from support.world import ARMED, HOME, World, loopback, world
 
 from anafi_mav import geo
@@ -288,29 +286,18 @@ async def test_conf_146_noise_changes_nothing(flavour: str) -> None:
         assert w.drone.flying_state.name == "LANDED"
 
 
-async def test_conf_147_a_storm_of_clients(tmp_path: Path) -> None:
+async def test_conf_147_a_storm_of_clients() -> None:
     """Four clients ping and steer at 50 Hz each: the heartbeat's time does not move by a tenth of a second."""
-    address = loopback()
-    config = f"""
-        endpoints: ["tcpin://{address}:5760"]
-        drones: [{{name: alpha, sysid: 1, sim: {{address: {loopback()}}}}}]
-    """
-    async with product(tmp_path, config):
-        clients = [await Client(255 - n).connect(5760, address) for n in range(4)]
-        try:
-            await clients[0].heartbeat(lambda beat: True)
-            mark = clients[0].mark()
-            for count in range(250):
-                for client in clients:
-                    client.send(dialect.MAVLink_ping_message(count, count, 0, 0))
-                    client.send(dialect.MAVLink_manual_control_message(1, 0, 0, 500, 0, 0))
-                await asyncio.sleep(0.02)  # the clients' own rate
-            beats = [at for at, _ in clients[0].since(mark, "HEARTBEAT")]
-            gaps = [b - a for a, b in itertools.pairwise(beats)]
-            assert len(gaps) >= 3
-            assert all(0.9 <= gap <= 1.1 for gap in gaps), gaps
-            answers = [m for client in clients for _, m in client.since(0, "PING")]
-            assert len(answers) > 900  # of a thousand, the last of which are still on their way
-        finally:
-            for client in clients:
-                await client.close()
+    async with world(clients=4) as w:
+        mark = w.client.mark()
+        for count in range(250):
+            for client in w.clients:
+                client.send(dialect.MAVLink_ping_message(count, count, 0, 0))
+                client.send(dialect.MAVLink_manual_control_message(1, 0, 0, 500, 0, 0))
+            await asyncio.sleep(0.02)  # the clients' own rate
+        beats = [at for at, _ in w.client.since(mark, "HEARTBEAT")]
+        gaps = [b - a for a, b in itertools.pairwise(beats)]
+        assert len(gaps) >= 3
+        assert all(0.9 <= gap <= 1.1 for gap in gaps), gaps
+        answers = [m for client in w.clients for _, m in client.since(0, "PING")]
+        assert len(answers) > 900  # of a thousand, the last of which are still on their way

@@ -6,22 +6,23 @@ before `send` returns), then nothing can happen until that timer: the clock is s
 A minute of flight takes as long as its computations do, on any machine, with the timers in the order they are due.
 
 Not counted either is the time in which callbacks were ready to run and did not, because the machine is shared: what
-they did not spend on a processor, if they did not wait for anything (the kernel counts voluntary switches), and what
-the machine below a virtual one has stolen from its processors meanwhile, which the kernel counts as work of whoever it
-was stolen from. So code of ours that computes for too long, sleeps or blocks is as late as it is.
+they waited for a processor, and what the machine below a virtual one has stolen from its processors meanwhile, which
+the kernel counts as work of whoever it was stolen from. So code of ours that computes for too long, sleeps or blocks is
+as late as it is.
 
-As soon as somebody else is there, a child process or work in a thread, the clock runs like theirs.
+As soon as somebody else is there, a child process, work in a thread or a timer of the kernel's, the clock runs like
+theirs.
 """
 
 from __future__ import annotations
 
 import asyncio
 import os
-import resource
 import selectors
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -55,6 +56,14 @@ def now() -> float:
     return _newest
 
 
+def queued() -> float:
+    """s that this thread was ready to run and did not, because others ran; 0 where the system does not tell."""
+    try:
+        return int(Path("/proc/thread-self/schedstat").read_bytes().split()[1]) * 1e-9
+    except OSError:
+        return 0.0
+
+
 def stolen() -> list[float]:
     """s that were stolen from each processor; nothing where the system does not tell."""
     try:
@@ -79,15 +88,17 @@ class Selector(selectors.DefaultSelector):
     def __init__(self) -> None:
         super().__init__()
         self._left = self._state()
-        self._stolen, self._looked = stolen(), _real()
+        self._queued, self._stolen, self._looked = queued(), stolen(), _real()
         self.in_threads = 0
         """Works in threads that the loop waits for."""
+        self.others = 0
+        """Who else can bring something about, as the test has said."""
         self.processes: list[asyncio.SubprocessTransport] = []
         """Those whose end the loop has not been told of: a thread may have collected it already."""
 
     @staticmethod
-    def _state() -> tuple[float, float, int]:
-        return _real(), time.thread_time(), resource.getrusage(resource.RUSAGE_THREAD).ru_nvcsw
+    def _state() -> tuple[float, float]:
+        return _real(), time.thread_time()
 
     def select(self, timeout: float | None = None) -> Any:
         global _lost, _began
@@ -99,30 +110,30 @@ class Selector(selectors.DefaultSelector):
         here = _real()
         quick = alone and timeout is not None and timeout > 0.0
         ready = self._look() if quick else super().select(timeout)
-        self._left = (back, working, _) = self._state()
-        if quick and not ready:
-            _lost += back - here - timeout
+        self._left = (back, working) = self._state()
+        if alone and timeout is not None:
+            _lost += back - here - (timeout if quick and not ready else 0.0)
         if alone:
             _began = max(_newest, back - _lost), working, threading.get_ident()
         return ready
 
     def _waited(self) -> float:
         """s of the callbacks' time that were none of theirs."""
-        (left, worked, waited), (here, working, waiting) = self._left, self._state()
-        took = here - left
-        if waited == waiting:
-            took = min(took, working - worked + INTERRUPTED)
+        (left, worked), (here, working) = self._left, self._state()
+        lost, idle = 0.0, here - left - (working - worked)
+        if idle > INTERRUPTED:
+            before, self._queued = self._queued, queued()
+            lost = min(idle, self._queued - before)
         if here - left > LONG or here - self._looked > LOOK_EVERY:
-            before, self._stolen, self._looked = self._stolen, stolen(), here
+            earlier, self._stolen, self._looked = self._stolen, stolen(), here
             if here - left > LONG:
-                most = max((b - a for a, b in zip(before, self._stolen, strict=True)), default=0.0)
-                took = max(0.0, min(took, here - left - most))
-        return here - left - took
+                lost += max((b - a for a, b in zip(earlier, self._stolen, strict=True)), default=0.0)
+        return min(lost, here - left)
 
     def _alone(self) -> bool:
         """Whether nobody but the loop itself can bring anything about."""
         self.processes = [process for process in self.processes if process.get_returncode() is None]
-        return not self.in_threads and not self.processes and childless()
+        return not (self.in_threads or self.others or self.processes) and childless()
 
     def _look(self) -> Any:
         """What is ready by itself."""
@@ -137,22 +148,34 @@ class Loop(asyncio.SelectorEventLoop):
     """Knows its processes and works in threads, whose ends it has to wait for in earnest."""
 
     def __init__(self) -> None:
-        self._waits = Selector()
-        super().__init__(self._waits)
+        self.waits = Selector()
+        super().__init__(self.waits)
 
     def run_in_executor(self, executor: Any, func: Callable[..., Any], *args: Any) -> Any:
         work = super().run_in_executor(executor, func, *args)
-        self._waits.in_threads += 1
+        self.waits.in_threads += 1
         work.add_done_callback(self._ended)
         return work
 
     async def subprocess_exec(self, *args: Any, **options: Any) -> Any:
         transport, protocol = await super().subprocess_exec(*args, **options)
-        self._waits.processes.append(transport)
+        self.waits.processes.append(transport)
         return transport, protocol
 
     def _ended(self, work: object) -> None:
-        self._waits.in_threads -= 1
+        self.waits.in_threads -= 1
+
+
+@contextmanager
+def everybodys() -> Iterator[None]:
+    """Within the block the clock runs like everybody's: for what the kernel does by timers of its own."""
+    loop = asyncio.get_running_loop()
+    assert isinstance(loop, Loop)
+    loop.waits.others += 1
+    try:
+        yield
+    finally:
+        loop.waits.others -= 1
 
 
 def install() -> None:

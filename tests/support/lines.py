@@ -8,6 +8,7 @@ import tty
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
+from support.clock import everybodys
 from support.mav import Client
 
 
@@ -56,7 +57,8 @@ async def pseudo_terminal() -> AsyncIterator[tuple[int, str]]:
     master, slave = os.openpty()
     tty.setraw(slave)  # before the gateway opens it: what is echoed until then would come back as garbage
     try:
-        yield master, os.ttyname(slave)
+        with everybodys():  # the kernel hands over what is written in its own time
+            yield master, os.ttyname(slave)
     finally:
         os.close(slave)
         os.close(master)
