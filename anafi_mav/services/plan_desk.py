@@ -3,7 +3,8 @@
     desk.receive(message, peer, now) -> effects;  desk.stored(commit, now) -> effects
     desk.deadline() -> when to call desk.expire(now)
 
-A message that would change a list while that list is being stored waits its turn: clients send it once.
+What is about a list as a whole waits its turn while that list is being stored: clients say it once. dronekit does not
+wait for the acknowledgement of what it uploaded before it asks for the list, and must not be told of the old one.
 """
 
 from __future__ import annotations
@@ -22,22 +23,21 @@ ALL = dialect.MAV_MISSION_TYPE_ALL
 MAX_WAITING = 16
 """Messages that wait for a plan to be stored, which takes milliseconds: a handful of clients, one or two of each."""
 
-_WRITING = frozenset(
+_WHOLE = frozenset(
     {
         dialect.MAVLINK_MSG_ID_MISSION_COUNT,
         dialect.MAVLINK_MSG_ID_MISSION_CLEAR_ALL,
         dialect.MAVLINK_MSG_ID_MISSION_WRITE_PARTIAL_LIST,
+        dialect.MAVLINK_MSG_ID_MISSION_REQUEST_LIST,
     }
 )
-
-_BEGINNING = _WRITING | {dialect.MAVLINK_MSG_ID_MISSION_REQUEST_LIST}
+"""Messages that begin something with a list."""
 
 MESSAGES = (
-    *_WRITING,
+    *_WHOLE,
     dialect.MAVLINK_MSG_ID_MISSION_ITEM,
     dialect.MAVLINK_MSG_ID_MISSION_ITEM_INT,
     dialect.MAVLINK_MSG_ID_MISSION_ACK,
-    dialect.MAVLINK_MSG_ID_MISSION_REQUEST_LIST,
     dialect.MAVLINK_MSG_ID_MISSION_REQUEST,
     dialect.MAVLINK_MSG_ID_MISSION_REQUEST_INT,
     dialect.MAVLINK_MSG_ID_MISSION_REQUEST_PARTIAL_LIST,
@@ -55,11 +55,11 @@ class PlanDesk:
 
     def receive(self, message: Any, peer: Peer, now: float) -> list[Effect]:
         """A message of `MESSAGES` from a client."""
-        if message.get_msgId() in _BEGINNING:
+        if message.get_msgId() in _WHOLE:
             for kind, transfer in self.transfers.items():
                 if kind != message.mission_type:
                     transfer.gone_on(peer)
-        if message.get_msgId() in _WRITING and (self._waiting or self._storing(message.mission_type)):
+        if message.get_msgId() in _WHOLE and (self._waiting or self._storing(message.mission_type)):
             if len(self._waiting) >= MAX_WAITING:
                 return [_ack(peer, dialect.MAV_MISSION_ERROR, message.mission_type)]
             self._waiting.append((message, peer))

@@ -457,16 +457,27 @@ def test_what_comes_while_a_plan_is_stored_waits() -> None:
     """MAVProxy does not wait for the acknowledgement of a clear before it uploads."""
     plans = desk()
     commit = commit_of(plans.receive(clear(), ME, 0.0))
+    (total,) = replies(plans.receive(ask_list(RALLY), OTHER, 0.0))  # another list does not
+    assert total.count == 0
     assert plans.receive(count(2), ME, 0.0) == []
     assert plans.receive(clear(ALL), OTHER, 0.0) == []
-    (total,) = replies(plans.receive(ask_list(RALLY), OTHER, 0.0))  # reading does not wait
-    assert total.count == 0
     effects = plans.stored(commit, 0.0)
     final, request, denied = replies(effects)
     assert (final.get_type(), final.type) == ("MISSION_ACK", ACCEPTED)
     assert (request.get_type(), request.seq) == ("MISSION_REQUEST_INT", 0)
     assert (denied.type, denied.mission_type) == (DENIED, ALL)
     assert uploaded_rest(plans, 0, 2) == items(2)
+
+
+def test_who_asks_for_a_list_while_it_is_stored_is_told_of_the_new_one() -> None:
+    """dronekit asks as soon as it has sent its last item."""
+    plans = desk()
+    plans.receive(count(1), ME, 0.0)
+    commit = commit_of(plans.receive(item(0), ME, 0.0))
+    assert plans.receive(ask_list(), ME, 0.0) == []
+    final, total = replies(plans.stored(commit, 0.0))
+    assert (final.get_type(), final.type) == ("MISSION_ACK", ACCEPTED)
+    assert (total.get_type(), total.count) == ("MISSION_COUNT", 1)
 
 
 def test_what_waits_is_bounded() -> None:
