@@ -55,16 +55,17 @@ class PlanDesk:
 
     def receive(self, message: Any, peer: Peer, now: float) -> list[Effect]:
         """A message of `MESSAGES` from a client."""
-        if message.get_msgId() in _WHOLE:
-            for kind, transfer in self.transfers.items():
-                if kind != message.mission_type:
-                    transfer.gone_on(peer)
-        if message.get_msgId() in _WHOLE and (self._waiting or self._storing(message.mission_type)):
-            if len(self._waiting) >= MAX_WAITING:
-                return [_ack(peer, dialect.MAV_MISSION_ERROR, message.mission_type)]
-            self._waiting.append((message, peer))
-            return []
-        return self._handle(message, peer, now)
+        if message.get_msgId() not in _WHOLE:
+            return self._handle(message, peer, now)
+        for kind, transfer in self.transfers.items():
+            if kind != message.mission_type:
+                transfer.gone_on(peer)
+        if not self._waiting and not self._storing(message.mission_type):
+            return self._handle(message, peer, now)
+        if len(self._waiting) >= MAX_WAITING:
+            return [_ack(peer, dialect.MAV_MISSION_ERROR, message.mission_type)]
+        self._waiting.append((message, peer))
+        return []
 
     def _handle(self, message: Any, peer: Peer, now: float) -> list[Effect]:
         id, kind = message.get_msgId(), message.mission_type

@@ -257,8 +257,8 @@ def test_every_protobuf_message_passes_libarsdk(referee: Referee) -> None:
 @pytest.mark.parametrize("version", [1, 3])
 def test_olympe_answers_our_pings(referee: Referee, version: int) -> None:
     async def body() -> None:
-        session, _ = await join(version, ping_after=0.05, silence_limit=0.5)
-        while session.counters["ping"] < 10:
+        session, _ = await join(version, ping_after=0.2)
+        while session.counters["ping"] < 5:
             await asyncio.sleep(0.05)
             assert not session.lost.done()
         await session.close()

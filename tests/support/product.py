@@ -75,7 +75,7 @@ class Process:
                     position += 1
                     if accept(line):
                         return line
-                assert not all(reader.done() for reader in self._readers), f"it ended: {self}"
+                assert not all(reader.done() for reader in self._readers), f"ended: {self.process.returncode}{self}"
                 await self._news.wait()
 
         try:
