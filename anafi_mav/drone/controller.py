@@ -35,7 +35,7 @@ from anafi_mav.arsdk.messages.skyctrl import Source
 from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone.controller_state import REDUCERS, ControllerState, KnownDrone
 from anafi_mav.drone.element import Element, Reducer
-from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander
+from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, loop_time
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost, LocalProtocolError, NotSupported
 
 log = logging.getLogger("anafi_mav")
@@ -124,7 +124,7 @@ class Controller(Element[ControllerState]):
     @property
     def pilot_flies(self) -> bool:
         """The pilot has taken the drone from our user, whose commands of motion are refused for the time being."""
-        return self.present and self._now() < self._pilot_keeps_until
+        return self.present and loop_time() < self._pilot_keeps_until
 
     def allows(self, message: Message) -> bool:
         """Shown every command before it is sent. A command of motion takes sticks and source for our user.
@@ -134,7 +134,7 @@ class Controller(Element[ControllerState]):
         """
         if not self.present or not is_motion(message):
             return True
-        now = self._now()
+        now = loop_time()
         if now < self._pilot_keeps_until:
             if isinstance(message, ardrone3.PCMD):
                 self._pilot_keeps_until = max(self._pilot_keeps_until, now + PILOT_KEEPS)
@@ -206,7 +206,7 @@ class Controller(Element[ControllerState]):
         self.give_back()
         if self._take_over is not None:
             self._take_over()
-        self._pilot_keeps_until = self._now() + PILOT_KEEPS
+        self._pilot_keeps_until = loop_time() + PILOT_KEEPS
 
     def _watch(self, delay: float) -> None:
         self._timer = asyncio.get_running_loop().call_later(delay, self._look)
@@ -214,7 +214,7 @@ class Controller(Element[ControllerState]):
     def _look(self) -> None:
         """Is the motion over?"""
         self._timer = None
-        rest = self._last_motion + QUIET - self._now()
+        rest = self._last_motion + QUIET - loop_time()
         if rest > 0.0:
             self._watch(rest)
         elif self._moving():
@@ -224,10 +224,6 @@ class Controller(Element[ControllerState]):
 
     def _grab_message(self) -> mapper.Grab:
         return mapper.Grab(self._extra_buttons, self._extra_axes | (STICKS if self.taken else 0))
-
-    @staticmethod
-    def _now() -> float:
-        return asyncio.get_running_loop().time()
 
     # -- verbs
 

@@ -24,6 +24,15 @@ ANSWER_TIMEOUT = 5.0
 """s. A drone answers within tens of milliseconds, over a bad link within a few retransmissions of 150 ms; Parrot's
 own SDK waits 10 s, too long for a ground station that repeats its command every second."""
 
+QUIET = 1.0
+"""s after the drone received a command in which it would have said what it did; silence means that there was nothing to
+do. Its acknowledgement came through, so its events do too, a few retransmissions of 150 ms later at most."""
+
+
+def loop_time() -> float:
+    """Now, s, on the clock of the running loop: what verbs count their time by."""
+    return asyncio.get_running_loop().time()
+
 
 class Wire(Protocol):
     """What is needed of a session: see `arsdk.session.Session`."""
@@ -96,6 +105,22 @@ class Expectation(Generic[T]):
         finally:
             self.close()
 
+    async def came(self, delivery: asyncio.Future[None], what: str, timeout: float) -> bool:
+        """Wait for an answer that need not come: True when it came, False when the drone has the command and is quiet.
+
+        Raises `CommandTimeout` when neither is known in time, `LinkLost`.
+        """
+        self.expire_after(timeout, CommandTimeout(what, timeout))
+        either: set[asyncio.Future[Any]] = {self.future, delivery}
+        await asyncio.wait(either, return_when=asyncio.FIRST_COMPLETED)
+        if not self.future.done():
+            delivery.result()  # raises LinkLost
+            await asyncio.wait({self.future}, timeout=QUIET)
+            if not self.future.done():
+                return False
+        self.future.result()
+        return True
+
     def close(self) -> None:
         """Stop listening."""
         if self._timer is not None:
@@ -137,6 +162,11 @@ class Commander:
     def begins(self) -> bool:
         """Something that is to fly the drone waits for its confirmation (see `begin`)."""
         return bool(self._beginning)
+
+    def require_link(self) -> None:
+        """Raise `LinkLost` without a link."""
+        if self._wire is None:
+            raise LinkLost("not connected")
 
     def attach(self, wire: Wire) -> None:
         """Commands go out here from now on."""
@@ -195,8 +225,7 @@ class Commander:
         if not halting:
             return
         _, late = await asyncio.wait(halting, timeout=max(timeout, 0.0))
-        if not self.connected:
-            raise LinkLost("not connected")
+        self.require_link()
         if late:
             raise CommandTimeout(what, timeout)
         for delivery in halting:
@@ -231,8 +260,7 @@ class Commander:
         self, answers: Sequence[type[Message]], judge: Callable[[Any], T | AnafiMavError | None]
     ) -> Expectation[T]:
         """Listen for an answer among these kinds of events. Raises `LinkLost` when there is no link."""
-        if self._wire is None:
-            raise LinkLost("not connected")
+        self.require_link()
         expectation = Expectation(self, answers, judge)
         self._open.add(expectation)
         for answer in answers:
@@ -316,16 +344,14 @@ class Commander:
             self._give_up(beginning)
 
     def _give_up(self, beginning: _Beginning) -> None:
-        self._given_up[type(beginning.undo)] = asyncio.get_running_loop().time()
+        self._given_up[type(beginning.undo)] = loop_time()
         self.halt_if_connected(beginning.undo)
 
     def may_begin(self, undo: type[Message], memory: float) -> bool:
         """Can something that this kind of command undoes still begin: is it on its way, or was given up within so many
         seconds, when the drone may have heard it already?"""
         given_up = self._given_up.get(undo)
-        return undo in self._beginning or (
-            given_up is not None and asyncio.get_running_loop().time() - given_up < memory
-        )
+        return undo in self._beginning or (given_up is not None and loop_time() - given_up < memory)
 
     def certainly_not(self, undo: type[Message]) -> None:
         """What was given up has not begun, and will not: the drone has received the order against it and is quiet."""

@@ -6,7 +6,6 @@ drone says which by what it reports (feature flight_plan).
 
 from __future__ import annotations
 
-import asyncio
 import re
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
@@ -21,7 +20,7 @@ from anafi_mav.arsdk.messages.flight_plan import Indicator, SupportedCapabilitie
 from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone.alerts import spoken
 from anafi_mav.drone.element import Reducer, members, with_item
-from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander
+from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, loop_time
 from anafi_mav.drone.rest import Rest
 from anafi_mav.drone.settings import Commanding
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost, NotSupported, RemoteProtocolError
@@ -225,7 +224,7 @@ class FlightPlan(Commanding[FlightPlanState]):
             raise
         except BaseException as error:
             if number == self._starts and self._commander.may_begin(common.Stop, START_TIMEOUT):
-                self._unwanted = uid, asyncio.get_running_loop().time() + START_TIMEOUT
+                self._unwanted = uid, loop_time() + START_TIMEOUT
             if isinstance(error, CommandTimeout) and self.state.unavailable:
                 raise CommandRejected(self._why()) from None
             raise

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import math
 from collections.abc import Mapping
 from typing import Any, ClassVar
@@ -15,7 +14,7 @@ from anafi_mav.arsdk.messages.follow_me import Behavior, Input, Mode
 from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone.alerts import spoken
 from anafi_mav.drone.element import Position, Reducer, members, position, with_item
-from anafi_mav.drone.expectation import ANSWER_TIMEOUT
+from anafi_mav.drone.expectation import ANSWER_TIMEOUT, loop_time
 from anafi_mav.drone.settings import Commanding, number
 from anafi_mav.errors import (
     AnafiMavError,
@@ -136,7 +135,7 @@ class FollowMe(Commanding[FollowMeState]):
                 north,
                 east,
                 down,
-                asyncio.get_running_loop().time() * 1000.0,
+                loop_time() * 1000.0,
             )
         )
 

@@ -14,7 +14,9 @@ from anafi_mav.arsdk.messages.common import PlayingState
 from anafi_mav.arsdk.messages.follow_me import Mode as FollowMeMode
 from anafi_mav.arsdk.messages.piloting_style import PilotingStyleStyle
 from anafi_mav.arsdk.wire import Message
+from anafi_mav.drone.alerts import spoken
 from anafi_mav.drone.element import Position, Range, Reducer, finite, members, position, setting
+from anafi_mav.drone.sticks import Limits
 
 MOTORS_OFF = frozenset({FlyingState.LANDED, FlyingState.EMERGENCY})
 ON_THE_GROUND = MOTORS_OFF | {FlyingState.MOTOR_RAMPING, FlyingState.USERTAKEOFF}
@@ -100,6 +102,23 @@ class PilotingState(msgspec.Struct, frozen=True):
     def in_air(self) -> bool | None:
         """Is the drone off the ground? None when the drone has not said."""
         return None if self.flying is None else self.flying not in ON_THE_GROUND
+
+    @property
+    def limits(self) -> Limits | None:
+        """What 100 % stick is; None before the drone has reported all of it."""
+        tilt, yaw, climb = self.max_tilt, self.max_rotation_speed, self.max_vertical_speed
+        if tilt is None or yaw is None or climb is None:
+            return None
+        return Limits(tilt.current, yaw.current, climb.current)
+
+
+def in_state(flying: FlyingState | None) -> str:
+    """The flying state as the reason of a refusal."""
+    return (
+        "the drone has not reported its flying state"
+        if flying is None
+        else f"the drone is in the state {spoken(flying)}"
+    )
 
 
 def _attitude(state: PilotingState, message: ardrone3.AttitudeChanged) -> PilotingState:

@@ -16,7 +16,7 @@ from typing import Any, TypeAlias, TypeVar
 from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone.element import Element, StateT
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, Expectation
-from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost, LocalProtocolError, NotSupported
+from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LocalProtocolError, NotSupported
 
 T = TypeVar("T")
 
@@ -47,8 +47,7 @@ class Commanding(Element[StateT]):
 
     def _require(self, reported: object, feature: str) -> None:
         """Raise `LinkLost` without a link, `NotSupported` when what the drone should have reported is None or empty."""
-        if not self._commander.connected:
-            raise LinkLost("not connected")
+        self._commander.require_link()
         if reported is None or reported == frozenset() or reported == {}:
             raise NotSupported(feature)
 

@@ -1,0 +1,210 @@
+"""Up and down: the verbs that start the motors, and those that end a flight.
+
+A take-off that was given up may have reached the drone all the same: a landing and an emergency have to catch what may
+still begin.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from anafi_mav.arsdk.messages import ardrone3, common
+from anafi_mav.arsdk.messages.ardrone3 import FlyingState
+from anafi_mav.arsdk.wire import Message
+from anafi_mav.drone.element import Element
+from anafi_mav.drone.expectation import QUIET, Commander, Expectation, loop_time
+from anafi_mav.drone.piloting_state import MOTORS_OFF, PilotingState, in_state
+from anafi_mav.drone.piloting_sticks import StickStream
+from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost
+
+RAMPING_TIMEOUT = 10.0
+"""s that the motors may take from their first turn to the take-off."""
+
+TAKE_OFF_MEMORY = 10.0
+"""s after a take-off was given up in which the drone may still carry it out, or already does and could not say so."""
+
+EMERGENCY_TIMEOUT = 30.0
+"""s that cutting the motors is tried for while the link seems to live but delivers nothing."""
+
+_TAKEN_OFF = frozenset({FlyingState.TAKINGOFF, FlyingState.HOVERING, FlyingState.FLYING})
+_LANDING = frozenset({FlyingState.LANDING, FlyingState.LANDED, FlyingState.EMERGENCY_LANDING, FlyingState.EMERGENCY})
+_MOTORS_CUT = frozenset({FlyingState.EMERGENCY, FlyingState.LANDED})
+
+
+class Motors:
+    """Take-off, hand launch, landing, emergency. `Piloting` says what its verbs of the same names promise."""
+
+    def __init__(
+        self,
+        commander: Commander,
+        flight: Element[PilotingState],
+        sticks: StickStream,
+        takeoff_blockers: Callable[[], list[str]],
+    ) -> None:
+        self._commander = commander
+        self._flight = flight
+        self._sticks = sticks
+        self._takeoff_blockers = takeoff_blockers
+        self._launches: set[Expectation[bool]] = set()
+        """Waits of take-offs and hand launches whose command may not have left."""
+        self._may_take_off_until = -math.inf
+
+    def link_lost(self) -> None:
+        """Take-offs that were given up before are no concern of the next connection."""
+        self._may_take_off_until = -math.inf
+
+    @property
+    def about_to_fly(self) -> bool:
+        return self._flight.state.flying == FlyingState.LANDED and (
+            bool(self._launches)
+            or loop_time() < self._may_take_off_until
+            or self._commander.may_begin(common.Stop, TAKE_OFF_MEMORY)
+        )
+
+    async def take_off(self, timeout: float) -> None:
+        self._commander.require_link()
+        flying = self._flight.state.flying
+        if flying in _TAKEN_OFF:
+            return
+        if flying not in (FlyingState.LANDED, FlyingState.MOTOR_RAMPING):
+            raise CommandRejected(in_state(flying))
+        await self._launch(ardrone3.TakeOff(), _TAKEN_OFF, timeout)
+
+    async def hand_launch(self, timeout: float) -> None:
+        self._commander.require_link()
+        flying = self._flight.state.flying
+        if flying == FlyingState.USERTAKEOFF:
+            return
+        if flying != FlyingState.LANDED:
+            raise CommandRejected(in_state(flying))
+        if self._launches:
+            raise CommandRejected("the drone is about to take off")
+        try:
+            await self._launch(ardrone3.UserTakeOff(1), _TAKEN_OFF | {FlyingState.USERTAKEOFF}, timeout)
+        except LinkLost:
+            raise
+        except BaseException:
+            # Given up: the motors of a drone that somebody holds must not start a moment later.
+            self._commander.halt_if_connected(ardrone3.UserTakeOff(0))
+            raise
+
+    async def _launch(self, command: Message, up: frozenset[FlyingState], timeout: float) -> None:
+        """Send a command that starts the motors; returns when the drone is in one of these states."""
+        self._sticks.silence()
+
+        def judge(message: ardrone3.FlyingStateChanged) -> bool | AnafiMavError | None:
+            if message.state in up:
+                return True
+            if message.state == FlyingState.MOTOR_RAMPING:
+                answer.expire_after(RAMPING_TIMEOUT, CommandTimeout(command.NAME, RAMPING_TIMEOUT))
+            elif message.state in _MOTORS_CUT:
+                return CommandRejected(self._why_on_the_ground("the motors stopped again"))
+            return None
+
+        answer = self._commander.expect((ardrone3.FlyingStateChanged,), judge)
+        self._commander.dispatch(answer, command, timeout)
+        self._launches.add(answer)
+        try:
+            await answer.wait()
+        except CommandRejected:
+            raise
+        except BaseException as error:
+            self._may_take_off_until = loop_time() + TAKE_OFF_MEMORY
+            if isinstance(error, CommandTimeout) and (reasons := self._why_on_the_ground("")):
+                raise CommandRejected(reasons) from None
+            raise
+        finally:
+            self._launches.discard(answer)
+
+    async def cancel_hand_launch(self, timeout: float) -> None:
+        self._commander.require_link()
+        if self.about_to_fly:
+            await self.land(timeout)
+            return
+        if self._flight.state.flying in MOTORS_OFF:
+            return
+        if self._flight.state.in_air:
+            raise CommandRejected("the drone flies")
+        await self._commander.confirm(
+            ardrone3.UserTakeOff(0),
+            (ardrone3.FlyingStateChanged,),
+            lambda message: True if message.state in MOTORS_OFF else None,
+            timeout,
+        )
+
+    def _why_on_the_ground(self, otherwise: str) -> str:
+        return ", ".join(self._takeoff_blockers()) or otherwise
+
+    async def land(self, timeout: float) -> None:
+        self._commander.require_link()
+        self._commander.call_off("the drone is to land")
+        if self._flight.state.flying in _LANDING and not self.about_to_fly:
+            return
+        # Level at once, then nothing, from here on and not from the drone's answer on: a positive gaz would cancel
+        # the landing.
+        self._sticks.let_go()
+        self._sticks.silence()
+        self._sticks.landings_asked += 1
+        try:
+            if self.about_to_fly:
+                await self._catch_take_off(timeout)
+            if self._flight.state.flying in _LANDING:
+                return
+            self._end_hand_launch()
+            await self._commander.confirm(
+                ardrone3.Landing(),
+                (ardrone3.FlyingStateChanged,),
+                lambda message: True if message.state in _LANDING else None,
+                timeout,
+            )
+        finally:
+            self._sticks.landings_asked -= 1
+
+    def _end_hand_launch(self) -> None:
+        """A drone that idles in a hand has no use for a Landing: it waits to be thrown, or for this."""
+        if self.about_to_fly or self._flight.state.flying in (FlyingState.MOTOR_RAMPING, FlyingState.USERTAKEOFF):
+            self._commander.halt(ardrone3.UserTakeOff(0))
+
+    async def _catch_take_off(self, timeout: float) -> None:
+        """Return when the drone is off the ground, or when it certainly stays there.
+
+        That is known once it has received a Landing, behind any take-off of ours, and then says nothing. Raises
+        `CommandTimeout` while it is not known; the Landing is not taken back.
+        """
+        self._end_hand_launch()
+        answer = self._commander.expect(
+            (ardrone3.FlyingStateChanged,),
+            lambda message: None if message.state in (FlyingState.MOTOR_RAMPING, FlyingState.USERTAKEOFF) else True,
+        )
+        try:
+            delivery = self._commander.deliver(ardrone3.Landing())
+            if not await answer.came(delivery, ardrone3.Landing.NAME, timeout):
+                self._may_take_off_until = -math.inf
+                self._commander.certainly_not(common.Stop)
+        finally:
+            answer.close()
+
+    async def emergency(self) -> None:
+        self._commander.require_link()
+        self._sticks.silence()
+        cut = self._flight.state.flying in _MOTORS_CUT and not self.about_to_fly
+        # Emergency overtakes what waits in the queue: nothing of that may follow it.
+        self._commander.call_off("the motors are cut")
+        for launch in self._launches:
+            launch.fail(CommandRejected("the motors are cut"))
+            if launch.token is not None:
+                self._commander.cancel(launch.token)
+        answer = self._commander.expect(
+            (ardrone3.FlyingStateChanged,), lambda message: True if message.state in _MOTORS_CUT else None
+        )
+        try:
+            delivery = self._commander.deliver(ardrone3.Emergency())
+            said = await answer.came(delivery, ardrone3.Emergency.NAME, EMERGENCY_TIMEOUT)
+        except CommandTimeout as error:
+            self._commander.take_back(delivery, error)  # said to have failed, it must not be carried out later
+            raise
+        finally:
+            answer.close()
+        if not said and not cut:
+            raise CommandTimeout(ardrone3.Emergency.NAME, QUIET)

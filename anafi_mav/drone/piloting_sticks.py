@@ -1,0 +1,117 @@
+"""The PCMDs on their way: the stick position that holds now, sent when it is due, and when none may be sent at all.
+
+What is due when is decided in `sticks`, without I/O; this is its timer and its way to the drone.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+
+from anafi_mav.arsdk.messages.ardrone3 import FlyingState
+from anafi_mav.arsdk.messages.common import PlayingState
+from anafi_mav.arsdk.wire import Message
+from anafi_mav.drone.alerts import spoken
+from anafi_mav.drone.element import Element
+from anafi_mav.drone.expectation import Commander, loop_time
+from anafi_mav.drone.home import Home
+from anafi_mav.drone.piloting_state import PilotingState, in_state
+from anafi_mav.drone.sticks import Percent, Sticks
+from anafi_mav.errors import LinkLost
+
+log = logging.getLogger("anafi_mav")
+
+RELEASES = 3
+"""PCMDs that say that nobody holds the sticks; they are not acknowledged."""
+
+_STICKS_DEAD = frozenset(
+    {FlyingState.LANDED, FlyingState.LANDING, FlyingState.EMERGENCY, FlyingState.EMERGENCY_LANDING}
+)
+"""States in which no PCMD is sent: positive gaz cancels a landing (ardrone3.xml 1-0-3)."""
+
+
+class StickStream:
+    """Sends PCMDs while there are any to send. All of it acts at once; a dead stream sends and keeps nothing."""
+
+    def __init__(self, commander: Commander, flight: Element[PilotingState], home: Home) -> None:
+        self._commander = commander
+        self._flight = flight
+        self._home = home
+        self._sticks = Sticks()
+        self._timer: asyncio.TimerHandle | None = None
+        self.landings_asked = 0
+        """Landings that were ordered and have not been answered: nothing is sent that could cancel one."""
+
+    @property
+    def blocked(self) -> str | None:
+        """Why no setpoint is sent at present; None when the sticks work."""
+        if self._flight.state.plan == PlayingState.PLAYING:
+            return "a flight plan plays"
+        return self.dead
+
+    @property
+    def dead(self) -> str | None:
+        """Why no PCMD at all is sent at present, not even one that centres the sticks."""
+        flying = self._flight.state.flying
+        if not self._commander.connected:
+            return "not connected"
+        if flying is None or flying in _STICKS_DEAD:
+            return in_state(flying)
+        if self.landings_asked:
+            return "the drone is about to land"
+        if self._home.state.returning_by_itself and self._home.state.reason is not None:
+            return f"the drone returns home by itself: {spoken(self._home.state.reason)}"
+        return None
+
+    def hold(self, position: Percent, age: float) -> None:
+        """This position from now on, said `age` s ago: see `Piloting.pilot`. Whoever calls has asked `blocked`."""
+        now = loop_time()
+        self._sticks.command(position, now, now - age)
+        self.pump()
+
+    def centre(self) -> None:
+        """Centred from now on, for two seconds, whether there was anything to send or not."""
+        self._sticks.centre(loop_time())
+        self.pump()
+
+    def pump(self) -> None:
+        """Send the PCMD that is due and come back for the next."""
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        if self.dead is not None:
+            self._sticks.stop()
+        now = loop_time()
+        pcmd = self._sticks.due(now)
+        if pcmd is not None:
+            self._send(pcmd)
+        deadline = self._sticks.deadline
+        if deadline is not None:
+            self._timer = asyncio.get_running_loop().call_at(deadline, self.pump)
+
+    def let_go(self) -> None:
+        """Let go of what deflection there is. What begins now may be refused; the sticks must not stay as they are."""
+        if self._sticks.active:
+            self.centre()
+
+    def silence(self) -> None:
+        """No more PCMDs: something else flies the drone now."""
+        self._sticks.stop()
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
+    def release(self) -> None:
+        """Take the hands off: a return waits for a PCMD with flag 0 (rth.xml 146-0-11)."""
+        if self._sticks.active and self.dead is None:
+            for _ in range(RELEASES):
+                self._commander.send(self._sticks.released(loop_time()))
+        self.silence()
+
+    def _send(self, message: Message) -> None:
+        """For what is worth sending only while there is a link; its loss is reported elsewhere."""
+        try:
+            self._commander.send(message)
+        except LinkLost as error:
+            log.debug("%s not sent: %s", message.NAME, error)
+            self._sticks.stop()
