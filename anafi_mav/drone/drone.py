@@ -9,7 +9,7 @@ import asyncio
 import contextlib
 import logging
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from datetime import datetime
 from functools import partial
 from typing import Any, TypeAlias, TypeVar
@@ -28,6 +28,7 @@ from anafi_mav.arsdk.messages.proto import device_manager
 from anafi_mav.arsdk.rtsp import DEFAULT_PORT as RTSP_PORT
 from anafi_mav.arsdk.wire import Message, UnknownMessage
 from anafi_mav.clock import Clock, SystemClock
+from anafi_mav.drone import inquiry
 from anafi_mav.drone.alerts import Alerts, Blocker, spoken, takeoff_blockers
 from anafi_mav.drone.animations import Animations
 from anafi_mav.drone.battery import Battery
@@ -50,7 +51,6 @@ from anafi_mav.drone.piloting import Piloting
 from anafi_mav.drone.poi import Poi
 from anafi_mav.drone.product import MODELS, Identity, Model, Product
 from anafi_mav.drone.rest import HTTP_PORT, Rest
-from anafi_mav.drone.settings import Question
 from anafi_mav.drone.sound import Sound
 from anafi_mav.drone.storage import Storage
 from anafi_mav.drone.thermal import Thermal
@@ -69,17 +69,11 @@ Callback: TypeAlias = Callable[[Message, float], None]
 REBOOT_TIMEOUT = 15.0
 """s within which the link to a drone that reboots is lost; silence is noticed after 2.5 s."""
 
-DETAILS_TIMEOUT = 3.0
-"""s to wait for what may never come; as Olympe (arsdkng/drone: optional, at most 3 s)."""
-
 CONTROLLER_PORTS = 100
 """A Skycontroller 3 has the TCP ports of its drone this much higher (Olympe, libarsdkctrl arsdk_device.c)."""
 
 CONTROLLER_TIMEOUT = 5.0
 """s that a Skycontroller may take to find its drone; then it is asked anew, so that its own state is fresh."""
-
-STATES_TIMEOUT = 5.0
-"""s that a drone may take to send all its states, and all its settings: a few hundred messages."""
 
 
 class Drone:
@@ -203,8 +197,8 @@ class Drone:
                 await self._find_web_server(session)
                 await self._read_states()
                 if self._model.protobuf:
-                    await self._ask([*self.camera.questions(), *self.storage.questions()])
-                    await self._ask([*self.camera.details(), *self.storage.details()])
+                    await inquiry.ask(self._commander, self.name, [*self.camera.questions(), *self.storage.questions()])
+                    await inquiry.ask(self._commander, self.name, [*self.camera.details(), *self.storage.details()])
             except BaseException:
                 await self.close()
                 raise
@@ -256,7 +250,8 @@ class Drone:
         the Skycontroller first, if there is one, then of the drone behind it."""
         date = datetime.fromtimestamp(self._clock.time()).astimezone().strftime("%Y%m%dT%H%M%S%z")
         if self.controller.present:
-            await self._read(
+            await inquiry.read(
+                self._commander,
                 "Skycontroller",
                 (skyctrl.CurrentDateTime(date), skyctrl.AllStates(), skyctrl.AllSettings()),
                 (skyctrl.AllStatesChanged, skyctrl.AllSettingsChanged),
@@ -264,46 +259,12 @@ class Drone:
             for question in self.controller.questions():
                 self._commander.send(question)
             await self._find_drone()
-        await self._read(
+        await inquiry.read(
+            self._commander,
             "drone",
             (common.CurrentDateTime(date), common.AllStates(), common.AllSettings()),
             (common.AllStatesChanged, common.AllSettingsChanged),
         )
-
-    async def _read(self, who: str, questions: Sequence[Message], markers: Sequence[type[Message]]) -> None:
-        waits = [
-            (name, self._commander.expect((marker,), lambda message: True))
-            for name, marker in zip(("states", "settings"), markers, strict=True)
-        ]
-        try:
-            for question in questions:
-                self._commander.send(question)
-            for name, wait in waits:
-                wait.expire_after(STATES_TIMEOUT, CommandTimeout(f"all {name}", STATES_TIMEOUT))
-            for name, wait in waits:
-                try:
-                    await wait.wait()
-                except CommandTimeout:
-                    raise LinkLost(f"the {who} did not send all its {name} within {STATES_TIMEOUT:g} s") from None
-        finally:
-            for _, wait in waits:
-                wait.close()
-
-    async def _ask(self, questions: list[Question]) -> None:
-        """Ask what is told only on demand. An answer that does not come is a feature that this drone does not have."""
-        waits = [(command, self._commander.expect((answer,), judge)) for command, answer, judge in questions]
-        try:
-            for command, wait in waits:
-                wait.token = self._commander.send(command)
-                wait.expire_after(DETAILS_TIMEOUT, CommandTimeout(command.NAME, DETAILS_TIMEOUT))
-            for command, wait in waits:
-                try:
-                    await wait.wait()
-                except CommandTimeout:
-                    log.info("%s: no answer to %s", self.name, command.NAME)
-        finally:
-            for _, wait in waits:
-                wait.close()
 
     async def _find_drone(self) -> None:
         """Wait until the Skycontroller is connected to its drone."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from anafi_mav.arsdk.messages.ardrone3 import PoiStatus
 from anafi_mav.arsdk.messages.gimbal import Axis
@@ -12,9 +12,42 @@ from anafi_mav.arsdk.messages.mediastore import MediastoreState
 from anafi_mav.arsdk.messages.obstacle_avoidance import Availability as AvoidanceAvailability
 from anafi_mav.arsdk.messages.precise_home import PreciseHomeState
 from anafi_mav.arsdk.messages.rth import RthState
+from anafi_mav.drone.animations import Animations
+from anafi_mav.drone.calibration import Calibration
+from anafi_mav.drone.camera import Camera
+from anafi_mav.drone.flight_plan import FlightPlan
+from anafi_mav.drone.follow_me import FollowMe
+from anafi_mav.drone.gimbal import Gimbal
+from anafi_mav.drone.home import Home
+from anafi_mav.drone.media import Media
+from anafi_mav.drone.piloting import Piloting
+from anafi_mav.drone.poi import Poi
+from anafi_mav.drone.sound import Sound
+from anafi_mav.drone.storage import Storage
+from anafi_mav.drone.thermal import Thermal
 
-if TYPE_CHECKING:
-    from anafi_mav.drone.drone import Drone
+
+class Elements(Protocol):
+    """What is looked at of a drone."""
+
+    animations: Animations
+    calibration: Calibration
+    camera: Camera
+    flight_plan: FlightPlan
+    follow_me: FollowMe
+    gimbal: Gimbal
+    home: Home
+    media: Media
+    piloting: Piloting
+    poi: Poi
+    sound: Sound
+    storage: Storage
+    thermal: Thermal
+
+    @property
+    def connected(self) -> bool:
+        """It has sent all its states."""
+        ...
 
 
 class Support(enum.Enum):
@@ -65,7 +98,7 @@ def _has(reported: object, works: bool | None = True) -> Support:
     return Support.UNAVAILABLE if works is False else Support.AVAILABLE
 
 
-def features(drone: Drone) -> Mapping[Feature, Support]:
+def features(drone: Elements) -> Mapping[Feature, Support]:
     """Every feature, and whether this drone has it. UNKNOWN before it has sent its states."""
     if not drone.connected:
         return dict.fromkeys(Feature, Support.UNKNOWN)
