@@ -22,12 +22,13 @@ from anafi_mav.arsdk.session import OnMessage
 from anafi_mav.arsdk.wire import Buffer, Message, UnknownMessage
 from anafi_mav.errors import ConfigError
 from anafi_mav.sim.air import Air
+from anafi_mav.sim.body import Body
 from anafi_mav.sim.faults import Faults
 from anafi_mav.sim.firmware import Firmware, Identity
 from anafi_mav.sim.http import WebServer
 from anafi_mav.sim.log import Log, LogEntry
 from anafi_mav.sim.model import MODELS
-from anafi_mav.sim.motion import Body, Pose
+from anafi_mav.sim.motion import Pose
 from anafi_mav.sim.place import Origin
 from anafi_mav.sim.power import Battery
 from anafi_mav.sim.rtsp import VideoServer

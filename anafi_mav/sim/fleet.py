@@ -10,10 +10,11 @@ from pathlib import Path
 from types import TracebackType
 
 from anafi_mav.errors import ConfigError
+from anafi_mav.sim.body import Body
 from anafi_mav.sim.drone import DroneSpec, SimulatedDrone
 from anafi_mav.sim.log import Log, LogFile
 from anafi_mav.sim.model import MODELS
-from anafi_mav.sim.motion import STEP, Body, Motion
+from anafi_mav.sim.motion import STEP, Motion
 from anafi_mav.sim.scenario import Scenario
 
 TURN, FAST_TURN = 0.01, STEP

@@ -19,6 +19,7 @@ from anafi_mav.arsdk.messages.rth import RthEndingBehavior, StateReason
 from anafi_mav.arsdk.wire import Message
 from anafi_mav.sim import power
 from anafi_mav.sim.animation import Animations
+from anafi_mav.sim.body import Body
 from anafi_mav.sim.compass import Compass
 from anafi_mav.sim.endurance import Endurance
 from anafi_mav.sim.faults import Faults
@@ -30,7 +31,7 @@ from anafi_mav.sim.guidance import Guidance
 from anafi_mav.sim.homing import UNKNOWN, Homing
 from anafi_mav.sim.machine import AIRBORNE, GUIDED, LANDED, Event, next_state
 from anafi_mav.sim.model import Model
-from anafi_mav.sim.motion import Body, Pose
+from anafi_mav.sim.motion import Pose
 from anafi_mav.sim.operator import Operator
 from anafi_mav.sim.payload import Payload
 from anafi_mav.sim.picture import Scene

@@ -15,8 +15,9 @@ from anafi_mav.arsdk.messages import camera, common, flight_plan
 from anafi_mav.arsdk.messages.common import FlightPlanComponent as Part
 from anafi_mav.arsdk.messages.common import MavlinkType, PlayError, PlayingState
 from anafi_mav.arsdk.wire import Message
+from anafi_mav.sim.body import Body
 from anafi_mav.sim.model import Model
-from anafi_mav.sim.motion import Body, Pose, Turn
+from anafi_mav.sim.motion import Pose, Turn
 from anafi_mav.sim.operator import Operator
 from anafi_mav.sim.panorama import Panorama
 from anafi_mav.sim.place import Origin

@@ -16,7 +16,8 @@ from typing import Any, NamedTuple
 from anafi_mav.arsdk.messages import controller_info, follow_me
 from anafi_mav.arsdk.messages.follow_me import Animation, Behavior, GeoRelConfigureParam, Input, Mode
 from anafi_mav.arsdk.wire import Message
-from anafi_mav.sim.motion import Body, Pose
+from anafi_mav.sim.body import Body
+from anafi_mav.sim.motion import Pose
 from anafi_mav.sim.place import Origin
 from anafi_mav.sim.poi import look
 from anafi_mav.sim.settings import Settings

@@ -13,9 +13,10 @@ from anafi_mav.arsdk.messages import ardrone3, move
 from anafi_mav.arsdk.messages.ardrone3 import MoveByError, MoveToStatus
 from anafi_mav.arsdk.messages.rth import RthEndingBehavior
 from anafi_mav.arsdk.wire import Message
+from anafi_mav.sim.body import Body
 from anafi_mav.sim.homing import Homing
 from anafi_mav.sim.model import Model
-from anafi_mav.sim.motion import Body, Pose
+from anafi_mav.sim.motion import Pose
 from anafi_mav.sim.moves import MoveBy, MoveTo, asked_speeds, own_speeds
 from anafi_mav.sim.place import Origin
 from anafi_mav.sim.settings import Settings

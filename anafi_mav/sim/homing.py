@@ -15,7 +15,8 @@ from typing import NamedTuple
 from anafi_mav.arsdk.messages import ardrone3, rth
 from anafi_mav.arsdk.messages.rth import RthEndingBehavior, RthHomeType, RthState, StateReason
 from anafi_mav.arsdk.wire import Message
-from anafi_mav.sim.motion import Body, Pose, Turn
+from anafi_mav.sim.body import Body
+from anafi_mav.sim.motion import Pose, Turn
 from anafi_mav.sim.place import Origin
 from anafi_mav.sim.settings import HOME_TYPES, Settings
 from anafi_mav.units import RAD_PER_DEG

@@ -6,8 +6,9 @@ import math
 
 import pytest
 
+from anafi_mav.sim.body import Body
 from anafi_mav.sim.model import MODELS
-from anafi_mav.sim.motion import STEP, Body, Motion, Pose, Turn
+from anafi_mav.sim.motion import STEP, Motion, Pose, Turn
 
 RAD = math.pi / 180.0
 AIRFRAME = MODELS["4k"].airframe

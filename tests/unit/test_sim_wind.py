@@ -10,8 +10,9 @@ import pytest
 
 from anafi_mav.arsdk.messages.ardrone3 import WarningLevel
 from anafi_mav.errors import ConfigError
+from anafi_mav.sim.body import Body
 from anafi_mav.sim.model import MODELS
-from anafi_mav.sim.motion import STEP, Body, Motion, Pose
+from anafi_mav.sim.motion import STEP, Motion, Pose
 from anafi_mav.sim.wind import CALM, Wind, WindSpec, WindWatch
 
 RAD = math.pi / 180.0
