@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from anafi_mav.arsdk.messages import camera, common, flight_plan
+from anafi_mav.arsdk.messages import common, flight_plan
 from anafi_mav.arsdk.messages.common import FlightPlanComponent as Part
 from anafi_mav.arsdk.messages.common import MavlinkType, PlayError, PlayingState
 from anafi_mav.arsdk.wire import Message
@@ -21,6 +21,7 @@ from anafi_mav.sim.motion import Pose, Turn
 from anafi_mav.sim.operator import Operator
 from anafi_mav.sim.panorama import Panorama
 from anafi_mav.sim.place import Origin
+from anafi_mav.sim.plan_camera import COMMANDS, PlanCamera
 from anafi_mav.sim.plan_file import Command, Item, PlanFileError, read
 from anafi_mav.sim.poi import look
 from anafi_mav.sim.settings import Settings
@@ -81,6 +82,7 @@ class FlightPlan:
         self._settings = settings
         self._pilot = pilot
         self._operator = operator
+        self._camera = PlanCamera(operator)
         self._emit = emit
         self._note = note
         self.state = PlayingState.STOPPED
@@ -106,10 +108,7 @@ class FlightPlan:
         self._view = 0
         self._rois: list[tuple[float, float, float]] = []
         self._roi: tuple[float, float, float] | None = None
-        self._still: tuple[float, float] = (0.0, 0.0)
         self._panning: Panorama | None = None
-        self._photos = 0
-        """How many are to be taken before photographing ends by itself; 0: it does not."""
 
     # -- what others ask
 
@@ -197,8 +196,8 @@ class FlightPlan:
         self._uid, self._name, self._type = uid, name or uid, type
         self._items, self._index, self._goes_on = items, item, goes_on
         self._begun, self._progress, self._began = False, None, time
-        self._speed, self._view, self._roi, self._still = CRUISE, 0, None, (0.0, 0.0)
-        self._photos = 0
+        self._speed, self._view, self._roi = CRUISE, 0, None
+        self._camera.start(type)
         self._rois = [self._point(found) for found in items if found.command is Command.SET_ROI and found.p1 == 3]
         self._legs = self._way_in(pose) if self._model.modern and not on_ground else []
         self._set(PlayingState.PLAYING)
@@ -276,9 +275,7 @@ class FlightPlan:
     def tick(self, time: float, pose: Pose, arrived: bool) -> None:
         """Go on; called while it plays and the drone flies."""
         self._time = time
-        if self._photos and self._operator.shots >= self._photos:
-            self._photos = 0
-            self._operator.operate(camera.StopPhoto(0))
+        self._camera.tick()
         if self._legs:
             self._fly_in(pose, time)
             return
@@ -321,7 +318,7 @@ class FlightPlan:
             if over:
                 self._stop_panning()
             return over
-        if item.command is Command.START_PHOTO and self._count(item) == 1:
+        if item.command is Command.START_PHOTO and self._camera.count(item) == 1:
             return not self._operator.camera_busy or time >= self._due + CAMERA_LIMIT
         return time >= self._due
 
@@ -453,56 +450,8 @@ class FlightPlan:
         if neutral or math.isfinite(item.p1):
             self._operator.aim(0.0 if neutral else item.p1)
 
-    def _still_mode(self, item: Item, pose: Pose, time: float) -> None:
-        self._still = (item.p1, item.p2)
-
-    def _count(self, item: Item) -> float:
-        return item.p3 if self._type is MavlinkType.FLIGHT_PLAN_V2 else item.p2
-
-    def _start_photo(self, item: Item, pose: Pose, time: float) -> None:
-        interval = item.p2 if self._type is MavlinkType.FLIGHT_PLAN_V2 else item.p1
-        mode, step = camera.CameraPhotoMode.SINGLE, 0.0
-        if self._count(item) != 1:
-            gps = self._still[0] == 1 and not interval > 0.0
-            mode = camera.CameraPhotoMode.GPS_LAPSE if gps else camera.CameraPhotoMode.TIME_LAPSE
-            step = interval if interval > 0.0 else self._still[1]
-        self._photograph(mode, step)
-        self._photos = int(self._count(item)) if self._count(item) > 1 else 0
-
-    def _trigger(self, item: Item, pose: Pose, time: float) -> None:
-        if not item.p1 > 0.0:
-            self._stop_photo(item, pose, time)
-        elif item.command is Command.TRIGGER_DISTANCE:
-            self._photograph(camera.CameraPhotoMode.GPS_LAPSE, item.p1)
-        else:
-            self._photograph(camera.CameraPhotoMode.TIME_LAPSE, item.p1 / 1000.0)
-
-    def _photograph(self, mode: camera.CameraPhotoMode, step: float) -> None:
-        self._photos = 0
-        self._operator.operate(camera.SetCameraMode(0, camera.CameraCameraMode.PHOTO))
-        self._operator.operate(
-            camera.SetPhotoMode(
-                0,
-                mode,
-                camera.PhotoFormat.RECTILINEAR,
-                camera.PhotoFileFormat.JPEG,
-                camera.BurstValue.BURST_14_OVER_1S,
-                camera.BracketingPreset.PRESET_1EV,
-                step,
-            )
-        )
-        self._operator.operate(camera.TakePhoto(0))
-
-    def _stop_photo(self, item: Item, pose: Pose, time: float) -> None:
-        self._photos = 0
-        self._operator.operate(camera.StopPhoto(0))
-
-    def _start_video(self, item: Item, pose: Pose, time: float) -> None:
-        self._operator.operate(camera.SetCameraMode(0, camera.CameraCameraMode.RECORDING))
-        self._operator.operate(camera.StartRecording(0))
-
-    def _stop_video(self, item: Item, pose: Pose, time: float) -> None:
-        self._operator.operate(camera.StopRecording(0))
+    def _photograph(self, item: Item, pose: Pose, time: float) -> None:
+        self._camera.carry_out(item)
 
     def _panorama(self, item: Item, pose: Pose, time: float) -> None:
         self._target = (pose.north, pose.east, pose.up)
@@ -536,13 +485,7 @@ _BEGIN: dict[Command, Callable[[FlightPlan, Item, Pose, float], bool | None]] = 
     Command.SET_ROI_NONE: FlightPlan._set_roi,
     Command.SET_ROI: FlightPlan._set_roi,
     Command.MOUNT_CONTROL: FlightPlan._mount,
-    Command.TRIGGER_DISTANCE: FlightPlan._trigger,
-    Command.TRIGGER_INTERVAL: FlightPlan._trigger,
-    Command.START_PHOTO: FlightPlan._start_photo,
-    Command.STOP_PHOTO: FlightPlan._stop_photo,
-    Command.START_VIDEO: FlightPlan._start_video,
-    Command.STOP_VIDEO: FlightPlan._stop_video,
     Command.PANORAMA: FlightPlan._panorama,
     Command.SET_VIEW_MODE: FlightPlan._view_mode,
-    Command.SET_STILL_MODE: FlightPlan._still_mode,
+    **dict.fromkeys(COMMANDS, FlightPlan._photograph),
 }
