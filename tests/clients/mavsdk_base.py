@@ -60,12 +60,14 @@ async def held(name: str, seconds: float = 0.0) -> None:
     await asyncio.to_thread(sys.stdin.readline)
 
 
-async def tried(name: str, work: Awaitable[Any]) -> None:
-    """What became of something that may be refused."""
+async def tried(name: str, work: Awaitable[Any]) -> bool:
+    """Whether something that may be refused was done; it says what became of it."""
     try:
         await work
         say("tried", name, "done")
+        return True
     except Exception as error:  # MAVSDK has a class for each plugin
         if not hasattr(error, "result"):
             raise
         say("tried", name, error.result.name)
+        return False

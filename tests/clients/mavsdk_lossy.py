@@ -2,7 +2,7 @@
 
     mavsdk_lossy.py URL COUNT up|both
 
-No two way points are alike. It prints what became of it.
+No two way points are alike. An upload that MAVSDK gives up is tried again. It prints what became of it.
 """
 
 from __future__ import annotations
@@ -13,6 +13,8 @@ import time
 
 from mavsdk.asyncio.plugins.mission_raw import MissionItem, MissionRawAsync
 from mavsdk_base import connected, fields, say, tried
+
+TRIES = 3
 
 
 def way_points(count: int) -> list[MissionItem]:
@@ -28,7 +30,9 @@ def way_points(count: int) -> list[MissionItem]:
 async def main(url: str, count: int, what: str) -> None:
     async with connected(url) as drone:
         mission, wanted, began = MissionRawAsync(drone), way_points(count), time.monotonic()
-        await tried("upload", mission.upload_mission(wanted))
+        for _ in range(TRIES):
+            if await tried("upload", mission.upload_mission(wanted)):
+                break
         say("seconds", f"{time.monotonic() - began:.1f}")
         if what == "both":
             read = await mission.download_mission()

@@ -18,12 +18,11 @@ COUNT = 500
 
 BAD = 0.25
 
-MAVSDKS_SHARE = 0.1
-"""By the way MAVSDK counts, 99.995 % of such uploads succeed. With 15 % lost, the highest loss in steps of a twentieth
-that leaves more than 99.9 %, it is 99.94 %; but it counts half seconds without a request, which go on when the gateway
-is late, and on a machine with seven times as much to do as it can one of nine such uploads ended in a timeout. With a
-quarter lost it is 97.7 %, and 99.9 % cannot be: it says its first message five times, and once in a thousand uploads
-all five are lost. tests/bench/lossy_uploads.py has the figures."""
+MAVSDKS_TRIES = 3
+"""By the way MAVSDK counts, 97.7 % of such uploads succeed, and 99.9 % cannot, whatever the vehicle does: it says its
+first message five times, and once in a thousand uploads all five are lost. Nor is it patient: the half seconds without
+a request that it counts go on while the gateway waits for a processor. An upload that it has given up, and said so, is
+begun anew, as its user would. tests/bench/lossy_uploads.py has the figures."""
 
 MAVSDKS_OWN = 0.05
 """What MAVSDK's own test of lossy transfers loses. It asks for an item five times, so 99.6 % of such downloads succeed,
@@ -34,7 +33,7 @@ async def by_mavsdk(w: World, link: LossyLink, what: str) -> list[str]:
     """What it printed, line by line, once it has done its work."""
     words = (sys.executable, "-u", str(SCRIPT), "udpout://{}:{}".format(*link.address), str(COUNT), what)
     async with program(*words) as script:
-        await script.line(lambda line: line == "done", timeout=150.0)
+        await script.line(lambda line: line == "done", timeout=350.0)
         return script.lines
 
 
@@ -46,10 +45,13 @@ async def holds_what_mavsdk_sent(w: World) -> None:
     ]
 
 
-@pytest.mark.timeout(240)
+@pytest.mark.timeout(400)
 async def test_conf_061_500_items_by_mavsdk_on_a_bad_link() -> None:
-    async with world(udp=True) as w, lossy_link((w.address, UDP_PORT), MAVSDKS_SHARE) as link:
-        assert "tried upload done" in await by_mavsdk(w, link, "up")
+    async with world(udp=True) as w, lossy_link((w.address, UDP_PORT), BAD) as link:
+        lines = await by_mavsdk(w, link, "up")
+        told = [line for line in lines if line.startswith("tried")]
+        assert told[-1] == "tried upload done"
+        assert len(told) <= MAVSDKS_TRIES
         link.check(COUNT)
         await holds_what_mavsdk_sent(w)
 
