@@ -153,10 +153,10 @@ class GuidedMoves:
 
         True when a moveTo was cancelled.
         """
-        move = self._moves.cancel_to(why)
-        if move is not None:
-            if move.answer.token is not None:
-                self._commander.cancel(move.answer.token)
+        journey = self._moves.cancel_to(why)
+        if journey is not None:
+            if journey.answer.token is not None:
+                self._commander.cancel(journey.answer.token)
             self._commander.halt(ardrone3.CancelMoveTo())
         moves = self._moves.cancel_by(why, loop_time())
         for move in moves:
@@ -164,7 +164,7 @@ class GuidedMoves:
                 self._commander.cancel(move.answer.token)
         if moves:
             self._commander.halt(ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0))
-        return move is not None
+        return journey is not None
 
     def require_free(self) -> None:
         if self._home.state.returning_by_itself:

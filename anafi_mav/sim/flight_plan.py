@@ -105,7 +105,6 @@ class FlightPlan:
         self._target: tuple[float, float, float] | None = None
         self._progress: tuple[float, Pose] | None = None
         self._speed = CRUISE
-        self._view = 0
         self._rois: list[tuple[float, float, float]] = []
         self._roi: tuple[float, float, float] | None = None
         self._panning: Panorama | None = None
@@ -196,7 +195,7 @@ class FlightPlan:
         self._uid, self._name, self._type = uid, name or uid, type
         self._items, self._index, self._goes_on = items, item, goes_on
         self._begun, self._progress, self._began = False, None, time
-        self._speed, self._view, self._roi = CRUISE, 0, None
+        self._speed, self._roi = CRUISE, None
         self._camera.start(type)
         self._rois = [self._point(found) for found in items if found.command is Command.SET_ROI and found.p1 == 3]
         self._legs = self._way_in(pose) if self._model.modern and not on_ground else []

@@ -724,6 +724,20 @@ async def test_hover_cancels_what_we_started(drone: Drone, device: ScriptedDevic
     assert device.got(rth.Abort) == []
 
 
+async def test_hover_cancels_a_move_to_of_somebody_else_also_when_a_move_by_is_ours(
+    drone: Drone, device: ScriptedDevice
+) -> None:
+    await flying(drone, device)
+    await reported(drone, device, running(ardrone3.MoveTo(48.0, 2.0, 15.0, OrientationMode.NONE, 0.0)))
+    relative = asyncio.ensure_future(drone.piloting.move_by(1.0, 0.0, 0.0, 0.0))
+    await device.until(ardrone3.MoveBy)
+    drone.piloting.hover()
+    with pytest.raises(CommandRejected, match="hover"):
+        await relative
+    await device.until(ardrone3.CancelMoveTo)
+    assert device.got(ardrone3.MoveBy)[-1] == ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0)
+
+
 async def test_hover_ends_the_following_of_a_target_and_an_animation(drone: Drone, device: ScriptedDevice) -> None:
     await flying(drone, device)
     await reported(drone, device, following(follow_me.Mode.GEOGRAPHIC))
