@@ -6,11 +6,13 @@ import math
 from collections.abc import Awaitable, Callable, Hashable
 
 from anafi_mav.mavlink import dialect
+from anafi_mav.services.bounds import FASTEST, SLOWEST
 from anafi_mav.services.commands import Command
 from anafi_mav.services.guided import guided_mode
 from anafi_mav.services.modes import FlightMode
+from anafi_mav.services.refusal import Refused
 from anafi_mav.services.targets import height, place
-from anafi_mav.services.vehicle import FASTEST, SLOWEST, Refused, Vehicle
+from anafi_mav.services.vehicle import Vehicle
 
 Handler = Callable[[Vehicle, Command], Awaitable[None]]
 
@@ -23,9 +25,9 @@ RELATIVE_YAW = dialect.MAV_DO_REPOSITION_FLAGS_RELATIVE_YAW
 async def arm_disarm(vehicle: Vehicle, command: Command) -> None:
     """MAV_CMD_COMPONENT_ARM_DISARM: param1 1 arm, 0 disarm; param2 21196 disarms by force."""
     if command.params[0] == 1.0:
-        await vehicle.arm(command.client)
+        await vehicle.takeoff.arm(command.client)
     elif command.params[0] == 0.0:
-        await vehicle.disarm(force=command.params[1] == FORCE)
+        await vehicle.takeoff.disarm(force=command.params[1] == FORCE)
     else:
         raise Refused("Refused: param1 is 1 to arm, 0 to disarm", lasting=True)
 
@@ -39,9 +41,9 @@ async def takeoff(vehicle: Vehicle, command: Command) -> None:
     """
     relative = command.flavour.relative_takeoff or (command.x == 0.0 and command.y == 0.0)
     if command.frame is None and relative and not math.isnan(command.z):
-        await vehicle.take_off(command.z, command.client)
+        await vehicle.takeoff.begin(command.z, command.client)
         return
-    await vehicle.take_off(height(vehicle, command), command.client)
+    await vehicle.takeoff.begin(height(vehicle, command), command.client)
 
 
 async def land(vehicle: Vehicle, command: Command) -> None:
@@ -81,7 +83,7 @@ async def reposition(vehicle: Vehicle, command: Command) -> None:
         if attitude is None:
             raise Refused("Refused: the present heading is not known")
         heading += attitude.yaw
-    await vehicle.reposition(where, ato, heading, speed if speed > 0.0 else None, mode)
+    await vehicle.guided.reposition(where, ato, heading, speed if speed > 0.0 else None, mode)
 
 
 async def set_mode(vehicle: Vehicle, command: Command) -> None:

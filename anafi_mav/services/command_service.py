@@ -28,10 +28,10 @@ from anafi_mav.services.commands import (
 )
 from anafi_mav.services.flavours import flavour_of
 from anafi_mav.services.modes import FlightMode
+from anafi_mav.services.refusal import Refused
 from anafi_mav.services.service import Action, Host, MessageHandler, Query, Service, client_of
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.targets import UnsupportedFrame
-from anafi_mav.services.vehicle import Refused
 
 logger = logging.getLogger(__name__)
 

@@ -19,10 +19,11 @@ from anafi_mav.services.commands import Command
 from anafi_mav.services.fence_mirror import FenceMirror
 from anafi_mav.services.fence_watch import CEILING, EVERYTHING, FLOOR, FenceWatch, Reaction, Sight, State
 from anafi_mav.services.modes import FlightMode
+from anafi_mav.services.refusal import Refused
 from anafi_mav.services.service import Action, Host, Service
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.stream import Stream, Times
-from anafi_mav.services.vehicle import Refused, Vehicle
+from anafi_mav.services.vehicle import Vehicle
 
 LOOK_EVERY = 0.5
 """s between looks while the drone tells nothing new."""

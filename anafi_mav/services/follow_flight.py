@@ -16,6 +16,7 @@ from anafi_mav.clock import Clock
 from anafi_mav.drone import PilotingCommand, events
 from anafi_mav.drone.events import Message
 from anafi_mav.errors import LinkLost
+from anafi_mav.services.bounds import amsl_to_ato, check_height, check_on_earth, check_place
 from anafi_mav.services.follow import (
     PATIENCE,
     REACH,
@@ -112,7 +113,7 @@ class FollowFlight:
         if here is None:
             return "the drone has no GPS fix"
         try:
-            self._vehicle.check_on_earth(Place(seen.latitude, seen.longitude), "Target")
+            check_on_earth(Place(seen.latitude, seen.longitude), "Target")
         except Refused as refusal:
             return refusal.reason.partition("efused: ")[2]
         distance = geo.distance(here.latitude, here.longitude, seen.latitude, seen.longitude)
@@ -154,7 +155,7 @@ class FollowFlight:
             wanted = self._follower.aim(motion.north, motion.east, self._height(), now)
             if wanted is not None and vehicle.place is not None and motion.reference is not None:
                 place = Place(*geo.destination(*motion.reference, wanted.x.position or 0.0, wanted.y.position or 0.0))
-                vehicle.check_place(place)
+                check_place(vehicle, place)
                 sticks = self._controller.sticks(wanted, limits, now) or sticks
         except Refused as refusal:
             self.complain(f"Target not followed: {refusal.reason.partition('efused: ')[2] or refusal.reason}")
@@ -171,8 +172,8 @@ class FollowFlight:
         elif settings.altitude_mode is AltitudeMode.TARGET:
             if self._follower.altitude is None:
                 raise Refused("Refused: the target does not tell its altitude")
-            height += self._vehicle.amsl_to_ato(self._follower.altitude)
-        self._vehicle.check_height(height)
+            height += amsl_to_ato(self._vehicle, self._follower.altitude)
+        check_height(self._vehicle, height)
         return height
 
     def _expired(self) -> None:

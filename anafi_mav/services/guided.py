@@ -16,14 +16,18 @@ from anafi_mav.drone.events import FlyingStateChanged, Message, PoiMode, RthHome
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
+from anafi_mav.services.bounds import FASTEST, SLOWEST, check_height, check_on_earth
 from anafi_mav.services.commands import Command
 from anafi_mav.services.flavours import Flavour, flavour_of
+from anafi_mav.services.guided_flight import Goto
 from anafi_mav.services.modes import FlightMode
+from anafi_mav.services.place import Place
+from anafi_mav.services.refusal import Refused
 from anafi_mav.services.service import Action, Host, Service, client_of
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.targets import UnsupportedFrame, height, height_in_frame, place
 from anafi_mav.services.turns import DEG_PER_TURN, heading_of
-from anafi_mav.services.vehicle import FASTEST, SLOWEST, Goto, Place, Refused, Vehicle
+from anafi_mav.services.vehicle import Vehicle
 
 KEEP, DEFAULT = -1.0, -2.0
 """What stands for "no change" and "back to the default" in speed and throttle (MAVLink common.xml DO_CHANGE_SPEED)."""
@@ -68,8 +72,8 @@ async def _fly_item(host: Host, inbound: Inbound) -> None:
             if item.command != dialect.MAV_CMD_NAV_WAYPOINT:
                 raise Refused("Goto refused: the item is no way point", lasting=True)
             where = Place(item.x / scale, item.y / scale)
-            vehicle.check_on_earth(where, "Goto")
-            await vehicle.reposition(where, ato, None, mode=guided_mode(flavour))
+            check_on_earth(where, "Goto")
+            await vehicle.guided.reposition(where, ato, None, mode=guided_mode(flavour))
         else:
             await change_altitude(vehicle, ato, flavour)
         result = dialect.MAV_MISSION_ACCEPTED
@@ -88,12 +92,12 @@ async def _fly_item(host: Host, inbound: Inbound) -> None:
 
 async def change_altitude(vehicle: Vehicle, ato: float, flavour: Flavour) -> None:
     """Go to a height (m above take-off): on the way to a place there, else here."""
-    goto = vehicle.goto
+    goto = vehicle.guided.goto
     if goto is None:
-        await vehicle.reposition(None, ato, None, mode=guided_mode(flavour))
+        await vehicle.guided.reposition(None, ato, None, mode=guided_mode(flavour))
     else:
-        vehicle.check_height(ato)
-        await vehicle.go(goto.at_height(ato))
+        check_height(vehicle, ato)
+        await vehicle.guided.go(goto.at_height(ato))
 
 
 class GuidedService(Service):
@@ -162,8 +166,8 @@ class GuidedService(Service):
             vehicle.cruise_speed = wanted
         else:
             vehicle.climb_speed = wanted
-        if (goto := vehicle.goto) is not None:
-            await vehicle.go(goto)
+        if (goto := vehicle.guided.goto) is not None:
+            await vehicle.guided.go(goto)
 
     async def _change_altitude(self, command: Command) -> None:
         """MAV_CMD_DO_CHANGE_ALTITUDE: param1 height in m, param2 MAV_FRAME. On the way to a place, there."""
@@ -190,10 +194,12 @@ class GuidedService(Service):
             raise Refused("Turn refused: the drone is not in the air, or does not tell its heading")
         now = attitude.yaw * units.DEG_PER_RAD
         turn = heading_of(angle, 0.0 if math.isnan(way) else way, relative == 1.0, now)
-        if (goto := vehicle.goto) is not None:
-            await vehicle.go(goto.with_heading((now + turn) * units.RAD_PER_DEG))
+        if (goto := vehicle.guided.goto) is not None:
+            await vehicle.guided.go(goto.with_heading((now + turn) * units.RAD_PER_DEG))
         else:
-            await vehicle.turn(turn * units.RAD_PER_DEG, rate if rate > 0.0 else None, guided_mode(command.flavour))
+            await vehicle.guided.turn(
+                turn * units.RAD_PER_DEG, rate if rate > 0.0 else None, guided_mode(command.flavour)
+            )
 
     async def _pause_or_continue(self, command: Command) -> None:
         """MAV_CMD_DO_PAUSE_CONTINUE: param1 0 hovers, 1 goes on to where the pause stopped it, or with its mission.
@@ -202,7 +208,7 @@ class GuidedService(Service):
         """
         vehicle = self.host.vehicle
         if command.params[0] == 0.0:
-            goto = vehicle.goto or self._interrupted
+            goto = vehicle.guided.goto or self._interrupted
             mission = vehicle.mission.flying or self._mission_interrupted
             await vehicle.hold(guided_mode(command.flavour))
             self._paused = None if goto is None else (goto, vehicle.orders)
@@ -214,7 +220,7 @@ class GuidedService(Service):
                 return
             if goto is None:
                 raise Refused("Continue refused: nothing was paused, or something else was ordered since")
-            await vehicle.go(goto)
+            await vehicle.guided.go(goto)
             self._paused = None
         else:
             raise Refused("Refused: param1 is 0 to pause, 1 to continue", lasting=True)
@@ -245,7 +251,7 @@ class GuidedService(Service):
 
     async def _look(self, where: Place, ato: float) -> None:
         vehicle = self.host.vehicle
-        vehicle.check_on_earth(where, "Region of interest")
+        check_on_earth(where, "Region of interest")
         if not vehicle.in_air:
             raise Refused("Region of interest refused: the drone is not in the air")
         await self.host.drone.poi.start(where.latitude, where.longitude, ato, PoiMode.LOCKED_GIMBAL)
@@ -275,7 +281,7 @@ class GuidedService(Service):
             if where is None:
                 raise Refused("Home refused: it has no place", lasting=True)
             ato = height(vehicle, command) or 0.0
-        vehicle.check_on_earth(where, "Home")
+        check_on_earth(where, "Home")
         before = home.state.preferred_type
         try:
             await home.set_preferred_type(RthHomeType.CUSTOM)

@@ -14,6 +14,7 @@ from anafi_mav.errors import PlanError
 from anafi_mav.mavlink import dialect
 from anafi_mav.plans.plan import Item
 from anafi_mav.plans.translate import Cursor, Leg, Start, Step, translate
+from anafi_mav.services.bounds import check_place
 from anafi_mav.services.fence_watch import OutsideFence
 from anafi_mav.services.place import Place
 from anafi_mav.services.refusal import Refused
@@ -110,7 +111,7 @@ async def check_path(vehicle: Vehicle, parts: Sequence[Leg | Step], after: int, 
 def _check(vehicle: Vehicle, start: Place | None, point: WayPoint, number: int) -> None:
     ceiling = vehicle.drone.piloting.state.max_altitude
     try:
-        vehicle.check_place(point.place, start=start)
+        check_place(vehicle, point.place, start=start)
         if ceiling is not None and point.ato > ceiling.current:
             raise Refused(f"{point.ato:.1f} m is above the drone's ceiling of {ceiling.current:g} m", lasting=True)
         vehicle.fence.check_height(point.ato)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from anafi_mav import geo
+from anafi_mav.services.bounds import amsl_to_ato, check_height, check_place
 from anafi_mav.services.offboard_control import Axis, Demand, Motion
 from anafi_mav.services.offboard_setpoints import MotionSetpoint, Origin, Vector
 from anafi_mav.services.place import Place
@@ -53,8 +54,8 @@ def resolve(setpoint: MotionSetpoint, vehicle: Vehicle, motion: Motion) -> Goal:
     height = None if z is None else -z if setpoint.origin is Origin.LOCAL else z
     if height is not None:
         if setpoint.origin is Origin.SEA:
-            height = vehicle.amsl_to_ato(height)
-        vehicle.check_height(height)
+            height = amsl_to_ato(vehicle, height)
+        check_height(vehicle, height)
     place: Place | None = None
     north = east = None
     if x is not None or y is not None:
@@ -64,7 +65,7 @@ def resolve(setpoint: MotionSetpoint, vehicle: Vehicle, motion: Motion) -> Goal:
             place = _local_place(vehicle.origin, x, y, vehicle.place)
         else:
             place = Place(x or 0.0, y or 0.0)
-        vehicle.check_place(place, start=vehicle.place)
+        check_place(vehicle, place, start=vehicle.place)
         if motion.reference is not None:
             north, east = geo.offset(*motion.reference, place.latitude, place.longitude)
     return Goal(
@@ -98,7 +99,7 @@ def _from_vehicle(setpoint: MotionSetpoint, vehicle: Vehicle, motion: Motion) ->
             raise Refused("Refused: the drone's height is not known")
         height = present - down
         if down != 0.0:
-            vehicle.check_height(height)
+            check_height(vehicle, height)
     cos, sin = math.cos(motion.yaw), math.sin(motion.yaw)
     if setpoint.body:
         front, right = ahead, aside
@@ -110,7 +111,7 @@ def _from_vehicle(setpoint: MotionSetpoint, vehicle: Vehicle, motion: Motion) ->
     if here is not None:
         place = Place(*geo.destination(here.latitude, here.longitude, north, east))
         if north != 0.0 or east != 0.0:
-            vehicle.check_place(place, start=here)
+            check_place(vehicle, place, start=here)
     turn = motion.yaw if setpoint.body else 0.0
     along = motion.north * math.cos(turn) + motion.east * math.sin(turn)
     across = motion.east * math.cos(turn) - motion.north * math.sin(turn)

@@ -18,6 +18,7 @@ from anafi_mav.drone.events import Message
 from anafi_mav.drone.moves import Move, MoveEnd
 from anafi_mav.errors import LinkLost
 from anafi_mav.mavlink import dialect
+from anafi_mav.services.bounds import SLOWEST, check_height, check_on_earth, check_place
 from anafi_mav.services.circle import (
     DEFAULT_RADIUS,
     DEFAULT_SPEED,
@@ -33,14 +34,16 @@ from anafi_mav.services.circle import (
     outline,
 )
 from anafi_mav.services.commands import Command
+from anafi_mav.services.guided_flight import Goto
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.offboard_control import Controller
+from anafi_mav.services.place import Place
 from anafi_mav.services.refusal import Refused
 from anafi_mav.services.service import Action, Host, Service
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.stream import Stream, Times
 from anafi_mav.services.targets import height, place
-from anafi_mav.services.vehicle import SLOWEST, Goto, Place, Vehicle
+from anafi_mav.services.vehicle import Vehicle
 
 AS_IT_IS = 5.0
 """ORBIT_YAW_BEHAVIOUR_UNCHANGED; QGroundControl always sends it."""
@@ -113,12 +116,12 @@ class OrbitService(Service):
             raise Refused("Orbit refused: the pilot at the Skycontroller flies")
         start = entry(circle, here)
         for point in outline(circle, here):
-            vehicle.check_place(point)
+            check_place(vehicle, point)
         circle, self._cruise = self._held_back(circle), vehicle.cruise_speed
         bearing = _bearing(circle.centre, start)
         off = abs(geo.distance(*circle.centre.point, *here.point) - circle.radius)
         if off > ON_IT or abs((vehicle.drone.piloting.state.altitude or 0.0) - circle.height) > ON_IT:
-            await vehicle.go(Goto(start, circle.height, heading_at(circle, bearing), None, FlightMode.HOLD))
+            await vehicle.guided.go(Goto(start, circle.height, heading_at(circle, bearing), None, FlightMode.HOLD))
             move = vehicle.drone.piloting.move
             self._lap = Lap(circle)
             vehicle.select(FlightMode.ORBIT, self)
@@ -142,7 +145,7 @@ class OrbitService(Service):
         where = place(command) or (None if running is None else running.centre) or vehicle.place
         if where is None:
             raise Refused("Orbit refused: it has no centre, and no GPS fix")
-        vehicle.check_on_earth(where, "Orbit")
+        check_on_earth(where, "Orbit")
         if math.isnan(radius):
             radius = DEFAULT_RADIUS if running is None else running.signed_radius
         if not SMALLEST <= abs(radius) <= LARGEST:
@@ -160,7 +163,7 @@ class OrbitService(Service):
             ato = piloting.altitude if running is None else running.height
         if ato is None:
             raise Refused("Orbit refused: the drone's height is not known")
-        vehicle.check_height(ato)
+        check_height(vehicle, ato)
         heading = 0.0 if piloting.attitude is None else piloting.attitude.yaw
         return Circle(
             where,

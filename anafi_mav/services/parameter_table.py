@@ -14,11 +14,11 @@ from typing import Any
 from anafi_mav.drone import MODELS, Drone, Range, events
 from anafi_mav.drone.events import Axis, PreciseHomeMode, RthEndingBehavior, RthHomeType
 from anafi_mav.drone.events import ObstacleAvoidanceMode as AvoidanceMode
+from anafi_mav.services.bounds import LOWEST
 from anafi_mav.services.link_loss import LossAction
 from anafi_mav.services.parameter import Limits, Parameter, bounds, current, number, own
 from anafi_mav.services.parameter_codec import Kind
 from anafi_mav.services.service import Host
-from anafi_mav.services.vehicle import LOWEST
 
 OFF_ON = {0: "Off", 1: "On"}
 
@@ -336,7 +336,7 @@ MODEL = Parameter(
 
 
 def _put_takeoff_height(host: Host, value: float) -> None:
-    host.vehicle.takeoff_height = value
+    host.vehicle.takeoff.height = value
 
 
 def _takeoff_limits(host: Host) -> Limits:
@@ -348,7 +348,7 @@ TAKEOFF_HEIGHT = Parameter(
     "ANF_TKOFF_ALT",
     Kind.REAL32,
     "Height of a take-off that names none",
-    read=lambda host: host.vehicle.takeoff_height,
+    read=lambda host: host.vehicle.takeoff.height,
     write=own(_put_takeoff_height),
     put=_put_takeoff_height,
     limits=_takeoff_limits,
@@ -363,14 +363,14 @@ TAKEOFF_HEIGHT = Parameter(
 
 
 async def _set_hand_launch(host: Host, value: float) -> None:
-    host.vehicle.hand_launch = value == 1
+    host.vehicle.takeoff.hand_launch = value == 1
 
 
 HAND_LAUNCH = Parameter(
     "ANF_HAND_LAUNCH",
     Kind.INT32,
     "Arming starts the motors",
-    read=lambda host: number(host.vehicle.hand_launch),
+    read=lambda host: number(host.vehicle.takeoff.hand_launch),
     write=_set_hand_launch,
     values=OFF_ON,
     polled=True,
@@ -397,8 +397,8 @@ async def _set_climb_speed(host: Host, value: float) -> None:
 
 async def _go_on(host: Host) -> None:
     """A move under way changes its speed, as it does for MAV_CMD_DO_CHANGE_SPEED."""
-    if (goto := host.vehicle.goto) is not None:
-        await host.vehicle.go(goto)
+    if (goto := host.vehicle.guided.goto) is not None:
+        await host.vehicle.guided.go(goto)
 
 
 def _climb_limits(host: Host) -> Limits | None:

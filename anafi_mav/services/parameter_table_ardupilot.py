@@ -33,7 +33,7 @@ from anafi_mav.services.parameter_table import (
 from anafi_mav.services.parameter_table_fence import FENCE_ARDUPILOT
 from anafi_mav.services.refusal import Refused
 from anafi_mav.services.service import Host
-from anafi_mav.services.vehicle import AUTO_DISARM
+from anafi_mav.services.takeoff import AUTO_DISARM
 
 FACTS = "ArduPilot facts"
 

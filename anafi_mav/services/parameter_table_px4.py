@@ -38,7 +38,7 @@ from anafi_mav.services.parameter_table_fence import FENCE_PX4
 from anafi_mav.services.parameter_table_follow import FOLLOW_PX4
 from anafi_mav.services.refusal import Refused
 from anafi_mav.services.service import Host
-from anafi_mav.services.vehicle import AUTO_DISARM
+from anafi_mav.services.takeoff import AUTO_DISARM
 
 FACTS = "PX4 facts"
 

@@ -15,3 +15,8 @@ class Place(msgspec.Struct, frozen=True):
     def point(self) -> tuple[float, float]:
         """Latitude and longitude."""
         return self.latitude, self.longitude
+
+
+def point_of(place: Place | None) -> tuple[float, float] | None:
+    """Latitude and longitude, where there is a place."""
+    return None if place is None else place.point

@@ -8,9 +8,12 @@ from __future__ import annotations
 import math
 
 from anafi_mav.mavlink import dialect
+from anafi_mav.services.bounds import amsl_to_ato
 from anafi_mav.services.commands import Command
 from anafi_mav.services.flavours import ARDUPILOT
-from anafi_mav.services.vehicle import Place, Refused, Vehicle
+from anafi_mav.services.place import Place
+from anafi_mav.services.refusal import Refused
+from anafi_mav.services.vehicle import Vehicle
 
 _AMSL_FRAMES = (None, dialect.MAV_FRAME_GLOBAL, dialect.MAV_FRAME_GLOBAL_INT)
 _RELATIVE_FRAMES = (dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT, dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
@@ -51,7 +54,7 @@ def height_in_frame(vehicle: Vehicle, z: float, frame: int | None, *, amsl: bool
     if not math.isfinite(z):
         raise Refused("Refused: the height is not a number", lasting=True)
     if frame in _AMSL_FRAMES or (amsl and frame in _RELATIVE_FRAMES):
-        return vehicle.amsl_to_ato(z)
+        return amsl_to_ato(vehicle, z)
     if frame in _RELATIVE_FRAMES:
         return z
     raise UnsupportedFrame(frame)

@@ -1,0 +1,78 @@
+"""Where a vehicle may be sent: the checks of heights, places and speeds that every order passes before it is flown.
+
+What is out of bounds is refused, never clamped: by the numbers themselves, by the drone's own limits, by the fence.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from anafi_mav import geo
+from anafi_mav.services.fence_watch import OutsideFence
+from anafi_mav.services.place import Place, point_of
+from anafi_mav.services.refusal import Refused
+
+if TYPE_CHECKING:
+    from anafi_mav.services.vehicle import Vehicle
+
+SLOWEST, FASTEST = 0.1, 100.0
+"""m/s. A speed beyond these is a number in the wrong place, or in another unit. Within them the drone limits itself."""
+
+NOWHERE = 1e-5
+"""deg. A place that is so near to 0/0 is no place but numbers that were not set, or integers in the place of floats."""
+
+LOWEST = 1.0
+"""m above take-off: where an ANAFI hovers by itself after take-off. Lower targets are refused, never clamped."""
+
+
+def check_height(vehicle: Vehicle, ato: float) -> None:
+    """Raise `Refused` unless a target height (m above take-off) is one the drone may go to."""
+    ceiling = vehicle.drone.piloting.state.max_altitude
+    if not math.isfinite(ato):
+        raise Refused("Refused: the height is not a number", lasting=True)
+    if ato < LOWEST:
+        raise Refused(f"Refused: {ato:.1f} m above take-off is below {LOWEST:g} m", lasting=True)
+    if ceiling is not None and ato > ceiling.current:
+        raise Refused(
+            f"Refused: {ato:.1f} m above take-off is above the drone's ceiling of {ceiling.current:g} m",
+            lasting=True,
+        )
+    try:
+        vehicle.fence.check_height(ato)
+    except OutsideFence as error:
+        raise Refused(f"Refused: {error}", lasting=True) from error
+
+
+def amsl_to_ato(vehicle: Vehicle, amsl: float) -> float:
+    """Height above take-off (m) of an AMSL height; raises `Refused` when no bridge is known."""
+    ato = vehicle.height.ato(amsl)
+    if ato is None:
+        raise Refused("Refused: no GPS fix on the ground, so the take-off point's height above sea level is unknown")
+    return ato
+
+
+def check_on_earth(place: Place, what: str) -> None:
+    """Raise `Refused` unless this is a place."""
+    if not (abs(place.latitude) <= 90.0 and abs(place.longitude) <= 180.0):
+        raise Refused(f"{what} refused: that is no place on earth", lasting=True)
+    if abs(place.latitude) < NOWHERE and abs(place.longitude) < NOWHERE:
+        raise Refused(f"{what} refused: latitude and longitude are both 0", lasting=True)
+
+
+def check_place(vehicle: Vehicle, place: Place, *, start: Place | None = None) -> None:
+    """Raise `Refused` unless the drone may fly there, and the straight way from `start` if that is given."""
+    check_on_earth(place, "Goto")
+    state, centre = vehicle.drone.piloting.state, vehicle.home
+    if state.geofence and state.max_distance is not None and centre is not None:
+        distance = geo.distance(centre.latitude, centre.longitude, place.latitude, place.longitude)
+        if distance > state.max_distance.current:
+            raise Refused(
+                f"Goto refused: {distance:.0f} m from home is beyond the drone's limit of "
+                f"{state.max_distance.current:g} m",
+                lasting=True,
+            )
+    try:
+        vehicle.fence.check_place(point_of(place), point_of(centre), point_of(start))
+    except OutsideFence as error:
+        raise Refused(f"Goto refused: {error}", lasting=error.lasting) from error

@@ -1,0 +1,244 @@
+"""From the ground into the air: arming, which an ANAFI does not know, and the take-off to a height.
+
+The drone takes off to a height of its own; the climb to the asked one is a move that follows in the background. An
+armed state that nothing follows lapses, and so does a take-off that waits for its client to arm.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Coroutine, Hashable
+from typing import TYPE_CHECKING, Any
+
+from anafi_mav.drone.events import AltitudeChanged, FlyingState, FlyingStateChanged
+from anafi_mav.errors import AnafiMavError, CommandRejected
+from anafi_mav.services.bounds import check_height
+from anafi_mav.services.flying import AIRBORNE
+from anafi_mav.services.modes import FlightMode
+from anafi_mav.services.refusal import Refused
+from anafi_mav.services.statustext import Severity
+
+if TYPE_CHECKING:
+    from anafi_mav.services.vehicle import Vehicle
+
+AUTO_DISARM = 10.0
+"""s that an armed vehicle waits for a take-off (as PX4's COM_DISARM_PRFLT)."""
+
+ARM_WAIT = 10.0
+"""s that a take-off waits for somebody to arm: QGroundControl sends take-off first and arms on its acceptance."""
+
+CLIMB_WAIT = 15.0
+"""s for the drone to hover after it took off, before the climb to the asked height is given up."""
+
+ALTITUDE_WAIT = 3.0
+"""s for the drone to tell its height, which it does five times a second."""
+
+CLOSE_ENOUGH = 0.1
+"""m from the height of a take-off that are no reason for a move."""
+
+
+class Takeoff:
+    """The way of one vehicle from standing disarmed to hovering at a height."""
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        self.height = 2.5
+        """m above take-off for a take-off that names no height (PX4's default of MIS_TAKEOFF_ALT)."""
+        self.hand_launch = False
+        """Arming starts the motors and waits for the drone to be thrown (a parameter; Parrot's UserTakeOff)."""
+        self._vehicle = vehicle
+        self._armed = False
+        self._climbing = False
+        self._pending: tuple[float, Hashable] | None = None
+        """Height of a take-off that waits for its client to arm, and the client."""
+        self._disarm_timer: asyncio.TimerHandle | None = None
+        self._pending_timer: asyncio.TimerHandle | None = None
+        self._background: asyncio.Task[None] | None = None
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    @property
+    def armed(self) -> bool:
+        """Arming was accepted and has not lapsed. What flies is armed in any case (`Vehicle.armed`)."""
+        return self._armed
+
+    @property
+    def climbing(self) -> bool:
+        """The climb that follows the drone's own take-off is under way."""
+        return self._climbing
+
+    # What clients ask for. Each returns when the drone confirmed, or raises.
+
+    async def arm(self, client: Hashable = None) -> None:
+        """Accept arming. An ANAFI has no such state: nothing turns until a take-off; it lapses after `AUTO_DISARM`.
+
+        With `hand_launch` the motors do turn, and the drone flies as soon as it leaves the hand.
+
+        A take-off that this client asked for begins now. Another client's does not: whoever arms to look at something
+        must not find propellers turning.
+        """
+        vehicle = self._vehicle
+        if vehicle.armed and not vehicle.on_ground:
+            return
+        if problems := vehicle.prearm_problems():
+            raise Refused("PreArm: " + "; ".join(problems))
+        if self.hand_launch:
+            await vehicle.take_over()
+            await vehicle.drone.piloting.hand_launch()
+            return
+        self._armed = True
+        self._rearm_disarm_timer()
+        vehicle.changed()
+        if self._pending is not None and self._pending[1] == client:
+            height, _ = self._pending
+            self.forget()
+            self._start_background(self._take_off_and_report(height))
+        else:
+            vehicle.mission.armed(client)
+
+    async def disarm(self, *, force: bool) -> None:
+        """Disarm on the ground. In the air only `force` with `allow_kill` does it: the motors stop, the drone falls."""
+        vehicle = self._vehicle
+        if vehicle.on_ground:
+            await vehicle.take_over()
+            await vehicle.drone.piloting.land()  # a take-off that is on its way to the drone must not follow
+            if not vehicle.on_ground:
+                raise Refused("Disarm refused: the drone had just taken off, it lands")
+            self._armed = False
+            vehicle.changed()
+            return
+        if vehicle.flying_state == FlyingState.USERTAKEOFF:
+            await vehicle.take_over()
+            await vehicle.drone.piloting.cancel_hand_launch()
+            return
+        if not force:
+            raise Refused("Disarm refused: the drone is in the air")
+        await vehicle.terminate()
+
+    async def begin(self, ato: float | None, client: Hashable = None) -> None:
+        """Take off to `ato` m (None: `height`). Returns when the drone confirmed that it takes off.
+
+        Disarmed, it returns at once and the take-off waits `ARM_WAIT` for this client to arm.
+        """
+        vehicle = self._vehicle
+        height = self.height if ato is None else ato
+        check_height(vehicle, height)
+        if not vehicle.on_ground:
+            raise Refused("Takeoff refused: the drone is in the air")
+        if problems := vehicle.prearm_problems():
+            raise Refused("PreArm: " + "; ".join(problems))
+        if not self._armed:
+            self._pending = (height, client)
+            self._set_timer("_pending_timer", ARM_WAIT, self._lapsed)
+            return
+        await vehicle.take_over()
+        await self._lift_off()
+        if vehicle.selected is not FlightMode.GUIDED:
+            vehicle.forget_mode()
+        self._start_background(self._climb(height))
+
+    # What ends it.
+
+    def forget(self) -> None:
+        """No take-off waits to be armed any more."""
+        self._pending = None
+        self._cancel_timer("_pending_timer")
+
+    def end(self) -> list[asyncio.Task[None]]:
+        """Something else flies now: what goes on in the background is given up. Returns tasks that are about to end."""
+        task, self._background, self._climbing = self._background, None, False
+        if task is None:
+            return []
+        task.cancel()
+        return [task]
+
+    def end_climb(self) -> None:
+        """The drone lands or returns: it does not climb. A take-off that has yet to begin is not disturbed."""
+        if self._climbing:
+            self.end()
+
+    def came_down(self) -> None:
+        """The drone has come down: it is disarmed, and nothing of before lifts it off again."""
+        self._armed = False
+        self.forget()
+
+    def left_ground(self) -> None:
+        """The drone has left the ground: arming does not lapse any more."""
+        self._cancel_timer("_disarm_timer")
+
+    def link_down(self) -> None:
+        """What was asked for before counts for nothing."""
+        self._armed = False
+        for task in tuple(self._tasks):
+            task.cancel()
+
+    # Taking off.
+
+    async def _lift_off(self) -> None:
+        """The drone's own take-off. Until it has succeeded or failed, the armed state does not lapse."""
+        self._cancel_timer("_disarm_timer")
+        try:
+            await self._vehicle.drone.piloting.take_off()
+        finally:
+            if self._armed and self._vehicle.on_ground:
+                self._rearm_disarm_timer()
+
+    async def _take_off_and_report(self, height: float) -> None:
+        """The take-off that waited for arming: its command was answered long ago, so failures are texts."""
+        try:
+            await self._lift_off()
+        except AnafiMavError as error:
+            self._vehicle.text(Severity.ERROR, f"Takeoff failed: {error}")
+            return
+        await self._climb(height)
+
+    async def _climb(self, height: float) -> None:
+        """From the drone's own hover height to the asked one."""
+        vehicle = self._vehicle
+        self._climbing = True
+        vehicle.changed()
+        try:
+            if not vehicle.in_air:
+                await vehicle.drone.expect(FlyingStateChanged, lambda m: m.state in AIRBORNE, CLIMB_WAIT)
+            # What it told last is from while it rose.
+            present = (await vehicle.drone.expect(AltitudeChanged, timeout=ALTITUDE_WAIT)).altitude
+            if not vehicle.in_air or vehicle.returning:
+                raise CommandRejected("the drone does something else now")
+            if abs(height - present) > CLOSE_ENOUGH:
+                await vehicle.drone.piloting.move_by(0.0, 0.0, present - height, 0.0)
+        except AnafiMavError as error:
+            vehicle.text(Severity.ERROR, f"Climb to {height:g} m given up: {error}")
+        finally:
+            if self._background is asyncio.current_task():
+                self._climbing, self._background = False, None
+                vehicle.changed()
+
+    def _start_background(self, work: Coroutine[Any, Any, None]) -> None:
+        self.end()
+        task = asyncio.get_running_loop().create_task(work)
+        self._background = task
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    # What lapses.
+
+    def _lapsed(self) -> None:
+        self.forget()
+        self._vehicle.text(Severity.WARNING, "Takeoff forgotten: nobody armed")
+
+    def _rearm_disarm_timer(self) -> None:
+        self._set_timer("_disarm_timer", AUTO_DISARM, self._auto_disarm)
+
+    def _auto_disarm(self) -> None:
+        if self._armed and self._vehicle.on_ground:
+            self._armed = False
+            self._vehicle.text(Severity.INFO, "Disarmed: no take-off followed")
+            self._vehicle.changed()
+
+    def _set_timer(self, name: str, delay: float, callback: Callable[[], None]) -> None:
+        self._cancel_timer(name)
+        setattr(self, name, asyncio.get_running_loop().call_later(delay, callback))
+
+    def _cancel_timer(self, name: str) -> None:
+        timer: asyncio.TimerHandle | None = getattr(self, name)
+        if timer is not None:
+            timer.cancel()
+            setattr(self, name, None)
