@@ -1,8 +1,8 @@
 """The flight core: one drone as the vehicle that MAVLink's clients think they fly. No flavour, no message.
 
 It knows what MAVLink has and an ANAFI has not (an armed state, a chosen mode) and keeps it honest: both follow what the
-drone does, and a verb returns when the drone confirmed. Here it is told to stop, land or return, and hears who takes it
-over. How it gets into the air is `takeoff`, to a place `guided_flight`; whoever keeps telling it how to fly is a `Helm`.
+drone does, and a verb returns when the drone confirmed. Whatever is to fly the drone takes it over here. How it gets
+into the air is `takeoff`, how to a place `guided_flight`; who keeps telling it how to fly is a `Helm`.
 """
 
 from __future__ import annotations
