@@ -22,7 +22,7 @@ from anafi_mav.services.mission_path import check_path, lay_out
 from anafi_mav.services.mission_progress import Progress, State
 from anafi_mav.services.mission_record import Record
 from anafi_mav.services.mission_steps import fly_step
-from anafi_mav.services.mission_waits import ArmWait, EndWatch
+from anafi_mav.services.mission_waits import ArmWait, EndWatch, StoreWait
 from anafi_mav.services.mission_words import refusal
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.refusal import Refused
@@ -64,6 +64,7 @@ class MissionFlight:
         self._starting: tuple[Leg, int] | None = None
         """What the drone is asked to begin, and after which line."""
         self._files = FilesOnDrone(vehicle.drone.flight_plan)
+        self.storing = StoreWait()
         self._arming = ArmWait(self._lapsed)
         self._beginning = False
         """Taken over by ourselves."""
@@ -103,6 +104,7 @@ class MissionFlight:
 
         On the ground and disarmed it waits until this client arms. Raises `Refused`, or what the drone refused.
         """
+        await self.storing.over()
         progress, vehicle = self.progress, self._vehicle
         if progress.state is State.NONE:
             raise Refused("Mission refused: there is no mission")
@@ -121,6 +123,7 @@ class MissionFlight:
 
     async def choose(self, client: Hashable, item: int) -> None:
         """Make an item the current one; a mission that is flown goes on there."""
+        await self.storing.over()
         if self.progress.state is State.NONE:
             raise Refused("Current item refused: there is no mission")
         if not 0 <= item < len(self.progress.items):
@@ -244,6 +247,7 @@ class MissionFlight:
     async def _begin_and_report(self, number: int) -> None:
         """The beginning that waited for arming: its command was answered long ago, so failures are texts."""
         try:
+            await self.storing.over()
             await self._begin(self.progress.first, number, waited=True)
         except AnafiMavError as error:
             self._vehicle.text(Severity.ERROR, str(error))

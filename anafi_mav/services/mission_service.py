@@ -101,6 +101,7 @@ class MissionService(Service):
         """MAV_CMD_DO_SET_MISSION_CURRENT: param1 the item, -1 none; param2 1 begins anew after the end."""
         item, anew = command.params[:2]
         flight = self._flight
+        await flight.storing.over()
         if not flight.there:
             raise Refused("Current item refused: there is no mission", lasting=True)
         if math.isinf(item) or (not math.isnan(item) and item != int(item)):

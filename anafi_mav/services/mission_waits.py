@@ -1,14 +1,17 @@
-"""What a mission waits for without being flown: that somebody arms, and what a drone does that has stopped its plan."""
+"""What a mission waits for without being flown: that it is stored, that somebody arms, and what a drone does that has
+stopped its plan."""
 
 from __future__ import annotations
 
 import asyncio
 import functools
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from anafi_mav.drone.events import FlyingState, ForcedLandingReason
 from anafi_mav.services.mission_progress import Progress
+from anafi_mav.services.refusal import Refused
 
 if TYPE_CHECKING:
     from anafi_mav.services.vehicle import Vehicle
@@ -18,6 +21,39 @@ ARM_WAIT = 10.0
 
 END_WAIT = 2.0
 """s within which a drone whose plan has ended with a landing or a return has begun it."""
+
+
+STORE_WAIT = 5.0
+"""s that an order waits for a mission to be stored, which takes a thread some milliseconds and a disk its time."""
+
+
+class StoreWait:
+    """A mission has come and is being stored: what its client orders meanwhile is meant for it, not for the old one.
+
+    Clients like dronekit do not wait for the acknowledgement of their last item.
+    """
+
+    def __init__(self) -> None:
+        self._stored: asyncio.Event | None = None
+
+    @contextmanager
+    def going_on(self) -> Iterator[None]:
+        """For as long as a mission is being stored, and until it is the one of the vehicle."""
+        stored = self._stored = asyncio.Event()
+        try:
+            yield
+        finally:
+            stored.set()
+            if self._stored is stored:
+                self._stored = None
+
+    async def over(self) -> None:
+        """Return when no mission is being stored: at once if that is so. Raises `Refused` when it takes too long."""
+        while self._stored is not None:
+            try:
+                await asyncio.wait_for(self._stored.wait(), STORE_WAIT)
+            except asyncio.TimeoutError:
+                raise Refused("Mission refused: it is still being stored") from None
 
 
 class ArmWait:

@@ -55,6 +55,12 @@ class PlanDesk:
 
     def receive(self, message: Any, peer: Peer, now: float) -> list[Effect]:
         """A message of `MESSAGES` from a client."""
+        if message.get_msgId() == dialect.MAVLINK_MSG_ID_MISSION_ACK:  # it gives up what it has asked for
+            self._waiting = deque(
+                (other, who)
+                for other, who in self._waiting
+                if (other.mission_type, who.client) != (message.mission_type, peer.client)
+            )
         if message.get_msgId() not in _WHOLE:
             return self._handle(message, peer, now)
         for kind, transfer in self.transfers.items():

@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 
 from anafi_mav import units
 from anafi_mav.mavlink import dialect
@@ -20,7 +21,7 @@ from anafi_mav.services.flavours import flavour_of
 from anafi_mav.services.guided import fly_item, is_guided_item
 from anafi_mav.services.mission_kind import MissionKind
 from anafi_mav.services.plan_desk import MESSAGES, PlanDesk
-from anafi_mav.services.plan_items import PlanItem
+from anafi_mav.services.plan_items import Fault, PlanItem
 from anafi_mav.services.plan_transfer import Changed, Commit, Effect, Peer, PlanKind, Reply, Say
 from anafi_mav.services.rally import RallyKind, Return
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
@@ -117,19 +118,31 @@ class PlanService(Service):
         self.host.send(reply.message, reply.peer.channel)
 
     async def _store(self, commit: Commit) -> None:
+        concerned = self._mission.mission_type in commit.plans
+        with self.host.vehicle.mission.storing.going_on() if concerned else nullcontext():
+            try:
+                fault = await self._put(commit)
+            except Exception:
+                # Whatever went wrong, clients must not wait for ever for what comes after it.
+                logger.exception("%s: a plan could not be stored", self.host.drone.name)
+                fault = Fault(dialect.MAV_MISSION_ERROR, "the gateway failed to store it")
+            if fault is not None:
+                self.host.complain(f"Mission refused: {fault.reason}")
+            self._perform(self._desk.stored(commit, self.host.clock.monotonic(), fault))
+
+    async def _put(self, commit: Commit) -> Fault | None:
+        """Keep plans; what is wrong with the mission, if anything is."""
         mission = commit.plans.get(self._mission.mission_type)
         if mission:
             fault = await asyncio.to_thread(self._mission.examine, mission, commit.peer.flavour)
             if fault is not None:
-                self.host.complain(f"Mission refused: {fault.reason}")
-                self._perform(self._desk.stored(commit, self.host.clock.monotonic(), fault))
-                return
+                return fault
         for kind, items in commit.plans.items():
             self.host.memory.put(kind, items)
         problem = await self.host.memory.save()
         if problem is not None:
             self.host.complain(problem)
-        self._perform(self._desk.stored(commit, self.host.clock.monotonic()))
+        return None
 
     def _set_timer(self) -> None:
         """Come back when something is to be said again.

@@ -489,8 +489,9 @@ class PlanTransfer:
     def gone_on(self, peer: Peer) -> None:
         """The client begins with another list, so it has heard of this one. MAVSDK takes an acknowledgement of any list
         for one of that which it transfers."""
-        if self._done is not None and self._done.peer.client == peer.client:
-            self._done.echoes = 0
+        for done in (self._done, self._committing):
+            if done is not None and done.peer.client == peer.client:
+                done.echoes = 0
 
     def _forget_done(self, peer: Peer) -> None:
         """The client goes on to something else: nothing late of its last transfer must meet it."""

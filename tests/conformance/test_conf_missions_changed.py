@@ -15,6 +15,7 @@ from support.mav import Client
 from support.missions import (
     ACTIVE,
     COMPLETE,
+    LAND,
     NO_MISSION,
     NOT_STARTED,
     PAUSED,
@@ -45,7 +46,9 @@ from support.plans import (
 )
 from support.world import HOME, World, world
 
-INVALID = 5
+from anafi_mav.services.memory import Memory
+
+ERROR, INVALID = 1, 5
 
 SERVO = [takeoff(6.0), way(10.0, 0.0, 6.0), Item(183, 0.0, 0.0, p1=1.0, p2=1500.0, frame=2)]
 NOTHING = [Item(178, 0.0, 0.0, p1=1.0, p2=4.0, p3=-1.0, frame=2), Item(189, 0.0, 0.0, frame=2)]
@@ -227,3 +230,64 @@ async def test_conf_063_an_upload_that_fails_does_not_touch_the_flight(flavour: 
         assert pauses(w) == [*before, "stopped"]
         assert reached(w) == [0, 1, 2, 3]
         assert len(await download(w.client, MISSION)) == len(CORNERS) + first(w)
+
+
+ONE_WAY = [takeoff(6.0), way(15.0, 0.0, 6.0), LAND]
+OTHER_WAY = [takeoff(6.0), way(0.0, 12.0, 6.0), way(0.0, 15.0, 6.0), LAND]
+
+
+async def up_to_the_last_item(w: World, items: list[Item]) -> None:
+    """Upload, and do not wait for the acknowledgement."""
+    listed = [Item(16, *HOME), *items] if first(w) else items
+    position = send_count(w.client, len(listed), MISSION)
+    for seq, item in enumerate(listed):
+        await w.client.wait(REQUESTS, lambda m, seq=seq: m.seq == seq, since=position)
+        send_item(w.client, item, seq, MISSION)
+
+
+@both
+async def test_conf_073_an_order_to_start_right_after_the_last_item_is_for_the_new_mission(flavour: str) -> None:
+    async with world(flavour=flavour, web=True) as w:
+        await put(w, ONE_WAY)
+        assert (await w.client.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)).result == ACCEPTED
+        mark = w.client.mark()
+        await up_to_the_last_item(w, OTHER_WAY)
+        if flavour == "ardupilot":
+            ack = await w.client.command(dialect.MAV_CMD_MISSION_START, 0, 0)
+        else:
+            ack = await w.client.command(dialect.MAV_CMD_DO_SET_MODE, 1, 4, 4)
+        assert ack.result == ACCEPTED
+        assert [m.type for _, m in w.client.since(mark, "MISSION_ACK")] == [ACCEPTED]
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["east"] > 11.0, timeout=40.0)
+        assert all(e.args["north"] < 2.0 for e in w.drone.log if e.kind == "pose")
+        files = [e for e in w.drone.log if e.kind == "plan" and e.name == "plan" and e.args["state"] == "playing"]
+        assert len(files) == 1
+
+
+@both
+async def test_conf_074_an_item_chosen_right_after_the_last_one_is_of_the_new_mission(flavour: str) -> None:
+    async with world(flavour=flavour, web=True) as w:
+        await put(w, ONE_WAY)
+        mark = w.client.mark()
+        await up_to_the_last_item(w, OTHER_WAY)
+        chosen = first(w) + 3
+        w.client.send(dialect.MAVLink_mission_set_current_message(1, 1, chosen))
+        told = await w.client.wait("MISSION_CURRENT", lambda m: m.seq == chosen, since=mark)
+        assert whole(told).total == len(OTHER_WAY)  # home is not one of them
+
+
+async def test_conf_063_a_mission_that_cannot_be_stored_is_told_and_the_next_one_is_taken(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Whatever goes wrong in the gateway: clients must not wait for an answer that never comes."""
+
+    async def fail(memory: Memory) -> None:
+        raise RuntimeError("as if the gateway had a mistake")
+
+    async with world(web=True) as w:
+        with monkeypatch.context() as broken:
+            broken.setattr(Memory, "save", fail)
+            assert (await upload(w.client, ONE_WAY, MISSION)).type == ERROR
+            assert (await w.client.wait("STATUSTEXT", lambda m: "failed to store" in m.text, since=0)).severity <= 4
+        assert (await upload(w.client, OTHER_WAY, MISSION)).type == ACCEPTED
+        assert len(await download(w.client, MISSION)) == len(OTHER_WAY)

@@ -480,6 +480,16 @@ def test_who_asks_for_a_list_while_it_is_stored_is_told_of_the_new_one() -> None
     assert (total.get_type(), total.count) == ("MISSION_COUNT", 1)
 
 
+def test_who_gives_up_while_it_waits_is_not_asked_for_items() -> None:
+    plans = desk()
+    commit = commit_of(plans.receive(clear(), ME, 0.0))
+    assert plans.receive(count(2), OTHER, 0.0) == []
+    assert plans.receive(ask_list(), ME, 0.0) == []
+    assert plans.receive(ack(CANCELLED), OTHER, 0.0) == []
+    assert [message.get_type() for message in replies(plans.stored(commit, 0.0))] == ["MISSION_ACK", "MISSION_COUNT"]
+    assert plans.deadline() is None
+
+
 def test_what_waits_is_bounded() -> None:
     plans = desk()
     plans.receive(clear(), ME, 0.0)
