@@ -196,7 +196,7 @@ class MissionFlight:
             parts, rest, line = *await lay_out(vehicle, items, item, number, jumps), -1
         await check_path(vehicle, parts, line, number)
         if not resumes and isinstance(parts[0], Leg):
-            parts[0], uid, line = await self._files.beginning_with(parts[0])
+            parts[0], uid, line = await self._files.beginning_with(parts[0], items)
         self._beginning = True
         try:
             if not waited:
@@ -280,7 +280,7 @@ class MissionFlight:
                     await check_path(self._vehicle, self._parts, -1, 0)
                 head = self._parts[0]
                 if isinstance(head, Leg):
-                    leg, uid, line = await self._files.beginning_with(head)
+                    leg, uid, line = await self._files.beginning_with(head, progress.items)
                     self._parts[0] = leg
                     await self._play(leg, uid, line)
                     return  # it says itself when it ends

@@ -291,3 +291,30 @@ async def test_conf_063_a_mission_that_cannot_be_stored_is_told_and_the_next_one
             assert (await w.client.wait("STATUSTEXT", lambda m: "failed to store" in m.text, since=0)).severity <= 4
         assert (await upload(w.client, OTHER_WAY, MISSION)).type == ACCEPTED
         assert len(await download(w.client, MISSION)) == len(OTHER_WAY)
+
+
+@both
+@pytest.mark.parametrize("how", ["longer", "shorter"])
+async def test_conf_074_an_edited_mission_is_flown_with_the_new_numbers(flavour: str, how: str) -> None:
+    """An Ai begins in the middle of a file that it has; the old mission's file says the same places of other items."""
+    last = [way(14.0, 14.0, 6.0), way(0.0, 14.0, 6.0)]
+    longer = [takeoff(6.0), way(14.0, 0.0, 6.0), way(7.0, 7.0, 6.0), *last]
+    async with world(flavour=flavour, web=True, model="ai") as w:
+        await on_the_way(w, 1)
+        mark, edited = w.client.mark(), longer if how == "longer" else last
+        begin = len(edited) - len(last)
+        await put(w, edited)
+        await state(w, NOT_STARTED, seq=0, since=mark)
+        if begin:
+            number = begin + first(w)
+            assert (await w.client.command(224, number, 0)).result == dialect.MAV_RESULT_ACCEPTED
+        assert (await w.client.command(dialect.MAV_CMD_MISSION_START, 0, 0)).result == dialect.MAV_RESULT_ACCEPTED
+        await state(w, ACTIVE, seq=begin, since=mark)
+        await state(w, COMPLETE, since=mark)
+        assert reached(w, mark) == [begin, begin + 1], "and no item that was never flown"
+        old, new = w.commands("flight_plan.start_at_v2")
+        assert old.args["flightplan_id"] != new.args["flightplan_id"]
+        assert [e.args["index"] for e in w.drone.log if e.name == "item" and e.t > new.t] == [0, 1]
+        assert [e.args["state"] for e in w.drone.log if e.name == "plan" and e.t > new.t][-1] == "stopped"
+        await mode(w, w.modes.idle, since=mark)
+        await settled(w, (0.0, 14.0, 6.0))
