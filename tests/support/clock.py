@@ -7,8 +7,8 @@ A minute of flight takes as long as its computations do, on any machine, with th
 
 Not counted either is the time in which callbacks were ready to run and did not, because the machine is shared: what
 they waited for a processor, and what the machine below a virtual one has stolen from its processors meanwhile, which
-the kernel counts as work of whoever it was stolen from. So code of ours that computes for too long, sleeps or blocks is
-as late as it is.
+the kernel counts as work of whoever it was stolen from. Code of ours that computes for long, sleeps or blocks is as
+late as it is; how much many short works come to is for tests/bench/ to say.
 
 As soon as somebody else is there, a child process, work in a thread or a timer of the kernel's, the clock runs like
 theirs.
@@ -30,7 +30,12 @@ INTERRUPTED = 0.0001
 """s of callbacks that are interrupted in the course of things."""
 
 LONG = 0.02
-"""s of callbacks after which it is looked whether time was stolen; the kernel counts that in hundredths of a second."""
+"""s of callbacks that work for long: all that is beyond counts, and it is looked whether time was stolen. The kernel
+counts that in hundredths of a second, so of less it cannot be known."""
+
+SHARE = 0.1
+"""What counts of shorter work: from one moment to the next a shared machine can be so much slower. Some does count,
+so that no two moments are the same."""
 
 LOOK_EVERY = 0.25
 """s after which it is looked anyway, so that what is found is of now."""
@@ -49,7 +54,7 @@ def now() -> float:
     """What `time.monotonic` is in tests; never steps back. While callbacks run it is their work that counts."""
     global _newest
     if _began is not None and _began[2] == threading.get_ident() and asyncio._get_running_loop() is not None:
-        told = _began[0] + time.thread_time() - _began[1]
+        told = _began[0] + counted(time.thread_time() - _began[1])
     else:
         told = _real() - _lost
     _newest = max(_newest, told)
@@ -62,6 +67,11 @@ def queued() -> float:
         return int(Path("/proc/thread-self/schedstat").read_bytes().split()[1]) * 1e-9
     except OSError:
         return 0.0
+
+
+def counted(work: float) -> float:
+    """How many s so much work is on the clock."""
+    return SHARE * min(max(work, 0.0), LONG) + max(work - LONG, 0.0)
 
 
 def stolen() -> list[float]:
@@ -118,17 +128,18 @@ class Selector(selectors.DefaultSelector):
         return ready
 
     def _waited(self) -> float:
-        """s of the callbacks' time that were none of theirs."""
+        """s of the callbacks' time that do not count."""
         (left, worked), (here, working) = self._left, self._state()
-        lost, idle = 0.0, here - left - (working - worked)
+        work = working - worked
+        idle = max(0.0, here - left - work)
         if idle > INTERRUPTED:
             before, self._queued = self._queued, queued()
-            lost = min(idle, self._queued - before)
+            idle = max(0.0, idle - (self._queued - before))
         if here - left > LONG or here - self._looked > LOOK_EVERY:
             earlier, self._stolen, self._looked = self._stolen, stolen(), here
             if here - left > LONG:
-                lost += max((b - a for a, b in zip(earlier, self._stolen, strict=True)), default=0.0)
-        return min(lost, here - left)
+                work -= max((b - a for a, b in zip(earlier, self._stolen, strict=True)), default=0.0)
+        return here - left - idle - counted(work)
 
     def _alone(self) -> bool:
         """Whether nobody but the loop itself can bring anything about."""
