@@ -62,7 +62,9 @@ class MissionFlight:
         self._uid = ""
         """Of the file that the drone flies, or flew last."""
         self._starting: tuple[Leg, int] | None = None
-        """What the drone is asked to begin, and after which line."""
+        """What the drone is asked to begin, and after which line; None also when that is not wanted any more."""
+        self._taken_meanwhile = False
+        """While it was asked, the same mission was uploaded again."""
         self._files = FilesOnDrone(vehicle.drone.flight_plan)
         self.storing = StoreWait()
         self._arming = ArmWait(self._lapsed)
@@ -79,9 +81,14 @@ class MissionFlight:
         if identity == self.identity:
             return
         known, self.identity = self.identity != 0, identity
-        if self.progress.state is State.ACTIVE:
-            self._stop("another mission was uploaded" if items else "it was cleared")
-            self._suspend()
+        why = "another mission was uploaded" if items else "it was cleared"
+        flown, starting, self._starting = self.flying, self._starting is not None, None
+        if flown:
+            self._stop(why)
+        elif starting and self._running is not None:  # what it began for was answered long ago
+            self._vehicle.text(Severity.WARNING, f"Mission not begun: {why}")
+        if flown or starting:
+            self._suspend(starting=starting)
             self._vehicle.select(FlightMode.HOLD)
         self.progress.take(items)
         self._parts, self._rest, self._next = [], None, None
@@ -91,10 +98,17 @@ class MissionFlight:
 
     def taken_again(self) -> None:
         """The same mission was uploaded once more. One that is flown goes on undisturbed; else it is a new one."""
-        if self.progress.state is State.ACTIVE:
-            current = self.progress.current
+        starting, current = self._starting, self.progress.current
+        if starting is not None:
+            leg, line = starting
+            current, self._taken_meanwhile = leg.origins[line + 1], True
+        if starting is not None or self.progress.state is State.ACTIVE:
             self.say(Severity.INFO, lambda first: f"Mission: the same again, it goes on at item {current + first}")
             return
+        self._anew()
+
+    def _anew(self) -> None:
+        """Nothing of it has been flown."""
         self.progress.take(self.progress.items)
         self._parts, self._rest, self._next = [], None, None
         self.remember(None)
@@ -219,20 +233,30 @@ class MissionFlight:
         try:
             if isinstance(head, Leg):
                 await self._play(head, uid, line)
+                self._require_same(items)
             else:
                 progress.fly(head.item)
                 self._run(self._go_on())
-        except BaseException:
+        except BaseException as error:
             if progress.state is not State.ACTIVE:
                 vehicle.select(FlightMode.HOLD)
+                if self._taken_meanwhile and progress.items is items:
+                    self._anew()
+                    self.news()
+            if isinstance(error, CommandRejected):
+                self._require_same(items)
             raise
         self._announce(resumes)
+
+    def _require_same(self, items: Sequence[Item]) -> None:
+        if self.progress.items is not items:
+            raise Refused(f"Mission refused: {'another was uploaded' if self.there else 'it was cleared'} meanwhile")
 
     async def _play(self, leg: Leg, uid: str, line: int) -> None:
         """Begin a file, or go on with it; returns when the drone flies it."""
         plan = self._vehicle.drone.flight_plan
         goes_on = plan.state.returns_on_disconnect is False if plan.starts_anywhere else None
-        self._uid, self._starting = uid, (leg, line)
+        self._uid, self._starting, self._taken_meanwhile = uid, (leg, line), False
         try:
             await plan.start(uid, line + 1 if plan.starts_anywhere else 0, continue_on_disconnect=goes_on)
             if self._starting is not None:
@@ -419,10 +443,13 @@ class MissionFlight:
             self._suspend()
         return ended
 
-    def _suspend(self) -> None:
-        """The drone is not to fly its file any more. A landing or a return of its own is not disturbed."""
+    def _suspend(self, *, starting: bool = False) -> None:
+        """The drone is not to fly its file any more. A landing or a return of its own is not disturbed.
+
+        `starting`: it has been asked to begin it and has not said that it does, so no landing or return is that file's.
+        """
         vehicle = self._vehicle
-        if vehicle.flying_state not in _LANDING and not vehicle.returning:
+        if starting or (vehicle.flying_state not in _LANDING and not vehicle.returning):
             with contextlib.suppress(LinkLost):
                 vehicle.drone.flight_plan.suspend()
 

@@ -15,17 +15,19 @@ from support.mav import Client
 from support.missions import (
     ACTIVE,
     COMPLETE,
+    CORNERS,
     LAND,
     NO_MISSION,
     NOT_STARTED,
     PAUSED,
     first,
     mode,
+    on_the_way,
+    pauses,
     put,
     reached,
     said,
     settled,
-    start,
     state,
     takeoff,
     way,
@@ -118,22 +120,6 @@ async def test_conf_066_a_refusal_that_was_lost_is_heard_when_the_last_item_come
 
 
 # While one is flown.
-
-CORNERS = [takeoff(6.0), way(14.0, 0.0, 6.0), way(14.0, 14.0, 6.0), way(0.0, 14.0, 6.0)]
-
-
-async def on_the_way(w: World, item: int) -> None:
-    """CORNERS are flown, and the drone is on the way to a corner."""
-    await put(w, CORNERS)
-    await start(w)
-    await state(w, ACTIVE, seq=item, since=0)
-
-
-def pauses(w: World) -> list[str]:
-    """What the drone was told against its plan, and how it plays."""
-    names = ("Pause", "Stop", "moveBy", "moveTo", "PCMD")
-    told = [e.name for e in w.drone.log if e.kind == "command" and e.name.rpartition(".")[2] in names]
-    return [*told, *(e.args["state"] for e in w.drone.log if e.name == "plan")]
 
 
 @both

@@ -96,3 +96,20 @@ async def settled(w: World, wanted: tuple[float, float, float]) -> None:
     await w.drone.wait_log(
         lambda entry: math.dist((w.drone.pose.north, w.drone.pose.east, w.drone.pose.up), wanted) < 0.7, timeout=30.0
     )
+
+
+CORNERS = [takeoff(6.0), way(14.0, 0.0, 6.0), way(14.0, 14.0, 6.0), way(0.0, 14.0, 6.0)]
+
+
+async def on_the_way(w: World, item: int) -> None:
+    """CORNERS are flown, and the drone is on the way to a corner."""
+    await put(w, CORNERS)
+    await start(w)
+    await state(w, ACTIVE, seq=item, since=0)
+
+
+def pauses(w: World) -> list[str]:
+    """What the drone was told against its plan, and how it plays."""
+    names = ("Pause", "Stop", "moveBy", "moveTo", "PCMD")
+    told = [e.name for e in w.drone.log if e.kind == "command" and e.name.rpartition(".")[2] in names]
+    return [*told, *(e.args["state"] for e in w.drone.log if e.name == "plan")]

@@ -1,0 +1,159 @@
+"""Conformance items 66 and 74: missions and what befalls them in the moments between: after a start is asked for
+and before the drone says that it flies, between two files, and when somebody else goes on with what was paused.
+
+What is flown is taken from the simulator's own log.
+"""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.flavours import both
+from support.missions import (
+    ACTIVE,
+    COMPLETE,
+    CORNERS,
+    NO_MISSION,
+    NOT_STARTED,
+    PAUSED,
+    first,
+    mode,
+    pauses,
+    put,
+    reached,
+    said,
+    settled,
+    state,
+    takeoff,
+    way,
+    whole,
+)
+from support.plans import ACCEPTED, MISSION, Item, clear
+from support.world import World, world
+
+TURN = Item(115, 0.0, 0.0, p1=90.0, p4=1.0, frame=2)
+"""By 90 deg, to the right: no flight plan of Parrot's can say that."""
+
+PLAYS = "common.MavlinkState.MavlinkFilePlayingStateChanged"
+
+
+async def asked_for(w: World, items: list[Item]) -> int:
+    """In the air; the mission is started, the drone flies it and has not said so: it may take 20 s. A mark before."""
+    await w.take_off(6.0)
+    await put(w, items)
+    w.drone.faults.untold = frozenset({PLAYS})
+    mark = w.client.mark()
+    w.client.send_command(dialect.MAV_CMD_MISSION_START, 0, 0)
+    await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 2.0, 20.0)
+    return mark
+
+
+def tells_of_its_plan(w: World) -> None:
+    w.drone.faults.untold = frozenset()
+    w.drone.firmware.flight_plan.report_stopped()  # whatever it is
+
+
+@both
+@pytest.mark.parametrize("how", ["another", "one item", "cleared"])
+async def test_conf_074_another_mission_before_the_drone_has_begun_ends_the_start(flavour: str, how: str) -> None:
+    """The start is answered with a refusal, the drone is told to stop and hovers, and the mode is not Mission."""
+    async with world(flavour=flavour, web=True) as w:
+        mark = await asked_for(w, CORNERS)
+        w.drone.faults.untold = frozenset()
+        changed = w.client.mark()
+        if how == "cleared":
+            assert (await clear(w.client, MISSION)).type == ACCEPTED
+        else:
+            await put(w, [way(0.0, 9.0, 6.0)] if how == "another" else [*CORNERS[:-1], way(0.0, 9.0, 6.0)])
+        stopped = await w.drone.wait_log(lambda e: e.name == "plan" and e.args["state"] == "stopped", 10.0)
+        ack = await w.client.wait(
+            "COMMAND_ACK", lambda m: m.command == dialect.MAV_CMD_MISSION_START and m.result != 5, since=mark
+        )
+        assert ack.result == dialect.MAV_RESULT_TEMPORARILY_REJECTED
+        why = "it was cleared" if how == "cleared" else "another was uploaded"
+        await said(w, f"Mission refused: {why} meanwhile", since=mark)
+        await state(w, NO_MISSION if how == "cleared" else NOT_STARTED, since=changed)
+        await mode(w, w.modes.hold if flavour == "px4" else w.modes.idle, since=changed)
+        assert len(w.commands("common.Mavlink.Stop")) == 1
+        assert pauses(w)[-2:] == ["playing", "stopped"]
+        await w.drone.wait_log(lambda e: e.kind == "state" and e.args["event"] == "at_rest", since=stopped.t)
+        there = w.drone.pose
+        for _ in range(3):
+            await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.idle, since=w.client.mark())
+        here = w.drone.pose
+        assert math.dist((there.north, there.east, there.up), (here.north, here.east, here.up)) < 0.3
+        assert whole(await state(w, NO_MISSION if how == "cleared" else NOT_STARTED)).mission_mode != 1
+        assert [m.text for _, m in w.client.since(mark, "STATUSTEXT") if "begins at" in m.text] == []
+        if how != "cleared":  # and what is the mission now flies
+            assert (await w.client.command(dialect.MAV_CMD_MISSION_START, 0, 0)).result == dialect.MAV_RESULT_ACCEPTED
+            await settled(w, (0.0, 9.0, 6.0))
+            await state(w, COMPLETE, since=changed)
+
+
+@pytest.mark.parametrize("how", ["another", "cleared"])
+async def test_conf_074_another_mission_before_the_drone_has_begun_at_arming(how: str) -> None:
+    """The mode was chosen first and arming began it: both were accepted long ago, so it is a text. The drone, which has
+    taken off by then, hovers."""
+    async with world(web=True) as w:
+        await put(w, CORNERS)
+        assert (await w.client.command(dialect.MAV_CMD_DO_SET_MODE, 1, 4, 4)).result == dialect.MAV_RESULT_ACCEPTED
+        w.drone.faults.untold = frozenset({PLAYS})
+        mark = w.client.mark()
+        assert (await w.client.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)).result == dialect.MAV_RESULT_ACCEPTED
+        await w.drone.wait_log(lambda e: e.name == "item" and e.args["index"] == 1, 20.0)
+        w.drone.faults.untold = frozenset()
+        if how == "cleared":
+            assert (await clear(w.client, MISSION)).type == ACCEPTED
+        else:
+            await put(w, [takeoff(6.0), way(0.0, 9.0, 6.0)])
+        why = "it was cleared" if how == "cleared" else "another mission was uploaded"
+        await said(w, f"Mission not begun: {why}"[:50], since=mark)
+        stopped = await w.drone.wait_log(lambda e: e.name == "plan" and e.args["state"] == "stopped", 10.0)
+        await w.drone.wait_log(lambda e: e.kind == "state" and e.args["event"] == "at_rest", since=stopped.t)
+        await mode(w, w.modes.hold, since=w.client.mark())
+        await state(w, NO_MISSION if how == "cleared" else NOT_STARTED)
+        assert len(w.commands("common.Mavlink.Stop")) == 1
+        assert pauses(w)[-2:] == ["playing", "stopped"]
+
+
+@both
+async def test_conf_074_the_same_mission_before_the_drone_has_begun_disturbs_nothing(flavour: str) -> None:
+    """Two files with a turn between them: the start is accepted, and all of it is flown once."""
+    async with world(flavour=flavour, web=True) as w:
+        turned = [way(14.0, 0.0, 6.0), TURN, way(14.0, 10.0, 6.0)]
+        mark = await asked_for(w, turned)
+        await put(w, turned)
+        await said(w, f"the same again, it goes on at item {first(w)}", since=mark)
+        tells_of_its_plan(w)
+        ack = await w.client.wait(
+            "COMMAND_ACK", lambda m: m.command == dialect.MAV_CMD_MISSION_START and m.result != 5, since=mark
+        )
+        assert ack.result == dialect.MAV_RESULT_ACCEPTED
+        await state(w, ACTIVE, since=mark)
+        await state(w, COMPLETE, since=mark)
+        assert reached(w, mark) == [0, 1, 2]
+        assert len(w.commands("common.Mavlink.Start")) == 2
+        await settled(w, (14.0, 10.0, 6.0))
+
+
+@both
+async def test_conf_074_the_same_mission_while_a_start_fails_is_a_new_one(flavour: str) -> None:
+    """The drone hears the start and cannot: what was uploaded meanwhile begins at its first item."""
+    async with world(flavour=flavour, web=True) as w:
+        await w.take_off(6.0)
+        await put(w, CORNERS)
+        assert (await w.client.command(dialect.MAV_CMD_MISSION_START, 0, 0)).result == dialect.MAV_RESULT_ACCEPTED
+        await state(w, ACTIVE, seq=2, since=0)
+        assert (await w.client.command(192, -1, 1, 0)).result == dialect.MAV_RESULT_ACCEPTED
+        await state(w, PAUSED, seq=2)
+        w.drone.faults.untold = frozenset({PLAYS})
+        mark = w.client.mark()
+        w.client.send_command(dialect.MAV_CMD_MISSION_START, 0, 0)
+        await w.drone.wait_log(lambda e: e.name == "plan" and e.args["state"] == "playing", 10.0)
+        await put(w, CORNERS)
+        await said(w, f"the same again, it goes on at item {2 + first(w)}"[:40], since=mark)
+        assert (await w.client.command(192, -1, 1, 0)).result == dialect.MAV_RESULT_ACCEPTED
+        await state(w, NOT_STARTED, seq=0, since=mark)
+        await mode(w, w.modes.hold, since=mark)
