@@ -61,6 +61,7 @@ class MissionFlight:
         """The item after the part that is flown, where that is not flown without another word."""
         self._uid = ""
         """Of the file that the drone flies, or flew last."""
+        self._kept: Record | None = None
         self._starting: tuple[Leg, int] | None = None
         """What the drone is asked to begin, and after which line; None also when that is not wanted any more."""
         self._taken_meanwhile = False
@@ -94,7 +95,7 @@ class MissionFlight:
         self._parts, self._rest, self._next = [], None, None
         self._drop_pending()
         if known:  # else it has just been read, and what was kept of it has not been looked at
-            self.remember(None)
+            self._remember(None)
 
     def taken_again(self) -> None:
         """The same mission was uploaded once more. One that is flown goes on undisturbed; else it is a new one."""
@@ -111,7 +112,7 @@ class MissionFlight:
         """Nothing of it has been flown."""
         self.progress.take(self.progress.items)
         self._parts, self._rest, self._next = [], None, None
-        self.remember(None)
+        self._remember(None)
 
     async def engage(self, client: Hashable, item: int | None = None) -> None:
         """Mode Mission begins, or goes on where it was stopped, or at an item; returns when the drone flies it.
@@ -147,6 +148,7 @@ class MissionFlight:
             await self.engage(client, item)
         else:
             self.progress.choose(item)
+            self._keep()
             self.news()
 
     def armed(self, client: Hashable) -> None:
@@ -309,6 +311,7 @@ class MissionFlight:
                     await self._play(leg, uid, line)
                     return  # it says itself when it ends
                 progress.fly(head.item)
+                self._keep()
                 self.news()
                 await fly_step(self._vehicle, progress.items[head.item])
                 progress.did(head.done)
@@ -328,6 +331,7 @@ class MissionFlight:
             self.progress.current = following
             self._break_off("after a lost link it does not go on by itself")
             self.progress.choose(following, anew=False)
+            self._keep()
             self.news()
         elif self._parts or self._rest is not None:
             self._run(self._go_on())
@@ -336,7 +340,7 @@ class MissionFlight:
 
     def _finish(self) -> None:
         self.progress.finish()
-        self.remember(None)
+        self._remember(None)
         self.say(Severity.INFO, lambda first: "Mission complete")
         self._vehicle.select(FlightMode.HOLD)
         self.news()
@@ -483,29 +487,37 @@ class MissionFlight:
         progress, plan = self.progress, self._vehicle.drone.flight_plan.state
         if progress.leg is None and record is not None and record.mission == self.identity:
             leg, plays = record.leg, plan.uid == record.uid
-            if any(item >= len(progress.items) for item in leg.origins) or not (plays or self._vehicle.in_air):
+            if not (plays or self._vehicle.in_air):
                 return
-            self._uid, self._parts, self._next = record.uid, [leg], record.next
+            self._kept, self._uid, self._parts, self._next = record, record.uid, [leg], record.next
             progress.begin(leg, record.line)
             progress.jumps = dict(record.jumps)
             progress.stop()
         if progress.state is not State.PAUSED or progress.leg is None:
             return
-        current, mine = progress.current, plan.uid == self._uid
-        if mine and plan.playing == PlayingState.PLAYING:
+        plays = plan.uid == self._uid and plan.playing == PlayingState.PLAYING
+        if progress.leg_done and self._next is not None:
+            progress.current = self._next
+        current = progress.current
+        if plays:
             progress.begin(progress.leg, progress.line)
             self._vehicle.select(FlightMode.MISSION, self)
             how = "the drone flies it"
             self.say(Severity.NOTICE, lambda first: f"Mission: {how}, at item {current + first} or a later one")
+        elif progress.leg_done and self._next is None:
+            progress.begin(progress.leg, progress.line)
+            progress.finish()
+            self._remember(None)
+            self.say(Severity.INFO, lambda first: "Mission complete")
         else:
             how = "the drone flies it no more"
             self.say(Severity.NOTICE, lambda first: f"Mission: {how}, paused at item {current + first}")
         self.news()
 
     def _keep(self) -> None:
-        """Remember what the drone flies, so that another run of the gateway knows it again."""
-        leg = self.progress.leg
-        if leg is not None:
+        """Remember what the drone flies, or that the gateway is at an item behind its file, for another run of it."""
+        progress = self.progress
+        if progress.leg is not None:
             following = self._parts[1] if len(self._parts) > 1 else None
             after = self._next
             if isinstance(following, Step):
@@ -514,5 +526,11 @@ class MissionFlight:
                 after = following.origins[0]
             elif self._rest is not None:
                 after = self._rest.item
-            line, jumps = self.progress.line, self.progress.jumps
-            self.remember(Record.of(self.identity, self._uid, leg, line, after, jumps))
+            leg, line = progress.leg, progress.line
+            self._remember(Record.of(self.identity, self._uid, leg, line, after, progress.jumps))
+        elif self._kept is not None:
+            self._remember(self._kept.flown_up_to(progress.current, progress.jumps))
+
+    def _remember(self, record: Record | None) -> None:
+        self._kept = record
+        self.remember(record)

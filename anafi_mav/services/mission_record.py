@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from itertools import chain
 from typing import Any
 
 import msgspec
 from typing_extensions import Self
 
+from anafi_mav.plans.plan import DO_JUMP, Item
 from anafi_mav.plans.translate import Leg
+from anafi_mav.services.mission_path import way_points
 
 
 class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -33,17 +36,25 @@ class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     def of(cls, mission: int, uid: str, leg: Leg, line: int, following: int | None, jumps: Mapping[int, int]) -> Self:
         return cls(mission, uid, leg.content.decode(), leg.origins, leg.done, line, following, tuple(jumps.items()))
 
+    def flown_up_to(self, item: int, jumps: Mapping[int, int]) -> Self:
+        """The same when nothing of the file is left to fly: it goes on at an item."""
+        return msgspec.structs.replace(self, line=len(self.origins) - 1, next=item, jumps=tuple(jumps.items()))
+
     @classmethod
-    def read(cls, kept: Any) -> Self | None:
-        """What `written` made; None when it is anything else: people can write files."""
+    def read(cls, kept: Any, items: Sequence[Item]) -> Self | None:
+        """What `written` made of a flight of this mission; None when it cannot be that: people can write files."""
         try:
             record = msgspec.convert(kept, cls)
         except msgspec.ValidationError:
             return None
         lines = len(record.content.splitlines()) - 1
-        sound = len(record.origins) == len(record.done) == lines and -1 <= record.line < lines
-        numbers = chain(record.origins, *record.done, *record.jumps, [record.next or 0])
-        return record if sound and min(numbers) >= 0 else None
+        whole = len(record.origins) == len(record.done) == lines > 0 and -1 <= record.line < lines
+        named = chain(record.origins, *record.done, [] if record.next is None else [record.next])
+        there = all(0 <= item < len(items) for item in named)
+        jumped = all(
+            0 <= item < len(items) and items[item].command == DO_JUMP and often >= 0 for item, often in record.jumps
+        )
+        return record if whole and there and jumped and _leads_somewhere(record.leg) else None
 
     @property
     def written(self) -> Any:
@@ -53,3 +64,14 @@ class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     @property
     def leg(self) -> Leg:
         return Leg(self.content.encode(), self.origins, self.done)
+
+
+def _leads_somewhere(leg: Leg) -> bool:
+    """All way points are places."""
+    try:
+        points = [*way_points(leg)]
+    except (ValueError, IndexError):
+        return False
+    return all(
+        math.isfinite(one) for point in points for one in (point.place.latitude, point.place.longitude, point.ato)
+    )

@@ -70,7 +70,12 @@ class MissionService(Service):
         return {dialect.MAVLINK_MSG_ID_MISSION_CURRENT: Stream(self._current, on_change=True, flavoured=True)}
 
     def link_up(self) -> None:
-        self._flight.link_up(Record.read(self.host.memory.settings.get(RECORD)))
+        memory = self.host.memory
+        kept = memory.settings.get(RECORD)
+        record = Record.read(kept, self._flight.progress.items)
+        if kept is not None and record is None:
+            self.host.text(Severity.WARNING, f"flown mission in {memory.path}: ignored, it is not of the mission there")
+        self._flight.link_up(record)
 
     def link_down(self) -> None:
         self._flight.link_down()  # before anybody is told that something has ended: the drone may fly on

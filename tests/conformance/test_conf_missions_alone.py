@@ -14,9 +14,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.missions import (
     ACTIVE,
     COMPLETE,
+    NOT_STARTED,
     PAUSED,
     flown,
     mode,
@@ -263,3 +265,100 @@ async def test_without_the_gateway_what_it_flies_and_what_follows_is_not_flown(r
         assert 2 not in reached(w)
         assert len(w.commands("common.Mavlink.Start")) == 1
         assert [entry for entry in w.commands("ardrone3.Piloting.moveBy") if entry.args["dPsi"]] == []
+
+
+SLOW_TURN = Item(115, 0.0, 0.0, p1=180.0, p2=9.0, frame=2)
+"""Round to the south: twenty seconds in which something can happen."""
+
+STEPS = [takeoff(6.0), way(8.0, 0.0, 6.0), ZOOM, SLOW_TURN, way(8.0, 8.0, 6.0)]
+
+
+async def turning(w: World) -> None:
+    """STEPS are flown, and the drone is at the slow turn, its second item without a file."""
+    await put(w, STEPS)
+    await start(w)
+    await state(w, ACTIVE, seq=3, since=0)
+    await w.drone.wait_log(lambda e: e.kind == "command" and e.name == "move.extended_move_by", timeout=20.0)
+
+
+async def test_a_gateway_that_ends_between_two_files_goes_on_there(tmp_path: Path) -> None:
+    """Another run of it knows that the first file is flown, and which item was next: neither is flown again."""
+    drone, address = loopback(), loopback()
+    spec = DroneSpec(address=drone, home=HOME, http_port=WEB_PORT)
+    config = Config(
+        endpoints=(f"tcpin://{address}:5760",),
+        drones=(DroneConfig(name="alpha", sysid=1, address=drone, http_port=WEB_PORT),),
+        state=str(tmp_path),
+    )
+    async with Simulator([spec], speed=1.5, seed=1) as simulator:
+        for run in (1, 2):
+            async with Gateway(config) as running:
+                w = World(simulator, running, address)
+                await w.connect()
+                assert await running.ready(20.0)
+                if run == 1:
+                    await turning(w)
+                    assert reached(w) == [0, 1, 2]
+                else:
+                    await said(w, "the drone flies it no more")
+                    await state(w, PAUSED, seq=3)
+                    await w.client.command(dialect.MAV_CMD_MISSION_START, 0, 0, timeout=20.0)
+                    simulator.speed = 6.0
+                    await state(w, COMPLETE, since=0, timeout=60.0)
+                    assert reached(w) == [3, 4]
+                    await settled(w, (8.0, 8.0, 6.0))
+                await w.client.close()
+    assert len(w.commands("common.Mavlink.Start")) == 2
+    assert len(w.commands("camera.set_zoom_target")) == 1
+
+
+async def test_a_link_that_is_lost_between_two_files_does_not_take_the_mission_back() -> None:
+    """Not behind what was flown, and not behind the item that a client has chosen since."""
+    async with world(web=True, speed=1.5) as w:
+        await turning(w)
+        await lost_and_back(w)
+        await state(w, PAUSED, seq=3)
+        assert (await w.client.command(224, 4, 0)).result == dialect.MAV_RESULT_ACCEPTED
+        await state(w, PAUSED, seq=4)
+        await lost_and_back(w)
+        await state(w, PAUSED, seq=4)
+        assert reached(w) == [0, 1, 2]
+
+
+def spoil(folder: Path, key: str) -> None:
+    """What is kept of a flight of FAR names an item that it does not have."""
+    (path,) = folder.glob("*.json")
+    content = json.loads(path.read_text())
+    record = content["settings"]["mission"]
+    record[key] = [[len(FAR)]] * len(record["done"]) if key == "done" else [[len(FAR), 1]]
+    path.write_text(json.dumps(content))
+
+
+@pytest.mark.parametrize("key", ["done", "jumps"])
+async def test_what_was_kept_of_a_flight_and_is_none_of_the_mission_is_ignored_with_a_text(
+    tmp_path: Path, key: str
+) -> None:
+    """People can write files."""
+    drone, address = loopback(), loopback()
+    spec = DroneSpec(address=drone, home=HOME, http_port=WEB_PORT)
+    config = Config(
+        endpoints=(f"tcpin://{address}:5760",),
+        drones=(DroneConfig(name="alpha", sysid=1, address=drone, http_port=WEB_PORT),),
+        state=str(tmp_path),
+    )
+    async with Simulator([spec], speed=1.5, seed=1) as simulator:
+        for run in (1, 2):
+            async with Gateway(config) as running:
+                w = World(simulator, running, address)
+                await w.connect()
+                assert await running.ready(20.0)
+                if run == 1:
+                    await put(w, FAR)
+                    await start(w)
+                    await state(w, ACTIVE, seq=2, since=0)
+                else:
+                    await said(w, "flown mission in ")
+                    await state(w, NOT_STARTED, seq=0)
+                await w.client.close()
+            if run == 1:
+                spoil(tmp_path, key)

@@ -152,17 +152,65 @@ def test_another_mission() -> None:
     assert progress.state is State.NONE
 
 
-def test_what_is_kept_is_read_again_and_nothing_else() -> None:
-    record = Record.of(77, "abc", LEG, 2, None, {3: 2})
-    again = Record.read(record.written)
+PLACE = "\t0\t3\t16\t0\t0\t0\t0\t48.0\t2.0\t10.0\t1"
+KEPT = [*ITEMS[:3], JUMP, *ITEMS[4:]]
+
+
+def kept(following: int | None = None) -> Record:
+    content = "QGC WPL 120\n" + "".join(f"{line}{PLACE}\n" for line in range(6))
+    return Record.of(77, "abc", Leg(content.encode(), LEG.origins, LEG.done), 2, following, {3: 2})
+
+
+def test_what_is_kept_is_read_again() -> None:
+    record = kept(5)
+    again = Record.read(record.written, KEPT)
     assert again == record
-    assert again.leg == LEG
+    assert (again.leg.origins, again.leg.done) == (LEG.origins, LEG.done)
     assert dict(again.jumps) == {3: 2}
-    good = record.written
-    earlier = {key: value for key, value in good.items() if key != "jumps"}
-    assert Record.read(earlier) == Record.of(77, "abc", LEG, 2, None, {})
-    assert Record.read({**good, "jumps": [[3, -1]]}) is None
-    for key, wrong in [("line", 6), ("line", -2), ("origins", [0, 0]), ("done", "x"), ("uid", 3), ("more", 1)]:
-        assert Record.read({**good, key: wrong}) is None, key
-    assert Record.read({**good, "origins": [0, 0, 1, -2, 4, 5]}) is None
-    assert Record.read(None) is None
+    assert Record.read(kept().written, KEPT) == kept()
+    earlier = {key: value for key, value in record.written.items() if key != "jumps"}
+    without = Record.read(earlier, KEPT)
+    assert without is not None
+    assert without.jumps == ()
+
+
+def test_what_is_kept_when_the_file_is_flown() -> None:
+    behind = kept().flown_up_to(4, {3: 1})
+    assert (behind.line, behind.next, behind.jumps) == (5, 4, ((3, 1),))
+    assert Record.read(behind.written, KEPT) == behind
+
+
+@pytest.mark.parametrize(
+    ("key", "wrong"),
+    [
+        ("line", 6),
+        ("line", -2),
+        ("origins", [0, 0]),
+        ("origins", [0, 0, 1, -2, 4, 5]),
+        ("origins", [0, 0, 1, 2, 4, 6]),
+        ("done", "x"),
+        ("done", [[], [0], [1], [2, 3], [4], [6]]),
+        ("done", [[], [0], [1], [2, -1], [4], [5]]),
+        ("uid", 3),
+        ("more", 1),
+        ("next", 6),
+        ("next", -1),
+        ("jumps", [[3, -1]]),
+        ("jumps", [[6, 1]]),
+        ("jumps", [[-3, 1]]),
+        ("jumps", [[2, 1]]),
+        ("content", ""),
+        ("content", "QGC WPL 120\n" + "x\n" * 6),
+        ("content", "QGC WPL 120\n" + f"0{PLACE}\n" * 5 + f"0{PLACE}\n".replace("48.0", "nan")),
+    ],
+)
+def test_what_is_kept_and_can_be_nothing_of_the_mission_is_not_read(key: str, wrong: object) -> None:
+    """People can write files: each number is looked at before anything is looked up with it."""
+    assert Record.read({**kept().written, key: wrong}, KEPT) is None
+
+
+def test_what_is_kept_of_no_line_or_of_nothing_is_not_read() -> None:
+    empty = {"content": "QGC WPL 120\n", "origins": [], "done": [], "line": -1}
+    assert Record.read({**kept().written, **empty}, KEPT) is None
+    assert Record.read(kept().written, KEPT[:5]) is None, "a shorter mission"
+    assert Record.read(None, KEPT) is None
