@@ -62,6 +62,7 @@ class MissionFlight:
         self._uid = ""
         """Of the file that the drone flies, or flew last."""
         self._kept: Record | None = None
+        """What is remembered."""
         self._starting: tuple[Leg, int] | None = None
         """What the drone is asked to begin, and after which line; None also when that is not wanted any more."""
         self._taken_meanwhile = False

@@ -326,19 +326,27 @@ async def test_a_link_that_is_lost_between_two_files_does_not_take_the_mission_b
 
 
 def spoil(folder: Path, key: str) -> None:
-    """What is kept of a flight of FAR names an item that it does not have."""
+    """What is kept of a flight of FAR names an item that it does not have, or its last line as flown."""
     (path,) = folder.glob("*.json")
     content = json.loads(path.read_text())
     record = content["settings"]["mission"]
-    record[key] = [[len(FAR)]] * len(record["done"]) if key == "done" else [[len(FAR), 1]]
+    lines = len(record["done"])
+    record[key] = {"done": [[len(FAR)]] * lines, "jumps": [[len(FAR), 1]], "line": lines - 1}[key]
     path.write_text(json.dumps(content))
 
 
-@pytest.mark.parametrize("key", ["done", "jumps"])
-async def test_what_was_kept_of_a_flight_and_is_none_of_the_mission_is_ignored_with_a_text(
-    tmp_path: Path, key: str
+@pytest.mark.parametrize(
+    ("key", "words", "then"),
+    [
+        ("done", "flown mission in ", NOT_STARTED),
+        ("jumps", "flown mission in ", NOT_STARTED),
+        ("line", "Mission complete", COMPLETE),
+    ],
+)
+async def test_what_was_kept_of_a_flight_is_looked_at_before_it_is_believed(
+    tmp_path: Path, key: str, words: str, then: int
 ) -> None:
-    """People can write files."""
+    """What is none of the mission is ignored with a text: people can write files. What was flown is complete."""
     drone, address = loopback(), loopback()
     spec = DroneSpec(address=drone, home=HOME, http_port=WEB_PORT)
     config = Config(
@@ -357,8 +365,8 @@ async def test_what_was_kept_of_a_flight_and_is_none_of_the_mission_is_ignored_w
                     await start(w)
                     await state(w, ACTIVE, seq=2, since=0)
                 else:
-                    await said(w, "flown mission in ")
-                    await state(w, NOT_STARTED, seq=0)
+                    await said(w, words)
+                    await state(w, then, seq=0)
                 await w.client.close()
             if run == 1:
                 spoil(tmp_path, key)
