@@ -63,6 +63,8 @@ class MissionFlight:
         """Of the file that the drone flies, or flew last."""
         self._kept: Record | None = None
         """What is remembered."""
+        self._left: tuple[Leg, int, dict[int, int]] | None = None
+        """The drone has it paused, and the mission is to begin elsewhere next: file, last line, jumps."""
         self._starting: tuple[Leg, int] | None = None
         """What the drone is asked to begin, and after which line; None also when that is not wanted any more."""
         self._taken_meanwhile = False
@@ -93,7 +95,7 @@ class MissionFlight:
             self._suspend(starting=starting)
             self._vehicle.select(FlightMode.HOLD)
         self.progress.take(items)
-        self._parts, self._rest, self._next = [], None, None
+        self._left, self._parts, self._rest, self._next = None, [], None, None
         self._drop_pending()
         if known:  # else it has just been read, and what was kept of it has not been looked at
             self._remember(None)
@@ -110,10 +112,16 @@ class MissionFlight:
         self._anew()
 
     def _anew(self) -> None:
-        """Nothing of it has been flown."""
+        """Nothing of it has been flown, but for a file that the drone has paused."""
+        self._leave()
         self.progress.take(self.progress.items)
-        self._parts, self._rest, self._next = [], None, None
         self._remember(None)
+
+    def _leave(self) -> None:
+        """It begins elsewhere next; somebody else may still let the drone go on with what it has."""
+        progress = self.progress
+        if progress.state is State.PAUSED and progress.leg is not None:
+            self._left = progress.leg, progress.line, dict(progress.jumps)
 
     async def engage(self, client: Hashable, item: int | None = None) -> None:
         """Mode Mission begins, or goes on where it was stopped, or at an item; returns when the drone flies it.
@@ -148,6 +156,7 @@ class MissionFlight:
         if self.progress.state is State.ACTIVE:
             await self.engage(client, item)
         else:
+            self._leave()
             self.progress.choose(item)
             self._keep()
             self.news()
@@ -229,7 +238,7 @@ class MissionFlight:
         if progress.items is not items or not vehicle.armed:
             raise Refused("Mission refused: something else has happened meanwhile")
         vehicle.select(FlightMode.MISSION, self)
-        self._parts, self._rest = parts, rest
+        self._left, self._parts, self._rest = None, parts, rest
         if not resumes:
             self._next, progress.jumps = None, {**jumps}
         head = parts[0]
@@ -318,7 +327,7 @@ class MissionFlight:
                 progress.did(head.done)
                 for item in head.done:
                     self.reached(item)
-                del self._parts[0]
+                self._part_over()
         except AnafiMavError as error:
             self._break_off(str(error))
         else:
@@ -326,7 +335,7 @@ class MissionFlight:
 
     def _leg_over(self) -> None:
         """The drone has flown a whole file."""
-        del self._parts[:1]
+        self._part_over()
         if self._next is not None:
             following, self._next = self._next, None
             self.progress.current = following
@@ -339,7 +348,23 @@ class MissionFlight:
         else:
             self._finish()
 
+    def _part_over(self) -> None:
+        """What follows is the current item from now on: paused before it begins, the last one is not flown again."""
+        del self._parts[:1]
+        following = self._first_of(self._parts)
+        if following is not None:
+            self.progress.fly(following)
+            self._keep()
+            self.news()
+
+    def _first_of(self, parts: list[Leg | Step]) -> int | None:
+        """The item that these parts begin with, or where there is none the rest; None: nothing follows."""
+        if not parts:
+            return None if self._rest is None else self._rest.item
+        return parts[0].item if isinstance(parts[0], Step) else parts[0].origins[0]
+
     def _finish(self) -> None:
+        self._left = None
         self.progress.finish()
         self._remember(None)
         self.say(Severity.INFO, lambda first: "Mission complete")
@@ -397,10 +422,18 @@ class MissionFlight:
             elif message.filepath != self._uid:
                 if progress.state is State.ACTIVE:
                     self._break_off("the drone flies another plan")
-            elif progress.state is State.PAUSED and progress.leg is not None:
+                else:
+                    self._vehicle.text(Severity.NOTICE, "The drone flies a plan that is not of this mission")
+            elif progress.state is not State.ACTIVE:
                 # Not by us, but it flies, and who looks at the mission has to see that.
+                self._leave()
+                if self._left is None:
+                    self._vehicle.text(Severity.NOTICE, "The drone flies a plan that is not of this mission")
+                    return
                 self._vehicle.select(FlightMode.MISSION, self)
-                progress.begin(progress.leg, progress.line)
+                (leg, line, jumps), self._left = self._left, None
+                progress.begin(leg, line)
+                progress.jumps = jumps
                 self.say(Severity.NOTICE, lambda first: "Mission goes on: somebody else has continued it")
                 self.news()
         elif self._starting is None and progress.state is State.ACTIVE and progress.leg is not None:
@@ -420,6 +453,9 @@ class MissionFlight:
         if done:
             self._keep()
         self.news()
+        if self._end_watch.running and self.progress.leg_done:  # it has said so late
+            self._end_watch.end()
+            self._leg_over()
 
     def on_vehicle(self) -> None:
         """Landing, return or flying state have changed."""
@@ -474,11 +510,9 @@ class MissionFlight:
         self._arming.end()
         self._end_watch.end()
         self._starting, self._running = None, None
-        following = self._parts[1:]
-        if following:
-            self._next = following[0].item if isinstance(following[0], Step) else following[0].origins[0]
-        elif self._rest is not None:
-            self._next = self._rest.item
+        following = self._first_of(self._parts[1:])
+        if following is not None:
+            self._next = following
         self._parts, self._rest = self._parts[:1], None
         if self.progress.state is State.ACTIVE:
             self.progress.stop()
@@ -519,14 +553,8 @@ class MissionFlight:
         """Remember what the drone flies, or that the gateway is at an item behind its file, for another run of it."""
         progress = self.progress
         if progress.leg is not None:
-            following = self._parts[1] if len(self._parts) > 1 else None
-            after = self._next
-            if isinstance(following, Step):
-                after = following.item
-            elif following is not None:
-                after = following.origins[0]
-            elif self._rest is not None:
-                after = self._rest.item
+            following = self._first_of(self._parts[1:])
+            after = self._next if following is None else following
             leg, line = progress.leg, progress.line
             self._remember(Record.of(self.identity, self._uid, leg, line, after, progress.jumps))
         elif self._kept is not None:

@@ -101,6 +101,11 @@ class EndWatch:
         self._ended = ended
         self._timer: asyncio.TimerHandle | None = None
 
+    @property
+    def running(self) -> bool:
+        """It is watched."""
+        return self._timer is not None
+
     def begin(self) -> None:
         """The drone has stopped its plan before the last line."""
         self.end()

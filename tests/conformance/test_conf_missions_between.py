@@ -15,11 +15,13 @@ from support.missions import (
     ACTIVE,
     COMPLETE,
     CORNERS,
+    MISSION_MODE,
     NO_MISSION,
     NOT_STARTED,
     PAUSED,
     first,
     mode,
+    on_the_way,
     pauses,
     put,
     reached,
@@ -31,7 +33,10 @@ from support.missions import (
     whole,
 )
 from support.plans import ACCEPTED, MISSION, Item, clear
+from support.trouble import somebody_else
 from support.world import World, world
+
+from anafi_mav.arsdk.messages import common
 
 TURN = Item(115, 0.0, 0.0, p1=90.0, p4=1.0, frame=2)
 """By 90 deg, to the right: no flight plan of Parrot's can say that."""
@@ -157,3 +162,68 @@ async def test_conf_074_the_same_mission_while_a_start_fails_is_a_new_one(flavou
         assert (await w.client.command(192, -1, 1, 0)).result == dialect.MAV_RESULT_ACCEPTED
         await state(w, NOT_STARTED, seq=0, since=mark)
         await mode(w, w.modes.hold, since=mark)
+
+
+# Between two files, and by somebody else.
+
+
+async def test_conf_074_paused_before_a_file_begins_it_goes_on_behind_what_was_flown() -> None:
+    """A loop whose turn was just made: the drone turns as often as without the pause, and goes round as often."""
+    async with world(web=True) as w:
+        await w.take_off(6.0)
+        await put(w, [way(6.0, 0.0, 6.0), way(6.0, 6.0, 6.0), TURN, Item(177, 0.0, 0.0, p1=0.0, p2=2.0, frame=2)])
+        started = w.client.mark()
+        assert (await w.client.command(dialect.MAV_CMD_MISSION_START, 0, 0)).result == dialect.MAV_RESULT_ACCEPTED
+        await w.drone.wait_log(lambda e: e.name.endswith("moveByEnd") and turned(w) == 1, 30.0)
+        w.drone.faults.untold = frozenset({PLAYS})  # the next file is on its way
+        await state(w, ACTIVE, seq=0, since=w.client.mark())
+        mark = w.client.mark()
+        assert (await w.client.command(192, -1, 1, 0)).result == dialect.MAV_RESULT_ACCEPTED
+        await state(w, PAUSED, seq=0, since=mark)
+        w.drone.faults.untold = frozenset()
+        assert (await w.client.command(dialect.MAV_CMD_MISSION_START, 0, 0)).result == dialect.MAV_RESULT_ACCEPTED
+        await state(w, COMPLETE, since=mark, timeout=60.0)
+        assert turned(w) == 3
+        assert reached(w, started) == [0, 1, 2, 3] * 3
+
+
+def turned(w: World) -> int:
+    """How often the drone was told to turn where it is."""
+    moves = (e.args for e in w.drone.log if e.kind == "command" and e.name.rpartition(".")[2] == "moveBy")
+    return sum(abs(args["dPsi"]) > 1.0 for args in moves)
+
+
+@both
+@pytest.mark.parametrize("after", ["the same again", "another item"])
+async def test_conf_074_what_somebody_else_continues_is_followed(flavour: str, after: str) -> None:
+    """Paused, and uploaded once more or begun elsewhere next: the drone flies our file, so that is what is told."""
+    async with world(flavour=flavour, web=True) as w:
+        await on_the_way(w, 2)
+        assert (await w.client.command(192, -1, 1, 0)).result == dialect.MAV_RESULT_ACCEPTED
+        await state(w, PAUSED, seq=2)
+        mark = w.client.mark()
+        if after == "the same again":
+            await put(w, CORNERS)
+            await state(w, NOT_STARTED, seq=0, since=mark)
+        else:
+            ack = await w.client.command(dialect.MAV_CMD_DO_SET_MISSION_CURRENT, 1 + first(w), 0)
+            assert ack.result == dialect.MAV_RESULT_ACCEPTED
+        (begun,) = w.commands("common.Mavlink.Start")
+        somebody_else(w, common.Start(begun.args["filepath"], common.MavlinkType.FLIGHT_PLAN))
+        await said(w, "somebody else has continued it", since=mark)
+        await state(w, ACTIVE, seq=2, since=mark)
+        await mode(w, MISSION_MODE[flavour], since=mark)
+        await state(w, COMPLETE, since=mark)
+        assert reached(w) == [0, 1, 2, 3]
+
+
+async def test_conf_074_a_plan_that_is_not_the_missions_is_told() -> None:
+    async with world(web=True) as w:
+        await on_the_way(w, 2)
+        (begun,) = w.commands("common.Mavlink.Start")
+        await put(w, [way(0.0, 9.0, 6.0)])
+        mark = w.client.mark()
+        await w.drone.wait_log(lambda e: e.name == "plan" and e.args["state"] == "paused", 10.0)
+        somebody_else(w, common.Start(begun.args["filepath"], common.MavlinkType.FLIGHT_PLAN))
+        await said(w, "The drone flies a plan that is not", since=mark)
+        await state(w, NOT_STARTED, since=w.client.mark())

@@ -95,6 +95,23 @@ async def test_conf_073_an_end_that_the_drone_does_not_tell(flavour: str, model:
         assert reached(w) == [0, 1, 2, 3]
 
 
+async def test_conf_073_a_last_line_that_is_told_after_the_end_completes_it() -> None:
+    """The drone says that its plan has ended, and only then that the last line was executed."""
+    async with world(web=True) as w:
+
+        def ends() -> None:
+            plan = w.drone.firmware.flight_plan
+            last = len(plan._items) - 1
+            plan.stop(hover=True)
+            w.drone.faults.untold = frozenset()
+            w.drone._emit(common.MissionItemExecuted(last))
+
+        mark, _ = await to_the_last_line(w, LAND, ends)
+        await state(w, COMPLETE, since=mark)
+        assert reached(w) == [0, 1, 2, 3]
+        assert [m for _, m in w.client.since(mark, "STATUSTEXT") if "paused" in m.text] == []
+
+
 @both
 @pytest.mark.parametrize("last", [LAND, RTL], ids=["land", "return"])
 async def test_conf_074_a_plan_that_is_stopped_before_its_landing_is_paused(flavour: str, last: Item) -> None:
