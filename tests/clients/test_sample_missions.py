@@ -6,10 +6,12 @@ did when. Conformance 75 and 121.
 
 from __future__ import annotations
 
+import itertools
 import math
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -82,6 +84,14 @@ def executed(plan: Plan) -> Iterator[Item]:
         number += 1
 
 
+def apart(where: Sequence[float], begin: Sequence[float], end: Sequence[float]) -> float:
+    """m from the straight way between two places."""
+    way = [b - a for a, b in zip(begin, end, strict=True)]
+    towards = sum(w * (p - a) for w, p, a in zip(way, where, begin, strict=True))
+    part = min(max(towards / (sum(w * w for w in way) or 1.0), 0.0), 1.0)
+    return math.dist(where, [a + part * w for a, w in zip(begin, way, strict=True)])
+
+
 def place(item: Item) -> tuple[float, float, float]:
     """m north, east and up of the take-off."""
     latitude, longitude, height = item.params[4:]
@@ -137,7 +147,8 @@ def check(log: Log, plan: Plan) -> None:
         assert name == "waypoint", (number, lines[position:])
         position += 1
         end = lines[position][0]
-        closest = min(math.dist(where, at) for t, at in track if began <= t <= end + 0.2)
+        flown = [at for t, at in track if began <= t <= end + 0.2]
+        closest = min(itertools.starmap(partial(apart, where), itertools.pairwise(flown)))
         assert closest < WITHIN, (number, closest)
 
     def stays() -> bool:
