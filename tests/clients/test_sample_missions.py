@@ -9,13 +9,14 @@ from __future__ import annotations
 import itertools
 import math
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
+from support.missions import apart
 from support.product import product, program
 from support.world import loopback
 
@@ -82,14 +83,6 @@ def executed(plan: Plan) -> Iterator[Item]:
         else:
             yield item
         number += 1
-
-
-def apart(where: Sequence[float], begin: Sequence[float], end: Sequence[float]) -> float:
-    """m from the straight way between two places."""
-    way = [b - a for a, b in zip(begin, end, strict=True)]
-    towards = sum(w * (p - a) for w, p, a in zip(way, where, begin, strict=True))
-    part = min(max(towards / (sum(w * w for w in way) or 1.0), 0.0), 1.0)
-    return math.dist(where, [a + part * w for a, w in zip(begin, way, strict=True)])
 
 
 def place(item: Item) -> tuple[float, float, float]:

@@ -5,7 +5,7 @@ What was flown, in which order and how often, is read from the simulator's own l
 
 from __future__ import annotations
 
-import math
+import itertools
 from collections.abc import Sequence
 
 import pytest
@@ -14,6 +14,7 @@ from support.missions import (
     ACTIVE,
     COMPLETE,
     PAUSED,
+    apart,
     mode,
     put,
     reached,
@@ -52,13 +53,11 @@ TURN = list(range(1, JUMP + 1))
 def visits(w: World, *places: tuple[float, float]) -> str:
     """Which places the drone has come by, in its order; one that it stays at is one."""
     names, seen = "ABC", ""
-    for entry in w.drone.log:
-        if entry.kind == "pose" and entry.args["up"] > 4.0:
-            here = [
-                names[n] for n, p in enumerate(places) if math.dist((entry.args["north"], entry.args["east"]), p) < 2.0
-            ]
-            if here and not seen.endswith(here[0]):
-                seen += here[0]
+    poses = [entry.args for entry in w.drone.log if entry.kind == "pose" and entry.args["up"] > 4.0]
+    for stretch in itertools.pairwise((pose["north"], pose["east"]) for pose in poses):
+        here = [names[number] for number, there in enumerate(places) if apart(there, *stretch) < 2.0]
+        if here and not seen.endswith(here[0]):
+            seen += here[0]
     return seen
 
 
@@ -84,7 +83,7 @@ async def begun(w: World, number: int) -> None:
 async def test_a_loop_without_end_is_flown_file_after_file(model: str, cuts: int) -> None:
     """Paused and gone on with in a later file, and left by the current item. The drone comes by at each turn."""
     assert 4 * (SETS + 2) == MAX_LINES
-    async with world(web=True, model=model, speed=8.0) as w:
+    async with world(web=True, model=model, speed=4.0) as w:
         w.drone.faults.battery = 80
         await put(w, loop(-1.0))
         await said(w, "flown by the gateway")
@@ -114,7 +113,7 @@ async def test_a_loop_without_end_is_flown_file_after_file(model: str, cuts: int
 
 async def test_a_long_loop_has_as_many_turns_as_it_says() -> None:
     """Over a cut, and over a pause in which the drone was flown elsewhere and forgot its file."""
-    async with world(web=True, speed=8.0) as w:
+    async with world(web=True, speed=4.0) as w:
         w.drone.faults.battery = 80
         await put(w, loop(5.0))
         await start(w)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -113,3 +114,11 @@ def pauses(w: World) -> list[str]:
     names = ("Pause", "Stop", "moveBy", "moveTo", "PCMD")
     told = [e.name for e in w.drone.log if e.kind == "command" and e.name.rpartition(".")[2] in names]
     return [*told, *(e.args["state"] for e in w.drone.log if e.name == "plan")]
+
+
+def apart(where: Sequence[float], begin: Sequence[float], end: Sequence[float]) -> float:
+    """m from the straight way between two places."""
+    along = [b - a for a, b in zip(begin, end, strict=True)]
+    towards = sum(w * (p - a) for w, p, a in zip(along, where, begin, strict=True))
+    part = min(max(towards / (sum(w * w for w in along) or 1.0), 0.0), 1.0)
+    return math.dist(where, [a + part * w for a, w in zip(begin, along, strict=True)])
