@@ -127,7 +127,9 @@ class PlanService(Service):
                 logger.exception("%s: a plan could not be stored", self.host.drone.name)
                 fault = Fault(dialect.MAV_MISSION_ERROR, "the gateway failed to store it")
             if fault is not None:
-                self.host.complain(f"Mission refused: {fault.reason}")
+                transfer = self._desk.transfers.get(commit.mission_type)
+                what = "Plans" if transfer is None else transfer.kind.name.capitalize()
+                self.host.complain(f"{what} refused: {fault.reason}")
             self._perform(self._desk.stored(commit, self.host.clock.monotonic(), fault))
 
     async def _put(self, commit: Commit) -> Fault | None:
