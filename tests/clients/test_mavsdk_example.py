@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from support.poses import pose_at
 from support.product import free_udp_port, product, program
 from support.world import loopback
 
@@ -42,7 +43,7 @@ async def test_takeoff_goto_land(
         # And what really happened: the true pose when the drone heard the order to land.
         assert len(p.entries("command", "Piloting.TakeOff")) == 1
         (landing,) = p.entries("command", "Piloting.Landing")
-        pose = [entry["args"] for entry in p.entries("pose") if entry["t"] <= landing["t"]][-1]
+        pose = pose_at(p.entries("pose"), landing["t"])
         target = geo.destination(*HOME[:2], *place)
         assert geo.distance(*target, pose["lat"], pose["lon"]) < 1.0
         assert pose["ato"] == pytest.approx(height, abs=1.0)

@@ -281,15 +281,20 @@ async def turning(w: World) -> None:
     await w.drone.wait_log(lambda e: e.kind == "command" and e.name == "move.extended_move_by", timeout=20.0)
 
 
-async def test_a_gateway_that_ends_between_two_files_goes_on_there(tmp_path: Path) -> None:
-    """Another run of it knows that the first file is flown, and which item was next: neither is flown again."""
+def with_a_memory(folder: Path) -> tuple[DroneSpec, Config, str]:
+    """A drone, a gateway that keeps what it knows in a folder, and the gateway's address: for several runs of it."""
     drone, address = loopback(), loopback()
-    spec = DroneSpec(address=drone, home=HOME, http_port=WEB_PORT)
     config = Config(
         endpoints=(f"tcpin://{address}:5760",),
         drones=(DroneConfig(name="alpha", sysid=1, address=drone, http_port=WEB_PORT),),
-        state=str(tmp_path),
+        state=str(folder),
     )
+    return DroneSpec(address=drone, home=HOME, http_port=WEB_PORT), config, address
+
+
+async def test_a_gateway_that_ends_between_two_files_goes_on_there(tmp_path: Path) -> None:
+    """Another run of it knows that the first file is flown, and which item was next: neither is flown again."""
+    spec, config, address = with_a_memory(tmp_path)
     async with Simulator([spec], speed=1.5, seed=1) as simulator:
         for run in (1, 2):
             async with Gateway(config) as running:
@@ -347,13 +352,7 @@ async def test_what_was_kept_of_a_flight_is_looked_at_before_it_is_believed(
     tmp_path: Path, key: str, words: str, then: int
 ) -> None:
     """What is none of the mission is ignored with a text: people can write files. What was flown is complete."""
-    drone, address = loopback(), loopback()
-    spec = DroneSpec(address=drone, home=HOME, http_port=WEB_PORT)
-    config = Config(
-        endpoints=(f"tcpin://{address}:5760",),
-        drones=(DroneConfig(name="alpha", sysid=1, address=drone, http_port=WEB_PORT),),
-        state=str(tmp_path),
-    )
+    spec, config, address = with_a_memory(tmp_path)
     async with Simulator([spec], speed=1.5, seed=1) as simulator:
         for run in (1, 2):
             async with Gateway(config) as running:

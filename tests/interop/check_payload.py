@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import hashlib
-import itertools
 import re
 from pathlib import Path
 from typing import Any
 
 import pytest
 from support.olympe import failed
+from support.poses import pose_at
 
 BROKEN = "NameError: name '_get_namedtuple_from_mapping' is not defined"
 """What Olympe 8.5.0 comes to with every plan that it reads back: it has an answer in its hands and calls a function
@@ -44,14 +44,7 @@ def filmed(log: list[dict[str, Any]]) -> float:
         next(entry["t"] for entry in log if entry["kind"] == "command" and entry["name"].endswith(names))
         for names in ((".start_recording", ".StartRecording"), (".stop_recording", ".StopRecording"))
     )
-    poses = [entry for entry in log if entry["kind"] == "pose"]
-
-    def simulated(t: float) -> float:
-        before, after = next((a, b) for a, b in itertools.pairwise(poses) if a["t"] <= t <= b["t"])
-        part = (t - before["t"]) / (after["t"] - before["t"])
-        return float(before["args"]["time"] + part * (after["args"]["time"] - before["args"]["time"]))
-
-    return simulated(stop) - simulated(start)
+    return pose_at(log, stop)["time"] - pose_at(log, start)["time"]
 
 
 def check_media(report: dict[str, Any], folder: Path, seconds: float, *, thermal: bool) -> None:
