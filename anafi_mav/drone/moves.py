@@ -80,6 +80,14 @@ class Move:
         self.ended: asyncio.Future[MoveEnd] = asyncio.get_running_loop().create_future()
         """Do not await this one, a cancelled wait would cancel it: use `result`."""
 
+    async def under_way(self) -> None:
+        """Wait until the drone flies it, for others than the verb that started it. Raises what that verb raises."""
+        answer = self.answer.future
+        await asyncio.wait({answer})
+        if answer.cancelled():
+            raise CommandRejected("it was called off")
+        answer.result()
+
     async def result(self) -> MoveEnd:
         """Wait until the move has ended, and how. Never raises."""
         return await asyncio.shield(self.ended)

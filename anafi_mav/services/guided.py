@@ -97,10 +97,11 @@ async def change_altitude(vehicle: Vehicle, ato: float, flavour: Flavour) -> Non
         await vehicle.guided.reposition(None, ato, None, mode=guided_mode(flavour))
     else:
         check_height(vehicle, ato)
-        # MAVProxy says it as a command and as an item at once: the drone is not stopped for what it does already.
         move = vehicle.drone.piloting.move
-        if goto.at_height(ato) != goto or move is None or not move.running:
+        if goto.at_height(ato) != goto or move is None:
             await vehicle.guided.go(goto.at_height(ato))
+        else:  # MAVProxy says it as a command and as an item at once: both mean this move
+            await move.under_way()
 
 
 class GuidedService(Service):

@@ -107,24 +107,23 @@ class MissionKind(PlanKind):
 
         This is no `check_plan`: 5 000 items take half a second, which is for a thread.
         """
-        known = self._known
-        if known.items is not items:
-            neutral = tuple(map(from_wire, items))
-            report = examine(neutral, self._version()) if items else _NOTHING
-            known = self._known = Examined(items, neutral, report)
-        if not known.report.faults:
+        report = self.examined(items).report
+        if not report.faults:
             return None
-        fault = known.report.faults[0]
+        fault = report.faults[0]
         result = _RESULTS.get(fault.kind)
         if result is None:
             result = dialect.MAV_MISSION_INVALID_PARAM1 - 1 + (fault.param or 1)
         return Fault(result, f"item {fault.item + offset(flavour)}: {fault.reason}")
 
     def examined(self, items: Sequence[PlanItem]) -> Examined:
-        """A mission as `examine` saw it."""
-        if self._known.items is not items:
-            self.examine(items)
-        return self._known
+        """A mission, and what it is to the drone; the last one is known, whichever thread asked."""
+        known = self._known
+        if known.items is not items:
+            neutral = tuple(map(from_wire, items))
+            known = Examined(items, neutral, examine(neutral, self._version()) if items else _NOTHING)
+            self._known = known
+        return known
 
     def shown(self, items: Sequence[PlanItem], flavour: Flavour) -> Sequence[PlanItem]:
         if not items or not flavour.zero_home:

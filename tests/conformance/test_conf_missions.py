@@ -378,3 +378,18 @@ async def test_conf_141_items_that_are_orders(flavour: str, as_int: bool) -> Non
         assert (await order(w.client, 2, *place, 8.0, frame=10, as_int=as_int)).type == UNSUPPORTED_FRAME
         current = await w.client.wait("MISSION_CURRENT")
         assert current.seq == 0
+
+
+@both
+async def test_conf_141_a_height_said_as_a_command_and_as_an_item(flavour: str) -> None:
+    """MAVProxy's changealt says both at once. Both are answered by the one move that the drone is asked for."""
+    async with world(flavour=flavour) as w:
+        await w.take_off(5.0)
+        mark = w.client.mark()
+        height = dialect.MAV_CMD_DO_CHANGE_ALTITUDE
+        w.client.send_command(height, 12.0, dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT)
+        assert (await order(w.client, 3, 0.0, 0.0, 12.0, as_int=False)).type == ACCEPTED
+        ack = await w.client.wait("COMMAND_ACK", lambda ack: ack.command == height, since=mark)
+        assert ack.result == dialect.MAV_RESULT_ACCEPTED
+        await settled(w, (0.0, 0.0, 12.0))
+        assert len([e for e in w.drone.log if e.kind == "command" and e.name.endswith("Piloting.moveTo")]) == 1
