@@ -6,15 +6,12 @@ What is out of bounds is refused, never clamped: by the numbers themselves, by t
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 from anafi_mav import geo
+from anafi_mav.services.aircraft import Aircraft
 from anafi_mav.services.fence_watch import OutsideFence
 from anafi_mav.services.place import Place, point_of
 from anafi_mav.services.refusal import Refused
-
-if TYPE_CHECKING:
-    from anafi_mav.services.vehicle import Vehicle
 
 SLOWEST, FASTEST = 0.1, 100.0
 """m/s. A speed beyond these is a number in the wrong place, or in another unit. Within them the drone limits itself."""
@@ -26,7 +23,7 @@ LOWEST = 1.0
 """m above take-off: where an ANAFI hovers by itself after take-off. Lower targets are refused, never clamped."""
 
 
-def check_height(vehicle: Vehicle, ato: float) -> None:
+def check_height(vehicle: Aircraft, ato: float) -> None:
     """Raise `Refused` unless a target height (m above take-off) is one the drone may go to."""
     ceiling = vehicle.drone.piloting.state.max_altitude
     if not math.isfinite(ato):
@@ -44,7 +41,7 @@ def check_height(vehicle: Vehicle, ato: float) -> None:
         raise Refused(f"Refused: {error}", lasting=True) from error
 
 
-def amsl_to_ato(vehicle: Vehicle, amsl: float) -> float:
+def amsl_to_ato(vehicle: Aircraft, amsl: float) -> float:
     """Height above take-off (m) of an AMSL height; raises `Refused` when no bridge is known."""
     ato = vehicle.height.ato(amsl)
     if ato is None:
@@ -60,7 +57,7 @@ def check_on_earth(place: Place, what: str) -> None:
         raise Refused(f"{what} refused: latitude and longitude are both 0", lasting=True)
 
 
-def check_place(vehicle: Vehicle, place: Place, *, start: Place | None = None) -> None:
+def check_place(vehicle: Aircraft, place: Place, *, start: Place | None = None) -> None:
     """Raise `Refused` unless the drone may fly there, and the straight way from `start` if that is given."""
     check_on_earth(place, "Goto")
     state, centre = vehicle.drone.piloting.state, vehicle.home

@@ -24,14 +24,14 @@ class FlightRecord:
     took_off_at: int = 0
     landed_at: int = 0
     number: int = 0
-    """0: no flight yet."""
+    """0: no flight yet, or the drone has not said which."""
     _armed: bool | None = None
     _landed: Landed | None = None
 
     def look(self, *, armed: bool, landed: Landed, now: int) -> None:
         """What the vehicle is now. The first look only compares: what it shows began before it."""
         if self._armed is False and armed:
-            self.armed_at, self.took_off_at, self.landed_at = now, 0, 0
+            self.armed_at, self.took_off_at, self.landed_at, self.number = now, 0, 0, 0
         if self._landed is Landed.ON_GROUND and landed in (Landed.TAKEOFF, Landed.IN_AIR):
             self.took_off_at = now
         if self._landed not in (None, Landed.ON_GROUND) and landed is Landed.ON_GROUND:
@@ -65,8 +65,8 @@ class FlightRecordService(Service):
 
     def _look(self) -> None:
         vehicle = self.host.vehicle
-        self._record.flight_id(self.host.drone.product.state.flight_id)
         self._record.look(armed=vehicle.armed, landed=vehicle.landed, now=self.host.times().boot_us)
+        self._record.flight_id(self.host.drone.product.state.flight_id)
 
     def _build(self, vehicle: Vehicle, times: Times) -> dialect.MAVLink_message:
         record = self._record

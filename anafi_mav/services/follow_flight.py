@@ -9,13 +9,13 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections.abc import Callable, Hashable
-from typing import TYPE_CHECKING
 
 from anafi_mav import geo
 from anafi_mav.clock import Clock
 from anafi_mav.drone import PilotingCommand, events
 from anafi_mav.drone.events import Message
 from anafi_mav.errors import LinkLost
+from anafi_mav.services.aircraft import Aircraft
 from anafi_mav.services.bounds import amsl_to_ato, check_height, check_on_earth, check_place
 from anafi_mav.services.follow import (
     PATIENCE,
@@ -31,22 +31,21 @@ from anafi_mav.services.follow import (
 )
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.offboard_control import Controller, Motion
+from anafi_mav.services.offboard_flight import OffboardFlight
 from anafi_mav.services.place import Place
 from anafi_mav.services.refusal import Refused
 from anafi_mav.services.statustext import Severity
-
-if TYPE_CHECKING:
-    from anafi_mav.services.vehicle import Vehicle
 
 
 class FollowFlight:
     """Mode Follow of one vehicle."""
 
-    def __init__(self, vehicle: Vehicle, clock: Clock) -> None:
+    def __init__(self, vehicle: Aircraft, offboard: OffboardFlight, clock: Clock) -> None:
         self.settings = FollowSettings()
         self.state = State.OFF
         self.complain: Callable[[str], None] = lambda text: vehicle.text(Severity.WARNING, text)
         self._vehicle = vehicle
+        self._offboard = offboard
         self._clock = clock
         self._leader: Hashable = None
         self._heard_at = 0.0
@@ -56,7 +55,7 @@ class FollowFlight:
 
     @property
     def _motion(self) -> Motion:
-        return self._vehicle.offboard.motion
+        return self._offboard.motion
 
     @property
     def engaged(self) -> bool:

@@ -7,17 +7,14 @@ from __future__ import annotations
 
 import asyncio
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 from anafi_mav import units
 from anafi_mav.drone import MoveEnd, Position
+from anafi_mav.services.aircraft import Aircraft
 from anafi_mav.services.bounds import check_height, check_place
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.place import Place
 from anafi_mav.services.refusal import Refused
-
-if TYPE_CHECKING:
-    from anafi_mav.services.vehicle import Vehicle
 
 
 @dataclass(frozen=True)
@@ -44,7 +41,7 @@ class Goto:
 class GuidedFlight:
     """The moves of one vehicle, one at a time: where it is on its way to, and where it has arrived."""
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: Aircraft) -> None:
         self._vehicle = vehicle
         self._goto: Goto | None = None
         self._arrived: tuple[Place, Position | None] | None = None

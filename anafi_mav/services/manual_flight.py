@@ -20,18 +20,15 @@ import enum
 import math
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 from anafi_mav.clock import Clock
 from anafi_mav.drone import PilotingCommand
 from anafi_mav.errors import LinkLost
 from anafi_mav.mavlink import dialect
+from anafi_mav.services.aircraft import Aircraft
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.offboard import SILENCE
 from anafi_mav.services.statustext import Severity
-
-if TYPE_CHECKING:
-    from anafi_mav.services.vehicle import Vehicle
 
 DEAD_ZONE = 0.03
 """Share of the way that a stick may be off its middle and count as centred: none of them returns exactly."""
@@ -151,7 +148,7 @@ def _beyond_dead_zone(share: float) -> float:
 class ManualFlight:
     """The sticks of ground stations on one vehicle, and the drone flown by those who move them."""
 
-    def __init__(self, vehicle: Vehicle, clock: Clock) -> None:
+    def __init__(self, vehicle: Aircraft, clock: Clock) -> None:
         self.complain: Callable[[str], None] = lambda text: vehicle.text(Severity.WARNING, text)
         self.state = State.IDLE
         self._vehicle = vehicle

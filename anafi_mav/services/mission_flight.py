@@ -10,26 +10,25 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections.abc import Callable, Coroutine, Hashable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from anafi_mav.drone import events
 from anafi_mav.drone.events import FlyingState, Message, PlayingState
 from anafi_mav.errors import AnafiMavError, CommandRejected, LinkLost
 from anafi_mav.plans.plan import Item
-from anafi_mav.plans.translate import Cursor, Leg, Step
+from anafi_mav.plans.translate import Leg
+from anafi_mav.services.aircraft import Aircraft
+from anafi_mav.services.mission_course import Course
 from anafi_mav.services.mission_files import FilesOnDrone
 from anafi_mav.services.mission_path import check_path, lay_out
 from anafi_mav.services.mission_progress import Progress, State
-from anafi_mav.services.mission_record import Record
+from anafi_mav.services.mission_record import Keeper, Record
 from anafi_mav.services.mission_steps import fly_step
 from anafi_mav.services.mission_waits import ArmWait, EndWatch, StoreWait
-from anafi_mav.services.mission_words import refusal
+from anafi_mav.services.mission_words import beginning, refusal
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.refusal import Refused
 from anafi_mav.services.statustext import Severity
-
-if TYPE_CHECKING:
-    from anafi_mav.services.vehicle import Vehicle
 
 _LANDING = (FlyingState.LANDING, FlyingState.EMERGENCY_LANDING)
 
@@ -37,7 +36,7 @@ _LANDING = (FlyingState.LANDING, FlyingState.EMERGENCY_LANDING)
 class MissionFlight:
     """The mission of one vehicle; its `Helm` while it is flown."""
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: Aircraft) -> None:
         self.progress = Progress()
         self.identity = 0
         """The opaque id of the mission."""
@@ -51,18 +50,12 @@ class MissionFlight:
         """What a client calls item 0."""
         self.spawn: Callable[[Coroutine[Any, Any, None]], asyncio.Task[None]] | None = None
         """Runs something until the link goes down."""
-        self.remember: Callable[[Record | None], None] = lambda record: None
-        """Keeps what is needed to know the drone's plan again."""
+        self.keeper = Keeper()
+        """Remembers what is needed to know the drone's plan again."""
         self._vehicle = vehicle
-        self._parts: list[Leg | Step] = []
-        """What is flown, and what follows."""
-        self._rest: Cursor | None = None
-        self._next: int | None = None
-        """The item after the part that is flown, where that is not flown without another word."""
+        self._course = Course()
         self._uid = ""
         """Of the file that the drone flies, or flew last."""
-        self._kept: Record | None = None
-        """What is remembered."""
         self._left: tuple[Leg, int, dict[int, int]] | None = None
         """The drone has it paused, and the mission is to begin elsewhere next: file, last line, jumps."""
         self._starting: tuple[Leg, int] | None = None
@@ -95,10 +88,10 @@ class MissionFlight:
             self._suspend(starting=starting)
             self._vehicle.select(FlightMode.HOLD)
         self.progress.take(items)
-        self._left, self._parts, self._rest, self._next = None, [], None, None
+        self._left, self._course = None, Course()
         self._drop_pending()
         if known:  # else it has just been read, and what was kept of it has not been looked at
-            self._remember(None)
+            self.keeper.forget()
 
     def taken_again(self) -> None:
         """The same mission was uploaded once more. One that is flown goes on undisturbed; else it is a new one."""
@@ -115,7 +108,7 @@ class MissionFlight:
         """Nothing of it has been flown, but for a file that the drone has paused."""
         self._leave()
         self.progress.take(self.progress.items)
-        self._remember(None)
+        self.keeper.forget()
 
     def _leave(self) -> None:
         """It begins elsewhere next; somebody else may still let the drone go on with what it has."""
@@ -203,7 +196,7 @@ class MissionFlight:
         """The drone hovers, with the rest of what is to be flown in its memory."""
         progress, plan = self.progress, self._vehicle.drone.flight_plan.state
         paused = plan.playing == PlayingState.PAUSED and plan.uid == self._uid
-        whole = progress.leg is not None and self._next is None
+        whole = progress.leg is not None and self._course.later is None
         same = progress.state is State.PAUSED and item == progress.current
         return same and whole and paused and self._vehicle.in_air
 
@@ -217,12 +210,14 @@ class MissionFlight:
         items, resumes, uid = progress.items, self._resumes(item), self._uid
         jumps = {} if anew else progress.jumps
         if resumes:
-            parts, rest, line = self._parts, self._rest, progress.line
+            course, line = self._course, progress.line
         else:
-            parts, rest, line = *await lay_out(vehicle, items, item, number, jumps), -1
-        await check_path(vehicle, parts, line, number)
-        if not resumes and isinstance(parts[0], Leg):
-            parts[0], uid, line = await self._files.beginning_with(parts[0], items)
+            course, line = Course(*await lay_out(vehicle, items, item, number, jumps)), -1
+        await check_path(vehicle, course.parts, line, number)
+        head = course.parts[0]
+        if not resumes and isinstance(head, Leg):
+            head, uid, line = await self._files.beginning_with(head, items)
+            course.parts[0] = head
         self._beginning = True
         try:
             if not waited:
@@ -238,10 +233,9 @@ class MissionFlight:
         if progress.items is not items or not vehicle.armed:
             raise Refused("Mission refused: something else has happened meanwhile")
         vehicle.select(FlightMode.MISSION, self)
-        self._left, self._parts, self._rest = None, parts, rest
+        self._left, self._course = None, course
         if not resumes:
-            self._next, progress.jumps = None, {**jumps}
-        head = parts[0]
+            progress.jumps = {**jumps}
         try:
             if isinstance(head, Leg):
                 await self._play(head, uid, line)
@@ -290,17 +284,9 @@ class MissionFlight:
 
     def _announce(self, resumes: bool) -> None:
         """What is flown, and what happens to it without the gateway."""
-        progress, stepped = self.progress, len(self._parts) > 1 or self._rest is not None
-        stepped = stepped or isinstance(self._parts[0], Step)
+        current, stepped = self.progress.current, self._course.stepped
         returns = self._vehicle.drone.flight_plan.state.returns_on_disconnect
-        alone = {None: "does as it is set", True: "returns home", False: "flies on"}[returns]
-        if stepped and returns is not True:
-            alone = "flies to the end of its file and hovers"
-        verb, current = "goes on" if resumes else "begins", progress.current
-        self.say(
-            Severity.INFO,
-            lambda first: f"Mission {verb} at item {current + first}; without link or gateway the drone {alone}",
-        )
+        self.say(Severity.INFO, lambda first: beginning(current + first, resumes, stepped=stepped, returns=returns))
 
     # From part to part.
 
@@ -308,16 +294,15 @@ class MissionFlight:
         """Fly what follows: the steps that come next, and then the file behind them."""
         progress = self.progress
         try:
-            while self._parts or self._rest is not None:
-                if not self._parts:
-                    assert self._rest is not None
-                    rest, self._rest = self._rest, None
-                    self._parts, self._rest = await lay_out(self._vehicle, progress.items, rest, 0)
-                    await check_path(self._vehicle, self._parts, -1, 0)
-                head = self._parts[0]
+            while not self._course.over:
+                rest = self._course.rest
+                if not self._course.parts and rest is not None:
+                    self._course = Course(*await lay_out(self._vehicle, progress.items, rest, 0))
+                    await check_path(self._vehicle, self._course.parts, -1, 0)
+                head = self._course.parts[0]
                 if isinstance(head, Leg):
                     leg, uid, line = await self._files.beginning_with(head, progress.items)
-                    self._parts[0] = leg
+                    self._course.parts[0] = leg
                     await self._play(leg, uid, line)
                     return  # it says itself when it ends
                 progress.fly(head.item)
@@ -336,37 +321,30 @@ class MissionFlight:
     def _leg_over(self) -> None:
         """The drone has flown a whole file."""
         self._part_over()
-        if self._next is not None:
-            following, self._next = self._next, None
+        if (following := self._course.later) is not None:
+            self._course.later = None
             self.progress.current = following
             self._break_off("after a lost link it does not go on by itself")
             self.progress.choose(following, anew=False)
             self._keep()
             self.news()
-        elif self._parts or self._rest is not None:
+        elif not self._course.over:
             self._run(self._go_on())
         else:
             self._finish()
 
     def _part_over(self) -> None:
         """What follows is the current item from now on: paused before it begins, the last one is not flown again."""
-        del self._parts[:1]
-        following = self._first_of(self._parts)
+        following = self._course.part_over()
         if following is not None:
             self.progress.fly(following)
             self._keep()
             self.news()
 
-    def _first_of(self, parts: list[Leg | Step]) -> int | None:
-        """The item that these parts begin with, or where there is none the rest; None: nothing follows."""
-        if not parts:
-            return None if self._rest is None else self._rest.item
-        return parts[0].item if isinstance(parts[0], Step) else parts[0].origins[0]
-
     def _finish(self) -> None:
         self._left = None
         self.progress.finish()
-        self._remember(None)
+        self.keeper.forget()
         self.say(Severity.INFO, lambda first: "Mission complete")
         self._vehicle.select(FlightMode.HOLD)
         self.news()
@@ -510,10 +488,7 @@ class MissionFlight:
         self._arming.end()
         self._end_watch.end()
         self._starting, self._running = None, None
-        following = self._first_of(self._parts[1:])
-        if following is not None:
-            self._next = following
-        self._parts, self._rest = self._parts[:1], None
+        self._course.end_with_this_part()
         if self.progress.state is State.ACTIVE:
             self.progress.stop()
 
@@ -524,25 +499,27 @@ class MissionFlight:
             leg, plays = record.leg, plan.uid == record.uid
             if not (plays or self._vehicle.in_air):
                 return
-            self._kept, self._uid, self._parts, self._next = record, record.uid, [leg], record.next
+            self._uid, self._course = record.uid, Course([leg], later=record.next)
+            self.keeper.found(record)
             progress.begin(leg, record.line)
             progress.jumps = dict(record.jumps)
             progress.stop()
         if progress.state is not State.PAUSED or progress.leg is None:
             return
         plays = plan.uid == self._uid and plan.playing == PlayingState.PLAYING
-        if progress.leg_done and self._next is not None:
-            progress.current = self._next
+        later = self._course.later
+        if progress.leg_done and later is not None:
+            progress.current = later
         current = progress.current
         if plays:
             progress.begin(progress.leg, progress.line)
             self._vehicle.select(FlightMode.MISSION, self)
             how = "the drone flies it"
             self.say(Severity.NOTICE, lambda first: f"Mission: {how}, at item {current + first} or a later one")
-        elif progress.leg_done and self._next is None:
+        elif progress.leg_done and later is None:
             progress.begin(progress.leg, progress.line)
             progress.finish()
-            self._remember(None)
+            self.keeper.forget()
             self.say(Severity.INFO, lambda first: "Mission complete")
         else:
             how = "the drone flies it no more"
@@ -550,16 +527,4 @@ class MissionFlight:
         self.news()
 
     def _keep(self) -> None:
-        """Remember what the drone flies, or that the gateway is at an item behind its file, for another run of it."""
-        progress = self.progress
-        if progress.leg is not None:
-            following = self._first_of(self._parts[1:])
-            after = self._next if following is None else following
-            leg, line = progress.leg, progress.line
-            self._remember(Record.of(self.identity, self._uid, leg, line, after, progress.jumps))
-        elif self._kept is not None:
-            self._remember(self._kept.flown_up_to(progress.current, progress.jumps))
-
-    def _remember(self, record: Record | None) -> None:
-        self._kept = record
-        self.remember(record)
+        self.keeper.keep(self.identity, self._uid, self.progress, self._course.following)

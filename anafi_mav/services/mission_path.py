@@ -8,20 +8,17 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from anafi_mav.errors import PlanError
 from anafi_mav.mavlink import dialect
 from anafi_mav.plans.plan import Item
 from anafi_mav.plans.translate import Cursor, Leg, Start, Step, translate
+from anafi_mav.services.aircraft import Aircraft
 from anafi_mav.services.bounds import check_place
 from anafi_mav.services.fence_watch import OutsideFence
 from anafi_mav.services.place import Place
 from anafi_mav.services.refusal import Refused
 from anafi_mav.units import DEG_PER_RAD
-
-if TYPE_CHECKING:
-    from anafi_mav.services.vehicle import Vehicle
 
 BREATH = 20
 """Way points after which others get their turn: a large polygon takes a while."""
@@ -41,7 +38,7 @@ class WayPoint:
     """m above the take-off point."""
 
 
-def _start(vehicle: Vehicle) -> Start:
+def _start(vehicle: Aircraft) -> Start:
     """Where the flight begins."""
     state, place, amsl = vehicle.drone.piloting.state, vehicle.place, vehicle.height.ato(0.0)
     if place is None:
@@ -59,7 +56,7 @@ def _start(vehicle: Vehicle) -> Start:
 
 
 async def lay_out(
-    vehicle: Vehicle, items: Sequence[Item], first: int | Cursor, number: int, jumps: Mapping[int, int] | None = None
+    vehicle: Aircraft, items: Sequence[Item], first: int | Cursor, number: int, jumps: Mapping[int, int] | None = None
 ) -> tuple[list[Leg | Step], Cursor | None]:
     """What is flown from an item on, from where the drone is, and how it goes on after that. Raises `Refused`.
 
@@ -92,7 +89,7 @@ def way_points(leg: Leg, after: int = -1) -> Iterator[WayPoint]:
             yield WayPoint(item, place, float(columns[_HEIGHT]))
 
 
-async def check_path(vehicle: Vehicle, parts: Sequence[Leg | Step], after: int, number: int) -> None:
+async def check_path(vehicle: Aircraft, parts: Sequence[Leg | Step], after: int, number: int) -> None:
     """Raise `Refused` when a way point, or the straight way to it, is where the drone may not be.
 
     `after` is the line of the first file after which it is flown, `number` what the first item is called.
@@ -108,7 +105,7 @@ async def check_path(vehicle: Vehicle, parts: Sequence[Leg | Step], after: int, 
         after = -1
 
 
-def _check(vehicle: Vehicle, start: Place | None, point: WayPoint, number: int) -> None:
+def _check(vehicle: Aircraft, start: Place | None, point: WayPoint, number: int) -> None:
     ceiling = vehicle.drone.piloting.state.max_altitude
     try:
         check_place(vehicle, point.place, start=start)

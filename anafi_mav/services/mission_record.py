@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import chain
 from typing import Any
 
@@ -13,6 +13,7 @@ from typing_extensions import Self
 from anafi_mav.plans.plan import DO_JUMP, Item
 from anafi_mav.plans.translate import Leg
 from anafi_mav.services.mission_path import way_points
+from anafi_mav.services.mission_progress import Progress
 
 
 class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -64,6 +65,34 @@ class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     @property
     def leg(self) -> Leg:
         return Leg(self.content.encode(), self.origins, self.done)
+
+
+class Keeper:
+    """Sees to it that what the drone flies is remembered, or that the gateway is at an item behind the drone's file."""
+
+    def __init__(self) -> None:
+        self.write: Callable[[Record | None], None] = lambda record: None
+        """Takes what is to be remembered from now on."""
+        self._kept: Record | None = None
+
+    def found(self, record: Record) -> None:
+        """This was remembered by another run."""
+        self._kept = record
+
+    def forget(self) -> None:
+        """Nothing that is flown is of the mission."""
+        self._kept = None
+        self.write(None)
+
+    def keep(self, mission: int, uid: str, progress: Progress, following: int | None) -> None:
+        """Remember how far a mission is. `following` is the item behind the file that the drone flies."""
+        if progress.leg is not None:
+            self._kept = Record.of(mission, uid, progress.leg, progress.line, following, progress.jumps)
+        elif self._kept is not None:
+            self._kept = self._kept.flown_up_to(progress.current, progress.jumps)
+        else:
+            return
+        self.write(self._kept)
 
 
 def _leads_somewhere(leg: Leg) -> bool:

@@ -53,7 +53,7 @@ class MissionService(Service):
         self._flight.say = self._say
         self._flight.first_number = _first_number
         self._flight.spawn = host.spawn
-        self._flight.remember = self._remember
+        self._flight.keeper.write = self._remember
         self._saved = -math.inf
         self._unsaved = False
 

@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 from anafi_mav import units
 from anafi_mav.errors import CommandRejected
 from anafi_mav.mavlink import dialect
 from anafi_mav.plans.plan import Item
+from anafi_mav.services.aircraft import Aircraft
 from anafi_mav.services.turns import heading_of
-
-if TYPE_CHECKING:
-    from anafi_mav.services.vehicle import Vehicle
 
 FULL = 100.0
 """ZOOM_TYPE_RANGE: a share of what the camera can, %."""
 
 
-async def fly_step(vehicle: Vehicle, item: Item) -> None:
+async def fly_step(vehicle: Aircraft, item: Item) -> None:
     """Fly one item; returns when the drone has done it, or raises what kept it from that."""
     if not vehicle.in_air or vehicle.returning:
         raise CommandRejected("the drone does something else")
@@ -31,7 +28,7 @@ async def fly_step(vehicle: Vehicle, item: Item) -> None:
             raise CommandRejected(f"command {item.command} is not flown by the gateway")
 
 
-async def _turn(vehicle: Vehicle, item: Item) -> None:
+async def _turn(vehicle: Aircraft, item: Item) -> None:
     """param1 deg, param2 deg/s (unset or 0: the drone's own), param3 way, param4 1: from the present heading."""
     angle, rate, way, relative = item.params[:4]
     attitude = vehicle.drone.piloting.state.attitude
@@ -41,7 +38,7 @@ async def _turn(vehicle: Vehicle, item: Item) -> None:
     await vehicle.drone.piloting.move_by(0.0, 0.0, 0.0, turn * units.RAD_PER_DEG, turn_rate_dps=rate or None)
 
 
-async def _zoom(vehicle: Vehicle, item: Item) -> None:
+async def _zoom(vehicle: Aircraft, item: Item) -> None:
     """param1 ZOOM_TYPE, param2 its value: RANGE is a share of the camera's range in %."""
     kind, value = item.params[:2]
     if kind != dialect.ZOOM_TYPE_RANGE or value is None or not math.isfinite(value):

@@ -7,14 +7,11 @@ import asyncio
 import functools
 from collections.abc import Callable, Hashable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
 
 from anafi_mav.drone.events import FlyingState, ForcedLandingReason
+from anafi_mav.services.aircraft import Aircraft
 from anafi_mav.services.mission_progress import Progress
 from anafi_mav.services.refusal import Refused
-
-if TYPE_CHECKING:
-    from anafi_mav.services.vehicle import Vehicle
 
 ARM_WAIT = 10.0
 """s that a mission waits for somebody to arm: QGroundControl chooses the mode first and arms when it is shown."""
@@ -94,7 +91,7 @@ class EndWatch:
     A landing or a return of another cause is none of the mission's.
     """
 
-    def __init__(self, vehicle: Vehicle, progress: Progress, ended: Callable[[bool], None]) -> None:
+    def __init__(self, vehicle: Aircraft, progress: Progress, ended: Callable[[bool], None]) -> None:
         """`ended` is called with whether it has."""
         self._vehicle = vehicle
         self._progress = progress

@@ -1,4 +1,4 @@
-"""Why a drone does not begin a plan, in words for people (arsdk.md §3.1: components of the flight plan)."""
+"""What is said to people when a mission begins, or does not."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from anafi_mav.drone.events import FlightPlanComponent as Part
 from anafi_mav.drone.flight_plan import FlightPlanState
 from anafi_mav.errors import CommandRejected
 
-_WORDS = {
+_REASONS = {
     Part.GPS: "no GPS fix",
     Part.CALIBRATION: "the magnetometer wants to be calibrated",
     Part.MAVLINK_FILE: "it does not take the file",
@@ -17,10 +17,23 @@ _WORDS = {
     Part.MAVLINK_MEDIA: "it cannot store the pictures",
     Part.FIRST_WAYPOINT_TOO_FAR: "the first way point is too far away",
 }
+"""Parrot's components of a flight plan that keep it from being begun (arsdk.md §3.1)."""
 
 
 def refusal(state: FlightPlanState, error: CommandRejected) -> str:
     """One sentence on a start that the drone has refused."""
-    reasons = [_WORDS.get(part, part.name.lower()) for part, ok in state.components.items() if not ok]
+    reasons = [_REASONS.get(part, part.name.lower()) for part, ok in state.components.items() if not ok]
     reasons += [indicator.name.lower().replace("_", " ") for indicator in sorted(state.missing or ())]
     return f"Mission refused by the drone: {', '.join(reasons) or error.reason}"
+
+
+def beginning(item: int, resumes: bool, *, stepped: bool, returns: bool | None) -> str:
+    """Where a mission begins or goes on, and what becomes of it without the gateway.
+
+    `stepped`: the drone has a part of it only. `returns`: what its ReturnHomeOnDisconnect is set to.
+    """
+    alone = {None: "does as it is set", True: "returns home", False: "flies on"}[returns]
+    if stepped and returns is not True:
+        alone = "flies to the end of its file and hovers"
+    verb = "goes on" if resumes else "begins"
+    return f"Mission {verb} at item {item}; without link or gateway the drone {alone}"

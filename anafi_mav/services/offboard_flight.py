@@ -11,13 +11,14 @@ import asyncio
 import contextlib
 import math
 from collections.abc import Callable, Coroutine, Hashable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from anafi_mav import units
 from anafi_mav.clock import Clock
 from anafi_mav.drone import Limits, PilotingCommand, events
 from anafi_mav.drone.events import Message
 from anafi_mav.errors import AnafiMavError, LinkLost
+from anafi_mav.services.aircraft import Aircraft
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.offboard import OffboardStream, State
 from anafi_mav.services.offboard_control import STILL, WIND, Controller, Motion, tilt_for, turn_towards
@@ -26,9 +27,6 @@ from anafi_mav.services.offboard_moves import OffboardMoves
 from anafi_mav.services.offboard_setpoints import NOTHING, AttitudeSetpoint, MotionSetpoint, Setpoint
 from anafi_mav.services.refusal import Refused
 from anafi_mav.services.statustext import Severity
-
-if TYPE_CHECKING:
-    from anafi_mav.services.vehicle import Vehicle
 
 WARN_AGAIN = 1.0
 """m/s by which a velocity has to be higher than the last one whose tilt was worth a word."""
@@ -51,7 +49,7 @@ class _Course(NamedTuple):
 class OffboardFlight:
     """The setpoints of programs on one vehicle, and the drone flown by those of its pilot."""
 
-    def __init__(self, vehicle: Vehicle, clock: Clock) -> None:
+    def __init__(self, vehicle: Aircraft, clock: Clock) -> None:
         self.motion = Motion()
         """How the drone moves; whoever else flies it by sticks uses it too."""
         self.complain: Callable[[str], None] = lambda text: vehicle.text(Severity.WARNING, text)

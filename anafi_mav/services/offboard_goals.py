@@ -8,17 +8,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from anafi_mav import geo
+from anafi_mav.services.aircraft import Aircraft
 from anafi_mav.services.bounds import amsl_to_ato, check_height, check_place
 from anafi_mav.services.offboard_control import Axis, Demand, Motion
 from anafi_mav.services.offboard_setpoints import MotionSetpoint, Origin, Vector
 from anafi_mav.services.place import Place
 from anafi_mav.services.refusal import Refused
-
-if TYPE_CHECKING:
-    from anafi_mav.services.vehicle import Vehicle
 
 
 @dataclass(frozen=True)
@@ -46,7 +43,7 @@ class Goal:
         return (self.origin, self.body, self.position) == (setpoint.origin, setpoint.body, setpoint.position)
 
 
-def resolve(setpoint: MotionSetpoint, vehicle: Vehicle, motion: Motion) -> Goal:
+def resolve(setpoint: MotionSetpoint, vehicle: Aircraft, motion: Motion) -> Goal:
     """The goal of a setpoint that has a position. Raises `Refused` for one that the drone may not or cannot fly to."""
     if setpoint.origin is Origin.VEHICLE:
         return _from_vehicle(setpoint, vehicle, motion)
@@ -87,7 +84,7 @@ def _local_place(origin: Place, x: float | None, y: float | None, here: Place | 
     return Place(*geo.destination(origin.latitude, origin.longitude, x or 0.0, y or 0.0))
 
 
-def _from_vehicle(setpoint: MotionSetpoint, vehicle: Vehicle, motion: Motion) -> Goal:
+def _from_vehicle(setpoint: MotionSetpoint, vehicle: Aircraft, motion: Motion) -> Goal:
     x, y, z = setpoint.position
     ahead, aside, down = x or 0.0, y or 0.0, z or 0.0
     if motion.yaw is None:

@@ -10,15 +10,13 @@ import asyncio
 import contextlib
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 from anafi_mav import units
 from anafi_mav.drone import MoveEnd
 from anafi_mav.errors import AnafiMavError, CommandRejected, LinkLost
+from anafi_mav.services.aircraft import Aircraft
 from anafi_mav.services.offboard_goals import Goal
-
-if TYPE_CHECKING:
-    from anafi_mav.services.vehicle import Vehicle
 
 MOVE_EVERY = 0.2
 """s between two moves: a program may change its target with every setpoint, but each move has to be acknowledged by
@@ -36,7 +34,7 @@ _Wanted: TypeAlias = "tuple[Goal, float | None]"
 class OffboardMoves:
     """The moves of one session of setpoints."""
 
-    def __init__(self, vehicle: Vehicle, complain: Callable[[str], None]) -> None:
+    def __init__(self, vehicle: Aircraft, complain: Callable[[str], None]) -> None:
         self._vehicle = vehicle
         self._complain = complain
         self._wanted: _Wanted | None = None

@@ -8,18 +8,16 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Coroutine, Hashable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from anafi_mav.drone.events import AltitudeChanged, FlyingState, FlyingStateChanged
 from anafi_mav.errors import AnafiMavError, CommandRejected
+from anafi_mav.services.aircraft import Aircraft
 from anafi_mav.services.bounds import check_height
 from anafi_mav.services.flying import AIRBORNE
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.refusal import Refused
 from anafi_mav.services.statustext import Severity
-
-if TYPE_CHECKING:
-    from anafi_mav.services.vehicle import Vehicle
 
 AUTO_DISARM = 10.0
 """s that an armed vehicle waits for a take-off (as PX4's COM_DISARM_PRFLT)."""
@@ -40,12 +38,14 @@ CLOSE_ENOUGH = 0.1
 class Takeoff:
     """The way of one vehicle from standing disarmed to hovering at a height."""
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: Aircraft, armed: Callable[[Hashable], None]) -> None:
         self.height = 2.5
         """m above take-off for a take-off that names no height (PX4's default of MIS_TAKEOFF_ALT)."""
         self.hand_launch = False
         """Arming starts the motors and waits for the drone to be thrown (a parameter; Parrot's UserTakeOff)."""
         self._vehicle = vehicle
+        self._tell_armed = armed
+        """Who waited for this client to arm begins."""
         self._armed = False
         self._climbing = False
         self._pending: tuple[float, Hashable] | None = None
@@ -57,7 +57,7 @@ class Takeoff:
 
     @property
     def armed(self) -> bool:
-        """Arming was accepted and has not lapsed. What flies is armed in any case (`Vehicle.armed`)."""
+        """Arming was accepted and has not lapsed. What flies is armed in any case (`Aircraft.armed`)."""
         return self._armed
 
     @property
@@ -92,7 +92,7 @@ class Takeoff:
             self.forget()
             self._start_background(self._take_off_and_report(height))
         else:
-            vehicle.mission.armed(client)
+            self._tell_armed(client)
 
     async def disarm(self, *, force: bool) -> None:
         """Disarm on the ground. In the air only `force` with `allow_kill` does it: the motors stop, the drone falls."""

@@ -13,19 +13,17 @@ from collections.abc import Callable, Hashable
 
 from anafi_mav.clock import Clock
 from anafi_mav.drone import Drone
-from anafi_mav.drone.events import AlertLevel, FlyingState, ForcedLandingReason, PilotingStyleStyle, PlayingState
-from anafi_mav.services.fence_watch import FenceWatch, OutsideFence
+from anafi_mav.drone.events import AlertLevel, FlyingState, ForcedLandingReason, PlayingState
+from anafi_mav.services.aircraft import Aircraft
 from anafi_mav.services.flying import AIRBORNE, LANDING, ON_GROUND, TAKING_OFF
 from anafi_mav.services.follow_flight import FollowFlight
 from anafi_mav.services.guided_flight import GuidedFlight
-from anafi_mav.services.height import HeightReference
 from anafi_mav.services.helm import Helm
 from anafi_mav.services.link_loss import LossPolicy
 from anafi_mav.services.manual_flight import ManualFlight
 from anafi_mav.services.mission_flight import MissionFlight
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.offboard_flight import OffboardFlight
-from anafi_mav.services.place import Place, point_of
 from anafi_mav.services.rally import RallyPoints
 from anafi_mav.services.refusal import Refused
 from anafi_mav.services.statustext import Severity
@@ -51,7 +49,7 @@ class Health(enum.Enum):
     EMERGENCY = 6
 
 
-class Vehicle:
+class Vehicle(Aircraft):
     """One drone, flown. All methods run on the event loop's thread."""
 
     def __init__(
@@ -64,60 +62,32 @@ class Vehicle:
         changed: Callable[[], None],
         end_others: Callable[[], list[asyncio.Task[None]]],
     ) -> None:
-        self.drone = drone
-        self.height = HeightReference()
-        self.cruise_speed: float | None = None
-        """m/s over ground that moves keep to; None: the drone's own (MAV_CMD_DO_CHANGE_SPEED)."""
-        self.climb_speed: float | None = None
-        """m/s up and down that moves keep to; None: the drone's own."""
+        super().__init__(drone, text=text, changed=changed)
         self.gcs_loss = LossPolicy()
         """What to do when no ground station is heard any more (a parameter)."""
-        self.origin: Place | None = None
-        """Origin of the local frame: where the drone last took off, or first stood with a fix."""
-        self.fence = FenceWatch()
         self.rally = RallyPoints()
         self.orders = 0
         """Counts who took the vehicle over."""
         self.intended: FlightMode | None = None
         """The mode that a client last asked for by name or number."""
         self.allow_kill = allow_kill
-        self.text = text
-        self.changed = changed
-        """Says that mode, armed state or health may be others now."""
         self._end_others = end_others
-        self._selected = FlightMode.HOLD
         self._terminating = False
         self._last_flying: FlyingState | None = None
-        self.takeoff = Takeoff(self)
+        self.mission = MissionFlight(self)
+        self.takeoff = Takeoff(self, self.mission.armed)
         self.guided = GuidedFlight(self)
         self.offboard = OffboardFlight(self, clock)
         self.manual = ManualFlight(self, clock)
-        self.follow = FollowFlight(self, clock)
-        self.mission = MissionFlight(self)
+        self.follow = FollowFlight(self, self.offboard, clock)
         self.plan_ids: dict[int, int] = {}
         """Opaque ids of the plans that are in force, by MAV_MISSION_TYPE."""
-        self.helms: tuple[Helm, ...] = (self.offboard, self.manual, self.follow, self.mission)
-        """Who can fly the drone for as long as somebody keeps telling them how; one of them at a time."""
+        self.helms = (self.offboard, self.manual, self.follow, self.mission)
 
     # What the vehicle is.
 
     @property
-    def flying_state(self) -> FlyingState | None:
-        """Parrot's word for it; None until reported."""
-        return self.drone.piloting.state.flying
-
-    @property
-    def on_ground(self) -> bool:
-        return self.flying_state in ON_GROUND
-
-    @property
-    def in_air(self) -> bool:
-        """Flying, and not on its way down or up by itself."""
-        return self.flying_state in AIRBORNE
-
-    @property
     def armed(self) -> bool:
-        """Motors may turn: the drone is off the ground, or arming was accepted and has not lapsed."""
         return self.takeoff.armed or (self.flying_state is not None and not self.on_ground)
 
     @property
@@ -132,18 +102,7 @@ class Vehicle:
         return Landed.IN_AIR if state in AIRBORNE else Landed.UNKNOWN
 
     @property
-    def returning(self) -> bool:
-        """The drone flies home, whoever began it."""
-        return self.drone.home.state.returning and not self.on_ground
-
-    @property
-    def returning_by_itself(self) -> bool:
-        """Nobody asked for this return: battery, lost link, ... It is not ours to stop."""
-        return self.drone.home.state.returning_by_itself and not self.on_ground
-
-    @property
     def mode(self) -> FlightMode:
-        """What the drone does now."""
         state = self.flying_state
         if state == FlyingState.EMERGENCY:
             return FlightMode.TERMINATED
@@ -155,11 +114,6 @@ class Vehicle:
             return FlightMode.MISSION if self.mission.flying else FlightMode.TAKEOFF
         if state in AIRBORNE and self.drone.piloting.state.plan == PlayingState.PLAYING:
             return FlightMode.MISSION
-        return self._selected
-
-    @property
-    def selected(self) -> FlightMode:
-        """What was chosen to be done; `mode` tells what the drone makes of it."""
         return self._selected
 
     @property
@@ -177,27 +131,6 @@ class Vehicle:
         return Health.ACTIVE if self.armed else Health.STANDBY
 
     @property
-    def place(self) -> Place | None:
-        """Where the drone is by its newest GPS location; None without a fix."""
-        gps = self.drone.gps.state
-        if not gps.fixed or gps.location is None:
-            return None
-        return Place(gps.location.latitude, gps.location.longitude)
-
-    @property
-    def home(self) -> Place | None:
-        """Where a return ends: what the drone reports, before its first take-off where it stands."""
-        home = self.drone.home.state.location
-        if home is not None:
-            return Place(home.latitude, home.longitude)
-        return self.place if self.on_ground else None
-
-    @property
-    def sticks_follow_camera(self) -> bool:
-        """What sticks mean depends on where the camera looks (piloting_style.xml): no loop closes over that."""
-        return self.drone.piloting.state.style == PilotingStyleStyle.CAMERA_OPERATED
-
-    @property
     def enterable_modes(self) -> frozenset[FlightMode]:
         """Modes that a client may ask for as things stand. Hold, Land and Return are always among them: whether the
         drone can, it says itself."""
@@ -209,32 +142,9 @@ class Vehicle:
             modes.add(FlightMode.MISSION)
         return frozenset(modes)
 
-    def prearm_problems(self) -> list[str]:
-        """Why the drone would not take off, in sentences; empty when it would."""
-        problems: list[str] = []
-        if self.flying_state is None:
-            problems.append("the drone has not said whether it flies")
-        if self.flying_state == FlyingState.EMERGENCY:
-            problems.append("emergency stop")
-        problems += self.drone.takeoff_blockers()
-        if (problem := self.fence_problem) is not None:
-            problems.append(problem)
-        return problems
-
-    @property
-    def fence_problem(self) -> str | None:
-        """Why the fence keeps the drone on the ground, in a sentence; None when it does not."""
-        if self.on_ground:
-            try:
-                self.fence.check_place(point_of(self.place), point_of(self.home))
-            except OutsideFence as error:
-                return str(error)
-        return None
-
     # What it can be told to do. Each returns when the drone confirmed, or raises.
 
     async def terminate(self) -> None:
-        """Cut the motors, if the configuration allows it at all."""
         if not self.allow_kill:
             raise Refused(
                 "Motor cut refused: the drone would fall. Set allow_kill: true to permit it",
@@ -263,7 +173,6 @@ class Vehicle:
         await self.drone.piloting.return_home()
 
     async def hold(self, mode: FlightMode = FlightMode.HOLD) -> None:
-        """Stop and hover, in mode Hold or Position."""
         if self.flying_state in LANDING:
             raise Refused(f"{mode.value} refused: the drone is landing")
         if self.returning_by_itself:
@@ -312,11 +221,11 @@ class Vehicle:
             return
         if state in ON_GROUND and before is not None:
             self.takeoff.came_down()
-            self._end_helms(self._ending_mission)
+            self.end_helms(self._ending_mission)
             self.takeoff.end_climb()
             self._selected = FlightMode.HOLD
         elif state in LANDING:
-            self._end_helms(self._ending_mission)
+            self.end_helms(self._ending_mission)
             self.takeoff.end_climb()
         elif state in TAKING_OFF and before in ON_GROUND:
             self.height.take_off()
@@ -342,7 +251,7 @@ class Vehicle:
     def on_return(self) -> None:
         """The drone's return began, ended or changed: setpoints and the climb after a take-off never fight it."""
         if self.returning:
-            self._end_helms(self._ending_mission)
+            self.end_helms(self._ending_mission)
             self.takeoff.end_climb()
         self.changed()
 
@@ -368,31 +277,12 @@ class Vehicle:
 
     # Machinery.
 
-    def select(self, mode: FlightMode, helm: Helm | None = None) -> None:
-        """This is what the vehicle does from now on. Whoever flew it by setpoints or sticks ends, but for `helm`."""
-        self._end_helms(helm)
-        self._selected = mode
-        self.changed()
-
-    def _end_helms(self, helm: Helm | None = None) -> list[asyncio.Task[None]]:
-        """Nobody flies by setpoints or sticks any more, but for `helm`; tasks that are about to end."""
-        return [task for one in self.helms if one is not helm for task in one.end()]
-
     @property
     def _ending_mission(self) -> Helm | None:
         """The mission, where the landing or return that begins is its own."""
         return self.mission if self.mission.ending else None
 
-    def forget_mode(self) -> None:
-        """What was chosen is over: until something else is, the vehicle holds."""
-        self._selected = FlightMode.HOLD
-
     async def take_over(self) -> None:
-        """A new intention replaces whatever was going on, and waits until that has let go of the drone.
-
-        Without the wait a move that is given up could cancel the one that follows it. Raises `Refused` while the
-        motors are being cut.
-        """
         if self._terminating:
             raise Refused("Refused: the motors are being cut")
         self.orders += 1
@@ -404,4 +294,4 @@ class Vehicle:
         """End what this vehicle does by itself; the tasks that are still about to end."""
         self.takeoff.forget()
         self.guided.forget_arrival()
-        return [*self._end_helms(), *self.takeoff.end()]
+        return [*self.end_helms(), *self.takeoff.end()]

@@ -194,7 +194,7 @@ async def test_conf_075_121_every_sample_on_a_drone_of_its_own(tmp_path: Path) -
         paths.append(str(path))
     async with product(tmp_path, config, ready=False) as p:
         await p.line(lambda line: line.startswith("ready"), timeout=90.0)
-        words = (sys.executable, "-u", "-X", "faulthandler", str(SCRIPT), f"tcpout://{first}:5760", *paths)
+        words = (sys.executable, "-u", str(SCRIPT), f"tcpout://{first}:5760", *paths)
         async with program(*words) as mavsdk:
             await mavsdk.line(lambda line: line == "done", timeout=200.0)
         entries = p.entries("pose") + p.entries("plan") + p.entries("command")

@@ -51,7 +51,7 @@ class Process:
     ) -> Self:
         """`env` is added to our own environment."""
         pipe = asyncio.subprocess.PIPE
-        whole = {**os.environ, **(env or {})}
+        whole = {**os.environ, "PYTHONFAULTHANDLER": "1", **(env or {})}
         return cls(await asyncio.create_subprocess_exec(*words, stdin=stdin, stdout=pipe, stderr=pipe, env=whole))
 
     async def _read(self, stream: asyncio.StreamReader | None, lines: list[str]) -> None:
@@ -81,7 +81,14 @@ class Process:
         try:
             return await asyncio.wait_for(find(), timeout)
         except asyncio.TimeoutError:
+            await self._say_where()
             raise AssertionError(f"no such line within {timeout} s: {self}") from None
+
+    async def _say_where(self) -> None:
+        """End a program that is late: Python's last words are where each of its threads stands."""
+        with suppress(ProcessLookupError, asyncio.TimeoutError):
+            self.process.send_signal(signal.SIGABRT)
+            await asyncio.wait_for(asyncio.shield(asyncio.gather(*self._readers)), 5.0)
 
     def said(self, words: str) -> list[str]:
         """What followed these words on stdout, line by line."""

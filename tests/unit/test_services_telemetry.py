@@ -128,7 +128,7 @@ def test_a_flight_is_armed_takes_off_and_lands() -> None:
     record.look(armed=False, landed=Landed.ON_GROUND, now=23)
     assert (record.armed_at, record.took_off_at, record.landed_at, record.number) == (5, 8, 22, number)
     record.look(armed=True, landed=Landed.ON_GROUND, now=30)
-    assert (record.armed_at, record.took_off_at, record.landed_at) == (30, 0, 0)
+    assert (record.armed_at, record.took_off_at, record.landed_at, record.number) == (30, 0, 0, 0)
 
 
 def test_what_began_before_we_looked_is_unknown() -> None:
