@@ -5,7 +5,8 @@ reads them, `piloting` sends the commands.
 
 Two facts make the bookkeeping more than a flag. A new moveTo replaces the running one without a word about it, and
 a new moveBy makes the previous one end as "interrupted" (ardrone3.xml 1-0-10, 1-0-7). And an event does not say
-which command it answers: it may belong to a move that was cancelled a moment ago.
+which command it answers: it may belong to a move that was cancelled a moment ago. Of a moveTo it tells the target, so
+two that could be confused do not get the same one.
 """
 
 from __future__ import annotations
@@ -29,12 +30,17 @@ from anafi_mav.drone.home import Home
 from anafi_mav.drone.piloting_state import MOTORS_OFF
 from anafi_mav.errors import CommandRejected
 
+MAX_UNHEARD = 8
+"""moveTos that are remembered after they were called off; the drone answers one within a few tenths of a second."""
+
 STRAY_FOR = 2.0
 """s after a cancelled moveBy in which a moveByEnd may still be its own, or that of the zero move that cancelled it."""
 
 _SAME_PLACE_DEG = 1e-7
 """About a centimetre. The drone echoes a target as it got it; this tolerates a detour through single precision."""
 _SAME_HEIGHT = 1e-3
+_APART = 2e-3
+"""m between the heights of two moveTos that are told apart by it."""
 _NO_MOVE = 1e-3
 """m or rad below which a moveBy went nowhere."""
 
@@ -80,13 +86,11 @@ class Move:
         self.ended: asyncio.Future[MoveEnd] = asyncio.get_running_loop().create_future()
         """Do not await this one, a cancelled wait would cancel it: use `result`."""
 
-    async def under_way(self) -> None:
-        """Wait until the drone flies it, for others than the verb that started it. Raises what that verb raises."""
+    async def under_way(self) -> bool:
+        """Wait until the drone flies this moveTo, or will not: for others than the verb that started it."""
         answer = self.answer.future
         await asyncio.wait({answer})
-        if answer.cancelled():
-            raise CommandRejected("it was called off")
-        answer.result()
+        return not answer.cancelled() and answer.exception() is None
 
     async def result(self) -> MoveEnd:
         """Wait until the move has ended, and how. Never raises."""
@@ -98,13 +102,15 @@ class Move:
 
     def is_to(self, message: ardrone3.MoveToChanged) -> bool:
         """Does this event speak of this move's target?"""
-        target = self.target
-        return (
-            target is not None
-            and math.isclose(message.latitude, target.latitude, rel_tol=0.0, abs_tol=_SAME_PLACE_DEG)
-            and math.isclose(message.longitude, target.longitude, rel_tol=0.0, abs_tol=_SAME_PLACE_DEG)
-            and math.isclose(message.altitude, target.altitude, rel_tol=1e-6, abs_tol=_SAME_HEIGHT)
-        )
+        return self.target is not None and _same(message, self.target)
+
+
+def _same(one: ardrone3.MoveToChanged | Position, other: Position) -> bool:
+    return (
+        math.isclose(one.latitude, other.latitude, rel_tol=0.0, abs_tol=_SAME_PLACE_DEG)
+        and math.isclose(one.longitude, other.longitude, rel_tol=0.0, abs_tol=_SAME_PLACE_DEG)
+        and math.isclose(one.altitude, other.altitude, rel_tol=1e-6, abs_tol=_SAME_HEIGHT)
+    )
 
 
 _MOVE_TO_ENDS = {
@@ -135,6 +141,9 @@ class Moves:
         """The moveTo that still runs while `to` waits for its answer: a refused newer one leaves it alone."""
         self._cancelling: Move | None = None
         """The moveTo that we cancelled and whose CANCELED has not come yet."""
+        self._unheard: deque[Position] = deque(maxlen=MAX_UNHEARD)
+        """Targets of moveTos that were called off or replaced before the drone had said anything of them. It may still,
+        until it flies a newer one."""
         self._stray_until = 0.0
         self.inherited = True
         """The drone was found flying: a moveBy of an earlier connection may be under way, which no event tells."""
@@ -147,6 +156,13 @@ class Moves:
 
     # -- what we do
 
+    def distinct(self, target: Position) -> Position:
+        """The target for a new moveTo: this one, or a little above it where the drone's words on a move that was called
+        off would be taken for its own."""
+        while any(_same(target, other) for other in self._unheard):
+            target = msgspec.structs.replace(target, altitude=target.altitude + _APART)
+        return target
+
     def begin_to(self, move: Move) -> Move | None:
         """A moveTo is about to be sent. Returns one that nobody waits for any more, it was not under way yet."""
         before, self.to = self.to, move
@@ -155,6 +171,7 @@ class Moves:
         if before.running:
             self._older = before
             return None
+        self._unhear(before)
         before.end(MoveEnd.REPLACED)
         before.answer.fail(CommandRejected("replaced by a newer moveTo"))
         return before
@@ -173,8 +190,13 @@ class Moves:
             if move.running:
                 self._cancelling = move
             else:
+                self._unhear(move)
                 move.end(MoveEnd.CANCELED)
         return newest
+
+    def _unhear(self, move: Move) -> None:
+        if move.target is not None:
+            self._unheard.append(move.target)
 
     def cancel_by(self, why: str, now: float) -> list[Move]:
         """The moveBys are about to be cancelled; returns them. They end here: the drone's event names none of them."""
@@ -210,6 +232,7 @@ class Moves:
                 move.answer.fail(CommandRejected(how.value))
         self.to = self.returning = self._older = self._cancelling = None
         self.by.clear()
+        self._unheard.clear()
         self._stray_until = 0.0
         self.aborting = False
         self.inherited = True
@@ -243,6 +266,8 @@ class Moves:
                 self._older.end(how)
                 self._older = None
                 return
+        if any(_same(message, target) for target in self._unheard):
+            return
         if move is None or (not move.is_to(message) and (move.running or how is MoveEnd.DONE)):
             return
         self.to, self._older = self._older, None
@@ -257,6 +282,7 @@ class Moves:
         if self._cancelling is not None:
             self._cancelling.end(MoveEnd.CANCELED)
             self._cancelling = None
+        self._unheard.clear()
         move.running = True
         move.answer.succeed(move)
 

@@ -101,10 +101,9 @@ class GuidedMoves:
         ):
             raise LocalProtocolError("a target is not a number")
         self.require_free()
-        command = self._move_to_command(
-            Position(latitude, longitude, altitude), heading_deg, horizontal_speed, vertical_speed
-        )
-        move = Move(self._commander.expect((), _decided_elsewhere), Position(latitude, longitude, altitude))
+        target = self._moves.distinct(Position(latitude, longitude, altitude))
+        command = self._move_to_command(target, heading_deg, horizontal_speed, vertical_speed)
+        move = Move(self._commander.expect((), _decided_elsewhere), target)
         self._sticks.let_go()
         self._commander.call_off("a move was asked for")
         obsolete = self._moves.begin_to(move)

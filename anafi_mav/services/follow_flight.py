@@ -31,7 +31,6 @@ from anafi_mav.services.follow import (
 )
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.offboard_control import Controller, Motion
-from anafi_mav.services.offboard_flight import OffboardFlight
 from anafi_mav.services.place import Place
 from anafi_mav.services.refusal import Refused
 from anafi_mav.services.statustext import Severity
@@ -40,22 +39,18 @@ from anafi_mav.services.statustext import Severity
 class FollowFlight:
     """Mode Follow of one vehicle."""
 
-    def __init__(self, vehicle: Aircraft, offboard: OffboardFlight, clock: Clock) -> None:
+    def __init__(self, vehicle: Aircraft, motion: Callable[[], Motion], clock: Clock) -> None:
         self.settings = FollowSettings()
         self.state = State.OFF
         self.complain: Callable[[str], None] = lambda text: vehicle.text(Severity.WARNING, text)
         self._vehicle = vehicle
-        self._offboard = offboard
+        self._motion = motion
         self._clock = clock
         self._leader: Hashable = None
         self._heard_at = 0.0
         self._timer: asyncio.TimerHandle | None = None
         self._follower = Follower(self.settings)
-        self._controller = Controller(self._motion)
-
-    @property
-    def _motion(self) -> Motion:
-        return self._offboard.motion
+        self._controller = Controller(self._motion())
 
     @property
     def engaged(self) -> bool:
@@ -86,7 +81,7 @@ class FollowFlight:
         self.state = TRANSITIONS[self.state][Event.ENGAGE]
         self._leader = None
         self._follower = Follower(self.settings)
-        self._controller = Controller(self._motion)
+        self._controller = Controller(self._motion())
         self._heard_at = self._clock.monotonic()
         self._watch(PATIENCE)
 
@@ -97,7 +92,7 @@ class FollowFlight:
         if reason := self._objection(seen):
             self.complain(f"Target ignored: {reason}")
             return
-        reference = self._motion.reference
+        reference = self._motion().reference
         if reference is None:
             return
         now = self._clock.monotonic()
@@ -150,7 +145,7 @@ class FollowFlight:
             return
         sticks = PilotingCommand()
         try:
-            motion = self._motion
+            motion = self._motion()
             wanted = self._follower.aim(motion.north, motion.east, self._height(), now)
             if wanted is not None and vehicle.place is not None and motion.reference is not None:
                 place = Place(*geo.destination(*motion.reference, wanted.x.position or 0.0, wanted.y.position or 0.0))

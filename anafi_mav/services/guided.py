@@ -98,10 +98,10 @@ async def change_altitude(vehicle: Vehicle, ato: float, flavour: Flavour) -> Non
     else:
         check_height(vehicle, ato)
         move = vehicle.drone.piloting.move
-        if goto.at_height(ato) != goto or move is None:
+        # MAVProxy says it as a command and as an item at once, and means one move. If nothing comes of that, the newer
+        # order stands for itself.
+        if goto.at_height(ato) != goto or move is None or not await move.under_way():
             await vehicle.guided.go(goto.at_height(ato))
-        else:  # MAVProxy says it as a command and as an item at once: both mean this move
-            await move.under_way()
 
 
 class GuidedService(Service):

@@ -80,7 +80,7 @@ class Keeper:
         self._kept = record
 
     def forget(self) -> None:
-        """Nothing that is flown is of the mission."""
+        """Another run has nothing to know."""
         self._kept = None
         self.write(None)
 

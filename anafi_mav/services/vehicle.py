@@ -79,7 +79,7 @@ class Vehicle(Aircraft):
         self.guided = GuidedFlight(self)
         self.offboard = OffboardFlight(self, clock)
         self.manual = ManualFlight(self, clock)
-        self.follow = FollowFlight(self, self.offboard, clock)
+        self.follow = FollowFlight(self, lambda: self.offboard.motion, clock)
         self.plan_ids: dict[int, int] = {}
         """Opaque ids of the plans that are in force, by MAV_MISSION_TYPE."""
         self.helms = (self.offboard, self.manual, self.follow, self.mission)

@@ -1,5 +1,7 @@
 """Missions for a whole fleet by MAVSDK's plugin mission_raw: each system flies its file, all of them at once.
 
+They begin one after the other.
+
     mavsdk_fleet_missions.py URL FILE ...
 
 The first file is for system 1, the next for system 2 and so on.

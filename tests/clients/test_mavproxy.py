@@ -10,7 +10,6 @@ import asyncio
 import re
 import shutil
 import sys
-from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -28,8 +27,7 @@ async def shown(mavproxy: Process, command: str, pattern: str) -> None:
     for _ in range(20):
         since = len(mavproxy.lines)
         mavproxy.say(command)
-        with suppress(AssertionError):
-            await mavproxy.line(lambda line: re.search(pattern, line) is not None, since=since, timeout=0.5)
+        if await mavproxy.look(lambda line: bool(re.search(pattern, line)), since=since, timeout=0.5) is not None:
             return
     raise AssertionError(f"{command} does not show {pattern}: {mavproxy}")
 

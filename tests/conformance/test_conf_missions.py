@@ -5,6 +5,7 @@ Where the drone went and what it did is taken from the simulator, never from the
 
 from __future__ import annotations
 
+import asyncio
 import math
 from typing import Any
 
@@ -38,6 +39,7 @@ from support.plans import ACCEPTED, FENCE, MISSION, UNSUPPORTED_FRAME, around, s
 from support.trouble import return_by_itself
 from support.world import ARMED, world
 
+from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.mavlink import dialect as newer
 
 # Flown to the end.
@@ -393,3 +395,36 @@ async def test_conf_141_a_height_said_as_a_command_and_as_an_item(flavour: str) 
         assert ack.result == dialect.MAV_RESULT_ACCEPTED
         await settled(w, (0.0, 0.0, 12.0))
         assert len([e for e in w.drone.log if e.kind == "command" and e.name.endswith("Piloting.moveTo")]) == 1
+
+
+@both
+async def test_conf_141_the_newest_order_counts(flavour: str) -> None:
+    """The same height again, behind a landing that called the first one off before the drone had begun it."""
+    async with world(flavour=flavour) as w:
+        await w.take_off(5.0)
+        mark = w.client.mark()
+        height, frame = dialect.MAV_CMD_DO_CHANGE_ALTITUDE, dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT
+        w.client.send_command(height, 12.0, frame)
+        w.client.send_command(dialect.MAV_CMD_NAV_LAND)
+        assert (await order(w.client, 3, 0.0, 0.0, 12.0, as_int=False)).type == ACCEPTED
+        await settled(w, (0.0, 0.0, 12.0))
+        acks = {ack.command: ack.result for _, ack in w.client.since(mark, "COMMAND_ACK")}
+        assert acks == dict.fromkeys((height, dialect.MAV_CMD_NAV_LAND), newer.MAV_RESULT_CANCELLED)
+        assert not [e for e in w.drone.log if e.kind == "command" and e.name.endswith("Piloting.Landing")]
+
+
+@both
+async def test_conf_141_a_height_that_the_drone_refuses_twice(flavour: str) -> None:
+    """What the first order was refused for, the second is refused for as well, after the drone was asked again."""
+    async with world(flavour=flavour) as w:
+        await w.take_off(5.0)
+        mark = w.client.mark()
+        w.drone.faults.untold = frozenset({ardrone3.MaxAltitudeChanged.NAME})  # else the gateway refuses it itself
+        w.drone.firmware.receive(ardrone3.MaxAltitude(10.0), asyncio.get_running_loop().time())
+        height = dialect.MAV_CMD_DO_CHANGE_ALTITUDE
+        w.client.send_command(height, 12.0, dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT)
+        assert (await order(w.client, 3, 0.0, 0.0, 12.0, as_int=False)).type != ACCEPTED
+        ack = await w.client.wait("COMMAND_ACK", lambda ack: ack.command == height, since=mark)
+        assert ack.result == dialect.MAV_RESULT_TEMPORARILY_REJECTED
+        asked = [e.args for e in w.drone.log if e.kind == "command" and e.name.endswith("Piloting.moveTo")]
+        assert [round(args["altitude"], 1) for args in asked] == [12.0, 12.0]

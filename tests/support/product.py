@@ -65,8 +65,8 @@ class Process:
         self._news.set()
         self._news = asyncio.Event()
 
-    async def line(self, accept: Callable[[str], bool], *, since: int = 0, timeout: float = START_LIMIT) -> str:
-        """The first line of stdout, from a place on, that `accept` likes."""
+    async def look(self, accept: Callable[[str], bool], *, since: int, timeout: float) -> str | None:
+        """The first line of stdout, from a place on, that `accept` likes; None when none comes in time."""
 
         async def find() -> str:
             position = since
@@ -81,14 +81,18 @@ class Process:
         try:
             return await asyncio.wait_for(find(), timeout)
         except asyncio.TimeoutError:
-            await self._say_where()
-            raise AssertionError(f"no such line within {timeout} s: {self}") from None
+            return None
 
-    async def _say_where(self) -> None:
-        """End a program that is late: Python's last words are where each of its threads stands."""
-        with suppress(ProcessLookupError, asyncio.TimeoutError):
-            self.process.send_signal(signal.SIGABRT)
-            await asyncio.wait_for(asyncio.shield(asyncio.gather(*self._readers)), 5.0)
+    async def line(self, accept: Callable[[str], bool], *, since: int = 0, timeout: float = START_LIMIT) -> str:
+        """As `look`, where the line has to come. A program that is late is ended: where its threads stand is its last
+        word, if it is Python's."""
+        found = await self.look(accept, since=since, timeout=timeout)
+        if found is None:
+            with suppress(ProcessLookupError, asyncio.TimeoutError):
+                self.process.send_signal(signal.SIGABRT)
+                await asyncio.wait_for(asyncio.shield(asyncio.gather(*self._readers)), 5.0)
+            raise AssertionError(f"no such line within {timeout} s: {self}")
+        return found
 
     def said(self, words: str) -> list[str]:
         """What followed these words on stdout, line by line."""

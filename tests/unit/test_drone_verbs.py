@@ -523,6 +523,31 @@ async def test_the_cancelled_of_a_move_does_not_end_the_next_to_the_same_place(
     assert await second.result() is MoveEnd.DONE
 
 
+async def test_what_a_move_called_off_unheard_still_says_is_not_of_the_next_to_the_same_place(
+    drone: Drone, device: ScriptedDevice
+) -> None:
+    await flying(drone, device)
+    first = asyncio.ensure_future(drone.piloting.move_to(48.0, 2.0, 15.0))
+    await device.until(ardrone3.MoveTo)
+    drone.piloting.hover()
+    with pytest.raises(CommandRejected, match="hover"):
+        await first
+    second = asyncio.ensure_future(drone.piloting.move_to(48.0, 2.0, 15.0))
+    await device.until(ardrone3.MoveTo, 2)
+    one, two = device.got(ardrone3.MoveTo)
+    assert (two.latitude, two.longitude, two.altitude) == (48.0, 2.0, 15.002)
+    await reported(drone, device, running(one), running(one, MoveToStatus.CANCELED))
+    assert not second.done()
+    await reported(drone, device, running(two))
+    journey = await second
+    assert journey.running
+    assert drone.moves_started == (journey,)
+    # Once it is flown, nothing can be confused any more.
+    device.script[ardrone3.MoveTo] = lambda command: [running(command)]
+    await drone.piloting.move_to(48.0, 2.0, 15.0)
+    assert device.got(ardrone3.MoveTo)[-1].altitude == 15.0
+
+
 async def test_a_move_to_given_up_is_cancelled(drone: Drone, device: ScriptedDevice) -> None:
     with pytest.raises(CommandTimeout):
         await drone.piloting.move_to(48.0, 2.0, 15.0, timeout=SHORT)
