@@ -23,7 +23,7 @@ CONFIGURATION = """\
 `anafi-mav run -c fleet.yaml` reads one YAML file. Two drones or a hundred are a longer list, nothing else:
 
 ```yaml
-endpoints: ["udpout://127.0.0.1:14550", "udpout://127.0.0.1:14540", "tcpin://127.0.0.1:5760"]
+endpoints: ["udpout://127.0.0.1:14550", "udpout://127.0.0.1:14540", "tcpin://127.0.0.1:5760?flavour=ardupilot"]
 drones:
   - {name: alpha, sysid: 1, address: 192.168.42.1}            # a real ANAFI
   - {name: bravo, sysid: 2, sim: {model: 4k, home: [48.8789, 2.3677, 35.0]}}
@@ -63,6 +63,9 @@ ENDPOINTS = """
 | `tcpin://HOST:PORT` | waits at HOST:PORT for TCP connections |
 | `tcpout://HOST:PORT` | connects to HOST:PORT by TCP |
 | `serial:///dev/ttyUSB0:57600` | a serial line, here with 57600 baud |
+
+Each may end in `?flavour=px4` (the default), `?flavour=ardupilot` or `?flavour=standard`: the autopilot that its
+clients are shown.
 
 `udpin` and `tcpin` listen on loopback unless HOST says otherwise. MAVLink has no password: who reaches an endpoint
 flies the drones.
@@ -246,8 +249,9 @@ them, to everybody. Ranges are the drone's own: it tells them with each setting,
 `parameter.json`, which QGroundControl and MAVSDK load by themselves over MAVLink FTP.
 
 A write is answered when the drone has confirmed it, with what it confirmed. What is out of range, read only or of
-another type is refused with PARAM_ERROR. A value that is not known is NaN, a whole number -1. Settings of the gateway
-begin with their default whenever it is started; the drone keeps its own.
+another type is refused with PARAM_ERROR. A value that is not known is NaN, a whole number -1. The drone keeps its own
+settings, and the gateway keeps its settings for each drone, but for `ANF_HAND_LAUNCH`, `ANF_CRUISE_SPEED`,
+`ANF_CLIMB_SPEED` and `ANF_FENCE_ON`, which begin with their default whenever it is started.
 """
 
 PARAMETERS_NATIVE = """
@@ -333,7 +337,7 @@ STATES = """\
 <!-- Made by docs/generate.py from the tables of the code. -->
 
 What can happen in which state, and what comes of it. A test walks every pair of state and event. What has no arrow
-changes nothing: it is ignored, refused or put off, as the module says.
+changes nothing, for it is ignored, refused or put off, or it cannot happen: the module says which.
 """
 
 

@@ -279,8 +279,8 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     state: Annotated[
         Annotated[str, Meta(min_length=1, max_length=MAX_PATH)] | None,
         Meta(
-            description="The folder of what outlives the gateway: of each drone a file with its fence, its rally "
-            "points and the gateway's own settings for it. `~` is the user's home. Left out: "
+            description="The folder of what outlives the gateway: of each drone a file with its mission, its "
+            "fence, its rally points and the gateway's own settings for it. `~` is the user's home. Left out: "
             "`$XDG_STATE_HOME/anafi-mav`, which without that variable is `~/.local/state/anafi-mav`.",
             extra=expected("the path of a folder"),
         ),

@@ -107,7 +107,10 @@ REACHED: dict[str, Reach] = {
     "flightplan/start": Reach(
         "mode Mission, `MAV_CMD_MISSION_START`", _MISSIONS + "test_conf_049_073_a_mission_from_the_ground_to_its_end"
     ),
-    "flightplan/stop": Reach("`MAV_CMD_DO_SET_MISSION_CURRENT`", _MISSIONS + "test_conf_072_the_current_item"),
+    "flightplan/stop": Reach(
+        "`MISSION_CLEAR_ALL`",
+        "conformance/test_conf_missions_changed.py::test_conf_074_another_mission_stops_the_one_that_is_flown",
+    ),
     "flightplan/upload": Reach(
         "mission protocol", "conformance/test_conf_plans.py::test_conf_047_upload_and_download_are_equal"
     ),
