@@ -113,9 +113,9 @@ async def follow(system: Any) -> None:
     await until(telemetry.subscribe_flight_mode(), lambda mode: mode.name == "FOLLOW_ME")
     say("following", await plugin.is_active())
     for second in range(15):
-        await plugin.set_target_location(
-            TargetLocation(HOME[0] + (10.0 + 1.5 * second) * M, HOME[1], HOME[2], 1.5, 0.0, 0.0)
-        )
+        north = 10.0 + 1.5 * second
+        await plugin.set_target_location(TargetLocation(HOME[0] + north * M, HOME[1], HOME[2], 1.5, 0.0, 0.0))
+        say("target", north)
         await asyncio.sleep(1.0)
     say("target", 10.0 + 1.5 * 15)
     await held("following")
