@@ -62,6 +62,9 @@ async def test_mavsdk_offboard() -> None:
         assert abs(pose.vn) < 0.4
         await script.line(lambda line: line.startswith("stopped"), timeout=20.0)
         assert await script.end() == 0, script
+        # It began again as often as it was held up, and for no other reason.
+        silences = [text for _, text in w.client.since(0, "STATUSTEXT") if "setpoints stopped" in text.text]
+        assert len(script.said("resumed")) == len(silences), script
 
 
 async def test_mavsdk_manual_control() -> None:
