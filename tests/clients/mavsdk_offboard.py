@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import asyncio
 import sys
+from collections.abc import Awaitable, Callable
+from functools import partial
 from typing import Any
 
 from mavsdk.asyncio.plugins.action import ActionAsync
@@ -32,28 +34,38 @@ M = 1.0 / 111_226.0
 """Degrees of latitude a metre, here."""
 
 
-resumed = 0
+class Pilot:
+    """Flies by setpoints, and begins again where the machine has held this program up for half a second.
 
+    The drone hovers then, in mode Hold, and MAVSDK forgets the setpoint.
+    """
 
-async def stay(plugin: Any, telemetry: Any) -> None:
-    """A machine that holds this program up for half a second has the drone hover, and mode Hold: begin again."""
-    global resumed
-    there = False
-    async for mode in telemetry.subscribe_flight_mode():
-        gone, there = there and mode.name != "OFFBOARD", mode.name == "OFFBOARD"
-        if gone:
-            resumed += 1
-            say("resumed", resumed)
-            await plugin.start()
+    def __init__(self, plugin: OffboardAsync, telemetry: TelemetryAsync) -> None:
+        self._plugin, self._telemetry = plugin, telemetry
+        self._wanted: Callable[[], Awaitable[None]] | None = None
+        self._resumed = 0
 
+    async def fly(self, wanted: Callable[[], Awaitable[None]]) -> None:
+        self._wanted = wanted
+        await wanted()
 
-async def flown(name: str, seconds: float = 0.0) -> None:
-    """As `held`, for so long without having been held up."""
-    before = None
-    while before != resumed:
-        before = resumed
-        await asyncio.sleep(seconds)
-    await held(name)
+    async def held(self, name: str, seconds: float = 0.0) -> None:
+        """As `held`, for so long without a break."""
+        before = None
+        while before != self._resumed:
+            before = self._resumed
+            await asyncio.sleep(seconds)
+        await held(name)
+
+    async def stay(self) -> None:
+        there = False
+        async for mode in self._telemetry.subscribe_flight_mode():
+            gone, there = there and mode.name != "OFFBOARD", mode.name == "OFFBOARD"
+            if gone and self._wanted is not None:
+                self._resumed += 1
+                say("resumed", self._resumed)
+                await self._wanted()
+                await self._plugin.start()
 
 
 async def offboard(system: Any) -> None:
@@ -62,34 +74,39 @@ async def offboard(system: Any) -> None:
     await plugin.set_attitude_rate(AttitudeRate(0.0, 0.0, 20.0, 0.5))
     await tried("start with rates", plugin.start())
     await plugin.stop()
-    await plugin.set_attitude(Attitude(0.0, -6.0, 0.0, 0.6))
+    pilot = Pilot(plugin, telemetry)
+    await pilot.fly(partial(plugin.set_attitude, Attitude(0.0, -6.0, 0.0, 0.6)))
     await tried("start", plugin.start())
-    staying = asyncio.ensure_future(stay(plugin, telemetry))
-    await flown("attitude", 2.5)
-    await plugin.set_velocity_ned(VelocityNedYaw(0.0, 2.0, 0.5, 90.0))
-    await flown("velocity ned", 5.0)
-    await plugin.set_velocity_body(VelocityBodyYawspeed(2.0, 0.0, -0.5, 0.0))
-    await flown("velocity body", 4.0)
-    await plugin.set_position_ned(PositionNedYaw(8.0, -6.0, -12.0, 0.0))
+    staying = asyncio.ensure_future(pilot.stay())
+    await pilot.held("attitude", 2.5)
+    await pilot.fly(partial(plugin.set_velocity_ned, VelocityNedYaw(0.0, 2.0, 0.5, 90.0)))
+    await pilot.held("velocity ned", 5.0)
+    await pilot.fly(partial(plugin.set_velocity_body, VelocityBodyYawspeed(2.0, 0.0, -0.5, 0.0)))
+    await pilot.held("velocity body", 4.0)
+    await pilot.fly(partial(plugin.set_position_ned, PositionNedYaw(8.0, -6.0, -12.0, 0.0)))
     await until(
         telemetry.subscribe_position_velocity_ned(),
         lambda p: abs(p.position.north_m - 8.0) < 0.5 and abs(p.position.east_m + 6.0) < 0.5,
     )
-    await flown("position ned", 1.5)
+    await pilot.held("position ned", 1.5)
     for name, altitude, kind in (("relative", 9.0, 0), ("amsl", HOME[2] + 11.0, 1)):
         place = PositionGlobalYaw(HOME[0] + 20.0 * M, HOME[1], altitude, 0.0, PositionGlobalYaw.AltitudeType(kind))
-        await plugin.set_position_global(place)
+        await pilot.fly(partial(plugin.set_position_global, place))
         await until(telemetry.subscribe_position(), lambda p: abs(p.latitude_deg - HOME[0] - 20.0 * M) < 5e-6)
-        await flown(f"position global {name}", 2.5)
-    await plugin.set_position_velocity_ned(PositionNedYaw(30.0, 0.0, -11.0, 0.0), VelocityNedYaw(0.0, 0.0, 0.0, 0.0))
+        await pilot.held(f"position global {name}", 2.5)
+    await pilot.fly(
+        partial(
+            plugin.set_position_velocity_ned, PositionNedYaw(30.0, 0.0, -11.0, 0.0), VelocityNedYaw(0.0, 0.0, 0.0, 0.0)
+        )
+    )
     # At rest: an acceleration is flown on from the speed that there is.
     await until(
         telemetry.subscribe_position_velocity_ned(),
         lambda p: abs(p.position.north_m - 30.0) < 0.5 and abs(p.velocity.north_m_s) < 0.15,
     )
-    await flown("position and velocity")
-    await plugin.set_acceleration_ned(AccelerationNed(0.0, 1.0, 0.0))
-    await flown("acceleration", 2.0)
+    await pilot.held("position and velocity")
+    await pilot.fly(partial(plugin.set_acceleration_ned, AccelerationNed(0.0, 1.0, 0.0)))
+    await pilot.held("acceleration", 2.0)
     staying.cancel()
     await plugin.stop()
     await until(telemetry.subscribe_flight_mode(), lambda mode: mode.name == "HOLD")
