@@ -39,8 +39,8 @@ STRAY_FOR = 2.0
 _SAME_PLACE_DEG = 1e-7
 """About a centimetre. The drone echoes a target as it got it; this tolerates a detour through single precision."""
 _SAME_HEIGHT = 1e-3
-_APART = 2e-3
-"""m between the heights of two moveTos that are told apart by it."""
+_APART, _APART_SHARE = 2e-3, 2e-6
+"""m, and share of the height, between two moveTos that are told apart by it: twice what `_same` lets pass."""
 _NO_MOVE = 1e-3
 """m or rad below which a moveBy went nowhere."""
 
@@ -157,10 +157,11 @@ class Moves:
     # -- what we do
 
     def distinct(self, target: Position) -> Position:
-        """The target for a new moveTo: this one, or a little above it where the drone's words on a move that was called
-        off would be taken for its own."""
+        """The target for a new moveTo: this one, or a little below it where the drone's words on a move that was called
+        off would be taken for its own. Not above it, which the ceiling may forbid."""
         while any(_same(target, other) for other in self._unheard):
-            target = msgspec.structs.replace(target, altitude=target.altitude + _APART)
+            step = max(_APART, _APART_SHARE * abs(target.altitude))
+            target = msgspec.structs.replace(target, altitude=target.altitude - step)
         return target
 
     def begin_to(self, move: Move) -> Move | None:

@@ -34,6 +34,10 @@ M = 1.0 / 111_226.0
 """Degrees of latitude a metre, here."""
 
 
+STEP, STANDSTILL = 0.1, 0.3
+"""s of a wait, and of one in which the machine stood still: what is flown by then has to settle anew."""
+
+
 class Pilot:
     """Flies by setpoints, and begins again where the machine has held this program up for half a second.
 
@@ -50,11 +54,13 @@ class Pilot:
         await wanted()
 
     async def held(self, name: str, seconds: float = 0.0) -> None:
-        """As `held`, for so long without a break."""
-        before = None
-        while before != self._resumed:
-            before = self._resumed
-            await asyncio.sleep(seconds)
+        """As `held`, for so long without a break, of the flight or of the machine."""
+        clock = asyncio.get_running_loop().time
+        begun, resumed = clock(), self._resumed
+        while (step := clock()) - begun < seconds:
+            await asyncio.sleep(STEP)
+            if clock() - step > STANDSTILL or self._resumed != resumed:
+                begun, resumed = clock(), self._resumed
         await held(name)
 
     async def stay(self) -> None:

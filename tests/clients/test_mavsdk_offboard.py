@@ -15,7 +15,6 @@ from support.setpoints import allow_speed, held
 from support.world import HOME, World, world
 
 from anafi_mav import geo
-from anafi_mav.sim.motion import Pose
 
 SCRIPT = Path(__file__).with_name("mavsdk_offboard.py")
 
@@ -32,22 +31,6 @@ async def flown(what: str) -> AsyncIterator[tuple[World, Process]]:
         yield w, script
 
 
-async def steady(w: World, script: Process, name: str, velocity: tuple[float, float, float]) -> Pose:
-    """The drone truly flies at a velocity (m/s, NED) for one and a half seconds while a program holds a step.
-
-    After a moment in which the machine stood still it may have to settle anew.
-    """
-
-    def settled() -> bool:
-        poses = [e.args for e in w.drone.log if e.kind == "pose"][-15:]  # ten times a second
-        speeds = [(pose["vn"], pose["ve"], pose["vd"]) for pose in poses]
-        return all(abs(is_ - wanted) < 0.3 for speed in speeds for is_, wanted in zip(speed, velocity, strict=True))
-
-    await script.line(lambda line: line == f"held {name}", timeout=60.0)
-    await w.drone.wait_log(lambda e: e.kind == "pose" and settled(), 20.0, since=w.drone.log[-1].t)
-    return await held(w, script, name)
-
-
 async def test_mavsdk_offboard() -> None:
     async with flown("offboard") as (w, script):
         allow_speed(w)
@@ -60,9 +43,11 @@ async def test_mavsdk_offboard() -> None:
         assert pose.vn > 1.0  # nose down
         assert abs(pose.ve) < 0.3
         assert pose.up > 8.5  # thrust above a half
-        pose = await steady(w, script, "velocity ned", (0.0, 2.0, 0.5))
+        pose = await held(w, script, "velocity ned")
+        assert (pose.vn, pose.ve, pose.vd) == pytest.approx((0.0, 2.0, 0.5), abs=0.3)
         assert math.degrees(pose.yaw) == pytest.approx(90.0, abs=6.0)
-        await steady(w, script, "velocity body", (0.0, 2.0, -0.5))
+        pose = await held(w, script, "velocity body")
+        assert (pose.vn, pose.ve, pose.vd) == pytest.approx((0.0, 2.0, -0.5), abs=0.3)
         pose = await held(w, script, "position ned")
         assert (pose.north, pose.east, pose.up) == pytest.approx((8.0, -6.0, 12.0), abs=0.7)
         assert abs(math.degrees(pose.yaw)) < 6.0

@@ -535,7 +535,7 @@ async def test_what_a_move_called_off_unheard_still_says_is_not_of_the_next_to_t
     second = asyncio.ensure_future(drone.piloting.move_to(48.0, 2.0, 15.0))
     await device.until(ardrone3.MoveTo, 2)
     one, two = device.got(ardrone3.MoveTo)
-    assert (two.latitude, two.longitude, two.altitude) == (48.0, 2.0, 15.002)
+    assert (two.latitude, two.longitude, two.altitude) == (48.0, 2.0, 14.998)
     await reported(drone, device, running(one), running(one, MoveToStatus.CANCELED))
     assert not second.done()
     await reported(drone, device, running(two))
@@ -546,6 +546,20 @@ async def test_what_a_move_called_off_unheard_still_says_is_not_of_the_next_to_t
     device.script[ardrone3.MoveTo] = lambda command: [running(command)]
     await drone.piloting.move_to(48.0, 2.0, 15.0)
     assert device.got(ardrone3.MoveTo)[-1].altitude == 15.0
+
+
+@pytest.mark.parametrize(("height", "again"), [(2000.0, 1999.996), (1e300, 1e300 - 2e294)])
+async def test_moves_are_told_apart_at_any_height(
+    drone: Drone, device: ScriptedDevice, height: float, again: float
+) -> None:
+    await flying(drone, device)
+    for number in (1, 2):
+        move = asyncio.ensure_future(drone.piloting.move_to(48.0, 2.0, height))
+        await device.until(ardrone3.MoveTo, number)
+        drone.piloting.hover()
+        with pytest.raises(CommandRejected, match="hover"):
+            await move
+    assert [move.altitude for move in device.got(ardrone3.MoveTo)] == pytest.approx([height, again], rel=1e-12)
 
 
 async def test_a_move_to_given_up_is_cancelled(drone: Drone, device: ScriptedDevice) -> None:
