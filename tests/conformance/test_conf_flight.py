@@ -11,6 +11,7 @@ from support.mav import NAN
 from support.world import ARMED, HOLD, HOME, LAND, POSITION, RETURN, world
 
 from anafi_mav import geo
+from anafi_mav.services.takeoff import ARM_WAIT, AUTO_DISARM
 
 ACCEPTED, DENIED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_DENIED
 REJECTED = dialect.MAV_RESULT_TEMPORARILY_REJECTED
@@ -31,12 +32,46 @@ async def test_conf_019_takeoff_before_arming(flavour: str) -> None:
         assert abs(w.drone.pose.up - 8.0) < 0.5
 
 
-async def test_a_takeoff_that_nobody_arms_is_forgotten() -> None:
-    async with world() as w:
-        await w.client.command(TAKE_OFF, -1, NAN, NAN, NAN)
-        assert (await w.client.command(ARM, 0)).result == ACCEPTED  # disarming takes it back at once
+@pytest.mark.parametrize("flavour", FLAVOURS)
+async def test_disarming_takes_back_a_takeoff_that_waits(flavour: str) -> None:
+    async with world(flavour=flavour) as w:
+        assert (await w.client.command(TAKE_OFF, -1, NAN, NAN, NAN)).result == ACCEPTED
+        assert (await w.client.command(ARM, 0)).result == ACCEPTED
         assert (await w.client.command(ARM, 1)).result == ACCEPTED
         await w.client.wait("HEARTBEAT")
+        await w.client.wait("HEARTBEAT")
+        assert w.commands("ardrone3.Piloting.TakeOff") == []
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+async def test_a_takeoff_that_nobody_arms_is_forgotten(flavour: str) -> None:
+    """QGroundControl arms as soon as its take-off is accepted; who arms after ARM_WAIT wants something else."""
+    async with world(flavour=flavour) as w:
+        mark, began = w.client.mark(), time.monotonic()
+        assert (await w.client.command(TAKE_OFF, -1, NAN, NAN, NAN)).result == ACCEPTED
+        text = "Takeoff forgotten: nobody armed"
+        await w.client.wait("STATUSTEXT", lambda m: m.text == text, since=mark, timeout=ARM_WAIT + 5.0)
+        assert ARM_WAIT <= time.monotonic() - began < ARM_WAIT + 0.5
+        mark = w.client.mark()
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        await w.client.heartbeat(lambda beat: beat.base_mode & ARMED, since=mark)
+        await w.client.wait("HEARTBEAT")
+        assert w.commands("ardrone3.Piloting.TakeOff") == []
+        assert w.drone.flying_state.name == "LANDED"
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+async def test_an_armed_state_that_no_takeoff_follows_lapses(flavour: str) -> None:
+    async with world(flavour=flavour) as w:
+        mark, began = w.client.mark(), time.monotonic()
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        await w.client.heartbeat(lambda beat: beat.base_mode & ARMED, since=mark)
+        await w.client.heartbeat(lambda beat: not beat.base_mode & ARMED, timeout=AUTO_DISARM + 5.0)
+        # A heartbeat is due at once when the bit changes, and a second later in any case.
+        assert AUTO_DISARM <= time.monotonic() - began < AUTO_DISARM + 1.2
+        await w.client.wait("STATUSTEXT", lambda m: m.text == "Disarmed: no take-off followed", since=mark)
+        # Nobody is armed any more: a take-off waits again instead of beginning.
+        assert (await w.client.command(TAKE_OFF, -1, NAN, NAN, NAN)).result == ACCEPTED
         await w.client.wait("HEARTBEAT")
         assert w.commands("ardrone3.Piloting.TakeOff") == []
 
