@@ -6,7 +6,8 @@ I/O-free: `OffboardStream` keeps whose setpoints there are and whether they fly 
 A session has one pilot: whoever engages it. Setpoints of others change nothing while it lasts. PX4's way to engage is
 mode Offboard, refused without setpoints. ArduPilot's way is to send setpoints in mode Guided, and there a single
 position is a move of its own, which nothing but its end or another order ends; a second setpoint of the same program
-within `TOGETHER` makes a stream of it, whose end is silence.
+within `TOGETHER` makes a stream of it, whose end is silence. After that end a position of the same program is a part of
+the stream for `STRAGGLING` longer: a datagram that a bad link delivers late must not send the drone off again, for good.
 """
 
 from __future__ import annotations
@@ -14,13 +15,17 @@ from __future__ import annotations
 import enum
 from collections.abc import Hashable
 
-from anafi_mav.services.offboard_setpoints import Setpoint
+from anafi_mav.services.offboard_setpoints import MotionSetpoint, Setpoint
 
 SILENCE = 0.45
 """s without a setpoint until the drone is told to hover, so that it has been told within half a second."""
 
 TOGETHER = 0.5
 """s within which a second setpoint makes a stream of the first."""
+
+STRAGGLING = 3.0
+"""s after the silence for which a position may still be one of the stream's; the time after which ArduCopter takes a
+stream of velocities for ended."""
 
 MAX_PILOTS = 8
 """Programs whose setpoints are listened to at once."""
@@ -71,6 +76,11 @@ TRANSITIONS: dict[State, dict[Event, State]] = {
 stream does not become a single setpoint again, and a single one is followed by silence."""
 
 
+def ends(setpoint: Setpoint) -> bool:
+    """It can be flown to its end: a position can, a velocity has none."""
+    return isinstance(setpoint, MotionSetpoint) and setpoint.moves
+
+
 class OffboardStream:
     """The newest setpoints, their age, and whose of them fly the drone."""
 
@@ -79,6 +89,8 @@ class OffboardStream:
         self.pilot: Hashable = None
         """Whose setpoints fly the drone while the session is engaged."""
         self._heard: dict[Hashable, tuple[Setpoint, float]] = {}
+        self._fell_silent: tuple[Hashable, float] | None = None
+        """Whose stream of positions silence ended last, and when it had lasted too long."""
 
     @property
     def flying(self) -> bool:
@@ -99,6 +111,12 @@ class OffboardStream:
         """This program's last setpoint is so young that one that arrives now is of the same stream."""
         heard = self._heard.get(sender)
         return heard is not None and now - heard[1] < TOGETHER
+
+    def straggles(self, sender: Hashable, now: float) -> bool:
+        """A position of this program may be one of a stream that has ended: it is flown as a part of it."""
+        return (
+            self._fell_silent is not None and self._fell_silent[0] == sender and now < self._fell_silent[1] + STRAGGLING
+        )
 
     def newest(self, sender: Hashable) -> Setpoint | None:
         """What this program asked for last."""
@@ -156,6 +174,8 @@ class OffboardStream:
         if deadline is None or now < deadline:
             return False
         engaged = self.state is State.ENGAGED
+        if engaged and ends(self._heard[self.pilot][0]):
+            self._fell_silent = self.pilot, now
         self._prune(now)
         self.pilot = None
         self.state = TRANSITIONS[self.state][Event.SILENCE]

@@ -20,7 +20,7 @@ from anafi_mav.drone.events import Message
 from anafi_mav.errors import AnafiMavError, LinkLost
 from anafi_mav.services.aircraft import Aircraft
 from anafi_mav.services.modes import FlightMode
-from anafi_mav.services.offboard import OffboardStream, State
+from anafi_mav.services.offboard import OffboardStream, State, ends
 from anafi_mav.services.offboard_control import STILL, WIND, Controller, Motion, tilt_for, turn_towards
 from anafi_mav.services.offboard_goals import Goal, demand, resolve
 from anafi_mav.services.offboard_moves import OffboardMoves
@@ -116,7 +116,7 @@ class OffboardFlight:
         if self._timer is None:
             self._watch()
         pilot = self.engaged and sender == self._stream.pilot
-        if pilot and self._stream.state is State.SINGLE and (follows or not _ends(setpoint)):
+        if pilot and self._stream.state is State.SINGLE and (follows or not ends(setpoint)):
             self._stream.engage(sender)
             self._watch()
             self._vehicle.select(FlightMode.OFFBOARD, self)
@@ -176,7 +176,7 @@ class OffboardFlight:
             return "take off first"
         if mode is not FlightMode.GUIDED:
             return f"setpoints fly the drone in mode Guided, this is {mode.value}"
-        self._alone = not follows and _ends(setpoint)
+        self._alone = ends(setpoint) and not (follows or self._stream.straggles(sender, now))
         if self._engaging is None or self._engaging.done():
             self._engaging = self.act(sender, self._engage_guided(sender, setpoint, now))
         return None
@@ -380,11 +380,6 @@ class OffboardFlight:
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
-
-
-def _ends(setpoint: Setpoint) -> bool:
-    """It can be flown to its end: a position can, a velocity has none."""
-    return isinstance(setpoint, MotionSetpoint) and setpoint.moves
 
 
 def _at_once(client: Hashable, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:

@@ -34,6 +34,7 @@ from support.setpoints import (
 from support.world import HOLD, HOME, World, world
 
 from anafi_mav import geo
+from anafi_mav.services.offboard import STRAGGLING
 from anafi_mav.arsdk.messages import ardrone3, piloting_style
 
 REJECTED = dialect.MAV_RESULT_TEMPORARILY_REJECTED
@@ -117,6 +118,29 @@ async def test_conf_105_silence_of_a_move(flavour: str, setpoint: Any, command: 
         assert now() - last < 1.0
         await w.drone.wait_log(lambda e: e.kind == "pose" and abs(e.args["vn"]) < 0.2, 10.0, since=halt.t)
         assert w.drone.pose.north < 30.0
+
+
+async def test_conf_105_a_late_position_of_a_stream_that_has_ended() -> None:
+    """In Guided a lone position is flown to its end, but not one that a bad link delivers when its sender is dead."""
+    async with world(speed=1.0, flavour="ardupilot") as w:
+        await w.take_off(8.0)
+        place = local(POSITION_ONLY, at=(60.0, 0.0, -8.0))
+        async with streaming(w.client, place) as sent:
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 3.0, 10.0)
+        await w.drone.wait_log(lambda e: e.name.endswith("CancelMoveTo"), 5.0, since=sent[-1])
+        await asyncio.sleep(1.0)  # as late as that
+        late = now()
+        w.client.send(place)
+        await w.drone.wait_log(lambda e: e.name.endswith(".moveTo"), 5.0, since=late)
+        halt = await w.drone.wait_log(lambda e: e.name.endswith("CancelMoveTo"), 5.0, since=late)
+        assert halt.t - late <= HOVER_WITHIN
+        # When the stream is long over, the same words are an order of their own.
+        await asyncio.sleep(STRAGGLING)
+        again = now()
+        w.client.send(place)
+        await arrived(w, again)
+        assert w.drone.pose.north == pytest.approx(60.0, abs=0.5)
+        assert heard(w, "CancelMoveTo", since=again) == []
 
 
 async def test_setpoints_of_ardupilots_clients_fly_in_guided_only() -> None:

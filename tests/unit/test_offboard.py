@@ -8,7 +8,16 @@ from typing import Any
 import pytest
 
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.offboard import MAX_PILOTS, SILENCE, TOGETHER, TRANSITIONS, Event, OffboardStream, State
+from anafi_mav.services.offboard import (
+    MAX_PILOTS,
+    SILENCE,
+    STRAGGLING,
+    TOGETHER,
+    TRANSITIONS,
+    Event,
+    OffboardStream,
+    State,
+)
 from anafi_mav.services.offboard_control import turn_towards
 from anafi_mav.services.offboard_setpoints import (
     AttitudeSetpoint,
@@ -170,6 +179,21 @@ def test_a_second_setpoint_makes_a_stream_of_the_first() -> None:
     stream.receive("a", PLACE, 0.4)
     stream.engage("a")
     assert stream.expire(0.4 + SILENCE)
+
+
+def test_a_position_straggles_after_the_silence_of_positions_alone() -> None:
+    stream = OffboardStream()
+    stream.receive("a", PLACE, 0.0)
+    stream.engage("a")
+    assert not stream.straggles("a", 0.1)
+    assert stream.expire(SILENCE)
+    assert stream.straggles("a", SILENCE + STRAGGLING - 0.01)
+    assert not stream.straggles("a", SILENCE + STRAGGLING)
+    assert not stream.straggles("b", SILENCE + 0.1)
+    stream.receive("b", LEVEL, 10.0)
+    stream.engage("b")
+    assert stream.expire(10.0 + SILENCE)
+    assert not stream.straggles("b", 10.0 + SILENCE)
 
 
 IGNORE_POSITION, IGNORE_VELOCITY, IGNORE_ACCELERATION = 0x007, 0x038, 0x1C0
