@@ -7,7 +7,7 @@ A session has one pilot: whoever engages it. Setpoints of others change nothing 
 mode Offboard, refused without setpoints. ArduPilot's way is to send setpoints in mode Guided, and there a single
 position is a move of its own, which nothing but its end or another order ends; a second setpoint of the same program
 within `TOGETHER` makes a stream of it, whose end is silence. After that end a position of the same program is a part of
-the stream for `STRAGGLING` longer: a datagram that a bad link delivers late must not send the drone off again, for good.
+the stream for `STRAGGLING` longer: what a bad link delivers late must not send the drone off for good.
 """
 
 from __future__ import annotations

@@ -15,14 +15,20 @@ import dronekit
 from dronekit_base import say, until
 from pymavlink import mavutil
 
-EVERY = 0.1
+EVERY, STANDSTILL = 0.1, 0.3
+"""s from one to the next, and between two of which the machine stood still."""
 VELOCITY_ONLY = 0b0000_1101_1100_0111
 POSITION_ONLY = 0b0000_1101_1111_1000
 
 
-def repeated(do: Callable[[], None], seconds: float, name: str) -> None:
-    """A program's own loop, as the examples of dronekit have it; after some time, until the test has looked."""
+def repeated(do: Callable[[], None], seconds: float, name: str, engage: Callable[[], None] = lambda: None) -> None:
+    """A program's own loop, as the examples of dronekit have it; after some time, until the test has looked.
+
+    `engage` is what makes the drone listen. Where the machine held this program up, the drone hovers and listens no
+    more: so it is said again, and what is flown by then has to settle anew.
+    """
     due: float | None = time.monotonic() + seconds
+    last = time.monotonic()
     looked = threading.Event()
 
     def look() -> None:
@@ -31,6 +37,10 @@ def repeated(do: Callable[[], None], seconds: float, name: str) -> None:
 
     while not looked.wait(EVERY):
         do()
+        if time.monotonic() - last > STANDSTILL:
+            engage()
+            due = due and time.monotonic() + seconds
+        last = time.monotonic()
         if due is not None and time.monotonic() > due:
             due = None
             say("held", name)
@@ -64,12 +74,17 @@ def main(url: str, flavour: str) -> None:
 
     nowhere = (0.0, 0.0, 0.0)
     north = setpoint(mavutil.mavlink.MAV_FRAME_LOCAL_NED, VELOCITY_ONLY, nowhere, (2.0, 0.0, 0.0))
+
+    def engage() -> None:
+        if flavour == "px4":
+            vehicle.mode = dronekit.VehicleMode("OFFBOARD")
+
     if flavour == "px4":
         repeated(north, 1.0, "setpoints before Offboard")
-        vehicle.mode = dronekit.VehicleMode("OFFBOARD")
-    repeated(north, 5.0, "velocity")
+    engage()
+    repeated(north, 5.0, "velocity", engage)
     place = setpoint(mavutil.mavlink.MAV_FRAME_LOCAL_NED, POSITION_ONLY, (4.0, -5.0, -10.0), nowhere)
-    repeated(place, 9.0, "position")
+    repeated(place, 9.0, "position", engage)
     until(vehicle, "mode", lambda mode: mode.name == idle)
     say("idle", idle)
 

@@ -25,9 +25,9 @@ async def test_conf_118_setpoints(flavour: str) -> None:
             allow_speed(w)
             if flavour == "px4":
                 await held(w, script, "setpoints before Offboard")
-            pose = await held(w, script, "velocity")
+            pose = await held(w, script, "velocity", calm=5.0)
             assert (pose.vn, pose.ve, pose.vd) == pytest.approx((2.0, 0.0, 0.0), abs=0.3)
-            pose = await held(w, script, "position")
+            pose = await held(w, script, "position", calm=9.0)
             assert (pose.north, pose.east, pose.up) == pytest.approx((4.0, -5.0, 10.0), abs=0.7)
             await script.line(lambda line: line.startswith("idle"), timeout=30.0)
             assert (await held(w, script, "channels")).ve > 1.0

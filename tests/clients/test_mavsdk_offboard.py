@@ -34,7 +34,7 @@ async def flown(what: str) -> AsyncIterator[tuple[World, Process]]:
 async def test_mavsdk_offboard() -> None:
     async with flown("offboard") as (w, script):
         allow_speed(w)
-        pose = await held(w, script, "attitude")
+        pose = await held(w, script, "attitude", calm=2.5)
         assert [line for line in script.lines if line.startswith("tried")] == [
             "tried start without setpoints NO_SETPOINT_SET",
             "tried start with rates COMMAND_DENIED",
@@ -43,21 +43,21 @@ async def test_mavsdk_offboard() -> None:
         assert pose.vn > 1.0  # nose down
         assert abs(pose.ve) < 0.3
         assert pose.up > 8.5  # thrust above a half
-        pose = await held(w, script, "velocity ned")
+        pose = await held(w, script, "velocity ned", calm=5.0)
         assert (pose.vn, pose.ve, pose.vd) == pytest.approx((0.0, 2.0, 0.5), abs=0.3)
         assert math.degrees(pose.yaw) == pytest.approx(90.0, abs=6.0)
-        pose = await held(w, script, "velocity body")
+        pose = await held(w, script, "velocity body", calm=4.0)
         assert (pose.vn, pose.ve, pose.vd) == pytest.approx((0.0, 2.0, -0.5), abs=0.3)
-        pose = await held(w, script, "position ned")
+        pose = await held(w, script, "position ned", calm=6.0)
         assert (pose.north, pose.east, pose.up) == pytest.approx((8.0, -6.0, 12.0), abs=0.7)
         assert abs(math.degrees(pose.yaw)) < 6.0
         for name, height in (("relative", 9.0), ("amsl", 11.0)):
-            pose = await held(w, script, f"position global {name}")
+            pose = await held(w, script, f"position global {name}", calm=6.0)
             assert geo.offset(*HOME[:2], *w.drone.firmware.place()) == pytest.approx((20.0, 0.0), abs=0.7)
             assert pose.up == pytest.approx(height, abs=0.5)
-        pose = await held(w, script, "position and velocity")
+        pose = await held(w, script, "position and velocity", calm=6.0)
         assert (pose.north, pose.east, pose.up) == pytest.approx((30.0, 0.0, 11.0), abs=1.0)
-        pose = await held(w, script, "acceleration")
+        pose = await held(w, script, "acceleration", calm=2.0)
         assert pose.ve > 0.8
         assert abs(pose.vn) < 0.4
         await script.line(lambda line: line.startswith("stopped"), timeout=20.0)

@@ -166,9 +166,21 @@ async def said(client: Client, part: str, mark: int = 0) -> None:
         await client.wait("STATUSTEXT")
 
 
-async def held(w: World, script: Process, name: str) -> Pose:
-    """Where the drone truly is while a program holds a step; it may go on then."""
+async def held(w: World, script: Process, name: str, calm: float = 0.0) -> Pose:
+    """Where the drone truly is while a program holds a step; it may go on then.
+
+    `calm`: s that what the program asks for takes to settle. Where the machine holds the program up, just now perhaps,
+    the drone hovers and begins anew: nobody looks before that has settled too.
+    """
     await script.line(lambda line: line == f"held {name}", timeout=60.0)
+    loop = asyncio.get_running_loop()
+    disturbed = ("setpoints stopped", "Setpoint not flown")
+    for _ in range(10):
+        texts_at = [at for at, m in w.client.since(0, "STATUSTEXT") if any(words in m.text for words in disturbed)]
+        left = max(texts_at, default=-calm) + calm - loop.time()
+        if left <= 0.0:
+            break
+        await asyncio.sleep(left)
     pose = w.drone.pose
     script.say("next")
     return pose
