@@ -62,6 +62,7 @@ from anafi_mav.arsdk.messages.common import PlayingState as PlayingState
 from anafi_mav.arsdk.messages.common import ReturnHomeOnDisconnectChanged as ReturnHomeOnDisconnectChanged
 from anafi_mav.arsdk.messages.common import Sensor as Sensor
 from anafi_mav.arsdk.messages.common import SensorsStatesListChanged as SensorsStatesListChanged
+from anafi_mav.arsdk.messages.flight_plan import Indicator as FlightPlanIndicator
 from anafi_mav.arsdk.messages.flight_plan import WaypointSkipped as WaypointSkipped
 from anafi_mav.arsdk.messages.follow_me import Mode as FollowMeMode
 from anafi_mav.arsdk.messages.gimbal import Attitude as GimbalAttitudeChanged
@@ -125,6 +126,7 @@ __all__ = [
     "ControllerAttitudeChanged",
     "FlightId",
     "FlightPlanComponent",
+    "FlightPlanIndicator",
     "FlyingState",
     "FlyingStateChanged",
     "FollowMeMode",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from anafi_mav.drone.events import FlightPlanComponent as Part
+from anafi_mav.drone.events import FlightPlanIndicator as Input
 from anafi_mav.drone.flight_plan import FlightPlanState
 from anafi_mav.errors import CommandRejected
 
@@ -19,12 +20,15 @@ _REASONS = {
 }
 """Parrot's components of a flight plan that keep it from being begun (arsdk.md §3.1)."""
 
+_INPUTS = {Input.DRONE_GPS: _REASONS[Part.GPS], Input.DRONE_MAGNETO: _REASONS[Part.CALIBRATION]}
+"""What an Ai lacks and tells twice: as a missing input, and as one of the components."""
+
 
 def refusal(state: FlightPlanState, error: CommandRejected) -> str:
     """One sentence on a start that the drone has refused."""
     reasons = [_REASONS.get(part, part.name.lower()) for part, ok in state.components.items() if not ok]
-    reasons += [indicator.name.lower().replace("_", " ") for indicator in sorted(state.missing or ())]
-    return f"Mission refused by the drone: {', '.join(reasons) or error.reason}"
+    reasons += [_INPUTS.get(one) or one.name.lower().replace("_", " ") for one in sorted(state.missing or ())]
+    return f"Mission refused by the drone: {', '.join(dict.fromkeys(reasons)) or error.reason}"
 
 
 def beginning(item: int, resumes: bool, *, stepped: bool, returns: bool | None) -> str:

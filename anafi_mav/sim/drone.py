@@ -338,7 +338,8 @@ class SimulatedDrone:
             self.skycontroller.tick(now)
         if session is not None and self._in_reach:
             for message in self._telemetry.due(now):
-                session.send(message)
+                if message.NAME not in self.faults.untold:
+                    session.send(message)
         if now >= self._next_pose:
             self._next_pose = max(self._next_pose + POSE_PERIOD, now)
             self._log_pose(now, pose)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from anafi_mav.arsdk.messages.alarms import TakeoffChecklistType
 from anafi_mav.arsdk.messages.ardrone3 import MotorError, WarningLevel
+from anafi_mav.arsdk.messages.common import FlightPlanComponent
 
 
 @dataclass(frozen=True)
@@ -59,10 +60,14 @@ class Faults:
     vibration: WarningLevel = WarningLevel.OK
     refuse_take_off: frozenset[TakeoffChecklistType] = frozenset()
     """Further lines of the take-off checklist that prevent it."""
+    refuse_plan: frozenset[FlightPlanComponent] = frozenset()
+    """Further components of a flight plan that are not as they have to be. What the drone looks for in the file itself
+    it finds when it is told to start."""
     storage_full: bool = False
     """No room for a photo more."""
     untold: frozenset[str] = frozenset()
-    """Names of events that this firmware does not send, at once: what is not written down another one may not tell."""
+    """Names of events that this firmware does not send, at once, telemetry included: what is not written down another
+    one may not tell."""
 
     def __setattr__(self, name: str, value: object) -> None:
         object.__setattr__(self, name, value)

@@ -106,7 +106,7 @@ class Flight:
         self.endurance = Endurance(model, self.settings)
         self.homing = Homing(body, origin, self.settings, emit)
         self.guidance = Guidance(model, body, origin, self.settings, self.homing, emit)
-        self.flight_plan = FlightPlan(model, body, origin, self.settings, self, self.operator, emit, note)
+        self.flight_plan = FlightPlan(model, body, origin, self.settings, self, self.operator, emit, note, self.faults)
         self.poi = Poi(origin, emit, self.operator.aim, lambda: self.settings.yaw_rate, model.modern)
         self.follow = FollowMe(body, origin, self.settings, emit, self.operator.aim, model.airframe.max_speed)
         self.animations = Animations(model, body, self.operator, emit)
@@ -118,7 +118,7 @@ class Flight:
         self._wind = WindWatch(model.envelope.wind_resistance)
         self._alert = AlertState.NONE
         self._blockers: frozenset[TakeoffChecklistType] = frozenset()
-        self._ready: tuple[bool, ...] = ()
+        self._ready: tuple[object, ...] = ()
         self._by_hand = False
         self._timer = 0.0
         """End of the motors' ramp, or of the pause after an emergency."""
@@ -331,11 +331,11 @@ class Flight:
         """Whether a flight plan or a point of interest could be started now."""
         rising = (FlyingState.MOTOR_RAMPING, FlyingState.TAKINGOFF)
         can_fly = self.state in GUIDED or self.state in rising or (self.state is LANDED and not self.blockers())
-        ready = (self.fix, not self.compass.required, can_fly, self.state in GUIDED)
+        fix, calibrated, guided = self.fix, not self.compass.required, self.state in GUIDED
+        ready = (fix, calibrated, can_fly, guided, self.faults.refuse_plan)
         if ready == self._ready:
             return
         self._ready = ready
-        fix, calibrated, can_fly, guided = ready
         self.flight_plan.sensors(fix, calibrated, can_fly)
         self.poi.sensors(fix, calibrated, guided)
 

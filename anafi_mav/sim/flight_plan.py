@@ -16,6 +16,7 @@ from anafi_mav.arsdk.messages.common import FlightPlanComponent as Part
 from anafi_mav.arsdk.messages.common import MavlinkType, PlayError, PlayingState
 from anafi_mav.arsdk.wire import Message
 from anafi_mav.sim.body import Body
+from anafi_mav.sim.faults import Faults
 from anafi_mav.sim.model import Model
 from anafi_mav.sim.motion import Pose, Turn
 from anafi_mav.sim.operator import Operator
@@ -41,6 +42,9 @@ STALL = 4.0
 
 CAMERA_LIMIT = 5.0
 """s that a single photo is waited for."""
+
+_LOOKED_AT = (Part.MAVLINK_FILE, Part.WAYPOINTS_BEYOND_GEOFENCE, Part.FIRST_WAYPOINT_TOO_FAR)
+"""What only the file tells: known from one start to the next."""
 
 _MOVED = 0.05
 _LAND_SAFE = 1.0
@@ -75,6 +79,7 @@ class FlightPlan:
         operator: Operator,
         emit: Callable[[Message], None],
         note: Callable[[str, dict[str, Any]], None],
+        faults: Faults,
     ) -> None:
         self._model = model
         self._body = body
@@ -85,6 +90,7 @@ class FlightPlan:
         self._camera = PlanCamera(operator)
         self._emit = emit
         self._note = note
+        self._faults = faults
         self.state = PlayingState.STOPPED
         self._uid = ""
         self._name = ""
@@ -147,8 +153,10 @@ class FlightPlan:
     def sensors(self, fix: bool, magneto: bool, can_fly: bool) -> None:
         """What a plan needs: a fix, a calibrated magnetometer, and a drone that flies or may take off."""
         was = self.available
-        for part, ok in ((Part.GPS, fix), (Part.CALIBRATION, magneto), (Part.TAKE_OFF, can_fly)):
-            self._mark(part, ok)
+        seen = {Part.GPS: fix, Part.CALIBRATION: magneto, Part.TAKE_OFF: can_fly}
+        for part in Part:
+            if part not in _LOOKED_AT:
+                self._mark(part, seen.get(part, True) and part not in self._faults.refuse_plan)
         if self.available is not was:
             self._emit(common.AvailabilityStateChanged(int(self.available)))
         if self.playing and not (fix and magneto):
@@ -180,8 +188,8 @@ class FlightPlan:
             self._begun, self._progress = False, None
             self._set(PlayingState.PLAYING)
             return True
-        self._mark(Part.MAVLINK_FILE, True)
-        self._mark(Part.WAYPOINTS_BEYOND_GEOFENCE, True)
+        for part in _LOOKED_AT:
+            self._mark(part, part not in self._faults.refuse_plan)
         items = self._read(data, type)
         if items is None or item >= len(items):
             self._mark(Part.MAVLINK_FILE, False)

@@ -27,6 +27,7 @@ from msgspec import UNSET, Meta, UnsetType
 from anafi_mav import documents
 from anafi_mav.arsdk.messages.alarms import TakeoffChecklistType
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState, MotorError, WarningLevel
+from anafi_mav.arsdk.messages.common import FlightPlanComponent
 from anafi_mav.errors import ConfigError
 from anafi_mav.sim.faults import Faults, Impairment
 from anafi_mav.sim.motion import Pose
@@ -92,6 +93,7 @@ class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True, rename={"for
     vibration: str | UnsetType = UNSET
     calibration_required: bool | UnsetType = UNSET
     refuse_take_off: list[str] | UnsetType = UNSET
+    refuse_plan: list[str] | UnsetType = UNSET
     storage_full: bool | UnsetType = UNSET
     wind: Blow | UnsetType = UNSET
     throw: bool | UnsetType = UNSET
@@ -243,6 +245,8 @@ def _changes(step: Step) -> Iterable[tuple[str, Any]]:
         yield "vibration", _LEVELS[step.vibration]
     if step.refuse_take_off is not UNSET:
         yield "refuse_take_off", frozenset(_CHECKS[name] for name in step.refuse_take_off)
+    if step.refuse_plan is not UNSET:
+        yield "refuse_plan", frozenset(_PARTS[name] for name in step.refuse_plan)
     if step.link is not UNSET:
         for name, direction in (("up", step.link.up), ("down", step.link.down)):
             chosen = direction or step.link.both
@@ -254,6 +258,7 @@ _STATES = {state.name.lower(): state for state in FlyingState}
 _MOTOR_ERRORS = {error.name.lower().removeprefix("error_"): error for error in MotorError}
 _LEVELS = {level.name.lower(): level for level in WarningLevel}
 _CHECKS = {check.name.lower(): check for check in TakeoffChecklistType}
+_PARTS = {part.name.lower(): part for part in FlightPlanComponent}
 _TRIGGERS = ("at", "when", "after", "for_", "drone")
 
 
@@ -272,9 +277,12 @@ def _check(path: str, step: Step) -> None:
     for name, known in (("motor_error", _MOTOR_ERRORS), ("vibration", _LEVELS)):
         value = getattr(step, name)
         _one_of(f"{path}.{name}", None if value is UNSET else value, known)
-    if step.refuse_take_off is not UNSET:
-        for index, name in enumerate(step.refuse_take_off):
-            _one_of(f"{path}.refuse_take_off[{index}]", name, _CHECKS)
+    for key, chosen, choice in (
+        ("refuse_take_off", step.refuse_take_off, _CHECKS),
+        ("refuse_plan", step.refuse_plan, _PARTS),
+    ):
+        for index, name in enumerate([] if chosen is UNSET else chosen):
+            _one_of(f"{path}.{key}[{index}]", name, choice)
 
 
 def _one_of(path: str, value: str | None, known: Collection[str]) -> None:

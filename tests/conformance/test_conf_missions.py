@@ -151,7 +151,7 @@ async def test_conf_049_a_mission_that_waits_for_arming_is_forgotten() -> None:
 
 
 @both
-async def test_conf_049_refused_with_the_drones_reasons(flavour: str) -> None:
+async def test_conf_049_refused_by_the_gateway_itself(flavour: str) -> None:
     async with world(flavour=flavour, web=True) as w:
         number = MISSION_MODE[flavour]
         params = (1, number) if first(w) else (1, 4, 4)

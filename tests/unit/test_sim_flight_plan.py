@@ -406,6 +406,19 @@ def test_not_without_gps_or_calibration() -> None:
     assert refused(flight) == {Part.CALIBRATION, Part.TAKE_OFF}
 
 
+@pytest.mark.parametrize("part", Part)
+def test_not_with_a_part_that_a_test_has_broken(part: Part) -> None:
+    flight = Flight(line(93, 1))
+    flight.bench.faults.refuse_plan = frozenset({part})
+    flight.bench.run(0.1)
+    assert refused(flight) == {part}
+    flight.bench.faults.refuse_plan = frozenset()
+    flight.bench.run(0.1)
+    flight.bench.events.clear()
+    flight.start()
+    assert flight.states == [PlayingState.PLAYING]
+
+
 # -- without a controller
 
 

@@ -10,6 +10,7 @@ import pytest
 
 from anafi_mav.arsdk.messages.alarms import TakeoffChecklistType
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState, MotorError, TakeOff, WarningLevel
+from anafi_mav.arsdk.messages.common import FlightPlanComponent
 from anafi_mav.errors import ConfigError
 from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
 from anafi_mav.sim.faults import CLEAR, Impairment
@@ -89,6 +90,7 @@ async def test_everything_there_is() -> None:
             motors: [1, 4]
             vibration: critical
             refuse_take_off: [update_ongoing, vcam]
+            refuse_plan: [camera_available]
             wind: {speed: 7, direction: 90}
             for: 1
         """
@@ -101,11 +103,13 @@ async def test_everything_there_is() -> None:
     assert (faults.motor_error, faults.motors) == (MotorError.ERROR_MOSFET, 0b1001)
     assert faults.vibration is WarningLevel.CRITICAL
     assert faults.refuse_take_off == {TakeoffChecklistType.UPDATE_ONGOING, TakeoffChecklistType.VCAM}
+    assert faults.refuse_plan == {FlightPlanComponent.CAMERA_AVAILABLE}
     assert world.drone.wind.spec == WindSpec(7.0, 90.0)
     world.run(1.0)
     assert not faults.mute
     assert (faults.up, faults.down) == (CLEAR, CLEAR)
     assert faults.motor_error is MotorError.NO_ERROR
+    assert faults.refuse_plan == frozenset()
     assert world.drone.wind.spec == CALM
 
 
@@ -125,6 +129,7 @@ BAD = {
     "steps: [{when: {}, gps: false}]": "steps[0].when: expected a condition",
     "steps: [{at: 1, motor_error: tired}]": "steps[0].motor_error: expected one of no_error, eeprom, ",
     "steps: [{at: 1, refuse_take_off: [vcam, mood]}]": "steps[0].refuse_take_off[1]: expected one of ",
+    "steps: [{at: 1, refuse_plan: [mood]}]": "steps[0].refuse_plan[0]: expected one of gps, calibration, ",
     "steps: [{at: 1, motors: [5]}]": "steps[0].motors[0]: expected `int` <= 4",
     "steps: [{at: 1, battery: 101}]": "steps[0].battery: expected `int` <= 100",
     "steps: [{at: 1, gps: false, gps: true}]": "test.yaml, line 1, column 29: the key 'gps' stands twice",
