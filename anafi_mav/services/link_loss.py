@@ -42,6 +42,15 @@ class GcsWatch:
         back, self.lost = self.lost, False
         return back
 
+    def restart(self, now: float) -> None:
+        """They can be heard again: that nobody was listening in between is no silence of theirs.
+
+        Who was there before is expected again, and a loss of before counts anew.
+        """
+        if self._heard is not None:
+            self._heard = now
+        self.lost = False
+
     def expire(self, now: float, after: float) -> bool:
         """True at the first look after they have been silent for so long."""
         if self._heard is None or self.lost or now - self._heard < after:

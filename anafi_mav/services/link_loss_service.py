@@ -18,8 +18,8 @@ class LinkLossService(Service):
         super().__init__(host)
         self._watch = GcsWatch()
 
-    def link_down(self) -> None:
-        self._watch = GcsWatch()
+    def link_up(self) -> None:
+        self._watch.restart(self.host.clock.monotonic())
 
     def tick(self, now: float) -> None:
         policy = self.host.vehicle.gcs_loss

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.mav import Client
+from support.params import write
 from support.process import simulator_process
 from support.world import ARMED, HOLD, OFFBOARD, TAKEOFF, loopback, world
 
@@ -132,3 +133,22 @@ async def test_all_datagrams_lost(engaged: bool) -> None:
             assert {entry.name for entry in after} <= AT_CONNECTION
         finally:
             sender.cancel()
+
+
+async def test_the_ground_station_falls_silent_during_the_loss() -> None:
+    """What ANF_GCS_LOSS promises is kept, counted from when the drone is back: nobody was heard before."""
+    async with world(speed=1.0) as w:
+        client, after = w.client, 4.0
+        await write(client, "ANF_GCS_LOSS", 2, dialect.MAV_PARAM_TYPE_INT32)
+        await write(client, "ANF_GCS_LOSS_T", after)
+        await w.take_off()
+        client.send(dialect.MAVLink_heartbeat_message(dialect.MAV_TYPE_GCS, 8, 0, 0, 4, 3))
+        w.drone.faults.mute = True
+        await silent_after(client, time.monotonic())
+        assert w.commands("rth.return_to_home") == []
+        w.drone.faults.mute = False
+        await client.heartbeat(lambda beat: True, timeout=5.0)
+        back = time.monotonic()
+        done = await w.drone.wait_log(lambda e: e.name == "rth.return_to_home", 2.0 * after)
+        assert done.t - back > after - 1.0
+        await client.wait("STATUSTEXT", lambda m: "No ground station for 4 s: return" in m.text, since=0)

@@ -11,6 +11,7 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.services import commands
 from anafi_mav.services.flavours import ARDUPILOT, PX4
 from anafi_mav.services.height import HeightReference
+from anafi_mav.services.link_loss import GcsWatch
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.statustext import Severity, TextNumbers
 
@@ -274,3 +275,26 @@ def test_command_int_scales_places_only() -> None:
     assert math.isnan(unset.x)
     assert math.isnan(unset.y)
     assert message(1000, 12, 0).x == 12
+
+
+def test_a_ground_station_is_lost_once_for_each_silence() -> None:
+    watch = GcsWatch()
+    assert not watch.expire(100.0, 10.0)  # who was never there cannot be lost
+    assert not watch.heard(100.0)
+    assert [watch.expire(now, 10.0) for now in (109.9, 110.0, 120.0)] == [False, True, False]
+    assert watch.heard(121.0)
+    assert not watch.heard(122.0)
+
+
+def test_a_silence_in_which_nobody_could_be_heard_does_not_count() -> None:
+    watch = GcsWatch()
+    watch.restart(50.0)
+    assert not watch.expire(100.0, 10.0)
+    watch.heard(100.0)
+    watch.restart(130.0)
+    assert [watch.expire(now, 10.0) for now in (130.0, 139.9, 140.0)] == [False, False, True]
+    # What was to be done for the first loss may have been lost with the link: the next silence is a loss again.
+    watch.restart(150.0)
+    assert [watch.expire(now, 10.0) for now in (159.9, 160.0)] == [False, True]
+    watch.restart(170.0)
+    assert not watch.heard(171.0)
