@@ -138,10 +138,15 @@ class FollowFlight:
         limits = vehicle.drone.piloting.limits
         if limits is None:
             return
+        reason = None
         if vehicle.drone.controller.pilot_flies:
+            reason = "the pilot at the Skycontroller flies"
+        elif vehicle.sticks_follow_camera:
+            reason = "the drone's sticks have become relative to the camera"
+        if reason is not None:
             self.end()
             vehicle.select(FlightMode.HOLD)
-            vehicle.text(Severity.WARNING, "Follow ended: the pilot at the Skycontroller flies")
+            vehicle.text(Severity.WARNING, f"Follow ended: {reason}")
             return
         sticks = PilotingCommand()
         try:

@@ -114,6 +114,8 @@ class OrbitService(Service):
             raise Refused("Orbit refused: no GPS fix")
         if vehicle.drone.controller.pilot_flies:
             raise Refused("Orbit refused: the pilot at the Skycontroller flies")
+        if vehicle.sticks_follow_camera:
+            raise Refused("Orbit refused: the drone's piloting style makes its sticks relative to the camera")
         start = entry(circle, here)
         for point in outline(circle, here):
             check_place(vehicle, point)
@@ -227,6 +229,8 @@ class OrbitService(Service):
         sticks = None if demand is None or limits is None else controller.sticks(demand, limits, now)
         if vehicle.drone.controller.pilot_flies:
             self._give_up("the pilot at the Skycontroller flies", Severity.WARNING)
+        elif vehicle.sticks_follow_camera:
+            self._give_up("the drone's sticks have become relative to the camera", Severity.WARNING)
         elif sticks is None:
             self._give_up("nobody knows where the drone is", Severity.WARNING)
         elif lap.done:

@@ -15,7 +15,7 @@ from support.setpoints import allow_speed, heard, idle_mode, motion, said, strea
 from support.world import HOLD, HOME, World, world
 
 from anafi_mav import geo
-from anafi_mav.arsdk.messages import ardrone3
+from anafi_mav.arsdk.messages import ardrone3, piloting_style
 
 SET_MODE = 176
 PX4_FOLLOW, COPTER_FOLLOW = 0x08040000, 23
@@ -165,6 +165,25 @@ async def test_where_it_may_not_fly_it_does_not_follow() -> None:
         async with streaming(w.client, target(10.0, 0.0), 0.3):
             await said(w.client, "ceiling")
         assert motion(w, began) == []
+
+
+@both
+async def test_sticks_that_follow_the_camera_follow_no_target(flavour: str) -> None:
+    async with world(speed=1.0, flavour=flavour) as w:
+        await w.take_off(8.0)
+        assert await follow(w.client, flavour) == 0
+        async with streaming(w.client, target(60.0, 0.0), 0.3):
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["vn"] > 1.0, 10.0)
+            mark = w.client.mark()
+            style = piloting_style.SetStyle(piloting_style.PilotingStyleStyle.CAMERA_OPERATED)
+            w.drone.firmware.receive(style, now())
+            await said(w.client, "Follow ended: the drone's sticks have become relative to the camera", mark)
+            ended = now()
+            hold = HOLD if flavour == "px4" else 17
+            await w.client.heartbeat(lambda beat: beat.custom_mode == hold, since=mark)
+            await w.drone.wait_log(lambda e: e.kind == "pose" and abs(e.args["vn"]) < 0.2, 10.0, since=ended)
+            assert await follow(w.client, flavour) == REJECTED
+            assert motion(w, ended) == []
 
 
 async def test_another_order_ends_following() -> None:

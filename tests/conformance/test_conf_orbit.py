@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import itertools
 import math
 from typing import Any
@@ -10,9 +11,11 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.flavours import both
 from support.mav import NAN
+from support.setpoints import motion, said
 from support.world import HOLD, HOME, World, world
 
 from anafi_mav import geo, units
+from anafi_mav.arsdk.messages import piloting_style
 
 ACCEPTED, DENIED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_DENIED
 REJECTED = dialect.MAV_RESULT_TEMPORARILY_REJECTED
@@ -124,6 +127,29 @@ async def test_without_gps_the_orbit_ends_in_a_hover() -> None:
         await w.drone.wait_log(lambda e: len(w.commands("ardrone3.Piloting.PCMD")) > flown + 5)
         last = w.commands("ardrone3.Piloting.PCMD")[flown:]
         assert {(e.args["roll"], e.args["pitch"]) for e in last} == {(0, 0)}
+
+
+async def test_sticks_that_follow_the_camera_are_no_sticks_for_an_orbit() -> None:
+    """Ahead would be where the camera looks: the orbit ends in a hover, and there is no other while that is so."""
+    orbit: dict[str, Any] = {"frame": GLOBAL, "x": HOME[0], "y": HOME[1], "z": HOME[2] + 10.0}
+    async with world(speed=1.0) as w:
+        await w.take_off(10.0)
+        assert (await w.client.command(ORBIT, 8.0, 3.0, **orbit)).result == ACCEPTED
+        await w.drone.wait_log(
+            lambda e: e.name == "ardrone3.Piloting.PCMD" and (e.args["roll"], e.args["pitch"]) != (0, 0), 30.0
+        )
+        mark = w.client.mark()
+        style = piloting_style.SetStyle(piloting_style.PilotingStyleStyle.CAMERA_OPERATED)
+        w.drone.firmware.receive(style, asyncio.get_running_loop().time())
+        await said(w.client, "Orbit ended: the drone's sticks have become relative to the camera", mark)
+        ended = asyncio.get_running_loop().time()
+        await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD, since=mark)
+        await w.drone.wait_log(
+            lambda e: e.kind == "pose" and math.hypot(e.args["vn"], e.args["ve"]) < 0.3, 10.0, since=ended
+        )
+        assert (await w.client.command(ORBIT, 8.0, 3.0, **orbit)).result == REJECTED
+        await said(w.client, "Orbit refused: the drone's piloting style", mark)
+        assert motion(w, ended) == []
 
 
 @pytest.mark.parametrize(
