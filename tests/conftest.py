@@ -31,7 +31,9 @@ HEAD = """\
 What a MAVLink client needs of a vehicle, item by item, shown over real sockets with a simulated drone behind the
 gateway and judged by the simulator's own log. The numbers are those of the tests' names, `test_conf_NNN`. A flavour is
 the autopilot that an endpoint shows its clients. A number is how many tests of this flavour have passed, a dash that
-the item does not concern it; items that do not depend on the flavour have one count.
+the item does not concern it; items that do not depend on the flavour have one count. Times in an item are those of
+timers: most tests run on a clock that leaves out what client, gateway and simulated drone compute in their one process
+(`tests/support/clock.py`), which is what `tests/bench/` measures.
 
 | | item | px4 | ardupilot | shown in |
 |---|---|---|---|---|

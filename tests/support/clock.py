@@ -7,7 +7,9 @@ A minute of flight takes as long as its computations do, on any machine, with th
 
 While callbacks run the clock goes at a hundredth of its pace: no two moments are the same, and a machine that lets them
 wait for a second, or a hypervisor that takes the processor away and tells nobody, makes them ten milliseconds late.
-What our computations take is for tests/bench/ to say, and that nothing of ours blocks a loop for ruff.
+How long one turn of callbacks computed at most, which every timer has to wait for in earnest, can be asked for
+(`turns`): it is processor time of this thread. What latencies that makes is for tests/bench/ to say, and that nothing
+of ours blocks a loop in other ways for ruff.
 
 As soon as somebody else is there, a child process, work in a thread or a timer of the kernel's, the clock runs like
 theirs.
@@ -16,6 +18,7 @@ theirs.
 from __future__ import annotations
 
 import asyncio
+import gc
 import os
 import selectors
 import threading
@@ -55,6 +58,21 @@ def childless() -> bool:
     return False
 
 
+class Turns:
+    """How long a loop computes between two looks at its sockets and timers: so long everything else has to wait."""
+
+    def __init__(self) -> None:
+        self.longest = 0.0
+        """s of processor time of this thread: what the machine takes away, as far as it says so, is not in it."""
+        self._began = time.thread_time()
+
+    def begin(self) -> None:
+        self._began = time.thread_time()
+
+    def end(self) -> None:
+        self.longest = max(self.longest, time.thread_time() - self._began)
+
+
 class Selector(selectors.DefaultSelector):
     """Does not wait when there is nothing to wait for."""
 
@@ -66,8 +84,15 @@ class Selector(selectors.DefaultSelector):
         """Who else can bring something about, as the test has said."""
         self.processes: list[asyncio.SubprocessTransport] = []
         """Those whose end the loop has not been told of: a thread may have collected it already."""
+        self.turns = Turns()
 
     def select(self, timeout: float | None = None) -> Any:
+        self.turns.end()
+        ready = self._select(timeout)
+        self.turns.begin()
+        return ready
+
+    def _select(self, timeout: float | None) -> Any:
         global _ahead, _began
         alone = timeout is not None and self._alone()
         if _began is not None:
@@ -119,16 +144,38 @@ class Loop(asyncio.SelectorEventLoop):
         self.waits.in_threads -= 1
 
 
+def _selector() -> Selector:
+    loop = asyncio.get_running_loop()
+    assert isinstance(loop, Loop)
+    return loop.waits
+
+
 @contextmanager
 def everybodys() -> Iterator[None]:
     """Within the block the clock runs like everybody's: for what the kernel does by timers of its own."""
-    loop = asyncio.get_running_loop()
-    assert isinstance(loop, Loop)
-    loop.waits.others += 1
+    selector = _selector()
+    selector.others += 1
     try:
         yield
     finally:
-        loop.waits.others -= 1
+        selector.others -= 1
+
+
+@contextmanager
+def turns() -> Iterator[Turns]:
+    """The turns that end within the block.
+
+    The garbage collector rests meanwhile: it would look through every message that a client of the tests has kept, and
+    through what all tests before have left. The product's own heap is in the figures of tests/bench/heartbeat.py.
+    """
+    selector = _selector()
+    selector.turns = Turns()
+    gc.disable()
+    try:
+        yield selector.turns
+        selector.turns.end()
+    finally:
+        gc.enable()
 
 
 def install() -> None:
