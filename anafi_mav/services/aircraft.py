@@ -34,6 +34,8 @@ class Aircraft(ABC):
         self.origin: Place | None = None
         """Origin of the local frame: where the drone last took off, or first stood with a fix."""
         self.fence = FenceWatch()
+        self.home_choice = asyncio.Lock()
+        """Held by who chooses the drone's home, which is a type and a place: two choices at once would mix."""
         self.text = text
         self.changed = changed
         """Says that mode, armed state or health may be others now."""

@@ -286,13 +286,14 @@ class GuidedService(Service):
                 raise Refused("Home refused: it has no place", lasting=True)
             ato = height(vehicle, command) or 0.0
         check_on_earth(where, "Home")
-        before = home.state.preferred_type
-        try:
-            await home.set_preferred_type(RthHomeType.CUSTOM)
-            await home.set_custom_location(where.latitude, where.longitude, ato)
-        except BaseException:
-            # The custom home of some other day must not stay: a return that replaces this waits until it is gone.
-            if before is not None and before != RthHomeType.CUSTOM:
-                await asyncio.wait([self.host.spawn(self._prefer(before))])
-            raise
+        async with vehicle.home_choice:
+            before = home.state.preferred_type
+            try:
+                await home.set_preferred_type(RthHomeType.CUSTOM)
+                await home.set_custom_location(where.latitude, where.longitude, ato)
+            except BaseException:
+                # The custom home of some other day must not stay: a return that replaces this waits until it is gone.
+                if before is not None and before != RthHomeType.CUSTOM:
+                    await asyncio.wait([self.host.spawn(self._prefer(before))])
+                raise
         self.host.text(Severity.NOTICE, "Home set: the drone returns there until its home type is changed")

@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import math
 
+from anafi_mav.drone import Position
 from anafi_mav.drone.events import RthHomeType
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.services.rally import RallyPoint, RallyPoints, Return
@@ -20,6 +21,9 @@ LOOK_EVERY = 1.0
 
 REJECTED_FOR = 30.0
 """s for which a point that the drone did not accept is not proposed again: it may be too far away only for now."""
+
+SAME_PLACE = 1e-6
+"""deg, 0.1 m: what a drone repeats of a place that it was given is closer to it than that."""
 
 MIRROR = "rally_home"
 """In the drone's memory: the home type that the drone preferred before a rally point became its home."""
@@ -34,6 +38,8 @@ class RallyService(Service):
         self._task: asyncio.Task[None] | None = None
         self._chosen: RallyPoint | None = None
         """The drone's custom home by our doing."""
+        self._given: Position | None = None
+        """Where the drone's custom home was when we last gave it one: another place is somebody's choice since."""
         self._rejected: dict[RallyPoint, float] = {}
         """Until when they are not proposed again."""
 
@@ -42,10 +48,10 @@ class RallyService(Service):
         return self.host.vehicle.rally
 
     def link_up(self) -> None:
-        self._chosen = None
+        self._chosen, self._given = None, self.host.drone.home.state.custom_location
 
     def link_down(self) -> None:
-        self._task = self._chosen = None
+        self._task = self._chosen = self._given = None
         self._rejected.clear()
         self._looked = -math.inf
 
@@ -55,16 +61,18 @@ class RallyService(Service):
         self._looked = now
         if self._task is not None and not self._task.done():
             return
-        vehicle, state = self.host.vehicle, self.host.drone.home.state
+        vehicle = self.host.vehicle
+        if self._taken_over():
+            self._task = self.host.spawn(self._leave())
+            return
         if vehicle.returning or not (vehicle.in_air or vehicle.on_ground):
             return  # a return under way, or a landing, keeps its end
         chosen = self._choose(now) if vehicle.in_air else None
         if chosen is not None:
-            if chosen == self._chosen or not self._may_choose(state.preferred_type):
-                return
-            self._task = self.host.spawn(self._use(chosen, state.preferred_type, now))
+            if chosen != self._chosen and self._may_choose():
+                self._task = self.host.spawn(self._use(chosen, now))
         elif self._before() is not None:
-            self._task = self.host.spawn(self._restore())
+            self._task = self.host.spawn(self._leave())
 
     def _choose(self, now: float) -> RallyPoint | None:
         vehicle = self.host.vehicle
@@ -81,47 +89,68 @@ class RallyService(Service):
 
         return self._rally.choose(vehicle.place.point, home, vehicle.height.takeoff_amsl, self._chosen, usable)
 
-    def _may_choose(self, preferred: RthHomeType | None) -> bool:
+    def _may_choose(self) -> bool:
         """The drone can have a custom home, and has none that somebody else chose."""
-        types = self.host.drone.home.state.types
-        if preferred is None or types is None or RthHomeType.CUSTOM not in types:
+        state = self.host.drone.home.state
+        if state.preferred_type is None or state.types is None or RthHomeType.CUSTOM not in state.types:
             return False
-        if preferred == RthHomeType.CUSTOM and self._before() is None:
+        if state.preferred_type == RthHomeType.CUSTOM and self._before() is None:
             self.host.complain("Rally points not used: the drone returns to the home that was set")
             return False
         return True
 
-    async def _use(self, point: RallyPoint, preferred: RthHomeType | None, now: float) -> None:
+    def _taken_over(self) -> bool:
+        """Somebody else has chosen a custom home since we did."""
+        state, given = self.host.drone.home.state, self._given
+        chosen = state.custom_location
+        if self._before() is None or state.preferred_type != RthHomeType.CUSTOM or chosen is None:
+            return False
+        return (
+            given is None
+            or max(abs(chosen.latitude - given.latitude), abs(chosen.longitude - given.longitude)) > SAME_PLACE
+        )
+
+    async def _use(self, point: RallyPoint, now: float) -> None:
         home = self.host.drone.home
-        try:
-            if self._before() is None:
-                assert preferred is not None
-                await self._remember(preferred.name)
-            await home.set_preferred_type(RthHomeType.CUSTOM)
-            await home.set_custom_location(point.latitude, point.longitude, point.ato)
-        except AnafiMavError as error:
-            self._rejected[point] = now + REJECTED_FOR
-            self._chosen = None
-            self.host.text(Severity.WARNING, f"Rally point {point.number} not used: {error}")
-            # Not at the next tick: a return in between would go to the custom home of some other day.
+        async with self.host.vehicle.home_choice:
+            if self._taken_over() or not self._may_choose():
+                return  # while we waited; the next look makes something of it
+            try:
+                if self._before() is None:
+                    assert home.state.preferred_type is not None
+                    self._given = home.state.custom_location
+                    await self._remember(home.state.preferred_type.name)
+                await home.set_preferred_type(RthHomeType.CUSTOM)
+                self._given = await home.set_custom_location(point.latitude, point.longitude, point.ato)
+            except AnafiMavError as error:
+                self._rejected[point] = now + REJECTED_FOR
+                self._chosen = None
+                self.host.text(Severity.WARNING, f"Rally point {point.number} not used: {error}")
+                # Not at the next tick: a return in between would go to the custom home of some other day.
+                await self._restore()
+            else:
+                self._chosen = point
+                self.host.text(Severity.NOTICE, f"Returns end at rally point {point.number}")
+
+    async def _leave(self) -> None:
+        async with self.host.vehicle.home_choice:
             await self._restore()
-        else:
-            self._chosen = point
-            self.host.text(Severity.NOTICE, f"Returns end at rally point {point.number}")
 
     async def _restore(self) -> None:
-        home = self.host.drone.home
-        before = self._before()
-        assert before is not None
+        """What the drone preferred before us counts again; a home that somebody has chosen since stays his."""
+        home, before = self.host.drone.home, self._before()
+        if before is None:
+            return
         self._chosen = None
+        taken_over = self._taken_over()
         try:
-            if home.state.preferred_type == RthHomeType.CUSTOM:
+            if home.state.preferred_type == RthHomeType.CUSTOM and not taken_over:
                 await home.set_preferred_type(before)
         except AnafiMavError as error:
             self.host.complain(f"The drone's home type could not be put back: {error}")
             return
         await self._remember(None)
-        if not self.host.vehicle.on_ground:
+        if not (taken_over or self.host.vehicle.on_ground):
             self.host.text(Severity.NOTICE, "Returns end at home")
 
     def _before(self) -> RthHomeType | None:

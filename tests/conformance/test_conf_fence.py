@@ -508,3 +508,70 @@ async def test_conf_077_a_home_that_somebody_chose_is_left_alone() -> None:
         assert (await upload(w.client, [rally(around(PLACE, (30.0, 0.0))[0], 20.0)], RALLY)).type == TAKEN
         await said(w.client, "Rally points not used", timeout=10.0)
         assert len(w.commands("rth.set_custom_location")) == sent
+
+
+def homes(w: World) -> list[tuple[float, float]]:
+    """Places that the drone was given as its home, m north and east of where it took off."""
+    entries = w.commands("rth.set_custom_location")
+    return [
+        (round(north), round(east))
+        for north, east in (geo.offset(*PLACE, e.args["latitude"], e.args["longitude"]) for e in entries)
+    ]
+
+
+async def set_home(w: World, north: float, timeout: float = 8.0) -> None:
+    place = around(PLACE, (north, 0.0))[0]
+    ack = await w.client.command(dialect.MAV_CMD_DO_SET_HOME, 0, x=place[0], y=place[1], z=HOME[2], timeout=timeout)
+    assert ack.result == ACCEPTED
+
+
+async def looked(w: World) -> None:
+    """The rally points have been looked at again, which is once a second."""
+    for _ in range(3):
+        await w.client.wait("HEARTBEAT")
+
+
+async def test_conf_077_a_home_that_is_set_while_a_rally_point_counts_stays() -> None:
+    """No other rally point takes its place in flight, nor the take-off point after the landing."""
+    async with world() as w:
+        await put(w, "RTL_TYPE", 1)
+        assert (await upload(w.client, [rally(around(PLACE, (30.0, 0.0))[0], 20.0)], RALLY)).type == TAKEN
+        await w.take_off()
+        await said(w.client, "Returns end at rally point 0", since=0, timeout=10.0)
+        await set_home(w, 10.0)
+        assert (await upload(w.client, [rally(around(PLACE, (0.0, 20.0))[0], 20.0)], RALLY)).type == TAKEN
+        await said(w.client, "Rally points not used: the drone returns to the home that was set", timeout=10.0)
+        assert (await w.client.command(21)).result == ACCEPTED
+        await w.client.heartbeat(lambda beat: not beat.base_mode & 128, timeout=60.0)
+        await looked(w)
+        assert homes(w) == [(30, 0), (10, 0)]
+        assert preferred(w) == [3, 3]
+
+
+async def test_conf_077_a_home_that_is_set_just_before_the_landing_stays() -> None:
+    """Nobody has looked at it before the drone stands."""
+    async with world() as w:
+        await put(w, "RTL_TYPE", 1)
+        assert (await upload(w.client, [rally(around(PLACE, (30.0, 0.0))[0], 20.0)], RALLY)).type == TAKEN
+        await w.take_off()
+        await said(w.client, "Returns end at rally point 0", since=0, timeout=10.0)
+        assert (await w.client.command(21)).result == ACCEPTED
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["up"] < 0.5, 30.0, since=w.drone.log[-1].t)
+        await set_home(w, 10.0)
+        await w.client.heartbeat(lambda beat: not beat.base_mode & 128, timeout=60.0)
+        await looked(w)
+        assert (homes(w), preferred(w)) == ([(30, 0), (10, 0)], [3, 3])
+
+
+async def test_conf_077_a_home_that_is_set_while_a_rally_point_is_refused_stays() -> None:
+    """The drone does not take the rally point, which is too far away, and says so by silence: it is asked meanwhile."""
+    async with world() as w:
+        await put(w, "RTL_TYPE", 1)
+        assert (await upload(w.client, [rally(around(PLACE, (200.0, 0.0))[0], 20.0)], RALLY)).type == TAKEN
+        await w.take_off()
+        await w.drone.wait_log(lambda e: e.name == "rth.set_custom_location", 10.0)
+        await set_home(w, 10.0, timeout=15.0)
+        await said(w.client, "Rally point 0 not used", since=0)
+        await looked(w)
+        assert homes(w) == [(200, 0), (10, 0)]
+        assert preferred(w)[-1] == 3
