@@ -65,8 +65,8 @@ def usage(process: subprocess.Popen[str]) -> tuple[float, float]:
 class Client:
     """A MAVLink client of system 1, over pymavlink's own connection."""
 
-    def __init__(self, url: str) -> None:
-        self.link: Any = mavutil.mavlink_connection(url, source_system=255, source_component=190)
+    def __init__(self, url: str, system: int = 255) -> None:
+        self.link: Any = mavutil.mavlink_connection(url, source_system=system, source_component=190)
         self.expect("HEARTBEAT", 10.0)
 
     def expect(self, kind: str, timeout: float, accept: Callable[[Any], bool] = lambda message: True) -> Any:

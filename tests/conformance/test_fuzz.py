@@ -12,15 +12,13 @@ import itertools
 import logging
 import math
 import random
-import struct
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
-from pymavlink.generator.mavcrc import x25crc
 from support import clock
+from support.fuzz import LONGEST, framed, random_frames
 from support.mav import NAN
 from support.missions import ROUND, put
 from support.setpoints import COPTER_BRAKE, COPTER_GUIDED, POSITION_ONLY, VELOCITY_ONLY, ZERO, attitude, earth, local
@@ -51,9 +49,6 @@ longest one takes 0.03 s, for a batch."""
 
 HEIGHT = 20.0
 """m: room for what moves."""
-
-LONGEST = 280
-"""Bytes of a frame with the longest payload and a signature (MAVLink serialization.md)."""
 
 UNSUPPORTED = dialect.MAV_RESULT_UNSUPPORTED
 
@@ -87,49 +82,6 @@ def motions(w: World, since: float) -> list[str]:
             or (entry.name == "ardrone3.Piloting.PCMD" and any(entry.args[k] for k in ("roll", "pitch", "yaw", "gaz")))
         )
     ]
-
-
-def framed(id: int, payload: bytes, sequence: int) -> bytes:
-    """A frame of MAVLink 2 with a right checksum (MAVLink serialization.md)."""
-    head = struct.pack("<BBBBBBB", len(payload), 0, 0, sequence, 255, 190, id & 0xFF) + struct.pack("<H", id >> 8)
-    crc = x25crc(head + payload)
-    crc.accumulate(bytes([newer.mavlink_map[id].crc_extra]))
-    return b"\xfd" + head + payload + struct.pack("<H", crc.crc)
-
-
-SIZES = {"char": 1, "int8_t": 1, "uint8_t": 1, "int16_t": 2, "uint16_t": 2, "int32_t": 4, "uint32_t": 4, "float": 4}
-SIZES |= {"int64_t": 8, "uint64_t": 8, "double": 8, "uint8_t_mavlink_version": 1}
-
-
-def offset(kind: Any, name: str) -> int:
-    """Where a field of one byte stands in the payload."""
-    types = dict(zip(kind.fieldnames, kind.fieldtypes, strict=True))
-    place = 0
-    for field, length in zip(kind.ordered_fieldnames, kind.array_lengths, strict=True):
-        if field == name:
-            return place
-        place += SIZES[types[field]] * (length or 1)
-    raise KeyError(name)
-
-
-def random_frames(source: random.Random) -> Iterator[bytes]:
-    """Well-formed frames of any message, two thirds of them to our system, and damaged ones."""
-    ids = sorted(newer.mavlink_map)
-    for count in itertools.count():
-        id = source.choice(ids)
-        kind = newer.mavlink_map[id]
-        size = struct.calcsize(kind.unpacker.format)
-        payload = bytearray(source.randbytes(size))
-        for name, target in (("target_system", 1), ("target_component", 1)):
-            if name in kind.ordered_fieldnames and source.random() < 0.67:
-                payload[offset(kind, name)] = target
-        frame = framed(id, bytes(payload).rstrip(b"\0") or b"\0", count % 256)
-        if source.random() < 0.2:
-            damaged = bytearray(frame)
-            for _ in range(source.randint(1, 3)):
-                damaged[source.randrange(len(damaged))] = source.randrange(256)
-            frame = bytes(damaged[: source.randint(1, len(damaged))])
-        yield frame
 
 
 FLYING = (
