@@ -8,11 +8,13 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as stock
 from support.mav import Client
+from support.setpoints import attitude, engage, streaming
 from support.world import World, world
 
 from anafi_mav.arsdk.messages import alarms, ardrone3, camera, common, rth, wifi
 from anafi_mav.arsdk.messages.generic import ListFlags
 from anafi_mav.mavlink import dialect
+from anafi_mav.sim.skycontroller import PITCH, ROLL, THROTTLE, YAW, Skycontroller
 
 ACCEPTED, REJECTED = stock.MAV_RESULT_ACCEPTED, stock.MAV_RESULT_TEMPORARILY_REJECTED
 FIRST, LAST = 1 << ListFlags.FIRST, 1 << ListFlags.LAST
@@ -173,16 +175,14 @@ async def test_no_skycontroller() -> None:
             assert (await w.client.command(stock.MAV_CMD_REQUEST_MESSAGE, id)).result == REJECTED
 
 
-async def controller_world(w: World) -> None:
-    await stream(w.client, dialect.MAVLINK_MSG_ID_ANAFI_CONTROLLER_INPUT, 0.05)
-    await stream(w.client, dialect.MAVLINK_MSG_ID_ANAFI_CONTROLLER_ATTITUDE, 0.05)
+def at_hand(w: World) -> Skycontroller:
+    controller = w.drone.skycontroller
+    assert controller is not None
+    return controller
 
 
 async def test_skycontroller() -> None:
     async with world(skycontroller=3, speed=1.0) as w:
-        await controller_world(w)
-        attitude = await w.client.wait("ANAFI_CONTROLLER_ATTITUDE")
-        assert math.hypot(*attitude.q) == pytest.approx(1.0, abs=1e-6)
         status = await ask(w.client, dialect.MAVLINK_MSG_ID_ANAFI_CONTROLLER_STATUS)
         assert status.model == 0x0918
         assert status.source == dialect.ANAFI_PILOTING_SOURCE_SKYCONTROLLER
@@ -192,6 +192,49 @@ async def test_skycontroller() -> None:
         told = await ask(w.client, dialect.MAVLINK_MSG_ID_ANAFI_CONTROLLER_INPUT)
         assert told.grabbed_axes == 0
         assert told.axes == [-128] * 6
+
+
+@pytest.mark.parametrize(
+    ("angles", "q"),
+    [
+        # rad of roll, pitch, yaw; cos and sin of half of them. All three: the product of their quaternions, by hand.
+        ((0.6, 0.0, 0.0), (0.955336, 0.295520, 0.0, 0.0)),
+        ((0.0, -0.4, 0.0), (0.980067, 0.0, -0.198669, 0.0)),
+        ((0.0, 0.0, 1.2), (0.825336, 0.0, 0.0, 0.564642)),
+        ((math.pi / 2, 0.0, math.pi / 2), (0.5, 0.5, 0.5, 0.5)),
+    ],
+)
+async def test_where_the_skycontroller_points(angles: tuple[float, float, float], q: tuple[float, ...]) -> None:
+    async with world(skycontroller=3) as w:
+        await stream(w.client, dialect.MAVLINK_MSG_ID_ANAFI_CONTROLLER_ATTITUDE, 0.05)
+        at_hand(w).attitude = angles
+        await w.client.wait("ANAFI_CONTROLLER_ATTITUDE", lambda m: m.q == pytest.approx(q, abs=1e-5))
+
+
+async def test_the_sticks_of_the_skycontroller_are_told_while_a_program_flies() -> None:
+    """Each is moved as little as a hand that rests on it does: the program goes on."""
+    told = {YAW: 4, THROTTLE: -7, ROLL: -5, PITCH: 10}
+    places = {YAW: 0, THROTTLE: 1, ROLL: 2, PITCH: 3}  # ANAFI_AXIS, by its bits
+    async with world(skycontroller=3, speed=1.0) as w:
+        await w.take_off()
+        await stream(w.client, dialect.MAVLINK_MSG_ID_ANAFI_CONTROLLER_INPUT, 0.05)
+        async with streaming(w.client, attitude(pitch=-0.1)):
+            await engage(w.client, "px4")
+            for axis, percent in told.items():
+                at_hand(w).stick(axis, percent)
+                inputs = await w.client.wait(
+                    "ANAFI_CONTROLLER_INPUT", lambda m, p=percent, a=axis: m.axes[places[a]] == p
+                )
+            assert inputs.axes == [4, -7, -5, 10, -128, -128]  # the wheels are the pilot's
+            axes = dialect.ANAFI_AXIS_YAW | dialect.ANAFI_AXIS_THROTTLE | dialect.ANAFI_AXIS_ROLL
+            assert inputs.grabbed_axes == axes | dialect.ANAFI_AXIS_PITCH
+            assert inputs.source == dialect.ANAFI_PILOTING_SOURCE_GATEWAY
+            began = w.drone.log[-1].t
+            await w.drone.wait_log(lambda e: e.name.endswith("PCMD") and e.args["pitch"] > 0, since=began)
+        # The program is gone: so are the sticks, which are the pilot's again.
+        inputs = await w.client.wait("ANAFI_CONTROLLER_INPUT", lambda m: m.grabbed_axes == 0)
+        assert inputs.axes == [-128] * 6
+        assert inputs.source == dialect.ANAFI_PILOTING_SOURCE_SKYCONTROLLER
 
 
 async def test_the_dialect_works_in_pymavlink_as_the_page_says() -> None:

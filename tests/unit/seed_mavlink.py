@@ -79,10 +79,12 @@ REACHED: dict[str, Reach] = {
     "drone/state": Reach("`EXTENDED_SYS_STATE`, `HEARTBEAT`, `ANAFI_FLIGHT_STATUS`", _ANAFI + "test_flight_status"),
     "gimbal/attitude/absolute": Reach("", waits=PAYLOAD),
     "home/location": Reach("`HOME_POSITION`, `ANAFI_HOME`", _TELEMETRY + "test_conf_034_home"),
-    "link/quality": Reach("`RADIO_STATUS`, `ANAFI_LINK`", _TELEMETRY + "test_conf_135_radio_status"),
-    "skycontroller/attitude": Reach("`ANAFI_CONTROLLER_ATTITUDE`", _ANAFI + "test_skycontroller"),
-    "skycontroller/command": Reach("`ANAFI_CONTROLLER_INPUT`", _ANAFI + "test_skycontroller"),
-    "skycontroller/rpy": Reach("`ANAFI_CONTROLLER_ATTITUDE`", _ANAFI + "test_skycontroller"),
+    "link/quality": Reach("`RC_CHANNELS`.rssi, `ANAFI_LINK`.quality", _TELEMETRY + "test_conf_134_rssi"),
+    "skycontroller/attitude": Reach("`ANAFI_CONTROLLER_ATTITUDE`", _ANAFI + "test_where_the_skycontroller_points"),
+    "skycontroller/command": Reach(
+        "`ANAFI_CONTROLLER_INPUT`", _ANAFI + "test_the_sticks_of_the_skycontroller_are_told_while_a_program_flies"
+    ),
+    "skycontroller/rpy": Reach("`ANAFI_CONTROLLER_ATTITUDE`", _ANAFI + "test_where_the_skycontroller_points"),
     "storage/available": Reach("", waits=PAYLOAD),
     "time": Reach("`SYSTEM_TIME`", "conformance/test_conf_talk.py::test_conf_111_system_time"),
     "camera/photo/stop": Reach("", waits=PAYLOAD),
