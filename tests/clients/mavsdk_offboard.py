@@ -21,6 +21,7 @@ from mavsdk.asyncio.plugins.offboard import (
     Attitude,
     AttitudeRate,
     OffboardAsync,
+    OffboardError,
     PositionGlobalYaw,
     PositionNedYaw,
     VelocityBodyYawspeed,
@@ -38,52 +39,100 @@ STEP, STANDSTILL = 0.1, 0.3
 """s of a wait, and of one in which the machine stood still: what is flown by then has to settle anew."""
 
 
+async def unbroken(seconds: float, flight: Callable[[], int | None]) -> None:
+    """Wait until one flight has gone on for so long, with a machine that did not stand still meanwhile.
+
+    `flight` numbers the flights; None while there is none.
+    """
+    clock = asyncio.get_running_loop().time
+    begun, number = clock(), flight()
+    while (step := clock()) - begun < seconds or number is None:
+        await asyncio.sleep(STEP)
+        if clock() - step > STANDSTILL or flight() is None or flight() != number:
+            begun, number = clock(), flight()
+
+
+SETTLED = 3
+"""Targets on time, a second each, after which a drone that follows is in its place again."""
+
+
 class Pilot:
     """Flies by setpoints, and begins again where the machine has held this program up for half a second.
 
-    The drone hovers then, in mode Hold, and MAVSDK forgets the setpoint.
+    The drone hovers then, in mode Hold, and MAVSDK forgets the setpoint: at the first heartbeat that tells another mode
+    than Offboard three seconds after the last start. One may come between a setpoint and the start that follows.
     """
 
     def __init__(self, plugin: OffboardAsync, telemetry: TelemetryAsync) -> None:
         self._plugin, self._telemetry = plugin, telemetry
         self._wanted: Callable[[], Awaitable[None]] | None = None
+        self._turn = asyncio.Lock()
+        """Of whoever sets or starts: what is started is what was set last."""
+        self._there = False
         self._resumed = 0
+        self._staying: asyncio.Future[None] | None = None
 
     async def fly(self, wanted: Callable[[], Awaitable[None]]) -> None:
-        self._wanted = wanted
-        await wanted()
+        async with self._turn:
+            self._wanted = wanted
+            await wanted()
+
+    async def begin(self) -> None:
+        """Start, and stay in mode Offboard from then on."""
+        await self._engage()
+        self._there = True
+        self._staying = asyncio.ensure_future(self._stay())
 
     async def held(self, name: str, seconds: float = 0.0) -> None:
         """As `held`, for so long without a break, of the flight or of the machine."""
-        clock = asyncio.get_running_loop().time
-        begun, resumed = clock(), self._resumed
-        while (step := clock()) - begun < seconds:
-            await asyncio.sleep(STEP)
-            if clock() - step > STANDSTILL or self._resumed != resumed:
-                begun, resumed = clock(), self._resumed
+        await unbroken(seconds, self._flight)
         await held(name)
 
-    async def stay(self) -> None:
-        there = False
+    async def end(self) -> None:
+        """Do not begin again any more; the drone flies on."""
+        self._flight()
+        async with self._turn:
+            if self._staying is not None:
+                self._staying.cancel()
+
+    def _flight(self) -> int | None:
+        if self._staying is not None and self._staying.done():
+            self._staying.result()
+        return self._resumed if self._there else None
+
+    async def _engage(self) -> None:
+        """Set what is wanted and start; both again where a heartbeat or a standstill came in between."""
+        clock = asyncio.get_running_loop().time
+        async with self._turn:
+            while True:
+                begun = clock()
+                assert self._wanted is not None
+                await self._wanted()
+                try:
+                    return await self._plugin.start()
+                except OffboardError as error:
+                    if error.result.name != "NO_SETPOINT_SET" and clock() - begun < STANDSTILL:
+                        raise
+
+    async def _stay(self) -> None:
         async for mode in self._telemetry.subscribe_flight_mode():
-            gone, there = there and mode.name != "OFFBOARD", mode.name == "OFFBOARD"
-            if gone and self._wanted is not None:
+            gone, self._there = self._there and mode.name != "OFFBOARD", mode.name == "OFFBOARD"
+            if gone:
                 self._resumed += 1
                 say("resumed", self._resumed)
-                await self._wanted()
-                await self._plugin.start()
+            if not self._there:
+                await self._engage()
 
 
 async def offboard(system: Any) -> None:
     plugin, telemetry = OffboardAsync(system), TelemetryAsync(system)
     await tried("start without setpoints", plugin.start())
-    await plugin.set_attitude_rate(AttitudeRate(0.0, 0.0, 20.0, 0.5))
-    await tried("start with rates", plugin.start())
-    await plugin.stop()
     pilot = Pilot(plugin, telemetry)
+    await pilot.fly(partial(plugin.set_attitude_rate, AttitudeRate(0.0, 0.0, 20.0, 0.5)))
+    await tried("start with rates", pilot.begin())
+    await plugin.stop()
     await pilot.fly(partial(plugin.set_attitude, Attitude(0.0, -6.0, 0.0, 0.6)))
-    await tried("start", plugin.start())
-    staying = asyncio.ensure_future(pilot.stay())
+    await tried("start", pilot.begin())
     await pilot.held("attitude", 2.5)
     await pilot.fly(partial(plugin.set_velocity_ned, VelocityNedYaw(0.0, 2.0, 0.5, 90.0)))
     await pilot.held("velocity ned", 5.0)
@@ -113,7 +162,7 @@ async def offboard(system: Any) -> None:
     await pilot.held("position and velocity")
     await pilot.fly(partial(plugin.set_acceleration_ned, AccelerationNed(0.0, 1.0, 0.0)))
     await pilot.held("acceleration", 2.0)
-    staying.cancel()
+    await pilot.end()
     await plugin.stop()
     await until(telemetry.subscribe_flight_mode(), lambda mode: mode.name == "HOLD")
     say("stopped", await plugin.is_active())
@@ -122,14 +171,22 @@ async def offboard(system: Any) -> None:
 async def manual(system: Any) -> None:
     plugin, telemetry = ManualControlAsync(system), TelemetryAsync(system)
     sticks = [0.0, 0.0, 0.5, 0.0]
+    there, enough = asyncio.Event(), asyncio.Event()
 
     async def joystick() -> None:
-        while True:
+        while not enough.is_set():
             await plugin.set_manual_control_input(*sticks)
+            there.set()
             await asyncio.sleep(0.05)
 
     stream = asyncio.ensure_future(joystick())
-    await asyncio.sleep(0.3)  # the sticks have to be there before they may fly
+
+    def flight() -> int:
+        if stream.done():
+            stream.result()
+        return 0
+
+    await there.wait()  # the sticks have to be there before they may fly
     await plugin.start_position_control()
     await until(telemetry.subscribe_flight_mode(), lambda mode: mode.name == "POSCTL")
     for name, position in (
@@ -139,9 +196,11 @@ async def manual(system: Any) -> None:
         ("clockwise", (0.0, 0.0, 0.5, 0.5)),
     ):
         sticks[:] = position
-        await held(name, 2.0)
-    stream.cancel()
-    await held("still", 1.0)
+        await unbroken(2.0, flight)
+        await held(name)
+    enough.set()
+    await stream
+    await held("still")
 
 
 async def follow(system: Any) -> None:
@@ -161,12 +220,18 @@ async def follow(system: Any) -> None:
     await tried("start", plugin.start())
     await until(telemetry.subscribe_flight_mode(), lambda mode: mode.name == "FOLLOW_ME")
     say("following", await plugin.is_active())
-    for second in range(15):
-        north = 10.0 + 1.5 * second
+    clock = asyncio.get_running_loop().time
+    north, on_time, told = 10.0, 0, 0
+    while told < 9 or on_time < SETTLED:
+        begun = clock()
         await plugin.set_target_location(TargetLocation(HOME[0] + north * M, HOME[1], HOME[2], 1.5, 0.0, 0.0))
-        say("target", north)
         await asyncio.sleep(1.0)
-    say("target", 10.0 + 1.5 * 15)
+        north += 1.5
+        # Where the machine stood still the drone went on, and the target of this program did not.
+        on_time = on_time + 1 if clock() - begun < 1.0 + STANDSTILL else 0
+        if told or (north > 20.0 and on_time >= SETTLED):
+            told += 1
+            say("target" if on_time >= SETTLED else "late target", north)
     await held("following")
     await plugin.stop()
     await until(telemetry.subscribe_flight_mode(), lambda mode: mode.name == "HOLD")
