@@ -17,10 +17,14 @@ OUT = os.fdopen(os.dup(1), "w")
 os.dup2(2, 1)
 
 import olympe  # noqa: E402
+from olympe.features.media import media as media_feature  # noqa: E402
 from olympe.messages.ardrone3 import PilotingState  # noqa: E402
 
 LIMIT = 60.0
 """s for anything: a machine may be slow. What takes its time on an aircraft is told apart by the simulator's log."""
+
+# Olympe tries once to open the websocket of the media, for half a second, and knows nothing of them if that fails.
+media_feature.HTTP_CONNECTION_TIMEOUT = LIMIT
 
 
 def plain(value: Any) -> Any:

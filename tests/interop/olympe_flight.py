@@ -152,7 +152,8 @@ class Flight(Visit):
         result["extended_move_by"] = self.last(PilotingEvent.moveByEnd)
         far = here[0] + 60 / METRES_PER_DEGREE
         flying = PilotingState.FlyingStateChanged(state="flying", _policy="check_wait", _timeout=LIMIT)
-        self.expect("far", Piloting.moveTo(far, here[1], 5.0, "NONE", 0.0) >> flying)
+        # Slowly: how much later this program gets to cancel it is up to the machine.
+        self.expect("far", move.extended_move_to(far, here[1], 5.0, "none", 0.0, 1, 1, 60) >> flying)
         self.hear(4)  # on a part of the way
         self.expect("cancel", Piloting.CancelMoveTo() >> moved("CANCELED") >> at_rest())
 

@@ -22,6 +22,7 @@ tempfile.tempdir = FOLDER
 
 import olympe  # noqa: E402
 from olympe.examples import media_ai, skyctrl_media  # noqa: E402
+from olympe.features.media import media as media_feature  # noqa: E402
 
 
 def main() -> None:
@@ -29,6 +30,8 @@ def main() -> None:
     # The examples end with a disconnect() that must succeed. What would follow is Olympe's own way out, in which its
     # timers race each other (one of 2 s against a count of turns that is meant to be 3 s) and which takes seconds.
     olympe.Drone.destroy = olympe.SkyController4.destroy = lambda self: None
+    # It tries once to open the websocket of the media, for half a second, and knows nothing of them if that fails.
+    media_feature.HTTP_CONNECTION_TIMEOUT = 60.0
     # The example knows the address alone, and its web server to be on port 80.
     olympe.SkyController4 = functools.partial(olympe.SkyController4, http_port=int(PORT))
     # This example's own listener downloads the whole media again for each file of it that it is told of, and then finds

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from olympe_base import LIMIT, Visit, plain  # isort: skip
@@ -191,8 +192,8 @@ class Payload(Visit):
         listed = media.list_media()
         self.result["media"] = {id: plain(media.media_info(id)._asdict()) for id in listed}
         for id in listed:
-            self.download(id)
-        self.ask("thumbnails of a burst", download_media_thumbnail("10000002"))
+            self.download(f"download {id}", partial(download_media, id, integrity_check=True))
+        self.download("thumbnails of a burst", partial(download_media_thumbnail, "10000002"))
         files = [file for file in sorted(self.folder.iterdir()) if file.suffix in (".JPG", ".DNG", ".MP4")]
         self.result["files"] = {file.name: hashlib.md5(file.read_bytes()).hexdigest() for file in files}
         self.result["thumbnails"] = sorted(file.name for file in (self.folder / "thumbnails").glob("*.JPG"))
@@ -206,11 +207,11 @@ class Payload(Visit):
         gone = mediastore.counters(photo_media_count=0, video_media_count=0, _policy="check_wait", _timeout=LIMIT)
         self.expect("and not counted", gone)
 
-    def download(self, id: str) -> None:
+    def download(self, name: str, media: Callable[[], object]) -> None:
         """It gives the machine's own disk two seconds, which a busy machine may need for a burst: up to three times."""
-        with self.step(f"download {id}") as entry:
+        with self.step(name) as entry:
             for _ in range(3):
-                if self._wait(entry, self.drone.media(download_media(id, integrity_check=True))):
+                if self._wait(entry, self.drone.media(media())):
                     return
 
     def format(self) -> None:

@@ -57,16 +57,16 @@ class Video(Look, Visit):
         self.say("seen to land", watch.wait_for_state("FS_LANDING") and watch.wait_for_state("FS_LANDED"))
 
     def replay(self, name: str) -> None:
-        """Record a second of the machine's time, and watch it."""
+        """Record for three seconds of the machine's time, and watch it."""
         if self.model == "ai":
             start = camera2.Event.Recording(type="start", stop_reason="user_request", _policy="wait")
             self.expect("record", camera2.Command.StartRecording(camera_id=0) & start)
-            time.sleep(1.0)
+            time.sleep(3.0)
             stop = camera2.Event.Recording(type="stop", _policy="wait")
             self.expect("recorded", camera2.Command.StopRecording(camera_id=0) & stop)
         else:
             self.expect("record", camera.start_recording(cam_id=0))
-            time.sleep(1.0)
+            time.sleep(3.0)
             self.expect("recorded", camera.stop_recording(cam_id=0))
         url = f"http://{self.address}:{self.http_port}/api/v1/media/medias"
         with urllib.request.urlopen(url, timeout=LIMIT) as answer:

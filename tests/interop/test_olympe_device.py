@@ -188,8 +188,9 @@ def test_olympe_understands_us_and_we_understand_olympe(
         assert await heard.get() == ardrone3.AltitudeChanged(1.5)
         referee.send("generic.custom_evt", [0x1234, 1, {"hex": payload.hex()}])
         assert await heard.get() == UnknownMessage(MessageId(133, 0, 3), packed)
-        # all is acknowledged, nothing is unreadable, nothing was sent twice
-        assert {name for name in session.counters if name not in ("sent", "received")} <= {"ping"}
+        # All is acknowledged, nothing is unreadable, nothing was sent twice; but libarsdk does so, where the machine
+        # lets it wait for our acknowledgement longer than 150 ms.
+        assert {name for name in session.counters if name not in ("sent", "received")} <= {"ping", "duplicate"}
         await session.close()
 
     referee.run(body)
@@ -257,7 +258,7 @@ def test_every_protobuf_message_passes_libarsdk(referee: Referee) -> None:
 @pytest.mark.parametrize("version", [1, 3])
 def test_olympe_answers_our_pings(referee: Referee, version: int) -> None:
     async def body() -> None:
-        session, _ = await join(version, ping_after=0.2)
+        session, _ = await join(version)
         while session.counters["ping"] < 5:
             await asyncio.sleep(0.05)
             assert not session.lost.done()

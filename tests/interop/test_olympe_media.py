@@ -21,7 +21,9 @@ async def test_olympes_media_examples(via: str, tmp_path: Path) -> None:
     downloads.mkdir()
     port = str(olympe.HTTP_PORT)
     controller = ("--skycontroller", "4") if via == "skycontroller" else ()
-    async with simulator_process(address, log, "--model", "ai", "--http-port", port, "--seed", "1", *controller):
+    # The examples give a burst and its media three seconds; it takes one and a half of simulated ones.
+    options = ("--model", "ai", "--http-port", port, "--seed", "1", "--speed", "3", *controller)
+    async with simulator_process(address, log, *options):
         report, err = await olympe.run("olympe_media.py", address, port, via, str(downloads), timeout=200.0)
     assert report == {"failed": None}, err
     told = olympe.complaints(err)
@@ -34,6 +36,7 @@ async def test_olympes_media_examples(via: str, tmp_path: Path) -> None:
         assert hashlib.md5(file.read_bytes()).hexdigest() == told_md5
     assert sorted(file.name for file in downloads.glob("*/thumbnails/*.JPG")) == [file.name for file in files]
     entries = [json.loads(line) for line in log.read_text().splitlines()]
+    olympe.clock_set(entries, "Drone" if via == "drone" else "SkyController4")
     counted = [entry["args"]["photo_resource_count"] for entry in entries if entry["name"] == "mediastore.counters"]
     # Files are counted as they reach the card, and when the example has all of them it deletes them.
     assert max(counted) == 14
