@@ -25,8 +25,11 @@ def repeated(do: Callable[[], None], seconds: float, name: str, engage: Callable
     """A program's own loop, as the examples of dronekit have it; after some time, until the test has looked.
 
     `engage` is what makes the drone listen. Where the machine held this program up, the drone hovers and listens no
-    more: so it is said again, and what is flown by then has to settle anew.
+    more: so it is said again, and what is flown by then has to settle anew. It is said at the beginning in any case:
+    the machine may have stood still since the last setpoint of what came before.
     """
+    do()
+    engage()
     due: float | None = time.monotonic() + seconds
     last = time.monotonic()
     looked = threading.Event()
@@ -81,7 +84,6 @@ def main(url: str, flavour: str) -> None:
 
     if flavour == "px4":
         repeated(north, 1.0, "setpoints before Offboard")
-    engage()
     repeated(north, 5.0, "velocity", engage)
     place = setpoint(mavutil.mavlink.MAV_FRAME_LOCAL_NED, POSITION_ONLY, (4.0, -5.0, -10.0), nowhere)
     repeated(place, 9.0, "position", engage)

@@ -30,7 +30,7 @@ async def test_conf_118_setpoints(flavour: str) -> None:
             pose = await held(w, script, "position", calm=9.0)
             assert (pose.north, pose.east, pose.up) == pytest.approx((4.0, -5.0, 10.0), abs=0.7)
             await script.line(lambda line: line.startswith("idle"), timeout=30.0)
-            assert (await held(w, script, "channels")).ve > 1.0
+            assert (await held(w, script, "channels", calm=3.0)).ve > 1.0
             await script.line(lambda line: line == "mode RTL", timeout=30.0)
             assert len(w.commands("rth.return_to_home")) == 1
             assert await script.end() == 0, script
