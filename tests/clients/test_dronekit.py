@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 import sys
 from pathlib import Path
 
 import pytest
+from support.missions import apart
 from support.product import product, program
 from support.world import loopback
 
@@ -54,8 +56,9 @@ async def test_conf_075_117_dronekit_missions(tmp_path: Path) -> None:
         await p.flying_state("landed")
         track = [entry["args"] for entry in p.entries("pose")]
         for place in ((HOME[0] + 0.00018, HOME[1], 6.0), (HOME[0], HOME[1] + 0.0001, 9.0)):
-            flat = [(geo.distance(*place[:2], at["lat"], at["lon"]), abs(at["ato"] - place[2])) for at in track]
-            assert min(max(pair) for pair in flat) < 2.0
+            # Between two poses the drone goes straight on, however rarely a busy machine lets it log one.
+            from_it = [(*geo.offset(*place[:2], at["lat"], at["lon"]), at["ato"] - place[2]) for at in track]
+            assert min(apart((0.0, 0.0, 0.0), one, two) for one, two in itertools.pairwise(from_it)) < 2.0
         names = [entry["args"]["command"] for entry in p.entries("plan", "item")]
         lines = [name.removeprefix("condition_") for name in names]
         assert lines[-7:] == [
