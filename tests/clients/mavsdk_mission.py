@@ -137,6 +137,7 @@ async def raw(drone: Any, paths: list[str]) -> None:
         other = [str(one.seq) for one, two in pairs if fields(one, autopilot) != fields(two, autopilot)]
         say("import", name, len(items), f"differs:{','.join(other)}" if other else "equal")
     changed = asyncio.ensure_future(changes(mission))
+    await asyncio.sleep(0)  # it has subscribed now, and is waiting
     say("yours")
     await changed
     say("changed to", len(await mission.download_mission()))
