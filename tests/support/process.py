@@ -29,8 +29,8 @@ class SimulatorProcess:
 
     def commands(self) -> list[dict[str, Any]]:
         """Every command it has received, oldest first."""
-        lines = self.log.read_text().splitlines() if self.log.exists() else []
-        return [entry for entry in map(json.loads, lines) if entry["kind"] == "command"]
+        whole = self.log.read_bytes().rpartition(b"\n")[0] if self.log.exists() else b""
+        return [entry for entry in map(json.loads, whole.splitlines()) if entry["kind"] == "command"]
 
 
 async def start_simulator(address: str, log: Path, *arguments: str) -> SimulatorProcess:
