@@ -16,6 +16,9 @@ from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.place import Place
 from anafi_mav.services.refusal import Refused
 
+SAME_HEIGHT = 0.1
+"""m by which the height of a moveTo may differ from the one asked for: some millimetres tell two of them apart."""
+
 
 @dataclass(frozen=True)
 class Goto:
@@ -30,6 +33,14 @@ class Goto:
     """m/s over ground, of this move only; None: the vehicle's cruise speed."""
     mode: FlightMode
     """The mode that the vehicle is in on the way."""
+
+    def is_to(self, target: Position) -> bool:
+        """A moveTo with this target (height above take-off) flies there."""
+        return (
+            self.place.latitude == target.latitude
+            and self.place.longitude == target.longitude
+            and abs(self.ato - target.altitude) < SAME_HEIGHT
+        )
 
     def at_height(self, ato: float) -> Goto:
         return replace(self, ato=ato)
@@ -49,10 +60,16 @@ class GuidedFlight:
 
     @property
     def goto(self) -> Goto | None:
-        """Where the drone is on its way to by `go`; None when it is on no such way."""
-        goto, vehicle = self._goto, self._vehicle
-        on_the_way = goto is not None and vehicle.selected is goto.mode and vehicle.drone.piloting.move is not None
-        return goto if on_the_way else None
+        """Where the drone is on its way to, by `go` or by a single setpoint in Guided; None when on no such way."""
+        goto, vehicle, move = self._goto, self._vehicle, self._vehicle.drone.piloting.move
+        if move is None or move.target is None:
+            return None
+        if goto is not None and goto.mode is vehicle.selected and goto.is_to(move.target):
+            return goto
+        if vehicle.selected is not FlightMode.GUIDED:
+            return None
+        target = move.target
+        return Goto(Place(target.latitude, target.longitude), target.altitude, None, None, FlightMode.GUIDED)
 
     async def reposition(
         self,

@@ -185,6 +185,8 @@ class OffboardFlight:
         """A setpoint in mode Guided takes the drone over from whatever it does in that mode."""
         try:
             self._require_freedom("Setpoint")
+            if self._vehicle.mode is not FlightMode.GUIDED:  # ended by what arrived together with the setpoint
+                raise Refused(f"Setpoint refused: this is {self._vehicle.mode.value}")
             await self._vehicle.take_over()
             await self._vehicle.drone.piloting.cancel_return_home()
             if not self._vehicle.in_air or self._vehicle.returning:
@@ -292,7 +294,7 @@ class OffboardFlight:
             self._goal, self._course = self._resolved(setpoint), self._turned_to(setpoint)
             if setpoint.moves and self._goal is not None:
                 self.flown = None
-                self._moves.go(self._goal, self._course.yaw, now)
+                self._moves.go(self._goal, self._course.yaw, now, asked=self._stream.state is State.ENGAGED)
             else:
                 self._hold(self._motion_sticks(setpoint, limits, now), now)
         except Refused as refusal:  # what the drone told when the setpoint arrived is not known any more

@@ -50,10 +50,13 @@ class OffboardMoves:
         """Something has been begun and not been stopped; it may have arrived."""
         return self._begun is not None
 
-    def go(self, goal: Goal, yaw: float | None, now: float) -> None:
-        """Fly to a goal, and turn to a heading (rad from north) on the way; None keeps what is."""
+    def go(self, goal: Goal, yaw: float | None, now: float, *, asked: bool) -> None:
+        """Fly to a goal, and turn to a heading (rad from north) on the way; None keeps what is.
+
+        `asked`: somebody still says so, again and again. What was said once is tried once.
+        """
         wanted = (goal, yaw)
-        if wanted == self._begun and now < self._retry_at:
+        if wanted == self._begun and (not asked or now < self._retry_at):
             return
         self._begun = self._wanted = wanted
         self._retry_at = math.inf

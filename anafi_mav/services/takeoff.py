@@ -228,7 +228,9 @@ class Takeoff:
         self._set_timer("_disarm_timer", AUTO_DISARM, self._auto_disarm)
 
     def _auto_disarm(self) -> None:
-        if self._armed and self._vehicle.on_ground:
+        if self._vehicle.drone.piloting.about_to_fly:
+            self._rearm_disarm_timer()  # a mission's start is with the drone: who says disarmed now may see it rise
+        elif self._armed and self._vehicle.on_ground:
             self._armed = False
             self._vehicle.text(Severity.INFO, "Disarmed: no take-off followed")
             self._vehicle.changed()

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import asyncio
 import enum
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterator
+from contextlib import contextmanager
 
 from anafi_mav.clock import Clock
 from anafi_mav.drone import Drone
@@ -161,7 +162,8 @@ class Vehicle(Aircraft):
     async def land(self) -> None:
         """Land here. On the ground there is nothing to do."""
         await self.take_over()
-        await self.drone.piloting.land()
+        with self._selected_no_more(None):
+            await self.drone.piloting.land()
 
     async def return_home(self) -> None:
         """Fly home by the drone's own return."""
@@ -170,7 +172,8 @@ class Vehicle(Aircraft):
         if self.flying_state in LANDING:
             raise Refused("Return refused: the drone is landing")
         await self.take_over()
-        await self.drone.piloting.return_home()
+        with self._selected_no_more(None):
+            await self.drone.piloting.return_home()
 
     async def hold(self, mode: FlightMode = FlightMode.HOLD) -> None:
         if self.flying_state in LANDING:
@@ -181,11 +184,12 @@ class Vehicle(Aircraft):
             raise Refused(f"{mode.value} refused: the drone is about to take off")
         await self.take_over()
         if not self.on_ground:
-            await self.drone.piloting.stop()
-            # One asked for through somebody else, or before the link was lost. Raises when it is the drone's own.
-            await self.drone.piloting.cancel_return_home()
-            if self.flying_state in LANDING:
-                raise Refused(f"{mode.value} refused: the drone is landing")
+            with self._selected_no_more(mode):
+                await self.drone.piloting.stop()
+                # One asked for through somebody else, or before the link was lost. Raises when it is the drone's own.
+                await self.drone.piloting.cancel_return_home()
+                if self.flying_state in LANDING:
+                    raise Refused(f"{mode.value} refused: the drone is landing")
         self.select(mode)
 
     async def set_mode(self, mode: FlightMode, client: Hashable = None) -> None:
@@ -276,6 +280,23 @@ class Vehicle(Aircraft):
             await self.drone.piloting.stop()
 
     # Machinery.
+
+    @contextmanager
+    def _selected_no_more(self, wanted: FlightMode | None) -> Iterator[None]:
+        """The mode that was chosen is over but for `wanted`, before the drone shows what it is told in the block: a
+        setpoint or stick of that mode that comes meanwhile is not a newer order. On the ground there is none to stop.
+
+        What the drone does not do leaves all as it was.
+        """
+        before, orders = self._selected, self.orders
+        if before is not wanted and not self.on_ground:
+            self.forget_mode()
+        try:
+            yield
+        except BaseException:
+            if self.orders == orders:
+                self._selected = before
+            raise
 
     @property
     def _ending_mission(self) -> Helm | None:

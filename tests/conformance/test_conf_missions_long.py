@@ -146,7 +146,7 @@ async def test_jumps_and_chosen_items_on_an_ai_begin_in_the_middle_of_its_file()
         mark = w.client.mark()
         assert (await w.client.command(224, 2, 0)).result == dialect.MAV_RESULT_ACCEPTED
         await state(w, ACTIVE, seq=2, since=mark)
-        await state(w, ACTIVE, seq=1, since=mark)
+        await state(w, ACTIVE, seq=1, since=w.client.mark())  # again, and not still
         mark = w.client.mark()
         assert (await w.client.command(224, 4, 0)).result == dialect.MAV_RESULT_ACCEPTED
         await state(w, ACTIVE, seq=4, since=mark)
