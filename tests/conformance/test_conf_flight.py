@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import time
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.mav import NAN
-from support.world import ARMED, HOLD, HOME, LAND, POSITION, RETURN, world
+from support.params import value_of, write
+from support.world import ARMED, HOLD, HOME, LAND, POSITION, RETURN, World, world
 
 from anafi_mav import geo
+from anafi_mav.arsdk.messages.rth import StateReason
+from anafi_mav.mavlink import dialect as newer
 from anafi_mav.services.takeoff import ARM_WAIT, AUTO_DISARM
 
 ACCEPTED, DENIED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_DENIED
@@ -155,6 +159,63 @@ async def test_conf_025_return(how: str, flavour: str) -> None:
             assert ack.result == ACCEPTED
         await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.returning, since=mark)
         assert len(w.commands("rth.return_to_home")) == 1
+
+
+@pytest.mark.parametrize("end", [newer.ANAFI_RETURN_END_LANDING, newer.ANAFI_RETURN_END_HOVERING])
+@pytest.mark.parametrize("flavour", FLAVOURS)
+async def test_conf_025_return_to_its_end(flavour: str, end: int) -> None:
+    """From the middle of a goto: it brakes, climbs to ANF_RTH_ALT, flies home, descends to ANF_RTH_END_ALT, and there
+    it lands or stays. Till then all of it is one mode, and ANAFI_HOME says how far it is."""
+    async with world(flavour=flavour) as w:
+        client = w.client
+        value = await write(client, "ANF_RTH_END", end, 6 if flavour == "px4" else 9, flavour)
+        assert value_of(value, flavour) == end
+        assert (await client.command(511, newer.MAVLINK_MSG_ID_ANAFI_HOME, 20_000)).result == ACCEPTED
+        await client.wait("ANAFI_HOME", lambda m: (m.end, m.min_altitude, m.hovering_altitude) == (end, 20.0, 10.0))
+        await w.take_off()
+        place = geo.destination(*HOME[:2], 30.0, 20.0)
+        assert (await client.command(REPOSITION, -1, 1, 0, NAN, frame=6, x=place[0], y=place[1], z=5.0)).result == 0
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 10.0, 20.0)
+        mark, began = client.mark(), w.drone.log[-1].t
+        client.send(dialect.MAVLink_set_mode_message(1, 1, w.modes.returning))
+        await client.heartbeat(lambda beat: beat.custom_mode == w.modes.returning, since=mark)
+        flying = client.mark()
+        over = await w.drone.wait_log(
+            lambda e: e.name == "rth.state" and e.args["reason"] == StateReason.FINISHED, 40.0
+        )
+        assert {m.custom_mode for at, m in client.since(flying, "HEARTBEAT") if at < over.t} == {w.modes.returning}
+        assert at_home(w)
+        assert w.drone.pose.up == pytest.approx(10.0, abs=0.3)
+        heights = [e.args["up"] for e in w.drone.log if e.kind == "pose" and e.t > began]
+        assert max(heights) == pytest.approx(20.0, abs=0.5)
+        await client.wait("ANAFI_HOME", lambda m: m.state == newer.ANAFI_RETURN_STATE_AVAILABLE, since=flying)
+        phases = [(m.state, m.reason) for _, m in client.since(mark, "ANAFI_HOME")]
+        begun = phases.index((newer.ANAFI_RETURN_STATE_PENDING, newer.ANAFI_RETURN_REASON_USER_REQUEST))
+        assert [phase for phase, _ in itertools.groupby(phases[begun:])] == [
+            (newer.ANAFI_RETURN_STATE_PENDING, newer.ANAFI_RETURN_REASON_USER_REQUEST),
+            (newer.ANAFI_RETURN_STATE_IN_PROGRESS, newer.ANAFI_RETURN_REASON_USER_REQUEST),
+            (newer.ANAFI_RETURN_STATE_AVAILABLE, newer.ANAFI_RETURN_REASON_FINISHED),
+        ]
+        if end == newer.ANAFI_RETURN_END_HOVERING:
+            await client.heartbeat(lambda beat: beat.custom_mode == w.modes.hold, since=flying)
+            await client.wait("HEARTBEAT")
+            await client.heartbeat(lambda beat: beat.custom_mode == w.modes.hold and beat.base_mode & ARMED)
+            assert w.drone.flying_state.name == "HOVERING"
+            assert at_home(w)
+            assert w.drone.pose.up == pytest.approx(10.0, abs=0.3)
+            assert (await client.command(21)).result == ACCEPTED
+        await client.heartbeat(lambda beat: beat.custom_mode == w.modes.land and beat.base_mode & ARMED, since=flying)
+        await client.heartbeat(lambda beat: not beat.base_mode & ARMED, since=flying, timeout=20.0)
+        assert w.drone.flying_state.name == "LANDED"
+        assert at_home(w)
+        orders = {e.name for e in w.drone.log if e.kind == "command" and e.t > began and not e.name.endswith("PCMD")}
+        landing = {"ardrone3.Piloting.Landing"} if end == newer.ANAFI_RETURN_END_HOVERING else set()
+        assert orders == {"rth.return_to_home"} | landing
+
+
+def at_home(w: World) -> bool:
+    """The drone truly is where it took off."""
+    return math.hypot(w.drone.pose.north, w.drone.pose.east) < 0.5
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
