@@ -349,7 +349,7 @@ def states() -> str:
     tables: list[tuple[str, Any]] = [
         ("Transfer of a mission, a fence or rally points", plan_transfer),
         ("A mission", mission_progress),
-        ("The fence", fence_watch),
+        ("The fence: zones, floor and ceiling each", fence_watch),
         ("Setpoints of a program", offboard),
         ("Sticks of a ground station", manual_flight),
         ("Following a target", follow),

@@ -116,22 +116,22 @@ class FenceService(Service):
     def _look(self, now: float) -> None:
         self._looked = now
         watch, before = self._watch, self._watch.state
-        blind = watch.blind
+        blind, breaches = watch.blind, watch.breaches
         action = watch.look(self._sight(now), now)
         if watch.blind and not blind:
             self.host.text(Severity.WARNING, "Fence not watched: the drone does not know where it is")
-        if watch.state is State.OUTSIDE and before is not State.OUTSIDE:
+        if watch.breaches != breaches:
             self._breach_ms = self.host.times().boot_ms
         if action is not None:
             self._begin(action)
-        elif before is State.OUTSIDE and watch.state is State.INSIDE:
+        elif before is State.OUTSIDE and watch.state is not State.OUTSIDE:
             self.host.text(Severity.NOTICE, "Inside the fence again")
         self._tell()
 
     def _begin(self, action: Reaction) -> None:
         verdict = self._watch.verdict
         assert verdict is not None
-        head = "Fence breach" if self._watch.state is State.OUTSIDE else "Fence ahead"
+        head = "Fence ahead" if verdict.ahead else "Fence breach"
         if action is Reaction.WARN:
             self.host.text(Severity.WARNING, f"{head}: {verdict.text}")
         elif self.host.drone.controller.pilot_flies:

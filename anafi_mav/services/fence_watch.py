@@ -2,8 +2,9 @@
 
     watch.look(sight, now) -> the action to carry out now, or None
 
-An action is carried out once for each time that the vehicle comes to the boundary; who takes it over then is let fly
-back. A vehicle that returns or lands, whoever told it to, is warned about and nothing more.
+An action is carried out once for each time that the vehicle comes to a boundary; who takes it over then is let fly
+back. Zones, floor and ceiling are boundaries of their own: beyond one of them the others hold. A vehicle that returns
+or lands, whoever told it to, is warned about and nothing more.
 """
 
 from __future__ import annotations
@@ -122,7 +123,8 @@ TRANSITIONS: dict[State, dict[Event, State]] = {
     State.LEAVING: {Event.AHEAD: State.LEAVING, Event.BREACH: State.OUTSIDE, Event.SAFE: State.INSIDE},
     State.OUTSIDE: {Event.SAFE: State.INSIDE},
 }
-"""What is not here changes nothing: outside, the vehicle is let fly however it will until it is back."""
+"""Of zones, floor and ceiling, each for itself. What is not here changes nothing: outside, the vehicle is let fly
+however it will until it is back."""
 
 
 class OutsideFence(AnafiMavError):
@@ -165,6 +167,46 @@ class Verdict:
     breach: Breach
     text: str
     """A clause: "3 m beyond the inclusion polygon of items 0 to 4"."""
+    ahead: bool = False
+    """It is not beyond yet."""
+
+
+Finding = tuple[Event | None, Verdict | None]
+"""What there is to see of a boundary; no event when nothing can be said."""
+
+SAFE: Finding = (Event.SAFE, None)
+
+
+class _Side:
+    """Where the vehicle is in relation to one kind of boundary, and what was done about it."""
+
+    def __init__(self) -> None:
+        self.state = State.INSIDE
+        self.verdict: Verdict | None = None
+        """Why the state is what it is; None when all is well."""
+        self.orders: int | None = None
+        """The vehicle's count of orders when our action was carried out."""
+        self.retry_at: float | None = None
+        """When an action that failed is tried again."""
+        self._calm_since: float | None = None
+        """Since when nothing ahead was seen."""
+
+    def see(self, event: Event | None, verdict: Verdict | None, now: float) -> State:
+        """Something is seen, or nothing can be; returns the state before."""
+        before = self.state
+        if event is not Event.SAFE:
+            self._calm_since = None
+        elif before is not State.INSIDE:
+            if self._calm_since is None:
+                self._calm_since = now
+            if now - self._calm_since < CALM:
+                return before
+        if event is None:
+            return before
+        self.state, self.verdict = TRANSITIONS[before].get(event, before), verdict
+        if verdict is None:
+            self.orders = self.retry_at = None
+        return before
 
 
 class FenceWatch:
@@ -181,9 +223,8 @@ class FenceWatch:
         """m above the take-off point; counts once the vehicle has been above it. 0: there is none."""
         self.items: tuple[PlanItem, ...] = ()
         self.fence = Fence()
-        self.state = State.INSIDE
         self.verdict: Verdict | None = None
-        """Why the state is what it is; None when all is well."""
+        """What the action is about that `look` returned; without one, why the state is what it is."""
         self.breach = Breach.NONE
         """The last one."""
         self.breaches = 0
@@ -192,20 +233,17 @@ class FenceWatch:
         self.blind = False
         """In the air with a fence and without knowing where."""
         self._above_floor = False
-        self._calm_since: float | None = None
-        """Since when nothing ahead was seen."""
-        self._acting = False
-        """An action is being carried out."""
-        self._orders: int | None = None
-        """The vehicle's count of orders when our action was carried out."""
-        self._retry_at: float | None = None
+        self._sides = _sides()
+        """In the order in which they are looked at: an action at the zones says most."""
+        self._acting: _Side | None = None
+        """For whose sake an action is being carried out."""
 
     # Settings.
 
     def take(self, items: Sequence[PlanItem]) -> None:
         """Another fence is in force."""
         self.items, self.fence = tuple(items), fence_of(items)
-        self.state, self.verdict, self._orders, self._retry_at = State.INSIDE, None, None, None
+        self._sides, self.verdict = _sides(), None
 
     def enable(self, types: int = EVERYTHING) -> None:
         """Enable some kinds of boundaries."""
@@ -229,6 +267,12 @@ class FenceWatch:
     def in_force(self) -> bool:
         """There is a boundary of ours, and it is enabled."""
         return bool(self.zones.zones) or self._has_floor
+
+    @property
+    def state(self) -> State:
+        """The worst of zones, floor and ceiling."""
+        states = {side.state for side in self._sides.values()}
+        return next(state for state in (State.OUTSIDE, State.LEAVING, State.INSIDE) if state in states)
 
     @property
     def healthy(self) -> bool:
@@ -285,71 +329,83 @@ class FenceWatch:
         elif sight.ato is not None and sight.ato >= self.floor:
             self._above_floor = True
         self.blind = bool(zones.zones) and sight.airborne and (sight.place is None or sight.age > STALE)
-        event, verdict = self._judge(zones, sight)
-        if event is not Event.SAFE:
-            self._calm_since = None
-        elif self.state is not State.INSIDE:
-            if self._calm_since is None:
-                self._calm_since = now
-            if now - self._calm_since < CALM:
-                return None
-        if event is None:
+        for breach, side in self._sides.items():
+            event, verdict = self._judge(breach, zones, sight)
+            before = side.see(event, verdict, now)
+            if side.state is State.OUTSIDE and before is not State.OUTSIDE:
+                self.breach, self.breached_at = breach, now
+                self.breaches += 1
+            action = None if verdict is None else self._answer(side, before, verdict, sight, now)
+            if action is not None:
+                self.verdict = verdict
+                return action  # the next look sees to the other boundaries
+        self.verdict = next((side.verdict for side in self._sides.values() if side.verdict is not None), None)
+        return None
+
+    def _answer(self, side: _Side, before: State, verdict: Verdict, sight: Sight, now: float) -> Reaction | None:
+        """What is to be done about what is seen of one boundary."""
+        if self.action is Reaction.NONE:
             return None
-        before, self.state = self.state, TRANSITIONS[self.state].get(event, self.state)
-        self.verdict = verdict
-        if verdict is None:
-            self._orders = self._retry_at = None
-            return None
-        if self.state is State.OUTSIDE and before is not State.OUTSIDE:
-            self.breach, self.breached_at = verdict.breach, now
-            self.breaches += 1
-        if self.action is Reaction.NONE or self._acting:
-            return None
-        if self._retry_at is not None:
-            return self._act(verdict, sight) if now >= self._retry_at else None
+        if self._acting is not None:
+            # What is under way serves all boundaries, but one that is crossed meanwhile is told of.
+            crossed = side.state is State.OUTSIDE and before is not State.OUTSIDE
+            return Reaction.WARN if crossed and side is not self._acting else None
+        if side.retry_at is not None:
+            return self._act(side, verdict, sight) if now >= side.retry_at else None
         if before is State.OUTSIDE:
             return None
-        if before is State.LEAVING and self._orders == sight.orders:
+        if before is State.LEAVING and side.orders == sight.orders:
             # It brakes already; should it not come to rest in time, nothing better can be done.
-            return Reaction.WARN if self.state is State.OUTSIDE else None
-        return self._act(verdict, sight)
+            return Reaction.WARN if side.state is State.OUTSIDE else None
+        return self._act(side, verdict, sight)
 
-    def _act(self, verdict: Verdict, sight: Sight) -> Reaction:
-        self._retry_at = None
+    def _act(self, side: _Side, verdict: Verdict, sight: Sight) -> Reaction:
+        side.retry_at = None
         if not sight.flying or verdict.breach is Breach.CEILING or self.action is Reaction.WARN:
-            self._orders = sight.orders
+            side.orders = sight.orders
             return Reaction.WARN
-        self._acting = True
+        self._acting = side
         return self.action
 
     def done(self, orders: int) -> None:
         """The action was carried out; `orders` is the vehicle's count after it."""
-        self._acting, self._orders = False, orders
-
-    def link_down(self) -> None:
-        """Nothing is known any more of what the vehicle does. The fence and its settings stay."""
-        self.state, self.verdict, self.blind = State.INSIDE, None, False
-        self._above_floor = self._acting = False
-        self._calm_since = self._orders = self._retry_at = None
+        self._acting = None
+        for side in self._sides.values():
+            side.orders, side.retry_at = orders, None
 
     def failed(self, now: float) -> None:
         """The action was not carried out: it is tried again, unless the vehicle comes back inside before."""
-        self._acting, self._retry_at = False, now + RETRY
+        self._acting = None
+        for side in self._sides.values():
+            if side.state is not State.INSIDE:
+                side.retry_at = now + RETRY
 
-    def _judge(self, zones: Fence, sight: Sight) -> tuple[Event | None, Verdict | None]:
-        """What there is to see; no event when nothing can be said."""
+    def link_down(self) -> None:
+        """Nothing is known any more of what the vehicle does. The fence and its settings stay."""
+        self._sides, self._acting, self.verdict = _sides(), None, None
+        self.blind = self._above_floor = False
+
+    def _judge(self, breach: Breach, zones: Fence, sight: Sight) -> Finding:
+        """What there is to see of one kind of boundary."""
         if not sight.airborne:
-            return Event.SAFE, None
-        if sight.ato is not None and sight.flying:
+            return SAFE
+        if breach is Breach.BOUNDARY:
+            return self._judge_zones(zones, sight)
+        if sight.ato is None or not sight.flying:
+            return SAFE
+        if breach is Breach.FLOOR:
             below = self.floor - sight.ato
             if self._has_floor and self._above_floor and below > SLACK:
-                return Event.BREACH, Verdict(Breach.FLOOR, f"{below:.0f} m below the floor of {self.floor:g} m")
-            above = -math.inf if sight.ceiling is None else sight.ato - sight.ceiling
-            if self.types & CEILING and above > SLACK:
-                text = f"{above:.0f} m above the drone's ceiling of {sight.ceiling:g} m"
-                return Event.BREACH, Verdict(Breach.CEILING, text)
+                return Event.BREACH, Verdict(breach, f"{below:.0f} m below the floor of {self.floor:g} m")
+        elif self.types & CEILING and sight.ceiling is not None:
+            above = sight.ato - sight.ceiling
+            if above > SLACK:
+                return Event.BREACH, Verdict(breach, f"{above:.0f} m above the drone's ceiling of {sight.ceiling:g} m")
+        return SAFE
+
+    def _judge_zones(self, zones: Fence, sight: Sight) -> Finding:
         if not zones.zones:
-            return Event.SAFE, None
+            return SAFE
         if sight.place is None or sight.age > STALE:
             return None, None
         north, east = sight.velocity
@@ -362,8 +418,12 @@ class FenceWatch:
             stopping = REACTION + speed / (2.0 * BRAKING)
             way = zones.leaves(here, geo.destination(*here, north * stopping, east * stopping), sight.home)
             if way is not None:
-                return Event.AHEAD, Verdict(Breach.BOUNDARY, f"too fast to stop before the {way.zone}")
-        return (Event.SAFE, None) if margin.metres >= BACK_INSIDE else (None, None)
+                return Event.AHEAD, Verdict(Breach.BOUNDARY, f"too fast to stop before the {way.zone}", ahead=True)
+        return SAFE if margin.metres >= BACK_INSIDE else (None, None)
+
+
+def _sides() -> dict[Breach, _Side]:
+    return {breach: _Side() for breach in (Breach.BOUNDARY, Breach.FLOOR, Breach.CEILING)}
 
 
 def _beyond(margin: Margin) -> str:

@@ -59,14 +59,14 @@ NUMBER = {"px4": {"hold": 2, "return": 3, "land": 5}, "ardupilot": {"hold": 4, "
 
 
 @asynccontextmanager
-async def flown(w: World, *, pitch: float = FORWARD) -> AsyncIterator[None]:
+async def flown(w: World, *, pitch: float = FORWARD, thrust: float = 0.5) -> AsyncIterator[None]:
     """A program at the PX4 endpoint that flies the drone north by setpoints, and goes on whatever the fence does."""
     pilot = await w.connect(254, port=5761)
 
     async def stream() -> None:
         rotation = list(quaternion_from_euler(0.0, pitch, 0.0))
         while True:
-            pilot.send(dialect.MAVLink_set_attitude_target_message(0, 1, 1, 0b111, rotation, 0.0, 0.0, 0.0, 0.5))
+            pilot.send(dialect.MAVLink_set_attitude_target_message(0, 1, 1, 0b111, rotation, 0.0, 0.0, 0.0, thrust))
             await asyncio.sleep(0.05)  # the program's own rate
 
     task = asyncio.ensure_future(stream())
@@ -186,6 +186,33 @@ async def test_conf_076_a_breach_is_acted_upon_once(flavour: str, action: str, c
             assert not w.commands("ardrone3.Piloting.Landing")
             north = [e.args["north"] for e in w.drone.log if e.kind == "pose"]
             assert north[-1] < max(north) - 1.0
+
+
+async def test_conf_076_below_the_floor_the_zones_hold() -> None:
+    """Held below the floor, the drone is flown on and out sideways: that is stopped like any other way out."""
+    async with world(also="px4", speed=1.0) as w:
+        assert (await upload(w.client, square(PLACE, 15.0), FENCE)).type == TAKEN
+        assert (await put(w, "ANF_FENCE_FLOOR", 10.0, 9)).param_value == 10.0
+        await w.take_off(12.0)
+        async with flown(w, pitch=0.0, thrust=0.2):
+            await said(w.client, "below the floor of 10 m: hold", timeout=20.0)
+        for ahead, words in ((1, "Fence ahead: too fast"), (0, "Fence breach: ")):
+            await put(w, "ANF_FENCE_AHEAD", ahead, 6)
+            mark = w.client.mark()
+            async with flown(w):
+                await said(w.client, words, since=mark, timeout=20.0)
+                await w.client.heartbeat(lambda beat: beat.custom_mode == MODES["px4"].hold, since=mark)
+                await at_rest(w)
+                assert farthest(w) < 15.0 if ahead else 15.0 < farthest(w) < 25.0
+                here = w.drone.pose.north
+                for _ in range(2):
+                    await w.client.wait("HEARTBEAT", timeout=3.0)
+                assert w.drone.pose.north == pytest.approx(here, abs=0.5)
+            assert w.drone.pose.up < 9.0
+            status = [m for _, m in w.client.since(0, "FENCE_STATUS")][-1]
+            kind = dialect.FENCE_BREACH_MINALT if ahead else dialect.FENCE_BREACH_BOUNDARY
+            assert (status.breach_status, status.breach_count, status.breach_type) == (1, 2 - ahead, kind)
+        assert len([text for text in texts(w.client) if text.endswith(": hold")]) == 3
 
 
 async def test_conf_076_warned_and_nothing_else() -> None:

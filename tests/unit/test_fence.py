@@ -504,6 +504,104 @@ def test_the_ceiling_is_the_drones_to_keep() -> None:
     assert watch.look(sight(ato=160.0), 2.0) is None
 
 
+# More than one boundary: the zones are a circle of 100 m, the floor is at 10 m, the ceiling at 150 m.
+
+
+def beyond(ato: float, action: Reaction = Reaction.HOLD, *, orders: int = 2) -> FenceWatch:
+    """Somebody has flown to this height, which is beyond floor or ceiling, and what that brings about was done."""
+    watch = watching(action)
+    watch.floor = 10.0
+    assert watch.look(sight(ato=12.0), 0.0) is None
+    assert watch.look(sight(ato=ato), 1.0) is not None
+    watch.done(orders)
+    assert (watch.state, watch.breaches) == (State.OUTSIDE, 1)
+    return watch
+
+
+@pytest.mark.parametrize(("ato", "kind"), [(8.0, Breach.FLOOR), (152.0, Breach.CEILING)])
+def test_beyond_floor_or_ceiling_the_zones_hold(ato: float, kind: Breach) -> None:
+    watch = beyond(ato)
+    assert watch.breach is kind
+    assert watch.look(sight(75.0, speed=(10.0, 0.0), ato=ato, orders=3), 2.0) is Reaction.HOLD
+    assert watch.verdict is not None
+    assert (watch.verdict.ahead, watch.verdict.breach) == (True, Breach.BOUNDARY)
+    assert (watch.state, watch.breach, watch.breaches) == (State.OUTSIDE, kind, 1)
+    watch.done(4)
+    assert watch.look(sight(90.0, speed=(5.0, 0.0), ato=ato, orders=4), 3.0) is None  # it brakes
+    assert watch.look(sight(103.0, ato=ato, orders=5), 4.0) is Reaction.HOLD  # somebody has flown on
+    assert watch.verdict.text == "3 m beyond the inclusion circle of item 0"
+    assert not watch.verdict.ahead
+    assert (watch.breach, watch.breaches, watch.breached_at) == (Breach.BOUNDARY, 2, 4.0)
+    watch.done(6)
+    assert watch.look(sight(110.0, ato=ato, orders=7), 5.0) is None  # he may fly back
+
+
+@pytest.mark.parametrize("action", [Reaction.WARN, Reaction.RETURN, Reaction.LAND, Reaction.TERMINATE])
+def test_each_boundary_has_the_action(action: Reaction) -> None:
+    watch = beyond(8.0, action)
+    assert watch.look(sight(103.0, ato=8.0, orders=3), 2.0) is action
+
+
+def test_beyond_the_zones_the_floor_holds() -> None:
+    watch = watching()
+    watch.floor = 10.0
+    assert watch.look(sight(103.0, ato=12.0), 0.0) is Reaction.HOLD
+    watch.done(2)
+    assert watch.look(sight(103.0, ato=8.0, orders=3), 1.0) is Reaction.HOLD
+    assert (watch.breach, watch.breaches) == (Breach.FLOOR, 2)
+
+
+def test_beyond_two_boundaries_nothing_is_done_again() -> None:
+    """Both estimates go to and fro over their boundaries for two minutes, and somebody flies it all the time."""
+    watch = beyond(8.0)
+    assert watch.look(sight(103.0, ato=8.0, orders=3), 2.0) is Reaction.HOLD
+    watch.done(4)
+    for n in range(240):
+        metres, ato = (95.0, 103.0)[n % 2], (8.0, 9.5)[n // 2 % 2]
+        assert watch.look(sight(metres, ato=ato, orders=5 + n), 3.0 + n / 2.0) is None
+    assert (watch.state, watch.breaches) == (State.OUTSIDE, 2)
+
+
+def test_back_inside_the_zones_they_hold_again_whatever_the_height() -> None:
+    watch = beyond(8.0)
+    assert watch.look(sight(103.0, ato=8.0, orders=3), 2.0) is Reaction.HOLD
+    watch.done(4)
+    for now in (3.0, 3.0 + CALM):
+        assert watch.look(sight(50.0, ato=8.0, orders=5), now) is None
+    assert watch.state is State.OUTSIDE  # below the floor
+    assert watch.look(sight(103.0, ato=8.0, orders=5), 6.0) is Reaction.HOLD
+    assert watch.breaches == 3
+    watch.done(6)
+    for now in (7.0, 7.0 + CALM):
+        assert watch.look(sight(50.0, ato=12.0, orders=7), now) is None
+    assert (watch.state, watch.verdict, watch.healthy) == (State.INSIDE, None, True)
+
+
+def test_two_boundaries_at_once_are_both_told_of() -> None:
+    watch = watching()
+    watch.floor = 10.0
+    watch.look(sight(ato=12.0), 0.0)
+    assert watch.look(sight(103.0, ato=8.0), 1.0) is Reaction.HOLD
+    assert watch.look(sight(104.0, ato=7.0), 1.2) is Reaction.WARN  # the hold is under way, and serves both
+    assert watch.verdict is not None
+    assert watch.verdict.breach is Breach.FLOOR
+    assert watch.look(sight(105.0, ato=7.0), 1.4) is None
+    watch.failed(2.0)
+    assert watch.look(sight(106.0, ato=7.0), 2.0 + RETRY) is Reaction.HOLD
+    watch.done(2)
+    assert watch.look(sight(106.0, ato=7.0, orders=2), 10.0) is None
+    assert watch.breaches == 2
+
+
+def test_a_warning_of_the_ceiling_stops_nobody() -> None:
+    """So it does not pass for the hold that brakes a vehicle before the zones."""
+    watch = watching()
+    assert watch.look(sight(85.0, speed=(9.0, 0.0)), 0.0) is Reaction.HOLD
+    watch.done(2)
+    assert watch.look(sight(95.0, ato=152.0, orders=3), 1.0) is Reaction.WARN
+    assert watch.look(sight(101.0, ato=152.0, orders=3), 2.0) is Reaction.HOLD
+
+
 def test_what_is_enabled() -> None:
     watch = FenceWatch()
     assert (watch.present, watch.in_force, watch.enabled) == (False, False, True)
