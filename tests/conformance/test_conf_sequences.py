@@ -6,14 +6,21 @@ from __future__ import annotations
 
 import asyncio
 import itertools
+import json
+import lzma
 import random
 import time
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from typing import Any
 
 import pytest
+from MAVProxy.modules.lib.param_ftp import ftp_param_decode
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.ftp import Ftp
 from support.mav import NAN, Client
 from support.params import fetch
+from support.plans import REQUESTS, content, mission, send_item
 from support.world import ARMED, HOME, World, loopback, world
 
 from anafi_mav import geo
@@ -35,6 +42,7 @@ async def requested(client: Client, message: str, id: int, *parameters: float, p
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
 async def test_conf_051_qgroundcontrol_connects(flavour: str) -> None:
+    """What was recorded of it, in that order (reference streams), and what newer ones ask besides (conformance A2)."""
     async with world(flavour=flavour) as w:
         client = w.client
         began = time.monotonic()
@@ -42,7 +50,10 @@ async def test_conf_051_qgroundcontrol_connects(flavour: str) -> None:
         # Its first word to a PX4 vehicle is a frame of MAVLink 1.
         frame = dialect.MAVLink_command_long_message(1, 1, REQUEST, 0, 148, 0, 0, 0, 0, 0, 0)
         client.send_raw(frame.pack(dialect.MAVLink(None, 255, 190), force_mavlink1=flavour == "px4"))
-        await client.wait("AUTOPILOT_VERSION", since=mark, timeout=1.0)
+        if flavour == "ardupilot":  # it does not wait for the first answer
+            assert (await client.command(511, 242, 1e6, timeout=1.2)).result == ACCEPTED
+        version = await client.wait("AUTOPILOT_VERSION", since=mark, timeout=1.0)
+        assert version.capabilities & dialect.MAV_PROTOCOL_CAPABILITY_FTP
         if flavour == "px4":
             assert (await requested(client, "PROTOCOL_VERSION", 300)).max_version == 200
         first = await requested(client, "AVAILABLE_MODES", 435, 1)
@@ -50,26 +61,63 @@ async def test_conf_051_qgroundcontrol_connects(flavour: str) -> None:
         for index in range(2, first.number_modes + 1):
             names.append((await requested(client, "AVAILABLE_MODES", 435, index)).mode_name)
         assert len(set(names)) == first.number_modes
-        metadata = await client.command(REQUEST, 397, timeout=1.2)
-        assert metadata.result in (ACCEPTED, UNSUPPORTED)
-        if flavour == "ardupilot":
+        where = await requested(client, "COMPONENT_METADATA", 397)
+        if flavour == "px4":
+            await metadata(client, where.uri)
+            assert (await client.command(401, timeout=1.2)).result == ACCEPTED
+            values = await fetch(client, flavour)
+            assert len(values) == next(iter(values.values())).param_count
+        else:
+            assert (await requested(client, "COMPONENT_INFORMATION", 395)).general_metadata_uri == where.uri
+            packed = ftp_param_decode(await Ftp(client).download("@PARAM/param.pck")).params
+            assert len({name for name, _, _ in packed}) == len(packed) > 100
+        async with data_streams(client if flavour == "ardupilot" else None):
+            for _ in range(2):
+                client.send(dialect.MAVLink_system_time_message(int(time.time() * 1e6), 1000))
+            for kind in (0, 1, 2):
+                mark = client.mark()
+                client.send(dialect.MAVLink_mission_request_list_message(1, 1, kind))
+                count = await client.wait(
+                    "MISSION_COUNT", lambda m, kind=kind: m.mission_type == kind, since=mark, timeout=0.5
+                )
+                assert (count.count, count.target_system, count.target_component) == (0, 255, 190)
+            await client.wait("HOME_POSITION", since=0, timeout=2.0)
+            assert time.monotonic() - began < 10.0
+            if flavour == "ardupilot":
+                for kind in ("SYS_STATUS", "RC_CHANNELS", "GLOBAL_POSITION_INT", "ATTITUDE", "VFR_HUD"):
+                    await client.wait(kind, timeout=2.0)
+        assert not [m for _, m in client.since(0, "STATUSTEXT") if m.severity <= dialect.MAV_SEVERITY_WARNING]
+
+
+async def metadata(client: Client, uri: str) -> None:
+    """It loads the general document, then what that says of parameters and events."""
+    general = await loaded(client, uri)
+    types = {entry["type"]: entry for entry in general["metadataTypes"]}
+    for type in (1, 4):  # COMP_METADATA_TYPE_PARAMETER and _EVENTS, which the stock dialect does not have
+        assert (await loaded(client, types[type]["uri"]))["version"] >= 1
+
+
+async def loaded(client: Client, uri: str) -> Any:
+    assert uri.startswith("mftp:///")
+    return json.loads(lzma.decompress(await Ftp(client).download(uri.removeprefix("mftp://"))))
+
+
+@asynccontextmanager
+async def data_streams(client: Client | None) -> AsyncIterator[None]:
+    """It asks ArduPilot's groups of streams at 2 Hz, all of them every half a second."""
+
+    async def ask() -> None:
+        while client is not None:
             for stream in (1, 2, 3, 6, 10, 11, 12):
                 client.send(dialect.MAVLink_request_data_stream_message(1, 1, stream, 2, 1))
-            assert (await client.command(511, 242, 1e6, timeout=1.2)).result == ACCEPTED
-        values = await fetch(client, flavour)
-        assert len(values) == next(iter(values.values())).param_count
-        for _ in range(2):
-            client.send(dialect.MAVLink_system_time_message(int(time.time() * 1e6), 1000))
-        for kind in (0, 1, 2):
-            mark = client.mark()
-            client.send(dialect.MAVLink_mission_request_list_message(1, 1, kind))
-            count = await client.wait(
-                "MISSION_COUNT", lambda m, kind=kind: m.mission_type == kind, since=mark, timeout=0.5
-            )
-            assert (count.count, count.target_system, count.target_component) == (0, 255, 190)
-        await client.wait("HOME_POSITION", since=0, timeout=2.0)
-        assert time.monotonic() - began < 10.0
-        assert not [m for _, m in client.since(0, "STATUSTEXT") if m.severity <= dialect.MAV_SEVERITY_WARNING]
+            await asyncio.sleep(0.5)
+
+    task = asyncio.ensure_future(ask())
+    try:
+        yield
+    finally:
+        task.cancel()
+        await asyncio.wait([task])
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
@@ -181,6 +229,47 @@ async def test_conf_120_mission_planner() -> None:
         await w.drone.wait_log(lambda e: e.kind == "pose" and abs(e.args["up"] - 9.0) < 0.4, 20.0)
         client.send_command(SET_MODE, 1, 9)
         await client.heartbeat(lambda beat: not beat.base_mode & ARMED, timeout=30.0)
+
+
+async def test_conf_120_mission_planner_writes_and_reads_a_mission() -> None:
+    """Its patience: 700 ms for a list's answer, 450 ms for the request after an item, 2.5 s for an item. It hears what
+    is addressed to it alone, and counts home as the first item."""
+    items = mission(HOME, 12)
+    async with world(flavour="ardupilot") as w:
+        client = w.client
+        version = await requested(client, "AUTOPILOT_VERSION", 148)
+        assert version.capabilities & dialect.MAV_PROTOCOL_CAPABILITY_MISSION_INT
+        mark = client.mark()
+        client.send(dialect.MAVLink_mission_count_message(1, 1, len(items), 0))
+        for seq, item in enumerate(items):
+            asked = await to_us(client, REQUESTS, mark, 0.7 if seq == 0 else 0.45)
+            assert asked.seq == seq
+            mark = client.mark()
+            send_item(client, item, seq, 0)
+        assert (await to_us(client, ("MISSION_ACK",), mark, 0.45)).type == dialect.MAV_MISSION_ACCEPTED
+
+        mark = client.mark()
+        client.send(dialect.MAVLink_mission_request_list_message(1, 1, 0))
+        assert (await to_us(client, ("MISSION_COUNT",), mark, 0.7)).count == len(items)
+        for seq, item in enumerate(items):
+            mark = client.mark()
+            client.send(dialect.MAVLink_mission_request_int_message(1, 1, seq, 0))
+            told = await to_us(client, ("MISSION_ITEM_INT",), mark, 2.5)
+            assert told.seq == seq
+            if seq:  # home is the vehicle's own
+                assert content(told) == pytest.approx(item.content)
+        client.send(dialect.MAVLink_mission_ack_message(1, 1, 0, 0))
+        assert not [m for _, m in client.since(0, "STATUSTEXT") if m.severity <= dialect.MAV_SEVERITY_WARNING]
+
+
+async def to_us(client: Client, kinds: tuple[str, ...], since: int, patience: float) -> Any:
+    """The first message of a mission transfer, which must be one of these, with our address on it."""
+    message = await client.wait(
+        (*REQUESTS, "MISSION_ACK", "MISSION_COUNT", "MISSION_ITEM_INT"), since=since, timeout=patience
+    )
+    assert message.get_type() in kinds, message
+    assert (message.target_system, message.target_component, message.mission_type) == (255, 190, 0)
+    return message
 
 
 async def test_conf_118_dronekit_on_px4s_flavour() -> None:

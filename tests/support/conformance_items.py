@@ -119,7 +119,7 @@ ITEMS: dict[int, Item] = {
     117: Item("dronekit on ArduPilot's flavour", COPTER),
     118: Item("dronekit on PX4's flavour", PX4),
     119: Item("MAVProxy on ArduPilot's flavour", COPTER),
-    120: Item("Mission Planner's sequences on ArduPilot's flavour", COPTER, "missions, camera"),
+    120: Item("Mission Planner's sequences on ArduPilot's flavour", COPTER, "camera"),
     121: Item("two vehicles, two ground stations: no answer goes astray", NEITHER),
     122: Item("plans outlive the gateway and a lost link, a mission that is flown goes on", NEITHER),
     125: Item("COMPONENT_METADATA, general.json, parameter.json", NEITHER),
