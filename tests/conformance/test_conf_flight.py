@@ -197,9 +197,10 @@ async def test_conf_025_return_to_its_end(flavour: str, end: int) -> None:
             (newer.ANAFI_RETURN_STATE_AVAILABLE, newer.ANAFI_RETURN_REASON_FINISHED),
         ]
         if end == newer.ANAFI_RETURN_END_HOVERING:
-            await client.heartbeat(lambda beat: beat.custom_mode == w.modes.hold, since=flying)
+            # The goto of before does not come back: Brake in ArduPilot's words, not Guided.
+            await client.heartbeat(lambda beat: beat.custom_mode == w.modes.idle, since=flying)
             await client.wait("HEARTBEAT")
-            await client.heartbeat(lambda beat: beat.custom_mode == w.modes.hold and beat.base_mode & ARMED)
+            await client.heartbeat(lambda beat: beat.custom_mode == w.modes.idle and beat.base_mode & ARMED)
             assert w.drone.flying_state.name == "HOVERING"
             assert at_home(w)
             assert w.drone.pose.up == pytest.approx(10.0, abs=0.3)
