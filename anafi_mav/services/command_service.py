@@ -18,6 +18,7 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.actions import ACTIONS, change_mode
 from anafi_mav.services.commands import (
+    MODE_PROGRESS_AFTER,
     PROGRESS_AFTER,
     PROGRESS_EVERY,
     Command,
@@ -141,14 +142,15 @@ class CommandService(Service):
         now, mode = self.host.clock.monotonic(), self.host.vehicle.mode
         repeated = self._desk.retransmission(command.client, command, now, mode)
         if repeated is not None:
-            self._acknowledge(inbound, command.id, repeated)
+            if not (command.patient and repeated == dialect.MAV_RESULT_IN_PROGRESS):  # else it is said in its time
+                self._acknowledge(inbound, command.id, repeated)
             return
         execution = self._desk.begin(command.client, command)
         self._spawn(self._execute(inbound, execution), _Running(command.client, (inbound, execution)))
 
     async def _execute(self, inbound: Inbound, execution: Execution) -> None:
         command = execution.command
-        progress = self.host.spawn(self._report_progress(inbound, command.id))
+        progress = self.host.spawn(self._report_progress(inbound, command))
         result = dialect.MAV_RESULT_FAILED
         try:
             await self._actions[command.id](command)
@@ -214,10 +216,10 @@ class CommandService(Service):
         finally:
             work.close()  # cancelled before it began, it would complain that nobody awaited it
 
-    async def _report_progress(self, inbound: Inbound, command: int) -> None:
-        await asyncio.sleep(PROGRESS_AFTER)
+    async def _report_progress(self, inbound: Inbound, command: Command) -> None:
+        await asyncio.sleep(MODE_PROGRESS_AFTER if command.patient else PROGRESS_AFTER)
         while True:
-            self._acknowledge(inbound, command, dialect.MAV_RESULT_IN_PROGRESS)
+            self._acknowledge(inbound, command.id, dialect.MAV_RESULT_IN_PROGRESS)
             await asyncio.sleep(PROGRESS_EVERY)
 
     def _acknowledge(self, inbound: Inbound, command: int, result: int) -> None:

@@ -6,7 +6,10 @@ What is flown is taken from the simulator's own log.
 
 from __future__ import annotations
 
+import asyncio
+import itertools
 import math
+import time
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -58,6 +61,30 @@ async def asked_for(w: World, items: list[Item]) -> int:
 def tells_of_its_plan(w: World) -> None:
     w.drone.faults.untold = frozenset()
     w.drone.firmware.flight_plan.report_stopped()  # whatever it is
+
+
+@both
+async def test_conf_011_049_a_mode_that_takes_its_time(flavour: str) -> None:
+    """MAVSDK asks for it four times in 2 s and takes IN_PROGRESS for the end of it: none is said while it waits."""
+    async with world(flavour=flavour, web=True) as w:
+        await w.take_off(6.0)
+        await put(w, CORNERS)
+        w.drone.faults.untold = frozenset({PLAYS})
+        mark, began = w.client.mark(), time.monotonic()
+        params = (1, MISSION_MODE[flavour]) if first(w) else (1, 4, 4)
+        for _ in range(4):
+            w.client.send_command(dialect.MAV_CMD_DO_SET_MODE, *params)
+            await asyncio.sleep(0.5)  # as MAVSDK's timer
+        assert w.client.since(mark, "COMMAND_ACK") == []
+        for _ in range(2):
+            assert (await w.client.wait("COMMAND_ACK")).result == dialect.MAV_RESULT_IN_PROGRESS
+        tells_of_its_plan(w)
+        await w.client.wait("COMMAND_ACK", lambda ack: ack.result == dialect.MAV_RESULT_ACCEPTED, since=mark)
+        at, results = zip(*[(at, ack.result) for at, ack in w.client.since(mark, "COMMAND_ACK")], strict=True)
+        assert 2.4 < at[0] - began < 3.0
+        assert max(b - a for a, b in itertools.pairwise(at)) <= 1.0
+        assert set(results[:-1]) == {dialect.MAV_RESULT_IN_PROGRESS}
+        assert len(w.commands("common.Mavlink.Start")) == 1
 
 
 @both
