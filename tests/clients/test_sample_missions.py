@@ -1,4 +1,5 @@
-"""The sample missions, flown from MAVSDK by one gateway, many at once, in real time, each on all four models.
+"""The sample missions, flown from MAVSDK by one gateway in real time: each on each of the four models, none of which
+has to refuse one. Two batches of twenty drones at once, for one of forty would keep two cores busy all the time.
 
 What counts is the simulator's own log: where each drone was when it was done with a way point, what its camera did
 when, where it looked and how many photos it took. Conformance 75 and 121.
