@@ -10,7 +10,9 @@ The first file is for system 1, the next for system 2 and so on.
 from __future__ import annotations
 
 import asyncio
+import os
 import sys
+import traceback
 from pathlib import Path
 from typing import Any
 
@@ -57,7 +59,14 @@ async def main(url: str, paths: list[Path]) -> None:
     async with ground_station() as mavsdk:
         # In this order: it is told of systems that are new from when it listens.
         found, _ = await asyncio.gather(systems(mavsdk, len(paths)), mavsdk.add_any_connection(url))
-        await asyncio.gather(*[fly(number, found[number], path) for number, path in enumerate(paths, start=1)])
+        flights = [fly(number, found[number], path) for number, path in enumerate(paths, start=1)]
+        try:
+            await asyncio.gather(*flights)
+        except Exception:
+            # MAVSDK crashes or hangs when it is taken down under another call of its own.
+            traceback.print_exc()
+            sys.stderr.flush()
+            os._exit(1)
         say("done")
 
 
