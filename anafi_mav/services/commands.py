@@ -28,9 +28,10 @@ PROGRESS_AFTER, PROGRESS_EVERY = 0.3, 0.8
 """s until the first IN_PROGRESS and between them: MAVSDK resends at 0.5 s, every client gives up after 1-3 s (R9)."""
 
 MODE_PROGRESS_AFTER = 2.5
-"""s until the first IN_PROGRESS of a DO_SET_MODE. MAVSDK 4.1 takes one for the end of start_mission, pause_mission and
-arm, which fail then and crash when the real end comes (mission_raw_impl.cpp start_mission; action_impl.cpp waits for
-the end, but for the mode that it sets before arming). It gives up 2 s after it has sent it, the others later."""
+"""s until the first IN_PROGRESS of a DO_SET_MODE. DEVIATION: R9 wants one a second of every command. MAVSDK 4.1 takes
+one for the end of start_mission, pause_mission and arm, which fail then and crash when the real end comes
+(mission_raw_impl.cpp start_mission; action_impl.cpp waits for the end, but for the mode that it sets before arming). It
+gives up 2 s after it has sent it, the others later."""
 
 _MODE_COMMANDS = (dialect.MAV_CMD_DO_SET_MODE, dialect.MAV_CMD_DO_SET_STANDARD_MODE)
 _STOPPING_MODES = (*HOVERING, FlightMode.LAND)

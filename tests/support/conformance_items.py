@@ -30,7 +30,7 @@ ITEMS: dict[int, Item] = {
     8: Item("a command to component 0 gets one acknowledgement"),
     9: Item("an unsupported command is answered within 200 ms", part=_LATER_CAMERA),
     10: Item("NaN in every parameter of every command means the default and breaks nothing"),
-    11: Item("a long action says IN_PROGRESS at least once a second, then how it ended"),
+    11: Item("a long action says IN_PROGRESS at least once a second (DO_SET_MODE after 2.5 s only), then how it ended"),
     12: Item("a command sent four times in two seconds is executed once"),
     13: Item("commands mean the same as LONG and as INT"),
     14: Item("AUTOPILOT_VERSION on request, unset parameters tolerated"),
