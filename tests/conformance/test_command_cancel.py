@@ -11,7 +11,6 @@ from support.trouble import (
     ARM,
     CANCELLED,
     GOTO,
-    PX4_HOLD,
     RTL,
     SET_MODE,
     TAKEOFF_CMD,
@@ -28,7 +27,7 @@ from support.world import HOME, RETURN, world
 from anafi_mav import geo
 from anafi_mav.mavlink import dialect
 
-MAV_CMD_DO_FLIGHTTERMINATION, STANDARD_MODE = 185, 262
+MAV_CMD_DO_FLIGHTTERMINATION, PAUSE, STANDARD_MODE = 185, 193, 262
 
 
 def call_off(client: Client, command: int) -> None:
@@ -95,9 +94,9 @@ async def test_an_order_to_stop_is_not_called_off_by_somebody_else() -> None:
         assert await goto(w, 80.0, 10.0) == ACCEPTED
         deaf(w, 1.5)
         mark = w.client.mark()
-        w.client.send_command(SET_MODE, *PX4_HOLD)
-        await being_tried(w.client, mark, SET_MODE)
-        call_off(other, SET_MODE)
-        assert await until(w.client, mark, 1) == [(SET_MODE, ACCEPTED)]
+        w.client.send_command(PAUSE, 0)
+        await being_tried(w.client, mark, PAUSE)
+        call_off(other, PAUSE)
+        assert await until(w.client, mark, 1) == [(PAUSE, ACCEPTED)]
         await watched(0.2)
         assert heard(w, "CancelMoveTo") == ["CancelMoveTo"]
