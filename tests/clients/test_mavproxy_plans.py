@@ -33,7 +33,7 @@ def waypoint_file(path: Path, items: list[Item]) -> Path:
 
 
 async def typed(mavproxy: Process, command: str, pattern: str, timeout: float = 15.0) -> str:
-    """Type a command; the line that follows and matches the pattern."""
+    """Type a command; the line that follows and has the pattern in it, behind MAVProxy's prompt perhaps."""
     since = len(mavproxy.lines)
     mavproxy.say(command)
     return await mavproxy.line(lambda line: re.search(pattern, line) is not None, since=since, timeout=timeout)
@@ -42,7 +42,7 @@ async def typed(mavproxy: Process, command: str, pattern: str, timeout: float = 
 async def listed(mavproxy: Process, what: str) -> list[int]:
     """The commands that `fence list`, `rally list` or `wp list` prints."""
     since = len(mavproxy.lines)
-    await typed(mavproxy, f"{what} list", r"^Saved \d+ waypoints to |Saved \w+ items to ")
+    await typed(mavproxy, f"{what} list", r"Saved \d+ waypoints to |Saved \w+ items to ")
     rows = [re.search(r"\b(\d+) \d+ -?\d+\.\d{10} ", line) for line in mavproxy.lines[since:]]
     return [int(row[1]) for row in rows if row is not None]
 
@@ -158,7 +158,7 @@ async def test_conf_119_142_missions(tmp_path: Path) -> None:
             assert [m.param1 for m in edited] == [item.p1 if seq != 6 else 2.0 for seq, item in enumerate(wanted)]
             edited = await changed(w, MISSION, "wp remove 5", mavproxy)
             assert [m.command for m in edited] == [16, 22, 178, 16, 205, 16, 20]
-            await typed(mavproxy, f"wp save {tmp_path / 'again.txt'}", "^Saved 7 waypoints to ")
+            await typed(mavproxy, f"wp save {tmp_path / 'again.txt'}", "Saved 7 waypoints to ")
             again = (tmp_path / "again.txt").read_text().splitlines()[1:]
             assert [line.split("\t")[3] for line in again] == ["16", "22", "178", "16", "205", "16", "20"]
 

@@ -21,7 +21,7 @@ MAVPROXY = shutil.which("mavproxy.py", path=str(Path(sys.executable).parent)) or
 
 
 async def typed(mavproxy: Process, command: str, pattern: str, timeout: float = 15.0) -> str:
-    """Type a command; the line that follows and matches the pattern."""
+    """Type a command; the line that follows and has the pattern in it, behind MAVProxy's prompt perhaps."""
     since = len(mavproxy.lines)
     mavproxy.say(command)
     return await mavproxy.line(lambda line: re.search(pattern, line) is not None, since=since, timeout=timeout)
@@ -31,8 +31,8 @@ async def setup(w: World, mavproxy: Process, flavour: str, folder: Path) -> None
     count = len(await fetch(w.client))
     await mavproxy.line(lambda line: "online system 1" in line)
     # PX4's clients find no packed file and take the list; ArduPilot's load the file.
-    how = "parameters" if flavour == "px4" else r"parameters \(ftp\)"
-    await mavproxy.line(lambda line: re.search(f"Received {count} {how}$", line) is not None, timeout=30.0)
+    how = r"(?! \(ftp\))" if flavour == "px4" else r" \(ftp\)"
+    await mavproxy.line(lambda line: re.search(f"Received {count} parameters{how}", line) is not None, timeout=30.0)
 
     await typed(mavproxy, "param show ANF_MODEL", r"ANF_MODEL\s+2324")
     await typed(mavproxy, "param show ANF_MAX_TILT", r"ANF_MAX_TILT\s+10\.0")
@@ -53,8 +53,8 @@ async def setup(w: World, mavproxy: Process, flavour: str, folder: Path) -> None
     await typed(mavproxy, f"param fetch {name}", rf"{name} = {value}")
 
     await typed(mavproxy, "ftp list", r"general\.json\.xz\s+\d+")
-    await typed(mavproxy, f"ftp get /parameter.json.xz {folder}/parameter.json.xz", r"^Wrote \d+ bytes")
-    crc = await typed(mavproxy, "ftp crc /parameter.json", r"^crc: /parameter.json 0x")
+    await typed(mavproxy, f"ftp get /parameter.json.xz {folder}/parameter.json.xz", r"Wrote \d+ bytes")
+    crc = await typed(mavproxy, "ftp crc /parameter.json", r"crc: /parameter.json 0x")
     await typed(mavproxy, "ftp get /nothing", "ftp open failed")
     # MAVProxy says that it wrote before it closes the file; by now it has.
     content = lzma.decompress((folder / "parameter.json.xz").read_bytes())
