@@ -68,7 +68,7 @@ class Vehicle(Aircraft):
         """What to do when no ground station is heard any more (a parameter)."""
         self.rally = RallyPoints()
         self.orders = 0
-        """Counts who took the vehicle over."""
+        """Counts who took the vehicle over, and what ended all orders: the ground, the loss of the link."""
         self.intended: FlightMode | None = None
         """The mode that a client last asked for by name or number."""
         self.allow_kill = allow_kill
@@ -224,6 +224,7 @@ class Vehicle(Aircraft):
         if state == before:
             return
         if state in ON_GROUND and before is not None:
+            self.orders += 1
             self.takeoff.came_down()
             self.end_helms(self._ending_mission)
             self.takeoff.end_climb()
@@ -262,6 +263,7 @@ class Vehicle(Aircraft):
     def link_down(self) -> None:
         """The link is lost: nothing that was asked for outlives it."""
         self.height.link_down(flying=not self.on_ground)
+        self.orders += 1
         self._let_go()
         self.takeoff.link_down()
         self._selected = FlightMode.HOLD

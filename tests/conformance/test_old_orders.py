@@ -8,7 +8,20 @@ from typing import Any
 import pytest
 from support.flavours import both
 from support.missions import ROUND, put
-from support.setpoints import POSITION_ONLY, VELOCITY_ONLY, arrived, earth, heard, local, motion, said, streaming, texts
+from support.setpoints import (
+    COPTER_BRAKE,
+    COPTER_GUIDED,
+    POSITION_ONLY,
+    VELOCITY_ONLY,
+    arrived,
+    earth,
+    heard,
+    local,
+    motion,
+    said,
+    streaming,
+    texts,
+)
 from support.trouble import ACCEPTED, ARM, LAND_CMD, RTL, SET_MODE, deaf, goto, watched
 from support.world import ARMED, HOME, World, world
 
@@ -106,6 +119,35 @@ async def test_a_stick_that_is_held_does_not_undo_what_the_drone_has_yet_to_begi
         ordered = next((e.t for e in heard(w, "return_to_home", since=began)), began)
         later = [e for e in heard(w, "PCMD", since=ordered) if e.t > ordered]
         assert {e.args["pitch"] for e in later[2:]} <= {0}
+
+
+@pytest.mark.parametrize("order", [LAND_CMD, RTL, PAUSE])
+async def test_an_order_that_the_link_ends_brings_no_mode_of_before_back(order: int) -> None:
+    """The setpoint that comes when the drone is there again finds it in Brake, not in Guided."""
+    async with world(speed=1.0, flavour="ardupilot") as w:
+        await w.take_off(8.0)
+        assert await goto(w, 30.0, 8.0) == ACCEPTED
+        await w.client.heartbeat(lambda beat: beat.custom_mode == COPTER_GUIDED)
+        w.drone.faults.mute = True
+        w.client.send_command(order, 0)
+        await silent(w)
+        w.drone.faults.mute = False
+        mark = w.client.mark()
+        beat = await w.client.heartbeat(lambda beat: True, since=mark, timeout=10.0)
+        assert beat.custom_mode == COPTER_BRAKE
+        since = now()
+        w.client.send(local(VELOCITY_ONLY, v=(2.0, 0.0, 0.0)))
+        await said(w.client, "setpoints fly the drone in mode Guided", mark)
+        assert motion(w, since) == []
+
+
+async def silent(w: World) -> None:
+    """No heartbeat any more, for as long as two would take."""
+    while True:
+        mark = w.client.mark()
+        await watched(2.1)
+        if not w.client.since(mark, "HEARTBEAT"):
+            return
 
 
 # -- single setpoints of before
