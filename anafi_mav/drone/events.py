@@ -91,6 +91,7 @@ from anafi_mav.arsdk.messages.rth import RthEndingBehavior as RthEndingBehavior
 from anafi_mav.arsdk.messages.rth import RthHomeReachability as HomeReachability
 from anafi_mav.arsdk.messages.rth import RthHomeType as RthHomeType
 from anafi_mav.arsdk.messages.rth import State as ReturnStateChanged
+from anafi_mav.arsdk.messages.rth import StateReason as StateReason
 from anafi_mav.arsdk.messages.rth import TakeoffLocation as TakeoffLocation
 from anafi_mav.arsdk.messages.skyctrl import AttitudeChanged as ControllerAttitudeChanged
 from anafi_mav.arsdk.messages.skyctrl import PilotingSource as PilotingSource
@@ -198,6 +199,7 @@ __all__ = [
     "SensorsStatesListChanged",
     "ShutterTrigger",
     "SpeedChanged",
+    "StateReason",
     "TakeoffChecklist",
     "TakeoffChecklistType",
     "TakeoffLocation",

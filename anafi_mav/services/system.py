@@ -19,6 +19,7 @@ from anafi_mav.drone.events import Message
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound, Node
+from anafi_mav.services.aborted_return_service import AbortedReturnService
 from anafi_mav.services.banner import BannerService
 from anafi_mav.services.command_service import CommandService
 from anafi_mav.services.event_service import EventService
@@ -78,6 +79,7 @@ SERVICES: tuple[type[Service], ...] = (
     TimeService,
     BannerService,
     WarningService,
+    AbortedReturnService,
     HighLatencyService,
     LogService,
     ShellService,
@@ -95,6 +97,9 @@ HEARTBEAT_EVERY = 1.0
 
 LOOK_EVERY = 0.1
 """s between looks at the other periodic messages; none of them is wanted more often."""
+
+DESCENT_WAIT = 1.5
+"""s that a landing or return may take to be confirmed when the gateway ends: it is not withdrawn."""
 
 STATUS_EVERY = 5.0
 """s before the same complaint is repeated as text."""
@@ -216,7 +221,10 @@ class System:
         """The gateway ends: nothing of ours goes on, a flying drone is left hovering. Clients must not be heard."""
         if not self.active:
             return
-        await self._commands.end_all()
+        if self.vehicle.descends:
+            await self._commands.settle(DESCENT_WAIT)
+        else:
+            await self._commands.end_all()
         await self.vehicle.let_go()
 
     # Host.
