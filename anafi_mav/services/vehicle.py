@@ -43,6 +43,14 @@ from anafi_mav.services.right import Extent, Right
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.takeoff import Takeoff
 
+FORCED = "forced landing"
+LANDS, PILOT_LANDS = "drone is landing", "Skycontroller pilot is landing"
+RETURNS, PILOT_RETURNS = "drone is returning", "Skycontroller pilot is returning"
+RETURNS_BY_ITSELF, MOTOR_DOWN = "drone is returning by itself", "drone returns, motor down"
+NOT_COUNTED = f"again within {APART:g} s"
+UNENDABLE = (FORCED, LANDS, PILOT_LANDS, RETURNS, PILOT_RETURNS, RETURNS_BY_ITSELF, MOTOR_DOWN, NOT_COUNTED)
+"""Why a landing or a return is not ended."""
+
 
 class Landed(enum.Enum):
     """Where the vehicle is between ground and air."""
@@ -304,27 +312,27 @@ class Vehicle(Aircraft):
         if self.landing:
             initiator = self._initiators.landing or Initiator.CLIENT
             if self._forced_landing:
-                raise Refused(f"{what} refused: forced landing")
+                raise Refused(f"{what} refused: {FORCED}")
             if initiator is Initiator.PILOT:
-                raise Refused(f"{what} refused: Skycontroller pilot is landing")
+                raise Refused(f"{what} refused: {PILOT_LANDS}")
             if by is None or (initiator is Initiator.DRONE and not all_of_them):
-                raise Refused(f"{what} refused: drone is landing")
+                raise Refused(f"{what} refused: {LANDS}")
         elif self.returning:
             initiator = self._initiators.returning or Initiator.CLIENT
             if self.returning_by_itself:
                 self._require_own_endable(what, by if all_of_them else None)
             elif initiator is Initiator.PILOT:
-                raise Refused(f"{what} refused: Skycontroller pilot is returning")
+                raise Refused(f"{what} refused: {PILOT_RETURNS}")
             elif by is None:
-                raise Refused(f"{what} refused: drone is returning")
+                raise Refused(f"{what} refused: {RETURNS}")
 
     def _require_own_endable(self, what: str, by: Right | None) -> None:
         if by is None:
-            raise Refused(f"{what} refused: drone is returning by itself")
+            raise Refused(f"{what} refused: {RETURNS_BY_ITSELF}")
         if self.drone.home.state.reason == StateReason.MOTOR_DOWN:
-            raise Refused(f"{what} refused: drone returns, motor down")
+            raise Refused(f"{what} refused: {MOTOR_DOWN}")
         if not by.counted:
-            raise Refused(f"{what} refused: again within {APART:g} s")
+            raise Refused(f"{what} refused: {NOT_COUNTED}")
 
     async def _free(self, what: str, by: Right) -> None:
         """End a landing or return that `by` may end; returns when the drone hovers, at once when it does neither."""
