@@ -69,6 +69,9 @@ Callback: TypeAlias = Callable[[Message, float], None]
 REBOOT_TIMEOUT = 15.0
 """s within which the link to a drone that reboots is lost; silence is noticed after 2.5 s."""
 
+WAIT_TIMEOUT = 30.0
+"""s that `wait_until` and `wait_for` wait unless the caller says otherwise: a take-off or landing takes about ten."""
+
 CONTROLLER_PORTS = 100
 """A Skycontroller 3 has the TCP ports of its drone this much higher (Olympe, libarsdkctrl arsdk_device.c)."""
 
@@ -452,6 +455,46 @@ class Drone:
         expectation = self._commander.expect((answer,), judge)
         expectation.expire_after(timeout, CommandTimeout(answer.NAME, timeout))
         return await expectation.wait()
+
+    async def wait_until(self, condition: Callable[[], bool], what: str, timeout: float = WAIT_TIMEOUT) -> None:
+        """Return when a condition on the drone's states is true; it is evaluated now and after each message.
+
+        Raises `CommandTimeout` about `what` after `timeout` s, `LinkLost`, and what the condition raises.
+        """
+        self._commander.require_link()
+        if condition():
+            return
+        met: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+
+        def look(message: Message, now: float) -> None:
+            if met.done():
+                return
+            try:
+                if condition():
+                    met.set_result(None)
+            except Exception as error:
+                met.set_exception(error)
+
+        lost, undo = self._lost, self.subscribe(look)
+        either: set[asyncio.Future[Any]] = {met, lost}
+        try:
+            await asyncio.wait(either, timeout=timeout, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            undo()
+        if met.done():
+            met.result()
+        elif lost.done():
+            raise LinkLost(lost.result())
+        else:
+            raise CommandTimeout(what, timeout)
+
+    async def wait_for(self, *states: FlyingState, timeout: float = WAIT_TIMEOUT) -> None:
+        """Return when the drone reports one of these flying states, at once when it is in one.
+
+        Raises `CommandTimeout` after `timeout` s, `LinkLost`.
+        """
+        words = " or ".join(spoken(state) for state in states)
+        await self.wait_until(lambda: self.piloting.state.flying in states, f"the state {words}", timeout)
 
     # -- the hot path
 
