@@ -49,6 +49,7 @@ from anafi_mav.arsdk.messages.battery import Alert as BatteryAlertChanged
 from anafi_mav.arsdk.messages.battery import AlertLevel as AlertLevel
 from anafi_mav.arsdk.messages.battery import BatteryAlert as BatteryAlert
 from anafi_mav.arsdk.messages.battery import Capacity as BatteryCapacity
+from anafi_mav.arsdk.messages.battery import Description as BatteryDescription
 from anafi_mav.arsdk.messages.common import CalibrationAxis as CalibrationAxis
 from anafi_mav.arsdk.messages.common import FlightId as FlightId
 from anafi_mav.arsdk.messages.common import FlightPlanComponent as FlightPlanComponent
@@ -120,6 +121,7 @@ __all__ = [
     "BatteryAlert",
     "BatteryAlertChanged",
     "BatteryCapacity",
+    "BatteryDescription",
     "Blocker",
     "BlockerKind",
     "CalibrationAxis",
