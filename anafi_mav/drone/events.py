@@ -55,6 +55,7 @@ from anafi_mav.arsdk.messages.common import FlightId as FlightId
 from anafi_mav.arsdk.messages.common import FlightPlanComponent as FlightPlanComponent
 from anafi_mav.arsdk.messages.common import MagnetoCalibrationRequiredState as MagnetoCalibrationRequiredState
 from anafi_mav.arsdk.messages.common import MagnetoCalibrationStartedChanged as MagnetoCalibrationStartedChanged
+from anafi_mav.arsdk.messages.common import MagnetoCalibrationStateChanged as MagnetoCalibrationStateChanged
 from anafi_mav.arsdk.messages.common import MavlinkFilePlayingStateChanged as MavlinkFilePlayingStateChanged
 from anafi_mav.arsdk.messages.common import MavlinkType as MavlinkType
 from anafi_mav.arsdk.messages.common import MissionItemExecuted as MissionItemExecuted
@@ -151,6 +152,7 @@ __all__ = [
     "IcingLevelChanged",
     "MagnetoCalibrationRequiredState",
     "MagnetoCalibrationStartedChanged",
+    "MagnetoCalibrationStateChanged",
     "MavlinkFilePlayingStateChanged",
     "MavlinkType",
     "MaxAltitudeChanged",

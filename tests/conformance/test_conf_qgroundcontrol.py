@@ -95,3 +95,25 @@ async def test_unknown_name_is_answered_by_param_error_alone() -> None:
         assert (error.param_id, error.error) == ("CAL_MAG7_ROT", 1)
         await w.client.wait("HEARTBEAT", timeout=3.0)
         assert not [m for _, m in w.client.since(mark, "PARAM_VALUE") if m.param_id == "CAL_MAG7_ROT"]
+
+
+async def test_compass_calibration_turns_three_of_qgroundcontrols_pictures() -> None:
+    """SensorsComponentController::_handleUASTextMessage: CAL_MAG_SIDES says which pictures there are, each turns from
+    its "orientation detected" to its "side done"."""
+    nose, left, down = 1 << 1, 1 << 2, 1 << 5
+    async with world() as w:
+        assert value_of(await read(w.client, "CAL_MAG_SIDES")) == nose | left | down
+        mark = w.client.mark()
+        calibrate = dialect.MAV_CMD_PREFLIGHT_CALIBRATION
+        ack = await w.client.command(calibrate, 0, 1, 0, 0, x=0.0, y=0.0, z=0.0, timeout=20.0)
+        assert ack.result == dialect.MAV_RESULT_ACCEPTED
+        said = [m.text for _, m in w.client.since(mark, "STATUSTEXT")]
+        sides = [
+            text for text in said if text.endswith(("orientation detected", "side done, rotate to a different side"))
+        ]
+        assert sides == [
+            f"[cal] {side} {what}"
+            for side in ("front", "left", "down")
+            for what in ("orientation detected", "side done, rotate to a different side")
+        ]
+        assert said[-1] == "[cal] calibration done: mag"
