@@ -67,6 +67,11 @@ ENDPOINTS = """
 Each may end in `?flavour=px4` (the default), `?flavour=ardupilot` or `?flavour=standard`: the autopilot that its
 clients are shown.
 
+A datagram of `udpout` and `udpin` carries one MAVLink frame: some programs (gomavlib since 3.3.2, and so mavp2p) read
+only the first frame of a datagram. `?frames=many` puts up to 512 bytes of frames into one. It is for a large fleet and
+for a client that reads them all, as QGroundControl, MAVSDK, pymavlink and mavlink-router do. Two options are joined by
+`&`, as in `udpout://127.0.0.1:14550?flavour=ardupilot&frames=many` (in a shell, put the URL in quotes).
+
 `udpin` and `tcpin` listen on loopback unless HOST says otherwise. MAVLink has no password: who reaches an endpoint
 flies the drones.
 """
