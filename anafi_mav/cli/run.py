@@ -20,7 +20,7 @@ from anafi_mav.cli.terminal import complain, say
 from anafi_mav.config import Config, DroneConfig, SimConfig, from_mapping, load, remarks
 from anafi_mav.errors import ConfigError
 from anafi_mav.gateway import Gateway
-from anafi_mav.sim import scenario
+from anafi_mav.sim import quirks, scenario
 
 READY_LIMIT = 15.0
 """s after which "ready" is said though a drone has not answered: its connection takes 3 s at most, its settings and
@@ -193,6 +193,8 @@ def place(config: Config, reservations: Reservations) -> tuple[Config, dict[str,
     drones = tuple(
         _placed(drone, *places[index]) if index in places else drone for index, drone in enumerate(config.drones)
     )
+    for index, sim in simulated.items():
+        quirks.named(sim.firmware_quirks, f"drones[{index}].sim.firmware_quirks")
     first = next(iter(simulated.values()))
     fleet = {
         "speed": first.speed,
@@ -223,6 +225,7 @@ def _entry(drone: DroneConfig, sim: SimConfig, address: str, ports: Ports) -> di
         "skycontroller": sim.skycontroller,
         "storage": options.size("storage", sim.storage) if isinstance(sim.storage, str) else sim.storage,
         "wind": {} if sim.wind is None else _without_none(msgspec.structs.asdict(sim.wind)),
+        "firmware_quirks": sim.firmware_quirks,
     }
 
 

@@ -21,6 +21,7 @@ from anafi_mav.arsdk.rtsp import DEFAULT_PORT as RTSP_PORT
 from anafi_mav.arsdk.session import OnMessage
 from anafi_mav.arsdk.wire import Buffer, Message, UnknownMessage
 from anafi_mav.errors import ConfigError
+from anafi_mav.sim import quirks
 from anafi_mav.sim.air import Air
 from anafi_mav.sim.body import Body
 from anafi_mav.sim.faults import Faults
@@ -83,6 +84,8 @@ class DroneSpec:
     """The generation of the Skycontroller in front of it, whose address `address` then is; None: there is none."""
     wind: WindSpec = CALM
     """What blows from the start."""
+    firmware_quirks: tuple[str, ...] = ()
+    """Names of the `Quirk`s that its firmware has from the start."""
 
     def __post_init__(self) -> None:
         if self.model not in MODELS:
@@ -112,6 +115,7 @@ class DroneSpec:
                 raise ConfigError("skycontroller", f"expected {expected}, got {self.skycontroller}")
             if self.model == "ai" and self.skycontroller == 3:
                 raise ConfigError("skycontroller", "expected another model than ai, which a Skycontroller 3 cannot fly")
+        quirks.named(self.firmware_quirks, "firmware_quirk")
         if self.serial is not None and not 5 <= len(self.serial) <= 32:
             raise ConfigError("serial", f"expected 5 to 32 characters, got {self.serial!r}")
 
@@ -133,7 +137,7 @@ class SimulatedDrone:
         self.spec = spec
         self.identity = identity
         self.log = log
-        self.faults = Faults()
+        self.faults = Faults(quirks=quirks.named(spec.firmware_quirks, "firmware_quirk"))
         self.faults.on_mute = self._mute_link
         self.wind = Wind(spec.wind, random.Random(chance.getrandbits(64)))
         """Set its `spec` to let it blow."""
