@@ -389,11 +389,11 @@ class Drone:
             name=product.name or self._announced_name,
         )
 
-    async def reboot(self, timeout: float = REBOOT_TIMEOUT) -> None:
-        """Let the drone start anew; returns when it has the order and the link is lost, which is all that it says.
+    async def request_reboot(self, timeout: float = REBOOT_TIMEOUT) -> None:
+        """Send the command to restart; return when the drone has acknowledged its receipt, which is all that it says.
 
-        Raises `CommandRejected` unless it has said that it stands; `LinkLost` when the link went before the order had
-        arrived; `CommandTimeout` when the drone just goes on. Given up, the order is taken back.
+        Raises `CommandRejected` unless the drone has reported that it stands; `LinkLost` or `CommandTimeout` when the
+        command has not arrived. Cancelled, it is not sent again.
         """
         if not self.connected:
             raise LinkLost("not connected")
@@ -401,13 +401,23 @@ class Drone:
         lost, delivery = self._lost, self._commander.deliver(common.Reboot())
         timed_out = CommandTimeout(common.Reboot.NAME, timeout)
         try:
-            await asyncio.wait({lost}, timeout=timeout)
+            either: tuple[asyncio.Future[Any], ...] = (lost, delivery)
+            await asyncio.wait(either, timeout=timeout, return_when=asyncio.FIRST_COMPLETED)
         finally:
-            if not lost.done():
+            if not (lost.done() or delivery.done()):
                 self._commander.take_back(delivery, timed_out)
-        if not lost.done():
-            raise timed_out
         delivery.result()
+
+    async def reboot(self, timeout: float = REBOOT_TIMEOUT) -> None:
+        """Restart the drone; return when it has received the command and the link is lost.
+
+        Raises as `request_reboot`, and `CommandTimeout` when the drone stays connected.
+        """
+        lost = self._lost
+        await self.request_reboot(timeout)
+        await asyncio.wait({lost}, timeout=timeout)
+        if not lost.done():
+            raise CommandTimeout(common.Reboot.NAME, timeout)
 
     # -- what others may look at
 

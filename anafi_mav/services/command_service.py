@@ -142,7 +142,8 @@ class CommandService(Service):
         now, mode = self.host.clock.monotonic(), self.host.vehicle.mode
         repeated = self._desk.retransmission(command.client, command, now, mode)
         if repeated is not None:
-            if not (command.patient and repeated == dialect.MAV_RESULT_IN_PROGRESS):  # else it is said in its time
+            quiet = command.patient or command.is_answered_once  # IN_PROGRESS is sent later, or not at all
+            if not (quiet and repeated == dialect.MAV_RESULT_IN_PROGRESS):
                 self._acknowledge(inbound, command.id, repeated)
             return
         execution = self._desk.begin(command.client, command)
@@ -217,6 +218,8 @@ class CommandService(Service):
             work.close()  # cancelled before it began, it would complain that nobody awaited it
 
     async def _report_progress(self, inbound: Inbound, command: Command) -> None:
+        if command.is_answered_once:
+            return
         await asyncio.sleep(MODE_PROGRESS_AFTER if command.patient else PROGRESS_AFTER)
         while True:
             self._acknowledge(inbound, command.id, dialect.MAV_RESULT_IN_PROGRESS)

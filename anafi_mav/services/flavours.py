@@ -64,6 +64,8 @@ class Flavour:
     """Clients of this family send 0 for what they do not set; NaN elsewhere."""
     guided_setpoints: bool = False
     """Setpoints fly the drone in mode Guided, without a mode of their own."""
+    unstreamed: frozenset[int] = frozenset()
+    """Message ids that a client of this family gets on change and on request only, not at an interval by default."""
     title: str = ""
     """How the autopilot calls itself in its banner; empty: it does not."""
 
@@ -165,6 +167,8 @@ ARDUPILOT = Flavour(
     relative_takeoff=True,
     zero_is_unset=True,
     guided_setpoints=True,
+    # ArduCopter sends home when it is set; programs take one that arrives later for news (dronekit2's own tests).
+    unstreamed=frozenset({dialect.MAVLINK_MSG_ID_HOME_POSITION}),
     title="ArduCopter V4.5.7",
 )
 

@@ -192,6 +192,8 @@ class GuidedService(Service):
             raise Refused("Turn refused: param1 is an angle of up to 360 degrees", lasting=True)
         if math.isinf(rate) or rate < 0.0 or 0.0 < rate < SLOWEST_TURN or math.isinf(way):
             raise Refused(f"Turn refused: param2 is {SLOWEST_TURN:g} deg/s or more, param3 -1, 0 or 1", lasting=True)
+        if not (math.isnan(relative) or relative in (0.0, 1.0)):  # ArduCopter refuses it too
+            raise Refused("Turn refused: param4 is 0 (absolute) or 1", lasting=True)
         vehicle = self.host.vehicle
         attitude = vehicle.drone.piloting.state.attitude
         if not vehicle.in_air or attitude is None:

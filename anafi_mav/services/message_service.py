@@ -50,7 +50,7 @@ class MessageService(Service):
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
-        self._intervals: Streams[Channel] = Streams()
+        self._intervals: Streams[Channel] = Streams(without=lambda channel: flavour_of(channel).unstreamed)
         self._table: Mapping[int, Stream] = {}
         self._requests: Mapping[int, Request] = {}
         self._news = News()

@@ -52,6 +52,7 @@ class PlanService(Service):
     def capabilities(self) -> int:
         return (
             dialect.MAV_PROTOCOL_CAPABILITY_MISSION_INT
+            | dialect.MAV_PROTOCOL_CAPABILITY_MISSION_FLOAT  # MISSION_ITEM and MISSION_REQUEST are accepted too
             | dialect.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
             | dialect.MAV_PROTOCOL_CAPABILITY_MISSION_RALLY
         )

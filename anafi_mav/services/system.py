@@ -21,6 +21,7 @@ from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound, Node
 from anafi_mav.services.banner import BannerService
 from anafi_mav.services.command_service import CommandService
+from anafi_mav.services.compass_service import CompassService
 from anafi_mav.services.event_service import EventService
 from anafi_mav.services.fence_service import FenceService
 from anafi_mav.services.flavours import Flavour, flavour_of
@@ -63,6 +64,7 @@ SERVICES: tuple[type[Service], ...] = (
     ModesService,
     GuidedService,
     MaintenanceService,
+    CompassService,
     OrbitService,
     TelemetryService,
     ParameterService,
@@ -89,6 +91,13 @@ SERVICES: tuple[type[Service], ...] = (
 """What a system consists of, beside commands and messages themselves."""
 
 AUTOPILOT = dialect.MAV_COMP_ID_AUTOPILOT1
+
+ABSENT = frozenset({dialect.MAV_COMP_ID_WINCH})
+"""Components that no ANAFI has and whose commands are answered all the same: MAVSDK sends DO_WINCH to the winch, waits
+for an answer from there and repeats it for seconds. Not a camera or a gimbal: clients take an answer for its presence.
+"""
+
+COMMANDS = (dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND_INT)
 
 HEARTBEAT_EVERY = 1.0
 """s (MAVLink heartbeat.md)."""
@@ -376,9 +385,11 @@ class System:
         handler = self._handlers.get(message.get_msgId())
         if handler is None or getattr(message, "target_system", 0) not in (0, self.sysid):
             return
-        if getattr(message, "target_component", 0) not in (0, AUTOPILOT):
-            return
-        handler(inbound)
+        component = getattr(message, "target_component", 0)
+        if component in (0, AUTOPILOT):
+            handler(inbound)
+        elif component in ABSENT and message.get_msgId() in COMMANDS and message.target_system == self.sysid:
+            self._node.send(_unsupported(inbound), sysid=self.sysid, compid=component, to=inbound.channel)
 
     def _heard(self, inbound: Inbound) -> None:
         for service in self.services:
@@ -389,6 +400,15 @@ class System:
         self._hushed.discard(channel)
         for service in self.services:
             service.channel_closed(channel)
+
+
+def _unsupported(inbound: Inbound) -> dialect.MAVLink_command_ack_message:
+    return dialect.MAVLink_command_ack_message(
+        inbound.message.command,
+        dialect.MAV_RESULT_UNSUPPORTED,
+        target_system=inbound.sysid,
+        target_component=inbound.compid,
+    )
 
 
 def _joined(tables: Any) -> dict[Any, Any]:
