@@ -22,6 +22,7 @@ from anafi_mav.cli.terminal import complain, say
 from anafi_mav.drone.controller import MODELS as CONTROLLERS
 from anafi_mav.drone.product import MODELS
 from anafi_mav.errors import AnafiMavError, ConfigError
+from anafi_mav.printable import printable
 
 USUAL = {
     "192.168.42.1": "the Wi-Fi of an ANAFI",
@@ -138,7 +139,7 @@ def configuration(finds: Sequence[Find]) -> list[str]:
     lines = ["drones:"]
     for sysid, find in enumerate(finds, 1):
         device, place = find.device, find.place
-        lines.append(f"  # {title(device)} {_printable(device.serial)}, found at {place}")
+        lines.append(f"  # {title(device)} {printable(device.serial)[:MAX_NAME]}, found at {place}")
         keys = [f'name: "{_name(device, names)}"', f"sysid: {sysid}", f"address: {place.address}"]
         if place.interface is not None and shared[place.address] > 1:
             keys.append(f"interface: {place.interface}")
@@ -152,10 +153,6 @@ def title(device: DeviceInfo) -> str:
         return f"{CONTROLLERS[device.model_id]} with the drone behind it,"
     model = MODELS.get(device.model_id)
     return f"unknown device 0x{device.model_id:04x}" if model is None else model.title
-
-
-def _printable(text: str) -> str:
-    return re.sub(r"[^\x20-\x7e]", "?", text)[:MAX_NAME]
 
 
 def _name(device: DeviceInfo, taken: set[str]) -> str:

@@ -1,4 +1,7 @@
-"""What the commands print. Colour only where a terminal is; elsewhere plain lines, each written at once."""
+"""What the commands print. Colour only where a terminal is; elsewhere plain lines, each written at once.
+
+Every line is cleaned of control characters: names and texts of drones and vehicles are in many of them.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,8 @@ from typing import TextIO
 from rich.console import Console
 from rich.progress import Progress
 from rich.text import Text
+
+from anafi_mav.printable import printable
 
 _bars: list[Progress] = []
 """Bars on the screen: what is said meanwhile is printed above them."""
@@ -41,9 +46,11 @@ def progress(what: str, total: int | None) -> Iterator[Callable[[int, int], None
 
 
 def _write(stream: TextIO, line: str, style: str) -> None:
+    line = printable(line)
     with contextlib.suppress(OSError):  # the reader may be gone (`anafi-mav | head`): no reason to end a flight
         if stream.isatty():
             console = _bars[-1].console if _bars and stream is sys.stdout else Console(file=stream)
             console.print(Text(line, style), soft_wrap=True)
         else:
-            print(line, file=stream, flush=True)
+            encoding = stream.encoding or "utf-8"  # a terminal without umlauts is no reason to end a flight
+            print(line.encode(encoding, "backslashreplace").decode(encoding), file=stream, flush=True)
