@@ -6,6 +6,7 @@ Every line is cleaned of control characters: names and texts of drones and vehic
 from __future__ import annotations
 
 import contextlib
+import json
 import sys
 from collections.abc import Callable, Iterator
 from typing import TextIO
@@ -23,6 +24,12 @@ _bars: list[Progress] = []
 def say(line: str, style: str = "") -> None:
     """A line on stdout. `style` is rich's."""
     _write(sys.stdout, line, style)
+
+
+def say_json(value: object) -> None:
+    """Print a value as JSON on stdout, indented, with every character outside ASCII as its escape."""
+    for line in json.dumps(value, indent=2).replace("\x7f", "\\u007f").split("\n"):
+        say(line)
 
 
 def complain(line: str, style: str = "red") -> None:
