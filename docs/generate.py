@@ -29,16 +29,20 @@ drones:
   - {name: bravo, sysid: 2, sim: {model: 4k, home: [48.8789, 2.3677, 35.0]}}
 ```
 
-Whatever is wrong is told in one line with the place of the key and what was expected there, the exit status is 2 and
+An error is one line with the file, the place of the key and what was expected there. The exit status is then 2, and
 nothing has been started:
 
 ```
-anafi-mav: drones[1].sysid: expected a sysid of its own, 1 is already at drones[0].sysid
+anafi-mav: fleet.yaml: drones[1].sysid: expected a sysid of its own, 1 is already at drones[0].sysid
 ```
 
 Two options of the command line stand in for a list of the file, or of the defaults: `--drone ADDRESS` (repeatable;
 the drones get the system ids 1, 2, …; `192.168.42.1%wlan1` names the interface too) and `--endpoint URL` (repeatable).
 `--allow-kill` is `allow_kill: true`.
+
+One gateway uses one `state` folder: its file `gateway.lock` names the process and its drones, and a second gateway is
+refused there. Two gateways on one machine need a folder each. A folder that cannot be used stops no gateway: it warns
+at the start and at each upload, keeps nothing, and its exit status is 1.
 
 Every ANAFI has the same address in its own Wi-Fi, and so has every Skycontroller. With a Wi-Fi adapter for each and the
 adapter's name as `interface` they fly together, without address translation:

@@ -162,7 +162,7 @@ class CommandService(Service):
             result = dialect.MAV_RESULT_CANCELLED
             raise
         except Exception:
-            logger.exception("command %d of system %d", command.id, self.host.sysid)
+            logger.exception("%s: command %d failed", self.host.drone.name, command.id)
         finally:
             progress.cancel()
             self._finish(inbound, execution, result)

@@ -278,7 +278,9 @@ class System:
     def text(self, severity: Severity, text: str, to: Channel | None = None) -> None:
         """A STATUSTEXT to everybody, and a line in the log; or to one channel alone."""
         if to is None:
-            logger.log(logging.WARNING if severity <= Severity.WARNING else logging.INFO, "%s: %s", self.sysid, text)
+            logger.log(
+                logging.WARNING if severity <= Severity.WARNING else logging.INFO, "%s: %s", self.drone.name, text
+            )
         if self.active:
             for message in self._texts.messages(severity, text):
                 self.send(message, to)
@@ -335,7 +337,7 @@ class System:
                     try:
                         service.tick(now)
                     except Exception:  # the heartbeat goes on whatever happens to one service
-                        logger.exception("%s of system %d", type(service).__name__, self.sysid)
+                        logger.exception("%s: %s failed", self.drone.name, type(service).__name__)
             await asyncio.sleep(max(0.0, min(self._next_heartbeat, next_look) - self.clock.monotonic()))
 
     # What the drone reports.
