@@ -67,6 +67,11 @@ ENDPOINTS = """
 Each may end in `?flavour=px4` (the default), `?flavour=ardupilot` or `?flavour=standard`: the autopilot that its
 clients are shown.
 
+A datagram of `udpout` and `udpin` carries one MAVLink frame: some programs (gomavlib since 3.3.2, and so mavp2p) read
+only the first frame of a datagram. `?frames=many` puts up to 512 bytes of frames into one. It is for a large fleet and
+for a client that reads them all, as QGroundControl, MAVSDK, pymavlink and mavlink-router do. Two options are joined by
+`&`, as in `udpout://127.0.0.1:14550?flavour=ardupilot&frames=many` (in a shell, put the URL in quotes).
+
 `udpin` and `tcpin` listen on loopback unless HOST says otherwise. MAVLink has no password: who reaches an endpoint
 flies the drones.
 """
@@ -249,9 +254,10 @@ them, to everybody. Ranges are the drone's own: it tells them with each setting,
 `parameter.json`, which QGroundControl and MAVSDK load by themselves over MAVLink FTP.
 
 A write is answered when the drone has confirmed it, with what it confirmed. What is out of range, read only or of
-another type is refused with PARAM_ERROR. A value that is not known is NaN, a whole number -1. The drone keeps its own
-settings, and the gateway keeps its settings for each drone, but for `ANF_HAND_LAUNCH`, `ANF_CRUISE_SPEED`,
-`ANF_CLIMB_SPEED` and `ANF_FENCE_ON`, which begin with their default whenever it is started.
+another type is refused with PARAM_ERROR. So is a read of a name that is not listed. A value that is not known reads
+-1; no parameter is ever NaN. The drone keeps its own settings, and the gateway keeps its settings for each drone, but
+for `ANF_HAND_LAUNCH`, `ANF_CRUISE_SPEED`, `ANF_CLIMB_SPEED` and `ANF_FENCE_ON`, which begin with their default whenever
+it is started.
 """
 
 PARAMETERS_NATIVE = """
@@ -264,7 +270,8 @@ PARAMETERS_NATIVE = """
 PARAMETERS_FACTS = """
 ## Facts in {title}'s words
 
-What its clients ask for and nobody could set. They can be read only.
+What its clients ask for and cannot be set. They can be read only. What QGroundControl's setup pages ask for and an
+ANAFI does not have is there with a neutral value: "not available on ANAFI".
 
 | name | what it is | value | unit | source |
 |---|---|---|---|---|
@@ -275,6 +282,7 @@ def parameters() -> str:
     """docs/parameters.md."""
     from anafi_mav.services.parameter_table_ardupilot import ARDUPILOT_NAMES
     from anafi_mav.services.parameter_table_px4 import PX4_NAMES
+    from anafi_mav.services.parameter_table_setup import NOT_AVAILABLE
     from anafi_mav.services.parameters import NATIVE_NAMES
 
     def twins(name: str, names: Any) -> str:
@@ -288,7 +296,7 @@ def parameters() -> str:
         if one.source != "fact":
             return "–"
         value = one.read(None)
-        return "not told" if value != value else f"{value:g}"
+        return "not reported: -1" if value != value else f"{value:g}"
 
     parts = [PARAMETERS, PARAMETERS_NATIVE]
     for one in sorted(NATIVE_NAMES, key=lambda parameter: parameter.name):
@@ -303,7 +311,8 @@ def parameters() -> str:
         for one in sorted(names, key=lambda parameter: parameter.name):
             if not one.native:
                 where = f"`{one.source}`" if "." in one.source else one.source
-                parts.append(f"| `{one.name}` | {one.short} | {stated(one)} | {one.unit or '–'} | {where} |\n")
+                what = f"{one.short}: {one.long.lower().rstrip('.')}" if one.long == NOT_AVAILABLE else one.short
+                parts.append(f"| `{one.name}` | {what} | {stated(one)} | {one.unit or '–'} | {where} |\n")
     return "".join(parts)
 
 

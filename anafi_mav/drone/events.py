@@ -49,11 +49,13 @@ from anafi_mav.arsdk.messages.battery import Alert as BatteryAlertChanged
 from anafi_mav.arsdk.messages.battery import AlertLevel as AlertLevel
 from anafi_mav.arsdk.messages.battery import BatteryAlert as BatteryAlert
 from anafi_mav.arsdk.messages.battery import Capacity as BatteryCapacity
+from anafi_mav.arsdk.messages.battery import Description as BatteryDescription
 from anafi_mav.arsdk.messages.common import CalibrationAxis as CalibrationAxis
 from anafi_mav.arsdk.messages.common import FlightId as FlightId
 from anafi_mav.arsdk.messages.common import FlightPlanComponent as FlightPlanComponent
 from anafi_mav.arsdk.messages.common import MagnetoCalibrationRequiredState as MagnetoCalibrationRequiredState
 from anafi_mav.arsdk.messages.common import MagnetoCalibrationStartedChanged as MagnetoCalibrationStartedChanged
+from anafi_mav.arsdk.messages.common import MagnetoCalibrationStateChanged as MagnetoCalibrationStateChanged
 from anafi_mav.arsdk.messages.common import MavlinkFilePlayingStateChanged as MavlinkFilePlayingStateChanged
 from anafi_mav.arsdk.messages.common import MavlinkType as MavlinkType
 from anafi_mav.arsdk.messages.common import MissionItemExecuted as MissionItemExecuted
@@ -122,6 +124,7 @@ __all__ = [
     "BatteryAlert",
     "BatteryAlertChanged",
     "BatteryCapacity",
+    "BatteryDescription",
     "Blocker",
     "BlockerKind",
     "CalibrationAxis",
@@ -151,6 +154,7 @@ __all__ = [
     "IcingLevelChanged",
     "MagnetoCalibrationRequiredState",
     "MagnetoCalibrationStartedChanged",
+    "MagnetoCalibrationStateChanged",
     "MavlinkFilePlayingStateChanged",
     "MavlinkType",
     "MaxAltitudeChanged",

@@ -54,6 +54,8 @@ class Flavour:
     float_plans: bool = False
     """Items of plans are requested with MISSION_REQUEST, which clients of this family answer in either form; otherwise
     with MISSION_REQUEST_INT."""
+    always_continues: bool = False
+    """A mission goes on after each item: autocontinue 0 means 1, and is read back as 1 (ArduPilot; PX4 stops there)."""
     partial_plans: bool = False
     """Clients replace single items of a plan (MISSION_WRITE_PARTIAL_LIST)."""
     relative_takeoff: bool = False
@@ -158,6 +160,7 @@ ARDUPILOT = Flavour(
     bytewise=False,
     zero_home=True,
     float_plans=True,
+    always_continues=True,
     partial_plans=True,
     relative_takeoff=True,
     zero_is_unset=True,

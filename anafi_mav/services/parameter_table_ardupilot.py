@@ -2,7 +2,7 @@
 
 Names, types and units are ArduCopter 4.5's (centimetres and centidegrees where it has them). QGroundControl's setup
 pages, Mission Planner and MAVProxy look for these (conformance E3). As with PX4's names, none is inert: what cannot be
-followed cannot be written, what an ANAFI does not tell is NaN or -1.
+followed cannot be written, what an ANAFI does not report reads -1.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ from anafi_mav.services.parameter_table import (
     put_end_of_return,
 )
 from anafi_mav.services.parameter_table_fence import FENCE_ARDUPILOT
+from anafi_mav.services.parameter_table_setup import SETUP_ARDUPILOT
 from anafi_mav.services.return_end import EndOfReturn
 from anafi_mav.services.service import Host
 from anafi_mav.services.statustext import Severity
@@ -39,7 +40,9 @@ from anafi_mav.services.takeoff import AUTO_DISARM
 
 FACTS = "ArduPilot facts"
 
-UNTOLD = "An ANAFI does not tell it."
+UNTOLD = "An ANAFI does not report it."
+
+DRONE_WARNS = "0: ArduPilot's word for no threshold. The drone warns of a low battery by levels of its own."
 
 CM = 100.0
 """cm in a m, centidegrees in a degree."""
@@ -152,10 +155,11 @@ FACTS_ARDUPILOT: tuple[Parameter, ...] = (
         source=events.BatteryCapacity.NAME,
     ),
     _fact("BATT_FS_CRT_ACT", 1, "Battery almost empty: the drone lands", values={1: "Land"}),
-    _untold("BATT_LOW_VOLT", "Voltage that is low", unit="V"),
-    _untold("BATT_CRT_VOLT", "Voltage that is critical", unit="V"),
-    _untold("BATT_LOW_MAH", "Charge that is low", unit="mAh"),
-    _untold("BATT_CRT_MAH", "Charge that is critical", unit="mAh"),
+    *(
+        _fact(f"BATT_{level}_{unit}", 0.0, "Threshold: none", Kind.REAL32, unit=name, long=DRONE_WARNS)
+        for level in ("LOW", "CRT")
+        for unit, name in (("VOLT", "V"), ("MAH", "mAh"))
+    ),
     _untold("LAND_SPEED", "Speed of a landing", Kind.INT16, unit="cm/s"),
     _fact("COMPASS_DEV_ID", 1, "Compass: the drone has one", Kind.INT32),
     _fact("COMPASS_DEV_ID2", 0, "Second compass: none", Kind.INT32),
@@ -206,4 +210,4 @@ FACTS_ARDUPILOT: tuple[Parameter, ...] = (
     ),
 )
 
-ARDUPILOT_NAMES: tuple[Parameter, ...] = (*TWINS, *FENCE_ARDUPILOT, *FACTS_ARDUPILOT)
+ARDUPILOT_NAMES: tuple[Parameter, ...] = (*TWINS, *FENCE_ARDUPILOT, *FACTS_ARDUPILOT, *SETUP_ARDUPILOT)

@@ -2,7 +2,7 @@
 
 QGroundControl calls a vehicle without some of these not set up, and complains of others when it opens a page
 (conformance A5). None of them is inert: a value that nothing would follow is a fact and cannot be written, one that an
-ANAFI does not tell is NaN or -1.
+ANAFI does not report reads -1. What only fills a page of QGroundControl is in `parameter_table_setup`.
 """
 
 from __future__ import annotations
@@ -38,6 +38,7 @@ from anafi_mav.services.parameter_table import (
 )
 from anafi_mav.services.parameter_table_fence import FENCE_PX4
 from anafi_mav.services.parameter_table_follow import FOLLOW_PX4
+from anafi_mav.services.parameter_table_setup import SETUP_PX4
 from anafi_mav.services.refusal import Refused
 from anafi_mav.services.return_end import LONGEST_WAIT, EndOfReturn
 from anafi_mav.services.service import Host
@@ -45,7 +46,7 @@ from anafi_mav.services.takeoff import AUTO_DISARM
 
 FACTS = "PX4 facts"
 
-UNTOLD = "An ANAFI does not tell it."
+UNTOLD = "An ANAFI does not report it."
 
 
 def _calibrated(host: Host) -> float:
@@ -250,4 +251,4 @@ FACTS_PX4: tuple[Parameter, ...] = (
     ),
 )
 
-PX4_NAMES: tuple[Parameter, ...] = (*TWINS, *FENCE_PX4, *FOLLOW_PX4, *FACTS_PX4)
+PX4_NAMES: tuple[Parameter, ...] = (*TWINS, *FENCE_PX4, *FOLLOW_PX4, *FACTS_PX4, *SETUP_PX4)

@@ -86,7 +86,7 @@ async def test_conf_042_parameter_list(flavour: str) -> None:
         assert {m.get_srcComponent() for m in values} == {1}
         assert {m.param_id for m in values} >= {*NATIVE, *(A5_PX4 if flavour == "px4" else WANTED_ARDUPILOT)}
         # Settings of a later generation, and what only the Ai has, are nothing that a 4K would show.
-        assert not {m.param_id for m in values} & {"ANF_HORI_SPEED", "ANF_OBS_AVOID", "COM_OBS_AVOID"}
+        assert not {m.param_id for m in values} & {"ANF_HORI_SPEED", "ANF_OBS_AVOID"}
 
 
 @both
