@@ -259,6 +259,9 @@ class Gateway:
         for s in self._supervised:
             if not s.system.active or s.system.vehicle.on_ground:
                 continue
+            if (ending := s.system.vehicle.alone) is not None:
+                sentences.append(f"{s.config.name} {ending}")
+                continue
             delay = s.drone.home.state.delay_s
             after = "after its own delay" if delay is None else f"{delay} s after it lost the link"
             home = "fly home " + after if s.system.vehicle.home is not None else "stay there, for it knows no home"

@@ -111,6 +111,10 @@ class _Interrupts:
                 continue  # nohup
             loop.add_signal_handler(number, self.receive, number)
 
+    def unsaid(self) -> list[str]:
+        """Return what drones in the air do when the gateway ends, unless a first SIGINT has shown it."""
+        return [] if self._told else self.flying()
+
     def receive(self, number: signal.Signals) -> None:
         sentences = self.flying() if number == signal.SIGINT and not self._told else []
         if not sentences:
@@ -136,6 +140,8 @@ async def _run(config: Config, sim_log: Path | None) -> list[str]:
             say(line)
         say("ready, Ctrl-C ends", "green")
         await interrupts.stop.wait()
+        for sentence in interrupts.unsaid():
+            say(sentence, "yellow")
         return gateway.state_problems()
 
 

@@ -12,7 +12,7 @@ from typing import ClassVar
 import msgspec
 from msgspec.structs import replace
 
-from anafi_mav.arsdk.messages import ardrone3, precise_home, rth
+from anafi_mav.arsdk.messages import ardrone3, common, precise_home, rth
 from anafi_mav.arsdk.messages.precise_home import PreciseHomeMode, PreciseHomeState
 from anafi_mav.arsdk.messages.rth import (
     AutoTriggerReason,
@@ -45,6 +45,8 @@ class HomeState(msgspec.Struct, frozen=True):
     """
     takeoff_location: Position | None = None
     """Where the drone took off; altitude above the take-off point."""
+    fixed_before_takeoff: bool | None = None
+    """`takeoff_location` was measured before the take-off, not with the first fix in the air."""
     custom_location: Position | None = None
     """The place a user chose; altitude above the take-off point."""
     type: RthHomeType | None = None
@@ -109,7 +111,9 @@ class Home(Commanding[HomeState]):
             state, location=position(message.latitude, message.longitude, message.altitude)
         ),
         rth.TakeoffLocation: lambda state, message: replace(
-            state, takeoff_location=position(message.latitude, message.longitude, message.altitude)
+            state,
+            takeoff_location=position(message.latitude, message.longitude, message.altitude),
+            fixed_before_takeoff=message.fixed_before_takeoff != 0,
         ),
         rth.CustomLocation: lambda state, message: replace(
             state, custom_location=position(message.latitude, message.longitude, message.altitude)
@@ -135,6 +139,10 @@ class Home(Commanding[HomeState]):
             state, precise_modes=members(message.modes, PreciseHomeMode)
         ),
     }
+
+    def request_states(self) -> None:
+        """Make the drone report all its states again, that of a return among them. Raises `LinkLost`."""
+        self._commander.send(common.AllStates())
 
     async def set_min_altitude(self, metres: float) -> float:
         """Height above take-off that a return climbs to first."""

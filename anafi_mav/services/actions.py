@@ -53,7 +53,7 @@ async def land(vehicle: Vehicle, command: Command) -> None:
 
 async def return_to_launch(vehicle: Vehicle, command: Command) -> None:
     """MAV_CMD_NAV_RETURN_TO_LAUNCH."""
-    await vehicle.return_home()
+    await vehicle.return_home(command.client)
 
 
 async def reposition(vehicle: Vehicle, command: Command) -> None:

@@ -292,10 +292,11 @@ class GuidedService(Service):
             before = home.state.preferred_type
             try:
                 await home.set_preferred_type(RthHomeType.CUSTOM)
-                await home.set_custom_location(where.latitude, where.longitude, ato)
+                given = await home.set_custom_location(where.latitude, where.longitude, ato)
             except BaseException:
                 # The custom home of some other day must not stay: a return that replaces this waits until it is gone.
                 if before is not None and before != RthHomeType.CUSTOM:
                     await asyncio.wait([self.host.spawn(self._prefer(before))])
                 raise
+        vehicle.return_end.set_home(given, "set home")
         self.host.text(Severity.NOTICE, "Home set: the drone returns there until its home type is changed")

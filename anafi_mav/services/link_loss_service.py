@@ -6,6 +6,7 @@ from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.link_loss import GcsWatch, LossAction
+from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.service import Host, Service
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.vehicle import Landed
@@ -37,7 +38,7 @@ class LinkLossService(Service):
             self.host.text(Severity.WARNING, silence)
         elif self.host.drone.controller.pilot_flies:
             self.host.text(Severity.WARNING, f"{silence}: the pilot at the Skycontroller flies on")
-        elif vehicle.returning:
+        elif vehicle.mode is FlightMode.RETURN:
             self.host.text(Severity.WARNING, f"{silence}: the drone is returning")
         else:
             self.host.text(Severity.CRITICAL, f"{silence}: {policy.action.name.lower()}")

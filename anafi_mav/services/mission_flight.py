@@ -179,6 +179,13 @@ class MissionFlight:
         """A landing or a return that begins now is the plan's own."""
         return self.progress.ending
 
+    @property
+    def returns(self) -> bool:
+        """A return that begins now is that of the mission's last item, done already or about to be."""
+        drone = self._vehicle.drone
+        by_plan = drone.home.state.reason == events.ReturnReason.FLIGHTPLAN and drone.flight_plan.state.uid == self._uid
+        return self.progress.ending or (by_plan and self.progress.returned)
+
     # The beginning.
 
     def _require_freedom(self) -> None:

@@ -222,10 +222,14 @@ class System:
         self._node.disown(self.sysid)
 
     async def let_go(self) -> None:
-        """The gateway ends: nothing of ours goes on, a flying drone is left hovering. Clients must not be heard."""
+        """The gateway ends: a flying drone is left hovering, or returning or landing where it does that already.
+
+        Clients must not be heard.
+        """
         if not self.active:
             return
-        await self._commands.end_all()
+        if not self.vehicle.ends_alone:  # a command that has begun a return would abort it on its end
+            await self._commands.end_all()
         await self.vehicle.let_go()
 
     # Host.

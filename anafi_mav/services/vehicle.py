@@ -16,6 +16,7 @@ from anafi_mav.clock import Clock
 from anafi_mav.drone import Drone
 from anafi_mav.drone.events import AlertLevel, FlyingState, ForcedLandingReason, PlayingState
 from anafi_mav.services.aircraft import Aircraft
+from anafi_mav.services.clients import system_of
 from anafi_mav.services.flying import AIRBORNE, LANDING, ON_GROUND, TAKING_OFF
 from anafi_mav.services.follow_flight import FollowFlight
 from anafi_mav.services.guided_flight import GuidedFlight
@@ -27,6 +28,7 @@ from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.offboard_flight import OffboardFlight
 from anafi_mav.services.rally import RallyPoints
 from anafi_mav.services.refusal import Refused
+from anafi_mav.services.return_end import ReturnEnd
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.takeoff import Takeoff
 
@@ -75,6 +77,7 @@ class Vehicle(Aircraft):
         self._end_others = end_others
         self._terminating = False
         self._last_flying: FlyingState | None = None
+        self.return_end = ReturnEnd(self)
         self.mission = MissionFlight(self)
         self.takeoff = Takeoff(self, self.mission.armed)
         self.guided = GuidedFlight(self)
@@ -107,6 +110,8 @@ class Vehicle(Aircraft):
         state = self.flying_state
         if state == FlyingState.EMERGENCY:
             return FlightMode.TERMINATED
+        if self.return_end.shown:
+            return FlightMode.RETURN
         if state in LANDING:
             return FlightMode.LAND
         if self.returning:
@@ -165,15 +170,21 @@ class Vehicle(Aircraft):
         with self._selected_no_more(None):
             await self.drone.piloting.land()
 
-    async def return_home(self) -> None:
-        """Fly home by the drone's own return."""
+    async def return_home(self, client: Hashable = None) -> None:
+        """Fly home by the drone's own return, and land there as `return_end` says. `client` is None for the gateway."""
         if self.on_ground:
             raise Refused("Return refused: the drone is on the ground")
         if self.flying_state in LANDING:
             raise Refused("Return refused: the drone is landing")
         await self.take_over()
-        with self._selected_no_more(None):
-            await self.drone.piloting.return_home()
+        attempt = self.return_end.command()
+        try:
+            with self._selected_no_more(None):
+                await self.drone.piloting.return_home()
+        except BaseException:
+            self.return_end.fail(attempt)
+            raise
+        self.return_end.announce(attempt, system_of(client))
 
     async def hold(self, mode: FlightMode = FlightMode.HOLD) -> None:
         if self.flying_state in LANDING:
@@ -201,7 +212,7 @@ class Vehicle(Aircraft):
             case FlightMode.LAND:
                 await self.land()
             case FlightMode.RETURN:
-                await self.return_home()
+                await self.return_home(client)
             case FlightMode.TAKEOFF:
                 await self.takeoff.begin(None, client)
             case FlightMode.OFFBOARD:
@@ -225,6 +236,7 @@ class Vehicle(Aircraft):
             return
         if state in ON_GROUND and before is not None:
             self.orders += 1
+            self.return_end.on_ground()
             self.takeoff.came_down()
             self.end_helms(self._ending_mission)
             self.takeoff.end_climb()
@@ -238,6 +250,7 @@ class Vehicle(Aircraft):
                 self.origin = place
         if not self.on_ground:
             self.takeoff.left_ground()
+        self.return_end.on_flying_state()
         self.changed()
 
     def on_position(self) -> None:
@@ -256,14 +269,18 @@ class Vehicle(Aircraft):
     def on_return(self) -> None:
         """The drone's return began, ended or changed: setpoints and the climb after a take-off never fight it."""
         if self.returning:
+            if self.mission.returns and not (self.returning_by_itself or self.return_end.active):
+                self.return_end.announce(self.return_end.command(), None)  # the mission's last item
             self.end_helms(self._ending_mission)
             self.takeoff.end_climb()
+        self.return_end.on_return_state()
         self.changed()
 
     def link_down(self) -> None:
         """The link is lost: nothing that was asked for outlives it."""
         self.height.link_down(flying=not self.on_ground)
         self.orders += 1
+        self.return_end.link_down()
         self._let_go()
         self.takeoff.link_down()
         self._selected = FlightMode.HOLD
@@ -273,8 +290,23 @@ class Vehicle(Aircraft):
             helm.link_down()
         self._terminating = False
 
+    @property
+    def ends_alone(self) -> bool:
+        """A return or a landing is commanded or under way, which the drone ends without the gateway."""
+        return self.returning or self.return_end.sent or self.flying_state in LANDING
+
+    @property
+    def alone(self) -> str | None:
+        """The end of a return or landing without the gateway, as a predicate of the drone; None: neither is on."""
+        if self.flying_state in LANDING:
+            return "is landing, and goes on landing"
+        return self.return_end.alone if self.ends_alone else None
+
     async def let_go(self) -> None:
-        """The gateway ends: give up whatever is under way and leave a flying drone hovering on its own."""
+        """The gateway ends: leave a flying drone hovering. A return or a landing goes on, whoever began it."""
+        if self.ends_alone:
+            self.return_end.end()
+            return
         await self.take_over()
         if self.drone.piloting.about_to_fly:
             await self.drone.piloting.land()
@@ -317,4 +349,4 @@ class Vehicle(Aircraft):
         """End what this vehicle does by itself; the tasks that are still about to end."""
         self.takeoff.forget()
         self.guided.forget_arrival()
-        return [*self.end_helms(), *self.takeoff.end()]
+        return [*self.return_end.end(), *self.end_helms(), *self.takeoff.end()]

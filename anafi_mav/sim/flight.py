@@ -39,6 +39,7 @@ from anafi_mav.sim.place import Origin
 from anafi_mav.sim.plan_store import FlightPlanStore
 from anafi_mav.sim.poi import Poi
 from anafi_mav.sim.power import Battery
+from anafi_mav.sim.quirks import Quirk
 from anafi_mav.sim.safety import Alarms, Warnings, check_changed
 from anafi_mav.sim.settings import Settings
 from anafi_mav.sim.wind import WindWatch
@@ -104,7 +105,8 @@ class Flight:
         self.alarms = Alarms()
         self.warnings = Warnings()
         self.endurance = Endurance(model, self.settings)
-        self.homing = Homing(body, origin, self.settings, emit)
+        unreported = lambda: Quirk.RTH_FINISHED_MISSING in self.faults.quirks  # noqa: E731
+        self.homing = Homing(body, origin, self.settings, emit, unreported)
         self.guidance = Guidance(model, body, origin, self.settings, self.homing, emit)
         self.flight_plan = FlightPlan(model, body, origin, self.settings, self, self.operator, emit, note, self.faults)
         self.poi = Poi(origin, emit, self.operator.aim, lambda: self.settings.yaw_rate, model.modern)

@@ -54,8 +54,17 @@ class Phase(enum.Enum):
 class Homing:
     """Home and the return. `emit` takes the events, `body` does the flying."""
 
-    def __init__(self, body: Body, origin: Origin, settings: Settings, emit: Callable[[Message], None]) -> None:
+    def __init__(
+        self,
+        body: Body,
+        origin: Origin,
+        settings: Settings,
+        emit: Callable[[Message], None],
+        ends_unreported: Callable[[], bool] = lambda: False,
+    ) -> None:
+        """`ends_unreported`: a finished return is not reported (quirk rth-finished-missing)."""
         self._body = body
+        self._ends_unreported = ends_unreported
         self._origin = origin
         self._settings = settings
         self._emit = emit
@@ -260,7 +269,10 @@ class Homing:
             self._go(north, east, min(self._settings.number("rth_hovering_altitude"), self._height))
         else:
             self._stop_body()
-            self._set(RthState.AVAILABLE, StateReason.FINISHED)
+            if self._ends_unreported():
+                self._state = (RthState.AVAILABLE, StateReason.ENABLED)
+            else:
+                self._set(RthState.AVAILABLE, StateReason.FINISHED)
             ending: RthEndingBehavior = self._settings["rth_ending"]
             return ending
         return None
