@@ -24,9 +24,12 @@ from anafi_mav.units import DEG_PER_RAD
 BREATH = 20
 """Way points after which others get their turn: a large polygon takes a while."""
 
+ACCEPTANCE = 5.0
+"""m around a way point that names no radius (Parrot's flight plan page)."""
+
 _AMSL_FRAMES = (dialect.MAV_FRAME_GLOBAL, dialect.MAV_FRAME_GLOBAL_INT)
 
-_COMMAND, _LATITUDE, _LONGITUDE, _HEIGHT = 3, 8, 9, 10
+_COMMAND, _RADIUS, _LATITUDE, _LONGITUDE, _HEIGHT = 3, 5, 8, 9, 10
 """Columns of a line (arsdk.md §3.3, Parrot's flight plan page)."""
 
 
@@ -39,6 +42,8 @@ class WayPoint:
     place: Place
     ato: float
     """m above the take-off point."""
+    radius: float
+    """m around it that count as reached."""
 
 
 def _start(vehicle: Aircraft) -> Start:
@@ -104,7 +109,8 @@ def way_points(leg: Leg, after: int = -1) -> Iterator[WayPoint]:
         columns = line.split("\t")
         if int(columns[_COMMAND]) == dialect.MAV_CMD_NAV_WAYPOINT:
             place = Place(float(columns[_LATITUDE]), float(columns[_LONGITUDE]))
-            yield WayPoint(item, place, float(columns[_HEIGHT]))
+            radius = float(columns[_RADIUS])
+            yield WayPoint(item, place, float(columns[_HEIGHT]), radius if radius > 0.0 else ACCEPTANCE)
 
 
 async def check_path(vehicle: Aircraft, parts: Sequence[Leg | Step], after: int, number: int) -> None:
