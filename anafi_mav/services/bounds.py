@@ -67,16 +67,15 @@ def check_on_earth(place: Place, what: str) -> None:
 def check_place(vehicle: Aircraft, place: Place, *, start: Place | None = None) -> None:
     """Raise `Refused` unless the drone may fly there, and the straight way from `start` if that is given."""
     check_on_earth(place, "Goto")
-    state, centre = vehicle.drone.piloting.state, vehicle.home
+    state, centre, home = vehicle.drone.piloting.state, vehicle.geofence_centre, vehicle.home
     if state.geofence and state.max_distance is not None and centre is not None:
         distance = geo.distance(centre.latitude, centre.longitude, place.latitude, place.longitude)
         if distance > state.max_distance.current:
             raise Refused(
-                f"Goto refused: {distance:.0f} m from home is beyond the drone's limit of "
-                f"{state.max_distance.current:g} m",
+                f"Goto refused: {distance:.0f} m from geofence centre > {state.max_distance.current:g} m",
                 lasting=True,
             )
     try:
-        vehicle.fence.check_place(point_of(place), point_of(centre), point_of(start))
+        vehicle.fence.check_place(point_of(place), point_of(home), point_of(start))
     except OutsideFence as error:
         raise Refused(f"Goto refused: {error}", lasting=error.lasting) from error
