@@ -67,6 +67,7 @@ class FlightPlanState(msgspec.Struct, frozen=True):
     capabilities: frozenset[SupportedCapabilities] | None = None
     """Ai only."""
     error: PlayError | None = None
+    """Why the drone refused or stopped a plan; None once it plays one."""
     returns_on_disconnect: bool | None = None
     """A lost link ends the plan with a return home."""
     recovery: Recovery | None = None
@@ -89,6 +90,7 @@ def _playing(state: FlightPlanState, message: common.MavlinkFilePlayingStateChan
         type=message.type,
         item=None if begins and not (same and state.playing == PlayingState.PLAYING) else state.item,
         skipped=None if begins else state.skipped,
+        error=None if begins else state.error,
     )
 
 

@@ -80,8 +80,10 @@ class PilotingState(msgspec.Struct, frozen=True):
     max_altitude: Range | None = None
     """m above the take-off point; always enforced."""
     max_distance: Range | None = None
-    """m from home; enforced when `geofence` is on."""
+    """m from `geofence_centre`; enforced when `geofence` is on."""
     geofence: bool | None = None
+    geofence_centre: tuple[float, float] | None = None
+    """deg, deg: what `max_distance` counts from, a controller's GPS or the last take-off (ardrone3.xml 1-2-4)."""
     banked_turn: bool | None = None
     max_horizontal_speed: Range | None = None
     """m/s; reported by later generations only."""
@@ -133,6 +135,11 @@ def _velocity(state: PilotingState, message: ardrone3.SpeedChanged) -> PilotingS
     return replace(state, velocity=Velocity(message.speedX, message.speedY, message.speedZ))
 
 
+def _centre(state: PilotingState, message: ardrone3.GeofenceCenterChanged) -> PilotingState:
+    centre = position(message.latitude, message.longitude, 0.0)
+    return replace(state, geofence_centre=None if centre is None else (centre.latitude, centre.longitude))
+
+
 def _move_to(state: PilotingState, message: ardrone3.MoveToChanged) -> PilotingState:
     target = position(message.latitude, message.longitude, message.altitude)
     return replace(state, move_to=message.status, move_target=target)
@@ -163,6 +170,7 @@ REDUCERS: Mapping[type[Message], Reducer] = {
     ardrone3.MaxAltitudeChanged: lambda state, message: replace(state, max_altitude=setting(message)),
     ardrone3.MaxDistanceChanged: lambda state, message: replace(state, max_distance=setting(message)),
     ardrone3.NoFlyOverMaxDistanceChanged: lambda state, message: replace(state, geofence=message.shouldNotFlyOver != 0),
+    ardrone3.GeofenceCenterChanged: _centre,
     ardrone3.BankedTurnChanged: lambda state, message: replace(state, banked_turn=message.state != 0),
     ardrone3.MaxHorizontalSpeedChanged: lambda state, message: replace(state, max_horizontal_speed=setting(message)),
     piloting_style.Style: lambda state, message: replace(state, style=message.style),

@@ -10,6 +10,7 @@ import math
 from anafi_mav import geo
 from anafi_mav.services.aircraft import Aircraft
 from anafi_mav.services.fence_watch import OutsideFence
+from anafi_mav.services.height import ESTIMATE_FLOOR
 from anafi_mav.services.place import Place, point_of
 from anafi_mav.services.refusal import Refused
 
@@ -45,8 +46,14 @@ def amsl_to_ato(vehicle: Aircraft, amsl: float) -> float:
     """Height above take-off (m) of an AMSL height; raises `Refused` when no bridge is known."""
     ato = vehicle.height.ato(amsl)
     if ato is None:
-        raise Refused("Refused: no GPS fix on the ground, so the take-off point's height above sea level is unknown")
+        raise Refused("Refused: take-off altitude unknown: no GPS fix")
     return ato
+
+
+def check_estimate(vehicle: Aircraft, ato: float) -> None:
+    """Raise `Refused` for an AMSL target that may be the ground because the bridge to AMSL is an estimate."""
+    if vehicle.height.estimated and ato < ESTIMATE_FLOOR:
+        raise Refused(f"Refused: estimated AMSL height {ato:.0f} m < {ESTIMATE_FLOOR:g} m")
 
 
 def check_on_earth(place: Place, what: str) -> None:
@@ -60,16 +67,15 @@ def check_on_earth(place: Place, what: str) -> None:
 def check_place(vehicle: Aircraft, place: Place, *, start: Place | None = None) -> None:
     """Raise `Refused` unless the drone may fly there, and the straight way from `start` if that is given."""
     check_on_earth(place, "Goto")
-    state, centre = vehicle.drone.piloting.state, vehicle.home
+    state, centre, home = vehicle.drone.piloting.state, vehicle.geofence_centre, vehicle.home
     if state.geofence and state.max_distance is not None and centre is not None:
         distance = geo.distance(centre.latitude, centre.longitude, place.latitude, place.longitude)
         if distance > state.max_distance.current:
             raise Refused(
-                f"Goto refused: {distance:.0f} m from home is beyond the drone's limit of "
-                f"{state.max_distance.current:g} m",
+                f"Goto refused: {distance:.0f} m from geofence centre > {state.max_distance.current:g} m",
                 lasting=True,
             )
     try:
-        vehicle.fence.check_place(point_of(place), point_of(centre), point_of(start))
+        vehicle.fence.check_place(point_of(place), point_of(home), point_of(start))
     except OutsideFence as error:
         raise Refused(f"Goto refused: {error}", lasting=error.lasting) from error

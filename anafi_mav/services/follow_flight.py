@@ -16,7 +16,7 @@ from anafi_mav.drone import PilotingCommand, events
 from anafi_mav.drone.events import Message
 from anafi_mav.errors import LinkLost
 from anafi_mav.services.aircraft import Aircraft
-from anafi_mav.services.bounds import amsl_to_ato, check_height, check_on_earth, check_place
+from anafi_mav.services.bounds import amsl_to_ato, check_estimate, check_height, check_on_earth, check_place
 from anafi_mav.services.follow import (
     PATIENCE,
     REACH,
@@ -172,6 +172,7 @@ class FollowFlight:
             if self._follower.altitude is None:
                 raise Refused("Refused: the target does not tell its altitude")
             height += amsl_to_ato(self._vehicle, self._follower.altitude)
+            check_estimate(self._vehicle, height)
         check_height(self._vehicle, height)
         return height
 

@@ -286,7 +286,7 @@ class GuidedService(Service):
             where = place(command)
             if where is None:
                 raise Refused("Home refused: it has no place", lasting=True)
-            ato = height(vehicle, command) or 0.0
+            ato = height(vehicle, command, flown=False) or 0.0
         check_on_earth(where, "Home")
         async with vehicle.home_choice:
             before = home.state.preferred_type

@@ -19,6 +19,7 @@ from anafi_mav.drone.events import Message
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound, Node
+from anafi_mav.services import takeoff_point_service
 from anafi_mav.services.banner import BannerService
 from anafi_mav.services.command_service import CommandService
 from anafi_mav.services.compass_service import CompassService
@@ -29,6 +30,7 @@ from anafi_mav.services.flight_record import FlightRecordService
 from anafi_mav.services.follow_service import FollowService
 from anafi_mav.services.ftp_service import FtpService
 from anafi_mav.services.guided import GuidedService
+from anafi_mav.services.height import TakeoffRecord
 from anafi_mav.services.high_latency import HighLatencyService
 from anafi_mav.services.identity import IdentityService
 from anafi_mav.services.link_loss_service import LinkLossService
@@ -50,6 +52,7 @@ from anafi_mav.services.service import MessageHandler, Service
 from anafi_mav.services.shell import ShellService
 from anafi_mav.services.statustext import Severity, TextNumbers
 from anafi_mav.services.stream import Times
+from anafi_mav.services.takeoff_point_service import TakeoffPointService
 from anafi_mav.services.telemetry import CHANGES, TelemetryService
 from anafi_mav.services.time_service import TimeService
 from anafi_mav.services.tune import TuneService
@@ -86,6 +89,7 @@ SERVICES: tuple[type[Service], ...] = (
     TuneService,
     NodeStatusService,
     FlightRecordService,
+    TakeoffPointService,
     VideoTelemetryService,
 )
 """What a system consists of, beside commands and messages themselves."""
@@ -175,6 +179,7 @@ class System:
             events.FlyingStateChanged: self.vehicle.on_flying_state,
             events.GpsLocationChanged: self.vehicle.on_position,
             events.FlightId: self.vehicle.on_position,
+            events.TakeoffLocation: self.vehicle.on_takeoff_location,
             events.ReturnStateChanged: self.vehicle.on_return,
         }
         """What the vehicle makes of an event, before the services hear of it."""
@@ -188,11 +193,10 @@ class System:
         self.active = True
         self._undo = self.drone.subscribe(self._on_event)
         self._node.own(self.sysid)
-        self.vehicle.on_flying_state()
-        self.vehicle.on_position()
         self._last_state = None
         if (problem := self.memory.load(self.drone.identity.serial)) is not None:
             self.text(Severity.WARNING, problem)
+        self.vehicle.link_up(TakeoffRecord.read(self.memory.settings.get(takeoff_point_service.KEY)))
         for service in self.services:
             service.link_up()
         self._listeners.clear()

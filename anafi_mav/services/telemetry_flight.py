@@ -243,7 +243,7 @@ def extended_sys_state(vehicle: Vehicle, times: Times) -> dialect.MAVLink_messag
 
 def home_position(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
     """HOME_POSITION. Its altitude is the take-off point's, whatever the home type; x and y are in the local frame."""
-    home, origin = vehicle.home, vehicle.origin
+    home, origin = vehicle.home or vehicle.origin, vehicle.origin
     ground = vehicle.height.takeoff_amsl
     if home is None or ground is None:
         return None

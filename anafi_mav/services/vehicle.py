@@ -14,18 +14,21 @@ from contextlib import contextmanager
 
 from anafi_mav.clock import Clock
 from anafi_mav.drone import Drone
-from anafi_mav.drone.events import AlertLevel, FlyingState, ForcedLandingReason, PlayingState
+from anafi_mav.drone.element import Position
+from anafi_mav.drone.events import AlertLevel, FlyingState, ForcedLandingReason, PlayingState, RthHomeType
 from anafi_mav.services.aircraft import Aircraft
 from anafi_mav.services.clients import system_of
 from anafi_mav.services.flying import AIRBORNE, LANDING, ON_GROUND, TAKING_OFF
 from anafi_mav.services.follow_flight import FollowFlight
 from anafi_mav.services.guided_flight import GuidedFlight
+from anafi_mav.services.height import ESTIMATE_ERROR, TakeoffRecord
 from anafi_mav.services.helm import Helm
 from anafi_mav.services.link_loss import LossPolicy
 from anafi_mav.services.manual_flight import ManualFlight
 from anafi_mav.services.mission_flight import MissionFlight
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.offboard_flight import OffboardFlight
+from anafi_mav.services.place import Place
 from anafi_mav.services.rally import RallyPoints
 from anafi_mav.services.refusal import Refused
 from anafi_mav.services.return_end import ReturnEnd
@@ -78,6 +81,8 @@ class Vehicle(Aircraft):
         self._terminating = False
         self._last_flying: FlyingState | None = None
         self.return_end = ReturnEnd(self)
+        self._takeoff_before: Position | None = None
+        """The take-off place that the drone reported when it landed: of the flight that has ended."""
         self.mission = MissionFlight(self)
         self.takeoff = Takeoff(self, self.mission.armed)
         self.guided = GuidedFlight(self)
@@ -248,6 +253,10 @@ class Vehicle(Aircraft):
             self.height.take_off()
             if (place := self.place) is not None:
                 self.origin = place
+            if self.drone.home.state.takeoff_location != self._takeoff_before:
+                self.on_takeoff_location()  # it was reported before the state
+        if state in ON_GROUND:
+            self._takeoff_before = self.drone.home.state.takeoff_location
         if not self.on_ground:
             self.takeoff.left_ground()
         self.return_end.on_flying_state()
@@ -255,16 +264,48 @@ class Vehicle(Aircraft):
 
     def on_position(self) -> None:
         """A new GPS location, altitude or flight id."""
-        gps = self.drone.gps.state
+        gps, ato = self.drone.gps.state, self.drone.piloting.state.altitude
+        amsl = gps.location.altitude if gps.fixed and gps.location is not None else None
         if self.flying_state == FlyingState.LANDED:
-            self.height.on_ground(
-                gps.location.altitude if gps.fixed and gps.location is not None else None,
-                self.drone.piloting.state.altitude,
-            )
+            self.height.on_ground(amsl, ato)
             if self.origin is None:
                 self.origin = self.place
-        elif self.flying_state is not None:
-            self.height.in_flight(self.drone.product.state.flight_id)
+        elif self.flying_state is not None and self.height.in_flight(self.drone.product.state.flight_id, amsl, ato):
+            self.text(Severity.WARNING, f"Take-off altitude estimated: GPS only (+-{ESTIMATE_ERROR:g} m)")
+
+    def on_takeoff_location(self) -> None:
+        """Adopt the take-off place that the drone reports for the present flight as origin of the local frame."""
+        location = self.drone.home.state.takeoff_location
+        if location is not None and self.flying_state is not None and not self.on_ground:
+            self.origin = Place(location.latitude, location.longitude)
+
+    def link_up(self, kept: TakeoffRecord | None) -> None:
+        """Begin with a drone that has reported all its states. `kept` is of the last flight that was seen."""
+        self.height.recall(kept)
+        self.on_flying_state()
+        self.on_position()
+        if self.flying_state is not None and not self.on_ground:
+            self.origin = self._origin_in_flight(kept)
+
+    def _origin_in_flight(self, kept: TakeoffRecord | None) -> Place | None:
+        """Return where a drone took off that was found in the air; None when nothing reports it."""
+        home, flight = self.drone.home.state, self.drone.product.state.flight_id
+        if (location := home.takeoff_location) is not None:
+            return Place(location.latitude, location.longitude)
+        if kept is not None and kept.flight_id == flight and kept.latitude is not None and kept.longitude is not None:
+            return Place(kept.latitude, kept.longitude)
+        if home.type == RthHomeType.TAKEOFF and home.location is not None:
+            return Place(home.location.latitude, home.location.longitude)
+        return None
+
+    @property
+    def takeoff_record(self) -> TakeoffRecord | None:
+        """The take-off point of the present flight, to be kept; None on the ground or without a flight id."""
+        height, origin = self.height, self.origin
+        if self.on_ground or not height.flight_id or height.takeoff_amsl is None:
+            return None
+        place = (None, None) if origin is None else origin.point
+        return TakeoffRecord(height.flight_id, height.takeoff_amsl, height.estimated, *place)
 
     def on_return(self) -> None:
         """The drone's return began, ended or changed: setpoints and the climb after a take-off never fight it."""
@@ -278,7 +319,7 @@ class Vehicle(Aircraft):
 
     def link_down(self) -> None:
         """The link is lost: nothing that was asked for outlives it."""
-        self.height.link_down(flying=not self.on_ground)
+        self.height.link_down()
         self.orders += 1
         self.return_end.link_down()
         self._let_go()

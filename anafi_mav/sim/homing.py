@@ -95,6 +95,12 @@ class Homing:
         return places.get(self.type, self.takeoff)
 
     @property
+    def geofence_centre(self) -> tuple[float, float] | None:
+        """deg, deg: the controller's place, if not known the take-off's (ardrone3.xml 1-2-4)."""
+        centre = self.takeoff if self.pilot is None else self.pilot
+        return None if centre is None else centre[:2]
+
+    @property
     def home_offset(self) -> tuple[float, float] | None:
         """The same as (north, east) in the simulator's plane, m; None also while the drone has no fix."""
         home = self.home
@@ -122,8 +128,10 @@ class Homing:
         """GPSSettings.SendControllerGPS. What is no place is not heard."""
         if not _somewhere(latitude, longitude, altitude):
             return
-        self.pilot = Location(latitude, longitude, altitude)
+        before, self.pilot = self.geofence_centre, Location(latitude, longitude, altitude)
         self._emit(ardrone3.GPSFixStateChanged(int(self._fix)))
+        if self.geofence_centre != before:
+            self._emit(ardrone3.GeofenceCenterChanged(*self.pilot[:2]))
         self._emit(ardrone3.HomeTypeAvailabilityChanged(ardrone3.AvailableHomeType.PILOT, 1))
         if self.type is RthHomeType.PILOT:
             self.preference_changed()
@@ -143,10 +151,9 @@ class Homing:
     def _places(self) -> list[Message]:
         messages: list[Message] = [self._home_changed()]
         if self.takeoff is not None:
-            messages += [
-                rth.TakeoffLocation(*self.takeoff, int(self.fixed_before_takeoff)),
-                ardrone3.GeofenceCenterChanged(*self.takeoff[:2]),
-            ]
+            messages.append(rth.TakeoffLocation(*self.takeoff, int(self.fixed_before_takeoff)))
+        if (centre := self.geofence_centre) is not None:
+            messages.append(ardrone3.GeofenceCenterChanged(*centre))
         return messages
 
     def settings_report(self) -> list[Message]:
