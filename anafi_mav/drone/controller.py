@@ -122,18 +122,28 @@ class Controller(Element[ControllerState]):
     # -- who flies
 
     @property
-    def pilot_flies(self) -> bool:
-        """The pilot has taken the drone from our user, whose commands of motion are refused for the time being."""
+    def pilot_acquired_control(self) -> bool:
+        """True while motion of ours is refused: the pilot moved a stick against it less than `PILOT_KEEPS` ago."""
         return self.present and loop_time() < self._pilot_keeps_until
+
+    @property
+    def pilot_has_source(self) -> bool:
+        """True while the Skycontroller's sticks fly the drone, whether a pilot holds it or not.
+
+        A source that is not reported is the pilot's: it is his after each connection (skyctrl.xml 4-20-0).
+        """
+        return self.present and not self.taken and self.state.source != Source.CONTROLLER
 
     def allows(self, message: Message) -> bool:
         """Shown every command before it is sent. A command of motion takes sticks and source for our user.
 
-        False: a stick position that must not be sent, since the pilot flies. Raises `CommandRejected` for any other
-        motion then.
+        False: a stick position that must not be sent, since the pilot flies; a level one while he has the source is
+        among them. Raises `CommandRejected` for any other motion then.
         """
-        if not self.present or not is_motion(message):
+        if not self.present:
             return True
+        if not is_motion(message):
+            return not (isinstance(message, ardrone3.PCMD) and self.pilot_has_source)
         now = loop_time()
         if now < self._pilot_keeps_until:
             if isinstance(message, ardrone3.PCMD):

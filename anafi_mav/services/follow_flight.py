@@ -66,7 +66,7 @@ class FollowFlight:
             raise Refused("Follow refused: the drone returns home")
         if vehicle.place is None:
             raise Refused("Follow refused: no GPS fix")
-        if vehicle.drone.controller.pilot_flies:
+        if vehicle.drone.controller.pilot_acquired_control:
             raise Refused("Follow refused: the pilot at the Skycontroller flies")
         if vehicle.drone.piloting.limits is None:
             raise Refused("Follow refused: the drone has not reported what full tilt and speed are")
@@ -139,7 +139,7 @@ class FollowFlight:
         if limits is None:
             return
         reason = None
-        if vehicle.drone.controller.pilot_flies:
+        if vehicle.drone.controller.pilot_acquired_control:
             reason = "the pilot at the Skycontroller flies"
         elif vehicle.sticks_follow_camera:
             reason = "the drone's sticks have become relative to the camera"
