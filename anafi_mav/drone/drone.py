@@ -129,6 +129,7 @@ class Drone:
         self.video = Video()
         self.piloting = Piloting(self._commander, self.home, self.takeoff_blockers)
         self.controller = Controller(self._commander, self._user_moves, self._pilot_takes_over)
+        self.piloting.pilot_has_source = self._pilot_has_source
         self._commander.gate = self._allows
         self._elements: tuple[Element[Any], ...] = (
             self.alerts,
@@ -325,6 +326,11 @@ class Drone:
             or piloting.state.following not in (None, FollowMeMode.NONE)
             or piloting.state.animation not in (None, AnimationType.NONE)
         )
+
+    def _pilot_has_source(self) -> bool:
+        """True while a Skycontroller's own sticks fly the drone."""
+        controller = self.controller
+        return controller.present and not controller.taken and controller.state.source == skyctrl.Source.SKY_CONTROLLER
 
     def _pilot_takes_over(self) -> None:
         """The pilot at the Skycontroller moved a stick: what our user ordered ends here."""

@@ -16,8 +16,10 @@ from anafi_mav.arsdk.messages import ardrone3, rth
 from anafi_mav.arsdk.messages.rth import RthEndingBehavior, RthHomeType, RthState, StateReason
 from anafi_mav.arsdk.wire import Message
 from anafi_mav.sim.body import Body
+from anafi_mav.sim.faults import Faults
 from anafi_mav.sim.motion import Pose, Turn
 from anafi_mav.sim.place import Origin
+from anafi_mav.sim.quirks import Quirk
 from anafi_mav.sim.settings import HOME_TYPES, Settings
 from anafi_mav.units import RAD_PER_DEG
 
@@ -60,11 +62,10 @@ class Homing:
         origin: Origin,
         settings: Settings,
         emit: Callable[[Message], None],
-        ends_unreported: Callable[[], bool] = lambda: False,
+        faults: Faults,
     ) -> None:
-        """`ends_unreported`: a finished return is not reported (quirk rth-finished-missing)."""
         self._body = body
-        self._ends_unreported = ends_unreported
+        self._faults = faults
         self._origin = origin
         self._settings = settings
         self._emit = emit
@@ -276,7 +277,7 @@ class Homing:
             self._go(north, east, min(self._settings.number("rth_hovering_altitude"), self._height))
         else:
             self._stop_body()
-            if self._ends_unreported():
+            if Quirk.RTH_FINISHED_MISSING in self._faults.quirks:
                 self._state = (RthState.AVAILABLE, StateReason.ENABLED)
             else:
                 self._set(RthState.AVAILABLE, StateReason.FINISHED)
