@@ -12,7 +12,7 @@ class AnafiMavError(Exception):
 
 
 class LocalProtocolError(AnafiMavError, ValueError):
-    """Our own code asked a protocol for something it cannot express (value out of range, wrong state)."""
+    """The program asked for something that the protocol cannot express (value out of range, wrong state)."""
 
 
 class RemoteProtocolError(AnafiMavError):

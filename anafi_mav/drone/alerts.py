@@ -21,6 +21,8 @@ from anafi_mav.drone.element import Element, Reducer, with_item
 
 
 class AlertsState(msgspec.Struct, frozen=True):
+    """Warnings of the drone, and its own list of what prevents a take-off."""
+
     alert: AlertState | None = None
     """The one alert of older firmware."""
     alarms: Mapping[alarms.Type, bool] = {}
@@ -49,6 +51,8 @@ def _forced_landing(state: AlertsState, message: ardrone3.ForcedLandingAutoTrigg
 
 
 class Alerts(Element[AlertsState]):
+    """Warnings that the drone reports. No verbs: `Drone.blockers` sums up what prevents a take-off."""
+
     NOTHING = AlertsState()
     REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = {
         ardrone3.AlertStateChanged: lambda state, message: replace(state, alert=message.state),
@@ -83,7 +87,7 @@ _FLIES_WITHOUT = (Sensor.GPS,)
 
 
 class BlockerKind(enum.Enum):
-    """What keeps a drone on the ground; the value is how its text begins."""
+    """Kind of a reason that prevents a take-off; the value is the beginning of its text."""
 
     CHECK = ""
     """A line of the take-off checklist."""
@@ -96,7 +100,7 @@ class BlockerKind(enum.Enum):
 
 
 class Blocker(NamedTuple):
-    """One thing that the drone has reported and that can keep it on the ground."""
+    """One reported reason that can prevent a take-off; `str` gives it in words."""
 
     kind: BlockerKind
     value: OpenEnum | None = None

@@ -80,7 +80,7 @@ CONTROLLER_TIMEOUT = 5.0
 
 
 class Drone:
-    """An ANAFI at a network address. Make it inside a running loop; connect, lose the link and connect again."""
+    """An ANAFI at a network address; `connect` makes one. It can be connected again after the link is lost."""
 
     def __init__(
         self,
@@ -178,9 +178,9 @@ class Drone:
     # -- the connection
 
     async def connect(self) -> None:
-        """Connect and read the drone's state anew; returns when it has sent all of it.
+        """Connect and read all states and settings; returns when the drone has sent them.
 
-        What was known before is forgotten first, and nothing of before is sent again. Raises `LinkLost`, or
+        States of an earlier connection are dropped, and none of its commands is sent again. Raises `LinkLost`, or
         `RemoteProtocolError` when what answers there is no drone.
         """
         if self._session is not None or self._opening:
@@ -352,7 +352,7 @@ class Drone:
             self._lost.set_result(why)
 
     async def close(self) -> None:
-        """End the connection. What was sent just before still leaves. Idempotent."""
+        """End the connection; commands sent just before still leave. Does nothing without one."""
         session = self._session
         if session is not None:
             try:
@@ -367,14 +367,14 @@ class Drone:
 
     @property
     def connected(self) -> bool:
-        """The link is up and the drone has sent all its states."""
+        """True when the link is up and the drone has sent all its states."""
         return self._complete
 
     @property
     def lost(self) -> asyncio.Future[str]:
         """Done when this connection is lost or closed, with the reason; `connect` makes a new one.
 
-        Wait for it with `asyncio.wait` or a shield: cancelling a bare wait would cancel it for everybody.
+        Wait for it with `asyncio.wait` or a shield: cancelling a bare wait would cancel it for all waiters.
         """
         return self._lost
 
@@ -385,7 +385,7 @@ class Drone:
 
     @property
     def identity(self) -> Identity:
-        """Who answered. Before a first connection its texts are empty."""
+        """Model, serial number and versions; empty before the first connection."""
         product = self.product.state
         return Identity(
             model=self._model,
@@ -429,7 +429,7 @@ class Drone:
 
     @property
     def features(self) -> Mapping[Feature, Support]:
-        """What this drone has, as it told when it connected."""
+        """Features of this drone, from what it reported when it connected."""
         return features(self)
 
     @property
@@ -438,17 +438,18 @@ class Drone:
         return self.piloting.moves_started
 
     def blockers(self) -> list[Blocker]:
-        """What the drone has reported against a take-off."""
+        """Return the reported reasons that can prevent a take-off."""
         return takeoff_blockers(self.alerts.state, self.battery.state, self.calibration.state)
 
     def takeoff_blockers(self) -> list[str]:
-        """The same in words."""
+        """Return `blockers` in words."""
         return [str(blocker) for blocker in self.blockers()]
 
     def subscribe(self, callback: Callback) -> Callable[[], None]:
-        """Call this with every known message once the states have it. Returns the function that ends it.
+        """Call `callback(message, time)` with every message, after the states are updated.
 
-        It also hears the messages that come while `connect` runs. What it raises is logged and goes no further.
+        Returns the function that ends it. `time` is the event loop's. Messages during `connect` are included. What the
+        callback raises is logged.
         """
         self._subscribers = (*self._subscribers, callback)
 
@@ -463,7 +464,7 @@ class Drone:
         predicate: Callable[[MessageT], bool] | None = None,
         timeout: float = ANSWER_TIMEOUT,
     ) -> MessageT:
-        """The next message of this class that the predicate accepts. Raises `CommandTimeout` or `LinkLost`."""
+        """Return the next message of a class that the predicate accepts. Raises `CommandTimeout` or `LinkLost`."""
 
         def judge(message: MessageT) -> MessageT | None:
             return message if predicate is None or predicate(message) else None

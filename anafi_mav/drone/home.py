@@ -38,6 +38,8 @@ _ASKED_FOR = (StateReason.USER_REQUEST, StateReason.FLIGHTPLAN)
 
 
 class HomeState(msgspec.Struct, frozen=True):
+    """Home, the return to it, and its settings."""
+
     location: Position | None = None
     """Home as the drone reports it; None on the ground before the first take-off.
 
@@ -64,34 +66,34 @@ class HomeState(msgspec.Struct, frozen=True):
     min_altitude: Range | None = None
     """Height that a return climbs to first, m above take-off."""
     ending: RthEndingBehavior | None = None
-    """What the drone does when it arrives."""
+    """End of a return: landing or hovering."""
     ending_altitude: Range | None = None
     """Height at which a return that ends in hovering stays, m above ground."""
     delay_s: int | None = None
     """Seconds between the loss of the link and the return."""
     delay_range_s: tuple[int, int] | None = None
-    """The shortest and the longest it can be."""
+    """Shortest and longest `delay_s`."""
     types: frozenset[RthHomeType] | None = None
     """The kinds that can be preferred."""
     by_itself: bool | None = None
-    """May the drone return by itself when its battery runs low?"""
+    """True when the drone returns by itself at low battery."""
     missing: frozenset[Indicator] | None = None
-    """What a return lacks; empty = available. Ai only."""
+    """Requirements that a return lacks; empty: available. Ai only."""
     precise_mode: PreciseHomeMode | None = None
-    """Does a return look for the picture of the take-off place?"""
+    """STANDARD: a return ends by the picture of the take-off place."""
     precise: PreciseHomeState | None = None
     precise_modes: frozenset[PreciseHomeMode] | None = None
 
     @property
     def returning(self) -> bool:
-        """Is a return running or about to?"""
+        """True when a return is running or pending."""
         return self.rth in _RETURNING
 
     @property
     def returning_by_itself(self) -> bool:
-        """Did the drone begin the running return on its own account (battery, lost link, ...)?
+        """True when the drone began the return for a reason of its own (battery, lost link, …).
 
-        A return that a user or the end of a flight plan asked for is none of its own.
+        A return that a user or the end of a flight plan commanded is not.
         """
         return self.rth in _RETURNING and self.reason not in _ASKED_FOR
 
@@ -102,6 +104,8 @@ def _auto_trigger(state: HomeState, message: rth.RthAutoTrigger) -> HomeState:
 
 
 class Home(Commanding[HomeState]):
+    """Home and the settings of a return. `Piloting.return_home` flies there."""
+
     NOTHING = HomeState()
     REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = {
         ardrone3.HomeChanged: lambda state, message: replace(
@@ -145,11 +149,11 @@ class Home(Commanding[HomeState]):
         self._commander.send(common.AllStates())
 
     async def set_min_altitude(self, metres: float) -> float:
-        """Height above take-off that a return climbs to first."""
+        """Set the height that a return climbs to first, m above take-off."""
         return await self._set(rth.SetMinAltitude(metres), rth.MinAltitude, self.state.min_altitude)
 
     async def set_ending(self, ending: RthEndingBehavior) -> RthEndingBehavior:
-        """Whether a return ends in landing or in hovering."""
+        """Set the end of a return: landing or hovering."""
         self._require(self.state.ending, rth.SetEndingBehavior.NAME)
         return await self._change(
             rth.SetEndingBehavior(ending),
@@ -158,18 +162,18 @@ class Home(Commanding[HomeState]):
         )
 
     async def set_ending_altitude(self, metres: float) -> float:
-        """Height above ground at which a return that ends in hovering stays."""
+        """Set the height at which a return that ends in hovering stays, m above ground."""
         return await self._set(
             rth.SetEndingHoveringAltitude(metres), rth.EndingHoveringAltitude, self.state.ending_altitude
         )
 
     async def set_delay(self, seconds: int) -> int:
-        """Seconds between the loss of the link and the return."""
+        """Set the time between the loss of the link and the return, s."""
         self._require(self.state.delay_s, rth.SetDelay.NAME)
         return await self._change(rth.SetDelay(seconds), rth.Delay, lambda message: int(message.delay))
 
     async def set_by_itself(self, allowed: bool) -> bool:
-        """Whether the drone returns by itself when its battery runs low."""
+        """Allow or forbid the drone's own return at low battery."""
         self._require(self.state.by_itself, rth.SetAutoTriggerMode.NAME)
         return await self._change(
             rth.SetAutoTriggerMode(RthAutoTriggerMode.ON if allowed else RthAutoTriggerMode.OFF),
@@ -178,7 +182,7 @@ class Home(Commanding[HomeState]):
         )
 
     async def set_preferred_type(self, kind: RthHomeType) -> RthHomeType:
-        """Which kind of home to fly to when it is known; `HomeState.type` is the one the drone would use now.
+        """Choose the kind of home to prefer; `HomeState.type` is the one the drone would use now.
 
         Raises `NotSupported` for a kind that this drone does not have.
         """
@@ -194,8 +198,8 @@ class Home(Commanding[HomeState]):
     ) -> Position:
         """Choose a place (deg, deg, m above take-off) for homes of type custom.
 
-        The drone flies there only while `preferred_type` is CUSTOM. One that does not accept the place (it is too far
-        away, or the drone does not know where it is itself) says nothing: `CommandTimeout`.
+        The drone flies there only while `preferred_type` is CUSTOM. One that does not accept the place (too far away,
+        or its own place is unknown) stays silent: `CommandTimeout`.
         """
         wanted = position(latitude, longitude, altitude)
         if wanted is None:
@@ -215,7 +219,7 @@ class Home(Commanding[HomeState]):
         )
 
     async def set_precise(self, on: bool) -> bool:
-        """Whether a return looks for the picture of the take-off place."""
+        """Switch the precise return, which looks for the picture of the take-off place."""
         self._require(self.state.precise_mode, precise_home.SetMode.NAME)
         return await self._change(
             precise_home.SetMode(PreciseHomeMode.STANDARD if on else PreciseHomeMode.DISABLED),

@@ -38,7 +38,7 @@ async def fly(address: str, http_port: int, file: Path | None) -> None:
         drone.subscribe(executed)
         await plan.start(uid)  # returns when the drone flies it
         print("started", flush=True)
-        await drone.wait_until(lambda: plan.state.playing is PlayingState.STOPPED, "end of the plan", LIMIT)
+        await drone.wait_until(lambda: plan.state.playing == PlayingState.STOPPED, "end of the plan", LIMIT)
         print("plan ended", flush=True)
 
         if drone.piloting.state.flying not in (FlyingState.LANDING, FlyingState.LANDED):

@@ -18,6 +18,8 @@ from anafi_mav import geo
 EXAMPLES = Path(__file__).parents[2] / "examples"
 HOME = (48.8789, 2.3677, 35.0)
 
+pytestmark = pytest.mark.third_party
+
 
 @asynccontextmanager
 async def played(

@@ -147,6 +147,19 @@ async def test_flight_plan_example_flies_the_file_to_its_end(tmp_path: Path, mod
         assert max(one["args"]["ato"] for one in entries(simulator, "pose")) == pytest.approx(25.0, abs=1.0)
 
 
+async def test_first_program_of_the_guide_flies_and_lands(tmp_path: Path) -> None:
+    address, script = loopback(), tmp_path / "first.py"
+    text = (EXAMPLES.parents[1] / "docs" / "python-api.md").read_text(encoding="utf-8")
+    first = text.split("```python\n")[1].split("```")[0]
+    assert first.count("127.0.42.1") == 1
+    script.write_text(first.replace("127.0.42.1", address), encoding="utf-8")
+    async with simulated(tmp_path / "log", address) as simulator:
+        async with program(sys.executable, str(script)) as running:
+            assert await running.end(60.0) == 0, running
+        assert commands(simulator, "TakeOff", "moveBy", "Landing") == ["TakeOff", "moveBy", "Landing"]
+        assert flown_states(simulator)[-1] == "landed"
+
+
 @pytest.mark.parametrize("name", sorted(path.name for path in EXAMPLES.glob("*.py") if path.stem != "four_drones"))
 async def test_example_without_a_drone_ends_with_one_line(name: str) -> None:
     async with example(name, loopback()) as alone:

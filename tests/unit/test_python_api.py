@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import ast
+import inspect
 import sys
 from pathlib import Path
 
 import pytest
+from python_api import classes, members
 
 from anafi_mav import drone
 from anafi_mav.drone import events
@@ -38,6 +40,22 @@ def test_every_exported_name_exists() -> None:
     assert [name for name in events.__all__ if not hasattr(events, name)] == []
 
 
+@pytest.mark.parametrize("owner", classes(), ids=lambda owner: owner.__name__)
+def test_public_class_and_its_methods_are_documented_and_typed(owner: type) -> None:
+    undocumented = [] if inspect.getdoc(owner) and owner.__doc__ else [owner.__name__]
+    untyped = []
+    for name, member in members(owner):
+        function = member.fget if isinstance(member, property) else member
+        if not function.__doc__:
+            undocumented.append(f"{owner.__name__}.{name}")
+        signature = inspect.signature(function)
+        parameters = [one for one in signature.parameters.values() if one.name != "self"]
+        if any(one.annotation is one.empty for one in parameters) or signature.return_annotation is signature.empty:
+            untyped.append(f"{owner.__name__}.{name}")
+    assert undocumented == []
+    assert untyped == []
+
+
 def test_package_ships_its_types() -> None:
     assert (Path(drone.__file__).parents[1] / "py.typed").is_file()
 
@@ -53,3 +71,11 @@ def test_example_imports_stable_names_only(path: Path) -> None:
             assert node.module is not None
             if node.module.partition(".")[0] not in sys.stdlib_module_names:
                 assert {alias.name for alias in node.names} <= stable[node.module]
+
+
+def test_python_of_the_guide_compiles() -> None:
+    text = (EXAMPLES[0].parents[2] / "docs" / "python-api.md").read_text(encoding="utf-8")
+    blocks = [block.split("```")[0] for block in text.split("```python\n")[1:]]
+    assert len(blocks) >= 4
+    for block in blocks:
+        compile(block, "docs/python-api.md", "exec", flags=ast.PyCF_ALLOW_TOP_LEVEL_AWAIT)
