@@ -86,6 +86,11 @@ _FLIES_WITHOUT = (Sensor.GPS,)
 """Sensors that a drone takes off without."""
 
 
+_HARMLESS = (None, AlertState.NONE, AlertState.USER, AlertState.LOW_BATTERY)
+"""Alerts with which a drone takes off. USER is a past emergency stop, which the flying state EMERGENCY tells better: a
+firmware that kept it would stay on the ground until it is switched off."""
+
+
 class BlockerKind(enum.Enum):
     """Kind of a reason that prevents a take-off; the value is the beginning of its text."""
 
@@ -114,7 +119,8 @@ def takeoff_blockers(alerts: AlertsState, battery: BatteryState, calibration: Ca
     """What the drone has reported that can keep it on the ground; empty when nothing is known.
 
     ARSDK refuses a take-off by silence. The take-off checklist (alarms.xml 175-0-2) is the drone's own list of
-    reasons; firmware without it leaves the alerts, the battery's alerts, the calibration and the sensors.
+    reasons and decides alone about alerts and sensors, whose last report may be old; firmware without it leaves the
+    alert, the calibration and the sensors. A critical battery counts in any case.
     """
     reasons = [Blocker(BlockerKind.CHECK, check) for check, blocks in alerts.checklist.items() if blocks]
     if TakeoffChecklistType.MAGNETO_CALIBRATION not in alerts.checklist and calibration.magneto_required:
@@ -126,7 +132,7 @@ def takeoff_blockers(alerts: AlertsState, battery: BatteryState, calibration: Ca
         reasons += [Blocker(BlockerKind.SENSOR, sensor) for sensor in failed]
     critical = [alert for alert, level in battery.alerts.items() if level == AlertLevel.CRITICAL]
     reasons += [Blocker(BlockerKind.BATTERY, alert) for alert in critical]
-    if alerts.alert not in (None, AlertState.NONE, AlertState.LOW_BATTERY):
+    if not alerts.checklist and alerts.alert not in _HARMLESS:
         reasons.append(Blocker(BlockerKind.ALERT, alerts.alert))
     if alerts.motor_error not in (None, MotorError.NO_ERROR):
         reasons.append(Blocker(BlockerKind.MOTOR, alerts.motor_error))

@@ -29,7 +29,7 @@ from anafi_mav.services.commands import (
 )
 from anafi_mav.services.flavours import flavour_of
 from anafi_mav.services.modes import FlightMode
-from anafi_mav.services.refusal import Refused
+from anafi_mav.services.refusal import Refused, Unsupported
 from anafi_mav.services.service import Action, Host, MessageHandler, Query, Service, client_of
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.targets import UnsupportedFrame
@@ -41,6 +41,7 @@ SETTLE = 0.1
 
 _RESULT_BY_ERROR: tuple[tuple[type[AnafiMavError], int], ...] = (
     (UnsupportedFrame, dialect.MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME),
+    (Unsupported, dialect.MAV_RESULT_UNSUPPORTED),
     (NotSupported, dialect.MAV_RESULT_UNSUPPORTED),
     (CommandRejected, dialect.MAV_RESULT_TEMPORARILY_REJECTED),
     (CommandTimeout, dialect.MAV_RESULT_FAILED),

@@ -128,9 +128,11 @@ class MissionService(Service):
         """MISSION_CURRENT."""
         progress, ids = vehicle.mission.progress, vehicle.plan_ids
         there = progress.state is not State.NONE
+        # ArduPilot is at home, its item 0, until the mission begins or a client sets another one.
+        at_home = times.flavour.zero_home and progress.is_untouched
         mode = IN_MISSION_MODE if vehicle.mode is FlightMode.MISSION else NOT_IN_MISSION_MODE
         return dialect.MAVLink_mission_current_message(
-            progress.current + offset(times.flavour) if there else 0,
+            progress.current + offset(times.flavour) if there and not at_home else 0,
             len(progress.items) if there else NO_TOTAL,
             MAVLINK_STATES[progress.state],
             mode if there else 0,

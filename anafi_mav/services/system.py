@@ -177,7 +177,7 @@ class System:
         self._ticking = [service for service in self.services if type(service).tick is not Service.tick]
         self._updates: dict[type[Message], Callable[[], None]] = {
             events.FlyingStateChanged: self.vehicle.on_flying_state,
-            events.GpsLocationChanged: self.vehicle.on_position,
+            events.GpsLocationChanged: self.vehicle.on_location,
             events.FlightId: self.vehicle.on_position,
             events.TakeoffLocation: self.vehicle.on_takeoff_location,
             events.ReturnStateChanged: self.vehicle.on_return,

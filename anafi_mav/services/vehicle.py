@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import enum
+import math
 from collections.abc import Callable, Hashable, Iterator
 from contextlib import contextmanager
 
@@ -34,6 +35,9 @@ from anafi_mav.services.refusal import Refused
 from anafi_mav.services.return_end import ReturnEnd
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.takeoff import Takeoff
+
+POSITION_OLD = 3.0
+"""s without a GPS location, which an ANAFI reports once a second, after which the last one is no position in flight."""
 
 
 class Landed(enum.Enum):
@@ -77,6 +81,9 @@ class Vehicle(Aircraft):
         self.intended: FlightMode | None = None
         """The mode that a client last asked for by name or number."""
         self.allow_kill = allow_kill
+        self._clock = clock
+        self._located_at = -math.inf
+        """When the newest GPS location arrived."""
         self._end_others = end_others
         self._terminating = False
         self._last_flying: FlyingState | None = None
@@ -109,6 +116,16 @@ class Vehicle(Aircraft):
         if state in LANDING:
             return Landed.LANDING
         return Landed.IN_AIR if state in AIRBORNE else Landed.UNKNOWN
+
+    @property
+    def position_is_old(self) -> bool:
+        """True in flight when GPS locations have stopped although the drone reports a fix."""
+        return (
+            self.place is not None
+            and self.flying_state is not None
+            and not self.on_ground
+            and self._clock.monotonic() - self._located_at > POSITION_OLD
+        )
 
     @property
     def mode(self) -> FlightMode:
@@ -262,6 +279,11 @@ class Vehicle(Aircraft):
         self.return_end.on_flying_state()
         self.changed()
 
+    def on_location(self) -> None:
+        """A new GPS location."""
+        self._located_at = self._clock.monotonic()
+        self.on_position()
+
     def on_position(self) -> None:
         """A new GPS location, altitude or flight id."""
         gps, ato = self.drone.gps.state, self.drone.piloting.state.altitude
@@ -327,6 +349,7 @@ class Vehicle(Aircraft):
         self._selected = FlightMode.HOLD
         self.intended = None
         self._last_flying = None
+        self._located_at = -math.inf
         for helm in self.helms:
             helm.link_down()
         self._terminating = False
