@@ -92,7 +92,7 @@ async def test_conf_027_059_mode_mission_by_every_way(flavour: str) -> None:
     async with world(flavour=flavour, web=True) as w:
         other = await w.connect(254)
         number = MISSION_MODE[flavour]
-        monitor = await w.client.wait("AVAILABLE_MODES_MONITOR")
+        monitor = await w.client.wait("AVAILABLE_MODES_MONITOR", since=0)
         await put(w, [takeoff(6.0), way(60.0, 0.0, 6.0)])
         await w.client.wait("AVAILABLE_MODES_MONITOR", lambda m: m.seq != monitor.seq)
         await w.take_off(5.0)
