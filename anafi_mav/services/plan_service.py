@@ -17,7 +17,7 @@ from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.plans.parrot import Version
 from anafi_mav.services.fence import FenceKind, summary
-from anafi_mav.services.flavours import flavour_of
+from anafi_mav.services.flavours import PX4, flavour_of
 from anafi_mav.services.guided import fly_item, is_guided_item
 from anafi_mav.services.mission_kind import MissionKind
 from anafi_mav.services.plan_desk import MESSAGES, PlanDesk
@@ -73,7 +73,7 @@ class PlanService(Service):
         """Why a plan that was kept is not taken."""
         for number, item in enumerate(items):
             if (fault := kind.check_item(item)) is not None:
-                return f"item {number}: {fault.reason}"
+                return f"item {kind.label(number, PX4)}: {fault.reason}"
         fault = self._mission.examine(items) if kind is self._mission else kind.check_plan(items)
         return None if fault is None else fault.reason
 
