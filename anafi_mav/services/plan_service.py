@@ -205,5 +205,5 @@ class PlanService(Service):
             vehicle.fence.take(items)
         elif kind == RallyKind.mission_type:
             if items and vehicle.rally.purpose is Return.HOME and items != vehicle.rally.items:
-                self.host.text(Severity.INFO, f"{len(items)} rally points kept and not used: RTL_TYPE says home")
+                self.host.text(Severity.INFO, f"Rally points not used: RTL_TYPE is home ({len(items)})")
             vehicle.rally.take(items)

@@ -23,6 +23,7 @@ from support.world import ARMED, HOLD, HOME, World, world
 
 from anafi_mav import geo
 from anafi_mav.arsdk.messages import ardrone3
+from anafi_mav.mavlink import dialect as newer
 
 PAGES: list[dict[str, Any]] = json.loads((Path(__file__).parents[1] / "support" / "qgroundcontrol.json").read_text())[
     "pages"
@@ -288,3 +289,28 @@ async def test_refused_write_of_a_parameter_gets_a_text() -> None:
         await w.client.wait("PARAM_VALUE", lambda m: m.param_id == "BAT1_N_CELLS", since=mark)
         assert len(w.client.since(mark, "STATUSTEXT")) <= 1
         assert not w.clients[1].since(other, "STATUSTEXT")
+
+
+async def test_critical_battery_is_one_line_of_the_arming_report() -> None:
+    """A drone reports it as a check, as an alert of its battery and as an alert of its own."""
+    async with world() as w:
+        document = json.loads(await Ftp(w.client).download("/events.json"))
+        (component,) = document["components"].values()
+        checks = {
+            1 << 24 | int(number): event["name"]
+            for number, event in component["event_groups"]["arming_check"]["events"].items()
+            if event.get("type") != "summary"
+        }
+        mark = w.client.mark()
+        w.drone.faults.battery = 8
+        await said(w, "Battery critical (8 %)", since=mark)
+        await w.client.wait("SYS_STATUS", lambda m: not m.onboard_control_sensors_health & 0x10000000, since=mark)
+        await w.client.wait("HEARTBEAT")
+        await w.client.wait("HEARTBEAT")
+        mark = w.client.mark()
+        assert (await w.client.command(newer.MAV_CMD_RUN_PREARM_CHECKS)).result == dialect.MAV_RESULT_ACCEPTED
+        await w.client.wait("HEARTBEAT")
+        named = [checks[m.id] for _, m in w.client.since(mark, "EVENT") if m.id in checks]
+        assert len(named) == 1
+        texts = [m.text for _, m in w.client.since(mark, "STATUSTEXT") if m.text.startswith("PreArm")]
+        assert len(texts) == 1
