@@ -12,7 +12,7 @@ from msgspec.structs import replace
 from anafi_mav.arsdk.messages import alarms, ardrone3
 from anafi_mav.arsdk.messages.alarms import TakeoffChecklistType
 from anafi_mav.arsdk.messages.ardrone3 import AlertState, ForcedLandingReason, MotorError, WarningLevel
-from anafi_mav.arsdk.messages.battery import AlertLevel
+from anafi_mav.arsdk.messages.battery import AlertLevel, BatteryAlert
 from anafi_mav.arsdk.messages.common import Sensor
 from anafi_mav.arsdk.wire import Message, OpenEnum
 from anafi_mav.drone.battery import BatteryState
@@ -112,7 +112,22 @@ class Blocker(NamedTuple):
     """Which check, sensor, alert or error."""
 
     def __str__(self) -> str:
+        if self.kind is BlockerKind.BATTERY and self.value == BatteryAlert.POWER_LEVEL:
+            return "battery critical"
         return self.kind.value + ("" if self.value is None else spoken(self.value))
+
+    @property
+    def is_charge(self) -> bool:
+        """True when the reason is a low charge, which a drone reports in three ways at once."""
+        return (self.kind, self.value) in _CHARGE
+
+
+_CHARGE: tuple[tuple[BlockerKind, OpenEnum], ...] = (
+    (BlockerKind.CHECK, TakeoffChecklistType.BATTERY_CRITICAL),
+    (BlockerKind.BATTERY, BatteryAlert.POWER_LEVEL),
+    (BlockerKind.ALERT, AlertState.CRITICAL_BATTERY),
+    (BlockerKind.ALERT, AlertState.ALMOST_EMPTY_BATTERY),
+)
 
 
 def takeoff_blockers(alerts: AlertsState, battery: BatteryState, calibration: CalibrationState) -> list[Blocker]:
@@ -136,4 +151,5 @@ def takeoff_blockers(alerts: AlertsState, battery: BatteryState, calibration: Ca
         reasons.append(Blocker(BlockerKind.ALERT, alerts.alert))
     if alerts.motor_error not in (None, MotorError.NO_ERROR):
         reasons.append(Blocker(BlockerKind.MOTOR, alerts.motor_error))
-    return reasons
+    charge = [reason for reason in reasons if reason.is_charge]
+    return [reason for reason in reasons if reason not in charge[1:]]
