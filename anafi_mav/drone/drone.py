@@ -9,7 +9,7 @@ import asyncio
 import contextlib
 import logging
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
 from functools import partial
 from typing import Any, TypeAlias, TypeVar
@@ -128,8 +128,8 @@ class Drone:
         self.thermal = Thermal(self._commander)
         self.video = Video()
         self.piloting = Piloting(self._commander, self.home, self.takeoff_blockers)
-        self.controller = Controller(self._commander, self._user_moves, self._pilot_takes_over)
-        self.piloting.pilot_has_source = self._pilot_has_source
+        self.controller = Controller(self._commander, self._user_moves, self._pilot_takes_over, self._stand_by)
+        self.piloting.pilot_has_source = lambda: self.controller.pilot_has_source
         self._commander.gate = self._allows
         self._elements: tuple[Element[Any], ...] = (
             self.alerts,
@@ -228,6 +228,9 @@ class Drone:
         self._session = session
         self._counters = session.counters
         self._commander.attach(session)
+        if self.controller.present:
+            session.on_stall = self.controller.stalled
+            session.watch()
         session.lost.add_done_callback(partial(self._on_lost, session))
 
     async def _find_web_server(self, session: ControllerSession) -> None:
@@ -320,6 +323,7 @@ class Drone:
         piloting = self.piloting
         return (
             piloting.moving
+            or piloting.sticks_held
             or self._commander.begins
             or piloting.state.plan == PlayingState.PLAYING
             or piloting.state.poi in (PoiStatus.RUNNING, PoiStatus.PENDING)
@@ -327,10 +331,10 @@ class Drone:
             or piloting.state.animation not in (None, AnimationType.NONE)
         )
 
-    def _pilot_has_source(self) -> bool:
-        """True while a Skycontroller's own sticks fly the drone."""
-        controller = self.controller
-        return controller.present and not controller.taken and controller.state.source == skyctrl.Source.SKY_CONTROLLER
+    def _stand_by(self, messages: Sequence[Message]) -> None:
+        """Have these sent when the host stalls; none: nothing is sent."""
+        if self._session is not None:
+            self._session.stand_by(messages)
 
     def _pilot_takes_over(self) -> None:
         """The pilot at the Skycontroller moved a stick: what our user ordered ends here."""

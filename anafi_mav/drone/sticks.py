@@ -107,6 +107,11 @@ class Sticks:
         return self._remaining != 0
 
     @property
+    def held(self) -> bool:
+        """A setpoint holds the sticks, level or not."""
+        return self._remaining is None
+
+    @property
     def deadline(self) -> float | None:
         """When the next PCMD is due; None when none is."""
         return self._next if self.active else None
