@@ -181,6 +181,17 @@ class Home(Commanding[HomeState]):
             lambda message: message.mode == RthAutoTriggerMode.ON,
         )
 
+    async def cancel_auto_trigger(self, timeout: float = ANSWER_TIMEOUT) -> None:
+        """Cancel the return that the drone has announced; returns when it announces none."""
+        if self.state.auto_trigger in (None, AutoTriggerReason.NONE):
+            return
+        await self._change(
+            rth.CancelAutoTrigger(),
+            rth.RthAutoTrigger,
+            lambda message: True if message.reason == AutoTriggerReason.NONE else None,
+            timeout,
+        )
+
     async def set_preferred_type(self, kind: RthHomeType) -> RthHomeType:
         """Choose the kind of home to prefer; `HomeState.type` is the one the drone would use now.
 
