@@ -111,6 +111,11 @@ class Piloting(PilotingSettings):
         return self._moves.to is not None or bool(self._moves.by)
 
     @property
+    def sticks_held(self) -> bool:
+        """A setpoint of ours holds the sticks, level or not."""
+        return self._sticks.held
+
+    @property
     def sticks_blocked(self) -> str | None:
         """Why no setpoint is sent at present; None when the sticks work."""
         return self._sticks.blocked

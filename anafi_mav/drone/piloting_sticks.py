@@ -60,6 +60,11 @@ class StickStream:
         return self.dead
 
     @property
+    def held(self) -> bool:
+        """A setpoint holds the sticks, level or not."""
+        return self._sticks.held
+
+    @property
     def dead(self) -> str | None:
         """Why no PCMD at all is sent at present, not even one that centres the sticks."""
         flying = self._flight.state.flying

@@ -32,7 +32,7 @@ the heading has just left; then the newest position waits, older ones are never 
 
 
 class PilotingCommand(msgspec.Struct, frozen=True):
-    """What a pilot wants, in aerospace signs (FRD body, and up for the climb). Values beyond the limits are clipped."""
+    """Position of the sticks in aerospace signs (FRD body, + up for the climb); clipped to the limits."""
 
     roll_deg: float = 0.0
     """Tilt, + right."""
@@ -45,7 +45,7 @@ class PilotingCommand(msgspec.Struct, frozen=True):
 
 
 class Limits(msgspec.Struct, frozen=True):
-    """What 100 % is: the drone's own settings, as it reported them."""
+    """Values at full stick: the drone's own settings."""
 
     tilt_deg: float
     yaw_rate_dps: float
@@ -110,6 +110,11 @@ class Sticks:
     def active(self) -> bool:
         """Is there anything left to send?"""
         return self._remaining != 0
+
+    @property
+    def held(self) -> bool:
+        """A setpoint holds the sticks, level or not."""
+        return self._remaining is None
 
     @property
     def deadline(self) -> float | None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from anafi_mav.drone.alerts import spoken
-from anafi_mav.drone.events import HomeReachability, StateReason, WarningLevel
+from anafi_mav.drone.events import HomeReachability, ReturnReason, WarningLevel
 from anafi_mav.services.aircraft import Aircraft
 from anafi_mav.services.flying import LANDING
 from anafi_mav.services.statustext import Severity
@@ -17,13 +17,13 @@ REPEAT_EVERY = 15.0
 """s between two reminders."""
 
 _BATTERY = (
-    StateReason.LOW_BATTERY,
-    StateReason.BATTERY_LOST_COMM,
-    StateReason.BATTERY_TOO_HOT,
+    ReturnReason.LOW_BATTERY,
+    ReturnReason.BATTERY_LOST_COMM,
+    ReturnReason.BATTERY_TOO_HOT,
 )
 """Reasons that last until the drone stands: the battery does not recover in the air."""
 
-_SHORT = {StateReason.LANDING_ZONE_NOT_FOUND: "no landing zone"}
+_SHORT = {ReturnReason.LANDING_ZONE_NOT_FOUND: "no landing zone"}
 
 _LAND_NOW = {
     HomeReachability.CRITICAL: "Home hardly reachable: land now",
@@ -34,7 +34,7 @@ _LAND_NOW = {
 class AbortedReturn:
     """One return of the drone's own that a client has ended."""
 
-    def __init__(self, system: int, reason: StateReason | None) -> None:
+    def __init__(self, system: int, reason: ReturnReason | None) -> None:
         self._system = system
         self._reason = reason
         self._next = -math.inf
@@ -43,7 +43,7 @@ class AbortedReturn:
         """True while the drone still has the reason for which it wanted to return."""
         if vehicle.on_ground:
             return False
-        if self._reason == StateReason.ICING:
+        if self._reason == ReturnReason.ICING:
             return vehicle.drone.alerts.state.icing not in (None, WarningLevel.OK)
         return self._reason in _BATTERY
 

@@ -97,11 +97,6 @@ class OffboardFlight:
         """The heading (rad from north) that is turned to or held; None when none is."""
         return self._course.yaw if self.engaged else None
 
-    @property
-    def age(self) -> float:
-        """s since the setpoint that is being flown arrived."""
-        return self._stream.age(self._clock.monotonic())
-
     # What programs ask for.
 
     def receive(self, sender: Hashable, setpoint: Setpoint, *, guided: bool = False) -> str | None:
@@ -168,7 +163,7 @@ class OffboardFlight:
             raise Refused(f"{what} refused: take off first, setpoints do not lift an ANAFI off the ground")
         if vehicle.returning:
             raise Refused(f"{what} refused: the drone returns home")
-        if vehicle.drone.controller.pilot_flies:
+        if vehicle.drone.controller.pilot_acquired_control:
             raise Refused(f"{what} refused: the pilot at the Skycontroller flies")
         if vehicle.drone.piloting.limits is None:
             raise Refused(f"{what} refused: the drone has not reported what full tilt and speed are")
@@ -287,7 +282,7 @@ class OffboardFlight:
         if setpoint is None or limits is None:
             return
         reason = None
-        if vehicle.drone.controller.pilot_flies:
+        if vehicle.drone.controller.pilot_acquired_control:
             # He moved a stick. That he let go of it again does not give the drone back to the program.
             reason = "the pilot at the Skycontroller flies"
         elif vehicle.sticks_follow_camera:

@@ -9,26 +9,31 @@ from __future__ import annotations
 
 import asyncio
 import enum
+import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 
 from anafi_mav.clock import Clock
 from anafi_mav.drone import Drone
+from anafi_mav.drone.element import Position
 from anafi_mav.drone.events import (
     AlertLevel,
     AutoTriggerReason,
     FlyingState,
     ForcedLandingReason,
     PlayingState,
-    StateReason,
+    ReturnReason,
+    RthHomeType,
 )
 from anafi_mav.errors import CommandRejected
 from anafi_mav.services.aborted_return import AbortedReturn
 from anafi_mav.services.aircraft import STOP_WAIT, Aircraft
+from anafi_mav.services.clients import system_of
 from anafi_mav.services.flying import AIRBORNE, LANDING, ON_GROUND, TAKING_OFF
 from anafi_mav.services.follow_flight import FollowFlight
 from anafi_mav.services.guided_flight import GuidedFlight
+from anafi_mav.services.height import ESTIMATE_ERROR, TakeoffRecord
 from anafi_mav.services.helm import Helm
 from anafi_mav.services.hold_rule import APART, HoldRule
 from anafi_mav.services.initiator import Initiator, Initiators
@@ -37,8 +42,10 @@ from anafi_mav.services.manual_flight import ManualFlight
 from anafi_mav.services.mission_flight import MissionFlight
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.offboard_flight import OffboardFlight
+from anafi_mav.services.place import Place
 from anafi_mav.services.rally import RallyPoints
 from anafi_mav.services.refusal import Refused
+from anafi_mav.services.return_end import ReturnEnd
 from anafi_mav.services.right import Extent, Right
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.takeoff import Takeoff
@@ -50,6 +57,9 @@ RETURNS_BY_ITSELF, MOTOR_DOWN = "drone is returning by itself", "drone returns, 
 NOT_COUNTED = f"again within {APART:g} s"
 UNENDABLE = (FORCED, LANDS, PILOT_LANDS, RETURNS, PILOT_RETURNS, RETURNS_BY_ITSELF, MOTOR_DOWN, NOT_COUNTED)
 """Why a landing or a return is not ended."""
+
+POSITION_OLD = 3.0
+"""s without a GPS location, which an ANAFI reports once a second, after which the last one is no position in flight."""
 
 
 class Landed(enum.Enum):
@@ -94,6 +104,8 @@ class Vehicle(Aircraft):
         """The mode that a client last asked for by name or number."""
         self.allow_kill = allow_kill
         self._clock = clock
+        self._located_at = -math.inf
+        """When the newest GPS location arrived."""
         self._end_others = end_others
         self._initiators = Initiators()
         self._landing_sent = 0
@@ -106,6 +118,9 @@ class Vehicle(Aircraft):
         """The return of the drone's own that a client has ended, while that has to be repeated to everybody."""
         self._terminating = False
         self._last_flying: FlyingState | None = None
+        self.return_end = ReturnEnd(self, self._land_after_return)
+        self._takeoff_before: Position | None = None
+        """The take-off place that the drone reported when it landed: of the flight that has ended."""
         self.mission = MissionFlight(self)
         self.takeoff = Takeoff(self, self.mission.armed)
         self.guided = GuidedFlight(self)
@@ -134,10 +149,22 @@ class Vehicle(Aircraft):
         return Landed.IN_AIR if state in AIRBORNE else Landed.UNKNOWN
 
     @property
+    def position_is_old(self) -> bool:
+        """True in flight when GPS locations have stopped although the drone reports a fix."""
+        return (
+            self.place is not None
+            and self.flying_state is not None
+            and not self.on_ground
+            and self._clock.monotonic() - self._located_at > POSITION_OLD
+        )
+
+    @property
     def mode(self) -> FlightMode:
         state = self.flying_state
         if state == FlyingState.EMERGENCY:
             return FlightMode.TERMINATED
+        if self.return_end.shown:
+            return FlightMode.RETURN
         if state in LANDING:
             return FlightMode.LAND
         if self.returning:
@@ -204,24 +231,41 @@ class Vehicle(Aircraft):
         finally:
             self._landing_sent -= 1
 
+    async def _land_after_return(self) -> None:
+        """Land at the end of a return that a client commanded; the landing is that client's too."""
+        self._initiators.land_commanded(self._clock.monotonic())
+        self._landing_sent += 1
+        try:
+            await self.drone.piloting.land()
+        finally:
+            self._landing_sent -= 1
+
     async def return_home(self, by: Right | None = None) -> None:
         """Fly home by the drone's own return. A landing goes on unless `by` ends it."""
         if self.on_ground:
             raise Refused("Return refused: the drone is on the ground")
-        if self.landing:
-            self._require_endable("Return", by)
+        commanded = None if by is None else replace(by, extent=Extent.COMMANDED)
+        if lands := self.landing:
+            self._require_endable("Return", commanded)
         await self.take_over()
-        if self.flying_state in LANDING:
+        if lands or self.landing:
             with self._selected_no_more(FlightMode.HOLD):
-                await self._end_landing("Return", by)
+                if await self.drone.piloting.settle_landing():
+                    self._require_endable("Return", commanded)
+                    await self._end_landing("Return", commanded)
         self._initiators.return_commanded(self._clock.monotonic())
         self._returns_sent += 1
+        attempt = self.return_end.command()
         try:
             with self._selected_no_more(None):
                 await self.drone.piloting.return_home()
                 self.paused = False
+        except BaseException:
+            self.return_end.fail(attempt)
+            raise
         finally:
             self._returns_sent -= 1
+        self.return_end.announce(attempt, None if by is None else system_of(by.client))
 
     async def hold(self, mode: FlightMode = FlightMode.HOLD, by: Right | None = None, *, pause: bool = False) -> None:
         """Stop and hover. A landing or return goes on, and this is refused, unless `by` ends it.
@@ -229,6 +273,7 @@ class Vehicle(Aircraft):
         `pause`: setpoints of every client are ignored from now on, see `paused`.
         """
         self._require_endable(mode.value, by)
+        own = self.returning_by_itself
         rising = self.drone.piloting.about_to_fly
         latched = self.paused and (pause or mode is self.mode)
         before, self.paused = self.paused, self.paused or pause
@@ -236,7 +281,7 @@ class Vehicle(Aircraft):
             await self.take_over(STOP_WAIT)
             if not self.on_ground or rising:
                 with self._selected_no_more(mode):
-                    await self._stop(mode.value, by)
+                    await self._stop(mode.value, by, own=own)
         except BaseException:
             self.paused = before
             raise
@@ -268,7 +313,7 @@ class Vehicle(Aircraft):
             case FlightMode.LAND:
                 await self.land()
             case FlightMode.RETURN:
-                await self.return_home(commanded)
+                await self.return_home(by)
             case FlightMode.TAKEOFF:
                 await self.take_off(None, by)
             case FlightMode.OFFBOARD:
@@ -325,11 +370,13 @@ class Vehicle(Aircraft):
                 raise Refused(f"{what} refused: {PILOT_RETURNS}")
             elif by is None:
                 raise Refused(f"{what} refused: {RETURNS}")
+        elif by is None and self._returns_sent > 0:
+            raise Refused(f"{what} refused: {RETURNS}")
 
     def _require_own_endable(self, what: str, by: Right | None) -> None:
         if by is None:
             raise Refused(f"{what} refused: {RETURNS_BY_ITSELF}")
-        if self.drone.home.state.reason == StateReason.MOTOR_DOWN:
+        if self.drone.home.state.reason == ReturnReason.MOTOR_DOWN:
             raise Refused(f"{what} refused: {MOTOR_DOWN}")
         if not by.counted:
             raise Refused(f"{what} refused: {NOT_COUNTED}")
@@ -342,13 +389,15 @@ class Vehicle(Aircraft):
             with self._selected_no_more(FlightMode.HOLD):
                 await self._stop(what, by)
 
-    async def _stop(self, what: str, by: Right | None) -> None:
-        """Hover, and end the landing or return that `by` may end. The right was checked for what was reported then."""
+    async def _stop(self, what: str, by: Right | None, *, own: bool = False) -> None:
+        """Hover, and end the landing or return that `by` may end.
+
+        `own`: the drone returned by itself when the command arrived. A return that it begins afterwards goes on.
+        """
         piloting, home = self.drone.piloting, self.drone.home
         await self._end_landing(what, by)
         announced = None if by is None else self._announced_for(by)
-        if self.returning_by_itself:
-            assert by is not None, "checked before"
+        if own and by is not None and self.returning_by_itself:
             reason = home.state.reason
             await piloting.cancel_return_home(even_its_own=True)
             self._return_aborted(by, reason)
@@ -387,9 +436,9 @@ class Vehicle(Aircraft):
         if self.returning_by_itself:
             raise Refused("Return not cancelled: it has begun")
         self.holds.withdraw()
-        self._return_aborted(by, StateReason.LOW_BATTERY)  # the one reason that is announced and can be cancelled
+        self._return_aborted(by, ReturnReason.LOW_BATTERY)  # the one reason that is announced and can be cancelled
 
-    def _return_aborted(self, by: Right, reason: StateReason | None) -> None:
+    def _return_aborted(self, by: Right, reason: ReturnReason | None) -> None:
         """Notify everybody that a client has ended a return of the drone's own, or cancelled it: at once, and again."""
         self.aborted_return = AbortedReturn(by.system, reason)
         self.aborted_return.report(self, self._clock.monotonic())
@@ -416,6 +465,7 @@ class Vehicle(Aircraft):
         self._note_landing(before)
         if state in ON_GROUND and before is not None:
             self.orders += 1
+            self.return_end.on_ground()
             self.takeoff.came_down()
             self.end_helms(self._ending_mission)
             self.takeoff.end_climb()
@@ -428,48 +478,104 @@ class Vehicle(Aircraft):
             self.height.take_off()
             if (place := self.place) is not None:
                 self.origin = place
+            if self.drone.home.state.takeoff_location != self._takeoff_before:
+                self.on_takeoff_location()  # it was reported before the state
+        if state in ON_GROUND:
+            self._takeoff_before = self.drone.home.state.takeoff_location
         if not self.on_ground:
             self.takeoff.left_ground()
+        self.return_end.on_flying_state()
         self.changed()
+
+    def on_location(self) -> None:
+        """A new GPS location."""
+        self._located_at = self._clock.monotonic()
+        self.on_position()
 
     def on_position(self) -> None:
         """A new GPS location, altitude or flight id."""
-        gps = self.drone.gps.state
+        gps, ato = self.drone.gps.state, self.drone.piloting.state.altitude
+        amsl = gps.location.altitude if gps.fixed and gps.location is not None else None
         if self.flying_state == FlyingState.LANDED:
-            self.height.on_ground(
-                gps.location.altitude if gps.fixed and gps.location is not None else None,
-                self.drone.piloting.state.altitude,
-            )
+            self.height.on_ground(amsl, ato)
             if self.origin is None:
                 self.origin = self.place
-        elif self.flying_state is not None:
-            self.height.in_flight(self.drone.product.state.flight_id)
+        elif self.flying_state is not None and self.height.in_flight(self.drone.product.state.flight_id, amsl, ato):
+            self.text(Severity.WARNING, f"Take-off altitude estimated: GPS only (+-{ESTIMATE_ERROR:g} m)")
+
+    def on_takeoff_location(self) -> None:
+        """Adopt the take-off place that the drone reports for the present flight as origin of the local frame."""
+        location = self.drone.home.state.takeoff_location
+        if location is not None and self.flying_state is not None and not self.on_ground:
+            self.origin = Place(location.latitude, location.longitude)
+
+    def link_up(self, kept: TakeoffRecord | None) -> None:
+        """Begin with a drone that has reported all its states. `kept` is of the last flight that was seen."""
+        self.height.recall(kept)
+        self.on_flying_state()
+        self.on_position()
+        if self.flying_state is not None and not self.on_ground:
+            self.origin = self._origin_in_flight(kept)
+
+    def _origin_in_flight(self, kept: TakeoffRecord | None) -> Place | None:
+        """Return where a drone took off that was found in the air; None when nothing reports it."""
+        home, flight = self.drone.home.state, self.drone.product.state.flight_id
+        if (location := home.takeoff_location) is not None:
+            return Place(location.latitude, location.longitude)
+        if kept is not None and kept.flight_id == flight and kept.latitude is not None and kept.longitude is not None:
+            return Place(kept.latitude, kept.longitude)
+        if home.type == RthHomeType.TAKEOFF and home.location is not None:
+            return Place(home.location.latitude, home.location.longitude)
+        return None
+
+    @property
+    def takeoff_record(self) -> TakeoffRecord | None:
+        """The take-off point of the present flight, to be kept; None on the ground or without a flight id."""
+        height, origin = self.height, self.origin
+        if self.on_ground or not height.flight_id or height.takeoff_amsl is None:
+            return None
+        place = (None, None) if origin is None else origin.point
+        return TakeoffRecord(height.flight_id, height.takeoff_amsl, height.estimated, *place)
 
     def on_return(self) -> None:
         """The drone's return began, ended or changed: setpoints and the climb after a take-off never fight it."""
         self._note_return()
         if self.returning:
+            if self.mission.returns and not (self.returning_by_itself or self.return_end.active):
+                self.return_end.announce(self.return_end.command(), None)  # the mission's last item
             self.end_helms(self._ending_mission)
             self.takeoff.end_climb()
+        self.return_end.on_return_state()
         self.changed()
 
     def link_down(self) -> None:
         """The link is lost: nothing that was asked for outlives it."""
-        self.height.link_down(flying=not self.on_ground)
+        self.height.link_down()
         self.orders += 1
+        self.return_end.link_down()
         self._let_go()
         self.takeoff.link_down()
         self._selected = FlightMode.HOLD
         self.paused = False
         self.intended = None
         self._last_flying = None
+        self._located_at = -math.inf
         for helm in self.helms:
             helm.link_down()
         self._terminating = False
 
+    @property
+    def alone(self) -> str | None:
+        """The end of a return or landing without the gateway, as a predicate of the drone; None: neither is on."""
+        if self.landing:
+            return "is landing, and goes on landing"
+        return self.return_end.alone if self.descends else None
+
     async def let_go(self) -> None:
         """The gateway ends: a landing or a return goes on, everything else is ended, and a flying drone hovers."""
         if self.descends:
+            if not self.landing:
+                self.return_end.end()
             return
         await self.take_over()
         if self.drone.piloting.about_to_fly:
@@ -502,7 +608,7 @@ class Vehicle(Aircraft):
         self._initiators.on_return(
             now,
             by_itself=home.returning_by_itself,
-            by_plan=home.reason == StateReason.FLIGHTPLAN,
+            by_plan=home.reason == ReturnReason.FLIGHTPLAN,
             skycontroller=self.drone.controller.present,
         )
 
@@ -552,4 +658,4 @@ class Vehicle(Aircraft):
         """End what this vehicle does by itself; the tasks that are still about to end."""
         self.takeoff.forget()
         self.guided.forget_arrival()
-        return [*self.end_helms(), *self.takeoff.end()]
+        return [*self.return_end.end(), *self.end_helms(), *self.takeoff.end()]

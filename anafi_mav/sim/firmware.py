@@ -126,6 +126,7 @@ class Firmware(Flight):
 
     def _controller_gps(self, message: ardrone3.SendControllerGPS) -> None:
         self.homing.set_pilot(message.latitude, message.longitude, message.altitude)
+        self.guidance.apply_limits()
 
     def _cancel_auto_trigger(self, message: Message) -> None:
         for event in self.endurance.cancel():

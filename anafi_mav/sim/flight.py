@@ -105,7 +105,7 @@ class Flight:
         self.alarms = Alarms()
         self.warnings = Warnings()
         self.endurance = Endurance(model, self.settings)
-        self.homing = Homing(body, origin, self.settings, emit)
+        self.homing = Homing(body, origin, self.settings, emit, self.faults)
         self.guidance = Guidance(model, body, origin, self.settings, self.homing, emit, self.faults)
         self.flight_plan = FlightPlan(model, body, origin, self.settings, self, self.operator, emit, note, self.faults)
         self.poi = Poi(origin, emit, self.operator.aim, lambda: self.settings.yaw_rate, model.modern)

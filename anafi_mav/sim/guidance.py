@@ -62,7 +62,7 @@ class Guidance:
         self._progress: tuple[float, Pose, float] | None = None
         """When, where and with which heading a move was last seen to get on."""
         self.take_off_place = (0.0, 0.0)
-        """North, east: the middle of the fence."""
+        """North, east."""
 
     @property
     def busy(self) -> bool:
@@ -81,13 +81,20 @@ class Guidance:
         self._body.limits(
             tilt_rate=settings.number("max_tilt_rate") * RAD_PER_DEG, ceiling=settings.number("max_altitude")
         )
-        self._body.fence(settings.number("max_distance") if settings["geofence"] else None, self.take_off_place)
+        self._body.fence(settings.number("max_distance") if settings["geofence"] else None, self.fence_centre)
+
+    @property
+    def fence_centre(self) -> tuple[float, float]:
+        """North, east: where the controller is, or where the drone took off."""
+        pilot = self._homing.pilot
+        return self.take_off_place if pilot is None else self._origin.offset(pilot.latitude, pilot.longitude)
 
     def fence_margin(self, north: float, east: float) -> float:
         """m between a place and the fence; infinite without one."""
         if not self._settings["geofence"]:
             return float("inf")
-        off_north, off_east = north - self.take_off_place[0], east - self.take_off_place[1]
+        centre = self.fence_centre
+        off_north, off_east = north - centre[0], east - centre[1]
         return self._settings.number("max_distance") - float((off_north**2 + off_east**2) ** 0.5)
 
     # -- time

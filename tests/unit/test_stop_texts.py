@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from anafi_mav.drone import piloting_landing
-from anafi_mav.drone.events import HomeReachability, StateReason, WarningLevel
+from anafi_mav.drone.events import HomeReachability, ReturnReason, WarningLevel
 from anafi_mav.services.aborted_return import REPEAT_EVERY, AbortedReturn
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.statustext import CHUNK
@@ -44,8 +44,8 @@ def test_texts_about_a_landing_that_goes_on_fit_one_text() -> None:
     assert f"Landing not aborted: {piloting_landing.ALREADY_LANDED}" == "Landing not aborted: already landed"
 
 
-@pytest.mark.parametrize("reason", [*StateReason, None])
-def test_texts_about_an_aborted_return_fit_one_text_each(reason: StateReason | None) -> None:
+@pytest.mark.parametrize("reason", [*ReturnReason, None])
+def test_texts_about_an_aborted_return_fit_one_text_each(reason: ReturnReason | None) -> None:
     texts = AbortedReturn(255, reason).texts(aircraft())
     assert [text for text in texts if len(text) > CHUNK] == []
     assert texts[-1].endswith("land now")
@@ -53,15 +53,15 @@ def test_texts_about_an_aborted_return_fit_one_text_each(reason: StateReason | N
 
 def test_aborted_return_names_system_reason_and_battery() -> None:
     vehicle = aircraft(reachability=HomeReachability.REACHABLE, percent=23)
-    assert AbortedReturn(7, StateReason.LOW_BATTERY).texts(vehicle) == [
+    assert AbortedReturn(7, ReturnReason.LOW_BATTERY).texts(vehicle) == [
         "Return aborted by system 7: low battery",
         "No automatic return: battery 23 %",
     ]
-    assert AbortedReturn(7, StateReason.ICING).texts(vehicle) == ["Return aborted by system 7: icing"]
+    assert AbortedReturn(7, ReturnReason.ICING).texts(vehicle) == ["Return aborted by system 7: icing"]
 
 
 def test_aborted_return_is_due_every_15_s_while_the_drone_neither_returns_nor_lands() -> None:
-    aborted, vehicle = AbortedReturn(1, StateReason.LOW_BATTERY), aircraft()
+    aborted, vehicle = AbortedReturn(1, ReturnReason.LOW_BATTERY), aircraft()
     aborted.report(vehicle, 100.0)
     assert len(vehicle.texts) == 3
     assert not aborted.due(vehicle, 100.0 + REPEAT_EVERY - 0.1)
@@ -72,12 +72,12 @@ def test_aborted_return_is_due_every_15_s_while_the_drone_neither_returns_nor_la
 @pytest.mark.parametrize(
     ("reason", "state", "lasts"),
     [
-        (StateReason.LOW_BATTERY, {}, True),
-        (StateReason.LOW_BATTERY, {"on_ground": True}, False),
-        (StateReason.CONNECTION_LOST, {}, False),
-        (StateReason.ICING, {"icing": WarningLevel.WARNING}, True),
-        (StateReason.ICING, {"icing": WarningLevel.OK}, False),
+        (ReturnReason.LOW_BATTERY, {}, True),
+        (ReturnReason.LOW_BATTERY, {"on_ground": True}, False),
+        (ReturnReason.CONNECTION_LOST, {}, False),
+        (ReturnReason.ICING, {"icing": WarningLevel.WARNING}, True),
+        (ReturnReason.ICING, {"icing": WarningLevel.OK}, False),
     ],
 )
-def test_reason_of_an_aborted_return_lasts(reason: StateReason, state: dict[str, Any], lasts: bool) -> None:
+def test_reason_of_an_aborted_return_lasts(reason: ReturnReason, state: dict[str, Any], lasts: bool) -> None:
     assert AbortedReturn(1, reason).lasts(aircraft(**state)) is lasts
