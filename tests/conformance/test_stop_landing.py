@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.callers import CALLERS, system_of
 from support.mav import NAN, Client
 from support.trouble import (
     ACCEPTED,
@@ -26,8 +27,6 @@ from support.world import HOLD, LAND, POSITION, RETURN, World, world
 
 from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.errors import AnafiMavError
-from anafi_mav.services.link_loss import LossAction
-from anafi_mav.services.manual_flight import Event
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.right import Extent, Right
 from anafi_mav.sim.faults import Impairment
@@ -217,38 +216,6 @@ async def test_landing_of_a_client_behind_a_skycontroller_is_ended_by_a_client()
 
 
 # Callers without the right.
-
-
-CALLERS: dict[str, Callable[[Any], Any]] = {
-    "link loss hold": lambda system: _service(system, "LinkLossService")._act(LossAction.HOLD),
-    "link loss return": lambda system: _service(system, "LinkLossService")._act(LossAction.RETURN),
-    "fence hold": lambda system: system.vehicle.hold(),
-    "fence return": lambda system: _service(system, "FenceService")._return_or_hold(),
-    "guided end": lambda system: _ended(system.vehicle.offboard.end()),
-    "follow end": lambda system: _ended(system.vehicle.follow.end()),
-    "mission end": lambda system: _ended(system.vehicle.mission.end()),
-    "mission break": lambda system: _call(system.vehicle.mission._break_off, "test"),
-    "setpoints silent": lambda system: _call(system.vehicle.offboard._expired),
-    "sticks silent": lambda system: _call(system.vehicle.manual._let_go, Event.END),
-    "gateway end": lambda system: system.let_go(),
-}
-
-
-async def _call(function: Callable[..., Any], *args: Any) -> None:
-    function(*args)
-
-
-async def _ended(tasks: list[asyncio.Task[None]]) -> None:
-    if tasks:
-        await asyncio.wait(tasks)
-
-
-def _service(system: Any, name: str) -> Any:
-    return next(service for service in system.services if type(service).__name__ == name)
-
-
-def system_of(w: World) -> Any:
-    return w.gateway._supervised[0].system
 
 
 @pytest.mark.parametrize("caller", CALLERS)
