@@ -116,10 +116,14 @@ async def test_return_while_pilot_has_source_sends_no_pcmd() -> None:
 
 async def test_first_texts_behind_skycontroller_say_that_failsafes_only_warn() -> None:
     async with world(skycontroller=3) as w:
+        await w.client.command(dialect.MAV_CMD_DO_SEND_BANNER)
+        await w.client.wait("STATUSTEXT", lambda m: "anafi-mav" in m.text, since=0)
         texts = [m.text for _, m in w.client.since(0, "STATUSTEXT")]
         assert texts[:2] == [
             "Skycontroller in control until a client flies",
             "Until then station loss and fence only warn",
         ]
     async with world() as w:
+        await w.client.command(dialect.MAV_CMD_DO_SEND_BANNER)
+        await w.client.wait("STATUSTEXT", lambda m: "anafi-mav" in m.text, since=0)
         assert not [m for _, m in w.client.since(0, "STATUSTEXT") if "Skycontroller" in m.text]
