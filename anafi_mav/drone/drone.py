@@ -9,7 +9,7 @@ import asyncio
 import contextlib
 import logging
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import datetime
 from functools import partial
 from typing import Any, TypeAlias, TypeVar
@@ -128,8 +128,9 @@ class Drone:
         self.thermal = Thermal(self._commander)
         self.video = Video()
         self.piloting = Piloting(self._commander, self.home, self.takeoff_blockers)
-        self.controller = Controller(self._commander, self._user_moves, self._pilot_takes_over)
-        self.piloting.pilot_has_source = self._pilot_has_source
+        self.controller = Controller(self._commander, self._user_moves, self._pilot_takes_over, self._stand_by)
+        self.piloting.pilot_has_source = lambda: self.controller.pilot_has_source
+        self.piloting.is_modern = lambda: self._model.protobuf
         self._commander.gate = self._allows
         self._elements: tuple[Element[Any], ...] = (
             self.alerts,
@@ -228,6 +229,9 @@ class Drone:
         self._session = session
         self._counters = session.counters
         self._commander.attach(session)
+        if self.controller.present:
+            session.on_stall = self.controller.stalled
+            session.watch()
         session.lost.add_done_callback(partial(self._on_lost, session))
 
     async def _find_web_server(self, session: ControllerSession) -> None:
@@ -306,6 +310,8 @@ class Drone:
             raise CommandRejected("the magnetometer is being calibrated: somebody turns the drone by hand")
         if isinstance(message, common.MagnetoCalibration) and message.calibrate:
             self._require_standing("calibrated")
+        if _starts_motors(message):
+            self.piloting.take_off_wanted()
         return self.controller.allows(message)
 
     def _require_standing(self, what: str) -> None:
@@ -315,11 +321,20 @@ class Drone:
         if self.piloting.about_to_fly:
             raise CommandRejected(f"a drone that is about to take off is not {what}")
 
+    def retire(self, tasks: Iterable[asyncio.Task[Any]]) -> None:
+        """From now on these tasks send nothing but what stops something: newer commands have replaced them."""
+        self._commander.retire(tasks)
+
+    def silence(self, tasks: Iterable[asyncio.Task[Any]]) -> None:
+        """From now on these tasks send nothing at all."""
+        self._commander.silence(tasks)
+
     def _user_moves(self) -> bool:
         """Does something fly the drone that a user of ours ordered?"""
         piloting = self.piloting
         return (
             piloting.moving
+            or piloting.sticks_held
             or self._commander.begins
             or piloting.state.plan == PlayingState.PLAYING
             or piloting.state.poi in (PoiStatus.RUNNING, PoiStatus.PENDING)
@@ -327,10 +342,10 @@ class Drone:
             or piloting.state.animation not in (None, AnimationType.NONE)
         )
 
-    def _pilot_has_source(self) -> bool:
-        """True while a Skycontroller's own sticks fly the drone."""
-        controller = self.controller
-        return controller.present and not controller.taken and controller.state.source == skyctrl.Source.SKY_CONTROLLER
+    def _stand_by(self, messages: Sequence[Message]) -> None:
+        """Have these sent when the host stalls; none: nothing is sent."""
+        if self._session is not None:
+            self._session.stand_by(messages)
 
     def _pilot_takes_over(self) -> None:
         """The pilot at the Skycontroller moved a stick: what our user ordered ends here."""
@@ -539,7 +554,8 @@ def _starts_motors(message: Message) -> bool:
     """Do the motors of a drone on the ground start by this command?"""
     if isinstance(message, ardrone3.UserTakeOff):
         return message.state != 0
-    return isinstance(message, ardrone3.TakeOff | common.Start | modern_plan.StartAt | modern_plan.StartAtV2)
+    starts = ardrone3.TakeOff | ardrone3.SmartTakeOffLand | common.Start | modern_plan.StartAt | modern_plan.StartAtV2
+    return isinstance(message, starts)
 
 
 def _model(id: int) -> Model:

@@ -28,7 +28,7 @@ from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone.element import Position, Range, Reducer, members, position, setting
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT
 from anafi_mav.drone.settings import Commanding
-from anafi_mav.errors import LocalProtocolError, NotSupported
+from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LocalProtocolError, NotSupported
 
 _SAME_PLACE_DEG = 1e-7
 """About a centimetre: an echo that went through single precision is further off than that."""
@@ -181,6 +181,17 @@ class Home(Commanding[HomeState]):
             lambda message: message.mode == RthAutoTriggerMode.ON,
         )
 
+    async def cancel_auto_trigger(self, timeout: float = ANSWER_TIMEOUT) -> None:
+        """Cancel the return that the drone has announced; returns when it announces none."""
+        if self.state.auto_trigger in (None, AutoTriggerReason.NONE):
+            return
+        await self._change(
+            rth.CancelAutoTrigger(),
+            rth.RthAutoTrigger,
+            lambda message: True if message.reason == AutoTriggerReason.NONE else None,
+            timeout,
+        )
+
     async def set_preferred_type(self, kind: RthHomeType) -> RthHomeType:
         """Choose the kind of home to prefer; `HomeState.type` is the one the drone would use now.
 
@@ -198,8 +209,9 @@ class Home(Commanding[HomeState]):
     ) -> Position:
         """Choose a place (deg, deg, m above take-off) for homes of type custom.
 
-        The drone flies there only while `preferred_type` is CUSTOM. One that does not accept the place (too far away,
-        or its own place is unknown) stays silent: `CommandTimeout`.
+        The drone flies there only while `preferred_type` is CUSTOM. One that does not accept the place (it is too far
+        away, or the drone does not know where it is itself) reports its old one or nothing: `CommandRejected`, at once
+        or after `QUIET`. `CommandTimeout` when the command did not arrive.
         """
         wanted = position(latitude, longitude, altitude)
         if wanted is None:
@@ -208,15 +220,27 @@ class Home(Commanding[HomeState]):
         if self.state.types is not None and RthHomeType.CUSTOM not in self.state.types:
             raise NotSupported("home of type custom")
 
-        def judge(message: rth.CustomLocation) -> Position | None:
+        def judge(message: rth.CustomLocation) -> Position | AnafiMavError | None:
             same = math.isclose(message.latitude, latitude, rel_tol=0.0, abs_tol=_SAME_PLACE_DEG) and math.isclose(
                 message.longitude, longitude, rel_tol=0.0, abs_tol=_SAME_PLACE_DEG
             )
-            return position(message.latitude, message.longitude, message.altitude) if same else None
+            if same:
+                return position(message.latitude, message.longitude, message.altitude)
+            return refused if delivery.done() else None  # else it is about an earlier command
 
-        return await self._change(
-            rth.SetCustomLocation(latitude, longitude, altitude), rth.CustomLocation, judge, timeout
-        )
+        refused = CommandRejected("Home refused: the drone does not accept the place")
+        command = rth.SetCustomLocation(latitude, longitude, altitude)
+        async with self._setting_lock(rth.CustomLocation):
+            answer = self._commander.expect((rth.CustomLocation,), judge)
+            delivery = self._commander.deliver(command)
+            try:
+                if not await answer.came(delivery, command.NAME, timeout):
+                    raise refused
+                return answer.future.result()
+            finally:
+                answer.close()
+                if not delivery.done():
+                    self._commander.take_back(delivery, CommandTimeout(command.NAME, timeout))
 
     async def set_precise(self, on: bool) -> bool:
         """Switch the precise return, which looks for the picture of the take-off place."""

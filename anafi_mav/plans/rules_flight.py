@@ -53,7 +53,7 @@ def _take_off(pen: Pen, item: Item) -> None:
     if height is None:
         pen.say("it says no height: the drone rises as high as it does by itself")
     elif height < 0.0:
-        pen.refuse(f"it rises to {height:g} m", 7)
+        pen.refuse(f"it rises to {height:g} m above take-off", 7)
     else:
         up = replace(pen.place, height=max(height, pen.place.height))
         if height > pen.place.height or heading is not None:

@@ -508,7 +508,7 @@ async def test_conf_077_rally_points_are_kept_and_not_used(flavour: str) -> None
         points = [rally(around(PLACE, (60.0, 0.0))[0], 15.0), rally(around(PLACE, (0.0, 80.0))[0], 20.0)]
         mark = w.client.mark()
         assert (await upload(w.client, points, RALLY)).type == TAKEN
-        await said(w.client, "2 rally points kept and not used", since=mark)
+        await said(w.client, "Rally points not used: RTL_TYPE is home (2)", since=mark)
         assert [content(item) for item in await download(w.client, RALLY)] == [item.content for item in points]
         await w.take_off()
         for _ in range(3):

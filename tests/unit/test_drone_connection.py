@@ -129,6 +129,13 @@ async def test_block_that_ends_while_motors_ramp_lands(real: SimulatedDrone) -> 
     assert real.flying_state in (FlyingState.LANDED, FlyingState.LANDING)
 
 
+async def test_block_that_ends_while_a_hand_launch_waits_stops_the_motors(real: SimulatedDrone) -> None:
+    async with connect("127.0.0.1", discovery_port=real.discovery_port) as drone:
+        await drone.piloting.hand_launch()
+        assert real.flying_state == FlyingState.USERTAKEOFF
+    assert real.flying_state == FlyingState.LANDED
+
+
 async def test_block_behind_a_skycontroller_leaves_the_drone_to_its_pilot() -> None:
     async with Simulator([spec(skycontroller=3)], speed=4.0, seed=1) as simulator:
         real = simulator.drones[0]
