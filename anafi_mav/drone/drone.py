@@ -411,10 +411,10 @@ class Drone:
         )
 
     async def request_reboot(self, timeout: float = REBOOT_TIMEOUT) -> None:
-        """Send the command to restart; return when the drone has acknowledged its receipt, which is all that it says.
+        """Send the command to restart; return when the drone has acknowledged its receipt, its only confirmation.
 
-        Raises `CommandRejected` unless the drone has reported that it stands; `LinkLost` or `CommandTimeout` when the
-        command has not arrived. Cancelled, it is not sent again.
+        Raises `CommandRejected` unless the drone has reported that it is landed; `LinkLost` or `CommandTimeout` when
+        the command has not arrived. Cancelled, it is not sent again.
         """
         if not self.connected:
             raise LinkLost("not connected")
