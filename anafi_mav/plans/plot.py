@@ -85,6 +85,7 @@ def _map(axes: Any, plan: Plan, stops: list[Stop], origin: tuple[float, float]) 
         colour, label = ("tab:green", "stay inside") if zone.inclusion else ("tab:red", "stay outside")
         axes.plot(*zip(*outline, strict=True), "--", color=colour, linewidth=1.0, label=label)
     _named(axes)
+    axes.margins(x=0.08, y=0.15)  # room for the scale below the way
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_xlabel("east, m")
     axes.set_ylabel("north, m")
