@@ -39,6 +39,7 @@ from anafi_mav.sim.place import Origin
 from anafi_mav.sim.plan_store import FlightPlanStore
 from anafi_mav.sim.poi import Poi
 from anafi_mav.sim.power import Battery
+from anafi_mav.sim.quirks import Quirk
 from anafi_mav.sim.safety import Alarms, Warnings, check_changed
 from anafi_mav.sim.settings import Settings
 from anafi_mav.sim.wind import WindWatch
@@ -205,8 +206,9 @@ class Flight:
 
     def motion_report(self) -> list[Message]:
         pose = self.pose
+        roll = -pose.roll if Quirk.ROLL_INVERTED in self.faults.quirks else pose.roll
         return [
-            ardrone3.AttitudeChanged(pose.roll, pose.pitch, pose.yaw),
+            ardrone3.AttitudeChanged(roll, pose.pitch, pose.yaw),
             ardrone3.SpeedChanged(pose.vn, pose.ve, pose.vd),
             ardrone3.AltitudeChanged(pose.up),
         ]
