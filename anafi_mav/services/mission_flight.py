@@ -179,6 +179,13 @@ class MissionFlight:
         """A landing or a return that begins now is the plan's own."""
         return self.progress.ending
 
+    @property
+    def returns(self) -> bool:
+        """A return that begins now is that of the mission's last item, done already or about to be."""
+        drone = self._vehicle.drone
+        by_plan = drone.home.state.reason == events.ReturnReason.FLIGHTPLAN and drone.flight_plan.state.uid == self._uid
+        return self.progress.ending or (by_plan and self.progress.returned)
+
     # The beginning.
 
     def _require_freedom(self) -> None:
@@ -187,7 +194,7 @@ class MissionFlight:
             raise Refused("Mission refused: the drone is landing")
         if vehicle.returning_by_itself:
             raise Refused("Mission refused: the drone returns home by itself")
-        if vehicle.drone.controller.pilot_flies:
+        if vehicle.drone.controller.pilot_acquired_control:
             raise Refused("Mission refused: the pilot at the Skycontroller flies")
         if not vehicle.in_air and not vehicle.on_ground:
             raise Refused("Mission refused: the drone is neither on the ground nor flying yet")
@@ -420,7 +427,7 @@ class MissionFlight:
                 self._leg_over()
             elif progress.ending and progress.at_last_line and message.state == PlayingState.STOPPED:
                 self._end_watch.begin()
-            elif self._vehicle.drone.controller.pilot_flies:
+            elif self._vehicle.drone.controller.pilot_acquired_control:
                 self._break_off("the pilot at the Skycontroller flies")
             elif message.state == PlayingState.STOPPED and (last := self._last_way_point(progress.leg)) is not None:
                 self._end_watch.begin(last)

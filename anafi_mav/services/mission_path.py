@@ -134,7 +134,9 @@ def _check(vehicle: Aircraft, start: Place | None, point: WayPoint, number: int)
     try:
         check_place(vehicle, point.place, start=start)
         if ceiling is not None and point.ato > ceiling.current:
-            raise Refused(f"{point.ato:.1f} m is above the drone's ceiling of {ceiling.current:g} m", lasting=True)
+            raise Refused(
+                f"{point.ato:.1f} m above take-off is above the drone's ceiling of {ceiling.current:g} m", lasting=True
+            )
         vehicle.fence.check_height(point.ato)
     except (Refused, OutsideFence) as error:
         reason = str(error).removeprefix("Goto refused: ")

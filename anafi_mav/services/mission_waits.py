@@ -147,7 +147,7 @@ class EndWatch:
         return (
             not vehicle.in_air
             or vehicle.drone.home.state.returning
-            or vehicle.drone.controller.pilot_flies
+            or vehicle.drone.controller.pilot_acquired_control
             or alerts.alert not in (None, AlertState.NONE)
             or alerts.forced_landing not in (None, ForcedLandingReason.NONE)
             or vehicle.drone.flight_plan.state.error not in (None, PlayError.NONE)

@@ -46,6 +46,9 @@ TILT_HELD = f"Tilt limit {CAUTIOUS_TILT * units.DEG_PER_RAD:.0f} deg: roll sign 
 SINGLE_WAIT = 2.0
 """s that a single setpoint may wait until what was under way has let go of the drone; then it is out of date."""
 
+PAUSED = "paused by a client"
+"""Why setpoints in Guided are ignored after a pause."""
+
 HEARD = (events.AttitudeChanged, events.SpeedChanged, events.AltitudeChanged, events.GpsLocationChanged)
 """What tells how the drone moves."""
 
@@ -106,11 +109,6 @@ class OffboardFlight:
         """The heading (rad from north) that is turned to or held; None when none is."""
         return self._course.yaw if self.engaged else None
 
-    @property
-    def age(self) -> float:
-        """s since the setpoint that is being flown arrived."""
-        return self._stream.age(self._clock.monotonic())
-
     # What programs ask for.
 
     def receive(self, sender: Hashable, setpoint: Setpoint, *, guided: bool = False) -> str | None:
@@ -152,6 +150,10 @@ class OffboardFlight:
             return refusal.reason.partition("efused: ")[2] or refusal.reason
         return None
 
+    def streamed_for(self, client: Hashable) -> bool:
+        """True when there are setpoints that mode Offboard would fly for this client."""
+        return self._stream.candidate(client, self._clock.monotonic()) is not None
+
     async def engage(self, client: Hashable) -> None:
         """Mode Offboard begins for this client; returns when its setpoints fly the drone, or raises `Refused`."""
         self._require_freedom("Offboard")
@@ -176,7 +178,7 @@ class OffboardFlight:
             raise Refused(f"{what} refused: take off first, setpoints do not lift an ANAFI off the ground")
         if vehicle.returning:
             raise Refused(f"{what} refused: the drone returns home")
-        if vehicle.drone.controller.pilot_flies:
+        if vehicle.drone.controller.pilot_acquired_control:
             raise Refused(f"{what} refused: the pilot at the Skycontroller flies")
         if vehicle.drone.piloting.limits is None:
             raise Refused(f"{what} refused: the drone has not reported what full tilt and speed are")
@@ -189,6 +191,8 @@ class OffboardFlight:
         mode = self._vehicle.mode
         if not self._vehicle.in_air:
             return "take off first"
+        if self._vehicle.paused:
+            return PAUSED
         if mode is not FlightMode.GUIDED:
             return f"setpoints fly the drone in mode Guided, this is {mode.value}"
         self._alone = ends(setpoint) and not (follows or self._stream.straggles(sender, now))
@@ -200,6 +204,8 @@ class OffboardFlight:
         """A setpoint in mode Guided takes the drone over from whatever it does in that mode."""
         try:
             self._require_freedom("Setpoint")
+            if self._vehicle.paused:
+                raise Refused(f"Setpoint refused: {PAUSED}")
             if self._vehicle.mode is not FlightMode.GUIDED:  # ended by what arrived together with the setpoint
                 raise Refused(f"Setpoint refused: this is {self._vehicle.mode.value}")
             await self._vehicle.take_over()
@@ -291,7 +297,7 @@ class OffboardFlight:
         if setpoint is None or limits is None:
             return
         reason = None
-        if vehicle.drone.controller.pilot_flies:
+        if vehicle.drone.controller.pilot_acquired_control:
             # He moved a stick. That he let go of it again does not give the drone back to the program.
             reason = "the pilot at the Skycontroller flies"
         elif vehicle.sticks_follow_camera:

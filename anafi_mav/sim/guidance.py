@@ -14,11 +14,13 @@ from anafi_mav.arsdk.messages.ardrone3 import MoveByError, MoveToStatus
 from anafi_mav.arsdk.messages.rth import RthEndingBehavior
 from anafi_mav.arsdk.wire import Message
 from anafi_mav.sim.body import Body
+from anafi_mav.sim.faults import Faults
 from anafi_mav.sim.homing import Homing
 from anafi_mav.sim.model import Model
 from anafi_mav.sim.motion import Pose
 from anafi_mav.sim.moves import MoveBy, MoveTo, asked_speeds, own_speeds
 from anafi_mav.sim.place import Origin
+from anafi_mav.sim.quirks import Quirk
 from anafi_mav.sim.settings import Settings
 from anafi_mav.units import RAD_PER_DEG, clip
 
@@ -40,6 +42,7 @@ class Guidance:
         settings: Settings,
         homing: Homing,
         emit: Callable[[Message], None],
+        faults: Faults,
     ) -> None:
         self._model = model
         self._body = body
@@ -47,6 +50,9 @@ class Guidance:
         self._settings = settings
         self._homing = homing
         self._emit = emit
+        self._faults = faults
+        self._tilting = False
+        """The last PCMD had flag 1: counts only for a firmware that remembers it."""
         self._move: MoveBy | MoveTo | None = None
         self._sticks_until = 0.0
         self._sticks_used = False
@@ -61,7 +67,8 @@ class Guidance:
     @property
     def busy(self) -> bool:
         """Somebody wants to move."""
-        return self._move is not None or self._homing.flying or self._sticks_used
+        remembered = self._tilting and Quirk.FLAG_REMEMBERED in self._faults.quirks
+        return self._move is not None or self._homing.flying or self._sticks_used or remembered
 
     @property
     def heading_for_place(self) -> bool:
@@ -129,6 +136,7 @@ class Guidance:
         """PCMD: percent of the limits; pitch + is nose down. Without `flag` roll and pitch do not count."""
         if self._homing.flying:
             return
+        self._tilting = bool(sticks.flag & 1)
         settings = self._settings
         tilt = settings.number("max_tilt") * RAD_PER_DEG if sticks.flag & 1 else 0.0
         yaw_rate = _share(sticks.yaw) * settings.number("max_rotation_speed") * RAD_PER_DEG
@@ -154,6 +162,10 @@ class Guidance:
         if yaw_rate is not None or self._stare is not None:
             self._stare = yaw_rate
             self._body.stick_yaw(yaw_rate or 0.0)
+
+    def forget_flag(self) -> None:
+        """No PCMD of the flight that has ended counts in the next one."""
+        self._tilting = False
 
     def release_sticks(self) -> None:
         self._sticks_used = False

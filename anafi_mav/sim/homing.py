@@ -16,8 +16,10 @@ from anafi_mav.arsdk.messages import ardrone3, rth
 from anafi_mav.arsdk.messages.rth import RthEndingBehavior, RthHomeType, RthState, StateReason
 from anafi_mav.arsdk.wire import Message
 from anafi_mav.sim.body import Body
+from anafi_mav.sim.faults import Faults
 from anafi_mav.sim.motion import Pose, Turn
 from anafi_mav.sim.place import Origin
+from anafi_mav.sim.quirks import Quirk
 from anafi_mav.sim.settings import HOME_TYPES, Settings
 from anafi_mav.units import RAD_PER_DEG
 
@@ -54,8 +56,16 @@ class Phase(enum.Enum):
 class Homing:
     """Home and the return. `emit` takes the events, `body` does the flying."""
 
-    def __init__(self, body: Body, origin: Origin, settings: Settings, emit: Callable[[Message], None]) -> None:
+    def __init__(
+        self,
+        body: Body,
+        origin: Origin,
+        settings: Settings,
+        emit: Callable[[Message], None],
+        faults: Faults,
+    ) -> None:
         self._body = body
+        self._faults = faults
         self._origin = origin
         self._settings = settings
         self._emit = emit
@@ -267,7 +277,10 @@ class Homing:
             self._go(north, east, min(self._settings.number("rth_hovering_altitude"), self._height))
         else:
             self._stop_body()
-            self._set(RthState.AVAILABLE, StateReason.FINISHED)
+            if Quirk.RTH_FINISHED_MISSING in self._faults.quirks:
+                self._state = (RthState.AVAILABLE, StateReason.ENABLED)
+            else:
+                self._set(RthState.AVAILABLE, StateReason.FINISHED)
             ending: RthEndingBehavior = self._settings["rth_ending"]
             return ending
         return None
