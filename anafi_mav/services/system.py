@@ -49,6 +49,7 @@ from anafi_mav.services.orbit import OrbitService
 from anafi_mav.services.parameters import ParameterService
 from anafi_mav.services.plan_service import PlanService
 from anafi_mav.services.rally_service import RallyService
+from anafi_mav.services.roll_sign_service import RollSignService
 from anafi_mav.services.service import MessageHandler, Service
 from anafi_mav.services.shell import ShellService
 from anafi_mav.services.statustext import Severity, TextNumbers
@@ -78,6 +79,7 @@ SERVICES: tuple[type[Service], ...] = (
     MissionService,
     FenceService,
     RallyService,
+    RollSignService,
     OffboardService,
     ManualControlService,
     FollowService,
