@@ -18,6 +18,8 @@ from support.conformance_items import ITEMS
 
 clock.install()
 
+pytest_plugins = ["support.repeats"]
+
 # A shell starts what runs in its background with SIGINT ignored, and the programs that tests start would inherit that.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
@@ -81,6 +83,8 @@ class _Table:
         number = _NUMBER.search(report.nodeid)
         if number is None:
             return
+        if report.outcome == "rerun":
+            return  # `support.repeats` prints it, the repetition counts
         if report.when == "call" or report.outcome != "passed":
             self._reports[int(number[1])].append(report)
         if report.when == "teardown":

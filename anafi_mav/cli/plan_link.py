@@ -19,6 +19,7 @@ from anafi_mav.mavlink.node import Inbound
 from anafi_mav.mavlink.plan_client import Download, Outcome, Upload
 from anafi_mav.plans.lists import fence_items, points_of, rally_items, zones_of
 from anafi_mav.plans.plan import GLOBAL, WAYPOINT, Item, Plan, Point, counted, shifted
+from anafi_mav.services.memory import NOT_KEPT
 from anafi_mav.services.mission_items import from_wire, to_wire
 from anafi_mav.services.plan_items import Fault, PlanItem, item_int, item_of
 
@@ -84,19 +85,22 @@ def _without_heading(item: Item) -> Item:
 
 
 def upload(arguments: argparse.Namespace) -> int:
-    """Hand it over. Raises `Refused` with the vehicle's reason."""
+    """Hand it over; 1 when the gateway took it and cannot store it. Raises `Refused` with the vehicle's reason."""
     sysid, plan = plan_options.sysid_of(arguments), plan_options.load(arguments)
-    asyncio.run(_upload(arguments, sysid, plan))
-    return 0
+    texts = asyncio.run(_upload(arguments, sysid, plan))
+    return 1 if NOT_KEPT in texts else 0
 
 
-async def _upload(arguments: argparse.Namespace, sysid: int | None, plan: Plan) -> None:
+async def _upload(arguments: argparse.Namespace, sysid: int | None, plan: Plan) -> list[str]:
     async with connected(arguments.endpoint, sysid) as ground:
-        await give(ground, plan, arguments.file.name)
+        return await give(ground, plan, arguments.file.name)
 
 
-async def give(ground: Ground, plan: Plan, source: str) -> None:
-    """Upload the lists that a plan has; others stay as the vehicle has them. Raises `Refused` and `PlanError`."""
+async def give(ground: Ground, plan: Plan, source: str) -> list[str]:
+    """Upload the lists that a plan has and return the vehicle's texts; other lists stay as the vehicle has them.
+
+    Raises `Refused` and `PlanError`.
+    """
     lists = Lists.of(plan)
     parts = {kind: lists.wire(kind, source, with_home=ground.first_item_is_home) for kind in NAMES}
     if not any(parts.values()):
@@ -105,6 +109,7 @@ async def give(ground: Ground, plan: Plan, source: str) -> None:
         for kind, items in parts.items():
             if items:
                 await give_list(ground, kind, items, texts)
+        return texts
 
 
 @contextlib.contextmanager

@@ -21,6 +21,8 @@ from anafi_mav.drone.element import Element, Reducer, with_item
 
 
 class AlertsState(msgspec.Struct, frozen=True):
+    """Warnings of the drone, and its own list of what prevents a take-off."""
+
     alert: AlertState | None = None
     """The one alert of older firmware."""
     alarms: Mapping[alarms.Type, bool] = {}
@@ -49,6 +51,8 @@ def _forced_landing(state: AlertsState, message: ardrone3.ForcedLandingAutoTrigg
 
 
 class Alerts(Element[AlertsState]):
+    """Warnings that the drone reports. No verbs: `Drone.blockers` sums up what prevents a take-off."""
+
     NOTHING = AlertsState()
     REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = {
         ardrone3.AlertStateChanged: lambda state, message: replace(state, alert=message.state),
@@ -82,8 +86,13 @@ _FLIES_WITHOUT = (Sensor.GPS,)
 """Sensors that a drone takes off without."""
 
 
+_HARMLESS = (None, AlertState.NONE, AlertState.USER, AlertState.LOW_BATTERY)
+"""Alerts with which a drone takes off. USER is a past emergency stop, which the flying state EMERGENCY tells better: a
+firmware that kept it would stay on the ground until it is switched off."""
+
+
 class BlockerKind(enum.Enum):
-    """What keeps a drone on the ground; the value is how its text begins."""
+    """Kind of a reason that prevents a take-off; the value is the beginning of its text."""
 
     CHECK = ""
     """A line of the take-off checklist."""
@@ -96,7 +105,7 @@ class BlockerKind(enum.Enum):
 
 
 class Blocker(NamedTuple):
-    """One thing that the drone has reported and that can keep it on the ground."""
+    """One reported reason that can prevent a take-off; `str` gives it in words."""
 
     kind: BlockerKind
     value: OpenEnum | None = None
@@ -125,7 +134,8 @@ def takeoff_blockers(alerts: AlertsState, battery: BatteryState, calibration: Ca
     """What the drone has reported that can keep it on the ground; empty when nothing is known.
 
     ARSDK refuses a take-off by silence. The take-off checklist (alarms.xml 175-0-2) is the drone's own list of
-    reasons; firmware without it leaves the alerts, the battery's alerts, the calibration and the sensors.
+    reasons and decides alone about alerts and sensors, whose last report may be old; firmware without it leaves the
+    alert, the calibration and the sensors. A critical battery counts in any case.
     """
     reasons = [Blocker(BlockerKind.CHECK, check) for check, blocks in alerts.checklist.items() if blocks]
     if TakeoffChecklistType.MAGNETO_CALIBRATION not in alerts.checklist and calibration.magneto_required:
@@ -137,7 +147,7 @@ def takeoff_blockers(alerts: AlertsState, battery: BatteryState, calibration: Ca
         reasons += [Blocker(BlockerKind.SENSOR, sensor) for sensor in failed]
     critical = [alert for alert, level in battery.alerts.items() if level == AlertLevel.CRITICAL]
     reasons += [Blocker(BlockerKind.BATTERY, alert) for alert in critical]
-    if alerts.alert not in (None, AlertState.NONE, AlertState.LOW_BATTERY):
+    if not alerts.checklist and alerts.alert not in _HARMLESS:
         reasons.append(Blocker(BlockerKind.ALERT, alerts.alert))
     if alerts.motor_error not in (None, MotorError.NO_ERROR):
         reasons.append(Blocker(BlockerKind.MOTOR, alerts.motor_error))

@@ -76,7 +76,7 @@ back: the time begins anew with every command, for a joystick that somebody forg
 
 
 class Controller(Element[ControllerState]):
-    """The Skycontroller, if there is one. `take_over` is called when its pilot has taken the drone."""
+    """The Skycontroller, if there is one."""
 
     NOTHING = ControllerState()
     REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = REDUCERS
@@ -122,18 +122,28 @@ class Controller(Element[ControllerState]):
     # -- who flies
 
     @property
-    def pilot_flies(self) -> bool:
-        """The pilot has taken the drone from our user, whose commands of motion are refused for the time being."""
+    def pilot_acquired_control(self) -> bool:
+        """True while motion of ours is refused: the pilot moved a stick against it less than `PILOT_KEEPS` ago."""
         return self.present and loop_time() < self._pilot_keeps_until
+
+    @property
+    def pilot_has_source(self) -> bool:
+        """True while the Skycontroller's sticks fly the drone, whether a pilot holds it or not.
+
+        A source that is not reported is the pilot's: it is his after each connection (skyctrl.xml 4-20-0).
+        """
+        return self.present and not self.taken and self.state.source != Source.CONTROLLER
 
     def allows(self, message: Message) -> bool:
         """Shown every command before it is sent. A command of motion takes sticks and source for our user.
 
-        False: a stick position that must not be sent, since the pilot flies. Raises `CommandRejected` for any other
-        motion then.
+        False: a stick position that must not be sent, since the pilot flies; a level one while he has the source is
+        among them. Raises `CommandRejected` for any other motion then.
         """
-        if not self.present or not is_motion(message):
+        if not self.present:
             return True
+        if not is_motion(message):
+            return not (isinstance(message, ardrone3.PCMD) and self.pilot_has_source)
         now = loop_time()
         if now < self._pilot_keeps_until:
             if isinstance(message, ardrone3.PCMD):
@@ -151,7 +161,7 @@ class Controller(Element[ControllerState]):
         return True
 
     def give_back(self) -> None:
-        """Sticks and source go back to the pilot now; what is grabbed by `grab` stays so."""
+        """Return sticks and piloting source to the pilot now; inputs of `grab` stay grabbed."""
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
@@ -228,8 +238,9 @@ class Controller(Element[ControllerState]):
     # -- verbs
 
     async def grab(self, axes: int = 0, buttons: int = 0, timeout: float = ANSWER_TIMEOUT) -> None:
-        """Have these axes and buttons (masks, bit n = number n) reported in the state instead of acting; zeros give
-        them back. What a motion grabs is not touched.
+        """Have axes and buttons (masks, bit n = number n) reported in the state instead of acting; zeros end it.
+
+        The axes of the sticks, which are grabbed during motion, are not changed.
 
         Raises `LocalProtocolError` for the sticks, which are grabbed by motion alone, and for the buttons that stay
         the pilot's.
@@ -249,7 +260,7 @@ class Controller(Element[ControllerState]):
         )
 
     async def discover_drones(self, timeout: float = ANSWER_TIMEOUT) -> Mapping[str, KnownDrone]:
-        """Let the controller look for drones; what it sees, by serial number."""
+        """Search for drones; return those in sight, by serial number."""
         self._require()
         if self.state.protobuf:
             await self._commander.confirm(
@@ -266,7 +277,7 @@ class Controller(Element[ControllerState]):
         return self.state.visible
 
     async def connect_drone(self, serial: str, key: str = "", timeout: float = 30.0) -> None:
-        """Let the controller change to this drone. The connection to us ends and has to be made anew, when it has."""
+        """Connect the Skycontroller to another drone. Its connection to this program ends: connect again."""
         self._require()
 
         if self.state.protobuf:
@@ -304,7 +315,7 @@ class Controller(Element[ControllerState]):
         await self._commander.confirm(device_manager.ConnectDevice(uid=serial, wifi=wifi), answers, judge, timeout)
 
     async def forget_drone(self, serial: str, timeout: float = ANSWER_TIMEOUT) -> None:
-        """Let the controller forget a drone that it knows."""
+        """Remove a drone from those the Skycontroller knows."""
         self._require()
         if serial not in self.state.known:
             raise CommandRejected(f"the Skycontroller knows no drone {serial}")

@@ -30,6 +30,13 @@ MAX_CLIENTS = 64
 _NO_CLIENTS = (dialect.MAV_TYPE_CAMERA, dialect.MAV_TYPE_GIMBAL, dialect.MAV_TYPE_ADSB)
 
 
+PILOT_IN_CONTROL = (
+    "Skycontroller in control until a client flies",
+    "Until then station loss and fence only warn",
+)
+"""First texts behind a Skycontroller: what a client must not rely on."""
+
+
 def banner(drone: Drone, flavour: Flavour) -> list[str]:
     """The texts: the gateway, and the drone with its firmware."""
     identity = drone.identity
@@ -89,6 +96,9 @@ class BannerService(Service):
             self._greet(channel)
 
     def _greet(self, channel: Channel) -> None:
+        if self.host.drone.controller.present:
+            for text in PILOT_IN_CONTROL:
+                self.host.text(Severity.WARNING, text, channel)
         for text in banner(self.host.drone, flavour_of(channel)):
             self.host.text(Severity.INFO, text, channel)
 

@@ -50,7 +50,7 @@ class MessageService(Service):
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
-        self._intervals: Streams[Channel] = Streams()
+        self._intervals: Streams[Channel] = Streams(without=lambda channel: flavour_of(channel).unstreamed)
         self._table: Mapping[int, Stream] = {}
         self._requests: Mapping[int, Request] = {}
         self._news = News()
@@ -159,7 +159,7 @@ class MessageService(Service):
             now = self.host.clock.monotonic()
             if now - self._failed.get(id, -math.inf) >= LOG_EVERY:
                 self._failed[id] = now
-                logger.error("message %d of system %d cannot be made: %r", id, self.host.sysid, error)
+                logger.error("%s: message %d cannot be made: %r", self.host.drone.name, id, error)
 
     def _data_stream(self, inbound: Inbound) -> None:
         """REQUEST_DATA_STREAM. PX4 ignores it, and MAVProxy would slow a PX4 down by it: only ArduPilot obeys."""

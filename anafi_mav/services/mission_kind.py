@@ -136,6 +136,8 @@ class MissionKind(PlanKind):
         return (self._home(), *(_shifted(_with_zero(item), 1) for item in items))
 
     def taken(self, items: Sequence[PlanItem], flavour: Flavour) -> Sequence[PlanItem]:
+        if flavour.always_continues:
+            items = [msgspec.structs.replace(item, autocontinue=1) for item in items]
         if not flavour.zero_home:
             return items
         return [_shifted(_without_zero(item), -1) for item in items[1:]]

@@ -135,9 +135,11 @@ class MissionService(Service):
         """MISSION_CURRENT."""
         progress, ids = vehicle.mission.progress, vehicle.plan_ids
         there = progress.state is not State.NONE
+        # ArduPilot is at home, its item 0, until the mission begins or a client sets another one.
+        at_home = times.flavour.zero_home and progress.is_untouched
         mode = IN_MISSION_MODE if vehicle.mode is FlightMode.MISSION else NOT_IN_MISSION_MODE
         return dialect.MAVLink_mission_current_message(
-            progress.current + offset(times.flavour) if there else 0,
+            progress.current + offset(times.flavour) if there and not at_home else 0,
             len(progress.items) if there else NO_TOTAL,
             MAVLINK_STATES[progress.state],
             mode if there else 0,
@@ -155,7 +157,8 @@ class MissionService(Service):
         vehicle, times = self.host.vehicle, self.host.times()
         progress, ids = vehicle.mission.progress, vehicle.plan_ids
         in_mission = vehicle.mode is FlightMode.MISSION
-        state = (progress.state, progress.current, len(progress.items), in_mission, *sorted(ids.items()))
+        said = progress.state, progress.current, progress.is_untouched, len(progress.items), in_mission
+        state = (*said, *sorted(ids.items()))
         if state == self._sent:
             return
         self._sent = state

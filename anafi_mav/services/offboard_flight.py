@@ -156,7 +156,7 @@ class OffboardFlight:
             raise Refused(f"{what} refused: take off first, setpoints do not lift an ANAFI off the ground")
         if vehicle.returning:
             raise Refused(f"{what} refused: the drone returns home")
-        if vehicle.drone.controller.pilot_flies:
+        if vehicle.drone.controller.pilot_acquired_control:
             raise Refused(f"{what} refused: the pilot at the Skycontroller flies")
         if vehicle.drone.piloting.limits is None:
             raise Refused(f"{what} refused: the drone has not reported what full tilt and speed are")
@@ -271,7 +271,7 @@ class OffboardFlight:
         if setpoint is None or limits is None:
             return
         reason = None
-        if vehicle.drone.controller.pilot_flies:
+        if vehicle.drone.controller.pilot_acquired_control:
             # He moved a stick. That he let go of it again does not give the drone back to the program.
             reason = "the pilot at the Skycontroller flies"
         elif vehicle.sticks_follow_camera:

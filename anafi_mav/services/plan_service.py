@@ -19,6 +19,7 @@ from anafi_mav.plans.parrot import Version
 from anafi_mav.services.fence import FenceKind, summary
 from anafi_mav.services.flavours import PX4, flavour_of
 from anafi_mav.services.guided import fly_item, is_guided_item
+from anafi_mav.services.memory import NOT_KEPT
 from anafi_mav.services.mission_kind import MissionKind
 from anafi_mav.services.plan_desk import MESSAGES, PlanDesk
 from anafi_mav.services.plan_items import Fault, PlanItem
@@ -52,6 +53,7 @@ class PlanService(Service):
     def capabilities(self) -> int:
         return (
             dialect.MAV_PROTOCOL_CAPABILITY_MISSION_INT
+            | dialect.MAV_PROTOCOL_CAPABILITY_MISSION_FLOAT  # MISSION_ITEM and MISSION_REQUEST are accepted too
             | dialect.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
             | dialect.MAV_PROTOCOL_CAPABILITY_MISSION_RALLY
         )
@@ -143,7 +145,9 @@ class PlanService(Service):
             self.host.memory.put(kind, items)
         problem = await self.host.memory.save()
         if problem is not None:
-            self.host.complain(problem)
+            logger.warning("%s: %s", self.host.drone.name, problem)
+            assert isinstance(commit.peer, _ChannelPeer)
+            self.host.text(Severity.WARNING, NOT_KEPT, commit.peer.channel)
         return None
 
     def _set_timer(self) -> None:

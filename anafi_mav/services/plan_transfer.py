@@ -148,6 +148,10 @@ class PlanKind:
         """Return the number of an item of this seq in texts."""
         return seq
 
+    def remarks(self, items: Sequence[PlanItem]) -> Sequence[str]:
+        """Warnings about a list that a client sent and that is accepted: items that `taken` leaves out."""
+        return ()
+
     def always_shown(self, seq: int, flavour: Flavour) -> PlanItem | None:
         """What stands at a place of the list even when it is empty; None: nothing."""
         return None
@@ -308,7 +312,8 @@ class PlanTransfer:
         self.state = TRANSITIONS[self.state][Event.LAST_ITEM]
         self._upload = None
         self._committing = _Done(peer, now, upload.requests.last, ECHOES if upload.lossy else 0)
-        return [Commit({self.kind.mission_type: items}, peer, self.kind.mission_type)]
+        remarks = [Say(Severity.WARNING, text) for text in self.kind.remarks(upload.items)]
+        return [*remarks, Commit({self.kind.mission_type: items}, peer, self.kind.mission_type)]
 
     def clear(self, peer: Peer, now: float) -> list[Effect]:
         """MISSION_CLEAR_ALL, or MISSION_COUNT of 0: acknowledged also when there is nothing to clear."""

@@ -19,8 +19,10 @@ from anafi_mav.drone.events import Message
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound, Node
+from anafi_mav.services import takeoff_point_service
 from anafi_mav.services.banner import BannerService
 from anafi_mav.services.command_service import CommandService
+from anafi_mav.services.compass_service import CompassService
 from anafi_mav.services.event_service import EventService
 from anafi_mav.services.fence_service import FenceService
 from anafi_mav.services.flavours import Flavour, flavour_of
@@ -28,6 +30,7 @@ from anafi_mav.services.flight_record import FlightRecordService
 from anafi_mav.services.follow_service import FollowService
 from anafi_mav.services.ftp_service import FtpService
 from anafi_mav.services.guided import GuidedService
+from anafi_mav.services.height import TakeoffRecord
 from anafi_mav.services.high_latency import HighLatencyService
 from anafi_mav.services.identity import IdentityService
 from anafi_mav.services.link_loss_service import LinkLossService
@@ -49,6 +52,7 @@ from anafi_mav.services.service import MessageHandler, Service
 from anafi_mav.services.shell import ShellService
 from anafi_mav.services.statustext import Severity, TextNumbers
 from anafi_mav.services.stream import Times
+from anafi_mav.services.takeoff_point_service import TakeoffPointService
 from anafi_mav.services.telemetry import CHANGES, TelemetryService
 from anafi_mav.services.time_service import TimeService
 from anafi_mav.services.tune import TuneService
@@ -63,6 +67,7 @@ SERVICES: tuple[type[Service], ...] = (
     ModesService,
     GuidedService,
     MaintenanceService,
+    CompassService,
     OrbitService,
     TelemetryService,
     ParameterService,
@@ -84,11 +89,19 @@ SERVICES: tuple[type[Service], ...] = (
     TuneService,
     NodeStatusService,
     FlightRecordService,
+    TakeoffPointService,
     VideoTelemetryService,
 )
 """What a system consists of, beside commands and messages themselves."""
 
 AUTOPILOT = dialect.MAV_COMP_ID_AUTOPILOT1
+
+ABSENT = frozenset({dialect.MAV_COMP_ID_WINCH})
+"""Components that no ANAFI has and whose commands are answered all the same: MAVSDK sends DO_WINCH to the winch, waits
+for an answer from there and repeats it for seconds. Not a camera or a gimbal: clients take an answer for its presence.
+"""
+
+COMMANDS = (dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND_INT)
 
 HEARTBEAT_EVERY = 1.0
 """s (MAVLink heartbeat.md)."""
@@ -171,8 +184,9 @@ class System:
         self._ticking = [service for service in self.services if type(service).tick is not Service.tick]
         self._updates: dict[type[Message], Callable[[], None]] = {
             events.FlyingStateChanged: self.vehicle.on_flying_state,
-            events.GpsLocationChanged: self.vehicle.on_position,
+            events.GpsLocationChanged: self.vehicle.on_location,
             events.FlightId: self.vehicle.on_position,
+            events.TakeoffLocation: self.vehicle.on_takeoff_location,
             events.ReturnStateChanged: self.vehicle.on_return,
         }
         """What the vehicle makes of an event, before the services hear of it."""
@@ -186,11 +200,10 @@ class System:
         self.active = True
         self._undo = self.drone.subscribe(self._on_event)
         self._node.own(self.sysid)
-        self.vehicle.on_flying_state()
-        self.vehicle.on_position()
         self._last_state = None
         if (problem := self.memory.load(self.drone.identity.serial)) is not None:
             self.text(Severity.WARNING, problem)
+        self.vehicle.link_up(TakeoffRecord.read(self.memory.settings.get(takeoff_point_service.KEY)))
         for service in self.services:
             service.link_up()
         self._listeners.clear()
@@ -223,10 +236,14 @@ class System:
         self._node.disown(self.sysid)
 
     async def let_go(self) -> None:
-        """The gateway ends: nothing of ours goes on, a flying drone is left hovering. Clients must not be heard."""
+        """The gateway ends: a flying drone is left hovering, or returning or landing where it does that already.
+
+        Clients must not be heard.
+        """
         if not self.active:
             return
-        await self._commands.end_all()
+        if not self.vehicle.ends_alone:  # a command that has begun a return would abort it on its end
+            await self._commands.end_all()
         await self.vehicle.let_go()
 
     # Host.
@@ -279,7 +296,9 @@ class System:
     def text(self, severity: Severity, text: str, to: Channel | None = None) -> None:
         """A STATUSTEXT to everybody, and a line in the log; or to one channel alone."""
         if to is None:
-            logger.log(logging.WARNING if severity <= Severity.WARNING else logging.INFO, "%s: %s", self.sysid, text)
+            logger.log(
+                logging.WARNING if severity <= Severity.WARNING else logging.INFO, "%s: %s", self.drone.name, text
+            )
         if self.active:
             for message in self._texts.messages(severity, text):
                 self.send(message, to)
@@ -338,7 +357,7 @@ class System:
                     try:
                         service.tick(now)
                     except Exception:  # the heartbeat goes on whatever happens to one service
-                        logger.exception("%s of system %d", type(service).__name__, self.sysid)
+                        logger.exception("%s: %s failed", self.drone.name, type(service).__name__)
             await asyncio.sleep(max(0.0, min(self._next_heartbeat, next_look) - self.clock.monotonic()))
 
     # What the drone reports.
@@ -416,12 +435,14 @@ class System:
         handler = self._handlers.get(message.get_msgId())
         if handler is None or getattr(message, "target_system", 0) not in (0, self.sysid):
             return
-        if getattr(message, "target_component", 0) not in (0, AUTOPILOT):
-            return
-        if getattr(message, "target_system", 0) == self.sysid:
-            for service in self._receiving:
-                service.received(inbound)
-        handler(inbound)
+        component = getattr(message, "target_component", 0)
+        if component in (0, AUTOPILOT):
+            if getattr(message, "target_system", 0) == self.sysid:
+                for service in self._receiving:
+                    service.received(inbound)
+            handler(inbound)
+        elif component in ABSENT and message.get_msgId() in COMMANDS and message.target_system == self.sysid:
+            self._node.send(_unsupported(inbound), sysid=self.sysid, compid=component, to=inbound.channel)
 
     def _heard(self, inbound: Inbound) -> None:
         for service in self.services:
@@ -432,6 +453,15 @@ class System:
         self._hushed.discard(channel)
         for service in self.services:
             service.channel_closed(channel)
+
+
+def _unsupported(inbound: Inbound) -> dialect.MAVLink_command_ack_message:
+    return dialect.MAVLink_command_ack_message(
+        inbound.message.command,
+        dialect.MAV_RESULT_UNSUPPORTED,
+        target_system=inbound.sysid,
+        target_component=inbound.compid,
+    )
 
 
 def _joined(tables: Any) -> dict[Any, Any]:

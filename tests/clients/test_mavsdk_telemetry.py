@@ -14,6 +14,8 @@ from support.world import loopback
 
 from anafi_mav import __version__
 
+pytestmark = pytest.mark.third_party
+
 HOME = (48.8789, 2.3677, 35.0)
 LISTEN = Path(__file__).with_name("mavsdk_listen.py")
 

@@ -39,6 +39,13 @@ async def ask(client: Client, id: int, *, timeout: float = 2.0) -> Any:
 @both
 async def test_conf_034_home(flavour: str) -> None:
     async with world(flavour=flavour) as w:
+        if flavour == "ardupilot":  # ArduCopter sends it when it is set; its clients request it, or an interval
+            late = await w.connect()
+            await late.wait("SYS_STATUS", since=0)
+            await late.wait("SYS_STATUS")
+            assert late.since(0, "HOME_POSITION") == []
+            interval = (dialect.MAV_CMD_SET_MESSAGE_INTERVAL, dialect.MAVLINK_MSG_ID_HOME_POSITION, 1_000_000)
+            assert (await w.client.command(*interval)).result == ACCEPTED
         home = await w.client.wait("HOME_POSITION", since=0, timeout=2.0)
         assert (home.latitude / 1e7, home.longitude / 1e7) == pytest.approx(HOME[:2], abs=3e-5)
         assert home.altitude / 1000 == pytest.approx(HOME[2], abs=1.5)
