@@ -13,3 +13,7 @@ class Refused(AnafiMavError):
         self.reason = reason
         self.lasting = lasting
         self.critical = critical
+
+
+class Unfinished(AnafiMavError):
+    """A command was accepted for later, and what it waited for has failed: MAV_RESULT_FAILED."""

@@ -81,7 +81,8 @@ class Vehicle(Aircraft):
         self.mission = MissionFlight(self)
         self.takeoff = Takeoff(self, self.mission.armed)
         self.guided = GuidedFlight(self)
-        self.offboard = OffboardFlight(self, clock)
+        self.offboard = OffboardFlight(self, clock, self.takeoff)
+        self.takeoff.ended = self.offboard.after_takeoff
         self.manual = ManualFlight(self, clock)
         self.follow = FollowFlight(self, lambda: self.offboard.motion, clock)
         self.plan_ids: dict[int, int] = {}
@@ -209,6 +210,7 @@ class Vehicle(Aircraft):
         match mode:
             case FlightMode.HOLD | FlightMode.GUIDED | FlightMode.POSITION:
                 await self.hold(mode)
+                self.mode_client = client
             case FlightMode.LAND:
                 await self.land()
             case FlightMode.RETURN:
@@ -217,6 +219,7 @@ class Vehicle(Aircraft):
                 await self.takeoff.begin(None, client)
             case FlightMode.OFFBOARD:
                 await self.offboard.engage(client)
+                self.mode_client = client
             case FlightMode.MISSION:
                 await self.mission.engage(client)
             case FlightMode.TERMINATED:
