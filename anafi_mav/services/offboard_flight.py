@@ -22,7 +22,7 @@ from anafi_mav.errors import AnafiMavError, LinkLost
 from anafi_mav.services.aircraft import Aircraft
 from anafi_mav.services.clients import system_of
 from anafi_mav.services.modes import FlightMode
-from anafi_mav.services.offboard import SILENCE, OffboardStream, State, ends
+from anafi_mav.services.offboard import GUIDED_TIMEOUT, SILENCE, OffboardStream, State, ends, lasts
 from anafi_mav.services.offboard_control import STILL, WIND, Controller, Motion, tilt_for, turn_towards
 from anafi_mav.services.offboard_goals import Goal, demand, resolve
 from anafi_mav.services.offboard_moves import OffboardMoves
@@ -62,6 +62,8 @@ class OffboardFlight:
     """The setpoints of programs on one vehicle, and the drone flown by those of its pilot."""
 
     def __init__(self, vehicle: Aircraft, clock: Clock, takeoff: Launcher) -> None:
+        self.guided_timeout = GUIDED_TIMEOUT
+        """s that a velocity lasts in ArduPilot's Guided (a parameter)."""
         self.motion = Motion()
         """How the drone moves; whoever else flies it by sticks uses it too."""
         self.complain: Callable[[str], None] = lambda text: vehicle.text(Severity.WARNING, text)
@@ -127,7 +129,7 @@ class OffboardFlight:
         if moves and isinstance(setpoint, MotionSetpoint) and (reason := self._objection(sender, setpoint)):
             return reason
         follows = self._stream.follows(sender, now)
-        if not self._stream.receive(sender, setpoint, now):
+        if not self._stream.receive(sender, setpoint, now, lasts(setpoint, self.guided_timeout if guided else None)):
             return "another program flies"
         if self._timer is None:
             self._watch()
@@ -482,7 +484,7 @@ class OffboardFlight:
         if self._moves.active:
             self._moves.stop()
         self.flown = sticks
-        self._vehicle.drone.piloting.pilot(sticks, age=self._stream.age(now))
+        self._vehicle.drone.piloting.pilot(sticks, age=self._stream.stick_age(now))
 
     # Silence.
 
