@@ -17,6 +17,7 @@ from anafi_mav.arsdk.interface import open_connection
 from anafi_mav.arsdk.mux_udp import UdpTunnel
 from anafi_mav.arsdk.session import OnMessage, reason_of
 from anafi_mav.arsdk.transport import Role, Transport
+from anafi_mav.arsdk.watchdog import Watchdog
 from anafi_mav.errors import LinkLost, RemoteProtocolError
 
 log = logging.getLogger("anafi_mav.arsdk")
@@ -38,11 +39,22 @@ class Stream:
         self._decoder = mux.Decoder()
         self.proxy: mux_proxy.Master | mux_proxy.Slave | None = None
         """Who gets the frames of TCP connections."""
+        self.guard: Watchdog | None = None
+        """Asked before each frame: the watchdog's process may be writing one."""
         self.write_raw(mux.encode_control(mux.HANDSHAKE, 0, 0, mux.VERSION))
 
     def write_raw(self, frame: bytes) -> None:
-        if not self.writer.is_closing() and self.writer.transport.get_write_buffer_size() < MAX_WAITING:
+        if self.writer.is_closing() or self.writer.transport.get_write_buffer_size() >= MAX_WAITING:
+            return
+        if self.guard is None:
             self.writer.write(frame)
+        elif self.guard.acquire():
+            self.writer.write(frame)
+            self.guard.release()
+
+    def whole(self) -> bool:
+        """True while no part of a frame waits to be written."""
+        return self.writer.transport.get_write_buffer_size() == 0
 
     async def drained(self) -> None:
         """Wait until there is room for more."""
@@ -112,6 +124,17 @@ class MuxControllerSession(ControllerSession):
         """Send and receive from now on."""
         self.connection_made(cast(asyncio.BaseTransport, _Endpoint(self._stream, self.connection_lost)))
         self._flush()
+
+    def watch(self) -> None:
+        """See `ControllerSession.watch`."""
+        super().watch()
+        self._stream.guard = self._watchdog
+
+    def _whole(self) -> Callable[[], bool] | None:
+        return self._stream.whole
+
+    def _wrapped(self, frame: bytes) -> bytes:
+        return mux.encode_frame(mux.TRANSPORT, frame)
 
     async def open_tcp(self, host: str, port: int) -> tuple[str, int]:
         """An address on this machine that leads to a port of "drone" or "skycontroller". Raises `LinkLost`."""

@@ -195,6 +195,10 @@ class Session(asyncio.DatagramProtocol):
                 case _:
                     assert_never(event)
 
+    def _flush_later(self, delay: float) -> None:
+        self._flush_due = True
+        self._loop.call_later(delay, self._flush)
+
     def _flush_soon(self) -> None:
         if not self._flush_due:
             self._flush_due = True

@@ -21,6 +21,7 @@ import enum
 import itertools
 import struct
 from collections import Counter, deque
+from collections.abc import Sequence
 from typing import TypeAlias
 
 import msgspec
@@ -49,6 +50,9 @@ MAX_UNANSWERED_PINGS = 3
 RETRIED_FOR_EVER = frozenset(MessageId(*numbers) for numbers in [(0, 2, 0), (0, 4, 0), (1, 0, 4), (4, 4, 0), (4, 6, 0)])
 """AllSettings and AllStates (of drone and Skycontroller) and Emergency: commands with timeout="RETRY" in Parrot's
 XML; version 1 does not give them up either."""
+
+STALL = 0.3
+"""s that a ping may be late before the host counts as stalled."""
 
 MAX_QUEUED = 4096
 """Messages waiting in an acknowledged queue. All states and settings of a drone are a few hundred; a queue this
@@ -322,6 +326,38 @@ class Transport:
                     queue.land()
                 return
 
+    def encode_ahead(self, messages: Sequence[Message]) -> list[tuple[int, bytes]]:
+        """Return (sequence number, bytes) of the frames that would carry these messages next, without sending them."""
+        queue = self._queues[_ACK_ID[self.role]]
+        waiting = deque(Waiting(0, wire.encode(message), True) for message in messages)
+        frames = []
+        seq = queue.seq
+        while waiting:
+            seq = (seq + 1) & self._seq_mask
+            payload = b"".join([piece.data for piece in pack(self.version, waiting)])
+            frames.append((seq, encode_frame(self.version, _WITHACK, queue.id, seq, payload)))
+        return frames
+
+    @property
+    def next_seq(self) -> int:
+        """Sequence number of the next frame that carries acknowledged commands."""
+        return (self._queues[_ACK_ID[self.role]].seq + 1) & self._seq_mask
+
+    def abandon(self, reason: str, skip: int = 0) -> None:
+        """Drop everything that was not delivered, and pass over `skip` sequence numbers that another process used."""
+        self._noack.clear()
+        for queue in self._queues.values():
+            # Of a split command that was begun the peer would take whatever follows for the rest: it is completed.
+            begun = [entry for entry in queue.waiting if entry.packed]
+            dropped = [piece.source for piece in queue.flight if piece.last] if not begun else []
+            dropped += [entry for entry in queue.waiting if not entry.packed]
+            self._pending.extend(Undelivered(entry.token, reason) for entry in dropped)
+            queue.waiting = deque(begun)
+            if not begun:
+                queue.land()
+        queue = self._queues[_ACK_ID[self.role]]
+        queue.seq = (queue.seq + skip) & self._seq_mask
+
     def outgoing(self, now: float) -> list[bytes]:
         """The datagrams to send now; they are forgotten here, repetitions come by themselves."""
         if self._down:
@@ -396,6 +432,10 @@ class Transport:
             if queue.flight and now >= queue.due:
                 self._give_up(queue)
         events = self._take_pending()
+        late = now - self._ping_due
+        if late >= STALL:
+            # The host stalled, and what arrived meanwhile may not have been read yet: that is no silence of the peer's.
+            self._last_received += late
         silence = now - self._last_received
         if silence >= self._silence_limit:
             self._go_down(f"nothing received for {silence:.1f} s", events)

@@ -9,7 +9,7 @@ import asyncio
 import contextlib
 import logging
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import datetime
 from functools import partial
 from typing import Any, TypeAlias, TypeVar
@@ -69,6 +69,9 @@ Callback: TypeAlias = Callable[[Message, float], None]
 REBOOT_TIMEOUT = 15.0
 """s within which the link to a drone that reboots is lost; silence is noticed after 2.5 s."""
 
+WAIT_TIMEOUT = 30.0
+"""s that `wait_until` and `wait_for` wait unless the caller says otherwise: a take-off or landing takes about ten."""
+
 CONTROLLER_PORTS = 100
 """A Skycontroller 3 has the TCP ports of its drone this much higher (Olympe, libarsdkctrl arsdk_device.c)."""
 
@@ -77,7 +80,7 @@ CONTROLLER_TIMEOUT = 5.0
 
 
 class Drone:
-    """An ANAFI at a network address. Make it inside a running loop; connect, lose the link and connect again."""
+    """An ANAFI at a network address; `connect` makes one. It can be connected again after the link is lost."""
 
     def __init__(
         self,
@@ -125,7 +128,9 @@ class Drone:
         self.thermal = Thermal(self._commander)
         self.video = Video()
         self.piloting = Piloting(self._commander, self.home, self.takeoff_blockers)
-        self.controller = Controller(self._commander, self._user_moves, self._pilot_takes_over)
+        self.controller = Controller(self._commander, self._user_moves, self._pilot_takes_over, self._stand_by)
+        self.piloting.pilot_has_source = lambda: self.controller.pilot_has_source
+        self.piloting.is_modern = lambda: self._model.protobuf
         self._commander.gate = self._allows
         self._elements: tuple[Element[Any], ...] = (
             self.alerts,
@@ -174,9 +179,9 @@ class Drone:
     # -- the connection
 
     async def connect(self) -> None:
-        """Connect and read the drone's state anew; returns when it has sent all of it.
+        """Connect and read all states and settings; returns when the drone has sent them.
 
-        What was known before is forgotten first, and nothing of before is sent again. Raises `LinkLost`, or
+        States of an earlier connection are dropped, and none of its commands is sent again. Raises `LinkLost`, or
         `RemoteProtocolError` when what answers there is no drone.
         """
         if self._session is not None or self._opening:
@@ -224,6 +229,9 @@ class Drone:
         self._session = session
         self._counters = session.counters
         self._commander.attach(session)
+        if self.controller.present:
+            session.on_stall = self.controller.stalled
+            session.watch()
         session.lost.add_done_callback(partial(self._on_lost, session))
 
     async def _find_web_server(self, session: ControllerSession) -> None:
@@ -302,6 +310,8 @@ class Drone:
             raise CommandRejected("the magnetometer is being calibrated: somebody turns the drone by hand")
         if isinstance(message, common.MagnetoCalibration) and message.calibrate:
             self._require_standing("calibrated")
+        if _starts_motors(message):
+            self.piloting.take_off_wanted()
         return self.controller.allows(message)
 
     def _require_standing(self, what: str) -> None:
@@ -311,17 +321,31 @@ class Drone:
         if self.piloting.about_to_fly:
             raise CommandRejected(f"a drone that is about to take off is not {what}")
 
+    def retire(self, tasks: Iterable[asyncio.Task[Any]]) -> None:
+        """From now on these tasks send nothing but what stops something: newer commands have replaced them."""
+        self._commander.retire(tasks)
+
+    def silence(self, tasks: Iterable[asyncio.Task[Any]]) -> None:
+        """From now on these tasks send nothing at all."""
+        self._commander.silence(tasks)
+
     def _user_moves(self) -> bool:
         """Does something fly the drone that a user of ours ordered?"""
         piloting = self.piloting
         return (
             piloting.moving
+            or piloting.sticks_held
             or self._commander.begins
             or piloting.state.plan == PlayingState.PLAYING
             or piloting.state.poi in (PoiStatus.RUNNING, PoiStatus.PENDING)
             or piloting.state.following not in (None, FollowMeMode.NONE)
             or piloting.state.animation not in (None, AnimationType.NONE)
         )
+
+    def _stand_by(self, messages: Sequence[Message]) -> None:
+        """Have these sent when the host stalls; none: nothing is sent."""
+        if self._session is not None:
+            self._session.stand_by(messages)
 
     def _pilot_takes_over(self) -> None:
         """The pilot at the Skycontroller moved a stick: what our user ordered ends here."""
@@ -343,7 +367,7 @@ class Drone:
             self._lost.set_result(why)
 
     async def close(self) -> None:
-        """End the connection. What was sent just before still leaves. Idempotent."""
+        """End the connection; commands sent just before still leave. Does nothing without one."""
         session = self._session
         if session is not None:
             try:
@@ -358,14 +382,14 @@ class Drone:
 
     @property
     def connected(self) -> bool:
-        """The link is up and the drone has sent all its states."""
+        """True when the link is up and the drone has sent all its states."""
         return self._complete
 
     @property
     def lost(self) -> asyncio.Future[str]:
         """Done when this connection is lost or closed, with the reason; `connect` makes a new one.
 
-        Wait for it with `asyncio.wait` or a shield: cancelling a bare wait would cancel it for everybody.
+        Wait for it with `asyncio.wait` or a shield: cancelling a bare wait would cancel it for all waiters.
         """
         return self._lost
 
@@ -376,7 +400,7 @@ class Drone:
 
     @property
     def identity(self) -> Identity:
-        """Who answered. Before a first connection its texts are empty."""
+        """Model, serial number and versions; empty before the first connection."""
         product = self.product.state
         return Identity(
             model=self._model,
@@ -386,11 +410,11 @@ class Drone:
             name=product.name or self._announced_name,
         )
 
-    async def reboot(self, timeout: float = REBOOT_TIMEOUT) -> None:
-        """Let the drone start anew; returns when it has the order and the link is lost, which is all that it says.
+    async def request_reboot(self, timeout: float = REBOOT_TIMEOUT) -> None:
+        """Send the command to restart; return when the drone has acknowledged its receipt, which is all that it says.
 
-        Raises `CommandRejected` unless it has said that it stands; `LinkLost` when the link went before the order had
-        arrived; `CommandTimeout` when the drone just goes on. Given up, the order is taken back.
+        Raises `CommandRejected` unless the drone has reported that it stands; `LinkLost` or `CommandTimeout` when the
+        command has not arrived. Cancelled, it is not sent again.
         """
         if not self.connected:
             raise LinkLost("not connected")
@@ -398,19 +422,29 @@ class Drone:
         lost, delivery = self._lost, self._commander.deliver(common.Reboot())
         timed_out = CommandTimeout(common.Reboot.NAME, timeout)
         try:
-            await asyncio.wait({lost}, timeout=timeout)
+            either: tuple[asyncio.Future[Any], ...] = (lost, delivery)
+            await asyncio.wait(either, timeout=timeout, return_when=asyncio.FIRST_COMPLETED)
         finally:
-            if not lost.done():
+            if not (lost.done() or delivery.done()):
                 self._commander.take_back(delivery, timed_out)
-        if not lost.done():
-            raise timed_out
         delivery.result()
+
+    async def reboot(self, timeout: float = REBOOT_TIMEOUT) -> None:
+        """Restart the drone; return when it has received the command and the link is lost.
+
+        Raises as `request_reboot`, and `CommandTimeout` when the drone stays connected.
+        """
+        lost = self._lost
+        await self.request_reboot(timeout)
+        await asyncio.wait({lost}, timeout=timeout)
+        if not lost.done():
+            raise CommandTimeout(common.Reboot.NAME, timeout)
 
     # -- what others may look at
 
     @property
     def features(self) -> Mapping[Feature, Support]:
-        """What this drone has, as it told when it connected."""
+        """Features of this drone, from what it reported when it connected."""
         return features(self)
 
     @property
@@ -419,17 +453,18 @@ class Drone:
         return self.piloting.moves_started
 
     def blockers(self) -> list[Blocker]:
-        """What the drone has reported against a take-off."""
+        """Return the reported reasons that can prevent a take-off."""
         return takeoff_blockers(self.alerts.state, self.battery.state, self.calibration.state)
 
     def takeoff_blockers(self) -> list[str]:
-        """The same in words."""
+        """Return `blockers` in words."""
         return [str(blocker) for blocker in self.blockers()]
 
     def subscribe(self, callback: Callback) -> Callable[[], None]:
-        """Call this with every known message once the states have it. Returns the function that ends it.
+        """Call `callback(message, time)` with every message, after the states are updated.
 
-        It also hears the messages that come while `connect` runs. What it raises is logged and goes no further.
+        Returns the function that ends it. `time` is the event loop's. Messages during `connect` are included. What the
+        callback raises is logged.
         """
         self._subscribers = (*self._subscribers, callback)
 
@@ -444,7 +479,7 @@ class Drone:
         predicate: Callable[[MessageT], bool] | None = None,
         timeout: float = ANSWER_TIMEOUT,
     ) -> MessageT:
-        """The next message of this class that the predicate accepts. Raises `CommandTimeout` or `LinkLost`."""
+        """Return the next message of a class that the predicate accepts. Raises `CommandTimeout` or `LinkLost`."""
 
         def judge(message: MessageT) -> MessageT | None:
             return message if predicate is None or predicate(message) else None
@@ -452,6 +487,46 @@ class Drone:
         expectation = self._commander.expect((answer,), judge)
         expectation.expire_after(timeout, CommandTimeout(answer.NAME, timeout))
         return await expectation.wait()
+
+    async def wait_until(self, condition: Callable[[], bool], what: str, timeout: float = WAIT_TIMEOUT) -> None:
+        """Return when a condition on the drone's states is true; it is evaluated now and after each message.
+
+        Raises `CommandTimeout` about `what` after `timeout` s, `LinkLost`, and what the condition raises.
+        """
+        self._commander.require_link()
+        if condition():
+            return
+        met: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+
+        def look(message: Message, now: float) -> None:
+            if met.done():
+                return
+            try:
+                if condition():
+                    met.set_result(None)
+            except Exception as error:
+                met.set_exception(error)
+
+        lost, undo = self._lost, self.subscribe(look)
+        either: set[asyncio.Future[Any]] = {met, lost}
+        try:
+            await asyncio.wait(either, timeout=timeout, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            undo()
+        if met.done():
+            met.result()
+        elif lost.done():
+            raise LinkLost(lost.result())
+        else:
+            raise CommandTimeout(what, timeout)
+
+    async def wait_for(self, *states: FlyingState, timeout: float = WAIT_TIMEOUT) -> None:
+        """Return when the drone reports one of these flying states, at once when it is in one.
+
+        Raises `CommandTimeout` after `timeout` s, `LinkLost`.
+        """
+        words = " or ".join(spoken(state) for state in states)
+        await self.wait_until(lambda: self.piloting.state.flying in states, f"the state {words}", timeout)
 
     # -- the hot path
 
@@ -479,7 +554,8 @@ def _starts_motors(message: Message) -> bool:
     """Do the motors of a drone on the ground start by this command?"""
     if isinstance(message, ardrone3.UserTakeOff):
         return message.state != 0
-    return isinstance(message, ardrone3.TakeOff | common.Start | modern_plan.StartAt | modern_plan.StartAtV2)
+    starts = ardrone3.TakeOff | ardrone3.SmartTakeOffLand | common.Start | modern_plan.StartAt | modern_plan.StartAtV2
+    return isinstance(message, starts)
 
 
 def _model(id: int) -> Model:

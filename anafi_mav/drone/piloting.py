@@ -24,6 +24,7 @@ from anafi_mav.drone.element import Reducer
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, QUIET, Commander, loop_time
 from anafi_mav.drone.home import Home
 from anafi_mav.drone.moves import Displacement, Move, MoveEnd, Moves
+from anafi_mav.drone.piloting_landing import LandingEnd
 from anafi_mav.drone.piloting_motors import Motors
 from anafi_mav.drone.piloting_moves import GuidedMoves
 from anafi_mav.drone.piloting_return import Returns
@@ -46,10 +47,15 @@ class Piloting(PilotingSettings):
         super().__init__(commander)
         self._home = home
         self._moves = Moves(home)
-        self._sticks = StickStream(commander, self, home)
+        self.pilot_has_source: Callable[[], bool] = lambda: False
+        """True while the pilot at a Skycontroller has the piloting source; set by `Drone`."""
+        self._sticks = StickStream(commander, self, home, lambda: self.pilot_has_source())
         self._motors = Motors(commander, self, self._sticks, takeoff_blockers)
         self._guided = GuidedMoves(commander, self, home, self._sticks, self._moves)
         self._returns = Returns(commander, self, home, self._sticks, self._moves)
+        self.is_modern: Callable[[], bool] = lambda: False
+        """True for an Ai; set by `Drone`."""
+        self._landing_end = LandingEnd(commander, self, self._sticks, self._motors, lambda: self.is_modern())
         self._stopping: dict[type[Message], float] = {}
         """Orders to stop something that the drone has not answered yet: until when once is enough."""
 
@@ -69,10 +75,15 @@ class Piloting(PilotingSettings):
         """Events to be shown to this element beyond its reducers."""
         return {
             **self._moves.reactions(),
+            ardrone3.FlyingStateChanged: self._on_flying_state,
             rth.State: self._returns.on_state,
             follow_me.State: lambda message, now: self._obeyed(follow_me.Stop),
             animation.State: lambda message, now: self._obeyed(animation.Cancel),
         }
+
+    def _on_flying_state(self, message: ardrone3.FlyingStateChanged, now: float) -> None:
+        self._moves.on_flying_state(message, now)
+        self._motors.on_flying_state(message)
 
     def _obeyed(self, order: type[Message]) -> None:
         self._stopping.pop(order, None)
@@ -98,6 +109,11 @@ class Piloting(PilotingSettings):
     def moving(self) -> bool:
         """A moveTo or moveBy of ours has not ended."""
         return self._moves.to is not None or bool(self._moves.by)
+
+    @property
+    def sticks_held(self) -> bool:
+        """A setpoint of ours holds the sticks, level or not."""
+        return self._sticks.held
 
     @property
     def sticks_blocked(self) -> str | None:
@@ -148,6 +164,31 @@ class Piloting(PilotingSettings):
         A drone that stands but is `about_to_fly` is watched until it certainly stays there, or is made to land.
         """
         await self._motors.land(timeout)
+
+    async def end_landing(self, timeout: float = ANSWER_TIMEOUT, *, take_off: bool = False) -> None:
+        """End a landing; returns when the drone reports another state, at once when it does not land.
+
+        By gaz for a second at most, and with `take_off` by TakeOff too (SmartTakeOffLand on the Ai), which starts the
+        motors of a drone that has landed: only for a user who wants just that. The sticks are centred then. Raises
+        `CommandRejected` when LANDED is reported first, or the drone goes on landing: nothing of this is sent after it.
+        """
+        await self._landing_end.end(timeout, take_off=take_off)
+
+    async def settle_landing(self, timeout: float = ANSWER_TIMEOUT) -> bool:
+        """Return True when the drone lands, also by a Landing of ours that was withdrawn and arrived all the same."""
+        return await self._motors.settle_landing(timeout)
+
+    async def stop_motors(self, *, force: bool = False) -> None:
+        """Stop propellers that turn on the ground or just above it; returns when the drone reports that they stand.
+
+        `force` cuts them when they still ramp up after `piloting_motors.FORCED_AFTER`, never once the drone has
+        left the ground.
+        """
+        await self._motors.stop_motors(force=force)
+
+    def take_off_wanted(self) -> None:
+        """A command that starts the motors is about to be sent."""
+        self._motors.take_off_wanted()
 
     async def emergency(self) -> None:
         """Cut the motors, wherever the drone is: in the air it falls. Returns when the drone says that they are.

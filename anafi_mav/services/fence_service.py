@@ -132,11 +132,12 @@ class FenceService(Service):
         verdict = self._watch.verdict
         assert verdict is not None
         head = "Fence ahead" if verdict.ahead else "Fence breach"
+        controller = self.host.drone.controller
         if action is Reaction.WARN:
             self.host.text(Severity.WARNING, f"{head}: {verdict.text}")
-        elif self.host.drone.controller.pilot_flies:
-            # He has the drone, and no order of ours would reach it.
-            self.host.text(Severity.CRITICAL, f"{head}: {verdict.text}; the pilot at the Skycontroller flies")
+        elif controller.pilot_has_source or controller.pilot_acquired_control:
+            # A person flies, or can at once: nothing of ours acts against him.
+            self.host.text(Severity.CRITICAL, f"{head}: {verdict.text}: pilot in control")
             self._watch.done(self.host.vehicle.orders)
         else:
             self.host.text(Severity.CRITICAL, f"{head}: {verdict.text}: {action.value}")

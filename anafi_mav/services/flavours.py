@@ -64,6 +64,8 @@ class Flavour:
     """Clients of this family send 0 for what they do not set; NaN elsewhere."""
     guided_setpoints: bool = False
     """Setpoints fly the drone in mode Guided, without a mode of their own."""
+    unstreamed: frozenset[int] = frozenset()
+    """Message ids that a client of this family gets on change and on request only, not at an interval by default."""
     title: str = ""
     """How the autopilot calls itself in its banner; empty: it does not."""
 
@@ -119,7 +121,8 @@ PX4 = Flavour(
     numbers=_PX4_NUMBERS,
     modes=_PX4_MODES,
     version=(1, 16, 0),
-    # A development build: QGroundControl nags about official releases that are older than the newest (conformance A2).
+    # A development build: of an official one that is older than the newest QGroundControl says so in a dialog at each
+    # connect (FirmwarePlugin::checkIfIsLatestStable), in either family. It shows "1.16.0dev" for it.
     version_type=dialect.FIRMWARE_VERSION_TYPE_DEV,
     bytewise=True,
 )
@@ -157,7 +160,7 @@ ARDUPILOT = Flavour(
         23: FlightMode.FOLLOW,
     },
     version=(4, 5, 7),
-    version_type=dialect.FIRMWARE_VERSION_TYPE_OFFICIAL,
+    version_type=dialect.FIRMWARE_VERSION_TYPE_DEV,
     bytewise=False,
     zero_home=True,
     float_plans=True,
@@ -166,6 +169,8 @@ ARDUPILOT = Flavour(
     relative_takeoff=True,
     zero_is_unset=True,
     guided_setpoints=True,
+    # ArduCopter sends home when it is set; programs take one that arrives later for news (dronekit2's own tests).
+    unstreamed=frozenset({dialect.MAVLINK_MSG_ID_HOME_POSITION}),
     title="ArduCopter V4.5.7",
 )
 

@@ -26,6 +26,9 @@ VERSION = 2
 
 _NO_SUCH = "an ANAFI has the magnetometer's and the gimbal's only"
 
+RESTART_WAIT = 15.0
+"""s after which a drone that was to restart should have disconnected."""
+
 _RESTART = 1.0
 """param1 of MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN."""
 
@@ -149,14 +152,23 @@ class MaintenanceService(Service):
         await self._told("level", gimbal.calibrate, gimbal.cancel_calibration)
 
     async def _reboot(self, command: Command) -> None:
-        """MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: param1 1. Accepted when the drone falls silent over it."""
+        """MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: param1 1. ACCEPTED once the drone has received it, as on every autopilot.
+
+        dronekit2 waits half a second for the acknowledgement, and the link is lost later. A text follows if it is not.
+        """
         if command.params[0] != _RESTART:
             raise Refused("Refused: an ANAFI can only be restarted", lasting=True)
         await self._on_ground(self._restart)
 
     async def _restart(self) -> None:
         self.host.text(Severity.NOTICE, "The drone restarts")
-        await self.host.drone.reboot()
+        await self.host.drone.request_reboot()
+        self.host.spawn(self._watch_restart())
+
+    async def _watch_restart(self) -> None:
+        """Report a drone that received the command and stays connected. The loss of the link cancels this."""
+        await asyncio.sleep(RESTART_WAIT)
+        self.host.text(Severity.ERROR, "Restart failed: drone is still connected")
 
     def _say(self, text: str, severity: Severity = Severity.INFO) -> None:
         self.host.text(severity, f"[cal] {text}")

@@ -87,8 +87,15 @@ class Progress:
         """Of it, the one that was executed last."""
         self.jumps: dict[int, int] = {}
         """Items that jump, and how often each was done since the mission or its current item was chosen."""
+        self._chosen = False
+        """A client has set the current item since the mission was uploaded."""
         self._skipped: set[int] = set()
         """Lines that the drone has left out."""
+
+    @property
+    def is_untouched(self) -> bool:
+        """True while the mission has not begun and no client has set its current item."""
+        return self.state is State.READY and not self._chosen
 
     @property
     def first(self) -> int:
@@ -126,7 +133,7 @@ class Progress:
         self.state = TRANSITIONS[self.state][Event.TAKE if items else Event.CLEAR]
         self.items = tuple(items)
         self._forget()
-        self.current, self.jumps = 0, {}
+        self.current, self.jumps, self._chosen = 0, {}, False
 
     def choose(self, item: int, *, anew: bool = True) -> None:
         """Begin there next time, with loops that have all their turns before them unless it goes on like that anyway.
@@ -137,7 +144,7 @@ class Progress:
             raise ValueError(f"the mission has no item {item}")
         self.state = TRANSITIONS[self.state][Event.CHOOSE]
         self._forget()
-        self.current = item
+        self.current, self._chosen = item, True
         if anew:
             self.jumps = {}
 

@@ -37,6 +37,9 @@ WARN_AGAIN = 1.0
 SINGLE_WAIT = 2.0
 """s that a single setpoint may wait until what was under way has let go of the drone; then it is out of date."""
 
+PAUSED = "paused by a client"
+"""Why setpoints in Guided are ignored after a pause."""
+
 HEARD = (
     events.AttitudeChanged,
     events.SpeedChanged,
@@ -109,11 +112,6 @@ class OffboardFlight:
     def yaw(self) -> float | None:
         """The heading (rad from north) that is turned to or held; None when none is."""
         return self._course.yaw if self.engaged else None
-
-    @property
-    def age(self) -> float:
-        """s since the setpoint that is being flown arrived."""
-        return self._stream.age(self._clock.monotonic())
 
     # What programs ask for.
 
@@ -251,6 +249,10 @@ class OffboardFlight:
             return refusal.reason.partition("efused: ")[2] or refusal.reason
         return None
 
+    def streamed_for(self, client: Hashable) -> bool:
+        """True when there are setpoints that mode Offboard would fly for this client."""
+        return self._stream.candidate(client, self._clock.monotonic()) is not None
+
     async def engage(self, client: Hashable) -> None:
         """Mode Offboard begins for this client; returns when its setpoints fly the drone, or raises `Refused`."""
         self._require_freedom("Offboard")
@@ -281,7 +283,7 @@ class OffboardFlight:
             raise Refused(f"{what} refused: drone is about to take off")
         if vehicle.returning:
             raise Refused(f"{what} refused: the drone returns home")
-        if vehicle.drone.controller.pilot_flies:
+        if vehicle.drone.controller.pilot_acquired_control:
             raise Refused(f"{what} refused: the pilot at the Skycontroller flies")
         if vehicle.drone.piloting.limits is None:
             raise Refused(f"{what} refused: the drone has not reported what full tilt and speed are")
@@ -296,6 +298,8 @@ class OffboardFlight:
             return None  # at its end the next setpoint is flown
         if not self._vehicle.in_air:
             return "take off first"
+        if self._vehicle.paused:
+            return PAUSED
         if mode is not FlightMode.GUIDED:
             return f"setpoints fly the drone in mode Guided, this is {mode.value}"
         self._alone = ends(setpoint) and not (follows or self._stream.straggles(sender, now))
@@ -307,6 +311,8 @@ class OffboardFlight:
         """A setpoint in mode Guided takes the drone over from whatever it does in that mode."""
         try:
             self._require_freedom("Setpoint")
+            if self._vehicle.paused:
+                raise Refused(f"Setpoint refused: {PAUSED}")
             if self._vehicle.mode is not FlightMode.GUIDED:  # ended by what arrived together with the setpoint
                 raise Refused(f"Setpoint refused: this is {self._vehicle.mode.value}")
             await self._vehicle.take_over()
@@ -404,7 +410,7 @@ class OffboardFlight:
         if setpoint is None or limits is None or not vehicle.in_air or self._lift.phase is Phase.JOINED:
             return
         reason = None
-        if vehicle.drone.controller.pilot_flies:
+        if vehicle.drone.controller.pilot_acquired_control:
             # He moved a stick. That he let go of it again does not give the drone back to the program.
             reason = "the pilot at the Skycontroller flies"
         elif vehicle.sticks_follow_camera:

@@ -112,7 +112,7 @@ class OrbitService(Service):
             raise Refused("Orbit refused: the drone is not in the air")
         if here is None:
             raise Refused("Orbit refused: no GPS fix")
-        if vehicle.drone.controller.pilot_flies:
+        if vehicle.drone.controller.pilot_acquired_control:
             raise Refused("Orbit refused: the pilot at the Skycontroller flies")
         if vehicle.sticks_follow_camera:
             raise Refused("Orbit refused: the drone's piloting style makes its sticks relative to the camera")
@@ -227,7 +227,7 @@ class OrbitService(Service):
         limits = vehicle.drone.piloting.limits
         demand = None if vehicle.place is None else lap.demand(vehicle.offboard.motion)
         sticks = None if demand is None or limits is None else controller.sticks(demand, limits, now)
-        if vehicle.drone.controller.pilot_flies:
+        if vehicle.drone.controller.pilot_acquired_control:
             self._give_up("the pilot at the Skycontroller flies", Severity.WARNING)
         elif vehicle.sticks_follow_camera:
             self._give_up("the drone's sticks have become relative to the camera", Severity.WARNING)

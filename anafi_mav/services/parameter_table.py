@@ -461,8 +461,8 @@ GCS_LOSS = Parameter(
     values={action.value: action.name.capitalize() for action in LossAction},
     polled=True,
     group=GATEWAY,
-    long="Once a ground station has been heard. Not while the pilot at a Skycontroller flies. "
-    "When the drone's link was lost and is back, the time begins anew.",
+    long="Once a ground station has been heard. Behind a Skycontroller, while nothing of ours flies the drone, a text "
+    "is all, even if its pilot does not hold it. When the drone's link was lost and is back, the time begins anew.",
     default=float(LossAction.NOTHING),
     source="gateway",
 )

@@ -12,7 +12,7 @@ from typing import Any
 
 from anafi_mav.drone.events import AltitudeChanged, FlyingState, FlyingStateChanged
 from anafi_mav.errors import AnafiMavError, CommandRejected
-from anafi_mav.services.aircraft import Aircraft
+from anafi_mav.services.aircraft import STOP_WAIT, Aircraft
 from anafi_mav.services.bounds import check_height
 from anafi_mav.services.flying import AIRBORNE
 from anafi_mav.services.modes import FlightMode
@@ -33,6 +33,9 @@ TAKEOFF_WAIT = 30.0
 
 ALTITUDE_WAIT = 3.0
 """s for the drone to tell its height, which it does five times a second."""
+
+LOW = 0.5
+"""m above take-off below which a drone that takes off is disarmed by a landing."""
 
 CLOSE_ENOUGH = 0.1
 """m from the height of a take-off that are no reason for a move."""
@@ -118,23 +121,37 @@ class Takeoff:
             self._tell_armed(client)
 
     async def disarm(self, *, force: bool) -> None:
-        """Disarm on the ground. In the air only `force` with `allow_kill` does it: the motors stop, the drone falls."""
+        """Disarm on the ground; propellers that turn there stop first, with `force` by cutting the motors if need be.
+
+        In the air only `force` with `allow_kill` does it: the motors stop, the drone falls.
+        """
         vehicle = self._vehicle
         if vehicle.on_ground:
-            await vehicle.take_over()
+            await vehicle.take_over(STOP_WAIT)
             await vehicle.drone.piloting.land()  # a take-off that is on its way to the drone must not follow
             if not vehicle.on_ground:
                 raise Refused("Disarm refused: the drone had just taken off, it lands")
             self._armed = False
             vehicle.changed()
             return
-        if vehicle.flying_state == FlyingState.USERTAKEOFF:
-            await vehicle.take_over()
-            await vehicle.drone.piloting.cancel_hand_launch()
+        if self._turns_near_ground:
+            await vehicle.take_over(STOP_WAIT)
+            await vehicle.drone.piloting.stop_motors(force=force)
+            self._armed = False
+            vehicle.changed()
             return
         if not force:
             raise Refused("Disarm refused: the drone is in the air")
         await vehicle.terminate()
+
+    @property
+    def _turns_near_ground(self) -> bool:
+        """The propellers turn, and the drone stands or has hardly left the ground."""
+        vehicle = self._vehicle
+        if vehicle.flying_state is FlyingState.TAKINGOFF:
+            height = vehicle.drone.piloting.state.altitude
+            return height is not None and height < LOW
+        return vehicle.flying_state in (FlyingState.MOTOR_RAMPING, FlyingState.USERTAKEOFF)
 
     async def begin(self, ato: float | None, client: Hashable = None) -> None:
         """Take off to `ato` m (None: `height`). Returns when the drone confirmed that it takes off.
