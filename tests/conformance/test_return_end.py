@@ -110,12 +110,13 @@ async def test_hold_above_home_cancels_the_landing() -> None:
         assert w.drone.flying_state.name == "HOVERING"
 
 
-async def test_return_replaced_by_another_clients_goto_does_not_land() -> None:
+async def test_return_ended_by_another_clients_hold_does_not_land() -> None:
     """The newest command wins, and a finished report of the drone that is late means nothing then."""
     async with world(speed=FAST) as w:
         await away(w)
         mark = await go_home(w)
         other = await w.connect(sysid=254)
+        assert (await other.command(SET_MODE, *PX4_HOLD)).result == ACCEPTED
         place = geo.destination(*HOME[:2], 3.0, 0.0)
         goto = (GOTO, -1, 1, 0, NAN)
         ack = await other.command(*goto, frame=6, x=place[0], y=place[1], z=5.0)
