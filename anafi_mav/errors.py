@@ -12,7 +12,7 @@ class AnafiMavError(Exception):
 
 
 class LocalProtocolError(AnafiMavError, ValueError):
-    """Our own code asked a protocol for something it cannot express (value out of range, wrong state)."""
+    """The program asked for something that the protocol cannot express (value out of range, wrong state)."""
 
 
 class RemoteProtocolError(AnafiMavError):
@@ -79,9 +79,11 @@ class PlanError(AnafiMavError, ValueError):
 
 
 class ConfigError(AnafiMavError, ValueError):
-    """The configuration is unusable at `key_path` ("drones[0].sysid"); the text says what was expected there."""
+    """The configuration is unusable at `key_path` ("drones[0].sysid") of the file `source`; the text says what was
+    expected there."""
 
-    def __init__(self, key_path: str, problem: str) -> None:
-        super().__init__(f"{key_path}: {problem}" if key_path else problem)
+    def __init__(self, key_path: str, problem: str, source: str = "") -> None:
+        super().__init__(": ".join(part for part in (source, key_path, problem) if part))
         self.key_path = key_path
         self.problem = problem
+        self.source = source

@@ -82,7 +82,7 @@ back: the time begins anew with every command, for a joystick that somebody forg
 
 
 class Controller(Element[ControllerState]):
-    """The Skycontroller, if there is one. `take_over` is called when its pilot has taken the drone."""
+    """The Skycontroller, if there is one."""
 
     NOTHING = ControllerState()
     REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = REDUCERS
@@ -188,7 +188,7 @@ class Controller(Element[ControllerState]):
         return True
 
     def give_back(self) -> None:
-        """Sticks and source go back to the pilot now; what is grabbed by `grab` stays so."""
+        """Return sticks and piloting source to the pilot now; inputs of `grab` stay grabbed."""
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
@@ -283,8 +283,9 @@ class Controller(Element[ControllerState]):
     # -- verbs
 
     async def grab(self, axes: int = 0, buttons: int = 0, timeout: float = ANSWER_TIMEOUT) -> None:
-        """Have these axes and buttons (masks, bit n = number n) reported in the state instead of acting; zeros give
-        them back. What a motion grabs is not touched.
+        """Have axes and buttons (masks, bit n = number n) reported in the state instead of acting; zeros end it.
+
+        The axes of the sticks, which are grabbed during motion, are not changed.
 
         Raises `LocalProtocolError` for the sticks, which are grabbed by motion alone, and for the buttons that stay
         the pilot's.
@@ -306,7 +307,7 @@ class Controller(Element[ControllerState]):
         )
 
     async def discover_drones(self, timeout: float = ANSWER_TIMEOUT) -> Mapping[str, KnownDrone]:
-        """Let the controller look for drones; what it sees, by serial number."""
+        """Search for drones; return those in sight, by serial number."""
         self._require()
         if self.state.protobuf:
             await self._commander.confirm(
@@ -323,7 +324,7 @@ class Controller(Element[ControllerState]):
         return self.state.visible
 
     async def connect_drone(self, serial: str, key: str = "", timeout: float = 30.0) -> None:
-        """Let the controller change to this drone. The connection to us ends and has to be made anew, when it has."""
+        """Connect the Skycontroller to another drone. Its connection to this program ends: connect again."""
         self._require()
 
         if self.state.protobuf:
@@ -361,7 +362,7 @@ class Controller(Element[ControllerState]):
         await self._commander.confirm(device_manager.ConnectDevice(uid=serial, wifi=wifi), answers, judge, timeout)
 
     async def forget_drone(self, serial: str, timeout: float = ANSWER_TIMEOUT) -> None:
-        """Let the controller forget a drone that it knows."""
+        """Remove a drone from those the Skycontroller knows."""
         self._require()
         if serial not in self.state.known:
             raise CommandRejected(f"the Skycontroller knows no drone {serial}")

@@ -69,6 +69,9 @@ Callback: TypeAlias = Callable[[Message, float], None]
 REBOOT_TIMEOUT = 15.0
 """s within which the link to a drone that reboots is lost; silence is noticed after 2.5 s."""
 
+WAIT_TIMEOUT = 30.0
+"""s that `wait_until` and `wait_for` wait unless the caller says otherwise: a take-off or landing takes about ten."""
+
 CONTROLLER_PORTS = 100
 """A Skycontroller 3 has the TCP ports of its drone this much higher (Olympe, libarsdkctrl arsdk_device.c)."""
 
@@ -81,7 +84,7 @@ CONTROLLER_TIMEOUT = 5.0
 
 
 class Drone:
-    """An ANAFI at a network address. Make it inside a running loop; connect, lose the link and connect again."""
+    """An ANAFI at a network address; `connect` makes one. It can be connected again after the link is lost."""
 
     def __init__(
         self,
@@ -130,6 +133,7 @@ class Drone:
         self.video = Video()
         self.piloting = Piloting(self._commander, self.home, self.takeoff_blockers)
         self.controller = Controller(self._commander, self._user_moves, self._pilot_takes_over, self._stand_by)
+        self.piloting.pilot_has_source = lambda: self.controller.pilot_has_source
         self._commander.gate = self._allows
         self._elements: tuple[Element[Any], ...] = (
             self.alerts,
@@ -184,9 +188,9 @@ class Drone:
     # -- the connection
 
     async def connect(self) -> None:
-        """Connect and read the drone's state anew; returns when it has sent all of it.
+        """Connect and read all states and settings; returns when the drone has sent them.
 
-        What was known before is forgotten first, and nothing of before is sent again. Raises `LinkLost`, or
+        States of an earlier connection are dropped, and none of its commands is sent again. Raises `LinkLost`, or
         `RemoteProtocolError` when what answers there is no drone.
         """
         if self._session is not None or self._opening:
@@ -461,7 +465,7 @@ class Drone:
             self._lost.set_result(why)
 
     async def close(self) -> None:
-        """End the connection. What was sent just before still leaves. Idempotent."""
+        """End the connection; commands sent just before still leave. Does nothing without one."""
         fading = self._fading
         self._drop_fading("closed")
         if fading is not None:
@@ -480,7 +484,7 @@ class Drone:
 
     @property
     def connected(self) -> bool:
-        """The link is up and the drone has sent all its states."""
+        """True when the link is up and the drone has sent all its states."""
         return self._complete
 
     @property
@@ -492,7 +496,7 @@ class Drone:
     def lost(self) -> asyncio.Future[str]:
         """Done when this connection is lost or closed, with the reason; `connect` makes a new one.
 
-        Wait for it with `asyncio.wait` or a shield: cancelling a bare wait would cancel it for everybody.
+        Wait for it with `asyncio.wait` or a shield: cancelling a bare wait would cancel it for all waiters.
         """
         return self._lost
 
@@ -503,7 +507,7 @@ class Drone:
 
     @property
     def identity(self) -> Identity:
-        """Who answered. Before a first connection its texts are empty."""
+        """Model, serial number and versions; empty before the first connection."""
         product = self.product.state
         return Identity(
             model=self._model,
@@ -513,11 +517,11 @@ class Drone:
             name=product.name or self._announced_name,
         )
 
-    async def reboot(self, timeout: float = REBOOT_TIMEOUT) -> None:
-        """Let the drone start anew; returns when it has the order and the link is lost, which is all that it says.
+    async def request_reboot(self, timeout: float = REBOOT_TIMEOUT) -> None:
+        """Send the command to restart; return when the drone has acknowledged its receipt, which is all that it says.
 
-        Raises `CommandRejected` unless it has said that it stands; `LinkLost` when the link went before the order had
-        arrived; `CommandTimeout` when the drone just goes on. Given up, the order is taken back.
+        Raises `CommandRejected` unless the drone has reported that it stands; `LinkLost` or `CommandTimeout` when the
+        command has not arrived. Cancelled, it is not sent again.
         """
         if not self.connected:
             raise LinkLost("not connected")
@@ -525,19 +529,29 @@ class Drone:
         lost, delivery = self._lost, self._commander.deliver(common.Reboot())
         timed_out = CommandTimeout(common.Reboot.NAME, timeout)
         try:
-            await asyncio.wait({lost}, timeout=timeout)
+            either: tuple[asyncio.Future[Any], ...] = (lost, delivery)
+            await asyncio.wait(either, timeout=timeout, return_when=asyncio.FIRST_COMPLETED)
         finally:
-            if not lost.done():
+            if not (lost.done() or delivery.done()):
                 self._commander.take_back(delivery, timed_out)
-        if not lost.done():
-            raise timed_out
         delivery.result()
+
+    async def reboot(self, timeout: float = REBOOT_TIMEOUT) -> None:
+        """Restart the drone; return when it has received the command and the link is lost.
+
+        Raises as `request_reboot`, and `CommandTimeout` when the drone stays connected.
+        """
+        lost = self._lost
+        await self.request_reboot(timeout)
+        await asyncio.wait({lost}, timeout=timeout)
+        if not lost.done():
+            raise CommandTimeout(common.Reboot.NAME, timeout)
 
     # -- what others may look at
 
     @property
     def features(self) -> Mapping[Feature, Support]:
-        """What this drone has, as it told when it connected."""
+        """Features of this drone, from what it reported when it connected."""
         return features(self)
 
     @property
@@ -546,17 +560,18 @@ class Drone:
         return self.piloting.moves_started
 
     def blockers(self) -> list[Blocker]:
-        """What the drone has reported against a take-off."""
+        """Return the reported reasons that can prevent a take-off."""
         return takeoff_blockers(self.alerts.state, self.battery.state, self.calibration.state)
 
     def takeoff_blockers(self) -> list[str]:
-        """The same in words."""
+        """Return `blockers` in words."""
         return [str(blocker) for blocker in self.blockers()]
 
     def subscribe(self, callback: Callback) -> Callable[[], None]:
-        """Call this with every known message once the states have it. Returns the function that ends it.
+        """Call `callback(message, time)` with every message, after the states are updated.
 
-        It also hears the messages that come while `connect` runs. What it raises is logged and goes no further.
+        Returns the function that ends it. `time` is the event loop's. Messages during `connect` are included. What the
+        callback raises is logged.
         """
         self._subscribers = (*self._subscribers, callback)
 
@@ -571,7 +586,7 @@ class Drone:
         predicate: Callable[[MessageT], bool] | None = None,
         timeout: float = ANSWER_TIMEOUT,
     ) -> MessageT:
-        """The next message of this class that the predicate accepts. Raises `CommandTimeout` or `LinkLost`."""
+        """Return the next message of a class that the predicate accepts. Raises `CommandTimeout` or `LinkLost`."""
 
         def judge(message: MessageT) -> MessageT | None:
             return message if predicate is None or predicate(message) else None
@@ -579,6 +594,46 @@ class Drone:
         expectation = self._commander.expect((answer,), judge)
         expectation.expire_after(timeout, CommandTimeout(answer.NAME, timeout))
         return await expectation.wait()
+
+    async def wait_until(self, condition: Callable[[], bool], what: str, timeout: float = WAIT_TIMEOUT) -> None:
+        """Return when a condition on the drone's states is true; it is evaluated now and after each message.
+
+        Raises `CommandTimeout` about `what` after `timeout` s, `LinkLost`, and what the condition raises.
+        """
+        self._commander.require_link()
+        if condition():
+            return
+        met: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+
+        def look(message: Message, now: float) -> None:
+            if met.done():
+                return
+            try:
+                if condition():
+                    met.set_result(None)
+            except Exception as error:
+                met.set_exception(error)
+
+        lost, undo = self._lost, self.subscribe(look)
+        either: set[asyncio.Future[Any]] = {met, lost}
+        try:
+            await asyncio.wait(either, timeout=timeout, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            undo()
+        if met.done():
+            met.result()
+        elif lost.done():
+            raise LinkLost(lost.result())
+        else:
+            raise CommandTimeout(what, timeout)
+
+    async def wait_for(self, *states: FlyingState, timeout: float = WAIT_TIMEOUT) -> None:
+        """Return when the drone reports one of these flying states, at once when it is in one.
+
+        Raises `CommandTimeout` after `timeout` s, `LinkLost`.
+        """
+        words = " or ".join(spoken(state) for state in states)
+        await self.wait_until(lambda: self.piloting.state.flying in states, f"the state {words}", timeout)
 
     # -- the hot path
 

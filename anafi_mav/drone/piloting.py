@@ -46,7 +46,9 @@ class Piloting(PilotingSettings):
         super().__init__(commander)
         self._home = home
         self._moves = Moves(home)
-        self._sticks = StickStream(commander, self, home)
+        self.pilot_has_source: Callable[[], bool] = lambda: False
+        """True while the pilot at a Skycontroller has the piloting source; set by `Drone`."""
+        self._sticks = StickStream(commander, self, home, lambda: self.pilot_has_source())
         self._motors = Motors(commander, self, self._sticks, takeoff_blockers)
         self._guided = GuidedMoves(commander, self, home, self._sticks, self._moves)
         self._returns = Returns(commander, self, home, self._sticks, self._moves)

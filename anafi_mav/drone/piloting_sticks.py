@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from collections.abc import Callable
 
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.messages.common import PlayingState
@@ -22,7 +23,7 @@ from anafi_mav.errors import LinkLost
 log = logging.getLogger("anafi_mav")
 
 RELEASES = 3
-"""PCMDs that say that nobody holds the sticks; they are not acknowledged."""
+"""Centred PCMDs that precede a return; they are not acknowledged."""
 
 _STICKS_DEAD = frozenset(
     {FlyingState.LANDED, FlyingState.LANDING, FlyingState.EMERGENCY, FlyingState.EMERGENCY_LANDING}
@@ -33,8 +34,16 @@ _STICKS_DEAD = frozenset(
 class StickStream:
     """Sends PCMDs while there are any to send. All of it acts at once; a dead stream sends and keeps nothing."""
 
-    def __init__(self, commander: Commander, flight: Element[PilotingState], home: Home) -> None:
+    def __init__(
+        self,
+        commander: Commander,
+        flight: Element[PilotingState],
+        home: Home,
+        pilot_has_source: Callable[[], bool] = lambda: False,
+    ) -> None:
+        """`pilot_has_source` returns True while the pilot at a Skycontroller has the piloting source."""
         self._commander = commander
+        self._pilot_has_source = pilot_has_source
         self._flight = flight
         self._home = home
         self._sticks = Sticks()
@@ -107,8 +116,11 @@ class StickStream:
             self._timer = None
 
     def release(self) -> None:
-        """Take the hands off: a return waits for a PCMD with flag 0 (rth.xml 146-0-11)."""
-        if self._sticks.active and self.dead is None:
+        """Send centred PCMDs, then none: a return waits for flag 0 (rth.xml 146-0-11), whoever sent flag 1 last.
+
+        Not while the pilot at a Skycontroller has the piloting source: the sticks that count are his.
+        """
+        if self.dead is None and not self._pilot_has_source():
             for _ in range(RELEASES):
                 self._commander.send(self._sticks.released(loop_time()))
         self.silence()

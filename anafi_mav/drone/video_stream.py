@@ -52,10 +52,10 @@ LIVE = "live"
 
 
 class Shown(msgspec.Struct, frozen=True):
-    """A stream as its server describes it; what it does not say is None."""
+    """A stream as the video server describes it; None: not described."""
 
     title: str
-    """By which it is chosen: "DefaultVideo", "Front camera", ..."""
+    """Name for `Video.watching`: "DefaultVideo", "Front camera", …"""
     offered: tuple[str, ...]
     """The titles of all streams of this drone."""
     fov_deg: tuple[float, float] | None = None

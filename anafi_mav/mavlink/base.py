@@ -8,6 +8,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import os
+import re
 from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Callable, Iterable
@@ -53,6 +54,8 @@ class EndpointUrl:
     """Port, 0 for any free one; the baud rate of a serial line."""
     flavour: str | None = None
     """The autopilot that clients of this endpoint want to see."""
+    frames: str = "one"
+    """MAVLink frames per datagram, "one" or "many". A byte stream has no datagrams."""
 
 
 class Sink(Protocol):
@@ -81,6 +84,13 @@ class Endpoint(ABC):
         return self.parsed.text
 
     @property
+    def shown_url(self) -> str:
+        """As in the configuration, with the real port in place of 0."""
+        if self.parsed.number or self.local_port is None:
+            return self.url
+        return re.sub(r":0+(?=\?|$)", f":{self.local_port}", self.url, count=1)
+
+    @property
     def local_port(self) -> int | None:
         """The port that it listens on; None where it listens on none."""
         return None
@@ -101,7 +111,8 @@ class Endpoint(ABC):
 class Outbox:
     """The frames of one turn of the loop leave together: a fleet's telemetry is thousands of small ones a second.
 
-    `limit` bytes at most go at once; the frame that would exceed them begins the next lot. What answers something that
+    `limit` bytes at most go at once; the frame that would exceed them begins the next lot. With a limit of 0 nothing
+    is gathered: each frame leaves alone and at once. What answers something that
     has just been read does not wait for the next turn: whoever reads does so `with` the outbox, and at the end of that
     block everything leaves.
     """
@@ -124,6 +135,9 @@ class Outbox:
 
     def add(self, raw: bytes) -> None:
         """A frame, to leave when this turn is over."""
+        if not self._limit:
+            self._write(raw)
+            return
         if self._size + len(raw) > self._limit and self._frames:
             self._give()
         self._frames.append(raw)
@@ -218,13 +232,16 @@ async def close_peers(peers: Iterable[StreamPeer]) -> None:
         await asyncio.wait([peer.lost for peer in peers], timeout=CLOSE_WAIT)
 
 
+UNTRIED = "not tried yet"
+
+
 class Reopening(Endpoint):
     """An endpoint with at most one stream, that is opened anew whenever it ends."""
 
     def __init__(self, url: EndpointUrl, sink: Sink, clock: Clock) -> None:
         super().__init__(url, sink, clock)
         self._peer: StreamPeer | None = None
-        self._problem = "not tried yet"
+        self._problem = UNTRIED
         self._task: asyncio.Task[None] | None = None
 
     @abstractmethod
@@ -260,7 +277,9 @@ class Reopening(Endpoint):
                 except OSError as error:
                     self._note(reason(error))
             if self._peer is not None:
-                logger.info("%s: connected", self.url)
+                # As loud as the loss that it ends.
+                logger.log(logging.WARNING if self._problem != UNTRIED else logging.INFO, "%s: connected", self.url)
+                self._problem = ""
                 await asyncio.shield(self._peer.lost)
                 self._peer = None
                 self._note("the connection ended")

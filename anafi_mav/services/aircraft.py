@@ -101,6 +101,19 @@ class Aircraft(ABC):
         return self.place if self.on_ground else None
 
     @property
+    def geofence_centre(self) -> Place | None:
+        """Middle of the drone's own geofence: a controller's GPS, else the take-off point (ardrone3.xml 1-2-4).
+
+        On the ground without such a controller it is where the drone stands: the drone still reports its last flight's.
+        """
+        reported, takeoff = self.drone.piloting.state.geofence_centre, self.drone.home.state.takeoff_location
+        if self.on_ground and self.drone.controller.state.position is None:
+            return self.place
+        if reported is not None:
+            return Place(*reported)
+        return self.origin if takeoff is None else Place(takeoff.latitude, takeoff.longitude)
+
+    @property
     def sticks_follow_camera(self) -> bool:
         """What sticks mean depends on where the camera looks (piloting_style.xml): no loop closes over that."""
         return self.drone.piloting.state.style == PilotingStyleStyle.CAMERA_OPERATED

@@ -29,7 +29,7 @@ from anafi_mav.services.commands import (
 )
 from anafi_mav.services.flavours import flavour_of
 from anafi_mav.services.modes import FlightMode
-from anafi_mav.services.refusal import Refused
+from anafi_mav.services.refusal import Refused, Unsupported
 from anafi_mav.services.service import Action, Host, MessageHandler, Query, Service, client_of
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.targets import UnsupportedFrame
@@ -41,6 +41,7 @@ SETTLE = 0.1
 
 _RESULT_BY_ERROR: tuple[tuple[type[AnafiMavError], int], ...] = (
     (UnsupportedFrame, dialect.MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME),
+    (Unsupported, dialect.MAV_RESULT_UNSUPPORTED),
     (NotSupported, dialect.MAV_RESULT_UNSUPPORTED),
     (CommandRejected, dialect.MAV_RESULT_TEMPORARILY_REJECTED),
     (CommandTimeout, dialect.MAV_RESULT_FAILED),
@@ -142,7 +143,8 @@ class CommandService(Service):
         now, mode = self.host.clock.monotonic(), self.host.vehicle.mode
         repeated = self._desk.retransmission(command.client, command, now, mode)
         if repeated is not None:
-            if not (command.patient and repeated == dialect.MAV_RESULT_IN_PROGRESS):  # else it is said in its time
+            quiet = command.patient or command.is_answered_once  # IN_PROGRESS is sent later, or not at all
+            if not (quiet and repeated == dialect.MAV_RESULT_IN_PROGRESS):
                 self._acknowledge(inbound, command.id, repeated)
             return
         execution = self._desk.begin(command.client, command)
@@ -161,7 +163,7 @@ class CommandService(Service):
             result = dialect.MAV_RESULT_CANCELLED
             raise
         except Exception:
-            logger.exception("command %d of system %d", command.id, self.host.sysid)
+            logger.exception("%s: command %d failed", self.host.drone.name, command.id)
         finally:
             progress.cancel()
             self._finish(inbound, execution, result)
@@ -217,6 +219,8 @@ class CommandService(Service):
             work.close()  # cancelled before it began, it would complain that nobody awaited it
 
     async def _report_progress(self, inbound: Inbound, command: Command) -> None:
+        if command.is_answered_once:
+            return
         await asyncio.sleep(MODE_PROGRESS_AFTER if command.patient else PROGRESS_AFTER)
         while True:
             self._acknowledge(inbound, command.id, dialect.MAV_RESULT_IN_PROGRESS)

@@ -11,7 +11,7 @@ from collections.abc import Hashable
 from dataclasses import dataclass
 
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.flavours import PX4, Flavour, mode_of_standard
+from anafi_mav.services.flavours import ARDUPILOT, PX4, Flavour, mode_of_standard
 from anafi_mav.services.modes import HOVERING, FlightMode
 
 RESEND_WINDOW = 3.5
@@ -80,6 +80,17 @@ class Command:
     def patient(self) -> bool:
         """Who sent it takes IN_PROGRESS amiss, and waits without: it is not said before `MODE_PROGRESS_AFTER`."""
         return self.id == dialect.MAV_CMD_DO_SET_MODE
+
+    @property
+    def is_answered_once(self) -> bool:
+        """True when IN_PROGRESS is never sent: ArduPilot's clients take the first acknowledgement for the final one.
+
+        dronekit2's tests count exactly one; Mission Planner waits up to 25 s for it.
+        """
+        return self.flavour is ARDUPILOT and self.id in (
+            dialect.MAV_CMD_PREFLIGHT_CALIBRATION,
+            dialect.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN,
+        )
 
     @property
     def stops(self) -> bool:

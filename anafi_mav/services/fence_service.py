@@ -108,7 +108,7 @@ class FenceService(Service):
             None if state.max_altitude is None else state.max_altitude.current,
             None if home is None else home.point,
             airborne=not vehicle.on_ground and vehicle.flying_state is not None,
-            flying=vehicle.in_air and not vehicle.returning,
+            flying=vehicle.in_air and vehicle.mode is not FlightMode.RETURN,
             steering=not own_way and state.plan != PlayingState.PLAYING,
             orders=vehicle.orders,
         )

@@ -192,6 +192,8 @@ class GuidedService(Service):
             raise Refused("Turn refused: param1 is an angle of up to 360 degrees", lasting=True)
         if math.isinf(rate) or rate < 0.0 or 0.0 < rate < SLOWEST_TURN or math.isinf(way):
             raise Refused(f"Turn refused: param2 is {SLOWEST_TURN:g} deg/s or more, param3 -1, 0 or 1", lasting=True)
+        if not (math.isnan(relative) or relative in (0.0, 1.0)):  # ArduCopter refuses it too
+            raise Refused("Turn refused: param4 is 0 (absolute) or 1", lasting=True)
         vehicle = self.host.vehicle
         attitude = vehicle.drone.piloting.state.attitude
         if not vehicle.in_air or attitude is None:
@@ -284,16 +286,17 @@ class GuidedService(Service):
             where = place(command)
             if where is None:
                 raise Refused("Home refused: it has no place", lasting=True)
-            ato = height(vehicle, command) or 0.0
+            ato = height(vehicle, command, flown=False) or 0.0
         check_on_earth(where, "Home")
         async with vehicle.home_choice:
             before = home.state.preferred_type
             try:
                 await home.set_preferred_type(RthHomeType.CUSTOM)
-                await home.set_custom_location(where.latitude, where.longitude, ato)
+                given = await home.set_custom_location(where.latitude, where.longitude, ato)
             except BaseException:
                 # The custom home of some other day must not stay: a return that replaces this waits until it is gone.
                 if before is not None and before != RthHomeType.CUSTOM:
                     await asyncio.wait([self.host.spawn(self._prefer(before))])
                 raise
+        vehicle.return_end.set_home(given, "set home")
         self.host.text(Severity.NOTICE, "Home set: the drone returns there until its home type is changed")

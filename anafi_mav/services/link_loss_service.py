@@ -6,6 +6,7 @@ from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.link_loss import GcsWatch, LossAction
+from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.service import Host, Service
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.vehicle import Landed
@@ -35,7 +36,7 @@ class LinkLossService(Service):
         silence = f"No ground station for {policy.after:g} s"
         if vehicle.landed not in (Landed.IN_AIR, Landed.TAKEOFF):
             self.host.text(Severity.WARNING, silence)
-        elif vehicle.returning:
+        elif vehicle.mode is FlightMode.RETURN:
             self.host.text(Severity.WARNING, f"{silence}: the drone is returning")
         elif controller.pilot_has_source or controller.pilot_acquired_control:
             self.host.text(Severity.WARNING, f"{silence}: pilot in control")

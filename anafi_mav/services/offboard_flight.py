@@ -94,11 +94,6 @@ class OffboardFlight:
         """The heading (rad from north) that is turned to or held; None when none is."""
         return self._course.yaw if self.engaged else None
 
-    @property
-    def age(self) -> float:
-        """s since the setpoint that is being flown arrived."""
-        return self._stream.age(self._clock.monotonic())
-
     # What programs ask for.
 
     def receive(self, sender: Hashable, setpoint: Setpoint, *, guided: bool = False) -> str | None:

@@ -18,6 +18,7 @@ from anafi_mav.services.bounds import LOWEST
 from anafi_mav.services.link_loss import LossAction
 from anafi_mav.services.parameter import Limits, Parameter, bounds, current, number, own
 from anafi_mav.services.parameter_codec import Kind
+from anafi_mav.services.return_end import LONGEST_WAIT, SHORTEST_WAIT, EndOfReturn
 from anafi_mav.services.service import Host
 
 OFF_ON = {0: "Off", 1: "On"}
@@ -223,7 +224,7 @@ RETURN_END_ALTITUDE = _range(
 RETURN_ENDING = Parameter(
     "ANF_RTH_END",
     Kind.INT32,
-    "How a return ends",
+    "End of the drone's own returns",
     read=lambda host: number(host.drone.home.state.ending),
     write=lambda host, value: host.drone.home.set_ending(RthEndingBehavior(int(value))),
     values={int(RthEndingBehavior.LANDING): "Landing", int(RthEndingBehavior.HOVERING): "Hovering"},
@@ -231,6 +232,7 @@ RETURN_ENDING = Parameter(
     present=lambda drone: drone.home.state.ending is not None,
     group=HOME,
     source=events.ReturnEnding.NAME,
+    long="Those that it begins by itself, and any when gateway or link dies on the way. Landing: any return lands.",
 )
 
 
@@ -480,6 +482,50 @@ GCS_LOSS_TIME = Parameter(
     source="gateway",
 )
 
+
+def put_end_of_return(host: Host, value: float) -> None:
+    """Set what a commanded return ends in."""
+    host.vehicle.return_end.ending = EndOfReturn(int(value))
+
+
+def put_return_wait(host: Host, value: float) -> None:
+    """Set the wait above home, s."""
+    host.vehicle.return_end.wait = value
+
+
+RETURN_LANDING = Parameter(
+    "ANF_RTL_END",
+    Kind.INT32,
+    "End of a return that a client or the gateway commanded",
+    read=lambda host: float(host.vehicle.return_end.ending),
+    write=own(put_end_of_return),
+    put=put_end_of_return,
+    values={int(EndOfReturn.LAND): "Land", int(EndOfReturn.HOVER): "Hover"},
+    polled=True,
+    group=GATEWAY,
+    long="The gateway lands the drone above a home that is certain, else it hovers and a text gives the reason. "
+    "Nothing is written on the drone: ANF_RTH_END stays its own.",
+    default=float(EndOfReturn.LAND),
+    source="gateway",
+)
+RETURN_WAIT = Parameter(
+    "ANF_RTL_WAIT",
+    Kind.REAL32,
+    "Wait above home before the landing of ANF_RTL_END",
+    read=lambda host: host.vehicle.return_end.wait,
+    write=own(put_return_wait),
+    put=put_return_wait,
+    limits=lambda host: (0.0, LONGEST_WAIT),
+    polled=True,
+    unit="s",
+    step=1.0,
+    decimals=1,
+    group=GATEWAY,
+    long=f"At least {SHORTEST_WAIT:g} s, also where this is less.",
+    default=SHORTEST_WAIT,
+    source="gateway",
+)
+
 NATIVE: tuple[Parameter, ...] = (
     MAX_TILT,
     TILT_RATE,
@@ -507,4 +553,6 @@ NATIVE: tuple[Parameter, ...] = (
     CLIMB_SPEED,
     GCS_LOSS,
     GCS_LOSS_TIME,
+    RETURN_LANDING,
+    RETURN_WAIT,
 )

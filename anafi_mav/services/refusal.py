@@ -13,3 +13,10 @@ class Refused(AnafiMavError):
         self.reason = reason
         self.lasting = lasting
         self.critical = critical
+
+
+class Unsupported(Refused):
+    """The vehicle has no such command, or not with these parameters: MAV_RESULT_UNSUPPORTED."""
+
+    def __init__(self, reason: str) -> None:
+        super().__init__(reason, lasting=True)

@@ -58,9 +58,9 @@ def amsl(vehicle: Vehicle) -> float | None:
 
 
 def global_position_int(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
-    """GLOBAL_POSITION_INT; only with a GPS fix, for 0/0 is a place."""
+    """GLOBAL_POSITION_INT; only with a GPS fix, for 0/0 is a place, and in flight with a location that is not old."""
     place, state, height = vehicle.place, vehicle.drone.piloting.state, amsl(vehicle)
-    if place is None or height is None or state.altitude is None or state.velocity is None:
+    if vehicle.position_is_old or place is None or height is None or state.altitude is None or state.velocity is None:
         return None
     return dialect.MAVLink_global_position_int_message(
         times.boot_ms,
@@ -78,7 +78,7 @@ def global_position_int(vehicle: Vehicle, times: Times) -> dialect.MAVLink_messa
 def local_position_ned(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
     """LOCAL_POSITION_NED: metres north, east and down of where the drone last took off."""
     place, origin, state = vehicle.place, vehicle.origin, vehicle.drone.piloting.state
-    if place is None or origin is None or state.altitude is None or state.velocity is None:
+    if vehicle.position_is_old or place is None or origin is None or state.altitude is None or state.velocity is None:
         return None
     north, east = geo.offset(origin.latitude, origin.longitude, place.latitude, place.longitude)
     velocity = state.velocity
@@ -103,7 +103,9 @@ def odometry(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
     """ODOMETRY: LOCAL_POSITION_NED and the attitude in one, the velocity along the drone's axes. Rates and covariances
     are not told: NaN."""
     place, origin, state = vehicle.place, vehicle.origin, vehicle.drone.piloting.state
-    if place is None or origin is None or state.altitude is None or state.velocity is None or state.attitude is None:
+    if vehicle.position_is_old or place is None or origin is None:
+        return None
+    if state.altitude is None or state.velocity is None or state.attitude is None:
         return None
     north, east = geo.offset(origin.latitude, origin.longitude, place.latitude, place.longitude)
     return dialect.MAVLink_odometry_message(
@@ -243,7 +245,7 @@ def extended_sys_state(vehicle: Vehicle, times: Times) -> dialect.MAVLink_messag
 
 def home_position(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
     """HOME_POSITION. Its altitude is the take-off point's, whatever the home type; x and y are in the local frame."""
-    home, origin = vehicle.home, vehicle.origin
+    home, origin = vehicle.home or vehicle.origin, vehicle.origin
     ground = vehicle.height.takeoff_amsl
     if home is None or ground is None:
         return None

@@ -9,26 +9,35 @@ from __future__ import annotations
 
 import asyncio
 import enum
+import math
 from collections.abc import Callable, Hashable, Iterator
 from contextlib import contextmanager
 
 from anafi_mav.clock import Clock
 from anafi_mav.drone import Drone
-from anafi_mav.drone.events import AlertLevel, FlyingState, ForcedLandingReason, PlayingState
+from anafi_mav.drone.element import Position
+from anafi_mav.drone.events import AlertLevel, FlyingState, ForcedLandingReason, PlayingState, RthHomeType
 from anafi_mav.services.aircraft import Aircraft
+from anafi_mav.services.clients import system_of
 from anafi_mav.services.flying import AIRBORNE, LANDING, ON_GROUND, TAKING_OFF
 from anafi_mav.services.follow_flight import FollowFlight
 from anafi_mav.services.guided_flight import GuidedFlight
+from anafi_mav.services.height import ESTIMATE_ERROR, TakeoffRecord
 from anafi_mav.services.helm import Helm
 from anafi_mav.services.link_loss import LossPolicy
 from anafi_mav.services.manual_flight import ManualFlight
 from anafi_mav.services.mission_flight import MissionFlight
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.offboard_flight import OffboardFlight
+from anafi_mav.services.place import Place
 from anafi_mav.services.rally import RallyPoints
 from anafi_mav.services.refusal import Refused
+from anafi_mav.services.return_end import ReturnEnd
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.takeoff import Takeoff
+
+POSITION_OLD = 3.0
+"""s without a GPS location, which an ANAFI reports once a second, after which the last one is no position in flight."""
 
 
 class Landed(enum.Enum):
@@ -72,9 +81,15 @@ class Vehicle(Aircraft):
         self.intended: FlightMode | None = None
         """The mode that a client last asked for by name or number."""
         self.allow_kill = allow_kill
+        self._clock = clock
+        self._located_at = -math.inf
+        """When the newest GPS location arrived."""
         self._end_others = end_others
         self._terminating = False
         self._last_flying: FlyingState | None = None
+        self.return_end = ReturnEnd(self)
+        self._takeoff_before: Position | None = None
+        """The take-off place that the drone reported when it landed: of the flight that has ended."""
         self.mission = MissionFlight(self)
         self.takeoff = Takeoff(self, self.mission.armed)
         self.guided = GuidedFlight(self)
@@ -103,10 +118,22 @@ class Vehicle(Aircraft):
         return Landed.IN_AIR if state in AIRBORNE else Landed.UNKNOWN
 
     @property
+    def position_is_old(self) -> bool:
+        """True in flight when GPS locations have stopped although the drone reports a fix."""
+        return (
+            self.place is not None
+            and self.flying_state is not None
+            and not self.on_ground
+            and self._clock.monotonic() - self._located_at > POSITION_OLD
+        )
+
+    @property
     def mode(self) -> FlightMode:
         state = self.flying_state
         if state == FlyingState.EMERGENCY:
             return FlightMode.TERMINATED
+        if self.return_end.shown:
+            return FlightMode.RETURN
         if state in LANDING:
             return FlightMode.LAND
         if self.returning:
@@ -165,15 +192,21 @@ class Vehicle(Aircraft):
         with self._selected_no_more(None):
             await self.drone.piloting.land()
 
-    async def return_home(self) -> None:
-        """Fly home by the drone's own return."""
+    async def return_home(self, client: Hashable = None) -> None:
+        """Fly home by the drone's own return, and land there as `return_end` says. `client` is None for the gateway."""
         if self.on_ground:
             raise Refused("Return refused: the drone is on the ground")
         if self.flying_state in LANDING:
             raise Refused("Return refused: the drone is landing")
         await self.take_over()
-        with self._selected_no_more(None):
-            await self.drone.piloting.return_home()
+        attempt = self.return_end.command()
+        try:
+            with self._selected_no_more(None):
+                await self.drone.piloting.return_home()
+        except BaseException:
+            self.return_end.fail(attempt)
+            raise
+        self.return_end.announce(attempt, system_of(client))
 
     async def hold(self, mode: FlightMode = FlightMode.HOLD) -> None:
         if self.flying_state in LANDING:
@@ -201,7 +234,7 @@ class Vehicle(Aircraft):
             case FlightMode.LAND:
                 await self.land()
             case FlightMode.RETURN:
-                await self.return_home()
+                await self.return_home(client)
             case FlightMode.TAKEOFF:
                 await self.takeoff.begin(None, client)
             case FlightMode.OFFBOARD:
@@ -225,6 +258,7 @@ class Vehicle(Aircraft):
             return
         if state in ON_GROUND and before is not None:
             self.orders += 1
+            self.return_end.on_ground()
             self.takeoff.came_down()
             self.end_helms(self._ending_mission)
             self.takeoff.end_climb()
@@ -236,45 +270,107 @@ class Vehicle(Aircraft):
             self.height.take_off()
             if (place := self.place) is not None:
                 self.origin = place
+            if self.drone.home.state.takeoff_location != self._takeoff_before:
+                self.on_takeoff_location()  # it was reported before the state
+        if state in ON_GROUND:
+            self._takeoff_before = self.drone.home.state.takeoff_location
         if not self.on_ground:
             self.takeoff.left_ground()
+        self.return_end.on_flying_state()
         self.changed()
+
+    def on_location(self) -> None:
+        """A new GPS location."""
+        self._located_at = self._clock.monotonic()
+        self.on_position()
 
     def on_position(self) -> None:
         """A new GPS location, altitude or flight id."""
-        gps = self.drone.gps.state
+        gps, ato = self.drone.gps.state, self.drone.piloting.state.altitude
+        amsl = gps.location.altitude if gps.fixed and gps.location is not None else None
         if self.flying_state == FlyingState.LANDED:
-            self.height.on_ground(
-                gps.location.altitude if gps.fixed and gps.location is not None else None,
-                self.drone.piloting.state.altitude,
-            )
+            self.height.on_ground(amsl, ato)
             if self.origin is None:
                 self.origin = self.place
-        elif self.flying_state is not None:
-            self.height.in_flight(self.drone.product.state.flight_id)
+        elif self.flying_state is not None and self.height.in_flight(self.drone.product.state.flight_id, amsl, ato):
+            self.text(Severity.WARNING, f"Take-off altitude estimated: GPS only (+-{ESTIMATE_ERROR:g} m)")
+
+    def on_takeoff_location(self) -> None:
+        """Adopt the take-off place that the drone reports for the present flight as origin of the local frame."""
+        location = self.drone.home.state.takeoff_location
+        if location is not None and self.flying_state is not None and not self.on_ground:
+            self.origin = Place(location.latitude, location.longitude)
+
+    def link_up(self, kept: TakeoffRecord | None) -> None:
+        """Begin with a drone that has reported all its states. `kept` is of the last flight that was seen."""
+        self.height.recall(kept)
+        self.on_flying_state()
+        self.on_position()
+        if self.flying_state is not None and not self.on_ground:
+            self.origin = self._origin_in_flight(kept)
+
+    def _origin_in_flight(self, kept: TakeoffRecord | None) -> Place | None:
+        """Return where a drone took off that was found in the air; None when nothing reports it."""
+        home, flight = self.drone.home.state, self.drone.product.state.flight_id
+        if (location := home.takeoff_location) is not None:
+            return Place(location.latitude, location.longitude)
+        if kept is not None and kept.flight_id == flight and kept.latitude is not None and kept.longitude is not None:
+            return Place(kept.latitude, kept.longitude)
+        if home.type == RthHomeType.TAKEOFF and home.location is not None:
+            return Place(home.location.latitude, home.location.longitude)
+        return None
+
+    @property
+    def takeoff_record(self) -> TakeoffRecord | None:
+        """The take-off point of the present flight, to be kept; None on the ground or without a flight id."""
+        height, origin = self.height, self.origin
+        if self.on_ground or not height.flight_id or height.takeoff_amsl is None:
+            return None
+        place = (None, None) if origin is None else origin.point
+        return TakeoffRecord(height.flight_id, height.takeoff_amsl, height.estimated, *place)
 
     def on_return(self) -> None:
         """The drone's return began, ended or changed: setpoints and the climb after a take-off never fight it."""
         if self.returning:
+            if self.mission.returns and not (self.returning_by_itself or self.return_end.active):
+                self.return_end.announce(self.return_end.command(), None)  # the mission's last item
             self.end_helms(self._ending_mission)
             self.takeoff.end_climb()
+        self.return_end.on_return_state()
         self.changed()
 
     def link_down(self) -> None:
         """The link is lost: nothing that was asked for outlives it."""
-        self.height.link_down(flying=not self.on_ground)
+        self.height.link_down()
         self.orders += 1
+        self.return_end.link_down()
         self._let_go()
         self.takeoff.link_down()
         self._selected = FlightMode.HOLD
         self.intended = None
         self._last_flying = None
+        self._located_at = -math.inf
         for helm in self.helms:
             helm.link_down()
         self._terminating = False
 
+    @property
+    def ends_alone(self) -> bool:
+        """A return or a landing is commanded or under way, which the drone ends without the gateway."""
+        return self.returning or self.return_end.sent or self.flying_state in LANDING
+
+    @property
+    def alone(self) -> str | None:
+        """The end of a return or landing without the gateway, as a predicate of the drone; None: neither is on."""
+        if self.flying_state in LANDING:
+            return "is landing, and goes on landing"
+        return self.return_end.alone if self.ends_alone else None
+
     async def let_go(self) -> None:
-        """The gateway ends: give up whatever is under way and leave a flying drone hovering on its own."""
+        """The gateway ends: leave a flying drone hovering. A return or a landing goes on, whoever began it."""
+        if self.ends_alone:
+            self.return_end.end()
+            return
         await self.take_over()
         if self.drone.piloting.about_to_fly:
             await self.drone.piloting.land()
@@ -317,4 +413,4 @@ class Vehicle(Aircraft):
         """End what this vehicle does by itself; the tasks that are still about to end."""
         self.takeoff.forget()
         self.guided.forget_arrival()
-        return [*self.end_helms(), *self.takeoff.end()]
+        return [*self.return_end.end(), *self.end_helms(), *self.takeoff.end()]

@@ -347,7 +347,7 @@ class SimulatedDrone:
             self.skycontroller.tick(now)
         if session is not None and self._in_reach:
             for message in self._telemetry.due(now):
-                if message.NAME not in self.faults.untold:
+                if not self._unreported(message):
                     session.send(message)
         if now >= self._next_pose:
             self._next_pose = max(self._next_pose + POSE_PERIOD, now)
@@ -484,11 +484,18 @@ class SimulatedDrone:
 
     def _send_all(self, session: DeviceSession, messages: list[Message], end: Message) -> None:
         for message in messages:
-            session.send(message)
+            if not self._unreported(message):
+                session.send(message)
         session.send(end)
 
+    def _unreported(self, message: Message) -> bool:
+        """True for an event that this firmware does not send."""
+        if isinstance(message, common.FlightId) and Quirk.NO_FLIGHT_ID in self.faults.quirks:
+            return True
+        return message.NAME in self.faults.untold
+
     def _emit(self, message: Message) -> None:
-        if message.NAME in self.faults.untold:
+        if self._unreported(message):
             return
         if message.BUFFER is not Buffer.NON_ACK:
             self.log.add_message(self._clock(), "event", message)

@@ -50,6 +50,7 @@ class Quirk(enum.Enum):
         "Landing and UserTakeOff(0) do nothing while the motors ramp up",
     )
     NO_FLIGHT_ID = ("no-flight-id", "FlightId is never reported")
+    GPS_LOCATION_STOPS = ("gps-location-stops", "GpsLocationChanged is no longer sent although the drone reports a fix")
     ROLL_INVERTED = ("roll-inverted", "AttitudeChanged.roll is positive with the left wing down")
 
 

@@ -7,7 +7,7 @@ import pytest
 from anafi_mav.clock import SystemClock
 from anafi_mav.errors import ConfigError
 from anafi_mav.mavlink.base import EndpointUrl
-from anafi_mav.mavlink.endpoint import SCHEMES, make_endpoint, parse_endpoint
+from anafi_mav.mavlink.endpoint import SCHEMES, is_open_to_network, make_endpoint, parse_endpoint
 from anafi_mav.mavlink.node import Node
 
 
@@ -65,6 +65,12 @@ def test_good_urls(url: str, scheme: str, place: str, number: int, flavour: str 
         ("tcpin://127.0.0.1:5760?flavour=px4&flavour=px4", "no option but"),
         ("tcpin://127.0.0.1:5760?", "no option but"),
         ("tcpin://127.0.0.1:5760?px4", "no option but"),
+        ("tcpin://127.0.0.1:5760?frames=many", "no option but ?flavour=px4|ardupilot|standard, each once"),
+        ("serial:///dev/ttyUSB0:57600?frames=one", "no option but ?flavour=px4|ardupilot|standard, each once"),
+        ("udpin://127.0.0.1:1?frames=2", "expected frames one or many, got '2'"),
+        ("udpin://127.0.0.1:1?frames=", "expected frames one or many, got ''"),
+        ("udpout://127.0.0.1:1?frames=many&frames=one", "frames=one|many, each once"),
+        ("udpout://127.0.0.1:1?flavour=px4&datagrams=many", "and frames=one|many, each once"),
     ],
 )
 def test_bad_urls(url: str, expected: str) -> None:
@@ -73,6 +79,22 @@ def test_bad_urls(url: str, expected: str) -> None:
     assert caught.value.key_path == ""
     assert expected in caught.value.problem
     assert repr(url) in caught.value.problem
+
+
+@pytest.mark.parametrize(
+    ("query", "flavour", "frames"),
+    [
+        ("", None, "one"),
+        ("?frames=one", None, "one"),
+        ("?frames=many", None, "many"),
+        ("?flavour=ardupilot&frames=many", "ardupilot", "many"),
+        ("?frames=many&flavour=px4", "px4", "many"),
+    ],
+)
+@pytest.mark.parametrize("scheme", ["udpin", "udpout"])
+def test_udp_url_with_options_keeps_each(scheme: str, query: str, flavour: str | None, frames: str) -> None:
+    url = parse_endpoint(f"{scheme}://127.0.0.1:14550{query}")
+    assert (url.flavour, url.frames) == (flavour, frames)
 
 
 def test_every_scheme_makes_its_endpoint_and_says_what_it_is() -> None:
@@ -89,3 +111,40 @@ async def test_closing_what_was_never_opened_does_no_harm() -> None:
     for name in SCHEMES:
         url = parse_endpoint(f"{name}://{'/dev/null:57600' if name == 'serial' else '127.0.0.1:1'}")
         await make_endpoint(url, Node(), SystemClock()).close()
+
+
+@pytest.mark.parametrize(
+    ("url", "is_open"),
+    [
+        ("tcpin://127.0.0.1:5760", False),
+        ("udpin://127.9.9.9:14550?flavour=ardupilot", False),
+        ("udpin://[::1]:14550", False),
+        ("tcpin://localhost:5760", False),
+        ("udpout://192.168.1.20:14550", False),  # hears that address only
+        ("tcpout://192.168.1.20:5760", False),
+        ("serial:///dev/ttyUSB0:57600", False),
+        ("udpin://0.0.0.0:14550", True),
+        ("tcpin://192.168.1.7:5760", True),
+        ("tcpin://[::]:5760", True),
+        ("tcpin://[fe80::1%eth0]:5760", True),
+        ("tcpin://gateway.local:5760", True),
+    ],
+)
+def test_endpoint_is_open_to_the_network_when_it_listens_beyond_loopback(url: str, is_open: bool) -> None:
+    assert is_open_to_network(parse_endpoint(url)) is is_open
+
+
+@pytest.mark.parametrize(
+    "url", ["tcpin://127.0.0.1:0?flavour=ardupilot", "udpin://127.0.0.1:0", "tcpin://127.0.0.1:00"]
+)
+async def test_endpoint_with_port_0_shows_its_real_port(url: str) -> None:
+    node = Node(on_message=lambda inbound: None, clock=SystemClock())
+    await node.start([url])
+    (endpoint,) = node.endpoints
+    port = endpoint.local_port
+    assert port
+    scheme, _, query = url.partition("?")
+    shown = f"{scheme.rpartition(':')[0]}:{port}" + (f"?{query}" if query else "")
+    assert endpoint.describe().startswith(f"{shown}: 0 ")
+    assert endpoint.url == url
+    await node.close()
