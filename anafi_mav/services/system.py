@@ -312,6 +312,11 @@ class System:
             for message in self._texts.messages(severity, text):
                 self.send(message, to)
 
+    def announce(self, severity: Severity, text: str) -> None:
+        """Send a STATUSTEXT about the drone's link to every client, also while that link is down."""
+        for message in self._texts.messages(severity, text):
+            self._node.send(message, sysid=self.sysid, compid=AUTOPILOT, to=self.channels)
+
     def complain(self, text: str) -> None:
         """A warning about something that arrives many times a second: said every `STATUS_EVERY` seconds at most."""
         now = self.clock.monotonic()
