@@ -124,7 +124,8 @@ class Vehicle(Aircraft):
         self.mission = MissionFlight(self)
         self.takeoff = Takeoff(self, self.mission.armed)
         self.guided = GuidedFlight(self)
-        self.offboard = OffboardFlight(self, clock)
+        self.offboard = OffboardFlight(self, clock, self.takeoff)
+        self.takeoff.ended = self.offboard.after_takeoff
         self.manual = ManualFlight(self, clock)
         self.follow = FollowFlight(self, lambda: self.offboard.motion, clock)
         self.plan_ids: dict[int, int] = {}
@@ -310,6 +311,7 @@ class Vehicle(Aircraft):
                 await self.hold(mode, by)
             case FlightMode.GUIDED:
                 await self.hold(mode, commanded)
+                self.mode_client = client
             case FlightMode.LAND:
                 await self.land()
             case FlightMode.RETURN:
@@ -321,6 +323,7 @@ class Vehicle(Aircraft):
                     raise Refused("Offboard refused: no setpoints arrive")
                 await self._free("Offboard", commanded)
                 await self.offboard.engage(client)
+                self.mode_client = client
             case FlightMode.MISSION:
                 if self.mission.there and not self.mission.flying:
                     await self._free("Mission", commanded)
