@@ -11,10 +11,14 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.callers import CALLERS, system_of
 from support.mav import NAN, Client
+from support.missions import LAND as LAND_ITEM
+from support.missions import put, start, takeoff, way
+from support.setpoints import local, streaming
 from support.trouble import (
     ACCEPTED,
     LAND_CMD,
     PX4_HOLD,
+    PX4_OFFBOARD,
     REJECTED,
     RTL,
     SET_MODE,
@@ -34,7 +38,7 @@ from anafi_mav.sim.quirks import Quirk
 
 BAD_AIR = Impairment(loss=0.25, delay=0.2)
 PX4_POSITION = (1, 3, 0)
-PX4_RETURN = (1, 4, 5)
+PX4_MISSION = (1, 4, 4)
 PAUSE = dialect.MAV_CMD_DO_PAUSE_CONTINUE
 
 
@@ -298,3 +302,49 @@ async def _race(stop: str, offset: float, quirks: frozenset[Quirk]) -> None:
             assert now == "landed", flown(w)
         if now in ("hovering", "flying"):
             assert result == ACCEPTED, flown(w)
+
+
+# Modes that begin once the drone hovers.
+
+
+async def test_offboard_with_setpoints_ends_a_landing_and_flies_them() -> None:
+    async with world(speed=1.0) as w:
+        await landing(w, 10.0)
+        async with streaming(w.client, local(0b110111000111, v=(1.0, 0.0, 0.0))):
+            assert (await w.client.command(SET_MODE, *PX4_OFFBOARD)).result == ACCEPTED
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["vn"] > 0.7, 10.0)
+        assert "landed" not in flown(w)
+
+
+async def test_mission_ends_a_landing_and_is_flown() -> None:
+    async with world(speed=2.0, web=True) as w:
+        await put(w, [way(12.0, 0.0, 8.0)])
+        await landing(w, 10.0)
+        assert (await w.client.command(SET_MODE, *PX4_MISSION)).result == ACCEPTED
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 3.0, 15.0)
+        assert "landed" not in flown(w)
+
+
+@pytest.mark.parametrize("mode", [PX4_OFFBOARD, PX4_MISSION])
+async def test_mode_that_cannot_begin_leaves_the_landing_alone(mode: tuple[int, int, int]) -> None:
+    """No setpoints arrive, there is no mission: a command that is refused disturbs nothing."""
+    async with world(speed=1.0) as w:
+        await landing(w, 6.0)
+        before = len(sticks(w))
+        assert (await w.client.command(SET_MODE, *mode)).result == REJECTED
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landed", 20.0)
+        assert all(args[4] <= 0 for args in sticks(w, before))
+        assert flown(w)[-2:] == ["landing", "landed"]
+
+
+async def test_landing_of_a_mission_is_ended_by_hold_and_not_by_its_own_mode() -> None:
+    async with world(speed=2.0, web=True) as w:
+        await put(w, [takeoff(8.0), way(8.0, 0.0, 8.0), LAND_ITEM])
+        await start(w)
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landing", 60.0)
+        await w.client.heartbeat(lambda beat: beat.custom_mode == LAND)
+        await w.client.command(SET_MODE, *PX4_MISSION)
+        assert flown(w)[-1] == "landing"
+        assert (await w.client.command(SET_MODE, *PX4_HOLD)).result == ACCEPTED
+        await watched(2.0)
+        assert flown(w)[-1] in ("flying", "hovering")
