@@ -17,7 +17,7 @@ from anafi_mav.arsdk.session import OnMessage, Session, reason_of
 from anafi_mav.arsdk.transport import Role, Transport
 from anafi_mav.arsdk.watchdog import Watchdog
 from anafi_mav.arsdk.wire import Message
-from anafi_mav.errors import LinkLost, RemoteProtocolError
+from anafi_mav.errors import HandshakeRefused, LinkLost, RemoteProtocolError
 
 log = logging.getLogger("anafi_mav.arsdk")
 
@@ -155,18 +155,30 @@ async def connect(
     on_message: OnMessage,
     ping_after: float = 0.5,
     silence_limit: float | None = 2.5,
+    fades: bool = False,
     timeout: float = 3.0,
 ) -> ControllerSession:
     """Connect to the drone at `host`.
 
     `handshake_port` None means the one that discovery tells. `versions` is the (lowest, highest) ARSDK protocol
     version offered. `local_address` and `interface` bind all our sockets; None: whatever routes to the drone.
-    `on_message` may be called before this returns. Raises `LinkLost` when nobody answers within `timeout` seconds or
-    the drone refuses, `RemoteProtocolError` when what answers is no drone.
+    `on_message` may be called before this returns; `fades`: see `Transport`.
+
+    Raises `LinkLost` when nothing answers within `timeout` seconds, `HandshakeRefused` when the drone refuses,
+    `RemoteProtocolError` when what answers is no drone.
     """
     handshake.check_versions(versions)
     opening = _connect(
-        host, discovery_port, handshake_port, versions, local_address, interface, on_message, ping_after, silence_limit
+        host,
+        discovery_port,
+        handshake_port,
+        versions,
+        local_address,
+        interface,
+        on_message,
+        ping_after,
+        silence_limit,
+        fades,
     )
     try:
         return await asyncio.wait_for(opening, timeout)
@@ -188,6 +200,7 @@ async def _connect(
     on_message: OnMessage,
     ping_after: float,
     silence_limit: float | None,
+    fades: bool,
 ) -> ControllerSession:
     reader, writer = await _open(host, discovery_port, local_address, interface)
     try:
@@ -223,6 +236,7 @@ async def _connect(
         asyncio.get_running_loop().time(),
         ping_after=ping_after,
         silence_limit=silence_limit,
+        fades=fades,
         gives_up=False,  # who waits for a command takes it back in time; an order to stop has to arrive
     )
     session = ControllerSession(transport, on_message, device, (reader, writer))
@@ -245,7 +259,7 @@ async def _shake_hands(
     finally:
         writer.close()
     if reply.status != 0:
-        raise LinkLost(f"{host}:{port} refused the connection (status {reply.status})")
+        raise HandshakeRefused(f"{host}:{port}", reply.status)
     if not request.proto_v_min <= reply.proto_v <= request.proto_v_max:
         raise RemoteProtocolError(
             f"{host}:{port} chose protocol version {reply.proto_v}, "

@@ -14,7 +14,7 @@ from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.drone.element import Element
 from anafi_mav.drone.expectation import Commander, loop_time
 from anafi_mav.drone.piloting_motors import Motors
-from anafi_mav.drone.piloting_state import PilotingState, in_state
+from anafi_mav.drone.piloting_state import PilotingState
 from anafi_mav.drone.piloting_sticks import StickStream
 from anafi_mav.drone.sticks import PERIOD, Percent
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout
@@ -29,6 +29,9 @@ ALREADY_LANDED = "already landed"
 
 STILL_LANDING = "drone still landing"
 """The reason of a failure: neither the end of the landing nor LANDED was reported in time."""
+
+MOTORS_CUT, FORCED = "motors cut", "forced landing"
+"""The reasons of a refusal: what the landing has become."""
 
 SMART_WAIT = 1.5
 """s for SmartTakeOffLand alone to end a landing, before gaz is tried."""
@@ -95,6 +98,8 @@ def _judge(message: ardrone3.FlyingStateChanged) -> bool | AnafiMavError | None:
             return None
         case FlyingState.LANDED:
             return CommandRejected(ALREADY_LANDED)
-        case FlyingState.EMERGENCY | FlyingState.EMERGENCY_LANDING:
-            return CommandRejected(in_state(message.state))
+        case FlyingState.EMERGENCY:
+            return CommandRejected(MOTORS_CUT)
+        case FlyingState.EMERGENCY_LANDING:
+            return CommandRejected(FORCED)
     return True

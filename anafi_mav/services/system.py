@@ -49,6 +49,7 @@ from anafi_mav.services.orbit import OrbitService
 from anafi_mav.services.parameters import ParameterService
 from anafi_mav.services.plan_service import PlanService
 from anafi_mav.services.rally_service import RallyService
+from anafi_mav.services.roll_sign_service import RollSignService
 from anafi_mav.services.service import MessageHandler, Service
 from anafi_mav.services.shell import ShellService
 from anafi_mav.services.statustext import Severity, TextNumbers
@@ -78,6 +79,7 @@ SERVICES: tuple[type[Service], ...] = (
     MissionService,
     FenceService,
     RallyService,
+    RollSignService,
     OffboardService,
     ManualControlService,
     FollowService,
@@ -309,6 +311,11 @@ class System:
         if self.active:
             for message in self._texts.messages(severity, text):
                 self.send(message, to)
+
+    def announce(self, severity: Severity, text: str) -> None:
+        """Send a STATUSTEXT about the drone's link to every client, also while that link is down."""
+        for message in self._texts.messages(severity, text):
+            self._node.send(message, sysid=self.sysid, compid=AUTOPILOT, to=self.channels)
 
     def complain(self, text: str) -> None:
         """A warning about something that arrives many times a second: said every `STATUS_EVERY` seconds at most."""

@@ -21,6 +21,8 @@ from anafi_mav.arsdk.transport import (
     LinkDown,
     Received,
     Role,
+    Silent,
+    Speaks,
     Transport,
     Undelivered,
 )
@@ -612,6 +614,33 @@ def test_no_bytes_of_a_peer_raise(role: Role, version: int, seed: int) -> None:
     assert sum(count for name, count in victim.counters.items() if name.startswith("garbage.")) > 100
     victim.receive(corpus[0], 1.2)
     assert any(frame.id == 1 for frame in frames(victim, victim.outgoing(1.2)))
+
+
+def test_a_fading_link_drops_what_waits_and_goes_on_when_the_peer_speaks() -> None:
+    transport = Transport(Role.CONTROLLER, 3, 0.0, ping_after=0.5, silence_limit=2.5, fades=True)
+    transport.send(tilt(1.0), 0.0)
+    transport.outgoing(0.0)
+    waiting = transport.send(tilt(2.0), 0.1)
+    for now in (0.5, 1.0, 1.5):
+        assert transport.expire(now) == []
+        transport.outgoing(now)
+    events = transport.expire(2.0)
+    assert events[-1] == Silent("3 pings unanswered, nothing received for 2.0 s")
+    assert Undelivered(waiting, "the link is silent") in events
+    # Only pings, however long, and nothing that is asked for meanwhile.
+    transport.send(tilt(3.0), 2.1)
+    transport.send(STICKS, 2.1)
+    for step in range(1, 20):
+        now = 2.0 + 0.5 * step
+        assert transport.expire(now) == []
+        assert {frame.id for frame in frames(transport, transport.outgoing(now))} <= {0}
+    spoken = transport.receive(data_frame(3, 126, 0, HOVERING), 12.0)
+    assert spoken == [Speaks(), Received(HOVERING)]
+    (answer,) = frames(transport, transport.outgoing(12.0))
+    assert answer.type == FrameType.ACK
+    transport.send(tilt(4.0), 12.0)
+    (frame,) = frames(transport, transport.outgoing(12.0))
+    assert (frame.seq, frame.payload[1:]) == (1, wire.encode(tilt(4.0)))
 
 
 # What another process sends for us.
