@@ -29,6 +29,7 @@ from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound, Node
 from anafi_mav.services.system import System
 from anafi_mav.state_lock import FILE, HeldDrone, StateLock, state_folder
+from anafi_mav.subject import DRONE
 
 logger = logging.getLogger(__name__)
 
@@ -58,6 +59,7 @@ class _Supervised:
         self.task: asyncio.Task[None] | None = None
 
     async def run(self) -> None:
+        DRONE.set(self.config.name)
         pause = RETRY_FIRST
         while True:
             try:
