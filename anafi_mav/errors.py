@@ -12,7 +12,7 @@ class AnafiMavError(Exception):
 
 
 class LocalProtocolError(AnafiMavError, ValueError):
-    """Our own code asked a protocol for something it cannot express (value out of range, wrong state)."""
+    """The program asked for something that the protocol cannot express (value out of range, wrong state)."""
 
 
 class RemoteProtocolError(AnafiMavError):
@@ -28,6 +28,14 @@ class LinkLost(AnafiMavError, ConnectionError):
     def __init__(self, reason: str) -> None:
         super().__init__(reason)
         self.reason = reason
+
+
+class HandshakeRefused(LinkLost):
+    """What answers there refuses the connection; `status` is its number for why, which Parrot does not explain."""
+
+    def __init__(self, where: str, status: int) -> None:
+        super().__init__(f"{where} refused the connection (status {status})")
+        self.status = status
 
 
 class CommandTimeout(AnafiMavError, TimeoutError):
@@ -71,9 +79,11 @@ class PlanError(AnafiMavError, ValueError):
 
 
 class ConfigError(AnafiMavError, ValueError):
-    """The configuration is unusable at `key_path` ("drones[0].sysid"); the text says what was expected there."""
+    """The configuration is unusable at `key_path` ("drones[0].sysid") of the file `source`; the text says what was
+    expected there."""
 
-    def __init__(self, key_path: str, problem: str) -> None:
-        super().__init__(f"{key_path}: {problem}" if key_path else problem)
+    def __init__(self, key_path: str, problem: str, source: str = "") -> None:
+        super().__init__(": ".join(part for part in (source, key_path, problem) if part))
         self.key_path = key_path
         self.problem = problem
+        self.source = source

@@ -12,8 +12,8 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-import os
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
 
@@ -24,10 +24,12 @@ from anafi_mav.clock import Clock, SystemClock
 from anafi_mav.config import Config, DroneConfig
 from anafi_mav.drone import Drone
 from anafi_mav.drone.rest import HTTP_PORT
-from anafi_mav.errors import AnafiMavError, ConfigError
+from anafi_mav.errors import AnafiMavError, ConfigError, HandshakeRefused
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound, Node
+from anafi_mav.services.statustext import Severity
 from anafi_mav.services.system import System
+from anafi_mav.state_lock import FILE, HeldDrone, StateLock, state_folder
 
 logger = logging.getLogger(__name__)
 
@@ -42,38 +44,38 @@ HOVER_TIME = 2.0
 """s that closing stays with a flying drone after its moves have ended: as long as hover centres the sticks."""
 
 
-def state_folder(configured: str | None) -> Path | None:
-    """Where to keep what outlives the gateway; None when the user has no home (XDG Base Directory Specification)."""
-    given = os.environ.get("XDG_STATE_HOME", "")
-    try:
-        if configured is not None:
-            return Path(configured).expanduser()
-        return (Path(given) if Path(given).is_absolute() else Path.home() / ".local" / "state") / "anafi-mav"
-    except RuntimeError as error:
-        logger.warning("nothing will outlive the gateway: %s", error)
-        return None
-
-
 class _Supervised:
     """A drone with its system and the task that keeps them connected."""
 
-    def __init__(self, config: DroneConfig, drone: Drone, system: System) -> None:
+    def __init__(self, config: DroneConfig, drone: Drone, system: System, changed: Callable[[], None]) -> None:
+        """`changed` is called whenever the drone has connected or disconnected."""
         self.config = config
         self.drone = drone
         self.system = system
+        self._changed = changed
         self.first_attempt = asyncio.Event()
         self.problem = ""
         """Why the last attempt to connect failed; empty while connected."""
         self.task: asyncio.Task[None] | None = None
 
     async def run(self) -> None:
+        """Keep the drone connected until cancelled."""
+        try:
+            await self._run()
+        finally:
+            await self.drone.close()
+
+    async def _run(self) -> None:
         pause = RETRY_FIRST
         while True:
             try:
                 await self.drone.connect()
+                if self.problem:  # it was reported at this level
+                    logger.warning("%s: connected", self.config.name)
                 self.problem, pause = "", RETRY_FIRST
                 try:
                     self.system.link_up()
+                    self._changed()
                     self.first_attempt.set()
                     reason = await asyncio.shield(self.drone.lost)
                     logger.warning("%s: link lost: %s", self.config.name, reason)
@@ -81,7 +83,9 @@ class _Supervised:
                     await self.system.settle()
                 finally:
                     self.system.link_down()
-                    await self.drone.close()
+                    self._changed()
+                    if not self.drone.fading:
+                        await self.drone.close()
             except Exception as error:
                 # Whatever it is, the drone must not be out of reach until somebody restarts the gateway.
                 problem = str(error) or repr(error)
@@ -89,10 +93,18 @@ class _Supervised:
                     logger.exception("%s: a mistake of ours", self.config.name)
                 elif problem != self.problem:
                     logger.warning("%s: %s", self.config.name, problem)
+                    if isinstance(error, HandshakeRefused):
+                        self.system.announce(Severity.WARNING, f"Connection refused by drone (status {error.status})")
                 self.problem = problem
                 self.first_attempt.set()
-                await asyncio.sleep(pause)
+                await self.drone.pause(pause)
                 pause = min(2.0 * pause, RETRY_LAST)
+
+    def held(self) -> HeldDrone:
+        """Return what the lock file says of this drone."""
+        assert self.config.address is not None
+        serial = self.drone.identity.serial if self.system.active else ""
+        return HeldDrone(self.config.name, self.config.address, self.config.interface, serial)
 
     def line(self) -> str:
         """One line for people: who, where, and how it stands."""
@@ -121,6 +133,10 @@ class Gateway:
         self._clock: Clock = clock or SystemClock()
         self._node = Node(on_message=self._receive, on_channel=self._on_channel, clock=self._clock)
         self._supervised: list[_Supervised] = []
+        self._state: Path | None = None
+        self._lock: StateLock | None = None
+        self._state_problem = ""
+        """Why the state folder cannot be used; empty while it can."""
 
     async def __aenter__(self) -> Self:
         await self.start()
@@ -132,16 +148,57 @@ class Gateway:
         await self.close()
 
     async def open(self) -> None:
-        """Open every endpoint, and no more; `start` does it where this has not. Raises `ConfigError`; nothing is left
-        open. It is a step of its own for the command line, which starts a simulator only when all endpoints are."""
-        if not self._node.endpoints:
+        """Lock the state folder and open every endpoint, and no more; `start` does it where this has not. Raises
+        `ConfigError`; nothing is left open. It is a step of its own for the command line, which starts a simulator only
+        when all endpoints are."""
+        if self._node.endpoints:
+            return
+        self._lock_state()
+        try:
             await self._node.start(self.config.endpoints)
+        except BaseException:
+            self._unlock_state()
+            raise
+
+    def _lock_state(self) -> None:
+        """One gateway per state folder: two would take the drones from each other and overwrite each other's plans."""
+        self._state = state_folder(self.config.state)
+        if self._state is None:
+            return
+        lock = StateLock(self._state)
+        try:
+            holder = lock.acquire()
+        except OSError as error:
+            self._state_problem = f"{self._state}: {error.strerror or error}"
+            logger.warning("state folder cannot be used: %s", self._state_problem)
+            return
+        if holder is not None:
+            drones = "".join(f", {drone.name} at {drone.address}" for drone in holder.drones)
+            raise ConfigError(
+                "state",
+                f"expected a folder that no other gateway uses, but the gateway with process id {holder.pid}{drones}, "
+                f"holds {self._state / FILE}; end that gateway, or name another folder for this one",
+            )
+        self._lock = lock
+
+    def _unlock_state(self) -> None:
+        if self._lock is not None:
+            self._lock.release()
+            self._lock = None
+
+    def _write_lock(self) -> None:
+        if self._lock is not None:
+            self._lock.write([supervised.held() for supervised in self._supervised])
+
+    def state_problems(self) -> list[str]:
+        """Return why what outlives the gateway could not be read or kept, a line each; empty when all is well."""
+        problems = [self._state_problem] if self._state_problem else []
+        return problems + [s.system.memory.problem for s in self._supervised if s.system.memory.problem]
 
     async def start(self) -> None:
         """Open every endpoint, then begin to connect to every drone. Raises `ConfigError`; nothing is left open."""
         await self.open()
         started = self._clock.monotonic()
-        state = state_folder(self.config.state)
         for config in self.config.drones:
             assert config.address is not None
             drone = Drone(
@@ -153,10 +210,13 @@ class Gateway:
                 name=config.name,
             )
             allow_kill = self.config.allow_kill if config.allow_kill is None else config.allow_kill
-            system = System(self._node, drone, config.sysid, self._clock, started, allow_kill=allow_kill, state=state)
-            supervised = _Supervised(config, drone, system)
+            system = System(
+                self._node, drone, config.sysid, self._clock, started, allow_kill=allow_kill, state=self._state
+            )
+            supervised = _Supervised(config, drone, system, self._write_lock)
             supervised.task = asyncio.get_running_loop().create_task(supervised.run())
             self._supervised.append(supervised)
+        self._write_lock()
 
     async def ready(self, timeout: float) -> bool:
         """Wait until each drone is connected or one attempt has failed. True when all of them are connected."""
@@ -176,6 +236,7 @@ class Gateway:
         await asyncio.gather(*(self._leave(s) for s in self._supervised))
         self._supervised.clear()
         await self._node.close()
+        self._unlock_state()
 
     async def _leave(self, supervised: _Supervised) -> None:
         if supervised.system.active:
@@ -208,6 +269,9 @@ class Gateway:
         sentences = []
         for s in self._supervised:
             if not s.system.active or s.system.vehicle.on_ground:
+                continue
+            if (ending := s.system.vehicle.alone) is not None:
+                sentences.append(f"{s.config.name} {ending}")
                 continue
             delay = s.drone.home.state.delay_s
             after = "after its own delay" if delay is None else f"{delay} s after it lost the link"

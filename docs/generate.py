@@ -13,7 +13,7 @@ import msgspec
 HERE = Path(__file__).parent
 TESTS = HERE.parent / "tests" / "unit"
 DIALECT_XML = HERE.parent / "dialect" / "anafi.xml"
-sys.path[:0] = [str(HERE.parent), str(TESTS)]
+sys.path[:0] = [str(HERE.parent), str(TESTS), str(HERE)]
 
 CONFIGURATION = """\
 # Configuration
@@ -29,16 +29,20 @@ drones:
   - {name: bravo, sysid: 2, sim: {model: 4k, home: [48.8789, 2.3677, 35.0]}}
 ```
 
-Whatever is wrong is told in one line with the place of the key and what was expected there, the exit status is 2 and
+An error is one line with the file, the place of the key and what was expected there. The exit status is then 2, and
 nothing has been started:
 
 ```
-anafi-mav: drones[1].sysid: expected a sysid of its own, 1 is already at drones[0].sysid
+anafi-mav: fleet.yaml: drones[1].sysid: expected a sysid of its own, 1 is already at drones[0].sysid
 ```
 
 Two options of the command line stand in for a list of the file, or of the defaults: `--drone ADDRESS` (repeatable;
 the drones get the system ids 1, 2, …; `192.168.42.1%wlan1` names the interface too) and `--endpoint URL` (repeatable).
 `--allow-kill` is `allow_kill: true`.
+
+One gateway uses one `state` folder: its file `gateway.lock` names the process and its drones, and a second gateway is
+refused there. Two gateways on one machine need a folder each. A folder that cannot be used stops no gateway: it warns
+at the start and at each upload, keeps nothing, and its exit status is 1.
 
 Every ANAFI has the same address in its own Wi-Fi, and so has every Skycontroller. With a Wi-Fi adapter for each and the
 adapter's name as `interface` they fly together, without address translation:
@@ -433,11 +437,59 @@ def plan_translation() -> str:
     return "".join(parts)
 
 
+PYTHON_API = """\
+# Reference of the Python API
+
+<!-- Made by docs/generate.py from the docstrings of anafi_mav/drone. -->
+
+For programs that fly an ANAFI: every stable name of `anafi_mav.drone`. [python-api.md](python-api.md) is the guide.
+Methods of the code that are not on this page belong to the package and may change.
+
+For all elements:
+
+- `state` is a frozen record of the drone's last reports. None in a field: not reported since the connection.
+- `drone.camera[0]` and `drone.gimbal[0]` are the states of the main camera and gimbal.
+- A coroutine returns when the drone has confirmed. A method without `async` sends and returns at once.
+- Each method that sends raises `LinkLost` without a link and `NotSupported` for what the drone does not have. Each that
+  waits raises `CommandTimeout` when the drone does not confirm in time.
+
+## connect
+
+```python
+{connect}
+```
+
+{connect_doc}
+"""
+
+EVENTS = """
+## events
+
+`anafi_mav.drone.events` has Parrot's own names: the enums that occur in states and verbs, and the messages that
+`Drone.subscribe` and `Drone.expect` deliver. Their fields are those of Parrot's protocol.
+
+{names}
+"""
+
+
+def python_api() -> str:
+    """docs/python-api-reference.md."""
+    from api_reference import body, function
+
+    from anafi_mav import drone
+
+    signature, doc = function("connect", drone.connect)
+    head = PYTHON_API.format(connect=signature, connect_doc=doc)
+    names = ", ".join(f"`{name}`" for name in drone.events.__all__)
+    return head + body() + EVENTS.format(names=names)
+
+
 PAGES: dict[str, Callable[[], str]] = {
     "configuration.md": configuration,
     "dialect.md": dialect,
     "parameters.md": parameters,
     "plan-translation.md": plan_translation,
+    "python-api-reference.md": python_api,
     "seed.md": seed,
     "seed-mavlink.md": seed_mavlink,
     "silence.md": silence,

@@ -23,7 +23,8 @@ COMMANDS = {
     "sim": "simulated drones alone, on Parrot's own wire protocol",
     "discover": "look for drones and Skycontrollers on every network interface; prints a configuration",
     "plan": "check, convert, show and draw flight plans; upload, download and fly them",
-    "info": "connect to one drone and tell what it is, what it has and what its limits are",
+    "info": "connect to one drone and print model, battery, features and limits",
+    "doctor": "examine the way to one drone: what is wrong, and how to mend it",
 }
 """Name of a command, which is the name of its module in this folder, and what it does."""
 

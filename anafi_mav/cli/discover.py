@@ -17,11 +17,13 @@ from dataclasses import dataclass
 from anafi_mav.arsdk.handshake import DeviceInfo
 from anafi_mav.arsdk.interface import networks
 from anafi_mav.arsdk.mux_link import look_either
+from anafi_mav.cli import interrupts
 from anafi_mav.cli.addresses import spot
-from anafi_mav.cli.terminal import complain, say
+from anafi_mav.cli.terminal import complain, say, say_json
 from anafi_mav.drone.controller import MODELS as CONTROLLERS
 from anafi_mav.drone.product import MODELS
 from anafi_mav.errors import AnafiMavError, ConfigError
+from anafi_mav.printable import printable
 
 USUAL = {
     "192.168.42.1": "the Wi-Fi of an ANAFI",
@@ -64,6 +66,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="ADDRESS",
         help=f"look here besides the usual places ({usual}); 192.168.42.1%%wlan1 names the network interface too",
     )
+    parser.add_argument("--json", action="store_true", help="print a JSON list instead of a configuration")
     parser.add_argument("--timeout", default="2", metavar="SECONDS", help="to wait for an answer (%(default)s)")
 
 
@@ -71,13 +74,31 @@ def run(arguments: argparse.Namespace) -> int:
     """Look everywhere at once. 1 when nothing is there."""
     timeout = _timeout(arguments.timeout)
     wanted = [_place(text) for text in arguments.addresses]
-    finds = asyncio.run(discover(places(wanted, networks()), timeout))
+    finds = interrupts.run(discover(places(wanted, networks()), timeout))
+    if arguments.json:
+        say_json([_facts(find) for find in finds])
+        return 0 if finds else 1
     if not finds:
         complain("nothing found; is the machine in the Wi-Fi of the drone, or a Skycontroller plugged in?")
         return 1
     for line in configuration(finds):
         say(line)
     return 0
+
+
+def _facts(find: Find) -> dict[str, object]:
+    device, place = find.device, find.place
+    kind = "drone" if device.model_id in MODELS else "controller" if device.model_id in CONTROLLERS else "unknown"
+    known = CONTROLLERS.get(device.model_id) or (MODELS[device.model_id].title if device.model_id in MODELS else None)
+    return {
+        "address": place.address,
+        "interface": place.interface,
+        "kind": kind,
+        "model": known,
+        "model_id": device.model_id,
+        "name": device.name,
+        "serial": device.serial,
+    }
 
 
 def _timeout(text: str) -> float:
@@ -138,7 +159,7 @@ def configuration(finds: Sequence[Find]) -> list[str]:
     lines = ["drones:"]
     for sysid, find in enumerate(finds, 1):
         device, place = find.device, find.place
-        lines.append(f"  # {title(device)} {_printable(device.serial)}, found at {place}")
+        lines.append(f"  # {title(device)} {printable(device.serial)[:MAX_NAME]}, found at {place}")
         keys = [f'name: "{_name(device, names)}"', f"sysid: {sysid}", f"address: {place.address}"]
         if place.interface is not None and shared[place.address] > 1:
             keys.append(f"interface: {place.interface}")
@@ -152,10 +173,6 @@ def title(device: DeviceInfo) -> str:
         return f"{CONTROLLERS[device.model_id]} with the drone behind it,"
     model = MODELS.get(device.model_id)
     return f"unknown device 0x{device.model_id:04x}" if model is None else model.title
-
-
-def _printable(text: str) -> str:
-    return re.sub(r"[^\x20-\x7e]", "?", text)[:MAX_NAME]
 
 
 def _name(device: DeviceInfo, taken: set[str]) -> str:

@@ -1,6 +1,6 @@
-"""`anafi-mav info ADDRESS`: what is there: model, serial, firmware, battery, features, limits.
+"""`anafi-mav info ADDRESS`: model, serial number, firmware, battery, features and limits of one drone.
 
-It connects as the gateway does. A drone has one controller at a time: whoever was connected is not any more.
+It connects as the gateway does, which takes the drone from any other controller: see `consent`.
 """
 
 from __future__ import annotations
@@ -13,13 +13,15 @@ from typing import Any
 import msgspec
 
 from anafi_mav.arsdk.wire import Message
+from anafi_mav.cli import consent, interrupts
 from anafi_mav.cli.addresses import spot
-from anafi_mav.cli.terminal import say
+from anafi_mav.cli.terminal import complain, say, say_json
 from anafi_mav.drone import Drone
 from anafi_mav.drone.element import Range
+from anafi_mav.errors import ConfigError
 
 LISTEN = 1.2
-"""s to listen after the connection: what the drone tells once a second has come by then."""
+"""s to listen after the connection: values that the drone sends once a second have arrived by then."""
 
 OLD_PROJECTS = {"ardrone3", "common", "skyctrl", "generic"}
 """Parrot's first families of messages; everything else is called a feature."""
@@ -30,16 +32,33 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "address", metavar="ADDRESS", help="of the drone or Skycontroller; 192.168.42.1%%wlan1 names the interface too"
     )
+    consent.add_arguments(parser)
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Connect, tell, disconnect. Raises `LinkLost` when nobody is there."""
-    for line in asyncio.run(_ask(**spot(arguments.address))):
-        say(line)
+    """Connect, print, disconnect. Raises `LinkLost` when no drone answers."""
+    place = spot(arguments.address)
+    held = consent.gateway_of(arguments.state, place["address"], place.get("interface"))
+    if held is not None:
+        complain(f"{arguments.address}: not connected: {held}{consent.GATEWAY_RETRIES}")
+        return 1
+    may = consent.may_connect(arguments.address, take=arguments.take)
+    if may is None:
+        without = "`anafi-mav discover` shows what is there without it"
+        raise ConfigError("--take", f"expected it, because {consent.WARNING}; {without}")
+    if not may:
+        return 1
+    facts = interrupts.run(_ask(**place))
+    if arguments.json:
+        say_json(facts)
+    else:
+        for line in _lines(facts):
+            say(line)
     return 0
 
 
-async def _ask(address: str, interface: str | None = None) -> list[str]:
+async def _ask(address: str, interface: str | None = None) -> dict[str, Any]:
     drone = Drone(address, interface=interface)
     features: set[str] = set()
 
@@ -50,52 +69,79 @@ async def _ask(address: str, interface: str | None = None) -> list[str]:
     await drone.connect()
     try:
         await asyncio.wait([drone.lost], timeout=LISTEN)
-        return [*_who(drone), f"features: {', '.join(sorted(features - OLD_PROJECTS))}", *_limits(drone)]
+        return {**_facts(drone), "features": sorted(features - OLD_PROJECTS), "limits": dict(_limits(drone))}
     finally:
         await drone.close()
 
 
-def _who(drone: Drone) -> Iterator[str]:
+def _facts(drone: Drone) -> dict[str, Any]:
+    """What the drone has reported of itself; None where it has not."""
     identity, battery, gps, product = drone.identity, drone.battery.state, drone.gps.state, drone.product.state
-    yield f"model: {identity.model.title}"
-    yield f"name: {identity.name}"
-    yield f"serial: {identity.serial}"
-    yield f"firmware: {identity.firmware or 'not told'}, hardware {identity.hardware or 'not told'}"
-    details = [
-        f"{value:g} {unit}"
-        for value, unit in (
-            (battery.percent, "%"),
-            (None if battery.voltage_mv is None else battery.voltage_mv / 1000.0, "V"),
-            (battery.health_percent, "% health"),
-            (battery.cycles, "charges"),
-        )
-        if value is not None
-    ]
-    yield f"battery: {', '.join(details) or 'not told'}"
-    if gps.fixed is not None:
-        sight = "" if gps.satellites is None else f", {gps.satellites} satellites"
-        yield f"GPS: {'fix' if gps.fixed else 'no fix'}{sight}"
-    if product.flights is not None and product.total_flight_s is not None:
-        yield f"flown: {product.flights} times, {product.total_flight_s / 3600.0:.1f} h"
-    blockers = drone.takeoff_blockers()
+    controller = drone.controller.state
+    return {
+        "model": identity.model.title,
+        "name": identity.name,
+        "serial": identity.serial,
+        "firmware": identity.firmware or None,
+        "hardware": identity.hardware or None,
+        "battery": {
+            "percent": battery.percent,
+            "volts": None if battery.voltage_mv is None else battery.voltage_mv / 1000.0,
+            "health_percent": battery.health_percent,
+            "charges": battery.cycles,
+        },
+        "gps": {"fix": gps.fixed, "satellites": gps.satellites},
+        "flights": product.flights,
+        "flown_s": product.total_flight_s,
+        "takeoff_blockers": drone.takeoff_blockers(),
+        "controller": {
+            "serial": controller.serial,
+            "firmware": controller.firmware,
+            "battery_percent": controller.battery_percent,
+        }
+        if drone.controller.present
+        else None,
+    }
+
+
+_UNITS = {"percent": "%", "volts": "V", "health_percent": "% health", "charges": "charges"}
+
+
+def _lines(facts: Mapping[str, Any]) -> Iterator[str]:
+    """The same for people."""
+    for key in ("model", "name", "serial"):
+        yield f"{key}: {facts[key]}"
+    yield f"firmware: {facts['firmware'] or 'not reported'}, hardware {facts['hardware'] or 'not reported'}"
+    battery = [f"{value:g} {_UNITS[key]}" for key, value in facts["battery"].items() if value is not None]
+    yield f"battery: {', '.join(battery) or 'not reported'}"
+    gps = facts["gps"]
+    if gps["fix"] is not None:
+        sight = "" if gps["satellites"] is None else f", {gps['satellites']} satellites"
+        yield f"GPS: {'fix' if gps['fix'] else 'no fix'}{sight}"
+    if facts["flights"] is not None and facts["flown_s"] is not None:
+        yield f"flown: {facts['flights']} times, {facts['flown_s'] / 3600.0:.1f} h"
+    blockers = facts["takeoff_blockers"]
     yield f"take-off: {'refused: ' + ', '.join(blockers) if blockers else 'possible'}"
-    if drone.controller.present:
-        state = drone.controller.state
-        charge = "charging or not told" if state.battery_percent is None else f"{state.battery_percent} %"
-        yield f"controller: {state.serial}, firmware {state.firmware}, battery {charge}"
-
-
-def _limits(drone: Drone) -> Iterator[str]:
-    """Every setting with a range that the drone has reported."""
+    if (controller := facts["controller"]) is not None:
+        percent = controller["battery_percent"]
+        charge = "charging or not reported" if percent is None else f"{percent} %"
+        yield f"controller: {controller['serial']}, firmware {controller['firmware']}, battery {charge}"
+    yield f"features: {', '.join(facts['features'])}"
     yield "limits (value, lowest to highest):"
+    for name, limit in facts["limits"].items():
+        yield f"  {name}: {limit['value']:g}, {limit['min']:g} to {limit['max']:g}"
+
+
+def _limits(drone: Drone) -> Iterator[tuple[str, dict[str, float]]]:
+    """Every setting with a range that the drone has reported, by its name."""
     for element in (drone.piloting, drone.home, drone.gimbal, drone.camera):
         yield from _ranges("", element.state)
 
 
-def _ranges(name: str, value: Any) -> Iterator[str]:
+def _ranges(name: str, value: Any) -> Iterator[tuple[str, dict[str, float]]]:
     """The ranges in a state, by the path to each."""
     if isinstance(value, Range):
-        yield f"  {name.strip()}: {value.current:g}, {value.min:g} to {value.max:g}"
+        yield name.strip(), {"value": value.current, "min": value.min, "max": value.max}
     elif isinstance(value, msgspec.Struct):
         for key in value.__struct_fields__:
             yield from _ranges(f"{name} {key.replace('_', ' ')}", getattr(value, key))

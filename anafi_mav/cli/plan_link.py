@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import asyncio
 import contextlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from anafi_mav.cli import plan_files, plan_options
+from anafi_mav.cli import interrupts, plan_files, plan_options
 from anafi_mav.cli.ground import Ground, Texts, connected
 from anafi_mav.cli.terminal import progress, say
 from anafi_mav.errors import AnafiMavError, PlanError
@@ -19,6 +18,7 @@ from anafi_mav.mavlink.node import Inbound
 from anafi_mav.mavlink.plan_client import Download, Outcome, Upload
 from anafi_mav.plans.lists import fence_items, points_of, rally_items, zones_of
 from anafi_mav.plans.plan import GLOBAL, WAYPOINT, Item, Plan, Point, counted, shifted
+from anafi_mav.services.memory import NOT_KEPT
 from anafi_mav.services.mission_items import from_wire, to_wire
 from anafi_mav.services.plan_items import Fault, PlanItem, item_int, item_of
 
@@ -84,19 +84,22 @@ def _without_heading(item: Item) -> Item:
 
 
 def upload(arguments: argparse.Namespace) -> int:
-    """Hand it over. Raises `Refused` with the vehicle's reason."""
-    sysid, plan = plan_options.sysid_of(arguments), plan_options.load(arguments)
-    asyncio.run(_upload(arguments, sysid, plan))
-    return 0
+    """Hand it over; 1 when the gateway took it and cannot store it. Raises `Refused` with the vehicle's reason."""
+    plan, sysid = plan_options.load(arguments), plan_options.sysid_of(arguments)
+    texts = interrupts.run(_upload(arguments, sysid, plan))
+    return 1 if NOT_KEPT in texts else 0
 
 
-async def _upload(arguments: argparse.Namespace, sysid: int | None, plan: Plan) -> None:
+async def _upload(arguments: argparse.Namespace, sysid: int | None, plan: Plan) -> list[str]:
     async with connected(arguments.endpoint, sysid) as ground:
-        await give(ground, plan, arguments.file.name)
+        return await give(ground, plan, arguments.file.name)
 
 
-async def give(ground: Ground, plan: Plan, source: str) -> None:
-    """Upload the lists that a plan has; others stay as the vehicle has them. Raises `Refused` and `PlanError`."""
+async def give(ground: Ground, plan: Plan, source: str) -> list[str]:
+    """Upload the lists that a plan has and return the vehicle's texts; other lists stay as the vehicle has them.
+
+    Raises `Refused` and `PlanError`.
+    """
     lists = Lists.of(plan)
     parts = {kind: lists.wire(kind, source, with_home=ground.first_item_is_home) for kind in NAMES}
     if not any(parts.values()):
@@ -105,6 +108,7 @@ async def give(ground: Ground, plan: Plan, source: str) -> None:
         for kind, items in parts.items():
             if items:
                 await give_list(ground, kind, items, texts)
+        return texts
 
 
 @contextlib.contextmanager
@@ -169,7 +173,9 @@ def download(arguments: argparse.Namespace) -> int:
     """Fetch mission, fence and rally points into one file. Raises `Refused`."""
     sysid = plan_options.sysid_of(arguments)
     plan_options.target_format(arguments.out, arguments.model)
-    plan = asyncio.run(_download(arguments, sysid))
+    plan_files.may_replace(arguments.out, force=arguments.force)
+    arguments.force = True  # it has been asked, before the vehicle was
+    plan = interrupts.run(_download(arguments, sysid))
     plan_files.store(plan, arguments, Path("the vehicle's plan"))
     return 0
 

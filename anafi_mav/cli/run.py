@@ -13,13 +13,14 @@ from typing import Any
 
 import msgspec
 
-from anafi_mav.cli import heap, options
+from anafi_mav.cli import heap, log, options
 from anafi_mav.cli.addresses import Ports, Reservations, spot
 from anafi_mav.cli.child import SimulatorProcess
 from anafi_mav.cli.terminal import complain, say
 from anafi_mav.config import Config, DroneConfig, SimConfig, from_mapping, load, remarks
 from anafi_mav.errors import ConfigError
 from anafi_mav.gateway import Gateway
+from anafi_mav.mavlink.endpoint import is_open_to_network, parse_endpoint
 from anafi_mav.sim import quirks, scenario
 
 READY_LIMIT = 15.0
@@ -51,15 +52,43 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Be the gateway until SIGINT or SIGTERM. Raises `ConfigError` before anything is started."""
-    level = (logging.WARNING, logging.INFO, logging.DEBUG)[min(arguments.verbose, 2)]
-    logging.basicConfig(level=level, format="%(asctime)s %(name)s: %(message)s")
+    """Be the gateway until SIGINT or SIGTERM; 1 when something could not be kept in the state folder.
+
+    Raises `ConfigError` before anything is started.
+    """
+    log.set_up((logging.WARNING, logging.INFO, logging.DEBUG)[min(arguments.verbose, 2)])
+    try:
+        return _serve(arguments)
+    except ConfigError as error:
+        raise _located(error, arguments) from error
+
+
+def _located(error: ConfigError, arguments: argparse.Namespace) -> ConfigError:
+    """Return the error with the option or the file that its key path is from."""
+    for key, option, given in (("drones", "--drone", arguments.drone), ("endpoints", "--endpoint", arguments.endpoint)):
+        if given and error.key_path.startswith(key) and not error.source:
+            return ConfigError(option, error.problem)
+    if arguments.config is None or error.source or not error.key_path or error.key_path.startswith("--"):
+        return error
+    return ConfigError(error.key_path, error.problem, str(arguments.config))
+
+
+def _serve(arguments: argparse.Namespace) -> int:
     config = configuration(arguments.config, arguments.drone, arguments.endpoint, arguments.allow_kill)
     for remark in remarks(config):
         complain(f"warning: {remark}", "yellow")
+    for index, text in enumerate(config.endpoints):
+        with contextlib.suppress(ConfigError):  # the gateway says what is wrong with it
+            if is_open_to_network(parse_endpoint(text)):
+                what = (
+                    "is open to the network and MAVLink has no password: any program that reaches it can fly the drones"
+                )
+                complain(f"warning: endpoints[{index}]: {text} {what}", "yellow")
     heap.settle()
-    asyncio.run(_run(config, arguments.sim_log.absolute() if arguments.sim_log else None))
-    return 0
+    problems = asyncio.run(_run(config, arguments.sim_log.absolute() if arguments.sim_log else None))
+    for problem in problems:
+        complain(f"not kept: {problem}")
+    return 1 if problems else 0
 
 
 def configuration(
@@ -90,6 +119,10 @@ class _Interrupts:
                 continue  # nohup
             loop.add_signal_handler(number, self.receive, number)
 
+    def unsaid(self) -> list[str]:
+        """Return what drones in the air do when the gateway ends, unless a first SIGINT has shown it."""
+        return [] if self._told else self.flying()
+
     def receive(self, number: signal.Signals) -> None:
         sentences = self.flying() if number == signal.SIGINT and not self._told else []
         if not sentences:
@@ -101,19 +134,23 @@ class _Interrupts:
         say("Ctrl-C once more ends the gateway all the same", "yellow")
 
 
-async def _run(config: Config, sim_log: Path | None) -> None:
+async def _run(config: Config, sim_log: Path | None) -> list[str]:
+    """Run the gateway; return what was wrong with its state folder at the end."""
     interrupts = _Interrupts()
     interrupts.install()
     async with contextlib.AsyncExitStack() as stack:
         gateway_config, fleet = place(config, stack.enter_context(Reservations()))
         gateway = Gateway(gateway_config)
         if not await _unless(interrupts.stop, _start(gateway, fleet, sim_log, stack)):
-            return
+            return []
         interrupts.flying = gateway.drones_in_air
         for line in gateway.lines():
             say(line)
         say("ready, Ctrl-C ends", "green")
         await interrupts.stop.wait()
+        for sentence in interrupts.unsaid():
+            say(sentence, "yellow")
+        return gateway.state_problems()
 
 
 async def _start(

@@ -1,8 +1,12 @@
-"""What the commands print. Colour only where a terminal is; elsewhere plain lines, each written at once."""
+"""What the commands print. Colour only where a terminal is; elsewhere plain lines, each written at once.
+
+Every line is cleaned of control characters: names and texts of drones and vehicles are in many of them.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import json
 import sys
 from collections.abc import Callable, Iterator
 from typing import TextIO
@@ -11,6 +15,8 @@ from rich.console import Console
 from rich.progress import Progress
 from rich.text import Text
 
+from anafi_mav.printable import printable
+
 _bars: list[Progress] = []
 """Bars on the screen: what is said meanwhile is printed above them."""
 
@@ -18,6 +24,12 @@ _bars: list[Progress] = []
 def say(line: str, style: str = "") -> None:
     """A line on stdout. `style` is rich's."""
     _write(sys.stdout, line, style)
+
+
+def say_json(value: object) -> None:
+    """Print a value as JSON on stdout, indented, with every character outside ASCII as its escape."""
+    for line in json.dumps(value, indent=2).replace("\x7f", "\\u007f").split("\n"):
+        say(line)
 
 
 def complain(line: str, style: str = "red") -> None:
@@ -41,9 +53,11 @@ def progress(what: str, total: int | None) -> Iterator[Callable[[int, int], None
 
 
 def _write(stream: TextIO, line: str, style: str) -> None:
+    line = printable(line)
     with contextlib.suppress(OSError):  # the reader may be gone (`anafi-mav | head`): no reason to end a flight
         if stream.isatty():
             console = _bars[-1].console if _bars and stream is sys.stdout else Console(file=stream)
             console.print(Text(line, style), soft_wrap=True)
         else:
-            print(line, file=stream, flush=True)
+            encoding = stream.encoding or "utf-8"  # a terminal without umlauts is no reason to end a flight
+            print(line.encode(encoding, "backslashreplace").decode(encoding), file=stream, flush=True)

@@ -26,7 +26,7 @@ _HOST_NAME = re.compile(r"(?!-)[A-Za-z0-9-]{1,63}(?<!-)(\.(?!-)[A-Za-z0-9-]{1,63
 
 def load(path: Path) -> Config:
     """The configuration in the file at `path`; paths in it are made relative to its folder. Raises `ConfigError`."""
-    config = _from_document(documents.read(path))
+    config = _from_document(documents.read(path), str(path))
     return msgspec.structs.replace(config, drones=tuple(_in_folder(path.parent, drone) for drone in config.drones))
 
 
@@ -39,11 +39,14 @@ def _in_folder(folder: Path, drone: DroneConfig) -> DroneConfig:
 
 def from_text(text: str | bytes, source: str) -> Config:
     """The configuration in YAML `text`; `source` names it in messages. Raises `ConfigError`."""
-    return _from_document(documents.parse(text, source))
+    return _from_document(documents.parse(text, source), source)
 
 
-def _from_document(document: object) -> Config:
-    return from_mapping({} if document is None else document)
+def _from_document(document: object, source: str) -> Config:
+    try:
+        return from_mapping({} if document is None else document)
+    except ConfigError as error:
+        raise ConfigError(error.key_path, error.problem, source) from error
 
 
 def from_mapping(document: object) -> Config:

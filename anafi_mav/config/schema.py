@@ -287,7 +287,8 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         Annotated[str, Meta(min_length=1, max_length=MAX_PATH)] | None,
         Meta(
             description="The folder of what outlives the gateway: of each drone a file with its mission, its "
-            "fence, its rally points and the gateway's own settings for it. `~` is the user's home. Left out: "
+            "fence, its rally points, the take-off point of its last flight and the gateway's own settings for it. "
+            "`~` is the user's home. Left out: "
             "`$XDG_STATE_HOME/anafi-mav`, which without that variable is `~/.local/state/anafi-mav`.",
             extra=expected("the path of a folder"),
         ),

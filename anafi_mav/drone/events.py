@@ -92,7 +92,9 @@ from anafi_mav.arsdk.messages.rth import PreferredHomeType as PreferredHomeType
 from anafi_mav.arsdk.messages.rth import RthEndingBehavior as RthEndingBehavior
 from anafi_mav.arsdk.messages.rth import RthHomeReachability as HomeReachability
 from anafi_mav.arsdk.messages.rth import RthHomeType as RthHomeType
+from anafi_mav.arsdk.messages.rth import RthState as RthState
 from anafi_mav.arsdk.messages.rth import State as ReturnStateChanged
+from anafi_mav.arsdk.messages.rth import StateReason as ReturnReason
 from anafi_mav.arsdk.messages.rth import TakeoffLocation as TakeoffLocation
 from anafi_mav.arsdk.messages.skyctrl import AttitudeChanged as ControllerAttitudeChanged
 from anafi_mav.arsdk.messages.skyctrl import PilotingSource as PilotingSource
@@ -195,9 +197,11 @@ __all__ = [
     "ReturnEndingAltitude",
     "ReturnHomeOnDisconnectChanged",
     "ReturnMinAltitude",
+    "ReturnReason",
     "ReturnStateChanged",
     "RthEndingBehavior",
     "RthHomeType",
+    "RthState",
     "Sensor",
     "SensorsStatesListChanged",
     "ShutterTrigger",

@@ -33,9 +33,10 @@ DEFAULT_INTERVALS: Mapping[int, float] = {
     mav.MAVLINK_MSG_ID_DISTANCE_SENSOR: 0.2,
     mav.MAVLINK_MSG_ID_SYSTEM_TIME: 1.0,
     mav.MAVLINK_MSG_ID_EKF_STATUS_REPORT: 1.0,
-    mav.MAVLINK_MSG_ID_CURRENT_MODE: 2.0,
+    # These two leave at each change, and stations of before 2024 count each of them as lost: their dialect lacks them.
+    mav.MAVLINK_MSG_ID_CURRENT_MODE: 5.0,
+    mav.MAVLINK_MSG_ID_AVAILABLE_MODES_MONITOR: 10.0,
     mav.MAVLINK_MSG_ID_ORBIT_EXECUTION_STATUS: 0.8,
-    mav.MAVLINK_MSG_ID_AVAILABLE_MODES_MONITOR: 3.3,
     mav.MAVLINK_MSG_ID_CURRENT_EVENT_SEQUENCE: 1.0,
     # Only while setpoints or moves are flown.
     mav.MAVLINK_MSG_ID_ATTITUDE_TARGET: 0.5,

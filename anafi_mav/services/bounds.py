@@ -10,6 +10,7 @@ import math
 from anafi_mav import geo
 from anafi_mav.services.aircraft import Aircraft
 from anafi_mav.services.fence_watch import OutsideFence
+from anafi_mav.services.height import ESTIMATE_FLOOR
 from anafi_mav.services.place import Place, point_of
 from anafi_mav.services.refusal import Refused
 
@@ -61,8 +62,14 @@ def amsl_to_ato(vehicle: Aircraft, amsl: float) -> float:
     """Height above take-off (m) of an AMSL height; raises `Refused` when no bridge is known."""
     ato = vehicle.height.ato(amsl)
     if ato is None:
-        raise Refused("Refused: no GPS fix on the ground, so the take-off point's height above sea level is unknown")
+        raise Refused("Refused: take-off altitude unknown: no GPS fix")
     return ato
+
+
+def check_estimate(vehicle: Aircraft, ato: float) -> None:
+    """Raise `Refused` for an AMSL target that may be the ground because the bridge to AMSL is an estimate."""
+    if vehicle.height.estimated and ato < ESTIMATE_FLOOR:
+        raise Refused(f"Refused: estimated AMSL height {ato:.0f} m < {ESTIMATE_FLOOR:g} m")
 
 
 def check_on_earth(place: Place, what: str) -> None:
@@ -76,7 +83,7 @@ def check_on_earth(place: Place, what: str) -> None:
 def check_place(vehicle: Aircraft, place: Place, *, start: Place | None = None) -> None:
     """Raise `Refused` unless the drone may fly there, and the straight way from `start` if that is given."""
     check_on_earth(place, "Goto")
-    centre = vehicle.home
+    centre, home = vehicle.geofence_centre, vehicle.home
     around = centre or vehicle.place
     if around is not None:
         distance = geo.distance(around.latitude, around.longitude, place.latitude, place.longitude)
@@ -85,16 +92,15 @@ def check_place(vehicle: Aircraft, place: Place, *, start: Place | None = None) 
         if centre is not None:
             _check_geofence(vehicle, distance)
     try:
-        vehicle.fence.check_place(point_of(place), point_of(centre), point_of(start))
+        vehicle.fence.check_place(point_of(place), point_of(home), point_of(start))
     except OutsideFence as error:
         raise Refused(f"Goto refused: {error}", lasting=error.lasting) from error
 
 
 def _check_geofence(vehicle: Aircraft, distance: float) -> None:
-    """Raise `Refused` for a place so far (m) from home when the drone's own geofence is on and ends before."""
+    """Raise `Refused` for a place so far (m) from the geofence's centre when the drone's own geofence ends before."""
     state = vehicle.drone.piloting.state
     if state.geofence and state.max_distance is not None and distance > state.max_distance.current:
         raise Refused(
-            f"Goto refused: {distance:.0f} m from home is beyond the drone's limit of {state.max_distance.current:g} m",
-            lasting=True,
+            f"Goto refused: {distance:.0f} m from geofence centre > {state.max_distance.current:g} m", lasting=True
         )

@@ -121,7 +121,8 @@ PX4 = Flavour(
     numbers=_PX4_NUMBERS,
     modes=_PX4_MODES,
     version=(1, 16, 0),
-    # A development build: QGroundControl nags about official releases that are older than the newest (conformance A2).
+    # A development build: of an official one that is older than the newest QGroundControl says so in a dialog at each
+    # connect (FirmwarePlugin::checkIfIsLatestStable), in either family. It shows "1.16.0dev" for it.
     version_type=dialect.FIRMWARE_VERSION_TYPE_DEV,
     bytewise=True,
 )
@@ -154,11 +155,12 @@ ARDUPILOT = Flavour(
         9: FlightMode.LAND,
         _POSHOLD: FlightMode.POSITION,
         _BRAKE: FlightMode.HOLD,
+        20: FlightMode.GUIDED,  # GUIDED_NOGPS takes attitudes alone, and ours takes them with or without GPS
         21: FlightMode.RETURN,  # SMART_RTL: an ANAFI has one way home
         23: FlightMode.FOLLOW,
     },
     version=(4, 5, 7),
-    version_type=dialect.FIRMWARE_VERSION_TYPE_OFFICIAL,
+    version_type=dialect.FIRMWARE_VERSION_TYPE_DEV,
     bytewise=False,
     zero_home=True,
     float_plans=True,

@@ -26,6 +26,9 @@ from anafi_mav.services.plan_transfer import MAX_ITEMS
 
 logger = logging.getLogger(__name__)
 
+NOT_KEPT = "Plans not kept: state folder cannot be used"
+"""Text to each client that uploads a plan which the gateway cannot store. The log has file and reason."""
+
 VERSION = 1
 
 MAX_BYTES = 4 * 1024 * 1024
@@ -102,8 +105,12 @@ class Memory:
         """By MAV_MISSION_TYPE."""
         self.settings: dict[str, Any] = {}
         """Plain JSON values by name. Who reads one looks whether it makes sense: people can write files."""
+        self.problem = ""
+        """Why what is here could not be read or written; empty while all is well."""
         self._folder = folder
         self._serial = ""
+        self._unreadable = False
+        """The file is there and cannot be read now: it may be another time, and must not be replaced."""
 
     @property
     def path(self) -> Path | None:
@@ -121,6 +128,7 @@ class Memory:
         if serial and serial == self._serial:
             return None
         self._serial = serial
+        self._unreadable, self.problem = False, ""
         self.plans, self.settings = {}, {}
         path = self.path
         if path is None:
@@ -138,8 +146,9 @@ class Memory:
         except FileNotFoundError:
             return None
         except OSError as error:
-            self._serial = ""  # what cannot be read now may be another time: it must not be replaced
-            return f"{path}: {error.strerror}; the drone begins without its plans, and new ones are not kept"
+            self._unreadable = True
+            self.problem = f"{path}: {error.strerror}; the drone begins without its plans, and new ones are not kept"
+            return self.problem
         except (ValueError, RecursionError) as error:
             return f"{path}: {error}; put aside as {self._put_aside(path)}"
         self.plans = {kind: tuple(map(_loaded, items)) for kind, items in content.plans.items()}
@@ -155,12 +164,16 @@ class Memory:
         path = self.path
         if path is None:
             return None
+        if self._unreadable:
+            return self.problem
         plans = {kind: list(map(_stored, items)) for kind, items in self.plans.items() if items}
         content = _File(VERSION, self._serial, plans, dict(self.settings))
         try:
             await asyncio.get_running_loop().run_in_executor(_WRITER, _write, path, msgspec.json.encode(content))
         except OSError as error:
-            return f"{path}: {error.strerror}; what was changed is lost when the gateway ends"
+            self.problem = f"{path}: {error.strerror}; what was changed is lost when the gateway ends"
+            return self.problem
+        self.problem = ""
         return None
 
     @staticmethod

@@ -116,6 +116,14 @@ class Progress:
         return self.items[leg.origins[self.line + 1]].command in ENDINGS
 
     @property
+    def returned(self) -> bool:
+        """The drone has executed the whole file, and its last line was a return."""
+        leg = self.leg
+        if leg is None or not self.leg_done or self.state not in (State.ACTIVE, State.COMPLETE):
+            return False
+        return self.items[leg.origins[-1]].command == dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH
+
+    @property
     def at_last_line(self) -> bool:
         """All but one line of the file are executed."""
         return self.leg is not None and self.line == len(self.leg.origins) - 2

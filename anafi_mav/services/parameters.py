@@ -8,6 +8,7 @@ MAVLink parameter.md, conformance A5, C4, R12, R13.
 from __future__ import annotations
 
 import asyncio
+import math
 import struct
 from collections import deque
 from collections.abc import Collection, Iterable, Iterator, Mapping
@@ -44,8 +45,15 @@ from anafi_mav.services.trickle import Trickle
 MAX_WRITES = 8
 """Writes under way at once. A drone answers one within tens of milliseconds; several clients load their files."""
 
+MAX_PACKED = 8
+"""Different parts of param.pck that are kept: clients ask for the whole, or for a few."""
+
 KEY = "parameters"
 """In the drone's memory: those of the gateway's own settings that are kept, by native name."""
+
+REFUSAL_EVERY = 0.5
+"""s between texts to one channel about writes that were refused: one for a user who changes a value, a few for a
+program that loads a whole file."""
 
 MAX_WAITING = 512
 """Writes that wait for their turn: a whole list, from two clients. What comes beyond that comes again (1 s later)."""
@@ -75,6 +83,8 @@ class ParameterList:
         """The value of each as everybody was told it last."""
         self.changes = [0] * len(self.parameters)
         """How often everybody was told of each."""
+        self.version = 0
+        """How often any of them has changed."""
 
     def __len__(self) -> int:
         return len(self.parameters)
@@ -108,6 +118,7 @@ class ParameterList:
             if raw != self._told[index]:
                 self._told[index] = raw
                 self.changes[index] += 1
+                self.version += 1
                 found.append(index)
         return found
 
@@ -128,15 +139,21 @@ class ParameterService(Service):
         """By name of the flavour: places of the gateway's own settings."""
         self._own: list[Parameter] = []
         """The gateway's own settings, each once."""
-        self._seen: list[float] = []
+        self._seen = b""
         """Their values at the last look."""
         self._trickle = Trickle(host)
+        self._refused_at: dict[Channel, float] = {}
+        """When a text was last sent about a refused write."""
         self._waiting: deque[tuple[Inbound, Parameter, float]] = deque()
         self._writers: set[asyncio.Task[None]] = set()
         self._kept_of: str | None = None
         """Serial number of the drone whose settings these are."""
         self._locks: dict[str, asyncio.Lock] = {}
         """One for each value, by its native name: two writes of it are carried out in their order."""
+        self._storing = asyncio.Lock()
+        """Held while changed settings are stored, until every client has been notified of them."""
+        self._packed_files: dict[str, tuple[int, dict[str, bytes]]] = {}
+        """By name of the flavour: param.pck by its query, and how often the values had changed when it was made."""
 
     def messages(self) -> Mapping[int, MessageHandler]:
         return {
@@ -175,6 +192,7 @@ class ParameterService(Service):
 
     def channel_closed(self, channel: Channel) -> None:
         self._trickle.closed(channel)
+        self._refused_at.pop(channel, None)
 
     def hears(self) -> Collection[type[Message]]:
         return self._by_news.keys()
@@ -184,7 +202,8 @@ class ParameterService(Service):
             self._tell(name, self._lists[name].changed(indices))
 
     def tick(self, now: float) -> None:
-        self._tell_settings()
+        if not self._storing.locked() and self._own_values() != self._seen:
+            self.host.spawn(self._settle())
 
     # What outlives the gateway.
 
@@ -204,17 +223,14 @@ class ParameterService(Service):
                 value = parameter.default
             parameter.put(self.host, value)
 
-    def _keep(self) -> None:
-        """Whoever changed them: they are there when the gateway comes back."""
+    async def _keep(self) -> None:
+        """Store the gateway's own settings, so that they hold when it comes back."""
         now = {one.name: one.value(self.host) for one in KEPT}
         settings = self.host.memory.settings
         if now != settings.get(KEY, {one.name: one.default for one in KEPT}):
             settings[KEY] = now
-            self.host.spawn(self._save())
-
-    async def _save(self) -> None:
-        if (problem := await self.host.memory.save()) is not None:
-            self.host.complain(problem)
+            if (problem := await self.host.memory.save()) is not None:
+                self.host.complain(problem)
 
     # Files.
 
@@ -229,8 +245,18 @@ class ParameterService(Service):
         numbers = {name: text for name, text in query.items() if text.isascii() and text.isdigit() and len(text) < 6}
         if numbers.keys() != query.keys():
             return None
-        count = int(numbers.get("count", "0")) or None
-        return packed_file(self._lists[flavour.name].values(), int(numbers.get("start", "0")), count)
+        listed = self._lists[flavour.name]
+        version, made = self._packed_files.get(flavour.name, (-1, {}))
+        if version != listed.version:
+            made = {}
+            self._packed_files[flavour.name] = (listed.version, made)
+        key = f"{numbers.get('start', '')}+{numbers.get('count', '')}"
+        if key not in made:
+            if len(made) >= MAX_PACKED:
+                made.clear()
+            count = int(numbers.get("count", "0")) or None
+            made[key] = packed_file(listed.values(), int(numbers.get("start", "0")), count)
+        return made[key]
 
     # Reading.
 
@@ -248,6 +274,16 @@ class ParameterService(Service):
         self._trickle.start(inbound.channel, client_of(inbound), messages())
 
     def _request_read(self, inbound: Inbound) -> None:
+        if self._storing.locked():  # a value that is read has to be one that is stored
+            self.host.spawn(self._read_when_stored(inbound))
+        else:
+            self._read(inbound)
+
+    async def _read_when_stored(self, inbound: Inbound) -> None:
+        async with self._storing:
+            self._read(inbound)
+
+    def _read(self, inbound: Inbound) -> None:
         message = inbound.message
         flavour = flavour_of(inbound.channel)
         listed = self._lists[flavour.name]
@@ -277,17 +313,17 @@ class ParameterService(Service):
         parameter = listed.parameters[index]
         # ArduPilot's clients do not know the types: ArduPilot itself looks at the name alone.
         if flavour.bytewise and message.param_type != parameter.kind.mav:
-            self._refuse(inbound, dialect.MAV_PARAM_ERROR_TYPE_MISMATCH)
+            self._refuse(inbound, dialect.MAV_PARAM_ERROR_TYPE_MISMATCH, "wrong type")
             return
         value = carried(message.param_value, parameter.kind, bytewise=flavour.bytewise)
         if parameter.write is None:
             if value == parameter.value(self.host):
                 self._answer(inbound)
             else:
-                self._refuse(inbound, dialect.MAV_PARAM_ERROR_READ_ONLY)
+                self._refuse(inbound, dialect.MAV_PARAM_ERROR_READ_ONLY, "read only")
             return
         if not parameter.accepts(self.host, value):
-            self._refuse(inbound, dialect.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE)
+            self._refuse(inbound, dialect.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, "out of range")
             return
         self._queue(inbound, parameter, value)
 
@@ -321,21 +357,27 @@ class ParameterService(Service):
                 await parameter.write(self.host, value)
             except AnafiMavError as error:
                 self.host.text(Severity.WARNING, f"{parameter.name} not set: {error}")
-        self._tell_settings()
-        if listed.changes[index] == before:  # otherwise everybody was told, he too
+        await self._settle()
+        if listed.changes[index] == before:  # otherwise every client was notified, this one too
             self._answer(inbound)
 
     # Telling.
 
-    def _tell_settings(self) -> None:
-        """Tell everybody of the gateway's own settings that have changed, and remember them."""
-        now = [one.read(self.host) for one in self._own]
-        if now == self._seen:
-            return
-        self._seen = now
-        self._keep()
-        for name, indices in self._polled.items():
-            self._tell(name, self._lists[name].changed(indices))
+    def _own_values(self) -> bytes:
+        """Bytes, so that NaN is equal to NaN."""
+        return struct.pack(f"<{len(self._own)}d", *(one.read(self.host) for one in self._own))
+
+    async def _settle(self) -> None:
+        """Store the gateway's own settings that have changed, then notify every client of them.
+
+        In this order: what a client has read back must hold also when the gateway is killed in the next instant.
+        """
+        async with self._storing:
+            while (now := self._own_values()) != self._seen:
+                self._seen = now
+                await self._keep()  # meanwhile at most as many change as there are writers: each waits for us
+            for name, indices in self._polled.items():
+                self._tell(name, self._lists[name].changed(indices))
 
     def _tell(self, name: str, indices: list[int]) -> None:
         """PARAM_VALUE of these to every channel of a flavour."""
@@ -351,9 +393,14 @@ class ParameterService(Service):
         listed = self._lists[flavour_of(inbound.channel).name]
         self.host.send(listed.message(listed.index[name_of(inbound.message.param_id)]), inbound.channel)
 
-    def _refuse(self, inbound: Inbound, error: int) -> None:
+    def _refuse(self, inbound: Inbound, error: int, why: str) -> None:
+        """PARAM_ERROR, which QGroundControl 4 does not know, the value that holds, and a text to the sender."""
         self._error(inbound, error)
         self._answer(inbound)
+        now = self.host.clock.monotonic()
+        if now - self._refused_at.get(inbound.channel, -math.inf) >= REFUSAL_EVERY:
+            self._refused_at[inbound.channel] = now
+            self.host.text(Severity.WARNING, f"{name_of(inbound.message.param_id)} not set: {why}", inbound.channel)
 
     def _error(self, inbound: Inbound, error: int) -> None:
         message: Any = inbound.message

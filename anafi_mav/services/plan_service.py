@@ -20,8 +20,9 @@ from anafi_mav.plans.parrot import Version
 from anafi_mav.services import plan_files
 from anafi_mav.services.fence import FenceKind, summary
 from anafi_mav.services.files import Query, ServedFile
-from anafi_mav.services.flavours import ARDUPILOT, Flavour, flavour_of
+from anafi_mav.services.flavours import ARDUPILOT, PX4, Flavour, flavour_of
 from anafi_mav.services.guided import fly_item, is_guided_item
+from anafi_mav.services.memory import NOT_KEPT
 from anafi_mav.services.mission_kind import MissionKind
 from anafi_mav.services.plan_desk import MESSAGES, PlanDesk
 from anafi_mav.services.plan_items import Fault, PlanItem
@@ -111,7 +112,7 @@ class PlanService(Service):
         """Why a plan that was kept is not taken."""
         for number, item in enumerate(items):
             if (fault := kind.check_item(item)) is not None:
-                return f"item {number}: {fault.reason}"
+                return f"item {kind.label(number, PX4)}: {fault.reason}"
         fault = self._mission.examine(items) if kind is self._mission else kind.check_plan(items)
         return None if fault is None else fault.reason
 
@@ -178,7 +179,9 @@ class PlanService(Service):
             self.host.memory.put(kind, items)
         problem = await self.host.memory.save()
         if problem is not None:
-            self.host.complain(problem)
+            logger.warning("%s: %s", self.host.drone.name, problem)
+            assert isinstance(commit.peer, _ChannelPeer)
+            self.host.text(Severity.WARNING, NOT_KEPT, commit.peer.channel)
         return None
 
     def _set_timer(self) -> None:
@@ -240,5 +243,5 @@ class PlanService(Service):
             vehicle.fence.take(items)
         elif kind == RallyKind.mission_type:
             if items and vehicle.rally.purpose is Return.HOME and items != vehicle.rally.items:
-                self.host.text(Severity.INFO, f"{len(items)} rally points kept and not used: RTL_TYPE says home")
+                self.host.text(Severity.INFO, f"Rally points not used: RTL_TYPE is home ({len(items)})")
             vehicle.rally.take(items)

@@ -150,6 +150,10 @@ class PlanKind:
         """Warnings about a list that a client sent and that is accepted: items that `taken` leaves out."""
         return ()
 
+    def label(self, seq: int, flavour: Flavour) -> int:
+        """Return the number of an item of this seq in texts."""
+        return seq
+
     def always_shown(self, seq: int, flavour: Flavour) -> PlanItem | None:
         """What stands at a place of the list even when it is empty; None: nothing."""
         return None
@@ -296,7 +300,8 @@ class PlanTransfer:
         item = item_of(message)
         fault = item if isinstance(item, Fault) else self.kind.check_item(item)
         if fault is not None:
-            return self._refuse(Fault(fault.result, f"item {message.seq}: {fault.reason}"), now)
+            number = self.kind.label(message.seq, peer.flavour)
+            return self._refuse(Fault(fault.result, f"item {number}: {fault.reason}"), now)
         assert isinstance(item, PlanItem)
         upload.items[message.seq : message.seq + 1] = [item]
         if upload.requests.came():
@@ -437,7 +442,7 @@ class PlanTransfer:
                 return [
                     self._ack(upload.peer, dialect.MAV_MISSION_OPERATION_CANCELLED),
                     Say(Severity.WARNING, f"{self.kind.name.capitalize()} upload given up: "
-                        f"item {upload.requests.expected} does not come"),
+                        f"item {self.kind.label(upload.requests.expected, upload.peer.flavour)} does not come"),
                 ]  # fmt: skip
             return [self._request(upload, now)]
         if upload is None and done is not None and done.echoes > 0 and now >= done.due:

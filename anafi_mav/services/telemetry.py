@@ -2,7 +2,8 @@
 
 A stream message leaves when one of its fields is new, never to fill a rate: an ANAFI's attitude comes five times a
 second, and so do the messages built from it, at most. State messages (battery, system status, home) repeat at their
-interval because a client that just connected needs them; a time in them is that of the last news.
+interval because a client that just connected needs them; a time in one that is repeated is that of its sending, for
+what has not changed is still true, and an old time looks like a restart (MAVProxy: "Time has wrapped").
 """
 
 from __future__ import annotations

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import ipaddress
+import json
 import re
 import socket
 import sys
@@ -51,6 +52,17 @@ async def test_what_it_prints_is_a_configuration() -> None:
         assert re.search(rf"# Skycontroller 3 with the drone behind it, PI\w+, found at {behind.address}", text)
         # By Parrot's mux, which is all that a Skycontroller 4 speaks.
         assert re.search(rf"# Skycontroller 4 with the drone behind it, PI\w+, found at {modern.address}", text)
+        async with words("discover", direct.address, "--timeout", "5", "--json") as held:
+            assert await held.end() == 0, str(held)
+        assert {
+            "address": direct.address,
+            "interface": None,
+            "kind": "drone",
+            "model": "ANAFI 4K",
+            "model_id": 0x0914,
+            "name": direct.identity.name,
+            "serial": direct.identity.serial,
+        } in json.loads("\n".join(held.lines))
         # Nobody was disturbed: no session was begun.
         assert not [entry for drone in simulator.drones for entry in drone.log.find("session")]
 
@@ -118,7 +130,7 @@ def test_whatever_a_device_calls_itself_is_no_trouble(name: str) -> None:
 async def test_info_tells_what_there_is() -> None:
     async with Simulator([spec("thermal", 3)], seed=1) as simulator:
         drone = simulator.drones[0]
-        async with words("info", drone.address) as held:
+        async with words("info", drone.address, "--take") as held:
             assert await held.end() == 0, str(held)
         text = "\n".join(held.lines)
         for line in (
@@ -137,9 +149,33 @@ async def test_info_tells_what_there_is() -> None:
         assert re.search(r"^controller: PI\w+, firmware 1.8.2, battery 87 %$", text, re.M)
 
 
+async def test_info_json_has_the_same_facts() -> None:
+    async with Simulator([spec("usa", 3)], seed=1) as simulator:
+        drone = simulator.drones[0]
+        async with words("info", drone.address, "--take", "--json") as held:
+            assert await held.end() == 0, str(held)
+    facts = json.loads("\n".join(held.lines))
+    assert (facts["model"], facts["serial"], facts["firmware"]) == ("ANAFI USA", drone.identity.serial, "1.8.2")
+    assert facts["limits"]["max tilt"] == {"value": 10.0, "min": 1.0, "max": 40.0}
+    assert facts["takeoff_blockers"] == []
+    assert facts["controller"]["battery_percent"] == 87
+
+
+async def test_escapes_of_a_drone_reach_no_terminal() -> None:
+    one = DroneSpec(address=loopback(), http_port=None, rtsp_port=None, name="\x1b]0;owned\x07 drone")
+    async with Simulator([one], seed=1) as simulator:
+        for command in (("info", one.address, "--take"), ("discover", one.address, "--timeout", "5")):
+            async with words(*command) as held:
+                assert await held.end() == 0, str(held)
+            assert not {"\x1b", "\x07"} & set("".join(held.lines))
+            if command[0] == "info":
+                assert r"name: \x1b]0;owned\x07 drone" in held.lines
+    assert simulator.drones[0].identity.name.startswith("\x1b")
+
+
 async def test_info_of_nobody() -> None:
     address = loopback()
-    async with words("info", address) as held:
+    async with words("info", address, "--take") as held:
         assert await held.end() == 1
     assert held.complaints == [f"anafi-mav: cannot connect to {address}:44445: Connection refused"]
 

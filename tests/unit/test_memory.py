@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from anafi_mav.gateway import state_folder
 from anafi_mav.services.memory import MAX_BYTES, Memory
 from anafi_mav.services.plan_items import PlanItem, opaque_id
+from anafi_mav.state_lock import state_folder
 
 SERIAL = "PI040443BA8K000123"
 ITEMS = (
@@ -128,7 +128,9 @@ async def test_what_cannot_be_read_now_is_not_replaced(tmp_path: Path) -> None:
     assert line is not None
     assert "new ones are not kept" in line
     memory.put(1, ITEMS)
-    assert await memory.save() is None
+    assert await memory.save() == memory.problem == line  # whoever uploads is notified each time
+    assert memory.load(SERIAL) is None
+    assert memory.plans[1] == ITEMS  # and has it until the gateway ends, also after a loss of the link
     assert (tmp_path / f"{SERIAL}.json").is_dir()
 
 

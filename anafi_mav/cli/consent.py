@@ -1,0 +1,54 @@
+"""Permission to connect to a drone: a handshake takes it from the controller that has it, in the air too.
+
+Whether another controller is connected cannot be known before the handshake. So `info` and `doctor` ask first, and
+without a terminal they connect only with `--take`. What a gateway of this machine holds they never connect to.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import sys
+
+from anafi_mav.state_lock import HeldDrone, Holder, read_holder, state_folder
+
+WARNING = "connecting takes the drone from any controller that has it, in the air too"
+
+GATEWAY_RETRIES = "; end that gateway first, or ask it by MAVLink"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of a command that may connect."""
+    parser.add_argument("--take", action="store_true", help=f"connect without asking: {WARNING}")
+    parser.add_argument(
+        "--state", metavar="FOLDER", help="state folder of a gateway on this machine, whose drones are left to it"
+    )
+
+
+def gateway_of(state: str | None, address: str, interface: str | None, serial: str = "") -> str | None:
+    """Return a clause about the gateway of this machine that holds a drone; None where no gateway does."""
+    holder = read_holder(state_folder(state))
+    drone = None if holder is None else holder.find(address, interface, serial)
+    return None if holder is None or drone is None else _clause(holder, drone)
+
+
+def _clause(holder: Holder, drone: HeldDrone) -> str:
+    doing = f"connected to {drone.serial}" if drone.serial else "connecting"
+    return f"the gateway with process id {holder.pid} holds it as {drone.name} ({doing})"
+
+
+def may_connect(address: str, *, take: bool) -> bool | None:
+    """Return whether the user wants to connect; None where there is no terminal to ask at."""
+    if take:
+        return True
+    if not (sys.stdin.isatty() and sys.stderr.isatty()):
+        return None
+    return confirmed(f"{WARNING}. Connect to {address}?")
+
+
+def confirmed(question: str) -> bool:
+    """Return whether the user answers yes at the terminal."""
+    print(f"anafi-mav: {question} [y/N] ", end="", file=sys.stderr, flush=True)
+    with contextlib.suppress(EOFError):
+        return input().strip().lower() in ("y", "yes")
+    return False

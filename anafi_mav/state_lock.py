@@ -1,0 +1,181 @@
+"""The state folder of a gateway, and the lock file that keeps it to one gateway at a time.
+
+The file `gateway.lock` says which process holds the folder and which drones it connects to: one line of JSON,
+
+    {"version": 1, "pid": 4711, "drones": [{"name": "alpha", "address": "192.168.42.1", "interface": null,
+     "serial": "PI040416DA9H839157"}]}
+
+`serial` is empty while that drone is not connected. What counts is the operating system's lock on the file, which ends
+with its process however that ends; the content of a file that nothing locks is of the past.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import logging
+import os
+import sys
+import time
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta
+
+logger = logging.getLogger(__name__)
+
+FILE = "gateway.lock"
+
+VERSION = 1
+
+MAX_BYTES = 256 * 1024
+"""Of the file: 250 drones take a quarter of this."""
+
+TRIES, TRY_EVERY = 5, 0.05
+"""Attempts and s between them: a program that looks whether the folder is held locks it for an instant, and a file
+that is being written may be read half."""
+
+_HELD = (errno.EWOULDBLOCK, errno.EACCES, errno.EDEADLK)
+"""What locking says when another has the lock: flock, fcntl on some systems, msvcrt."""
+
+
+def state_folder(configured: str | None) -> Path | None:
+    """Return the folder of what outlives the gateway, None when the user has no home (XDG Base Directory)."""
+    given = os.environ.get("XDG_STATE_HOME", "")
+    try:
+        if configured is not None:
+            return Path(configured).expanduser()
+        return (Path(given) if Path(given).is_absolute() else Path.home() / ".local" / "state") / "anafi-mav"
+    except RuntimeError as error:
+        logger.warning("nothing will outlive the gateway: %s", error)
+        return None
+
+
+class HeldDrone(msgspec.Struct, frozen=True):
+    """A drone of a running gateway."""
+
+    name: str
+    address: str
+    interface: str | None = None
+    serial: str = ""
+    """Serial number while connected; of the drone, also behind a Skycontroller."""
+
+
+class Holder(msgspec.Struct, frozen=True):
+    """The gateway that holds a state folder."""
+
+    version: int
+    pid: Annotated[int, Meta(ge=0)]
+    drones: tuple[HeldDrone, ...] = ()
+
+    def find(self, address: str, interface: str | None = None, serial: str = "") -> HeldDrone | None:
+        """Return its drone at this address or with this serial number. Without an interface any one matches."""
+        for drone in self.drones:
+            if serial and drone.serial == serial:
+                return drone
+            if drone.address == address and (interface is None or drone.interface in (None, interface)):
+                return drone
+        return None
+
+
+class StateLock:
+    """The lock of one state folder: `acquire`, `write` whenever a drone connects or disconnects, `release`."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._file: int | None = None
+
+    def acquire(self) -> Holder | None:
+        """Lock the folder and return None, or return the gateway that holds it. Raises `OSError` for a folder that
+        cannot be used."""
+        self._folder.mkdir(parents=True, exist_ok=True)
+        file = os.open(self._folder / FILE, os.O_RDWR | os.O_CREAT, 0o644)
+        try:
+            for attempt in range(TRIES):
+                if _lock(file):
+                    self._file, file = file, -1
+                    self.write(())
+                    return None
+                if attempt + 1 < TRIES:
+                    time.sleep(TRY_EVERY)
+            return _read(file)
+        finally:
+            if file >= 0:
+                os.close(file)
+
+    def write(self, drones: Iterable[HeldDrone]) -> None:
+        """Replace what the file says. A full disk is no reason to end a flight."""
+        if self._file is None:
+            return
+        line = msgspec.json.encode(Holder(VERSION, os.getpid(), tuple(drones))) + b"\n"
+        with contextlib.suppress(OSError):
+            os.lseek(self._file, 0, os.SEEK_SET)
+            os.write(self._file, line)  # readers take the first line: what follows it for an instant is old
+            os.ftruncate(self._file, len(line))
+
+    def release(self) -> None:
+        """Unlock the folder. Safe to call twice."""
+        if self._file is not None:
+            with contextlib.suppress(OSError):
+                os.ftruncate(self._file, 0)
+            os.close(self._file)
+            self._file = None
+
+
+def read_holder(folder: Path | None) -> Holder | None:
+    """Return the gateway that holds a folder now; None where none does, or it cannot be known."""
+    if folder is None:
+        return None
+    try:
+        file = os.open(folder / FILE, os.O_RDWR)
+    except OSError:
+        return None
+    try:
+        return None if _lock(file) else _read(file)
+    except OSError:
+        return None
+    finally:
+        os.close(file)  # which unlocks it
+
+
+def _read(file: int) -> Holder:
+    """Return what a locked file says; process id 0 where it says nothing."""
+    for _ in range(TRIES):
+        os.lseek(file, 0, os.SEEK_SET)
+        line = os.read(file, MAX_BYTES).partition(b"\n")[0]
+        with contextlib.suppress(ValueError, RecursionError):
+            return msgspec.json.decode(line, type=Holder)
+        time.sleep(TRY_EVERY)
+    return Holder(VERSION, 0)
+
+
+if sys.platform == "win32":
+    import msvcrt
+
+    _BEYOND = 1 << 30
+    """Place of the byte that is locked: Windows lets no other process read locked bytes."""
+
+    def _lock(file: int) -> bool:
+        os.lseek(file, _BEYOND, os.SEEK_SET)
+        try:
+            msvcrt.locking(file, msvcrt.LK_NBLCK, 1)
+        except OSError as error:
+            if error.errno in _HELD:
+                return False
+            raise
+        return True
+
+else:
+    import fcntl
+
+    def _lock(file: int) -> bool:
+        """Lock an open file; False when another holds it. Raises `OSError` where the file system has no locks."""
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            if error.errno in _HELD:
+                return False
+            raise
+        return True

@@ -1,0 +1,98 @@
+"""The lock file of a state folder: one gateway at a time, and what other programs read there."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from anafi_mav.state_lock import FILE, HeldDrone, Holder, StateLock, read_holder
+
+ALPHA = HeldDrone("alpha", "192.168.42.1", "wlan1", "PI040416DA9H839157")
+
+
+def held(folder: Path) -> Holder:
+    holder = read_holder(folder)
+    assert holder is not None
+    return holder
+
+
+def test_state_lock_while_held_names_process_and_drones(tmp_path: Path) -> None:
+    folder = tmp_path / "state"
+    lock = StateLock(folder)
+    assert read_holder(folder) is None
+    assert lock.acquire() is None
+    assert held(folder) == Holder(1, os.getpid(), ())
+    lock.write([ALPHA, HeldDrone("bravo", "192.168.42.1", "wlan2")])
+    assert held(folder).drones[0] == ALPHA
+    lock.write([ALPHA])  # shorter than before
+    assert held(folder).drones == (ALPHA,)
+    assert json.loads((folder / FILE).read_text()) == {
+        "version": 1,
+        "pid": os.getpid(),
+        "drones": [{"name": "alpha", "address": "192.168.42.1", "interface": "wlan1", "serial": "PI040416DA9H839157"}],
+    }
+    lock.release()
+    lock.release()
+    assert read_holder(folder) is None
+
+
+def test_state_lock_of_a_second_gateway_is_refused(tmp_path: Path) -> None:
+    first, second = StateLock(tmp_path), StateLock(tmp_path)
+    assert first.acquire() is None
+    first.write([ALPHA])
+    assert second.acquire() == Holder(1, os.getpid(), (ALPHA,))
+    assert held(tmp_path).drones == (ALPHA,)  # looking changed nothing
+    first.release()
+    assert second.acquire() is None
+    second.release()
+
+
+def test_state_lock_of_a_killed_process_is_free(tmp_path: Path) -> None:
+    script = (
+        "import sys, time; from pathlib import Path; from anafi_mav.state_lock import StateLock\n"
+        "lock = StateLock(Path(sys.argv[1])); lock.acquire(); print('held', flush=True); time.sleep(60)"
+    )
+    with subprocess.Popen([sys.executable, "-c", script, str(tmp_path)], stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == b"held\n"
+        assert held(tmp_path).pid == process.pid
+        process.kill()
+    assert (tmp_path / FILE).read_text() != ""
+    assert read_holder(tmp_path) is None  # what a process of the past wrote counts for nothing
+    lock = StateLock(tmp_path)
+    assert lock.acquire() is None
+    lock.release()
+
+
+@pytest.mark.parametrize("content", [b"", b"{", b"[]", b'{"version": 1, "pid": "x"}', b"\xff" * 100])
+def test_state_lock_with_unreadable_content_is_still_held(tmp_path: Path, content: bytes) -> None:
+    lock = StateLock(tmp_path)
+    assert lock.acquire() is None
+    (tmp_path / FILE).write_bytes(content)
+    assert held(tmp_path) == Holder(1, 0, ())
+    lock.release()
+
+
+def test_state_lock_of_an_unusable_folder_raises(tmp_path: Path) -> None:
+    (tmp_path / "state").write_text("a file")
+    with pytest.raises(OSError, match="File exists"):
+        StateLock(tmp_path / "state").acquire()
+    assert read_holder(tmp_path / "state") is None
+    assert read_holder(None) is None
+
+
+def test_holder_finds_a_drone_by_address_interface_or_serial() -> None:
+    bravo = HeldDrone("bravo", "192.168.42.1", "wlan2")
+    charlie = HeldDrone("charlie", "10.0.0.1")
+    holder = Holder(1, 1, (ALPHA, bravo, charlie))
+    assert holder.find("192.168.42.1", "wlan2") == bravo
+    assert holder.find("192.168.42.1") == ALPHA
+    assert holder.find("192.168.42.1", "wlan3") is None
+    assert holder.find("10.0.0.1", "eth0") == charlie
+    assert holder.find("192.168.53.1", serial=ALPHA.serial) == ALPHA
+    assert holder.find("192.168.53.1", serial="") is None
