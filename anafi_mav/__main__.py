@@ -1,8 +1,32 @@
-"""`python -m anafi_mav` is `anafi-mav`."""
+"""`anafi-mav` and `python -m anafi_mav`.
 
+Importing a command takes up to a second. Ctrl-C ends the program at once then: nothing has been opened or begun, and a
+traceback out of an import helps nobody. So this module imports nothing before it has made its arrangements.
+"""
+
+import os
+import signal
 import sys
 
-from anafi_mav.cli import main
+INTERRUPTED = 130
+"""Exit status of a program that Ctrl-C has ended, as shells have it."""
+
+
+def main() -> int:
+    """Run the command line; returns the exit status."""
+    _end_at_once_on_interrupt(INTERRUPTED)
+    from anafi_mav.cli import main as run
+
+    status = run()
+    _end_at_once_on_interrupt(status)
+    return status
+
+
+def _end_at_once_on_interrupt(status: int) -> None:
+    """Let SIGINT end the process with this status, unless it is ignored, as for a shell's background jobs."""
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        signal.signal(signal.SIGINT, lambda number, frame: os._exit(status))
+
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from anafi_mav.arsdk.handshake import DeviceInfo
 from anafi_mav.arsdk.interface import networks
 from anafi_mav.arsdk.mux_link import look_either
+from anafi_mav.cli import interrupts
 from anafi_mav.cli.addresses import spot
 from anafi_mav.cli.terminal import complain, say, say_json
 from anafi_mav.drone.controller import MODELS as CONTROLLERS
@@ -73,7 +74,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Look everywhere at once. 1 when nothing is there."""
     timeout = _timeout(arguments.timeout)
     wanted = [_place(text) for text in arguments.addresses]
-    finds = asyncio.run(discover(places(wanted, networks()), timeout))
+    finds = interrupts.run(discover(places(wanted, networks()), timeout))
     if arguments.json:
         say_json([_facts(find) for find in finds])
         return 0 if finds else 1

@@ -18,7 +18,7 @@ from anafi_mav.arsdk.handshake import DISCOVERY_PORT, HANDSHAKE_PORT, DeviceInfo
 from anafi_mav.arsdk.interface import bind_to_interface, networks, open_connection
 from anafi_mav.arsdk.mux_link import look_either
 from anafi_mav.arsdk.rtsp import DEFAULT_PORT as RTSP_PORT
-from anafi_mav.cli import consent, options
+from anafi_mav.cli import consent, interrupts, options
 from anafi_mav.cli.addresses import spot
 from anafi_mav.cli.terminal import say, say_json
 from anafi_mav.drone import Drone
@@ -91,7 +91,7 @@ def run(arguments: argparse.Namespace) -> int:
         http_port=_port("--http-port", arguments.http_port),
         rtsp_port=_port("--rtsp-port", arguments.rtsp_port),
     )
-    findings, device = asyncio.run(before_handshake(place))
+    findings, device = interrupts.run(before_handshake(place))
     held = consent.gateway_of(arguments.state, place.address, place.interface, "" if device is None else device.serial)
     if held is not None:
         findings.append(wrong("gateway", held, "its drones are left to it" + consent.GATEWAY_RETRIES))
@@ -101,7 +101,7 @@ def run(arguments: argparse.Namespace) -> int:
     unasked: tuple[str, ...] = UNASKED
     if held is None and device is not None and consent.may_connect(arguments.address, take=arguments.take):
         unasked = ()
-        more = asyncio.run(with_handshake(place))
+        more = interrupts.run(with_handshake(place))
         findings += more
         if not arguments.json:
             for finding in more:

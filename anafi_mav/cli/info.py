@@ -13,7 +13,7 @@ from typing import Any
 import msgspec
 
 from anafi_mav.arsdk.wire import Message
-from anafi_mav.cli import consent
+from anafi_mav.cli import consent, interrupts
 from anafi_mav.cli.addresses import spot
 from anafi_mav.cli.terminal import complain, say, say_json
 from anafi_mav.drone import Drone
@@ -49,7 +49,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise ConfigError("--take", f"expected it, because {consent.WARNING}; {without}")
     if not may:
         return 1
-    facts = asyncio.run(_ask(**place))
+    facts = interrupts.run(_ask(**place))
     if arguments.json:
         say_json(facts)
     else:

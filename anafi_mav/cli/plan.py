@@ -8,7 +8,7 @@ import logging
 from collections.abc import Callable
 from typing import NamedTuple, cast
 
-from anafi_mav.cli import log, plan_options
+from anafi_mav.cli import interrupts, log, plan_options
 
 
 class Action(NamedTuple):
@@ -47,5 +47,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Do it. Raises `PlanError` for a plan that is none, `ConfigError` for a wrong option."""
     log.set_up(logging.ERROR)  # how an endpoint fares is told when it matters
-    module = importlib.import_module(f"anafi_mav.cli.{ACTIONS[arguments.action].module}")
+    name = ACTIONS[arguments.action].module
+    module = importlib.import_module(f"anafi_mav.cli.{name}")
+    if name == "plan_files":  # the others run a loop, which has its own arrangements
+        interrupts.raise_on_interrupt()
     return cast(Callable[[argparse.Namespace], int], getattr(module, arguments.action))(arguments)

@@ -6,7 +6,7 @@ import argparse
 import asyncio
 from typing import Any
 
-from anafi_mav.cli import plan_options
+from anafi_mav.cli import interrupts, plan_options
 from anafi_mav.cli.ground import Ground, Texts, connected
 from anafi_mav.cli.plan_link import give
 from anafi_mav.cli.terminal import say
@@ -26,10 +26,10 @@ class Ended(AnafiMavError):
 
 def fly(arguments: argparse.Namespace) -> int:
     """Fly it. Raises `Refused`, `CommandRejected`, `LinkLost` and `Ended`."""
-    sysid, plan = plan_options.sysid_of(arguments), plan_options.load(arguments)
+    plan, sysid = plan_options.load(arguments), plan_options.sysid_of(arguments)
     if not plan.items:
         raise PlanError(arguments.file.name, "it has no mission: nothing to fly")
-    asyncio.run(_fly(arguments, sysid, plan))
+    interrupts.run(_fly(arguments, sysid, plan))
     return 0
 
 

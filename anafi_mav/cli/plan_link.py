@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import asyncio
 import contextlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from anafi_mav.cli import plan_files, plan_options
+from anafi_mav.cli import interrupts, plan_files, plan_options
 from anafi_mav.cli.ground import Ground, Texts, connected
 from anafi_mav.cli.terminal import progress, say
 from anafi_mav.errors import AnafiMavError, PlanError
@@ -86,8 +85,8 @@ def _without_heading(item: Item) -> Item:
 
 def upload(arguments: argparse.Namespace) -> int:
     """Hand it over; 1 when the gateway took it and cannot store it. Raises `Refused` with the vehicle's reason."""
-    sysid, plan = plan_options.sysid_of(arguments), plan_options.load(arguments)
-    texts = asyncio.run(_upload(arguments, sysid, plan))
+    plan, sysid = plan_options.load(arguments), plan_options.sysid_of(arguments)
+    texts = interrupts.run(_upload(arguments, sysid, plan))
     return 1 if NOT_KEPT in texts else 0
 
 
@@ -174,7 +173,9 @@ def download(arguments: argparse.Namespace) -> int:
     """Fetch mission, fence and rally points into one file. Raises `Refused`."""
     sysid = plan_options.sysid_of(arguments)
     plan_options.target_format(arguments.out, arguments.model)
-    plan = asyncio.run(_download(arguments, sysid))
+    plan_files.may_replace(arguments.out, force=arguments.force)
+    arguments.force = True  # it has been asked, before the vehicle was
+    plan = interrupts.run(_download(arguments, sysid))
     plan_files.store(plan, arguments, Path("the vehicle's plan"))
     return 0
 

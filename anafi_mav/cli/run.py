@@ -20,6 +20,7 @@ from anafi_mav.cli.terminal import complain, say
 from anafi_mav.config import Config, DroneConfig, SimConfig, from_mapping, load, remarks
 from anafi_mav.errors import ConfigError
 from anafi_mav.gateway import Gateway
+from anafi_mav.mavlink.endpoint import is_open_to_network, parse_endpoint
 from anafi_mav.sim import quirks, scenario
 
 READY_LIMIT = 15.0
@@ -76,6 +77,13 @@ def _serve(arguments: argparse.Namespace) -> int:
     config = configuration(arguments.config, arguments.drone, arguments.endpoint, arguments.allow_kill)
     for remark in remarks(config):
         complain(f"warning: {remark}", "yellow")
+    for index, text in enumerate(config.endpoints):
+        with contextlib.suppress(ConfigError):  # the gateway says what is wrong with it
+            if is_open_to_network(parse_endpoint(text)):
+                what = (
+                    "is open to the network and MAVLink has no password: any program that reaches it can fly the drones"
+                )
+                complain(f"warning: endpoints[{index}]: {text} {what}", "yellow")
     heap.settle()
     problems = asyncio.run(_run(config, arguments.sim_log.absolute() if arguments.sim_log else None))
     for problem in problems:

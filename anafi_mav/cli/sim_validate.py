@@ -20,7 +20,7 @@ from typing import Any
 from anafi_mav.arsdk.messages import ardrone3, gimbal
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.messages.gimbal import FrameOfReference
-from anafi_mav.cli import options
+from anafi_mav.cli import interrupts, options
 from anafi_mav.cli.terminal import complain, say
 from anafi_mav.drone import Drone, PilotingCommand
 from anafi_mav.drone.gimbal import Aim
@@ -103,7 +103,7 @@ def run(arguments: argparse.Namespace) -> int:
         except OSError as error:
             raise ConfigError("--plots", f"expected a folder, got {arguments.plots}: {error.strerror}") from error
     try:
-        flights = asyncio.run(_fly_all(models, speed))
+        flights = interrupts.run(_fly_all(models, speed))
     except StoodStill as error:
         complain(f"the flights are invalid: {error}; try again when it is less busy, or one --model at a time")
         return 1

@@ -8,6 +8,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import os
+import re
 from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Callable, Iterable
@@ -81,6 +82,13 @@ class Endpoint(ABC):
     def url(self) -> str:
         """As in the configuration."""
         return self.parsed.text
+
+    @property
+    def shown_url(self) -> str:
+        """As in the configuration, with the real port in place of 0."""
+        if self.parsed.number or self.local_port is None:
+            return self.url
+        return re.sub(r":0+(?=\?|$)", f":{self.local_port}", self.url, count=1)
 
     @property
     def local_port(self) -> int | None:
@@ -224,13 +232,16 @@ async def close_peers(peers: Iterable[StreamPeer]) -> None:
         await asyncio.wait([peer.lost for peer in peers], timeout=CLOSE_WAIT)
 
 
+UNTRIED = "not tried yet"
+
+
 class Reopening(Endpoint):
     """An endpoint with at most one stream, that is opened anew whenever it ends."""
 
     def __init__(self, url: EndpointUrl, sink: Sink, clock: Clock) -> None:
         super().__init__(url, sink, clock)
         self._peer: StreamPeer | None = None
-        self._problem = "not tried yet"
+        self._problem = UNTRIED
         self._task: asyncio.Task[None] | None = None
 
     @abstractmethod
@@ -266,7 +277,9 @@ class Reopening(Endpoint):
                 except OSError as error:
                     self._note(reason(error))
             if self._peer is not None:
-                logger.info("%s: connected", self.url)
+                # As loud as the loss that it ends.
+                logger.log(logging.WARNING if self._problem != UNTRIED else logging.INFO, "%s: connected", self.url)
+                self._problem = ""
                 await asyncio.shield(self._peer.lost)
                 self._peer = None
                 self._note("the connection ended")

@@ -10,6 +10,7 @@ so.
 
 from __future__ import annotations
 
+import ipaddress
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -41,8 +42,8 @@ class Scheme:
     """What follows "scheme://"."""
     description: str
     factory: Callable[[EndpointUrl, Sink, Clock], Endpoint]
-    any_port: bool = False
-    """Port 0, any free one, makes sense."""
+    listens: bool = False
+    """It waits for clients at an address of this machine. Port 0, any free one, makes sense."""
     datagrams: bool = False
     """It sends datagrams, so that `frames` makes sense."""
 
@@ -57,9 +58,9 @@ SCHEMES: dict[str, Scheme] = {
         "HOST:PORT", "send to HOST:PORT and hear its answers (QGroundControl, MAVSDK)", UdpOut, datagrams=True
     ),
     "udpin": Scheme(
-        "HOST:PORT", "listen on HOST:PORT, answer whoever speaks MAVLink there", UdpIn, any_port=True, datagrams=True
+        "HOST:PORT", "listen on HOST:PORT, answer whoever speaks MAVLink there", UdpIn, listens=True, datagrams=True
     ),
-    "tcpin": Scheme("HOST:PORT", "serve TCP clients on HOST:PORT (MAVProxy, Mission Planner)", TcpIn, any_port=True),
+    "tcpin": Scheme("HOST:PORT", "serve TCP clients on HOST:PORT (MAVProxy, Mission Planner)", TcpIn, listens=True),
     "tcpout": Scheme("HOST:PORT", "connect to a TCP server, again and again", TcpOut),
     "serial": Scheme("DEVICE:BAUD", "a serial line, e.g. serial:///dev/ttyUSB0:57600", SerialLine),
 }
@@ -89,10 +90,20 @@ def parse_endpoint(url: str) -> EndpointUrl:
     place = _PLACE.fullmatch(parts["rest"])
     if place is None:
         raise ConfigError("", f"{url!r}: expected {form}, e.g. {name}://127.0.0.1:14550")
-    port, lowest = int(place["number"]), 0 if scheme.any_port else 1
+    port, lowest = int(place["number"]), 0 if scheme.listens else 1
     if not lowest <= port <= MAX_PORT:
         raise ConfigError("", f"{url!r}: expected a port from {lowest} to {MAX_PORT}")
     return EndpointUrl(url, name, place["v6"] or place["host"], port, **_options(url, scheme, parts["query"]))
+
+
+def is_open_to_network(url: EndpointUrl) -> bool:
+    """True when other machines can send to this endpoint: it listens, and on more than this machine's loopback."""
+    if not SCHEMES[url.scheme].listens or url.place.rstrip(".").lower() == "localhost":
+        return False
+    try:
+        return not ipaddress.ip_address(url.place.partition("%")[0]).is_loopback
+    except ValueError:
+        return True
 
 
 def make_endpoint(url: EndpointUrl, sink: Sink, clock: Clock) -> Endpoint:

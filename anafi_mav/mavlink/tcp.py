@@ -52,7 +52,7 @@ class TcpIn(Endpoint):
 
     def describe(self) -> str:
         count = len(self._peers)
-        return f"{self.url}: {count} client{'' if count == 1 else 's'}"
+        return f"{self.shown_url}: {count} client{'' if count == 1 else 's'}"
 
     def admit(self, transport: asyncio.BaseTransport) -> StreamPeer | None:
         """The peer for a new connection; None if there are too many, or it comes while we close."""

@@ -183,6 +183,7 @@ class UdpOut(Endpoint):
             except OSError as error:
                 self._problem = reason(error)
             else:
+                logger.warning("%s: open again", self.url)
                 return
 
 
@@ -228,7 +229,7 @@ class UdpIn(Endpoint):
 
     def describe(self) -> str:
         count = len(self._peers)
-        return f"{self.url}: {count} peer{'' if count == 1 else 's'}"
+        return f"{self.shown_url}: {count} peer{'' if count == 1 else 's'}"
 
     def expire(self, now: float) -> None:
         """Forget the peers that have been silent for too long."""

@@ -105,7 +105,7 @@ class MissionService(Service):
         """MAV_CMD_MISSION_START: the mission begins or goes on, as by its mode. Only the whole of it."""
         if any(value not in (0.0, KEEP) and not math.isnan(value) for value in command.params[:2]):
             raise Refused("Mission refused: a part of it cannot be started, set the current item first", lasting=True)
-        await self.host.vehicle.set_mode(FlightMode.MISSION, command.client)
+        await self.host.vehicle.set_mode(FlightMode.MISSION, command.right)
 
     async def _choose(self, command: Command) -> None:
         """MAV_CMD_DO_SET_MISSION_CURRENT: param1 the item, -1 none; param2 1 begins anew after the end."""

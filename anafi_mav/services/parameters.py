@@ -45,6 +45,9 @@ from anafi_mav.services.trickle import Trickle
 MAX_WRITES = 8
 """Writes under way at once. A drone answers one within tens of milliseconds; several clients load their files."""
 
+MAX_PACKED = 8
+"""Different parts of param.pck that are kept: clients ask for the whole, or for a few."""
+
 KEY = "parameters"
 """In the drone's memory: those of the gateway's own settings that are kept, by native name."""
 
@@ -80,6 +83,8 @@ class ParameterList:
         """The value of each as everybody was told it last."""
         self.changes = [0] * len(self.parameters)
         """How often everybody was told of each."""
+        self.version = 0
+        """How often any of them has changed."""
 
     def __len__(self) -> int:
         return len(self.parameters)
@@ -113,6 +118,7 @@ class ParameterList:
             if raw != self._told[index]:
                 self._told[index] = raw
                 self.changes[index] += 1
+                self.version += 1
                 found.append(index)
         return found
 
@@ -133,7 +139,7 @@ class ParameterService(Service):
         """By name of the flavour: places of the gateway's own settings."""
         self._own: list[Parameter] = []
         """The gateway's own settings, each once."""
-        self._seen: list[float] = []
+        self._seen = b""
         """Their values at the last look."""
         self._trickle = Trickle(host)
         self._refused_at: dict[Channel, float] = {}
@@ -144,6 +150,10 @@ class ParameterService(Service):
         """Serial number of the drone whose settings these are."""
         self._locks: dict[str, asyncio.Lock] = {}
         """One for each value, by its native name: two writes of it are carried out in their order."""
+        self._storing = asyncio.Lock()
+        """Held while changed settings are stored, until every client has been notified of them."""
+        self._packed_files: dict[str, tuple[int, dict[str, bytes]]] = {}
+        """By name of the flavour: param.pck by its query, and how often the values had changed when it was made."""
 
     def messages(self) -> Mapping[int, MessageHandler]:
         return {
@@ -192,7 +202,8 @@ class ParameterService(Service):
             self._tell(name, self._lists[name].changed(indices))
 
     def tick(self, now: float) -> None:
-        self._tell_settings()
+        if not self._storing.locked() and self._own_values() != self._seen:
+            self.host.spawn(self._settle())
 
     # What outlives the gateway.
 
@@ -212,17 +223,14 @@ class ParameterService(Service):
                 value = parameter.default
             parameter.put(self.host, value)
 
-    def _keep(self) -> None:
-        """Whoever changed them: they are there when the gateway comes back."""
+    async def _keep(self) -> None:
+        """Store the gateway's own settings, so that they hold when it comes back."""
         now = {one.name: one.value(self.host) for one in KEPT}
         settings = self.host.memory.settings
         if now != settings.get(KEY, {one.name: one.default for one in KEPT}):
             settings[KEY] = now
-            self.host.spawn(self._save())
-
-    async def _save(self) -> None:
-        if (problem := await self.host.memory.save()) is not None:
-            self.host.complain(problem)
+            if (problem := await self.host.memory.save()) is not None:
+                self.host.complain(problem)
 
     # Files.
 
@@ -237,8 +245,18 @@ class ParameterService(Service):
         numbers = {name: text for name, text in query.items() if text.isascii() and text.isdigit() and len(text) < 6}
         if numbers.keys() != query.keys():
             return None
-        count = int(numbers.get("count", "0")) or None
-        return packed_file(self._lists[flavour.name].values(), int(numbers.get("start", "0")), count)
+        listed = self._lists[flavour.name]
+        version, made = self._packed_files.get(flavour.name, (-1, {}))
+        if version != listed.version:
+            made = {}
+            self._packed_files[flavour.name] = (listed.version, made)
+        key = f"{numbers.get('start', '')}+{numbers.get('count', '')}"
+        if key not in made:
+            if len(made) >= MAX_PACKED:
+                made.clear()
+            count = int(numbers.get("count", "0")) or None
+            made[key] = packed_file(listed.values(), int(numbers.get("start", "0")), count)
+        return made[key]
 
     # Reading.
 
@@ -256,6 +274,16 @@ class ParameterService(Service):
         self._trickle.start(inbound.channel, client_of(inbound), messages())
 
     def _request_read(self, inbound: Inbound) -> None:
+        if self._storing.locked():  # a value that is read has to be one that is stored
+            self.host.spawn(self._read_when_stored(inbound))
+        else:
+            self._read(inbound)
+
+    async def _read_when_stored(self, inbound: Inbound) -> None:
+        async with self._storing:
+            self._read(inbound)
+
+    def _read(self, inbound: Inbound) -> None:
         message = inbound.message
         flavour = flavour_of(inbound.channel)
         listed = self._lists[flavour.name]
@@ -329,21 +357,27 @@ class ParameterService(Service):
                 await parameter.write(self.host, value)
             except AnafiMavError as error:
                 self.host.text(Severity.WARNING, f"{parameter.name} not set: {error}")
-        self._tell_settings()
-        if listed.changes[index] == before:  # otherwise everybody was told, he too
+        await self._settle()
+        if listed.changes[index] == before:  # otherwise every client was notified, this one too
             self._answer(inbound)
 
     # Telling.
 
-    def _tell_settings(self) -> None:
-        """Tell everybody of the gateway's own settings that have changed, and remember them."""
-        now = [one.read(self.host) for one in self._own]
-        if now == self._seen:
-            return
-        self._seen = now
-        self._keep()
-        for name, indices in self._polled.items():
-            self._tell(name, self._lists[name].changed(indices))
+    def _own_values(self) -> bytes:
+        """Bytes, so that NaN is equal to NaN."""
+        return struct.pack(f"<{len(self._own)}d", *(one.read(self.host) for one in self._own))
+
+    async def _settle(self) -> None:
+        """Store the gateway's own settings that have changed, then notify every client of them.
+
+        In this order: what a client has read back must hold also when the gateway is killed in the next instant.
+        """
+        async with self._storing:
+            while (now := self._own_values()) != self._seen:
+                self._seen = now
+                await self._keep()  # meanwhile at most as many change as there are writers: each waits for us
+            for name, indices in self._polled.items():
+                self._tell(name, self._lists[name].changed(indices))
 
     def _tell(self, name: str, indices: list[int]) -> None:
         """PARAM_VALUE of these to every channel of a flavour."""

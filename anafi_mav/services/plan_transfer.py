@@ -144,13 +144,13 @@ class PlanKind:
         """The plan in a list that a client of this flavour sent; the inverse of `shown`."""
         return items
 
-    def label(self, seq: int, flavour: Flavour) -> int:
-        """Return the number of an item of this seq in texts."""
-        return seq
-
     def remarks(self, items: Sequence[PlanItem]) -> Sequence[str]:
         """Warnings about a list that a client sent and that is accepted: items that `taken` leaves out."""
         return ()
+
+    def label(self, seq: int, flavour: Flavour) -> int:
+        """Return the number of an item of this seq in texts."""
+        return seq
 
     def always_shown(self, seq: int, flavour: Flavour) -> PlanItem | None:
         """What stands at a place of the list even when it is empty; None: nothing."""

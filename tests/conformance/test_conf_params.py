@@ -545,7 +545,7 @@ async def test_what_is_set_in_the_gateway_outlives_it(tmp_path: Path) -> None:
             assert value_of(await read(w.client, name)) == value
         for name, (_, _, default) in passing.items():
             assert value_of(await read(w.client, name)) == default
-    (file,) = folder.iterdir()
+    (file,) = folder.glob("*.json")
     spoiled = file.read_text().replace('"ANF_GCS_LOSS":2', '"ANF_GCS_LOSS":9').replace("4.5", '"high"')
     file.write_text(spoiled)
     async with world(drone_address=address) as w:

@@ -390,6 +390,29 @@ async def test_a_mistake_is_one_line_and_nothing_is_started(tmp_path: Path, conf
             assert free(host, 5761)
 
 
+async def test_endpoint_open_to_the_network_is_warned_of_at_the_start(tmp_path: Path) -> None:
+    """192.0.2.1 is nobody's (RFC 5737): nothing is opened by this test."""
+    config = f"""
+        endpoints: ["tcpin://{loopback()}:5760", "tcpin://192.0.2.1:5760"]
+        drones: [{{name: a, sysid: 1, address: {loopback()}}}]
+    """
+    async with product(tmp_path, config, ready=False) as p:
+        assert await p.end() == 2
+        warning, error = p.complaints
+        assert warning.startswith("anafi-mav: warning: endpoints[1]: tcpin://192.0.2.1:5760 is open to the network")
+        assert error.startswith(f"anafi-mav: {tmp_path / 'fleet.yaml'}: endpoints[1]: cannot open")
+
+
+async def test_error_of_an_option_names_the_option(tmp_path: Path) -> None:
+    config = fleet(loopback(), loopback())
+    async with product(tmp_path, config, "--endpoint", "tcpin://192.0.2.1:5760", ready=False) as p:
+        assert await p.end() == 2
+        assert p.complaints[-1].startswith("anafi-mav: --endpoint: cannot open tcpin://192.0.2.1:5760")
+    async with product(tmp_path, config, "--drone", "192.168.42.300", ready=False) as p:
+        assert await p.end() == 2
+        assert p.complaints[-1].startswith("anafi-mav: --drone: expected an IPv4 address or a host name")
+
+
 async def test_a_log_that_cannot_be_written(tmp_path: Path) -> None:
     config = fleet(loopback(), loopback())
     async with product(tmp_path, config, "--sim-log", str(tmp_path), ready=False) as p:

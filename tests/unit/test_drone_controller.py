@@ -538,3 +538,52 @@ async def test_a_return_that_never_began_does_not_hold_the_source() -> None:
             await drone.piloting.return_home(timeout=0.2)
         await device.until(skyctrl.SetPilotingSource, 2)
         assert sources(device) == [Source.CONTROLLER, Source.SKY_CONTROLLER]
+
+
+def times_of(device: ScriptedDevice, kind: type[Message]) -> float:
+    return device.times(kind)[-1]
+
+
+async def test_axes_after_end_of_move_go_back_within_half_a_second() -> None:
+    async with behind() as (drone, device):
+        device.script[ardrone3.MoveTo] = under_way
+        move = await drone.piloting.move_to(48.0, 2.0, 5.0)
+        await asyncio.sleep(1.73)  # no multiple of any period
+        assert device.got(mapper.Grab)[-1].axes == STICKS
+        device.say(ended(move))
+        end = now()
+        await device.until(mapper.Grab, 2)
+        assert device.got(mapper.Grab)[-1].axes == 0
+        assert times_of(device, mapper.Grab) - end <= 0.5
+
+
+async def test_axes_while_level_setpoints_hold_the_sticks_stay_grabbed() -> None:
+    """Only so is a stick of the pilot seen against a program that happens to hover."""
+    async with behind() as (drone, device):
+        drone.piloting.pilot(FORWARD)
+        await device.until(mapper.Grab)
+        for _ in range(30):
+            drone.piloting.pilot(PilotingCommand())
+            await asyncio.sleep(0.05)
+        assert [m.axes for m in device.got(mapper.Grab)] == [STICKS]
+        device.say(mapper.GrabAxisEvent(PITCH, 60))
+        await device.until(mapper.Grab, 2)
+        assert device.got(mapper.Grab)[-1].axes == 0
+
+
+async def test_source_of_an_earlier_connection_is_given_back() -> None:
+    async with behind() as (_, device):
+        device.say(skyctrl.PilotingSource(Source.CONTROLLER))
+        await device.until(skyctrl.SetPilotingSource)
+        assert sources(device) == [Source.SKY_CONTROLLER]
+        assert device.got(mapper.Grab)[-1].axes == 0
+
+
+async def test_stall_of_the_host_ends_what_flies() -> None:
+    async with behind() as (drone, device):
+        device.script[ardrone3.MoveTo] = under_way
+        await drone.piloting.move_to(48.0, 2.0, 5.0)
+        drone.controller.stalled()
+        await device.until(ardrone3.CancelMoveTo)
+        assert drone.controller.pilot_acquired_control
+        assert not drone.controller.taken

@@ -7,7 +7,7 @@ import pytest
 from anafi_mav.clock import SystemClock
 from anafi_mav.errors import ConfigError
 from anafi_mav.mavlink.base import EndpointUrl
-from anafi_mav.mavlink.endpoint import SCHEMES, make_endpoint, parse_endpoint
+from anafi_mav.mavlink.endpoint import SCHEMES, is_open_to_network, make_endpoint, parse_endpoint
 from anafi_mav.mavlink.node import Node
 
 
@@ -111,3 +111,40 @@ async def test_closing_what_was_never_opened_does_no_harm() -> None:
     for name in SCHEMES:
         url = parse_endpoint(f"{name}://{'/dev/null:57600' if name == 'serial' else '127.0.0.1:1'}")
         await make_endpoint(url, Node(), SystemClock()).close()
+
+
+@pytest.mark.parametrize(
+    ("url", "is_open"),
+    [
+        ("tcpin://127.0.0.1:5760", False),
+        ("udpin://127.9.9.9:14550?flavour=ardupilot", False),
+        ("udpin://[::1]:14550", False),
+        ("tcpin://localhost:5760", False),
+        ("udpout://192.168.1.20:14550", False),  # hears that address only
+        ("tcpout://192.168.1.20:5760", False),
+        ("serial:///dev/ttyUSB0:57600", False),
+        ("udpin://0.0.0.0:14550", True),
+        ("tcpin://192.168.1.7:5760", True),
+        ("tcpin://[::]:5760", True),
+        ("tcpin://[fe80::1%eth0]:5760", True),
+        ("tcpin://gateway.local:5760", True),
+    ],
+)
+def test_endpoint_is_open_to_the_network_when_it_listens_beyond_loopback(url: str, is_open: bool) -> None:
+    assert is_open_to_network(parse_endpoint(url)) is is_open
+
+
+@pytest.mark.parametrize(
+    "url", ["tcpin://127.0.0.1:0?flavour=ardupilot", "udpin://127.0.0.1:0", "tcpin://127.0.0.1:00"]
+)
+async def test_endpoint_with_port_0_shows_its_real_port(url: str) -> None:
+    node = Node(on_message=lambda inbound: None, clock=SystemClock())
+    await node.start([url])
+    (endpoint,) = node.endpoints
+    port = endpoint.local_port
+    assert port
+    scheme, _, query = url.partition("?")
+    shown = f"{scheme.rpartition(':')[0]}:{port}" + (f"?{query}" if query else "")
+    assert endpoint.describe().startswith(f"{shown}: 0 ")
+    assert endpoint.url == url
+    await node.close()

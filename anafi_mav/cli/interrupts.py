@@ -1,0 +1,48 @@
+"""Ctrl-C in a command that does not make its own arrangements.
+
+Until a command has begun, Ctrl-C ends the process at once (`anafi_mav.__main__`). A command that has begun may have
+something to put away: it gets a KeyboardInterrupt, or its coroutine is cancelled.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+from collections.abc import Coroutine
+from typing import Any, TypeVar
+
+ResultT = TypeVar("ResultT")
+
+
+def raise_on_interrupt() -> None:
+    """Let SIGINT raise KeyboardInterrupt from now on, unless it is ignored."""
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def run(work: Coroutine[Any, Any, ResultT]) -> ResultT:
+    """Run a coroutine as asyncio.run does; SIGINT cancels it. Raises KeyboardInterrupt then, once it has ended."""
+    interrupted = False
+
+    async def guarded() -> ResultT:
+        task = asyncio.current_task()
+        assert task is not None
+
+        def interrupt() -> None:
+            nonlocal interrupted
+            interrupted = True
+            task.cancel()
+
+        if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+            try:
+                asyncio.get_running_loop().add_signal_handler(signal.SIGINT, interrupt)
+            except NotImplementedError:  # Windows
+                raise_on_interrupt()
+        return await work
+
+    try:
+        return asyncio.run(guarded())
+    except asyncio.CancelledError:
+        if interrupted:
+            raise KeyboardInterrupt from None
+        raise
