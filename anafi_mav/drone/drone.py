@@ -10,7 +10,7 @@ import contextlib
 import logging
 import math
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import datetime
 from functools import partial
 from typing import Any, TypeAlias, TypeVar
@@ -135,6 +135,7 @@ class Drone:
         self.piloting = Piloting(self._commander, self.home, self.takeoff_blockers)
         self.controller = Controller(self._commander, self._user_moves, self._pilot_takes_over, self._stand_by)
         self.piloting.pilot_has_source = lambda: self.controller.pilot_has_source
+        self.piloting.is_modern = lambda: self._model.protobuf
         self._commander.gate = self._allows
         self._elements: tuple[Element[Any], ...] = (
             self.alerts,
@@ -448,6 +449,8 @@ class Drone:
             raise CommandRejected("the magnetometer is being calibrated: somebody turns the drone by hand")
         if isinstance(message, common.MagnetoCalibration) and message.calibrate:
             self._require_standing("calibrated")
+        if _starts_motors(message):
+            self.piloting.take_off_wanted()
         return self.controller.allows(message)
 
     def _require_standing(self, what: str) -> None:
@@ -456,6 +459,14 @@ class Drone:
             raise CommandRejected(f"a drone that does not stand with its motors off is not {what}")
         if self.piloting.about_to_fly:
             raise CommandRejected(f"a drone that is about to take off is not {what}")
+
+    def retire(self, tasks: Iterable[asyncio.Task[Any]]) -> None:
+        """From now on these tasks send nothing but what stops something: newer commands have replaced them."""
+        self._commander.retire(tasks)
+
+    def silence(self, tasks: Iterable[asyncio.Task[Any]]) -> None:
+        """From now on these tasks send nothing at all."""
+        self._commander.silence(tasks)
 
     def _user_moves(self) -> bool:
         """Does something fly the drone that a user of ours ordered?"""
@@ -560,10 +571,10 @@ class Drone:
         )
 
     async def request_reboot(self, timeout: float = REBOOT_TIMEOUT) -> None:
-        """Send the command to restart; return when the drone has acknowledged its receipt, which is all that it says.
+        """Send the command to restart; return when the drone has acknowledged its receipt, its only confirmation.
 
-        Raises `CommandRejected` unless the drone has reported that it stands; `LinkLost` or `CommandTimeout` when the
-        command has not arrived. Cancelled, it is not sent again.
+        Raises `CommandRejected` unless the drone has reported that it is landed; `LinkLost` or `CommandTimeout` when
+        the command has not arrived. Cancelled, it is not sent again.
         """
         if not self.connected:
             raise LinkLost("not connected")
@@ -707,7 +718,8 @@ def _starts_motors(message: Message) -> bool:
     """Do the motors of a drone on the ground start by this command?"""
     if isinstance(message, ardrone3.UserTakeOff):
         return message.state != 0
-    return isinstance(message, ardrone3.TakeOff | common.Start | modern_plan.StartAt | modern_plan.StartAtV2)
+    starts = ardrone3.TakeOff | ardrone3.SmartTakeOffLand | common.Start | modern_plan.StartAt | modern_plan.StartAtV2
+    return isinstance(message, starts)
 
 
 def _model(id: int) -> Model:

@@ -46,7 +46,7 @@ class HomeState(msgspec.Struct, frozen=True):
     Parrot does not say what its altitude counts from: for display only.
     """
     takeoff_location: Position | None = None
-    """Where the drone took off; altitude above the take-off point."""
+    """Place of the take-off; altitude above the take-off point."""
     fixed_before_takeoff: bool | None = None
     """`takeoff_location` was measured before the take-off, not with the first fix in the air."""
     custom_location: Position | None = None
@@ -179,6 +179,17 @@ class Home(Commanding[HomeState]):
             rth.SetAutoTriggerMode(RthAutoTriggerMode.ON if allowed else RthAutoTriggerMode.OFF),
             rth.AutoTriggerMode,
             lambda message: message.mode == RthAutoTriggerMode.ON,
+        )
+
+    async def cancel_auto_trigger(self, timeout: float = ANSWER_TIMEOUT) -> None:
+        """Cancel the return that the drone has announced; returns when it announces none."""
+        if self.state.auto_trigger in (None, AutoTriggerReason.NONE):
+            return
+        await self._change(
+            rth.CancelAutoTrigger(),
+            rth.RthAutoTrigger,
+            lambda message: True if message.reason == AutoTriggerReason.NONE else None,
+            timeout,
         )
 
     async def set_preferred_type(self, kind: RthHomeType) -> RthHomeType:

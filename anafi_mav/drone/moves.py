@@ -245,7 +245,6 @@ class Moves:
         return {
             ardrone3.MoveToChanged: self._on_move_to,
             ardrone3.MoveByEnd: self._on_move_by_end,
-            ardrone3.FlyingStateChanged: self._on_flying_state,
         }
 
     def _on_move_to(self, message: ardrone3.MoveToChanged, now: float) -> None:
@@ -310,7 +309,8 @@ class Moves:
         went_nowhere = max(abs(message.dX), abs(message.dY), abs(message.dZ), abs(message.dPsi)) < _NO_MOVE
         return message.error == MoveByError.OK and went_nowhere
 
-    def _on_flying_state(self, message: ardrone3.FlyingStateChanged, now: float) -> None:
+    def on_flying_state(self, message: ardrone3.FlyingStateChanged, now: float) -> None:
+        """Motors that stand end every move."""
         if message.state in MOTORS_OFF:
             self.inherited = False
             self.cancel_to("the motors are off")

@@ -84,6 +84,11 @@ def _share(value: float, limit: float) -> int:
     return round(clip(100.0 * value / limit, -100.0, 100.0)) if limit > 0.0 else 0
 
 
+def is_deflected(pcmd: PCMD) -> bool:
+    """True when any stick of this PCMD is off its middle."""
+    return bool(pcmd.roll or pcmd.pitch or pcmd.yaw or pcmd.gaz)
+
+
 class Sticks:
     """When to send which stick position. `deadline` says when `due` has something, `due` hands it out once."""
 
@@ -150,9 +155,10 @@ class Sticks:
         self._last = self._position
         return self._pcmd(self._position, now)
 
-    def released(self, now: float) -> PCMD:
-        """Return a centred PCMD outside of the 20 Hz grid."""
-        return self._pcmd(CENTRED, now)
+    def single(self, position: Percent, now: float) -> PCMD:
+        """Return one PCMD outside of the 20 Hz grid."""
+        self._last = position
+        return self._pcmd(position, now)
 
     def _pcmd(self, position: Percent, now: float) -> PCMD:
         """Build a PCMD whose flag is 1 only where roll or pitch is deflected, as Parrot's own programs send it.

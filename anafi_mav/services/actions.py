@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Awaitable, Callable, Hashable
+from collections.abc import Awaitable, Callable
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.bounds import FASTEST, SLOWEST
@@ -11,6 +11,7 @@ from anafi_mav.services.commands import Command
 from anafi_mav.services.guided import guided_mode
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.refusal import Refused, Unsupported
+from anafi_mav.services.right import Right
 from anafi_mav.services.targets import height, place
 from anafi_mav.services.vehicle import Vehicle
 
@@ -42,9 +43,9 @@ async def takeoff(vehicle: Vehicle, command: Command) -> None:
     """
     relative = command.flavour.relative_takeoff or (command.x == 0.0 and command.y == 0.0)
     if command.frame is None and relative and not math.isnan(command.z):
-        await vehicle.takeoff.begin(command.z, command.client)
+        await vehicle.take_off(command.z, command.right)
         return
-    await vehicle.takeoff.begin(height(vehicle, command), command.client)
+    await vehicle.take_off(height(vehicle, command), command.right)
 
 
 async def land(vehicle: Vehicle, command: Command) -> None:
@@ -54,7 +55,7 @@ async def land(vehicle: Vehicle, command: Command) -> None:
 
 async def return_to_launch(vehicle: Vehicle, command: Command) -> None:
     """MAV_CMD_NAV_RETURN_TO_LAUNCH."""
-    await vehicle.return_home(command.client)
+    await vehicle.return_home(command.right)
 
 
 async def reposition(vehicle: Vehicle, command: Command) -> None:
@@ -77,7 +78,7 @@ async def reposition(vehicle: Vehicle, command: Command) -> None:
     if where is None and ato is None and heading is None:
         if speed > 0.0:
             raise Refused("Refused: a speed needs a place, a height or a heading to go to", lasting=True)
-        await vehicle.hold(mode)
+        await vehicle.hold(mode, command.right, pause=True)
         return
     bits = int(flags) if math.isfinite(flags) else 0
     if not bits & CHANGE_MODE:
@@ -87,6 +88,7 @@ async def reposition(vehicle: Vehicle, command: Command) -> None:
         if attitude is None:
             raise Refused("Refused: the present heading is not known")
         heading += attitude.yaw
+    await vehicle.takeoff.over("Goto")
     await vehicle.guided.reposition(where, ato, heading, speed if speed > 0.0 else None, mode)
 
 
@@ -104,14 +106,14 @@ def _require_change_of_mode(vehicle: Vehicle, command: Command) -> None:
 
 async def set_mode(vehicle: Vehicle, command: Command) -> None:
     """MAV_CMD_DO_SET_MODE, in the numbers of the sender's flavour."""
-    await change_mode(vehicle, command.mode, command.client)
+    await change_mode(vehicle, command.mode, command.right)
 
 
-async def change_mode(vehicle: Vehicle, mode: FlightMode | None, client: Hashable) -> None:
+async def change_mode(vehicle: Vehicle, mode: FlightMode | None, by: Right) -> None:
     """Enter a mode that some message named; None is one that we do not have."""
     if mode is None:
         raise Refused("Mode refused: an ANAFI has no such mode", lasting=True)
-    await vehicle.set_mode(mode, client)
+    await vehicle.set_mode(mode, by)
 
 
 async def terminate(vehicle: Vehicle, command: Command) -> None:

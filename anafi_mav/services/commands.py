@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.flavours import ARDUPILOT, PX4, Flavour, mode_of_standard
 from anafi_mav.services.modes import HOVERING, FlightMode
+from anafi_mav.services.right import Extent, Right
 
 RESEND_WINDOW = 3.5
 """s after an action succeeded in which the same one from the same client is a retransmission: MAVSDK resends 3 s after
@@ -66,6 +67,22 @@ class Command:
     """Who sent it: (channel, system id, component id)."""
     flavour: Flavour = PX4
     """The autopilot that who sent it believes to speak to."""
+    at: float = 0.0
+    """When it arrived, on the monotonic clock."""
+    counted: bool = True
+    """It `holds`, and its client sent no other such command in the 5 s before."""
+
+    @property
+    def right(self) -> Right:
+        """The right that its client has by it; what it ends of that is for its handler to say."""
+        return Right(self.client, Extent.ALL, self.at, self.counted)
+
+    @property
+    def holds(self) -> bool:
+        """Hold, Pause, Brake, Loiter or Position: a person means it against whatever the drone does."""
+        if self.id in _MODE_COMMANDS:
+            return self.mode in (FlightMode.HOLD, FlightMode.POSITION)
+        return self.id in (dialect.MAV_CMD_DO_REPOSITION, dialect.MAV_CMD_DO_PAUSE_CONTINUE) and self.stops
 
     @property
     def mode(self) -> FlightMode | None:

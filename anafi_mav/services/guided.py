@@ -73,6 +73,7 @@ async def _fly_item(host: Host, inbound: Inbound) -> None:
                 raise Refused("Goto refused: the item is no way point", lasting=True)
             where = Place(item.x / scale, item.y / scale)
             check_on_earth(where, "Goto")
+            await vehicle.takeoff.over("Goto")
             await vehicle.guided.reposition(where, ato, None, mode=guided_mode(flavour))
         else:
             await change_altitude(vehicle, ato, flavour)
@@ -216,13 +217,16 @@ class GuidedService(Service):
         if command.params[0] == 0.0:
             goto = vehicle.guided.goto or self._interrupted
             mission = vehicle.mission.flying or self._mission_interrupted
-            await vehicle.hold(guided_mode(command.flavour))
+            await vehicle.hold(guided_mode(command.flavour), command.right, pause=True)
             self._paused = None if goto is None else (goto, vehicle.orders)
             self._mission_paused = vehicle.orders if mission else None
         elif command.params[0] == 1.0:
             goto = self._interrupted
             if self._mission_interrupted:
-                await vehicle.set_mode(FlightMode.MISSION, command.client)
+                await vehicle.set_mode(FlightMode.MISSION, command.right)
+                return
+            if goto is None and vehicle.paused:
+                vehicle.paused = False  # setpoints may fly it again
                 return
             if goto is None:
                 raise Refused("Continue refused: nothing was paused, or something else was ordered since")

@@ -85,9 +85,6 @@ class GuidedFlight:
         `speed` (m/s over ground) counts for this move only. `mode` is Hold or Guided.
         """
         vehicle = self._vehicle
-        if place is None and ato is None and yaw is None and speed is None:
-            await vehicle.hold(mode)
-            return
         here, present = vehicle.place, vehicle.drone.piloting.state.altitude
         if here is None and place is None and ato is not None:
             await self._climb(ato, yaw, mode)
@@ -113,8 +110,8 @@ class GuidedFlight:
             raise Refused("Goto refused: the drone is not in the air")
         if not checked:
             check_place(vehicle, goto.place, start=vehicle.place)
-        if vehicle.returning_by_itself:
-            raise Refused("Goto refused: the drone returns home by itself")
+        if vehicle.returning:
+            raise Refused("Goto refused: drone is returning")
         await vehicle.take_over()
         await vehicle.drone.piloting.cancel_return_home()
         if not vehicle.in_air or vehicle.returning:  # no await from here to the moveTo
@@ -156,8 +153,8 @@ class GuidedFlight:
         vehicle = self._vehicle
         if not vehicle.in_air:
             raise Refused(f"{what} refused: the drone is not in the air")
-        if vehicle.returning_by_itself:
-            raise Refused(f"{what} refused: the drone returns home by itself")
+        if vehicle.returning:
+            raise Refused(f"{what} refused: drone is returning")
         await vehicle.take_over()
         await vehicle.drone.piloting.stop()
         await vehicle.drone.piloting.cancel_return_home()

@@ -105,7 +105,7 @@ class MissionService(Service):
         """MAV_CMD_MISSION_START: the mission begins or goes on, as by its mode. Only the whole of it."""
         if any(value not in (0.0, KEEP) and not math.isnan(value) for value in command.params[:2]):
             raise Refused("Mission refused: a part of it cannot be started, set the current item first", lasting=True)
-        await self.host.vehicle.set_mode(FlightMode.MISSION, command.client)
+        await self.host.vehicle.set_mode(FlightMode.MISSION, command.right)
 
     async def _choose(self, command: Command) -> None:
         """MAV_CMD_DO_SET_MISSION_CURRENT: param1 the item, -1 none; param2 1 begins anew after the end."""
@@ -157,7 +157,8 @@ class MissionService(Service):
         vehicle, times = self.host.vehicle, self.host.times()
         progress, ids = vehicle.mission.progress, vehicle.plan_ids
         in_mission = vehicle.mode is FlightMode.MISSION
-        state = (progress.state, progress.current, len(progress.items), in_mission, *sorted(ids.items()))
+        said = progress.state, progress.current, progress.is_untouched, len(progress.items), in_mission
+        state = (*said, *sorted(ids.items()))
         if state == self._sent:
             return
         self._sent = state

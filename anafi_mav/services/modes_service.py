@@ -165,4 +165,4 @@ class ModesService(Service):
 
     async def _set_standard(self, command: Command) -> None:
         """MAV_CMD_DO_SET_STANDARD_MODE: param1 MAV_STANDARD_MODE."""
-        await change_mode(self.host.vehicle, command.mode, command.client)
+        await change_mode(self.host.vehicle, command.mode, command.right)

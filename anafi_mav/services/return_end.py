@@ -15,6 +15,7 @@ import asyncio
 import contextlib
 import enum
 import logging
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
 from anafi_mav import geo
@@ -106,12 +107,14 @@ class _GivenHome:
 class ReturnEnd:
     """The end of the returns of one vehicle."""
 
-    def __init__(self, vehicle: Aircraft) -> None:
+    def __init__(self, vehicle: Aircraft, land: Callable[[], Awaitable[None]]) -> None:
+        """`land` commands a landing and returns when the drone has reported it."""
         self.ending = EndOfReturn.LAND
         """A parameter."""
         self.wait = SHORTEST_WAIT
         """s above home before the landing (a parameter); `SHORTEST_WAIT` holds where this is less."""
         self._vehicle = vehicle
+        self._command_landing = land
         self._attempt: Attempt | None = None
         self._given: _GivenHome | None = None
 
@@ -124,11 +127,6 @@ class ReturnEnd:
     def shown(self) -> bool:
         """The mode is Return though the drone reports none: it waits above home, or lands."""
         return self._attempt is not None and self._attempt.phase in (_Phase.WAITING, _Phase.LANDING)
-
-    @property
-    def sent(self) -> bool:
-        """The return or the landing is commanded, and the drone has not reported it yet."""
-        return self._attempt is not None and self._attempt.phase in (_Phase.COMMANDED, _Phase.LANDING)
 
     def set_home(self, place: Position, label: str) -> None:
         """A client has set the drone's custom home, or a rally point has become it."""
@@ -249,7 +247,7 @@ class ReturnEnd:
             return
         attempt.phase = _Phase.LANDING
         try:
-            await vehicle.drone.piloting.land()
+            await self._command_landing()
         except AnafiMavError as error:
             logger.warning("landing at home: %s", error)
             vehicle.text(Severity.ERROR, "Landing at home failed, hovering")

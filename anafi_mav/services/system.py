@@ -20,6 +20,7 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound, Node
 from anafi_mav.services import takeoff_point_service
+from anafi_mav.services.aborted_return_service import AbortedReturnService
 from anafi_mav.services.banner import BannerService
 from anafi_mav.services.command_service import CommandService
 from anafi_mav.services.compass_service import CompassService
@@ -48,6 +49,7 @@ from anafi_mav.services.orbit import OrbitService
 from anafi_mav.services.parameters import ParameterService
 from anafi_mav.services.plan_service import PlanService
 from anafi_mav.services.rally_service import RallyService
+from anafi_mav.services.roll_sign_service import RollSignService
 from anafi_mav.services.service import MessageHandler, Service
 from anafi_mav.services.shell import ShellService
 from anafi_mav.services.statustext import Severity, TextNumbers
@@ -77,12 +79,14 @@ SERVICES: tuple[type[Service], ...] = (
     MissionService,
     FenceService,
     RallyService,
+    RollSignService,
     OffboardService,
     ManualControlService,
     FollowService,
     TimeService,
     BannerService,
     WarningService,
+    AbortedReturnService,
     HighLatencyService,
     LogService,
     ShellService,
@@ -112,6 +116,9 @@ the plan or for a low battery, is reported by then, and stations announce one ch
 
 LOOK_EVERY = 0.1
 """s between looks at the other periodic messages; none of them is wanted more often."""
+
+DESCENT_WAIT = 1.5
+"""s that a landing or return may take to be confirmed when the gateway ends: it is not withdrawn."""
 
 STATUS_EVERY = 5.0
 """s before the same complaint is repeated as text."""
@@ -242,7 +249,9 @@ class System:
         """
         if not self.active:
             return
-        if not self.vehicle.ends_alone:  # a command that has begun a return would abort it on its end
+        if self.vehicle.descends:
+            await self._commands.settle(DESCENT_WAIT)
+        else:
             await self._commands.end_all()
         await self.vehicle.let_go()
 

@@ -208,8 +208,9 @@ class Flight:
 
     def motion_report(self) -> list[Message]:
         pose = self.pose
+        roll = -pose.roll if Quirk.ROLL_INVERTED in self.faults.quirks else pose.roll
         return [
-            ardrone3.AttitudeChanged(pose.roll, pose.pitch, pose.yaw),
+            ardrone3.AttitudeChanged(roll, pose.pitch, pose.yaw),
             ardrone3.SpeedChanged(pose.vn, pose.ve, pose.vd),
             ardrone3.AltitudeChanged(pose.up),
         ]

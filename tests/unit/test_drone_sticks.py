@@ -192,6 +192,6 @@ def test_the_stamp_counts_and_tells_the_milliseconds() -> None:
     assert pcmd.timestampAndSeqNum == 0x04000000 + 1
 
 
-def test_released_sticks_say_so_in_the_flag() -> None:
-    pcmd = Sticks().released(0.0)
+def test_single_pcmd_of_centred_sticks_has_flag_zero() -> None:
+    pcmd = Sticks().single(CENTRED, 0.0)
     assert (pcmd.flag, pcmd.roll, pcmd.pitch, pcmd.yaw, pcmd.gaz) == (0, 0, 0, 0, 0)
