@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import AsyncIterator
 
 import pytest
+from support.world import loopback
 
 from anafi_mav.drone import CommandTimeout, Drone, FlyingState, LinkLost, connect
 from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
@@ -154,6 +155,19 @@ async def test_move_behind_a_skycontroller_is_stopped_and_the_sticks_return_to_t
             await drone.piloting.move_to(HOME[0] + 0.001, HOME[1], 20.0)
         assert commands(real, "CancelMoveTo") == ["CancelMoveTo"]
         assert sources(real) == ["CONTROLLER", "SKY_CONTROLLER"]
+
+
+async def test_block_behind_a_skycontroller_4_ends_without_an_error_of_the_event_loop() -> None:
+    """The web server is reached through a proxy of the mux, whose open connections end with the block."""
+    problems: list[object] = []
+    asyncio.get_running_loop().set_exception_handler(lambda loop, context: problems.append(context))
+    address = loopback()
+    behind = DroneSpec(address=address, home=HOME, http_port=8080, rtsp_port=None, skycontroller=4)
+    async with Simulator([behind], speed=4.0, seed=1):
+        async with connect(address, http_port=8080) as drone:
+            assert await drone.media.list() == ()
+        await asyncio.sleep(0.0)
+    assert problems == []
 
 
 async def test_lost_link_ends_the_block_without_another_error(simulator: Simulator, real: SimulatedDrone) -> None:
