@@ -8,6 +8,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import datetime
@@ -166,6 +167,7 @@ class Drone:
             **self.piloting.reactions(),
             **self.controller.reactions(),
             common.MavlinkFilePlayingStateChanged: self._plan_says,
+            common.Disconnection: self._on_dismissal,
             drone_manager.ConnectionState: self._controller_says,
             device_manager.State: self._controller_says,
         }
@@ -176,6 +178,14 @@ class Drone:
         """A session that is silent, and goes on when the drone is heard again before a new handshake has succeeded."""
         self._heard: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         """Done when the fading session is heard again, or has ended."""
+        self.handshake_at = -math.inf
+        """Loop time of the newest handshake."""
+        self.last_heard = -math.inf
+        """Loop time at which the drone was heard last before its link was lost."""
+        self.may_be_displaced = False
+        """The link was lost as another controller's handshake would end it."""
+        self._dismissed: common.DisconnectionCause | None = None
+        """Cause with which the drone announced the end of the connection."""
         self._hover_due = False
         """What flew at the beginning of a silence is to be stopped when it is over."""
         self._opening = False
@@ -258,6 +268,7 @@ class Drone:
             attempt.cancel()
             await asyncio.wait([attempt])
         self._drop_fading("replaced by a new session")
+        self.handshake_at, self._dismissed, self.may_be_displaced = loop_time(), None, False
         session.on_message = self._receive
         return session
 
@@ -286,6 +297,7 @@ class Drone:
 
     def _on_silent(self, session: ControllerSession, reason: str) -> None:
         """The drone is not heard. For all others the link is lost; the session may go on."""
+        self._note_loss(session, silent=True)
         if session is not self._session or not self._complete:
             session.end(reason)
             return
@@ -302,6 +314,34 @@ class Drone:
         fading, self._fading = self._fading, None
         if fading is not None:
             fading.end(reason)
+
+    def _note_loss(self, session: ControllerSession, *, silent: bool) -> None:
+        """Keep what tells a loss by another controller's handshake, which silences us, from others.
+
+        The one connection of a Skycontroller 4 is closed by it. What loses the drone behind it, and a drone that is
+        switched off, is none.
+        """
+        self.last_heard = session.last_received
+        known = self._dismissed in (common.DisconnectionCause.OFF_BUTTON, common.DisconnectionCause.RESET_FACTORY)
+        closed = session.closed_by_peer and isinstance(session, mux_link.MuxControllerSession)
+        self.may_be_displaced = not known and (silent or closed or self._dismissed is not None)
+
+    def _on_dismissal(self, message: common.Disconnection, now: float) -> None:
+        self._dismissed = message.cause
+        log.warning("%s: the drone ends the connection: %s", self.name, spoken(message.cause))
+
+    @property
+    def dismissed(self) -> bool:
+        """The drone announced the end of the connection, and not because it is switched off."""
+        return self.may_be_displaced and self._dismissed is not None
+
+    async def heard_again(self) -> bool:
+        """Wait until a silent session is heard again, or a new handshake is due. False: it is not heard."""
+        if self._fading is None:
+            return False
+        rest = self._fading.last_received + HANDSHAKE_AFTER - loop_time()
+        await asyncio.wait({self._heard}, timeout=max(rest, 0.0))
+        return self._fading is not None and not self._fading.silent
 
     async def pause(self, seconds: float) -> None:
         """Wait before the next `connect`, no longer than until a silent session is heard again."""
@@ -458,6 +498,8 @@ class Drone:
                 self._heard.set_result(None)
         if session is not self._session:
             return
+        if not session.silent:
+            self._note_loss(session, silent=False)
         self._disconnected("closed" if reason.cancelled() else reason.result(), silent=False)
 
     def _disconnected(self, why: str, *, silent: bool) -> None:

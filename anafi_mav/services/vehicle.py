@@ -26,6 +26,7 @@ from anafi_mav.drone.events import (
     ReturnReason,
     RthHomeType,
 )
+from anafi_mav.drone.piloting_landing import ALREADY_LANDED
 from anafi_mav.errors import CommandRejected
 from anafi_mav.services.aborted_return import AbortedReturn
 from anafi_mav.services.aircraft import STOP_WAIT, Aircraft
@@ -299,7 +300,10 @@ class Vehicle(Aircraft):
         self._require_endable("Takeoff", by)
         await self.take_over(STOP_WAIT)
         with self._selected_no_more(FlightMode.HOLD):
-            await self._end_landing("Takeoff", by, take_off=True)
+            if await self.drone.piloting.settle_landing():
+                await self._end_landing("Takeoff", by, take_off=True)
+        if self.on_ground:
+            raise Refused(f"Landing not aborted: {ALREADY_LANDED}")
         self.select(FlightMode.HOLD)
 
     async def set_mode(self, mode: FlightMode, by: Right) -> None:
