@@ -76,8 +76,9 @@ async def _settle(drone: Drone) -> None:
     flying = piloting.state.flying
     if flying in _STANDING or flying in _LANDING:
         return
-    if home.state.returning or (drone.controller.present and not drone.controller.taken):
-        log.warning("%s: left in the air: %s", drone.name, "returning home" if home.state.returning else "its pilot's")
+    if home.state.returning or drone.controller.pilot_has_source:
+        doing = "returns home" if home.state.returning else "the Skycontroller's pilot flies"
+        log.warning("%s: left in the air: %s", drone.name, doing)
         return
     try:
         await piloting.stop()

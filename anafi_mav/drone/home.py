@@ -48,7 +48,7 @@ class HomeState(msgspec.Struct, frozen=True):
     Parrot does not say what its altitude counts from: for display only.
     """
     takeoff_location: Position | None = None
-    """Where the drone took off; altitude above the take-off point."""
+    """Place of the take-off; altitude above the take-off point."""
     fixed_before_takeoff: bool | None = None
     """`takeoff_location` was measured before the take-off, not with the first fix in the air."""
     custom_location: Position | None = None

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 
 from anafi_mav.drone import Drone
 from anafi_mav.drone.events import FlyingState, PilotingStyleStyle
@@ -48,6 +48,8 @@ class Aircraft(ABC):
         """Says that mode, armed state or health may be others now."""
         self.helms: tuple[Helm, ...] = ()
         """Who can fly the drone for as long as somebody keeps telling them how; one of them at a time."""
+        self.mode_client: Hashable = None
+        """Client that chose the selected mode by name or number; None for modes that something else led to."""
         self.paused = False
         """A client has paused: setpoints of every client are ignored until a command or another mode ends it."""
         self._selected = FlightMode.HOLD
@@ -171,13 +173,13 @@ class Aircraft(ABC):
     def select(self, mode: FlightMode, helm: Helm | None = None) -> None:
         """This is what the vehicle does from now on. Whoever flew it by setpoints or sticks ends, but for `helm`."""
         self.end_helms(helm)
-        self._selected = mode
+        self._selected, self.mode_client = mode, None
         self.paused = False
         self.changed()
 
     def forget_mode(self) -> None:
         """What was chosen is over: until something else is, the vehicle holds."""
-        self._selected = FlightMode.HOLD
+        self._selected, self.mode_client = FlightMode.HOLD, None
 
     def end_helms(self, helm: Helm | None = None) -> list[asyncio.Task[None]]:
         """Nobody flies by setpoints or sticks any more, but for `helm`; tasks that are about to end."""

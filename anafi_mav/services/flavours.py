@@ -155,6 +155,7 @@ ARDUPILOT = Flavour(
         9: FlightMode.LAND,
         _POSHOLD: FlightMode.POSITION,
         _BRAKE: FlightMode.HOLD,
+        20: FlightMode.GUIDED,  # GUIDED_NOGPS takes attitudes alone, and ours takes them with or without GPS
         21: FlightMode.RETURN,  # SMART_RTL: an ANAFI has one way home
         23: FlightMode.FOLLOW,
     },

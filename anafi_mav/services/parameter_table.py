@@ -16,6 +16,7 @@ from anafi_mav.drone.events import Axis, PreciseHomeMode, RthEndingBehavior, Rth
 from anafi_mav.drone.events import ObstacleAvoidanceMode as AvoidanceMode
 from anafi_mav.services.bounds import LOWEST
 from anafi_mav.services.link_loss import LossAction
+from anafi_mav.services.offboard import GUIDED_TIMEOUT, LONGEST_TIMEOUT, SHORTEST_TIMEOUT
 from anafi_mav.services.parameter import Limits, Parameter, bounds, current, number, own
 from anafi_mav.services.parameter_codec import Kind
 from anafi_mav.services.return_end import LONGEST_WAIT, SHORTEST_WAIT, EndOfReturn
@@ -526,6 +527,29 @@ RETURN_WAIT = Parameter(
     source="gateway",
 )
 
+
+def _put_guided_time(host: Host, value: float) -> None:
+    host.vehicle.offboard.guided_timeout = value
+
+
+GUIDED_TIME = Parameter(
+    "ANF_GUIDED_T",
+    Kind.REAL32,
+    "Silence after which a velocity of ArduPilot's Guided ends in a hover",
+    read=lambda host: host.vehicle.offboard.guided_timeout,
+    write=own(_put_guided_time),
+    put=_put_guided_time,
+    limits=lambda host: (SHORTEST_TIMEOUT, LONGEST_TIMEOUT),
+    polled=True,
+    unit="s",
+    step=0.1,
+    decimals=1,
+    group=GATEWAY,
+    long="Velocities and yaw rates alone; attitudes and accelerations last 0.5 s, as all does in PX4's Offboard.",
+    default=GUIDED_TIMEOUT,
+    source="gateway",
+)
+
 NATIVE: tuple[Parameter, ...] = (
     MAX_TILT,
     TILT_RATE,
@@ -555,4 +579,5 @@ NATIVE: tuple[Parameter, ...] = (
     GCS_LOSS_TIME,
     RETURN_LANDING,
     RETURN_WAIT,
+    GUIDED_TIME,
 )

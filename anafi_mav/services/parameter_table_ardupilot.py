@@ -18,6 +18,7 @@ from anafi_mav.services.parameter_table import (
     CRUISE_SPEED,
     GCS_LOSS,
     GCS_LOSS_TIME,
+    GUIDED_TIME,
     MAX_ALTITUDE,
     MAX_DISTANCE,
     MAX_TILT,
@@ -116,6 +117,7 @@ TWINS: tuple[Parameter, ...] = (
         {0: LossAction.NOTHING, 1: LossAction.RETURN, 5: LossAction.LAND, 7: LossAction.HOLD},
     ),
     twin(GCS_LOSS_TIME, "FS_GCS_TIMEOUT"),
+    twin(GUIDED_TIME, "GUID_TIMEOUT"),
 )
 
 

@@ -15,6 +15,10 @@ class Refused(AnafiMavError):
         self.critical = critical
 
 
+class Unfinished(AnafiMavError):
+    """A command was accepted for later, and what it waited for has failed: MAV_RESULT_FAILED."""
+
+
 class Unsupported(Refused):
     """The vehicle has no such command, or not with these parameters: MAV_RESULT_UNSUPPORTED."""
 

@@ -7,6 +7,7 @@ armed state that nothing follows lapses, and so does a take-off that waits for i
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from collections.abc import Callable, Coroutine, Hashable
 from typing import Any
 
@@ -16,7 +17,7 @@ from anafi_mav.services.aircraft import STOP_WAIT, Aircraft
 from anafi_mav.services.bounds import check_height
 from anafi_mav.services.flying import AIRBORNE
 from anafi_mav.services.modes import FlightMode
-from anafi_mav.services.refusal import Refused
+from anafi_mav.services.refusal import Refused, Unfinished
 from anafi_mav.services.statustext import Severity
 
 AUTO_DISARM = 10.0
@@ -28,6 +29,9 @@ ARM_WAIT = 10.0
 CLIMB_WAIT = 15.0
 """s for the drone to hover after it took off, before the climb to the asked height is given up."""
 
+TAKEOFF_WAIT = 30.0
+"""s that a command waits for the end of a take-off."""
+
 ALTITUDE_WAIT = 3.0
 """s for the drone to tell its height, which it does five times a second."""
 
@@ -36,6 +40,8 @@ LOW = 0.5
 
 CLOSE_ENOUGH = 0.1
 """m from the height of a take-off that are no reason for a move."""
+
+_RISING = (FlyingState.MOTOR_RAMPING, FlyingState.TAKINGOFF)
 
 
 class Takeoff:
@@ -50,6 +56,14 @@ class Takeoff:
         self._tell_armed = armed
         """Who waited for this client to arm begins."""
         self._armed = False
+        self._armed_by: set[Hashable] = set()
+        """Clients that have armed since the vehicle was disarmed last."""
+        self.ended: Callable[[], None] = lambda: None
+        """Called when an accepted take-off has ended, at its height or not."""
+        self._waiting: asyncio.Task[Any] | None = None
+        """The command that waits for the end of a take-off."""
+        self._reached = False
+        """The last take-off has reached its height."""
         self._climbing = False
         self._pending: tuple[float, Hashable] | None = None
         """Height of a take-off that waits for its client to arm, and the client."""
@@ -67,6 +81,20 @@ class Takeoff:
     def climbing(self) -> bool:
         """The climb that follows the drone's own take-off is under way."""
         return self._climbing
+
+    @property
+    def under_way(self) -> bool:
+        """An accepted take-off has not reached its height yet."""
+        return self._background is not None and not self._background.done()
+
+    @property
+    def rises(self) -> bool:
+        """A take-off is under way, or the drone rises to its first hover after a Hold has ended one."""
+        return self.under_way or self._vehicle.flying_state in _RISING
+
+    def is_armed_by(self, client: Hashable) -> bool:
+        """Has this client armed the vehicle for the flight that begins now?"""
+        return self._armed and client in self._armed_by
 
     # What clients ask for. Each returns when the drone confirmed, or raises.
 
@@ -87,7 +115,10 @@ class Takeoff:
             await vehicle.take_over()
             await vehicle.drone.piloting.hand_launch()
             return
+        if not self._armed:
+            self._armed_by.clear()
         self._armed = True
+        self._armed_by.add(client)
         self._rearm_disarm_timer()
         vehicle.changed()
         if self._pending is not None and self._pending[1] == client:
@@ -151,6 +182,53 @@ class Takeoff:
         if vehicle.selected is not FlightMode.GUIDED:
             vehicle.forget_mode()
         self._start_background(self._climb(height))
+
+    async def launch(self) -> None:
+        """Take off to the drone's own height, for setpoints; returns when the drone confirmed it."""
+        if problems := self._vehicle.prearm_problems():
+            raise Refused("PreArm: " + "; ".join(problems))
+        await self._lift_off()
+
+    async def abort(self) -> None:
+        """Disarm a drone that stands, land one that is about to leave the ground: its setpoints have stopped."""
+        await self._vehicle.take_over()
+        await self._vehicle.drone.piloting.land()
+        self._armed = False
+        self._vehicle.changed()
+
+    async def over(self, what: str) -> None:
+        """Wait until an accepted take-off has reached its height; return at once when the drone does not rise.
+
+        Where a Hold has ended the climb, the drone still rises to its own height: then for its first hover. (MAVSDK's
+        goto_location sends Hold first.) Of several commands that wait the newest stays, the others are cancelled.
+        Raises `Unfinished` when the take-off fails, or lasts for longer than `TAKEOFF_WAIT`.
+        """
+        if not self.rises:
+            return
+        if self._waiting is not None:
+            self._waiting.cancel()
+        current = self._waiting = asyncio.current_task()
+        end = asyncio.get_running_loop().create_task(self._until_risen())
+        try:
+            await asyncio.wait({end}, timeout=TAKEOFF_WAIT)
+            if not end.done():
+                raise Unfinished(f"{what} failed: takeoff not over after {TAKEOFF_WAIT:.0f} s")
+            if not end.result():
+                raise Unfinished(f"{what} failed: takeoff has not reached its height")
+        finally:
+            end.cancel()
+            if self._waiting is current:
+                self._waiting = None
+
+    async def _until_risen(self) -> bool:
+        """Wait for the end of a take-off, or of a rise. True: it has reached its height. Never raises."""
+        if self.under_way:
+            assert self._background is not None
+            await asyncio.wait({self._background})
+            return self._reached
+        with contextlib.suppress(AnafiMavError):
+            await self._vehicle.drone.expect(FlyingStateChanged, lambda m: m.state not in _RISING, TAKEOFF_WAIT)
+        return self._vehicle.in_air
 
     # What ends it.
 
@@ -221,6 +299,7 @@ class Takeoff:
                 raise CommandRejected("the drone does something else now")
             if abs(height - present) > CLOSE_ENOUGH:
                 await vehicle.drone.piloting.move_by(0.0, 0.0, present - height, 0.0)
+            self._reached = True
         except AnafiMavError as error:
             vehicle.text(Severity.ERROR, f"Climb to {height:g} m given up: {error}")
         finally:
@@ -230,10 +309,16 @@ class Takeoff:
 
     def _start_background(self, work: Coroutine[Any, Any, None]) -> None:
         self.end()
+        self._reached = False
         task = asyncio.get_running_loop().create_task(work)
         self._background = task
         self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
+        task.add_done_callback(self._done)
+
+    def _done(self, task: asyncio.Task[None]) -> None:
+        self._tasks.discard(task)
+        if not self.under_way:
+            self.ended()
 
     # What lapses.
 

@@ -26,6 +26,7 @@ from anafi_mav.drone.events import (
     ReturnReason,
     RthHomeType,
 )
+from anafi_mav.drone.piloting_landing import ALREADY_LANDED
 from anafi_mav.errors import CommandRejected
 from anafi_mav.services.aborted_return import AbortedReturn
 from anafi_mav.services.aircraft import STOP_WAIT, Aircraft
@@ -49,6 +50,14 @@ from anafi_mav.services.return_end import ReturnEnd
 from anafi_mav.services.right import Extent, Right
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.takeoff import Takeoff
+
+FORCED = "forced landing"
+LANDS, PILOT_LANDS = "drone is landing", "Skycontroller pilot is landing"
+RETURNS, PILOT_RETURNS = "drone is returning", "Skycontroller pilot is returning"
+RETURNS_BY_ITSELF, MOTOR_DOWN = "drone is returning by itself", "drone returns, motor down"
+NOT_COUNTED = f"again within {APART:g} s"
+UNENDABLE = (FORCED, LANDS, PILOT_LANDS, RETURNS, PILOT_RETURNS, RETURNS_BY_ITSELF, MOTOR_DOWN, NOT_COUNTED)
+"""Why a landing or a return is not ended."""
 
 POSITION_OLD = 3.0
 """s without a GPS location, which an ANAFI reports once a second, after which the last one is no position in flight."""
@@ -120,7 +129,8 @@ class Vehicle(Aircraft):
         self.mission = MissionFlight(self)
         self.takeoff = Takeoff(self, self.mission.armed)
         self.guided = GuidedFlight(self)
-        self.offboard = OffboardFlight(self, clock)
+        self.offboard = OffboardFlight(self, clock, self.takeoff)
+        self.takeoff.ended = self.offboard.after_takeoff
         self.manual = ManualFlight(self, clock)
         self.follow = FollowFlight(self, lambda: self.offboard.motion, clock)
         self.plan_ids: dict[int, int] = {}
@@ -240,12 +250,15 @@ class Vehicle(Aircraft):
         """Fly home by the drone's own return. A landing goes on unless `by` ends it."""
         if self.on_ground:
             raise Refused("Return refused: the drone is on the ground")
-        if self.landing:
-            self._require_endable("Return", by)
+        commanded = None if by is None else replace(by, extent=Extent.COMMANDED)
+        if lands := self.landing:
+            self._require_endable("Return", commanded)
         await self.take_over()
-        if self.flying_state in LANDING:
+        if lands or self.landing:
             with self._selected_no_more(FlightMode.HOLD):
-                await self._end_landing("Return", by)
+                if await self.drone.piloting.settle_landing():
+                    self._require_endable("Return", commanded)
+                    await self._end_landing("Return", commanded)
         self._initiators.return_commanded(self._clock.monotonic())
         self._returns_sent += 1
         attempt = self.return_end.command()
@@ -266,6 +279,7 @@ class Vehicle(Aircraft):
         `pause`: setpoints of every client are ignored from now on, see `paused`.
         """
         self._require_endable(mode.value, by)
+        own = self.returning_by_itself
         rising = self.drone.piloting.about_to_fly
         latched = self.paused and (pause or mode is self.mode)
         before, self.paused = self.paused, self.paused or pause
@@ -273,7 +287,7 @@ class Vehicle(Aircraft):
             await self.take_over(STOP_WAIT)
             if not self.on_ground or rising:
                 with self._selected_no_more(mode):
-                    await self._stop(mode.value, by)
+                    await self._stop(mode.value, by, own=own)
         except BaseException:
             self.paused = before
             raise
@@ -290,7 +304,10 @@ class Vehicle(Aircraft):
         self._require_endable("Takeoff", by)
         await self.take_over(STOP_WAIT)
         with self._selected_no_more(FlightMode.HOLD):
-            await self._end_landing("Takeoff", by, take_off=True)
+            if await self.drone.piloting.settle_landing():
+                await self._end_landing("Takeoff", by, take_off=True)
+        if self.on_ground:
+            raise Refused(f"Landing not aborted: {ALREADY_LANDED}")
         self.select(FlightMode.HOLD)
 
     async def set_mode(self, mode: FlightMode, by: Right) -> None:
@@ -302,10 +319,11 @@ class Vehicle(Aircraft):
                 await self.hold(mode, by)
             case FlightMode.GUIDED:
                 await self.hold(mode, commanded)
+                self.mode_client = client
             case FlightMode.LAND:
                 await self.land()
             case FlightMode.RETURN:
-                await self.return_home(commanded)
+                await self.return_home(by)
             case FlightMode.TAKEOFF:
                 await self.take_off(None, by)
             case FlightMode.OFFBOARD:
@@ -313,6 +331,7 @@ class Vehicle(Aircraft):
                     raise Refused("Offboard refused: no setpoints arrive")
                 await self._free("Offboard", commanded)
                 await self.offboard.engage(client)
+                self.mode_client = client
             case FlightMode.MISSION:
                 if self.mission.there and not self.mission.flying:
                     await self._free("Mission", commanded)
@@ -349,27 +368,29 @@ class Vehicle(Aircraft):
         if self.landing:
             initiator = self._initiators.landing or Initiator.CLIENT
             if self._forced_landing:
-                raise Refused(f"{what} refused: forced landing")
+                raise Refused(f"{what} refused: {FORCED}")
             if initiator is Initiator.PILOT:
-                raise Refused(f"{what} refused: Skycontroller pilot is landing")
+                raise Refused(f"{what} refused: {PILOT_LANDS}")
             if by is None or (initiator is Initiator.DRONE and not all_of_them):
-                raise Refused(f"{what} refused: drone is landing")
+                raise Refused(f"{what} refused: {LANDS}")
         elif self.returning:
             initiator = self._initiators.returning or Initiator.CLIENT
             if self.returning_by_itself:
                 self._require_own_endable(what, by if all_of_them else None)
             elif initiator is Initiator.PILOT:
-                raise Refused(f"{what} refused: Skycontroller pilot is returning")
+                raise Refused(f"{what} refused: {PILOT_RETURNS}")
             elif by is None:
-                raise Refused(f"{what} refused: drone is returning")
+                raise Refused(f"{what} refused: {RETURNS}")
+        elif by is None and self._returns_sent > 0:
+            raise Refused(f"{what} refused: {RETURNS}")
 
     def _require_own_endable(self, what: str, by: Right | None) -> None:
         if by is None:
-            raise Refused(f"{what} refused: drone is returning by itself")
+            raise Refused(f"{what} refused: {RETURNS_BY_ITSELF}")
         if self.drone.home.state.reason == ReturnReason.MOTOR_DOWN:
-            raise Refused(f"{what} refused: drone returns, motor down")
+            raise Refused(f"{what} refused: {MOTOR_DOWN}")
         if not by.counted:
-            raise Refused(f"{what} refused: again within {APART:g} s")
+            raise Refused(f"{what} refused: {NOT_COUNTED}")
 
     async def _free(self, what: str, by: Right) -> None:
         """End a landing or return that `by` may end; returns when the drone hovers, at once when it does neither."""
@@ -379,13 +400,15 @@ class Vehicle(Aircraft):
             with self._selected_no_more(FlightMode.HOLD):
                 await self._stop(what, by)
 
-    async def _stop(self, what: str, by: Right | None) -> None:
-        """Hover, and end the landing or return that `by` may end. The right was checked for what was reported then."""
+    async def _stop(self, what: str, by: Right | None, *, own: bool = False) -> None:
+        """Hover, and end the landing or return that `by` may end.
+
+        `own`: the drone returned by itself when the command arrived. A return that it begins afterwards goes on.
+        """
         piloting, home = self.drone.piloting, self.drone.home
         await self._end_landing(what, by)
         announced = None if by is None else self._announced_for(by)
-        if self.returning_by_itself:
-            assert by is not None, "checked before"
+        if own and by is not None and self.returning_by_itself:
             reason = home.state.reason
             await piloting.cancel_return_home(even_its_own=True)
             self._return_aborted(by, reason)

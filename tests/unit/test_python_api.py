@@ -20,7 +20,7 @@ Aim Alerts AlertsState AnafiMavError Angles Animations AnimationsState Antiflick
 BatteryState Blocker BlockerKind Bracketing Burst Calibration CalibrationState Camera CameraKind CameraMode CameraState
 CamerasState Colour CommandRejected CommandTimeout Controller ControllerState Displacement Drone ExposureMode
 ExposureSettings Feature FlightPlan FlightPlanState FlyingState FollowMe FollowMeState FrameMetadata Gimbal
-GimbalAttitude GimbalState Gps GpsState Home HomeState Identity KnownDrone Limits Link LinkLost LinkState
+GimbalAttitude GimbalState Gps GpsState HandshakeRefused Home HomeState Identity KnownDrone Limits Link LinkLost LinkState
 LocalProtocolError Location MODELS Media MediaItem MediaState Metering Model Move MoveEnd Ned NotSupported Notification
 Palette PhotoFile PhotoFormat PhotoMode PhotoOption PhotoSettings Picture Piloting PilotingCommand PilotingState Place
 PlanOnDrone PlayingState Poi PoiState Position Product ProductState Quaternion Range RecordingMode RecordingOption
