@@ -63,6 +63,10 @@ POSITION_OLD = 3.0
 """s without a GPS location, which an ANAFI reports once a second, after which the last one is no position in flight."""
 
 
+GOOD_ACCURACY = 5
+"""m of one standard deviation of GPS altitude that AMSL heights can be used with, without a text."""
+
+
 class Landed(enum.Enum):
     """Where the vehicle is between ground and air."""
 
@@ -483,6 +487,7 @@ class Vehicle(Aircraft):
             self.takeoff.end_climb()
         elif state in TAKING_OFF and before in ON_GROUND:
             self.height.take_off()
+            self._report_accuracy()
             if (place := self.place) is not None:
                 self.origin = place
             if self.drone.home.state.takeoff_location != self._takeoff_before:
@@ -509,6 +514,12 @@ class Vehicle(Aircraft):
                 self.origin = self.place
         elif self.flying_state is not None and self.height.in_flight(self.drone.product.state.flight_id, amsl, ato):
             self.text(Severity.WARNING, f"Take-off altitude estimated: GPS only (+-{ESTIMATE_ERROR:g} m)")
+
+    def _report_accuracy(self) -> None:
+        """Report that AMSL heights of this flight will be wrong by as much as GPS is at its beginning."""
+        gps = self.drone.gps.state
+        if gps.fixed and gps.altitude_accuracy is not None and gps.altitude_accuracy > GOOD_ACCURACY:
+            self.text(Severity.WARNING, f"Take-off altitude inaccurate: GPS +-{gps.altitude_accuracy} m")
 
     def on_takeoff_location(self) -> None:
         """Adopt the take-off place that the drone reports for the present flight as origin of the local frame."""
