@@ -38,6 +38,7 @@ from anafi_mav.services.height import ESTIMATE_ERROR, TakeoffRecord
 from anafi_mav.services.helm import Helm
 from anafi_mav.services.hold_rule import APART, HoldRule
 from anafi_mav.services.initiator import Initiator, Initiators
+from anafi_mav.services.joystick_override import Override
 from anafi_mav.services.link_loss import LossPolicy
 from anafi_mav.services.manual_flight import ManualFlight
 from anafi_mav.services.mission_flight import MissionFlight
@@ -65,6 +66,9 @@ POSITION_OLD = 3.0
 
 GOOD_ACCURACY = 5
 """m of one standard deviation of GPS altitude that AMSL heights can be used with, without a text."""
+
+_AUTO = (FlightMode.MISSION, FlightMode.FOLLOW, FlightMode.ORBIT, FlightMode.RETURN, FlightMode.LAND)
+"""Modes in which the drone flies without setpoints of a client."""
 
 
 class Landed(enum.Enum):
@@ -131,7 +135,7 @@ class Vehicle(Aircraft):
         self.guided = GuidedFlight(self)
         self.offboard = OffboardFlight(self, clock, self.takeoff)
         self.takeoff.ended = self.offboard.after_takeoff
-        self.manual = ManualFlight(self, clock)
+        self.manual = ManualFlight(self, clock, lambda: self.overridable)
         self.follow = FollowFlight(self, lambda: self.offboard.motion, clock)
         self.plan_ids: dict[int, int] = {}
         """Opaque ids of the plans that are in force, by MAV_MISSION_TYPE."""
@@ -180,6 +184,17 @@ class Vehicle(Aircraft):
         if state in AIRBORNE and self.drone.piloting.state.plan == PlayingState.PLAYING:
             return FlightMode.MISSION
         return self._selected
+
+    @property
+    def overridable(self) -> Override:
+        """What flies the drone, as far as a joystick may take over from it; whether a landing or return ends, `hold`
+        decides."""
+        mode = self.mode
+        if self.offboard.engaged and mode in (FlightMode.OFFBOARD, FlightMode.GUIDED):
+            return Override.OFFBOARD
+        if mode in _AUTO or (mode in (FlightMode.HOLD, FlightMode.GUIDED) and self.drone.piloting.moving):
+            return Override.AUTO
+        return Override(0)
 
     @property
     def health(self) -> Health:
