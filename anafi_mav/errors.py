@@ -12,7 +12,7 @@ class AnafiMavError(Exception):
 
 
 class LocalProtocolError(AnafiMavError, ValueError):
-    """Our own code asked a protocol for something it cannot express (value out of range, wrong state)."""
+    """The program asked for something that the protocol cannot express (value out of range, wrong state)."""
 
 
 class RemoteProtocolError(AnafiMavError):
@@ -28,6 +28,14 @@ class LinkLost(AnafiMavError, ConnectionError):
     def __init__(self, reason: str) -> None:
         super().__init__(reason)
         self.reason = reason
+
+
+class HandshakeRefused(LinkLost):
+    """What answers there refuses the connection; `status` is its number for why, which Parrot does not explain."""
+
+    def __init__(self, where: str, status: int) -> None:
+        super().__init__(f"{where} refused the connection (status {status})")
+        self.status = status
 
 
 class CommandTimeout(AnafiMavError, TimeoutError):

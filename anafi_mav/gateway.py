@@ -24,9 +24,10 @@ from anafi_mav.clock import Clock, SystemClock
 from anafi_mav.config import Config, DroneConfig
 from anafi_mav.drone import Drone
 from anafi_mav.drone.rest import HTTP_PORT
-from anafi_mav.errors import AnafiMavError, ConfigError
+from anafi_mav.errors import AnafiMavError, ConfigError, HandshakeRefused
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound, Node
+from anafi_mav.services.statustext import Severity
 from anafi_mav.services.system import System
 from anafi_mav.state_lock import FILE, HeldDrone, StateLock, state_folder
 from anafi_mav.subject import DRONE
@@ -59,7 +60,14 @@ class _Supervised:
         self.task: asyncio.Task[None] | None = None
 
     async def run(self) -> None:
+        """Keep the drone connected until cancelled."""
         DRONE.set(self.config.name)
+        try:
+            await self._run()
+        finally:
+            await self.drone.close()
+
+    async def _run(self) -> None:
         pause = RETRY_FIRST
         while True:
             try:
@@ -78,7 +86,8 @@ class _Supervised:
                 finally:
                     self.system.link_down()
                     self._changed()
-                    await self.drone.close()
+                    if not self.drone.fading:
+                        await self.drone.close()
             except Exception as error:
                 # Whatever it is, the drone must not be out of reach until somebody restarts the gateway.
                 problem = str(error) or repr(error)
@@ -86,9 +95,11 @@ class _Supervised:
                     logger.exception("%s: a mistake of ours", self.config.name)
                 elif problem != self.problem:
                     logger.warning("%s: %s", self.config.name, problem)
+                    if isinstance(error, HandshakeRefused):
+                        self.system.announce(Severity.WARNING, f"Connection refused by drone (status {error.status})")
                 self.problem = problem
                 self.first_attempt.set()
-                await asyncio.sleep(pause)
+                await self.drone.pause(pause)
                 pause = min(2.0 * pause, RETRY_LAST)
 
     def held(self) -> HeldDrone:
@@ -260,6 +271,9 @@ class Gateway:
         sentences = []
         for s in self._supervised:
             if not s.system.active or s.system.vehicle.on_ground:
+                continue
+            if (ending := s.system.vehicle.alone) is not None:
+                sentences.append(f"{s.config.name} {ending}")
                 continue
             delay = s.drone.home.state.delay_s
             after = "after its own delay" if delay is None else f"{delay} s after it lost the link"

@@ -13,7 +13,7 @@ import msgspec
 HERE = Path(__file__).parent
 TESTS = HERE.parent / "tests" / "unit"
 DIALECT_XML = HERE.parent / "dialect" / "anafi.xml"
-sys.path[:0] = [str(HERE.parent), str(TESTS)]
+sys.path[:0] = [str(HERE.parent), str(TESTS), str(HERE)]
 
 CONFIGURATION = """\
 # Configuration
@@ -70,6 +70,11 @@ ENDPOINTS = """
 
 Each may end in `?flavour=px4` (the default), `?flavour=ardupilot` or `?flavour=standard`: the autopilot that its
 clients are shown.
+
+A datagram of `udpout` and `udpin` carries one MAVLink frame: some programs (gomavlib since 3.3.2, and so mavp2p) read
+only the first frame of a datagram. `?frames=many` puts up to 512 bytes of frames into one. It is for a large fleet and
+for a client that reads them all, as QGroundControl, MAVSDK, pymavlink and mavlink-router do. Two options are joined by
+`&`, as in `udpout://127.0.0.1:14550?flavour=ardupilot&frames=many` (in a shell, put the URL in quotes).
 
 `udpin` and `tcpin` listen on loopback unless HOST says otherwise. MAVLink has no password: who reaches an endpoint
 flies the drones.
@@ -253,9 +258,10 @@ them, to everybody. Ranges are the drone's own: it tells them with each setting,
 `parameter.json`, which QGroundControl and MAVSDK load by themselves over MAVLink FTP.
 
 A write is answered when the drone has confirmed it, with what it confirmed. What is out of range, read only or of
-another type is refused with PARAM_ERROR. A value that is not known is NaN, a whole number -1. The drone keeps its own
-settings, and the gateway keeps its settings for each drone, but for `ANF_HAND_LAUNCH`, `ANF_CRUISE_SPEED`,
-`ANF_CLIMB_SPEED` and `ANF_FENCE_ON`, which begin with their default whenever it is started.
+another type is refused with PARAM_ERROR. So is a read of a name that is not listed. A value that is not known reads
+-1; no parameter is ever NaN. The drone keeps its own settings, and the gateway keeps its settings for each drone, but
+for `ANF_HAND_LAUNCH`, `ANF_CRUISE_SPEED`, `ANF_CLIMB_SPEED` and `ANF_FENCE_ON`, which begin with their default whenever
+it is started.
 """
 
 PARAMETERS_NATIVE = """
@@ -268,7 +274,8 @@ PARAMETERS_NATIVE = """
 PARAMETERS_FACTS = """
 ## Facts in {title}'s words
 
-What its clients ask for and nobody could set. They can be read only.
+What its clients ask for and cannot be set. They can be read only. What QGroundControl's setup pages ask for and an
+ANAFI does not have is there with a neutral value: "not available on ANAFI".
 
 | name | what it is | value | unit | source |
 |---|---|---|---|---|
@@ -279,6 +286,7 @@ def parameters() -> str:
     """docs/parameters.md."""
     from anafi_mav.services.parameter_table_ardupilot import ARDUPILOT_NAMES
     from anafi_mav.services.parameter_table_px4 import PX4_NAMES
+    from anafi_mav.services.parameter_table_setup import NOT_AVAILABLE
     from anafi_mav.services.parameters import NATIVE_NAMES
 
     def twins(name: str, names: Any) -> str:
@@ -292,7 +300,7 @@ def parameters() -> str:
         if one.source != "fact":
             return "–"
         value = one.read(None)
-        return "not told" if value != value else f"{value:g}"
+        return "not reported: -1" if value != value else f"{value:g}"
 
     parts = [PARAMETERS, PARAMETERS_NATIVE]
     for one in sorted(NATIVE_NAMES, key=lambda parameter: parameter.name):
@@ -307,7 +315,8 @@ def parameters() -> str:
         for one in sorted(names, key=lambda parameter: parameter.name):
             if not one.native:
                 where = f"`{one.source}`" if "." in one.source else one.source
-                parts.append(f"| `{one.name}` | {one.short} | {stated(one)} | {one.unit or '–'} | {where} |\n")
+                what = f"{one.short}: {one.long.lower().rstrip('.')}" if one.long == NOT_AVAILABLE else one.short
+                parts.append(f"| `{one.name}` | {what} | {stated(one)} | {one.unit or '–'} | {where} |\n")
     return "".join(parts)
 
 
@@ -428,11 +437,59 @@ def plan_translation() -> str:
     return "".join(parts)
 
 
+PYTHON_API = """\
+# Reference of the Python API
+
+<!-- Made by docs/generate.py from the docstrings of anafi_mav/drone. -->
+
+For programs that fly an ANAFI: every stable name of `anafi_mav.drone`. [python-api.md](python-api.md) is the guide.
+Methods of the code that are not on this page belong to the package and may change.
+
+For all elements:
+
+- `state` is a frozen record of the drone's last reports. None in a field: not reported since the connection.
+- `drone.camera[0]` and `drone.gimbal[0]` are the states of the main camera and gimbal.
+- A coroutine returns when the drone has confirmed. A method without `async` sends and returns at once.
+- Each method that sends raises `LinkLost` without a link and `NotSupported` for what the drone does not have. Each that
+  waits raises `CommandTimeout` when the drone does not confirm in time.
+
+## connect
+
+```python
+{connect}
+```
+
+{connect_doc}
+"""
+
+EVENTS = """
+## events
+
+`anafi_mav.drone.events` has Parrot's own names: the enums that occur in states and verbs, and the messages that
+`Drone.subscribe` and `Drone.expect` deliver. Their fields are those of Parrot's protocol.
+
+{names}
+"""
+
+
+def python_api() -> str:
+    """docs/python-api-reference.md."""
+    from api_reference import body, function
+
+    from anafi_mav import drone
+
+    signature, doc = function("connect", drone.connect)
+    head = PYTHON_API.format(connect=signature, connect_doc=doc)
+    names = ", ".join(f"`{name}`" for name in drone.events.__all__)
+    return head + body() + EVENTS.format(names=names)
+
+
 PAGES: dict[str, Callable[[], str]] = {
     "configuration.md": configuration,
     "dialect.md": dialect,
     "parameters.md": parameters,
     "plan-translation.md": plan_translation,
+    "python-api-reference.md": python_api,
     "seed.md": seed,
     "seed-mavlink.md": seed_mavlink,
     "silence.md": silence,

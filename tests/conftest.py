@@ -16,7 +16,15 @@ import pytest
 from support import clock, flavours
 from support.conformance_items import ITEMS
 
+from anafi_mav.arsdk import watchdog
+
 clock.install()
+
+pytest_plugins = ["support.repeats"]
+
+# Gateway, simulator and client share one event loop here: when it stalls, so does the Skycontroller that would be given
+# its axes back. Tests of the watchdog run the gateway as a process of its own.
+watchdog.LIMIT = None
 
 # A shell starts what runs in its background with SIGINT ignored, and the programs that tests start would inherit that.
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -81,6 +89,8 @@ class _Table:
         number = _NUMBER.search(report.nodeid)
         if number is None:
             return
+        if report.outcome == "rerun":
+            return  # `support.repeats` prints it, the repetition counts
         if report.when == "call" or report.outcome != "passed":
             self._reports[int(number[1])].append(report)
         if report.when == "teardown":

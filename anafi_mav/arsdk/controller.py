@@ -4,19 +4,28 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
+import os
 import socket
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TypeVar
 
-from anafi_mav.arsdk import handshake
+from anafi_mav.arsdk import handshake, watchdog
 from anafi_mav.arsdk.handshake import ConnectReply, ConnectRequest, DeviceInfo
 from anafi_mav.arsdk.interface import bind_to_interface, open_connection
 from anafi_mav.arsdk.session import OnMessage, Session, reason_of
 from anafi_mav.arsdk.transport import Role, Transport
-from anafi_mav.errors import LinkLost, RemoteProtocolError
+from anafi_mav.arsdk.watchdog import Watchdog
+from anafi_mav.arsdk.wire import Message
+from anafi_mav.errors import HandshakeRefused, LinkLost, RemoteProtocolError
+
+log = logging.getLogger("anafi_mav.arsdk")
 
 CONTROLLER_NAME = "anafi-mav"
 CONTROLLER_TYPE = "computer"
+
+STALL_PAUSE = 0.01
+"""s between two looks whether the watchdog's process has done its work after a stall."""
 
 ParsedT = TypeVar("ParsedT")
 
@@ -32,6 +41,12 @@ class ControllerSession(Session):
         discovery: tuple[asyncio.StreamReader, asyncio.StreamWriter],
     ) -> None:
         super().__init__(transport, on_message)
+        self.on_stall: Callable[[], None] = lambda: None
+        """Called when the host stalled and the watchdog has sent what stood by."""
+        self._watchdog: Watchdog | None = None
+        self._starting: asyncio.Task[None] | None = None
+        self._standby: Sequence[Message] = ()
+        self._standby_seq = -1
         self.device = device
         """What the drone said of itself."""
         self._discovery = discovery[1]
@@ -48,11 +63,67 @@ class ControllerSession(Session):
         super().end(reason)
         self._watch.cancel()
         self._discovery.close()
+        if self._watchdog is not None:
+            self._watchdog.close()
 
     async def close(self) -> None:
         """See `Session.close`."""
         await super().close()
         await asyncio.wait([self._watch])
+        if self._watchdog is not None and self._starting is not None:
+            await asyncio.wait([self._starting])
+            await self._watchdog.ended()
+
+    # -- what is sent for us when the host stalls
+
+    def watch(self) -> None:
+        """Start the process that sends what stands by when the event loop stalls; nowhere but on POSIX systems."""
+        if self._watchdog is None and watchdog.LIMIT is not None and os.name == "posix" and not self.lost.done():
+            self._watchdog = Watchdog(self._stalled, watchdog.LIMIT)
+            self._starting = asyncio.create_task(self._start_watchdog(self._watchdog))
+
+    def stand_by(self, messages: Sequence[Message]) -> None:
+        """Have these commands sent when the event loop stalls; none: nothing is sent."""
+        self._standby = messages
+        self._renew()
+
+    async def _start_watchdog(self, guard: Watchdog) -> None:
+        assert self._endpoint is not None
+        try:
+            await guard.start(self._endpoint.get_extra_info("socket"), self.version, self._whole())
+        except OSError as error:
+            log.warning("no watchdog over the axes of the Skycontroller: %s", error)
+
+    def _whole(self) -> Callable[[], bool] | None:
+        """See `Watchdog.start`."""
+        return None
+
+    def _wrapped(self, frame: bytes) -> bytes:
+        """A frame as it lies on the wire."""
+        return frame
+
+    def _renew(self) -> None:
+        if self._watchdog is not None and not self.lost.done():
+            frames = self._transport.encode_ahead(self._standby)
+            self._standby_seq = self._transport.next_seq
+            self._watchdog.stand_by([(seq, self._wrapped(frame)) for seq, frame in frames])
+
+    def _flush(self) -> None:
+        guard = self._watchdog
+        if guard is None or not guard.standing_by or self.lost.done():
+            super()._flush()
+        elif guard.secure():
+            super()._flush()
+            if self._transport.next_seq != self._standby_seq:
+                self._renew()
+        else:
+            self._flush_later(STALL_PAUSE)
+
+    def _stalled(self) -> None:
+        """The watchdog has sent what stood by: of our own, nothing of before is sent any more."""
+        used, self._standby = len(self._transport.encode_ahead(self._standby)), ()
+        self._transport.abandon("the host stalled", used)
+        self._loop.call_soon(self.on_stall)
 
 
 async def look(
@@ -84,18 +155,30 @@ async def connect(
     on_message: OnMessage,
     ping_after: float = 0.5,
     silence_limit: float | None = 2.5,
+    fades: bool = False,
     timeout: float = 3.0,
 ) -> ControllerSession:
     """Connect to the drone at `host`.
 
     `handshake_port` None means the one that discovery tells. `versions` is the (lowest, highest) ARSDK protocol
     version offered. `local_address` and `interface` bind all our sockets; None: whatever routes to the drone.
-    `on_message` may be called before this returns. Raises `LinkLost` when nobody answers within `timeout` seconds or
-    the drone refuses, `RemoteProtocolError` when what answers is no drone.
+    `on_message` may be called before this returns; `fades`: see `Transport`.
+
+    Raises `LinkLost` when nothing answers within `timeout` seconds, `HandshakeRefused` when the drone refuses,
+    `RemoteProtocolError` when what answers is no drone.
     """
     handshake.check_versions(versions)
     opening = _connect(
-        host, discovery_port, handshake_port, versions, local_address, interface, on_message, ping_after, silence_limit
+        host,
+        discovery_port,
+        handshake_port,
+        versions,
+        local_address,
+        interface,
+        on_message,
+        ping_after,
+        silence_limit,
+        fades,
     )
     try:
         return await asyncio.wait_for(opening, timeout)
@@ -117,6 +200,7 @@ async def _connect(
     on_message: OnMessage,
     ping_after: float,
     silence_limit: float | None,
+    fades: bool,
 ) -> ControllerSession:
     reader, writer = await _open(host, discovery_port, local_address, interface)
     try:
@@ -152,6 +236,7 @@ async def _connect(
         asyncio.get_running_loop().time(),
         ping_after=ping_after,
         silence_limit=silence_limit,
+        fades=fades,
         gives_up=False,  # who waits for a command takes it back in time; an order to stop has to arrive
     )
     session = ControllerSession(transport, on_message, device, (reader, writer))
@@ -174,7 +259,7 @@ async def _shake_hands(
     finally:
         writer.close()
     if reply.status != 0:
-        raise LinkLost(f"{host}:{port} refused the connection (status {reply.status})")
+        raise HandshakeRefused(f"{host}:{port}", reply.status)
     if not request.proto_v_min <= reply.proto_v <= request.proto_v_max:
         raise RemoteProtocolError(
             f"{host}:{port} chose protocol version {reply.proto_v}, "

@@ -165,20 +165,20 @@ class PictureSender:
 
 @dataclass(frozen=True)
 class Picture:
-    """One picture as it arrived."""
+    """One picture of the video, H.264."""
 
     timestamp: int
-    """Of `CLOCK_RATE`, wraps."""
+    """RTP timestamp, 90 kHz; wraps."""
     units: tuple[bytes, ...]
     """NAL units without start codes."""
     metadata: FrameMetadata | None
-    """None: none came, or not all of it."""
+    """None: absent or incomplete."""
     complete: bool
-    """Nothing of it was lost."""
+    """True when none of its packets was lost."""
 
     @property
     def is_key(self) -> bool:
-        """Decoding can begin here."""
+        """True when decoding can begin here."""
         return any(unit[0] & 0x1F == 5 for unit in self.units)
 
 

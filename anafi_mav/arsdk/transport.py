@@ -21,6 +21,7 @@ import enum
 import itertools
 import struct
 from collections import Counter, deque
+from collections.abc import Sequence
 from typing import TypeAlias
 
 import msgspec
@@ -49,6 +50,9 @@ MAX_UNANSWERED_PINGS = 3
 RETRIED_FOR_EVER = frozenset(MessageId(*numbers) for numbers in [(0, 2, 0), (0, 4, 0), (1, 0, 4), (4, 4, 0), (4, 6, 0)])
 """AllSettings and AllStates (of drone and Skycontroller) and Emergency: commands with timeout="RETRY" in Parrot's
 XML; version 1 does not give them up either."""
+
+STALL = 0.3
+"""s that a ping may be late before the host counts as stalled."""
 
 MAX_QUEUED = 4096
 """Messages waiting in an acknowledged queue. All states and settings of a drone are a few hundred; a queue this
@@ -93,13 +97,23 @@ class Garbage(msgspec.Struct, frozen=True):
     reason: str
 
 
+class Silent(msgspec.Struct, frozen=True):
+    """The peer is not heard any more. Commands are dropped until it speaks; only pings and answers are sent."""
+
+    reason: str
+
+
+class Speaks(msgspec.Struct, frozen=True):
+    """The peer is heard again after a silence."""
+
+
 class LinkDown(msgspec.Struct, frozen=True):
     """The link is dead. Nothing is sent or received any more; a new connection needs a new transport."""
 
     reason: str
 
 
-Event: TypeAlias = Received | Delivered | Undelivered | Garbage | LinkDown
+Event: TypeAlias = Received | Delivered | Undelivered | Garbage | Silent | Speaks | LinkDown
 
 _ACK, _NOACK, _WITHACK = int(FrameType.ACK), int(FrameType.NOACK), int(FrameType.WITHACK)
 
@@ -138,7 +152,8 @@ class Transport:
     """One connection. Construct it when the handshake is done; `version` is the negotiated protocol version.
 
     A ping goes out when nothing was received for `ping_after` seconds, and again every `ping_after`. The link is
-    down after three unanswered pings, or when nothing was received for `silence_limit` seconds.
+    down after three unanswered pings, or when nothing was received for `silence_limit` seconds. With `fades` it is
+    silent then: everything queued is dropped, and the session goes on when the peer speaks again.
 
     Call `outgoing` after every `receive`, `send`, `cancel` and `expire`.
     """
@@ -152,6 +167,7 @@ class Transport:
         ping_after: float = 2.0,
         silence_limit: float | None = None,
         gives_up: bool = True,
+        fades: bool = False,
     ) -> None:
         """`gives_up` False: a controller of version 1 repeats every command for ever, too."""
         if version not in VERSIONS:
@@ -181,7 +197,19 @@ class Transport:
         self._ping_due = now + ping_after
         self._ping_seq = -1
         self._unanswered = 0
+        self._fades = fades
+        self._silent = False
         self._down = False
+
+    @property
+    def last_received(self) -> float:
+        """When the peer was heard last, s; the beginning of the session if never."""
+        return self._last_received
+
+    @property
+    def silent(self) -> bool:
+        """The peer has not been heard for too long, and commands are dropped."""
+        return self._silent
 
     # -- receiving
 
@@ -196,6 +224,9 @@ class Transport:
             self._last_received = now
             self._ping_due = now + self._ping_after
             self._unanswered = 0
+            if self._silent:
+                self._silent = False
+                events.append(Speaks())
         for type, id, seq, payload in frames:
             if id in self._received_ids and type != _ACK:
                 if type == _WITHACK:
@@ -273,8 +304,8 @@ class Transport:
         if len(data) > longest:
             raise LocalProtocolError(f"{type(message).__name__} has {len(data)} bytes, its queue takes {longest}")
         token = next(self._tokens)
-        if self._down:
-            self.counters["dropped.down"] += 1
+        if self._down or self._silent:
+            self.counters["dropped.down" if self._down else "dropped.silent"] += 1
         elif buffer is Buffer.NON_ACK:
             if len(self._noack) >= MAX_QUEUED_NOACK:
                 self._noack.popleft()
@@ -321,6 +352,38 @@ class Transport:
                 if not kept:
                     queue.land()
                 return
+
+    def encode_ahead(self, messages: Sequence[Message]) -> list[tuple[int, bytes]]:
+        """Return (sequence number, bytes) of the frames that would carry these messages next, without sending them."""
+        queue = self._queues[_ACK_ID[self.role]]
+        waiting = deque(Waiting(0, wire.encode(message), True) for message in messages)
+        frames = []
+        seq = queue.seq
+        while waiting:
+            seq = (seq + 1) & self._seq_mask
+            payload = b"".join([piece.data for piece in pack(self.version, waiting)])
+            frames.append((seq, encode_frame(self.version, _WITHACK, queue.id, seq, payload)))
+        return frames
+
+    @property
+    def next_seq(self) -> int:
+        """Sequence number of the next frame that carries acknowledged commands."""
+        return (self._queues[_ACK_ID[self.role]].seq + 1) & self._seq_mask
+
+    def abandon(self, reason: str, skip: int = 0) -> None:
+        """Drop everything that was not delivered, and pass over `skip` sequence numbers that another process used."""
+        self._noack.clear()
+        for queue in self._queues.values():
+            # Of a split command that was begun the peer would take whatever follows for the rest: it is completed.
+            begun = [entry for entry in queue.waiting if entry.packed]
+            dropped = [piece.source for piece in queue.flight if piece.last] if not begun else []
+            dropped += [entry for entry in queue.waiting if not entry.packed]
+            self._pending.extend(Undelivered(entry.token, reason) for entry in dropped)
+            queue.waiting = deque(begun)
+            if not begun:
+                queue.land()
+        queue = self._queues[_ACK_ID[self.role]]
+        queue.seq = (queue.seq + skip) & self._seq_mask
 
     def outgoing(self, now: float) -> list[bytes]:
         """The datagrams to send now; they are forgotten here, repetitions come by themselves."""
@@ -382,7 +445,9 @@ class Transport:
             return None
         if self._pending:
             return self._last_received
-        deadline = min(self._ping_due, self._last_received + self._silence_limit)
+        deadline = self._ping_due
+        if not self._silent:
+            deadline = min(deadline, self._last_received + self._silence_limit)
         for queue in self._queues.values():
             if queue.due < deadline:
                 deadline = queue.due
@@ -396,15 +461,33 @@ class Transport:
             if queue.flight and now >= queue.due:
                 self._give_up(queue)
         events = self._take_pending()
+        late = now - self._ping_due
+        if late >= STALL:
+            # The host stalled, and what arrived meanwhile may not have been read yet: that is no silence of the peer's.
+            self._last_received += late
         silence = now - self._last_received
-        if silence >= self._silence_limit:
-            self._go_down(f"nothing received for {silence:.1f} s", events)
+        if self._silent:
+            if now >= self._ping_due:
+                self._send_ping(now)
+        elif silence >= self._silence_limit:
+            self._lose(f"nothing received for {silence:.1f} s", now, events)
         elif now >= self._ping_due:
             if self._unanswered >= MAX_UNANSWERED_PINGS:
-                self._go_down(f"{self._unanswered} pings unanswered, nothing received for {silence:.1f} s", events)
+                self._lose(f"{self._unanswered} pings unanswered, nothing received for {silence:.1f} s", now, events)
             else:
                 self._send_ping(now)
         return events
+
+    def _lose(self, reason: str, now: float, events: list[Event]) -> None:
+        """The peer is not heard any more."""
+        if not self._fades:
+            self._go_down(reason, events)
+            return
+        self.abandon("the link is silent")
+        events.extend(self._take_pending())
+        self._silent = True
+        self._send_ping(now)
+        events.append(Silent(reason))
 
     def _send_ping(self, now: float) -> None:
         self._unanswered += 1

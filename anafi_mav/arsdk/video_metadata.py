@@ -78,6 +78,8 @@ class LinkStatus(OpenEnum):
 
 
 class Quaternion(NamedTuple):
+    """A rotation from the frame of drone or picture (x forward, y right, z down) to north, east, down."""
+
     w: float
     x: float
     y: float
@@ -85,7 +87,7 @@ class Quaternion(NamedTuple):
 
 
 class Ned(NamedTuple):
-    """Metres or m/s, whichever the field says."""
+    """A vector, m or m/s as the field states."""
 
     north: float
     east: float
@@ -101,7 +103,7 @@ class Vector3(NamedTuple):
 
 
 class Location(msgspec.Struct, frozen=True, kw_only=True):
-    """Where the drone is."""
+    """Place of the drone."""
 
     latitude: float
     """deg."""
@@ -120,6 +122,8 @@ class Location(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class WifiLink(msgspec.Struct, frozen=True, kw_only=True):
+    """The Wi-Fi link."""
+
     goodput: int
     """kbit/s, estimated."""
     quality: int
@@ -147,7 +151,7 @@ class StarfishLink(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class FrameMetadata(msgspec.Struct, frozen=True, kw_only=True):
-    """The state of drone and camera when a picture was taken. None: not said."""
+    """State of drone and camera when a picture was taken. None: unknown."""
 
     drone_quat: Quaternion | None = None
     location: Location | None = None

@@ -21,7 +21,7 @@ from anafi_mav.config import Config, DroneConfig, SimConfig, from_mapping, load,
 from anafi_mav.errors import ConfigError
 from anafi_mav.gateway import Gateway
 from anafi_mav.mavlink.endpoint import is_open_to_network, parse_endpoint
-from anafi_mav.sim import scenario
+from anafi_mav.sim import quirks, scenario
 
 READY_LIMIT = 15.0
 """s after which "ready" is said though a drone has not answered: its connection takes 3 s at most, its settings and
@@ -119,6 +119,10 @@ class _Interrupts:
                 continue  # nohup
             loop.add_signal_handler(number, self.receive, number)
 
+    def unsaid(self) -> list[str]:
+        """Return what drones in the air do when the gateway ends, unless a first SIGINT has shown it."""
+        return [] if self._told else self.flying()
+
     def receive(self, number: signal.Signals) -> None:
         sentences = self.flying() if number == signal.SIGINT and not self._told else []
         if not sentences:
@@ -144,6 +148,8 @@ async def _run(config: Config, sim_log: Path | None) -> list[str]:
             say(line)
         say("ready, Ctrl-C ends", "green")
         await interrupts.stop.wait()
+        for sentence in interrupts.unsaid():
+            say(sentence, "yellow")
         return gateway.state_problems()
 
 
@@ -224,6 +230,8 @@ def place(config: Config, reservations: Reservations) -> tuple[Config, dict[str,
     drones = tuple(
         _placed(drone, *places[index]) if index in places else drone for index, drone in enumerate(config.drones)
     )
+    for index, sim in simulated.items():
+        quirks.named(sim.firmware_quirks, f"drones[{index}].sim.firmware_quirks")
     first = next(iter(simulated.values()))
     fleet = {
         "speed": first.speed,
@@ -254,6 +262,7 @@ def _entry(drone: DroneConfig, sim: SimConfig, address: str, ports: Ports) -> di
         "skycontroller": sim.skycontroller,
         "storage": options.size("storage", sim.storage) if isinstance(sim.storage, str) else sim.storage,
         "wind": {} if sim.wind is None else _without_none(msgspec.structs.asdict(sim.wind)),
+        "firmware_quirks": sim.firmware_quirks,
     }
 
 

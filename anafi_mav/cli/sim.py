@@ -20,6 +20,7 @@ from anafi_mav.cli.terminal import say
 from anafi_mav.errors import ConfigError
 from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator, scenario
 from anafi_mav.sim.model import MODELS
+from anafi_mav.sim.quirks import QUIRKS
 from anafi_mav.sim.scenario import Scenario
 from anafi_mav.sim.wind import CALM, WindSpec
 
@@ -60,6 +61,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--wind",
         metavar="SPEED,DIRECTION",
         help="m/s and degrees where it comes from; a third number is the gusts' share",
+    )
+    parser.add_argument(
+        "--firmware-quirk",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help=f"let the firmware differ, can be repeated: {', '.join(QUIRKS)}",
     )
     parser.add_argument("--scenario", type=Path, metavar="FILE", help="YAML: what goes wrong, and when")
     parser.add_argument("--log", type=Path, metavar="FILE", help="write what happens to FILE, one JSON object a line")
@@ -121,6 +129,7 @@ def _from_options(arguments: argparse.Namespace) -> Fleet:
             if arguments.skycontroller is None
             else integer("--skycontroller", arguments.skycontroller, "the generation of a Skycontroller, 3 or 4"),
             wind=CALM if arguments.wind is None else _wind(arguments.wind),
+            firmware_quirks=tuple(arguments.firmware_quirk),
             storage=None if arguments.storage is None else options.size("--storage", arguments.storage),
         )
     except ConfigError as error:

@@ -142,6 +142,13 @@ class SimConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
             extra=expected("a mapping like {speed: 8, direction: 270}"),
         ),
     ] = None
+    firmware_quirks: Annotated[
+        tuple[Annotated[str, Meta(max_length=MAX_TEXT, extra=expected("the name of a quirk"))], ...],
+        Meta(
+            description="Ways in which its firmware differs from the simulated one, as docs/simulator.md lists them.",
+            extra=expected("a list of names like [no-flight-id]"),
+        ),
+    ] = ()
     scenario: Annotated[
         Annotated[str, Meta(min_length=1, max_length=MAX_PATH)] | None,
         Meta(
@@ -280,7 +287,8 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         Annotated[str, Meta(min_length=1, max_length=MAX_PATH)] | None,
         Meta(
             description="The folder of what outlives the gateway: of each drone a file with its mission, its "
-            "fence, its rally points and the gateway's own settings for it. `~` is the user's home. Left out: "
+            "fence, its rally points, the take-off point of its last flight and the gateway's own settings for it. "
+            "`~` is the user's home. Left out: "
             "`$XDG_STATE_HOME/anafi-mav`, which without that variable is `~/.local/state/anafi-mav`.",
             extra=expected("the path of a folder"),
         ),

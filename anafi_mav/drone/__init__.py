@@ -1,13 +1,196 @@
-"""The vehicle as its owner sees it: a `Drone` with elements, each a frozen state and some verbs."""
+"""The Python API of an ANAFI: `connect` gives a `Drone` with elements, each a frozen state and some verbs.
 
-from anafi_mav.drone.drone import Drone as Drone
-from anafi_mav.drone.element import Position as Position
-from anafi_mav.drone.element import Range as Range
-from anafi_mav.drone.moves import Displacement as Displacement
-from anafi_mav.drone.moves import Move as Move
-from anafi_mav.drone.moves import MoveEnd as MoveEnd
-from anafi_mav.drone.product import MODELS as MODELS
-from anafi_mav.drone.product import Identity as Identity
-from anafi_mav.drone.product import Model as Model
-from anafi_mav.drone.sticks import Limits as Limits
-from anafi_mav.drone.sticks import PilotingCommand as PilotingCommand
+    from anafi_mav.drone import FlyingState, connect
+
+    async with connect("192.168.42.1") as drone:
+        await drone.piloting.take_off()
+        await drone.wait_for(FlyingState.HOVERING)
+
+The names in `__all__` are stable, and so are those of `anafi_mav.drone.events`, which follow Parrot's.
+docs/python-api.md is the guide, docs/python-api-reference.md the reference.
+"""
+
+from anafi_mav.arsdk.rtp_h264 import Picture
+from anafi_mav.arsdk.video_metadata import FrameMetadata, Location, Ned, Quaternion, WifiLink
+from anafi_mav.drone import events
+from anafi_mav.drone.alerts import Alerts, AlertsState, Blocker, BlockerKind
+from anafi_mav.drone.animations import Animations, AnimationsState
+from anafi_mav.drone.battery import Battery, BatteryState
+from anafi_mav.drone.calibration import Calibration, CalibrationState
+from anafi_mav.drone.camera import Camera
+from anafi_mav.drone.camera_state import (
+    CamerasState,
+    CameraState,
+    ExposureSettings,
+    PhotoOption,
+    PhotoSettings,
+    RecordingOption,
+    RecordingSettings,
+    StyleSettings,
+)
+from anafi_mav.drone.camera_words import (
+    Antiflicker,
+    Bracketing,
+    Burst,
+    CameraKind,
+    CameraMode,
+    ExposureMode,
+    Metering,
+    PhotoFile,
+    PhotoFormat,
+    PhotoMode,
+    RecordingMode,
+    Resolution,
+    Streaming,
+    Style,
+    WhiteBalance,
+)
+from anafi_mav.drone.connection import connect
+from anafi_mav.drone.controller import Controller
+from anafi_mav.drone.controller_state import ControllerState, KnownDrone
+from anafi_mav.drone.drone import Drone
+from anafi_mav.drone.element import Position, Range
+from anafi_mav.drone.events import FlyingState, PlayingState
+from anafi_mav.drone.features import Feature, Support
+from anafi_mav.drone.flight_plan import FlightPlan, FlightPlanState, PlanOnDrone, Recovery
+from anafi_mav.drone.follow_me import FollowMe, FollowMeState, Trajectory
+from anafi_mav.drone.gimbal import Aim, Angles, Gimbal, GimbalAttitude, GimbalState
+from anafi_mav.drone.gps import Gps, GpsState
+from anafi_mav.drone.home import Home, HomeState
+from anafi_mav.drone.link import Link, LinkState
+from anafi_mav.drone.media import Media, MediaItem, MediaState, Notification, Place, Resource
+from anafi_mav.drone.moves import Displacement, Move, MoveEnd
+from anafi_mav.drone.piloting import Piloting
+from anafi_mav.drone.piloting_state import Attitude, Avoidance, PilotingState, Velocity
+from anafi_mav.drone.poi import Poi, PoiState
+from anafi_mav.drone.product import MODELS, Identity, Model, Product, ProductState
+from anafi_mav.drone.sound import Sound, SoundState
+from anafi_mav.drone.sticks import Limits, PilotingCommand
+from anafi_mav.drone.storage import Storage, StorageState
+from anafi_mav.drone.thermal import Colour, Palette, Thermal, ThermalState
+from anafi_mav.drone.video import Video, VideoFrame, VideoState
+from anafi_mav.drone.video_stream import Shown
+from anafi_mav.errors import (
+    AnafiMavError,
+    CommandRejected,
+    CommandTimeout,
+    LinkLost,
+    LocalProtocolError,
+    NotSupported,
+    RemoteProtocolError,
+)
+
+__all__ = [
+    "MODELS",
+    "Aim",
+    "Alerts",
+    "AlertsState",
+    "AnafiMavError",
+    "Angles",
+    "Animations",
+    "AnimationsState",
+    "Antiflicker",
+    "Attitude",
+    "Avoidance",
+    "Battery",
+    "BatteryState",
+    "Blocker",
+    "BlockerKind",
+    "Bracketing",
+    "Burst",
+    "Calibration",
+    "CalibrationState",
+    "Camera",
+    "CameraKind",
+    "CameraMode",
+    "CameraState",
+    "CamerasState",
+    "Colour",
+    "CommandRejected",
+    "CommandTimeout",
+    "Controller",
+    "ControllerState",
+    "Displacement",
+    "Drone",
+    "ExposureMode",
+    "ExposureSettings",
+    "Feature",
+    "FlightPlan",
+    "FlightPlanState",
+    "FlyingState",
+    "FollowMe",
+    "FollowMeState",
+    "FrameMetadata",
+    "Gimbal",
+    "GimbalAttitude",
+    "GimbalState",
+    "Gps",
+    "GpsState",
+    "Home",
+    "HomeState",
+    "Identity",
+    "KnownDrone",
+    "Limits",
+    "Link",
+    "LinkLost",
+    "LinkState",
+    "LocalProtocolError",
+    "Location",
+    "Media",
+    "MediaItem",
+    "MediaState",
+    "Metering",
+    "Model",
+    "Move",
+    "MoveEnd",
+    "Ned",
+    "NotSupported",
+    "Notification",
+    "Palette",
+    "PhotoFile",
+    "PhotoFormat",
+    "PhotoMode",
+    "PhotoOption",
+    "PhotoSettings",
+    "Picture",
+    "Piloting",
+    "PilotingCommand",
+    "PilotingState",
+    "Place",
+    "PlanOnDrone",
+    "PlayingState",
+    "Poi",
+    "PoiState",
+    "Position",
+    "Product",
+    "ProductState",
+    "Quaternion",
+    "Range",
+    "RecordingMode",
+    "RecordingOption",
+    "RecordingSettings",
+    "Recovery",
+    "RemoteProtocolError",
+    "Resolution",
+    "Resource",
+    "Shown",
+    "Sound",
+    "SoundState",
+    "Storage",
+    "StorageState",
+    "Streaming",
+    "Style",
+    "StyleSettings",
+    "Support",
+    "Thermal",
+    "ThermalState",
+    "Trajectory",
+    "Velocity",
+    "Video",
+    "VideoFrame",
+    "VideoState",
+    "WhiteBalance",
+    "WifiLink",
+    "connect",
+    "events",
+]

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 from anafi_mav.arsdk.messages import alarms, ardrone3
 from anafi_mav.arsdk.messages.alarms import TakeoffChecklistType
 from anafi_mav.arsdk.messages.ardrone3 import AlertState, ForcedLandingReason, MotorError, WarningLevel
-from anafi_mav.arsdk.messages.battery import AlertLevel
+from anafi_mav.arsdk.messages.battery import AlertLevel, BatteryAlert
 from anafi_mav.arsdk.messages.common import Sensor
 from anafi_mav.arsdk.wire import Message, OpenEnum
 from anafi_mav.drone.battery import BatteryState
@@ -21,6 +21,8 @@ from anafi_mav.drone.element import Element, Reducer, with_item
 
 
 class AlertsState(msgspec.Struct, frozen=True):
+    """Warnings of the drone, and its own list of what prevents a take-off."""
+
     alert: AlertState | None = None
     """The one alert of older firmware."""
     alarms: Mapping[alarms.Type, bool] = {}
@@ -49,6 +51,8 @@ def _forced_landing(state: AlertsState, message: ardrone3.ForcedLandingAutoTrigg
 
 
 class Alerts(Element[AlertsState]):
+    """Warnings that the drone reports. No verbs: `Drone.blockers` sums up what prevents a take-off."""
+
     NOTHING = AlertsState()
     REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = {
         ardrone3.AlertStateChanged: lambda state, message: replace(state, alert=message.state),
@@ -82,8 +86,13 @@ _FLIES_WITHOUT = (Sensor.GPS,)
 """Sensors that a drone takes off without."""
 
 
+_HARMLESS = (None, AlertState.NONE, AlertState.USER, AlertState.LOW_BATTERY)
+"""Alerts with which a drone takes off. USER is a past emergency stop, which the flying state EMERGENCY tells better: a
+firmware that kept it would stay on the ground until it is switched off."""
+
+
 class BlockerKind(enum.Enum):
-    """What keeps a drone on the ground; the value is how its text begins."""
+    """Kind of a reason that prevents a take-off; the value is the beginning of its text."""
 
     CHECK = ""
     """A line of the take-off checklist."""
@@ -96,21 +105,37 @@ class BlockerKind(enum.Enum):
 
 
 class Blocker(NamedTuple):
-    """One thing that the drone has reported and that can keep it on the ground."""
+    """One reported reason that can prevent a take-off; `str` gives it in words."""
 
     kind: BlockerKind
     value: OpenEnum | None = None
     """Which check, sensor, alert or error."""
 
     def __str__(self) -> str:
+        if self.kind is BlockerKind.BATTERY and self.value == BatteryAlert.POWER_LEVEL:
+            return "battery critical"
         return self.kind.value + ("" if self.value is None else spoken(self.value))
+
+    @property
+    def is_charge(self) -> bool:
+        """True when the reason is a low charge, which a drone reports in three ways at once."""
+        return (self.kind, self.value) in _CHARGE
+
+
+_CHARGE: tuple[tuple[BlockerKind, OpenEnum], ...] = (
+    (BlockerKind.CHECK, TakeoffChecklistType.BATTERY_CRITICAL),
+    (BlockerKind.BATTERY, BatteryAlert.POWER_LEVEL),
+    (BlockerKind.ALERT, AlertState.CRITICAL_BATTERY),
+    (BlockerKind.ALERT, AlertState.ALMOST_EMPTY_BATTERY),
+)
 
 
 def takeoff_blockers(alerts: AlertsState, battery: BatteryState, calibration: CalibrationState) -> list[Blocker]:
     """What the drone has reported that can keep it on the ground; empty when nothing is known.
 
     ARSDK refuses a take-off by silence. The take-off checklist (alarms.xml 175-0-2) is the drone's own list of
-    reasons; firmware without it leaves the alerts, the battery's alerts, the calibration and the sensors.
+    reasons and decides alone about alerts and sensors, whose last report may be old; firmware without it leaves the
+    alert, the calibration and the sensors. A critical battery counts in any case.
     """
     reasons = [Blocker(BlockerKind.CHECK, check) for check, blocks in alerts.checklist.items() if blocks]
     if TakeoffChecklistType.MAGNETO_CALIBRATION not in alerts.checklist and calibration.magneto_required:
@@ -122,8 +147,9 @@ def takeoff_blockers(alerts: AlertsState, battery: BatteryState, calibration: Ca
         reasons += [Blocker(BlockerKind.SENSOR, sensor) for sensor in failed]
     critical = [alert for alert, level in battery.alerts.items() if level == AlertLevel.CRITICAL]
     reasons += [Blocker(BlockerKind.BATTERY, alert) for alert in critical]
-    if alerts.alert not in (None, AlertState.NONE, AlertState.LOW_BATTERY):
+    if not alerts.checklist and alerts.alert not in _HARMLESS:
         reasons.append(Blocker(BlockerKind.ALERT, alerts.alert))
     if alerts.motor_error not in (None, MotorError.NO_ERROR):
         reasons.append(Blocker(BlockerKind.MOTOR, alerts.motor_error))
-    return reasons
+    charge = [reason for reason in reasons if reason.is_charge]
+    return [reason for reason in reasons if reason not in charge[1:]]

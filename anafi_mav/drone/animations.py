@@ -45,22 +45,24 @@ _FIGURES: Mapping[Type, type[Message]] = {
 
 
 class AnimationsState(msgspec.Struct, frozen=True):
+    """The animation that the drone flies, and those it could begin."""
+
     available: frozenset[Type] | None = None
-    """What could be started now; empty on the ground."""
+    """Animations that can start now; empty on the ground."""
     running: Type | None = None
-    """NONE: nothing is flown."""
+    """The animation under way; NONE: none is flown."""
     percent: int | None = None
-    """How far it is."""
+    """Progress, %."""
     phase: AnimationState | None = None
-    """Of what is flown, or was last."""
+    """Of the current or most recent animation."""
     canceled: bool = False
-    """What is flown, or was last, did not get to its end."""
+    """The current or most recent animation was not completed."""
     values: Message | None = None
-    """The last event of the figure that is flown, or was last: it tells the values that count."""
+    """Last event of the current or most recent animation; holds the values in effect."""
     modes: Mapping[Mode, frozenset[Type]] = {}
-    """By the mode of flight, what there is at all. Ai only."""
+    """Animations of this drone by piloting mode. Ai only."""
     missing: Mapping[Type, frozenset[Indicator]] = {}
-    """What each one lacks; empty = available. Ai only."""
+    """Requirements that each animation lacks; empty: available. Ai only."""
 
 
 def _figure(state: AnimationsState, m: Any) -> AnimationsState:
@@ -69,6 +71,12 @@ def _figure(state: AnimationsState, m: Any) -> AnimationsState:
 
 
 class Animations(Commanding[AnimationsState]):
+    """Figures of Parrot that the drone flies by itself. None for a number leaves it to the drone.
+
+    Speeds are in m/s, turn speeds in rad/s, distances in m, angles in rad (animation.xml). Every figure returns when
+    the drone has begun it; `finished` waits for its end.
+    """
+
     NOTHING = AnimationsState()
     REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = {
         animation.Availability: lambda state, m: replace(state, available=members(m.values, Type)),
@@ -85,10 +93,10 @@ class Animations(Commanding[AnimationsState]):
     # -- figures
 
     async def horizontal_panorama(self, angle: float | None = None, speed: float | None = None) -> None:
-        """Turn on the spot. As all figures: returns when the drone has begun; `finished` waits for the end.
+        """Turn on the spot.
 
-        Raises `CommandRejected` with what is missing, `NotSupported` where the model has no such figure. A start that
-        is given up is taken back.
+        As all figures: raises `CommandRejected` with what is missing, `NotSupported` where the model has no such
+        figure. A start that times out or is cancelled is withdrawn.
         """
         await self._start(
             Type.HORIZONTAL_PANORAMA,
@@ -149,7 +157,7 @@ class Animations(Commanding[AnimationsState]):
     async def parabola(
         self, speed: float | None = None, vertical_distance: float | None = None, play: PlayMode | None = None
     ) -> None:
-        """Over the target to its other side."""
+        """Fly over the target to its other side."""
         await self._start(
             Type.PARABOLA,
             animation.StartParabola,
@@ -160,7 +168,7 @@ class Animations(Commanding[AnimationsState]):
     async def candle(
         self, speed: float | None = None, vertical_distance: float | None = None, play: PlayMode | None = None
     ) -> None:
-        """Towards the target, then up."""
+        """Fly towards the target, then up."""
         await self._start(
             Type.CANDLE, animation.StartCandle, animation.CandleConfigParam, (speed, vertical_distance, play)
         )
@@ -172,7 +180,7 @@ class Animations(Commanding[AnimationsState]):
         horizontal_distance: float | None = None,
         play: PlayMode | None = None,
     ) -> None:
-        """Straight past the target; `angle` is drone - target - destination."""
+        """Fly straight past the target; `angle` is the one between drone, target and destination."""
         await self._start(
             Type.DOLLY_SLIDE,
             animation.StartDollySlide,
@@ -187,7 +195,7 @@ class Animations(Commanding[AnimationsState]):
         finish: VertigoFinishAction | None = None,
         play: PlayMode | None = None,
     ) -> None:
-        """Away from the subject while zooming in on it; `duration` in s."""
+        """Fly away from the subject while zooming in on it; `duration` in s."""
         await self._start(
             Type.VERTIGO,
             animation.StartVertigo,
@@ -205,7 +213,7 @@ class Animations(Commanding[AnimationsState]):
         *,
         above_target: bool = False,
     ) -> None:
-        """Up while turning; `above_target`: first to where the target is."""
+        """Rise while turning; with `above_target` above the target."""
         await self._start(
             Type.POSITION_TWIST_UP if above_target else Type.TWIST_UP,
             animation.StartPositionTwistUp if above_target else animation.StartTwistUp,
@@ -214,7 +222,7 @@ class Animations(Commanding[AnimationsState]):
         )
 
     async def photo_panorama(self, type: Type = Type.SPHERICAL_PHOTO_PANORAMA) -> None:
-        """Pictures all around, one media of many: HORIZONTAL_180, VERTICAL_180, SPHERICAL or SUPER_WIDE."""
+        """Take a photo panorama, one media of many pictures: horizontal, vertical, spherical or super wide."""
         command = _PANORAMAS.get(type)
         if command is None:
             raise NotSupported(f"a photo panorama {spoken(type)}")
@@ -223,7 +231,7 @@ class Animations(Commanding[AnimationsState]):
     # -- their end
 
     async def finished(self, timeout: float = FIGURE_TIMEOUT) -> bool:
-        """Wait until nothing is flown, at once when nothing is; whether it came to its end (False: cancelled).
+        """Wait until no animation is flown; return True when the last one was completed, False when cancelled.
 
         Raises `CommandTimeout` after so long without progress.
         """
@@ -244,7 +252,7 @@ class Animations(Commanding[AnimationsState]):
         return not self.state.canceled
 
     async def cancel(self, timeout: float = ANSWER_TIMEOUT) -> None:
-        """Returns when nothing is flown, at once when nothing is and nothing is about to be."""
+        """End the animation; returns when none is flown, at once when none is running or starting."""
         self._require(self.state.running, "animations")
         self._commander.call_off("stopped", animation.Cancel)
         await self._commander.halted(animation.Cancel.NAME, timeout)

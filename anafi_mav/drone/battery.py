@@ -15,6 +15,8 @@ from anafi_mav.drone.element import Element, Reducer, with_item
 
 
 class BatteryState(msgspec.Struct, frozen=True):
+    """Charge and health of the battery."""
+
     percent: int | None = None
     """Charge left, %."""
     voltage_mv: int | None = None
@@ -44,6 +46,8 @@ def _alert(state: BatteryState, message: battery.Alert) -> BatteryState:
 
 
 class Battery(Element[BatteryState]):
+    """The battery. No verbs."""
+
     NOTHING = BatteryState()
     REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = {
         common.BatteryStateChanged: lambda state, message: replace(state, percent=message.percent),

@@ -26,6 +26,8 @@ _AXES = (CalibrationAxis.X_AXIS, CalibrationAxis.Y_AXIS, CalibrationAxis.Z_AXIS)
 
 
 class CalibrationState(msgspec.Struct, frozen=True):
+    """Calibration of the magnetometer and health of the sensors."""
+
     magneto_required: bool | None = None
     """The drone does not take off before its magnetometer is calibrated."""
     magneto_recommended: bool | None = None
@@ -42,11 +44,13 @@ class CalibrationState(msgspec.Struct, frozen=True):
 
     @property
     def sensors_ok(self) -> bool | None:
-        """Do all reported sensors work? None when the drone reported none."""
+        """True when all reported sensors work; None when the drone reported none."""
         return all(self.sensors.values()) if self.sensors else None
 
 
 class Calibration(Commanding[CalibrationState]):
+    """Calibration of the magnetometer, which a person does by turning the drone."""
+
     NOTHING = CalibrationState()
     REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = {
         common.MagnetoCalibrationRequiredState: lambda state, message: replace(
@@ -83,7 +87,7 @@ class Calibration(Commanding[CalibrationState]):
         )
 
     async def abort_magnetometer(self, timeout: float = ANSWER_TIMEOUT) -> None:
-        """Returns when no calibration runs."""
+        """Abort the calibration; returns when none is running."""
         self._require(self.state.started, "magnetometer calibration")
         await self._change(
             common.MagnetoCalibration(0),

@@ -56,7 +56,11 @@ Ask: TypeAlias = tuple[Message, type[Message]]
 
 
 class Camera(Commanding[CamerasState]):
-    """All cameras of the drone; the verbs mean the main one unless told another."""
+    """All cameras of the drone; `camera[id]` is the state of one, the verbs use the main one unless `id` says another.
+
+    Verbs that change a setting return the value that the drone confirmed: one that it does not take is clamped, or the
+    setting stays as it was. Raises `NotSupported` for what this camera does not have.
+    """
 
     NOTHING = CamerasState()
     REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = {**camera_classic.REDUCERS, **camera_modern.REDUCERS}
@@ -68,17 +72,17 @@ class Camera(Commanding[CamerasState]):
     # -- pictures
 
     async def set_mode(self, mode: CameraMode, id: int = MAIN) -> CameraMode | None:
-        """To photograph or to record."""
+        """Change to photo or recording mode."""
         return (await self._ask(id, "mode", lambda s, now: s.mode(id, now, mode))).mode
 
     async def set_photo(self, wish: PhotoSettings, id: int = MAIN) -> PhotoSettings | None:
-        """How to photograph; what is None stays."""
+        """Change the photo settings; a field that is None stays as it is."""
         if wish.interval is not None:
             number(wish.interval, "interval")
         return (await self._ask(id, "photo", lambda s, now: s.photo(id, now, wish))).photo
 
     async def take_photo(self, id: int = MAIN, timeout: float = SAVE_TIMEOUT) -> str | None:
-        """Take a photo; returns its media id when it is stored. Of a series: None, as soon as it has begun.
+        """Take a photo; return its media id once it is stored. A series returns None as soon as it has begun.
 
         Raises `CommandRejected` when no photo can be taken (in mode RECORDING, or the storage is full).
         """
@@ -100,7 +104,7 @@ class Camera(Commanding[CamerasState]):
         return result if isinstance(result, str) else None
 
     async def stop_photo(self, id: int = MAIN, timeout: float = SAVE_TIMEOUT) -> str | None:
-        """End a series; returns its media id if the drone tells one. `CommandRejected` when there is none."""
+        """End a series; return its media id if the drone reports one. Raises `CommandRejected` without a series."""
         speech, now = self._known(id)
         if now.taking is False:
             raise CommandRejected("no photo is being taken")
@@ -123,11 +127,11 @@ class Camera(Commanding[CamerasState]):
     # -- films
 
     async def set_recording(self, wish: RecordingSettings, id: int = MAIN) -> RecordingSettings | None:
-        """How to record; what is None stays."""
+        """Change the recording settings; a field that is None stays as it is."""
         return (await self._ask(id, "recording", lambda s, now: s.recording(id, now, wish))).recording
 
     async def start_recording(self, id: int = MAIN) -> None:
-        """Returns when the camera records. Raises `CommandRejected` when it cannot (in mode PHOTO)."""
+        """Start to record; returns when the camera records. Raises `CommandRejected` in mode PHOTO."""
         speech, now = self._known(id)
         if now.recording_now:
             return
@@ -143,7 +147,7 @@ class Camera(Commanding[CamerasState]):
         await self._capture(id, command, speech.recording_events, speech.recording_news, judge, ANSWER_TIMEOUT, None)
 
     async def stop_recording(self, id: int = MAIN, timeout: float = 2 * ANSWER_TIMEOUT) -> str:
-        """End the film; returns its media id when it is stored."""
+        """Stop recording; return the media id once the video is stored."""
         speech, now = self._known(id)
         if now.recording_now is False:
             raise CommandRejected("the camera does not record")
@@ -159,13 +163,13 @@ class Camera(Commanding[CamerasState]):
         )
 
     async def set_autorecord(self, on: bool, id: int = MAIN) -> bool | None:
-        """Whether to record from take-off to landing."""
+        """Switch automatic recording from take-off to landing."""
         return (await self._ask(id, "autorecord", lambda s, now: s.autorecord(id, now, on))).autorecord
 
     # -- zoom
 
     async def zoom(self, level: float, id: int = MAIN, timeout: float = ZOOM_TIMEOUT) -> float:
-        """Zoom to this level (1: none; clipped to what the camera can); returns the level when it is reached."""
+        """Zoom to a factor (1: no zoom; clipped to the range of the camera); return it once it is reached."""
         speech, now = self._known(id)
         wanted = clip(number(level, "zoom"), 1.0, self._zoom_max(now))
 
@@ -177,7 +181,7 @@ class Camera(Commanding[CamerasState]):
         return await self._insist(("zoom", id), speech.zoom(id, wanted), answer, timeout)
 
     def zoom_to(self, level: float, id: int = MAIN) -> None:
-        """`zoom`, sent once and not waited for: for levels that come in a stream."""
+        """Send a zoom factor once, without waiting: for targets that arrive in a stream."""
         speech, now = self._known(id)
         self._order(("zoom", id), speech.zoom(id, clip(number(level, "zoom"), 1.0, self._zoom_max(now))))
 
@@ -192,7 +196,7 @@ class Camera(Commanding[CamerasState]):
         self._order(("zoom", id), speech.zoom_rate(id, clip(number(share, "zoom rate"), -1.0, 1.0)))
 
     async def stop_zoom(self, id: int = MAIN) -> float:
-        """Returns the level at which the zoom stands."""
+        """Stop the zoom; return the factor at which it stands."""
         speech, now = self._known(id)
         self._zoom_max(now)
         last = math.nan
@@ -210,7 +214,7 @@ class Camera(Commanding[CamerasState]):
         return await self._insist(("zoom", id), speech.zoom_rate(id, 0.0), answer, ANSWER_TIMEOUT)
 
     async def reset_zoom(self, id: int = MAIN) -> float:
-        """Back to no zoom; returns the level then."""
+        """Reset the zoom; return the factor then."""
         speech, now = self._known(id)
         self._zoom_max(now)
         self._orders["zoom", id] += 1
@@ -222,29 +226,29 @@ class Camera(Commanding[CamerasState]):
         return await self._commander.confirm(speech.reset_zoom(id), (speech.zoom_event,), judge, ZOOM_TIMEOUT)
 
     async def set_zoom_speed(self, speed: float, id: int = MAIN) -> float | None:
-        """The fastest zoom, tan(deg)/s."""
+        """Set the highest zoom speed, tan(deg)/s."""
         number(speed, "zoom speed")
         return (await self._ask(id, "zoom_speed", lambda s, now: s.zoom_speed(id, now, speed))).zoom_speed
 
     async def set_zoom_may_degrade(self, allowed: bool, id: int = MAIN) -> bool | None:
-        """Whether a zoom by rate goes on where it only magnifies pixels."""
+        """Allow or forbid a zoom by rate beyond the lossless range."""
         state = await self._ask(id, "zoom_may_degrade", lambda s, now: s.zoom_may_degrade(id, now, allowed))
         return state.zoom_may_degrade
 
     # -- light
 
     async def set_ev(self, ev: float, id: int = MAIN) -> float | None:
-        """Exposure compensation, EV; the nearest third is taken."""
+        """Set the exposure compensation, EV, to the nearest third."""
         return (await self._ask(id, "ev", lambda s, now: s.ev(id, now, ev))).ev
 
     async def set_exposure(self, wish: ExposureSettings, id: int = MAIN) -> ExposureSettings | None:
-        """How to expose; what is None stays. Shutter and ISO are taken to the nearest step."""
+        """Change the exposure; a field that is None stays. Shutter and ISO take the nearest step."""
         return (await self._ask(id, "exposure", lambda s, now: s.exposure(id, now, wish))).exposure
 
     async def lock_exposure(
         self, on: bool = True, at: tuple[float, float] | None = None, id: int = MAIN
     ) -> bool | None:
-        """Keep the exposure as it is; `at` (0 to 1 from the upper left) as it is best for that place."""
+        """Lock or unlock the exposure; `at` (x, y: 0 to 1 from the upper left) locks it to what suits that place."""
         if not self[id].exposure_lockable:
             self._require(None, "exposure lock")
         return (await self._ask(id, "exposure", lambda s, now: s.lock_exposure(id, now, on, at))).exposure_locked
@@ -252,40 +256,44 @@ class Camera(Commanding[CamerasState]):
     async def set_white_balance(
         self, mode: WhiteBalance, temperature_k: float | None = None, id: int = MAIN
     ) -> tuple[WhiteBalance | None, float | None]:
-        """`temperature_k` (to the nearest 250 K) is for CUSTOM."""
+        """Set the white balance; `temperature_k` (to the nearest 250 K) is for CUSTOM. Return both."""
         state = await self._ask(id, "white_balance", lambda s, now: s.white_balance(id, now, mode, temperature_k))
         return state.white_balance, state.temperature_k
 
     async def lock_white_balance(self, on: bool = True, id: int = MAIN) -> bool | None:
+        """Lock or unlock the white balance."""
         if not self[id].white_balance_lockable:
             self._require(None, "white balance lock")
         state = await self._ask(id, "white_balance", lambda s, now: s.lock_white_balance(id, now, on))
         return state.white_balance_locked
 
     async def set_hdr(self, on: bool, id: int = MAIN) -> bool | None:
+        """Switch HDR on or off."""
         return (await self._ask(id, "hdr", lambda s, now: s.hdr(id, now, on))).hdr
 
     async def set_style(self, style: Style, id: int = MAIN) -> Style | None:
+        """Choose the style of the picture."""
         now = (await self._ask(id, "style", lambda s, now: s.style(id, now, style))).style
         return None if now is None else now.style
 
     async def set_style_params(
         self, saturation: float, contrast: float, sharpness: float, id: int = MAIN
     ) -> CameraState:
-        """Levels of the present style; their ranges are in `StyleSettings`."""
+        """Set the levels of the present style; their ranges are in `StyleSettings`."""
         number(saturation + contrast + sharpness, "style")
         return await self._ask(id, "style", lambda s, now: s.style_params(id, now, saturation, contrast, sharpness))
 
     async def set_streaming(self, mode: Streaming, id: int = MAIN) -> Streaming | None:
+        """Choose between low latency and reliability of the live video."""
         return (await self._ask(id, "streaming", lambda s, now: s.streaming(id, now, mode))).streaming
 
     async def set_alignment(self, yaw: float, pitch: float, roll: float, id: int = MAIN) -> CameraState:
-        """Corrections against the other camera, deg."""
+        """Set the corrections against the other camera, deg."""
         number(yaw + pitch + roll, "alignment")
         return await self._ask(id, "alignment", lambda s, now: s.alignment(id, now, yaw, pitch, roll))
 
     async def set_antiflicker(self, mode: Antiflicker) -> Antiflicker | None:
-        """The rhythm of the mains that the exposure keeps; one for all cameras."""
+        """Set the mains frequency that the exposure adapts to; one for all cameras."""
         self._require(self.state.antiflicker, "antiflicker")
         speech, _ = self._known(min(self.state.cameras, default=MAIN))
         command, answer = speech.antiflicker(mode)

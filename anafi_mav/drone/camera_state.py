@@ -33,7 +33,7 @@ MAX_OPTIONS = 64
 
 
 class PhotoSettings(msgspec.Struct, frozen=True):
-    """As a wish: None leaves it as it is."""
+    """Photo settings; in `Camera.set_photo` a field that is None stays as it is."""
 
     mode: PhotoMode | None = None
     format: PhotoFormat | None = None
@@ -47,7 +47,7 @@ class PhotoSettings(msgspec.Struct, frozen=True):
 
 
 class RecordingSettings(msgspec.Struct, frozen=True):
-    """As a wish: None leaves it as it is."""
+    """Recording settings; in `Camera.set_recording` a field that is None stays as it is."""
 
     mode: RecordingMode | None = None
     resolution: Resolution | None = None
@@ -60,18 +60,20 @@ class RecordingSettings(msgspec.Struct, frozen=True):
 
 
 class ExposureSettings(msgspec.Struct, frozen=True):
-    """As a wish: None leaves it as it is."""
+    """Exposure settings; in `Camera.set_exposure` a field that is None stays as it is."""
 
     mode: ExposureMode | None = None
     shutter_s: float | None = None
-    """Where the shutter is set by hand."""
+    """Shutter time for the modes that set it by hand."""
     iso: float | None = None
-    """Where the sensitivity is set by hand."""
+    """Sensitivity for the modes that set it by hand."""
     max_iso: float | None = None
     metering: Metering | None = None
 
 
 class StyleSettings(msgspec.Struct, frozen=True):
+    """The style of the picture and its levels."""
+
     style: Style | None = None
     saturation: Range | None = None
     contrast: Range | None = None
@@ -79,7 +81,7 @@ class StyleSettings(msgspec.Struct, frozen=True):
 
 
 class PhotoOption(msgspec.Struct, frozen=True):
-    """Settings that go together."""
+    """A combination of photo settings that the camera accepts."""
 
     modes: frozenset[PhotoMode]
     formats: frozenset[PhotoFormat]
@@ -88,7 +90,7 @@ class PhotoOption(msgspec.Struct, frozen=True):
 
 
 class RecordingOption(msgspec.Struct, frozen=True):
-    """Settings that go together."""
+    """A combination of recording settings that the camera accepts."""
 
     modes: frozenset[RecordingMode]
     resolutions: frozenset[Resolution]
@@ -97,8 +99,10 @@ class RecordingOption(msgspec.Struct, frozen=True):
 
 
 class CameraState(msgspec.Struct, frozen=True):
+    """One camera: its mode, settings, lens and light, and what it can do."""
+
     feature: str | None = None
-    """Which of Parrot's features speaks of it."""
+    """Parrot's feature that reports it: "camera" or "camera2"."""
     kind: CameraKind | None = None
     mode: CameraMode | None = None
     modes: frozenset[CameraMode] | None = None
@@ -106,42 +110,44 @@ class CameraState(msgspec.Struct, frozen=True):
     photo: PhotoSettings | None = None
     photos: tuple[PhotoOption, ...] = ()
     photo_available: bool | None = None
-    """Whether a photo can be taken now."""
+    """True when a photo can be taken now."""
     taking: bool | None = None
     """A photo is being taken, or a series of them."""
     photo_count: int | None = None
     """Pictures of the series so far."""
     last_photo: str | None = None
-    """Media id of what was stored last since the connection."""
+    """Media id of the last stored photo since the connection."""
     # -- films
     recording: RecordingSettings | None = None
     recordings: tuple[RecordingOption, ...] = ()
     recording_available: bool | None = None
     recording_now: bool | None = None
     recording_since_ms: int | None = None
-    """When it began, by the drone's clock, ms since 1970; None on the Ai, which tells a duration instead."""
+    """When it began, by the drone's clock, ms since 1970; None on the Ai, which reports a duration."""
     recording_for_ms: int | None = None
-    """How long it had run when the state was told; Ai only."""
+    """Duration when the state was reported; Ai only."""
     last_recording: str | None = None
     autorecord: bool | None = None
     """Record from take-off to landing."""
     # -- lens
     zoom: float | None = None
+    """Factor; 1: no zoom."""
     zoom_available: bool | None = None
     zoom_max: float | None = None
     zoom_max_lossless: float | None = None
-    """The largest zoom that still shows what the sensor sees."""
+    """The largest factor that the sensor resolves."""
     zoom_speed: float | None = None
     """The fastest zoom, tan(deg)/s."""
     zoom_speed_bounds: tuple[float, float] | None = None
     zoom_may_degrade: bool | None = None
-    """Whether a zoom by velocity goes beyond `zoom_max_lossless`."""
+    """True when a zoom by rate goes beyond `zoom_max_lossless`."""
     hfov_deg: float | None = None
     """Ai only."""
     # -- light
     ev: float | None = None
+    """Exposure compensation, EV."""
     evs: tuple[float, ...] = ()
-    """What `ev` can be."""
+    """Values that `ev` accepts."""
     exposure: ExposureSettings | None = None
     exposures: frozenset[ExposureMode] | None = None
     shutter_s: float | None = None
@@ -157,9 +163,9 @@ class CameraState(msgspec.Struct, frozen=True):
     white_balance_locked: bool | None = None
     white_balance_lockable: bool | None = None
     hdr: bool | None = None
-    """Is wished for."""
+    """Requested."""
     hdr_active: bool | None = None
-    """Is done; None where the drone tells the wish only."""
+    """In effect; None where the drone reports the request only."""
     style: StyleSettings | None = None
     styles: frozenset[Style] | None = None
     streaming: Streaming | None = None
@@ -169,12 +175,15 @@ class CameraState(msgspec.Struct, frozen=True):
 
     @property
     def zoom_speed_range(self) -> Range | None:
+        """`zoom_speed` with its bounds; None before both are reported."""
         if self.zoom_speed is None or self.zoom_speed_bounds is None:
             return None
         return Range(self.zoom_speed, *self.zoom_speed_bounds)
 
 
 class CamerasState(msgspec.Struct, frozen=True):
+    """All cameras by id."""
+
     cameras: Mapping[int, CameraState] = {}
     active: frozenset[int] = frozenset()
     """Ids of the cameras that work now: a thermal mode changes them."""

@@ -19,17 +19,23 @@ from anafi_mav.errors import LocalProtocolError, NotSupported
 
 
 class CameraKind(enum.Enum):
+    """Kind of a camera."""
+
     MAIN = "MAIN"
     THERMAL = "THERMAL"
     THERMAL_BLENDED = "THERMAL_BLENDED"
 
 
 class CameraMode(enum.Enum):
+    """Mode of a camera."""
+
     RECORDING = "RECORDING"
     PHOTO = "PHOTO"
 
 
 class PhotoMode(enum.Enum):
+    """Kind of photo or series."""
+
     SINGLE = "SINGLE"
     BRACKETING = "BRACKETING"
     BURST = "BURST"
@@ -38,6 +44,8 @@ class PhotoMode(enum.Enum):
 
 
 class PhotoFormat(enum.Enum):
+    """Projection of a photo."""
+
     FULL_FRAME = "FULL_FRAME"
     RECTILINEAR = "RECTILINEAR"
     FULL_FRAME_STABILIZED = "FULL_FRAME_STABILIZED"
@@ -45,6 +53,8 @@ class PhotoFormat(enum.Enum):
 
 
 class PhotoFile(enum.Enum):
+    """File format of a photo."""
+
     JPEG = "JPEG"
     DNG = "DNG"
     """Not on the Ai."""
@@ -78,6 +88,8 @@ class Bracketing(enum.Enum):
 
 
 class RecordingMode(enum.Enum):
+    """Kind of video."""
+
     STANDARD = "STANDARD"
     HYPERLAPSE = "HYPERLAPSE"
     SLOW_MOTION = "SLOW_MOTION"
@@ -101,6 +113,8 @@ class Resolution(enum.Enum):
 
 
 class ExposureMode(enum.Enum):
+    """Quantities that the camera exposes by, and those that are set by hand."""
+
     AUTOMATIC = "AUTOMATIC"
     AUTOMATIC_PREFER_ISO = "AUTOMATIC_PREFER_ISO_SENSITIVITY"
     AUTOMATIC_PREFER_SHUTTER = "AUTOMATIC_PREFER_SHUTTER_SPEED"
@@ -110,11 +124,15 @@ class ExposureMode(enum.Enum):
 
 
 class Metering(enum.Enum):
+    """Part of the picture that the exposure is measured in."""
+
     STANDARD = "STANDARD"
     CENTER_TOP = "CENTER_TOP"
 
 
 class WhiteBalance(enum.Enum):
+    """Light that the camera balances for."""
+
     AUTOMATIC = "AUTOMATIC"
     CANDLE = "CANDLE"
     SUNSET = "SUNSET"
@@ -137,6 +155,8 @@ class WhiteBalance(enum.Enum):
 
 
 class Style(enum.Enum):
+    """Style of the picture."""
+
     STANDARD = "STANDARD"
     PLOG = "PLOG"
     INTENSE = "INTENSE"
@@ -148,7 +168,7 @@ class Style(enum.Enum):
 
 
 class Streaming(enum.Enum):
-    """What the live picture gives up first."""
+    """Priority of the live video."""
 
     LOW_LATENCY = "LOW_LATENCY"
     HIGH_RELIABILITY = "HIGH_RELIABILITY"
@@ -156,7 +176,7 @@ class Streaming(enum.Enum):
 
 
 class Antiflicker(enum.Enum):
-    """The rhythm of the mains that the exposure keeps."""
+    """Mains frequency that the exposure adapts to."""
 
     OFF = "OFF"
     AUTO = "AUTO"

@@ -14,7 +14,7 @@ import asyncio
 import contextlib
 import logging
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar
 
 from anafi_mav.arsdk.messages import (
@@ -63,9 +63,15 @@ ALWAYS_THE_PILOTS = 1 << RETURN_HOME | 1 << TAKEOFF_LAND
 DEFLECTION = 10
 """Percent beyond which a stick is meant, and not just touched."""
 
-QUIET = 0.5
-"""s without a command of motion, and without a move under way, after which sticks and source go back. The setpoints of
-a user who flies come every few hundredths of a second."""
+LOOK_EVERY = 0.1
+"""s between looks whether something of ours still flies."""
+
+QUIET = 0.4
+"""s without a command of motion, and without a move under way, after which sticks and source go back: within half a
+second of the end."""
+
+CLAIM_EVERY = 1.0
+"""s between two attempts to give back a source that is ours by the Skycontroller's report only."""
 
 GOODBYE = 0.5
 """s to wait for the controller's answer when the connection is about to be closed."""
@@ -76,15 +82,22 @@ back: the time begins anew with every command, for a joystick that somebody forg
 
 
 class Controller(Element[ControllerState]):
-    """The Skycontroller, if there is one. `take_over` is called when its pilot has taken the drone."""
+    """The Skycontroller, if there is one."""
 
     NOTHING = ControllerState()
     REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = REDUCERS
 
     def __init__(
-        self, commander: Commander, moving: Callable[[], bool], take_over: Callable[[], None] | None = None
+        self,
+        commander: Commander,
+        moving: Callable[[], bool],
+        take_over: Callable[[], None] | None = None,
+        stand_by: Callable[[Sequence[Message]], None] = lambda messages: None,
     ) -> None:
-        """`moving` says whether a move that a user ordered is under way; `take_over` ends what the user ordered."""
+        """`moving` says whether a move that a user ordered is under way; `take_over` ends what the user ordered.
+
+        `stand_by` gets what has to be sent when the host stalls; nothing while the axes are the pilot's.
+        """
         super().__init__()
         self.present = False
         """There is a Skycontroller between us and the drone."""
@@ -97,6 +110,8 @@ class Controller(Element[ControllerState]):
         self._commander = commander
         self._moving = moving
         self._take_over = take_over
+        self._stand_by = stand_by
+        self._gave_back = -math.inf
         self._last_motion = -math.inf
         self._pilot_keeps_until = -math.inf
         self._extra_axes = 0
@@ -119,21 +134,42 @@ class Controller(Element[ControllerState]):
             self._timer.cancel()
             self._timer = None
 
+    def link_silent(self) -> None:
+        """The Skycontroller is not heard; what it is stays known, what we took is not ours any more."""
+        present, model = self.present, self.model
+        self.link_lost()
+        self.present, self.model = present, model
+
+    def link_heard(self) -> None:
+        """It is heard again, and may not have missed us: what we took goes back."""
+        if self.present:
+            self._send_back()
+
     # -- who flies
 
     @property
-    def pilot_flies(self) -> bool:
-        """The pilot has taken the drone from our user, whose commands of motion are refused for the time being."""
+    def pilot_acquired_control(self) -> bool:
+        """True while motion of ours is refused: the pilot moved a stick against it less than `PILOT_KEEPS` ago."""
         return self.present and loop_time() < self._pilot_keeps_until
+
+    @property
+    def pilot_has_source(self) -> bool:
+        """True while the Skycontroller's sticks fly the drone, whether a pilot holds it or not.
+
+        A source that is not reported is the pilot's: it is his after each connection (skyctrl.xml 4-20-0).
+        """
+        return self.present and not self.taken and self.state.source != Source.CONTROLLER
 
     def allows(self, message: Message) -> bool:
         """Shown every command before it is sent. A command of motion takes sticks and source for our user.
 
-        False: a stick position that must not be sent, since the pilot flies. Raises `CommandRejected` for any other
-        motion then.
+        False: a stick position that must not be sent, since the pilot flies; a level one while he has the source is
+        among them. Raises `CommandRejected` for any other motion then.
         """
-        if not self.present or not is_motion(message):
+        if not self.present:
             return True
+        if not is_motion(message):
+            return not (isinstance(message, ardrone3.PCMD) and self.pilot_has_source)
         now = loop_time()
         if now < self._pilot_keeps_until:
             if isinstance(message, ardrone3.PCMD):
@@ -146,24 +182,40 @@ class Controller(Element[ControllerState]):
             log.info("the source of piloting is ours, the axes of the Skycontroller are grabbed")
             self._commander.send(self._grab_message())
             self._commander.send(skyctrl.SetPilotingSource(Source.CONTROLLER))
+            self._stand_by(self._hand_back())
         if self._timer is None:
-            self._watch(QUIET)
+            self._watch(LOOK_EVERY)
         return True
 
     def give_back(self) -> None:
-        """Sticks and source go back to the pilot now; what is grabbed by `grab` stays so."""
+        """Return sticks and piloting source to the pilot now; inputs of `grab` stay grabbed."""
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
         if not self.taken:
             return
         self.taken = False
-        try:
-            self._commander.send(skyctrl.SetPilotingSource(Source.SKY_CONTROLLER))
-            self._commander.send(self._grab_message())
-        except LinkLost:
-            pass  # then the controller has done it by itself
+        self._send_back()
         log.info("sticks and source of piloting are given back to the pilot")
+
+    def _send_back(self) -> None:
+        self._gave_back = loop_time()
+        with contextlib.suppress(LinkLost):  # then the controller does it by itself
+            deliveries = [self._commander.deliver(message) for message in self._hand_back()]
+            deliveries[-1].add_done_callback(self._is_back)
+
+    def _is_back(self, delivery: asyncio.Future[None]) -> None:
+        """The Skycontroller has received what gives sticks and source back."""
+        if not self.taken:
+            self._stand_by(())
+
+    def _hand_back(self) -> tuple[Message, ...]:
+        """Commands that give sticks and source back; what is grabbed by `grab` stays so."""
+        return (skyctrl.SetPilotingSource(Source.SKY_CONTROLLER), mapper.Grab(self._extra_buttons, self._extra_axes))
+
+    def stalled(self) -> None:
+        """The host stalled while the axes were grabbed, and they were given back for us."""
+        self._yield("the host stalled: the pilot at the Skycontroller has the sticks")
 
     async def release(self) -> None:
         """`give_back` for good, before the connection is closed; waits a moment for the controller to say so."""
@@ -194,8 +246,11 @@ class Controller(Element[ControllerState]):
 
     def _on_source(self, message: skyctrl.PilotingSource, now: float) -> None:
         if not self.taken:
-            return
-        if message.source == Source.CONTROLLER:
+            if message.source == Source.CONTROLLER and loop_time() - self._gave_back >= CLAIM_EVERY:
+                # Of an earlier connection: nothing of ours flies, so that nobody would.
+                log.warning("the source of piloting was ours without a flight: given back")
+                self._send_back()
+        elif message.source == Source.CONTROLLER:
             self._confirmed = True
         elif self._confirmed:  # otherwise it answers a `give_back` that was followed by a new motion
             self._yield("the Skycontroller gave the source of piloting to its pilot")
@@ -214,11 +269,11 @@ class Controller(Element[ControllerState]):
     def _look(self) -> None:
         """Is the motion over?"""
         self._timer = None
-        rest = self._last_motion + QUIET - loop_time()
-        if rest > 0.0:
-            self._watch(rest)
-        elif self._moving():
-            self._watch(QUIET)
+        now = loop_time()
+        if self._moving():
+            self._last_motion = now
+        if now - self._last_motion < QUIET:
+            self._watch(LOOK_EVERY)
         else:
             self.give_back()
 
@@ -228,8 +283,9 @@ class Controller(Element[ControllerState]):
     # -- verbs
 
     async def grab(self, axes: int = 0, buttons: int = 0, timeout: float = ANSWER_TIMEOUT) -> None:
-        """Have these axes and buttons (masks, bit n = number n) reported in the state instead of acting; zeros give
-        them back. What a motion grabs is not touched.
+        """Have axes and buttons (masks, bit n = number n) reported in the state instead of acting; zeros end it.
+
+        The axes of the sticks, which are grabbed during motion, are not changed.
 
         Raises `LocalProtocolError` for the sticks, which are grabbed by motion alone, and for the buttons that stay
         the pilot's.
@@ -241,6 +297,8 @@ class Controller(Element[ControllerState]):
             raise LocalProtocolError("return home and take-off/land are the pilot's buttons")
         self._extra_axes, self._extra_buttons = axes, buttons
         wanted = self._grab_message()
+        if self.taken:
+            self._stand_by(self._hand_back())
         await self._commander.confirm(
             wanted,
             (mapper.GrabState,),
@@ -249,7 +307,7 @@ class Controller(Element[ControllerState]):
         )
 
     async def discover_drones(self, timeout: float = ANSWER_TIMEOUT) -> Mapping[str, KnownDrone]:
-        """Let the controller look for drones; what it sees, by serial number."""
+        """Search for drones; return those in sight, by serial number."""
         self._require()
         if self.state.protobuf:
             await self._commander.confirm(
@@ -266,7 +324,7 @@ class Controller(Element[ControllerState]):
         return self.state.visible
 
     async def connect_drone(self, serial: str, key: str = "", timeout: float = 30.0) -> None:
-        """Let the controller change to this drone. The connection to us ends and has to be made anew, when it has."""
+        """Connect the Skycontroller to another drone. Its connection to this program ends: connect again."""
         self._require()
 
         if self.state.protobuf:
@@ -304,7 +362,7 @@ class Controller(Element[ControllerState]):
         await self._commander.confirm(device_manager.ConnectDevice(uid=serial, wifi=wifi), answers, judge, timeout)
 
     async def forget_drone(self, serial: str, timeout: float = ANSWER_TIMEOUT) -> None:
-        """Let the controller forget a drone that it knows."""
+        """Remove a drone from those the Skycontroller knows."""
         self._require()
         if serial not in self.state.known:
             raise CommandRejected(f"the Skycontroller knows no drone {serial}")

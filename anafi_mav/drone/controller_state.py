@@ -48,6 +48,8 @@ class KnownDrone(msgspec.Struct, frozen=True):
 
 
 class ControllerState(msgspec.Struct, frozen=True):
+    """The Skycontroller, its pilot's controls and the drones it knows."""
+
     serial: str | None = None
     firmware: str | None = None
     hardware: str | None = None
@@ -56,7 +58,7 @@ class ControllerState(msgspec.Struct, frozen=True):
     battery: BatteryStatus | None = None
     attitude: Attitude | None = None
     position: Position | None = None
-    """Where the controller is; altitude above mean sea level."""
+    """Place of the controller; altitude above mean sea level."""
     magnetometer: CalibrationStatus | None = None
     link: Connection | None = None
     """To the drone."""
@@ -65,7 +67,7 @@ class ControllerState(msgspec.Struct, frozen=True):
     drone_model: int | None = None
     """Parrot's product number; 0 while there is no drone."""
     source: Source | None = None
-    """Whose sticks fly."""
+    """Piloting source: whose sticks fly the drone."""
     grabbed_axes: int | None = None
     grabbed_buttons: int | None = None
     axes: Mapping[int, int] = {}

@@ -9,7 +9,7 @@ import asyncio
 import contextlib
 import logging
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import datetime
 from functools import partial
 from typing import Any, TypeAlias, TypeVar
@@ -37,7 +37,7 @@ from anafi_mav.drone.camera import Camera
 from anafi_mav.drone.controller import MODELS as CONTROLLERS
 from anafi_mav.drone.controller import Controller, is_motion
 from anafi_mav.drone.element import Element, Reducer
-from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander
+from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, loop_time
 from anafi_mav.drone.features import Feature, Support, features
 from anafi_mav.drone.flight_plan import FlightPlan
 from anafi_mav.drone.follow_me import FollowMe
@@ -69,15 +69,22 @@ Callback: TypeAlias = Callable[[Message, float], None]
 REBOOT_TIMEOUT = 15.0
 """s within which the link to a drone that reboots is lost; silence is noticed after 2.5 s."""
 
+WAIT_TIMEOUT = 30.0
+"""s that `wait_until` and `wait_for` wait unless the caller says otherwise: a take-off or landing takes about ten."""
+
 CONTROLLER_PORTS = 100
 """A Skycontroller 3 has the TCP ports of its drone this much higher (Olympe, libarsdkctrl arsdk_device.c)."""
+
+HANDSHAKE_AFTER = 4.0
+"""s of silence before the first new handshake. libarsdk keeps a silent session for 8 s, and an earlier handshake could
+throw out one that was only fading."""
 
 CONTROLLER_TIMEOUT = 5.0
 """s that a Skycontroller may take to find its drone; then it is asked anew, so that its own state is fresh."""
 
 
 class Drone:
-    """An ANAFI at a network address. Make it inside a running loop; connect, lose the link and connect again."""
+    """An ANAFI at a network address; `connect` makes one. It can be connected again after the link is lost."""
 
     def __init__(
         self,
@@ -125,7 +132,9 @@ class Drone:
         self.thermal = Thermal(self._commander)
         self.video = Video()
         self.piloting = Piloting(self._commander, self.home, self.takeoff_blockers)
-        self.controller = Controller(self._commander, self._user_moves, self._pilot_takes_over)
+        self.controller = Controller(self._commander, self._user_moves, self._pilot_takes_over, self._stand_by)
+        self.piloting.pilot_has_source = lambda: self.controller.pilot_has_source
+        self.piloting.is_modern = lambda: self._model.protobuf
         self._commander.gate = self._allows
         self._elements: tuple[Element[Any], ...] = (
             self.alerts,
@@ -163,6 +172,12 @@ class Drone:
         self._subscribers: tuple[Callback, ...] = ()
 
         self._session: ControllerSession | None = None
+        self._fading: ControllerSession | None = None
+        """A session that is silent, and goes on when the drone is heard again before a new handshake has succeeded."""
+        self._heard: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        """Done when the fading session is heard again, or has ended."""
+        self._hover_due = False
+        """What flew at the beginning of a silence is to be stopped when it is over."""
         self._opening = False
         self._complete = False
         self._counters: Counter[str] = Counter()
@@ -174,24 +189,20 @@ class Drone:
     # -- the connection
 
     async def connect(self) -> None:
-        """Connect and read the drone's state anew; returns when it has sent all of it.
+        """Connect and read all states and settings; returns when the drone has sent them.
 
-        What was known before is forgotten first, and nothing of before is sent again. Raises `LinkLost`, or
+        States of an earlier connection are dropped, and none of its commands is sent again. Raises `LinkLost`, or
         `RemoteProtocolError` when what answers there is no drone.
         """
         if self._session is not None or self._opening:
             raise LocalProtocolError(f"{self.name} is connected, or about to be")
         self._opening = True
         try:
+            session = await self._open()
+            if session is None:
+                log.info("%s: heard again", self.name)
+                return
             self._reset()
-            session = await mux_link.connect_either(
-                self.address,
-                discovery_port=self._discovery_port,
-                handshake_port=self._handshake_port,
-                local_address=self._local_address,
-                interface=self._interface,
-                on_message=self._receive,
-            )
             self._begin(session)
             try:
                 await self._find_web_server(session)
@@ -204,9 +215,100 @@ class Drone:
                 raise
             self._complete = True
             self.video.link_up(self._video_route(session))
+            self._hover_after_silence()
         finally:
             self._opening = False
         log.info("%s: connected to %s, protocol %d", self.name, self.identity, session.version)
+
+    async def _open(self) -> ControllerSession | None:
+        """Open a session; None: the silent one of before goes on, since the drone has been heard again.
+
+        The drone may keep a silent session for 8 s (libarsdk) and a handshake would end it, so that the first one
+        waits. Until one has succeeded the silent session is listened to. Raises as `connect`.
+        """
+        fading = self._fading
+        if fading is not None:
+            rest = fading.last_received + HANDSHAKE_AFTER - loop_time()
+            await asyncio.wait({self._heard}, timeout=max(rest, 0.0))
+            if self._resume(fading):
+                return None
+        attempt = asyncio.ensure_future(
+            mux_link.connect_either(
+                self.address,
+                discovery_port=self._discovery_port,
+                handshake_port=self._handshake_port,
+                local_address=self._local_address,
+                interface=self._interface,
+                on_message=_ignore,
+                fades=True,
+            )
+        )
+        try:
+            either: set[asyncio.Future[Any]] = {attempt} if fading is None else {attempt, self._heard}
+            await asyncio.wait(either, return_when=asyncio.FIRST_COMPLETED)
+            if not attempt.done() and fading is not None and self._resume(fading):
+                return None
+            session = await attempt
+        except BaseException:
+            # Nobody takes what it may have opened.
+            if attempt.done() and not attempt.cancelled() and attempt.exception() is None:
+                await attempt.result().close()
+            raise
+        finally:
+            attempt.cancel()
+            await asyncio.wait([attempt])
+        self._drop_fading("replaced by a new session")
+        session.on_message = self._receive
+        return session
+
+    def _resume(self, session: ControllerSession) -> bool:
+        """Go on with a session that was silent. False: it is still silent, or has ended."""
+        if session is not self._fading or session.silent or session.lost.done():
+            return False
+        self._fading = None
+        self._session = session
+        self._lost = asyncio.get_running_loop().create_future()
+        self._commander.attach(session)
+        self._complete = True
+        self.controller.link_heard()
+        self.video.link_up(self._video_route(session))
+        self._hover_after_silence()
+        return True
+
+    def _hover_after_silence(self) -> None:
+        """Stop what flies on from before a silence; a flight plan, a landing and a return go on by themselves."""
+        due, self._hover_due = self._hover_due, False
+        piloting = self.piloting.state
+        free = piloting.flying in (FlyingState.HOVERING, FlyingState.FLYING) and not self.home.state.returning
+        if due and free and piloting.plan != PlayingState.PLAYING:
+            with contextlib.suppress(LinkLost):
+                self.piloting.hover()
+
+    def _on_silent(self, session: ControllerSession, reason: str) -> None:
+        """The drone is not heard. For all others the link is lost; the session may go on."""
+        if session is not self._session or not self._complete:
+            session.end(reason)
+            return
+        self._fading = session
+        self._heard = asyncio.get_running_loop().create_future()
+        self._hover_due = True
+        self._disconnected(reason, silent=True)
+
+    def _on_speaks(self, session: ControllerSession) -> None:
+        if session is self._fading and not self._heard.done():
+            self._heard.set_result(None)
+
+    def _drop_fading(self, reason: str) -> None:
+        fading, self._fading = self._fading, None
+        if fading is not None:
+            fading.end(reason)
+
+    async def pause(self, seconds: float) -> None:
+        """Wait before the next `connect`, no longer than until a silent session is heard again."""
+        if self._fading is None:
+            await asyncio.sleep(seconds)
+        else:
+            await asyncio.wait({self._heard}, timeout=seconds)
 
     def _reset(self) -> None:
         for element in self._elements:
@@ -224,7 +326,12 @@ class Drone:
         self._session = session
         self._counters = session.counters
         self._commander.attach(session)
+        if self.controller.present:
+            session.on_stall = self.controller.stalled
+            session.watch()
         session.lost.add_done_callback(partial(self._on_lost, session))
+        session.on_silent = partial(self._on_silent, session)
+        session.on_speaks = partial(self._on_speaks, session)
 
     async def _find_web_server(self, session: ControllerSession) -> None:
         """The drone's own, a hundred ports up at a Skycontroller 3, or behind the mux of a Skycontroller 4."""
@@ -302,6 +409,8 @@ class Drone:
             raise CommandRejected("the magnetometer is being calibrated: somebody turns the drone by hand")
         if isinstance(message, common.MagnetoCalibration) and message.calibrate:
             self._require_standing("calibrated")
+        if _starts_motors(message):
+            self.piloting.take_off_wanted()
         return self.controller.allows(message)
 
     def _require_standing(self, what: str) -> None:
@@ -311,11 +420,20 @@ class Drone:
         if self.piloting.about_to_fly:
             raise CommandRejected(f"a drone that is about to take off is not {what}")
 
+    def retire(self, tasks: Iterable[asyncio.Task[Any]]) -> None:
+        """From now on these tasks send nothing but what stops something: newer commands have replaced them."""
+        self._commander.retire(tasks)
+
+    def silence(self, tasks: Iterable[asyncio.Task[Any]]) -> None:
+        """From now on these tasks send nothing at all."""
+        self._commander.silence(tasks)
+
     def _user_moves(self) -> bool:
         """Does something fly the drone that a user of ours ordered?"""
         piloting = self.piloting
         return (
             piloting.moving
+            or piloting.sticks_held
             or self._commander.begins
             or piloting.state.plan == PlayingState.PLAYING
             or piloting.state.poi in (PoiStatus.RUNNING, PoiStatus.PENDING)
@@ -323,27 +441,46 @@ class Drone:
             or piloting.state.animation not in (None, AnimationType.NONE)
         )
 
+    def _stand_by(self, messages: Sequence[Message]) -> None:
+        """Have these sent when the host stalls; none: nothing is sent."""
+        if self._session is not None:
+            self._session.stand_by(messages)
+
     def _pilot_takes_over(self) -> None:
         """The pilot at the Skycontroller moved a stick: what our user ordered ends here."""
         with contextlib.suppress(LinkLost):
             self.piloting.hover()
 
     def _on_lost(self, session: ControllerSession, reason: asyncio.Future[str]) -> None:
+        if session is self._fading:
+            self._fading = None
+            if not self._heard.done():
+                self._heard.set_result(None)
         if session is not self._session:
             return
-        why = "closed" if reason.cancelled() else reason.result()
+        self._disconnected("closed" if reason.cancelled() else reason.result(), silent=False)
+
+    def _disconnected(self, why: str, *, silent: bool) -> None:
+        """Every wait ends, and nothing of before is sent again."""
         log.info("%s: link lost: %s", self.name, why)
         self._session = None
         self._complete = False
         self._commander.detach(why)
         self.piloting.link_lost()
-        self.controller.link_lost()
+        if silent:
+            self.controller.link_silent()
+        else:
+            self.controller.link_lost()
         self.video.link_lost()
         if not self._lost.done():
             self._lost.set_result(why)
 
     async def close(self) -> None:
-        """End the connection. What was sent just before still leaves. Idempotent."""
+        """End the connection; commands sent just before still leave. Does nothing without one."""
+        fading = self._fading
+        self._drop_fading("closed")
+        if fading is not None:
+            await fading.close()
         session = self._session
         if session is not None:
             try:
@@ -358,14 +495,19 @@ class Drone:
 
     @property
     def connected(self) -> bool:
-        """The link is up and the drone has sent all its states."""
+        """True when the link is up and the drone has sent all its states."""
         return self._complete
+
+    @property
+    def fading(self) -> bool:
+        """The drone is not heard, and its session goes on if it is heard again."""
+        return self._fading is not None
 
     @property
     def lost(self) -> asyncio.Future[str]:
         """Done when this connection is lost or closed, with the reason; `connect` makes a new one.
 
-        Wait for it with `asyncio.wait` or a shield: cancelling a bare wait would cancel it for everybody.
+        Wait for it with `asyncio.wait` or a shield: cancelling a bare wait would cancel it for all waiters.
         """
         return self._lost
 
@@ -376,7 +518,7 @@ class Drone:
 
     @property
     def identity(self) -> Identity:
-        """Who answered. Before a first connection its texts are empty."""
+        """Model, serial number and versions; empty before the first connection."""
         product = self.product.state
         return Identity(
             model=self._model,
@@ -386,11 +528,11 @@ class Drone:
             name=product.name or self._announced_name,
         )
 
-    async def reboot(self, timeout: float = REBOOT_TIMEOUT) -> None:
-        """Let the drone start anew; returns when it has the order and the link is lost, which is all that it says.
+    async def request_reboot(self, timeout: float = REBOOT_TIMEOUT) -> None:
+        """Send the command to restart; return when the drone has acknowledged its receipt, its only confirmation.
 
-        Raises `CommandRejected` unless it has said that it stands; `LinkLost` when the link went before the order had
-        arrived; `CommandTimeout` when the drone just goes on. Given up, the order is taken back.
+        Raises `CommandRejected` unless the drone has reported that it is landed; `LinkLost` or `CommandTimeout` when
+        the command has not arrived. Cancelled, it is not sent again.
         """
         if not self.connected:
             raise LinkLost("not connected")
@@ -398,19 +540,29 @@ class Drone:
         lost, delivery = self._lost, self._commander.deliver(common.Reboot())
         timed_out = CommandTimeout(common.Reboot.NAME, timeout)
         try:
-            await asyncio.wait({lost}, timeout=timeout)
+            either: tuple[asyncio.Future[Any], ...] = (lost, delivery)
+            await asyncio.wait(either, timeout=timeout, return_when=asyncio.FIRST_COMPLETED)
         finally:
-            if not lost.done():
+            if not (lost.done() or delivery.done()):
                 self._commander.take_back(delivery, timed_out)
-        if not lost.done():
-            raise timed_out
         delivery.result()
+
+    async def reboot(self, timeout: float = REBOOT_TIMEOUT) -> None:
+        """Restart the drone; return when it has received the command and the link is lost.
+
+        Raises as `request_reboot`, and `CommandTimeout` when the drone stays connected.
+        """
+        lost = self._lost
+        await self.request_reboot(timeout)
+        await asyncio.wait({lost}, timeout=timeout)
+        if not lost.done():
+            raise CommandTimeout(common.Reboot.NAME, timeout)
 
     # -- what others may look at
 
     @property
     def features(self) -> Mapping[Feature, Support]:
-        """What this drone has, as it told when it connected."""
+        """Features of this drone, from what it reported when it connected."""
         return features(self)
 
     @property
@@ -419,17 +571,18 @@ class Drone:
         return self.piloting.moves_started
 
     def blockers(self) -> list[Blocker]:
-        """What the drone has reported against a take-off."""
+        """Return the reported reasons that can prevent a take-off."""
         return takeoff_blockers(self.alerts.state, self.battery.state, self.calibration.state)
 
     def takeoff_blockers(self) -> list[str]:
-        """The same in words."""
+        """Return `blockers` in words."""
         return [str(blocker) for blocker in self.blockers()]
 
     def subscribe(self, callback: Callback) -> Callable[[], None]:
-        """Call this with every known message once the states have it. Returns the function that ends it.
+        """Call `callback(message, time)` with every message, after the states are updated.
 
-        It also hears the messages that come while `connect` runs. What it raises is logged and goes no further.
+        Returns the function that ends it. `time` is the event loop's. Messages during `connect` are included. What the
+        callback raises is logged.
         """
         self._subscribers = (*self._subscribers, callback)
 
@@ -444,7 +597,7 @@ class Drone:
         predicate: Callable[[MessageT], bool] | None = None,
         timeout: float = ANSWER_TIMEOUT,
     ) -> MessageT:
-        """The next message of this class that the predicate accepts. Raises `CommandTimeout` or `LinkLost`."""
+        """Return the next message of a class that the predicate accepts. Raises `CommandTimeout` or `LinkLost`."""
 
         def judge(message: MessageT) -> MessageT | None:
             return message if predicate is None or predicate(message) else None
@@ -452,6 +605,46 @@ class Drone:
         expectation = self._commander.expect((answer,), judge)
         expectation.expire_after(timeout, CommandTimeout(answer.NAME, timeout))
         return await expectation.wait()
+
+    async def wait_until(self, condition: Callable[[], bool], what: str, timeout: float = WAIT_TIMEOUT) -> None:
+        """Return when a condition on the drone's states is true; it is evaluated now and after each message.
+
+        Raises `CommandTimeout` about `what` after `timeout` s, `LinkLost`, and what the condition raises.
+        """
+        self._commander.require_link()
+        if condition():
+            return
+        met: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+
+        def look(message: Message, now: float) -> None:
+            if met.done():
+                return
+            try:
+                if condition():
+                    met.set_result(None)
+            except Exception as error:
+                met.set_exception(error)
+
+        lost, undo = self._lost, self.subscribe(look)
+        either: set[asyncio.Future[Any]] = {met, lost}
+        try:
+            await asyncio.wait(either, timeout=timeout, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            undo()
+        if met.done():
+            met.result()
+        elif lost.done():
+            raise LinkLost(lost.result())
+        else:
+            raise CommandTimeout(what, timeout)
+
+    async def wait_for(self, *states: FlyingState, timeout: float = WAIT_TIMEOUT) -> None:
+        """Return when the drone reports one of these flying states, at once when it is in one.
+
+        Raises `CommandTimeout` after `timeout` s, `LinkLost`.
+        """
+        words = " or ".join(spoken(state) for state in states)
+        await self.wait_until(lambda: self.piloting.state.flying in states, f"the state {words}", timeout)
 
     # -- the hot path
 
@@ -475,11 +668,16 @@ class Drone:
             message_log.debug("%s: %r", self.name, message)
 
 
+def _ignore(message: Message | UnknownMessage, now: float) -> None:
+    """What a session says before it is ours; all states are asked for afterwards."""
+
+
 def _starts_motors(message: Message) -> bool:
     """Do the motors of a drone on the ground start by this command?"""
     if isinstance(message, ardrone3.UserTakeOff):
         return message.state != 0
-    return isinstance(message, ardrone3.TakeOff | common.Start | modern_plan.StartAt | modern_plan.StartAtV2)
+    starts = ardrone3.TakeOff | ardrone3.SmartTakeOffLand | common.Start | modern_plan.StartAt | modern_plan.StartAtV2
+    return isinstance(message, starts)
 
 
 def _model(id: int) -> Model:

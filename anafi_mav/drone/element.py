@@ -42,7 +42,7 @@ class Range(msgspec.Struct, frozen=True):
 
 
 class Position(msgspec.Struct, frozen=True):
-    """A known place. Which zero `altitude` has is said where the position is a field."""
+    """A known place; the field that holds it states the zero of `altitude`."""
 
     latitude: float
     """deg, -90..90."""
@@ -53,7 +53,7 @@ class Position(msgspec.Struct, frozen=True):
 
 
 class Element(Generic[StateT]):
-    """One noun of the aircraft. Subclasses declare `NOTHING` and `REDUCERS`; some add verbs."""
+    """One part of the aircraft. Subclasses declare `NOTHING` and `REDUCERS`; some add verbs."""
 
     NOTHING: ClassVar[Any]
     """The state in which nothing has been reported."""

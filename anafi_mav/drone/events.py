@@ -49,11 +49,13 @@ from anafi_mav.arsdk.messages.battery import Alert as BatteryAlertChanged
 from anafi_mav.arsdk.messages.battery import AlertLevel as AlertLevel
 from anafi_mav.arsdk.messages.battery import BatteryAlert as BatteryAlert
 from anafi_mav.arsdk.messages.battery import Capacity as BatteryCapacity
+from anafi_mav.arsdk.messages.battery import Description as BatteryDescription
 from anafi_mav.arsdk.messages.common import CalibrationAxis as CalibrationAxis
 from anafi_mav.arsdk.messages.common import FlightId as FlightId
 from anafi_mav.arsdk.messages.common import FlightPlanComponent as FlightPlanComponent
 from anafi_mav.arsdk.messages.common import MagnetoCalibrationRequiredState as MagnetoCalibrationRequiredState
 from anafi_mav.arsdk.messages.common import MagnetoCalibrationStartedChanged as MagnetoCalibrationStartedChanged
+from anafi_mav.arsdk.messages.common import MagnetoCalibrationStateChanged as MagnetoCalibrationStateChanged
 from anafi_mav.arsdk.messages.common import MavlinkFilePlayingStateChanged as MavlinkFilePlayingStateChanged
 from anafi_mav.arsdk.messages.common import MavlinkType as MavlinkType
 from anafi_mav.arsdk.messages.common import MissionItemExecuted as MissionItemExecuted
@@ -90,7 +92,9 @@ from anafi_mav.arsdk.messages.rth import PreferredHomeType as PreferredHomeType
 from anafi_mav.arsdk.messages.rth import RthEndingBehavior as RthEndingBehavior
 from anafi_mav.arsdk.messages.rth import RthHomeReachability as HomeReachability
 from anafi_mav.arsdk.messages.rth import RthHomeType as RthHomeType
+from anafi_mav.arsdk.messages.rth import RthState as RthState
 from anafi_mav.arsdk.messages.rth import State as ReturnStateChanged
+from anafi_mav.arsdk.messages.rth import StateReason as ReturnReason
 from anafi_mav.arsdk.messages.rth import TakeoffLocation as TakeoffLocation
 from anafi_mav.arsdk.messages.skyctrl import AttitudeChanged as ControllerAttitudeChanged
 from anafi_mav.arsdk.messages.skyctrl import PilotingSource as PilotingSource
@@ -120,6 +124,7 @@ __all__ = [
     "BatteryAlert",
     "BatteryAlertChanged",
     "BatteryCapacity",
+    "BatteryDescription",
     "Blocker",
     "BlockerKind",
     "CalibrationAxis",
@@ -149,6 +154,7 @@ __all__ = [
     "IcingLevelChanged",
     "MagnetoCalibrationRequiredState",
     "MagnetoCalibrationStartedChanged",
+    "MagnetoCalibrationStateChanged",
     "MavlinkFilePlayingStateChanged",
     "MavlinkType",
     "MaxAltitudeChanged",
@@ -191,9 +197,11 @@ __all__ = [
     "ReturnEndingAltitude",
     "ReturnHomeOnDisconnectChanged",
     "ReturnMinAltitude",
+    "ReturnReason",
     "ReturnStateChanged",
     "RthEndingBehavior",
     "RthHomeType",
+    "RthState",
     "Sensor",
     "SensorsStatesListChanged",
     "ShutterTrigger",

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Callable, Sequence
+import weakref
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 from anafi_mav.arsdk.wire import Message, UnknownMessage
@@ -149,6 +150,10 @@ class Commander:
         self._deliveries: dict[int, asyncio.Future[None]] = {}
         self.halting: set[asyncio.Future[None]] = set()
         """Orders to stop something that the drone may not have received yet, whoever gave them."""
+        self._retired: weakref.WeakSet[asyncio.Task[Any]] = weakref.WeakSet()
+        """Tasks that newer commands have replaced: they send nothing but what stops something."""
+        self._silenced: weakref.WeakSet[asyncio.Task[Any]] = weakref.WeakSet()
+        """Tasks that send nothing at all."""
         self._beginning: dict[type[Message], _Beginning] = {}
         """By the kind of command that undoes it."""
         self._given_up: dict[type[Message], float] = {}
@@ -185,35 +190,55 @@ class Commander:
         self._deliveries.clear()
         self._given_up.clear()
 
-    def send(self, message: Message) -> int:
-        """Hand a command to the transport. Raises `LinkLost` when there is no link, or what the gate raises."""
+    def retire(self, tasks: Iterable[asyncio.Task[Any]]) -> None:
+        """Let these tasks send nothing but what stops something: what replaced them must not meet their commands."""
+        self._retired.update(tasks)
+
+    def silence(self, tasks: Iterable[asyncio.Task[Any]]) -> None:
+        """Let these tasks send nothing at all: what stops something could end what replaced them."""
+        self._silenced.update(tasks)
+
+    def _require_current(self, *, stops: bool) -> None:
+        """Raise `CommandRejected` in a task that may not send (any more)."""
+        if not (self._retired or self._silenced):
+            return
+        task = asyncio.current_task()
+        if task is not None and (task in self._silenced or (task in self._retired and not stops)):
+            raise CommandRejected("replaced by a newer command")
+
+    def send(self, message: Message, *, stops: bool = False) -> int:
+        """Hand a command to the transport. Raises `LinkLost` when there is no link, or what the gate raises.
+
+        `stops`: it stops something. Raises `CommandRejected` in a task that may not send it (see `retire`).
+        """
         if self._wire is None:
             raise LinkLost("not connected")
+        self._require_current(stops=stops)
         if self.gate is not None and not self.gate(message):
             return WITHHELD
         return self._wire.send(message)
 
-    def deliver(self, message: Message) -> asyncio.Future[None]:
+    def deliver(self, message: Message, *, stops: bool = False) -> asyncio.Future[None]:
         """Send an acknowledged command that is not to be taken back; the future is done when the drone has it.
 
         It fails with `LinkLost`, or `CommandTimeout` when the transport gives up. Do not await it bare, a cancelled
         wait would cancel it: use `asyncio.wait`.
         """
-        token = self.send(message)
+        token = self.send(message, stops=stops)
         delivery: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self._deliveries[token] = delivery
         return delivery
 
     def halt(self, message: Message) -> asyncio.Future[None]:
         """`deliver` an order to stop something; whoever has to confirm a stop waits for `halting`."""
-        delivery = self.deliver(message)
+        delivery = self.deliver(message, stops=True)
         self.halting.add(delivery)
         delivery.add_done_callback(self.halting.discard)
         return delivery
 
     def halt_if_connected(self, message: Message) -> None:
-        """`halt` for a verb that gives up: the loss of the link is reported elsewhere."""
-        with contextlib.suppress(LinkLost):
+        """`halt` for a verb that gives up: the loss of the link is reported elsewhere, and so is a newer command."""
+        with contextlib.suppress(LinkLost, CommandRejected):
             self.halt(message)
 
     async def halted(self, what: str, timeout: float) -> None:

@@ -51,17 +51,19 @@ class Elements(Protocol):
 
 
 class Support(enum.Enum):
+    """Availability of a feature."""
+
     UNKNOWN = "unknown"
-    """Not connected: nobody can say."""
+    """Not connected."""
     ABSENT = "absent"
     """The drone did not report it when it connected: its verbs raise `NotSupported`."""
     UNAVAILABLE = "unavailable"
-    """It has it, and says that it does not work now."""
+    """The drone has it and reports that it does not work now."""
     AVAILABLE = "available"
 
 
 class Feature(enum.Enum):
-    """The value is how it is called in front of people."""
+    """A feature that not every model has; the value is its name in texts."""
 
     CAMERA = "camera"
     CAMERA_ZOOM = "zoom"

@@ -33,47 +33,50 @@ _UID = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,127}")
 
 
 class PlanOnDrone(msgspec.Struct, frozen=True):
-    """A plan that was uploaded."""
+    """A plan on the drone."""
 
     uid: str
     date: str = ""
 
 
 class Recovery(msgspec.Struct, frozen=True):
-    """Where the last plan ended before its end, so that it can be flown on from there."""
+    """Place at which the last plan was interrupted, to resume it there."""
 
     uid: str
     custom_id: str
     item: int
     seconds: int
-    """Flown of it."""
+    """Duration flown."""
 
 
 class FlightPlanState(msgspec.Struct, frozen=True):
+    """The flight plan under way, and what the drone needs to fly one."""
+
     playing: PlayingState | None = None
     uid: str | None = None
-    """Of the plan that plays or is paused; empty when none does."""
+    """Id of the plan that plays or is paused; empty without one."""
     type: MavlinkType | None = None
     item: int | None = None
-    """Index of the item that was done last, from 0; None when none of this plan is."""
+    """Index of the last completed item, from 0; None before the first."""
     skipped: int | None = None
     """Waypoint that was left out. Ai only."""
     available: bool | None = None
-    """Can a plan be started?"""
+    """True when a plan can be started."""
     components: Mapping[FlightPlanComponent, bool] = {}
-    """What a plan needs -> it is all right."""
+    """Requirement of a plan -> fulfilled."""
     missing: frozenset[Indicator] | None = None
-    """What a plan lacks. Ai only."""
+    """Requirements that a plan lacks. Ai only."""
     capabilities: frozenset[SupportedCapabilities] | None = None
     """Ai only."""
     error: PlayError | None = None
+    """Why the drone refused or stopped a plan; None once it plays one."""
     returns_on_disconnect: bool | None = None
     """A lost link ends the plan with a return home."""
     recovery: Recovery | None = None
 
     @property
     def unavailable(self) -> tuple[str, ...]:
-        """What keeps a plan from being flown, in words."""
+        """Requirements that prevent the flight of a plan, in words."""
         words = [spoken(part) for part, ok in self.components.items() if not ok]
         words += [spoken(one) for one in sorted(self.missing or ())]
         return tuple(words)
@@ -89,6 +92,7 @@ def _playing(state: FlightPlanState, message: common.MavlinkFilePlayingStateChan
         type=message.type,
         item=None if begins and not (same and state.playing == PlayingState.PLAYING) else state.item,
         skipped=None if begins else state.skipped,
+        error=None if begins else state.error,
     )
 
 
@@ -98,6 +102,8 @@ def _recovery(state: FlightPlanState, message: modern.RecoveryInfo) -> FlightPla
 
 
 class FlightPlan(Commanding[FlightPlanState]):
+    """Flight plans: files in Parrot's format that the drone flies by itself."""
+
     NOTHING = FlightPlanState()
     REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = {
         common.MavlinkFilePlayingStateChanged: _playing,
@@ -140,18 +146,21 @@ class FlightPlan(Commanding[FlightPlanState]):
 
     @property
     def version(self) -> int:
-        """Of the file format that this drone flies: 1, or 2 on the Ai."""
+        """Version of the file format that this drone flies: 1, or 2 on the Ai."""
         return 1 if self.state.missing is None and self.state.capabilities is None else 2
 
     @property
     def starts_anywhere(self) -> bool:
-        """A plan can begin in its middle, and it can be said at its start whether it goes on without a link."""
+        """True when `start` takes an `item` and `continue_on_disconnect`."""
         return SupportedCapabilities.START_AT_V2 in (self.state.capabilities or frozenset())
 
     # -- files
 
     async def upload(self, plan: bytes) -> str:
-        """Hand over a plan; returns the name that the drone gives it, for `start`."""
+        """Upload a plan; return the id that the drone gives it, for `start`.
+
+        Raises `CommandRejected` when the web server refuses it, `CommandTimeout`, `RemoteProtocolError`.
+        """
         self._available()
         uid = await self._rest.json("PUT", f"{API}/flightplan", plan)
         if not isinstance(uid, str) or not _UID.fullmatch(uid):
@@ -159,7 +168,7 @@ class FlightPlan(Commanding[FlightPlanState]):
         return uid
 
     async def list(self) -> tuple[PlanOnDrone, ...]:
-        """The plans on the drone."""
+        """Return the plans on the drone."""
         self._available()
         told = await self._rest.json("GET", f"{API}/flightplans")
         try:
@@ -168,7 +177,7 @@ class FlightPlan(Commanding[FlightPlanState]):
             raise RemoteProtocolError(f"the drone's list of flight plans: {error}") from error
 
     async def get(self, uid: str) -> dict[str, Any]:
-        """What the drone tells of one plan. Raises `CommandRejected` when it has none of this name."""
+        """Return the details of one plan. Raises `CommandRejected` when the drone has none with this id."""
         self._available()
         told = await self._rest.json("GET", f"{API}/flightplan/{_checked(uid)}")
         if not isinstance(told, dict):
@@ -176,7 +185,7 @@ class FlightPlan(Commanding[FlightPlanState]):
         return told
 
     async def delete(self, uid: str) -> bool:
-        """Remove a plan. Parrot documents no way to do it: False when the drone does not."""
+        """Delete a plan; False when the drone does not: Parrot documents no way to do it."""
         self._available()
         try:
             await self._rest.read("DELETE", f"{API}/flightplan/{_checked(uid)}")
@@ -195,11 +204,11 @@ class FlightPlan(Commanding[FlightPlanState]):
         continue_on_disconnect: bool | None = None,
         timeout: float = START_TIMEOUT,
     ) -> None:
-        """Fly an uploaded plan, or go on with the paused one; returns when it plays.
+        """Fly an uploaded plan, or resume the paused one; returns when it plays.
 
-        `item` begins in the middle and `continue_on_disconnect` goes on without a link: Ai only. Raises
-        `CommandRejected` with what the drone lacks. A start that is given up is taken back, also when the drone begins
-        the plan only then.
+        `item` (from 0) is where it begins, `continue_on_disconnect` flies on without a link: Ai only. Raises
+        `CommandRejected` with what the drone lacks, `CommandTimeout`. A start that times out or is cancelled is
+        withdrawn, also when the drone begins the plan only then.
         """
         self._available()
         command = self._start(uid, item, type, continue_on_disconnect)
@@ -248,20 +257,20 @@ class FlightPlan(Commanding[FlightPlanState]):
         return f"the flight plan cannot be flown: {reasons}" if reasons else "the drone cannot start the flight plan"
 
     def suspend(self) -> None:
-        """Do not fly it any further: sent at once, not waited for. A start that was not answered is taken back."""
+        """Pause without waiting for the drone's confirmation; an unconfirmed start is withdrawn."""
         self._commander.call_off("something else flies", common.Stop)
         if self.state.playing == PlayingState.PLAYING:
             self._commander.halt_if_connected(common.Pause())
 
     async def pause(self, timeout: float = ANSWER_TIMEOUT) -> None:
-        """Hover; `start` with the same plan goes on. Raises `CommandRejected` when no plan plays."""
+        """Hover; `start` with the same plan resumes it. Raises `CommandRejected` when no plan plays."""
         self._available()
         if self.state.playing != PlayingState.PLAYING:
             raise CommandRejected("no flight plan plays")
         await self._end(common.Pause(), PlayingState.PAUSED, timeout)
 
     async def stop(self, timeout: float = ANSWER_TIMEOUT) -> None:
-        """Hover, and forget the plan. Returns at once when there is none, nor one on its way to the drone."""
+        """End the plan and hover; returns at once when none is playing, paused or starting."""
         self._available()
         self._commander.call_off("stopped", common.Stop)
         await self._commander.halted(common.Stop.NAME, timeout)
@@ -277,7 +286,7 @@ class FlightPlan(Commanding[FlightPlanState]):
             raise CommandRejected("the flight plan has ended")
 
     async def set_returns_on_disconnect(self, on: bool) -> bool:
-        """Whether a lost link ends a plan with a return home."""
+        """Set if a lost link ends a plan with a return home."""
         self._require(self.state.returns_on_disconnect, common.ReturnHomeOnDisconnect.NAME)
         return await self._change(
             common.ReturnHomeOnDisconnect(int(on)),

@@ -26,7 +26,7 @@ from anafi_mav.errors import (
 
 
 class Trajectory(msgspec.Struct, frozen=True):
-    """Where the drone believes its target to be, and how it moves (m/s)."""
+    """Place and velocity (m/s) of the target, as the drone estimates them."""
 
     position: Position
     """Altitude above mean sea level."""
@@ -36,13 +36,15 @@ class Trajectory(msgspec.Struct, frozen=True):
 
 
 class FollowMeState(msgspec.Struct, frozen=True):
+    """The target and how the drone follows it."""
+
     mode: Mode | None = None
-    """NONE: it follows nobody."""
+    """NONE: no target is followed."""
     behavior: Behavior | None = None
     missing: Mapping[Mode, frozenset[Input]] = {}
-    """By mode, what has to be there before it can begin."""
+    """By mode, the requirements that it lacks."""
     improvements: Mapping[Mode, frozenset[Input]] = {}
-    """By mode, what would make it better."""
+    """By mode, what would improve it."""
     target_is_controller: bool | None = None
     target: Trajectory | None = None
 
@@ -68,6 +70,8 @@ def _trajectory(state: FollowMeState, m: follow_me.TargetTrajectory) -> FollowMe
 
 
 class FollowMe(Commanding[FollowMeState]):
+    """Parrot's own follow me. The drone finds the target in the picture, or is sent its place."""
+
     NOTHING = FollowMeState()
     REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = {
         follow_me.State: lambda state, m: replace(state, mode=m.mode, behavior=m.behavior),
@@ -77,9 +81,9 @@ class FollowMe(Commanding[FollowMeState]):
     }
 
     async def start(self, mode: Mode, timeout: float = ANSWER_TIMEOUT) -> None:
-        """Returns when the drone follows or looks. Raises `CommandRejected` with what is missing.
+        """Follow the target or look at it; returns when the drone does. Raises `CommandRejected` with what is missing.
 
-        A start that is given up is taken back: a drone that lacks something would begin as soon as it has it.
+        A start that times out or is cancelled is withdrawn: a drone that lacks something would begin once it has it.
         """
         if mode == Mode.NONE:
             raise LocalProtocolError("NONE is no way to follow")
@@ -106,7 +110,7 @@ class FollowMe(Commanding[FollowMeState]):
         return f"cannot follow: it lacks {lacks}" if lacks else "cannot follow"
 
     async def stop(self, timeout: float = ANSWER_TIMEOUT) -> None:
-        """Returns when the drone follows nobody, at once when it does not and is not about to."""
+        """End following; returns when the drone has, at once when it is neither following nor starting to."""
         self._require(self.state.mode, "follow me")
         self._commander.call_off("stopped", follow_me.Stop)
         await self._commander.halted(follow_me.Stop.NAME, timeout)
@@ -119,9 +123,10 @@ class FollowMe(Commanding[FollowMeState]):
     def tell_target(
         self, place: Position, velocity: tuple[float, float, float] = (0.0, 0.0, 0.0), accuracy: float = 1.0
     ) -> None:
-        """Where who controls is (altitude above mean sea level; north, east, down in m/s; accuracy in m).
+        """Send the place of the controller (altitude above mean sea level; velocity north, east, down in m/s).
 
-        It is the target while `target_is_controller`. Say it once a second at least: it is not acknowledged.
+        It is the target while `target_is_controller`; `accuracy` is in m. Send it once a second at least: it is not
+        acknowledged.
         """
         self._require(self.state.mode, "follow me")
         north, east, down = (number(speed, "speed of the target") for speed in velocity)
@@ -140,7 +145,7 @@ class FollowMe(Commanding[FollowMeState]):
         )
 
     async def set_target_is_controller(self, on: bool) -> bool:
-        """Whether the target is who flies, or somebody that `target_image_detection` tells of."""
+        """Choose the target: the controller, or what the picture's `target_image_detection` reports."""
         self._require(self.state.target_is_controller, "follow me")
         return await self._change(
             follow_me.SetTargetIsController(int(on)), follow_me.TargetIsController, lambda m: bool(m.state)

@@ -47,39 +47,45 @@ CALIBRATION_TIMEOUT = 60.0
 
 
 class Aim(msgspec.Struct, frozen=True):
-    """What one axis shall do: an angle (deg) to point at, or a rate (deg/s) to turn with."""
+    """Target of one axis: an angle (deg) for `aim` and `point`, a rate (deg/s) for `turn`."""
 
     value: float
     frame: FrameOfReference = FrameOfReference.ABSOLUTE
 
 
 class Angles(msgspec.Struct, frozen=True):
-    """deg."""
+    """Angles of the three axes, deg: yaw + clockwise, pitch + up, roll + right."""
 
     yaw: float
     pitch: float
     roll: float
 
     def of(self, axis: Axis) -> float:
+        """Return the angle of one axis."""
         return (self.yaw, self.pitch, self.roll)[axis]
 
 
 class GimbalAttitude(msgspec.Struct, frozen=True):
+    """Attitude of a gimbal in both frames."""
+
     frames: Mapping[Axis, FrameOfReference]
-    """What each axis holds: RELATIVE moves with the body, ABSOLUTE stays with the horizon or north."""
+    """Frame that each axis holds: RELATIVE moves with the body, ABSOLUTE stays with the horizon or north."""
     relative: Angles
     """To the body."""
     absolute: Angles
     """To the horizon; yaw to magnetic north."""
 
     def angle(self, axis: Axis, frame: FrameOfReference) -> float:
+        """Return the angle of one axis in a frame, deg."""
         return (self.relative if frame == FrameOfReference.RELATIVE else self.absolute).of(axis)
 
 
 class GimbalState(msgspec.Struct, frozen=True):
+    """One gimbal: its attitude, ranges and calibration."""
+
     model: Model | None = None
     axes: frozenset[Axis] | None = None
-    """Those that turn."""
+    """Axes that turn."""
     attitude: GimbalAttitude | None = None
     relative_bounds: Mapping[Axis, tuple[float, float]] = {}
     absolute_bounds: Mapping[Axis, tuple[float, float]] = {}
@@ -88,7 +94,7 @@ class GimbalState(msgspec.Struct, frozen=True):
     offsets: Mapping[Axis, Range] = {}
     """Corrections by hand, deg."""
     offsets_open: bool | None = None
-    """Whether corrections are taken now."""
+    """True while `set_offsets` is accepted."""
     locked: frozenset[Axis] | None = None
     """Axes that do not turn at present."""
     calibration: GimbalCalibrationState | None = None
@@ -138,7 +144,7 @@ def _with(state: Gimbals, id: int, **changes: object) -> Gimbals:
 
 
 class Gimbal(Commanding[Gimbals]):
-    """All gimbals of the drone; `state` is by id, the verbs mean the main one unless told another."""
+    """All gimbals of the drone; `gimbal[id]` is the state of one, the verbs use the main one by default."""
 
     NOTHING: ClassVar[Gimbals] = {}
     REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = {
@@ -168,7 +174,7 @@ class Gimbal(Commanding[Gimbals]):
     # -- where to look
 
     def aim(self, *, yaw: Aim | None = None, pitch: Aim | None = None, roll: Aim | None = None, id: int = MAIN) -> None:
-        """Send a target (deg) once and do not wait: for setpoints that come in a stream. None leaves an axis alone.
+        """Send angles (deg) once, without waiting: for targets that arrive in a stream. None leaves an axis alone.
 
         Angles beyond the bounds are clipped to them. Raises `NotSupported` for an axis that this gimbal does not have.
         """
@@ -195,9 +201,10 @@ class Gimbal(Commanding[Gimbals]):
         id: int = MAIN,
         timeout: float | None = None,
     ) -> GimbalAttitude:
-        """`aim`, and return when the gimbal is there. Without a `timeout` it gets the time that the way takes.
+        """Point the gimbal at angles (deg); return its attitude once they are reached.
 
-        Raises `CommandRejected` when somebody else gives the gimbal another target meanwhile.
+        Without a `timeout` it has the time that the turn takes. Raises `CommandRejected` when a newer target replaces
+        this one.
         """
         targets = self._targets({Axis.YAW: yaw, Axis.PITCH: pitch, Axis.ROLL: roll}, id)
         if timeout is None:
@@ -216,7 +223,7 @@ class Gimbal(Commanding[Gimbals]):
         return await self._insist(id, self._command(targets, ControlMode.POSITION, id), answer, timeout)
 
     async def stop(self, id: int = MAIN, timeout: float = ANSWER_TIMEOUT) -> GimbalAttitude:
-        """End every turn; returns when the gimbal stands."""
+        """Stop all axes; return the attitude once the gimbal stands."""
         axes = self._axes(id)
         attitude = self[id].attitude
         frames = {} if attitude is None else attitude.frames
@@ -225,7 +232,7 @@ class Gimbal(Commanding[Gimbals]):
         return await self._insist(id, self._command(still, ControlMode.VELOCITY, id), answer, timeout)
 
     async def reset_orientation(self, id: int = MAIN, timeout: float = 2 * ANSWER_TIMEOUT) -> GimbalAttitude:
-        """Back to the drone's own reference orientation; returns when the gimbal stands there."""
+        """Turn to the drone's reference orientation; return the attitude once the gimbal stands there."""
         self._axes(id)
         self._orders[id] += 1
         return await self._commander.confirm(gimbal.ResetOrientation(id), (gimbal.Attitude,), _Standing(id), timeout)
@@ -233,7 +240,7 @@ class Gimbal(Commanding[Gimbals]):
     # -- settings
 
     async def set_max_speed(self, degrees_per_second: float, id: int = MAIN) -> Mapping[Axis, Range]:
-        """The fastest turn. The drone uses one number for all axes (gimbal.xml 148-0-4); returns what each has."""
+        """Set the highest rate, deg/s, one for all axes (gimbal.xml 148-0-4); return the setting of each axis."""
         if not math.isfinite(degrees_per_second):
             raise LocalProtocolError("a speed is not a number")
         self._require(self[id].max_speed, gimbal.SetMaxSpeed.NAME)
@@ -244,7 +251,7 @@ class Gimbal(Commanding[Gimbals]):
         )
 
     async def open_offsets(self, on: bool, id: int = MAIN) -> bool:
-        """Begin or end to correct the gimbal by hand; while it is open the gimbal keeps to its offsets."""
+        """Begin or end the correction by offsets; while it is open the gimbal keeps to them."""
         self._require(self[id].offsets_open, gimbal.StartOffsetsUpdate.NAME)
         return await self._change(
             gimbal.StartOffsetsUpdate(id) if on else gimbal.StopOffsetsUpdate(id),
@@ -255,7 +262,7 @@ class Gimbal(Commanding[Gimbals]):
     async def set_offsets(
         self, *, yaw: float | None = None, pitch: float | None = None, roll: float | None = None, id: int = MAIN
     ) -> Mapping[Axis, Range]:
-        """Corrections, deg; None keeps one. Taken while they are open only; returns what the drone has then."""
+        """Set the offsets, deg, while they are open; None keeps one. Return those of the drone."""
         now = self[id].offsets
         self._require(now, gimbal.SetOffsets.NAME)
         wanted = []
@@ -273,7 +280,7 @@ class Gimbal(Commanding[Gimbals]):
     # -- calibration
 
     async def calibrate(self, id: int = MAIN, timeout: float = CALIBRATION_TIMEOUT) -> None:
-        """Returns when the drone says that the calibration succeeded; `CommandRejected` when it did not."""
+        """Calibrate the gimbal; returns when that succeeded. Raises `CommandRejected` when it failed."""
         self._require(self[id].calibration, gimbal.Calibrate.NAME)
 
         def judge(message: gimbal.CalibrationResult | gimbal.CalibrationState) -> bool | AnafiMavError | None:
@@ -292,7 +299,7 @@ class Gimbal(Commanding[Gimbals]):
         await answer.wait()
 
     async def cancel_calibration(self, id: int = MAIN) -> None:
-        """Returns when no calibration runs."""
+        """Cancel the calibration; returns when none is running."""
         self._require(self[id].calibration, gimbal.CancelCalibration.NAME)
         await self._change(
             gimbal.CancelCalibration(id),

@@ -14,11 +14,13 @@ from anafi_mav.drone.element import Element, Position, Reducer, position
 
 
 class GpsState(msgspec.Struct, frozen=True):
+    """Fix, satellites and place."""
+
     fixed: bool | None = None
     satellites: int | None = None
     """Satellites in use."""
     location: Position | None = None
-    """Where the drone is, altitude above mean sea level; None also when the drone says that it does not know."""
+    """Place of the drone, altitude above mean sea level; None also when the drone reports it as unknown."""
     latitude_accuracy: int | None = None
     """m, one standard deviation."""
     longitude_accuracy: int | None = None
@@ -47,6 +49,8 @@ def _location(state: GpsState, message: ardrone3.GpsLocationChanged) -> GpsState
 
 
 class Gps(Element[GpsState]):
+    """The satellite receiver. No verbs."""
+
     NOTHING = GpsState()
     REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = {
         ardrone3.GPSFixStateChanged: lambda state, message: replace(state, fixed=message.fixed != 0),

@@ -12,7 +12,7 @@ from typing import ClassVar
 import msgspec
 from msgspec.structs import replace
 
-from anafi_mav.arsdk.messages import ardrone3, precise_home, rth
+from anafi_mav.arsdk.messages import ardrone3, common, precise_home, rth
 from anafi_mav.arsdk.messages.precise_home import PreciseHomeMode, PreciseHomeState
 from anafi_mav.arsdk.messages.rth import (
     AutoTriggerReason,
@@ -28,7 +28,7 @@ from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone.element import Position, Range, Reducer, members, position, setting
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT
 from anafi_mav.drone.settings import Commanding
-from anafi_mav.errors import LocalProtocolError, NotSupported
+from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LocalProtocolError, NotSupported
 
 _SAME_PLACE_DEG = 1e-7
 """About a centimetre: an echo that went through single precision is further off than that."""
@@ -38,13 +38,17 @@ _ASKED_FOR = (StateReason.USER_REQUEST, StateReason.FLIGHTPLAN)
 
 
 class HomeState(msgspec.Struct, frozen=True):
+    """Home, the return to it, and its settings."""
+
     location: Position | None = None
     """Home as the drone reports it; None on the ground before the first take-off.
 
     Parrot does not say what its altitude counts from: for display only.
     """
     takeoff_location: Position | None = None
-    """Where the drone took off; altitude above the take-off point."""
+    """Place of the take-off; altitude above the take-off point."""
+    fixed_before_takeoff: bool | None = None
+    """`takeoff_location` was measured before the take-off, not with the first fix in the air."""
     custom_location: Position | None = None
     """The place a user chose; altitude above the take-off point."""
     type: RthHomeType | None = None
@@ -62,34 +66,34 @@ class HomeState(msgspec.Struct, frozen=True):
     min_altitude: Range | None = None
     """Height that a return climbs to first, m above take-off."""
     ending: RthEndingBehavior | None = None
-    """What the drone does when it arrives."""
+    """End of a return: landing or hovering."""
     ending_altitude: Range | None = None
     """Height at which a return that ends in hovering stays, m above ground."""
     delay_s: int | None = None
     """Seconds between the loss of the link and the return."""
     delay_range_s: tuple[int, int] | None = None
-    """The shortest and the longest it can be."""
+    """Shortest and longest `delay_s`."""
     types: frozenset[RthHomeType] | None = None
     """The kinds that can be preferred."""
     by_itself: bool | None = None
-    """May the drone return by itself when its battery runs low?"""
+    """True when the drone returns by itself at low battery."""
     missing: frozenset[Indicator] | None = None
-    """What a return lacks; empty = available. Ai only."""
+    """Requirements that a return lacks; empty: available. Ai only."""
     precise_mode: PreciseHomeMode | None = None
-    """Does a return look for the picture of the take-off place?"""
+    """STANDARD: a return ends by the picture of the take-off place."""
     precise: PreciseHomeState | None = None
     precise_modes: frozenset[PreciseHomeMode] | None = None
 
     @property
     def returning(self) -> bool:
-        """Is a return running or about to?"""
+        """True when a return is running or pending."""
         return self.rth in _RETURNING
 
     @property
     def returning_by_itself(self) -> bool:
-        """Did the drone begin the running return on its own account (battery, lost link, ...)?
+        """True when the drone began the return for a reason of its own (battery, lost link, …).
 
-        A return that a user or the end of a flight plan asked for is none of its own.
+        A return that a user or the end of a flight plan commanded is not.
         """
         return self.rth in _RETURNING and self.reason not in _ASKED_FOR
 
@@ -100,6 +104,8 @@ def _auto_trigger(state: HomeState, message: rth.RthAutoTrigger) -> HomeState:
 
 
 class Home(Commanding[HomeState]):
+    """Home and the settings of a return. `Piloting.return_home` flies there."""
+
     NOTHING = HomeState()
     REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = {
         ardrone3.HomeChanged: lambda state, message: replace(
@@ -109,7 +115,9 @@ class Home(Commanding[HomeState]):
             state, location=position(message.latitude, message.longitude, message.altitude)
         ),
         rth.TakeoffLocation: lambda state, message: replace(
-            state, takeoff_location=position(message.latitude, message.longitude, message.altitude)
+            state,
+            takeoff_location=position(message.latitude, message.longitude, message.altitude),
+            fixed_before_takeoff=message.fixed_before_takeoff != 0,
         ),
         rth.CustomLocation: lambda state, message: replace(
             state, custom_location=position(message.latitude, message.longitude, message.altitude)
@@ -136,12 +144,16 @@ class Home(Commanding[HomeState]):
         ),
     }
 
+    def request_states(self) -> None:
+        """Make the drone report all its states again, that of a return among them. Raises `LinkLost`."""
+        self._commander.send(common.AllStates())
+
     async def set_min_altitude(self, metres: float) -> float:
-        """Height above take-off that a return climbs to first."""
+        """Set the height that a return climbs to first, m above take-off."""
         return await self._set(rth.SetMinAltitude(metres), rth.MinAltitude, self.state.min_altitude)
 
     async def set_ending(self, ending: RthEndingBehavior) -> RthEndingBehavior:
-        """Whether a return ends in landing or in hovering."""
+        """Set the end of a return: landing or hovering."""
         self._require(self.state.ending, rth.SetEndingBehavior.NAME)
         return await self._change(
             rth.SetEndingBehavior(ending),
@@ -150,18 +162,18 @@ class Home(Commanding[HomeState]):
         )
 
     async def set_ending_altitude(self, metres: float) -> float:
-        """Height above ground at which a return that ends in hovering stays."""
+        """Set the height at which a return that ends in hovering stays, m above ground."""
         return await self._set(
             rth.SetEndingHoveringAltitude(metres), rth.EndingHoveringAltitude, self.state.ending_altitude
         )
 
     async def set_delay(self, seconds: int) -> int:
-        """Seconds between the loss of the link and the return."""
+        """Set the time between the loss of the link and the return, s."""
         self._require(self.state.delay_s, rth.SetDelay.NAME)
         return await self._change(rth.SetDelay(seconds), rth.Delay, lambda message: int(message.delay))
 
     async def set_by_itself(self, allowed: bool) -> bool:
-        """Whether the drone returns by itself when its battery runs low."""
+        """Allow or forbid the drone's own return at low battery."""
         self._require(self.state.by_itself, rth.SetAutoTriggerMode.NAME)
         return await self._change(
             rth.SetAutoTriggerMode(RthAutoTriggerMode.ON if allowed else RthAutoTriggerMode.OFF),
@@ -169,8 +181,19 @@ class Home(Commanding[HomeState]):
             lambda message: message.mode == RthAutoTriggerMode.ON,
         )
 
+    async def cancel_auto_trigger(self, timeout: float = ANSWER_TIMEOUT) -> None:
+        """Cancel the return that the drone has announced; returns when it announces none."""
+        if self.state.auto_trigger in (None, AutoTriggerReason.NONE):
+            return
+        await self._change(
+            rth.CancelAutoTrigger(),
+            rth.RthAutoTrigger,
+            lambda message: True if message.reason == AutoTriggerReason.NONE else None,
+            timeout,
+        )
+
     async def set_preferred_type(self, kind: RthHomeType) -> RthHomeType:
-        """Which kind of home to fly to when it is known; `HomeState.type` is the one the drone would use now.
+        """Choose the kind of home to prefer; `HomeState.type` is the one the drone would use now.
 
         Raises `NotSupported` for a kind that this drone does not have.
         """
@@ -187,7 +210,8 @@ class Home(Commanding[HomeState]):
         """Choose a place (deg, deg, m above take-off) for homes of type custom.
 
         The drone flies there only while `preferred_type` is CUSTOM. One that does not accept the place (it is too far
-        away, or the drone does not know where it is itself) says nothing: `CommandTimeout`.
+        away, or the drone does not know where it is itself) reports its old one or nothing: `CommandRejected`, at once
+        or after `QUIET`. `CommandTimeout` when the command did not arrive.
         """
         wanted = position(latitude, longitude, altitude)
         if wanted is None:
@@ -196,18 +220,30 @@ class Home(Commanding[HomeState]):
         if self.state.types is not None and RthHomeType.CUSTOM not in self.state.types:
             raise NotSupported("home of type custom")
 
-        def judge(message: rth.CustomLocation) -> Position | None:
+        def judge(message: rth.CustomLocation) -> Position | AnafiMavError | None:
             same = math.isclose(message.latitude, latitude, rel_tol=0.0, abs_tol=_SAME_PLACE_DEG) and math.isclose(
                 message.longitude, longitude, rel_tol=0.0, abs_tol=_SAME_PLACE_DEG
             )
-            return position(message.latitude, message.longitude, message.altitude) if same else None
+            if same:
+                return position(message.latitude, message.longitude, message.altitude)
+            return refused if delivery.done() else None  # else it is about an earlier command
 
-        return await self._change(
-            rth.SetCustomLocation(latitude, longitude, altitude), rth.CustomLocation, judge, timeout
-        )
+        refused = CommandRejected("Home refused: the drone does not accept the place")
+        command = rth.SetCustomLocation(latitude, longitude, altitude)
+        async with self._setting_lock(rth.CustomLocation):
+            answer = self._commander.expect((rth.CustomLocation,), judge)
+            delivery = self._commander.deliver(command)
+            try:
+                if not await answer.came(delivery, command.NAME, timeout):
+                    raise refused
+                return answer.future.result()
+            finally:
+                answer.close()
+                if not delivery.done():
+                    self._commander.take_back(delivery, CommandTimeout(command.NAME, timeout))
 
     async def set_precise(self, on: bool) -> bool:
-        """Whether a return looks for the picture of the take-off place."""
+        """Switch the precise return, which looks for the picture of the take-off place."""
         self._require(self.state.precise_mode, precise_home.SetMode.NAME)
         return await self._change(
             precise_home.SetMode(PreciseHomeMode.STANDARD if on else PreciseHomeMode.DISABLED),

@@ -18,6 +18,8 @@ _PERTURBED = 1 << 7
 
 
 class LinkState(msgspec.Struct, frozen=True):
+    """Quality of the radio link."""
+
     quality: int | None = None
     """1 (a disconnection is highly probable) to 5 (very good)."""
     interference_4g: bool | None = None
@@ -38,6 +40,8 @@ def _quality(state: LinkState, message: common.LinkSignalQuality) -> LinkState:
 
 
 class Link(Element[LinkState]):
+    """The radio link to the drone. No verbs."""
+
     NOTHING = LinkState()
     REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = {
         common.LinkSignalQuality: _quality,

@@ -40,6 +40,8 @@ _FILE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,127}")
 
 
 class MediaState(msgspec.Struct, frozen=True):
+    """Counts of the media on the drone."""
+
     index: MediastoreState | None = None
     """The web server answers when it is INDEXED."""
     photos: int | None = None
@@ -49,7 +51,7 @@ class MediaState(msgspec.Struct, frozen=True):
 
 
 class Place(msgspec.Struct, frozen=True):
-    """deg, deg, m; Parrot writes 500 for unknown."""
+    """A place: deg, deg, m; Parrot writes 500 for unknown."""
 
     latitude: float = 500.0
     longitude: float = 500.0
@@ -57,7 +59,7 @@ class Place(msgspec.Struct, frozen=True):
 
 
 class Resource(msgspec.Struct, frozen=True):
-    """One file."""
+    """One file of a media."""
 
     resource_id: str
     media_id: str = ""
@@ -70,7 +72,7 @@ class Resource(msgspec.Struct, frozen=True):
     thumbnail: str | None = None
     datetime: str = ""
     md5: str | None = None
-    """Newer firmware only; `Media.md5` asks."""
+    """Newer firmware only; `Media.md5` requests it from others."""
     storage: str | int | None = None
     duration: float | None = None
     """ms."""
@@ -81,7 +83,7 @@ class Resource(msgspec.Struct, frozen=True):
 
 
 class MediaItem(msgspec.Struct, frozen=True):
-    """What one press of a button came to."""
+    """One media: a photo, a series or a video, with its files."""
 
     media_id: str
     type: str = ""
@@ -104,14 +106,14 @@ class MediaItem(msgspec.Struct, frozen=True):
 
 
 class Notification(msgspec.Struct, frozen=True):
-    """What the drone tells by itself: "media_created", "resource_removed", "indexing_state_changed", ..."""
+    """An event of the media store: "media_created", "resource_removed", "indexing_state_changed", …"""
 
     name: str
     data: dict[str, Any] = {}
 
     @property
     def media(self) -> MediaItem | None:
-        """The media it is about, if it describes one."""
+        """The media that the event describes, if any."""
         return _item(self.data.get("media"))
 
 
@@ -124,6 +126,12 @@ def _item(told: Any) -> MediaItem | None:
 
 
 class Media(Commanding[MediaState]):
+    """Photos and videos on the drone, from its web server.
+
+    All of them raise `CommandRejected` while the drone has not indexed its media or when the web server refuses,
+    `CommandTimeout` and `LinkLost` when it does not answer, `RemoteProtocolError` when the answer is not readable.
+    """
+
     NOTHING = MediaState()
     REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = {
         mediastore.State: lambda state, m: replace(state, index=m.state),
@@ -143,7 +151,7 @@ class Media(Commanding[MediaState]):
     # -- what there is
 
     async def list(self, *, newest_first: bool = True) -> tuple[MediaItem, ...]:
-        """All media. Raises `CommandRejected` while they are not indexed."""
+        """Return all media."""
         told = await self._ask("GET", f"{API}/medias", sort_order="newest" if newest_first else "oldest")
         if not isinstance(told, list):
             raise RemoteProtocolError("the drone's list of media is none")
@@ -153,14 +161,14 @@ class Media(Commanding[MediaState]):
         return tuple(item for item in items if item is not None)
 
     async def get(self, media_id: str) -> MediaItem:
-        """One media. Raises `CommandRejected` when there is none with this id."""
+        """Return one media. Raises `CommandRejected` when there is none with this id."""
         item = _item(await self._ask("GET", f"{API}/medias/{_name(media_id)}"))
         if item is None:
             raise RemoteProtocolError(f"media {media_id} is not readable")
         return item
 
     async def md5(self, resource: Resource) -> str:
-        """The MD5 of a file as the drone has it, hexadecimal."""
+        """Return the MD5 of a file on the drone, hexadecimal."""
         told = resource.md5
         if told is None:
             answer = await self._ask("GET", f"{API}/md5/{_name(resource.resource_id)}")
@@ -170,7 +178,7 @@ class Media(Commanding[MediaState]):
         return told.lower()
 
     async def thumbnail(self, of: MediaItem | Resource) -> bytes:
-        """A small JPEG. Raises `CommandRejected` when the drone has none."""
+        """Return a small JPEG. Raises `CommandRejected` when the drone has none."""
         self._available()
         if not of.thumbnail:
             raise RemoteProtocolError("no thumbnail was told")
@@ -179,9 +187,9 @@ class Media(Commanding[MediaState]):
     # -- files
 
     async def download(self, resource: Resource, directory: Path) -> Path:
-        """Copy a file to this directory and compare its MD5; returns its path.
+        """Download a file to a directory and compare its MD5; return its path.
 
-        It has its name only when it is whole. Raises `RemoteProtocolError` when it is not what the drone has.
+        The file has its name only once it is complete. Raises `RemoteProtocolError` when the MD5 differs.
         """
         self._available()
         wanted = await self.md5(resource)
@@ -207,27 +215,30 @@ class Media(Commanding[MediaState]):
         return path
 
     async def download_media(self, media_id: str, directory: Path) -> tuple[Path, ...]:
-        """`download` of every file of a media."""
+        """Download every file of a media; return their paths."""
         item = await self.get(media_id)
         return tuple([await self.download(resource, directory) for resource in item.resources])
 
     # -- away with them
 
     async def delete(self, media_id: str) -> None:
+        """Delete a media with all its files."""
         await self._ask("DELETE", f"{API}/medias/{_name(media_id)}")
 
     async def delete_resource(self, resource_id: str) -> None:
+        """Delete one file."""
         await self._ask("DELETE", f"{API}/resources/{_name(resource_id)}")
 
     async def delete_all(self) -> None:
+        """Delete all media."""
         await self._ask("DELETE", f"{API}/medias")
 
     # -- news
 
     async def notifications(self) -> AsyncGenerator[Notification, None]:
-        """What the drone tells while somebody iterates; use it in `contextlib.aclosing`. Ends when the drone ends it.
+        """Iterate over the events of the media store; use it in `contextlib.aclosing`.
 
-        What is not readable is left out.
+        It ends when the drone ends it. Events that are not readable are left out.
         """
         self._available()
         async with self._rest.websocket(f"{API}/notifications", NOTIFICATION_LIMIT) as socket:

@@ -50,17 +50,17 @@ class MoveEnd(enum.Enum):
 
     DONE = "done"
     CANCELED = "canceled"
-    """By us, by landing, or because somebody took over."""
+    """By this program, by a landing or by another controller."""
     ERROR = "error"
     """The drone could not do it."""
     REPLACED = "replaced"
     """A newer move took its place."""
     LINK_LOST = "link lost"
-    """Nobody knows: the link was lost on the way."""
+    """Unknown: the link was lost on the way."""
 
 
 class Displacement(msgspec.Struct, frozen=True):
-    """What a moveBy has flown, in the body's axes at its start."""
+    """Distance flown by a moveBy, in the axes of the body at its start."""
 
     front: float
     """m."""
@@ -73,7 +73,7 @@ class Displacement(msgspec.Struct, frozen=True):
 
 
 class Move:
-    """A move that we asked for. `target` is set for a moveTo only; its altitude is above the take-off point."""
+    """A move under way. `target` is set for a moveTo only; its altitude is above the take-off point."""
 
     __slots__ = ("answer", "ended", "running", "target")
 
@@ -93,7 +93,7 @@ class Move:
         return not answer.cancelled() and answer.exception() is None
 
     async def result(self) -> MoveEnd:
-        """Wait until the move has ended, and how. Never raises."""
+        """Wait until the move has ended; return how. Never raises."""
         return await asyncio.shield(self.ended)
 
     def end(self, how: MoveEnd) -> None:
@@ -245,7 +245,6 @@ class Moves:
         return {
             ardrone3.MoveToChanged: self._on_move_to,
             ardrone3.MoveByEnd: self._on_move_by_end,
-            ardrone3.FlyingStateChanged: self._on_flying_state,
         }
 
     def _on_move_to(self, message: ardrone3.MoveToChanged, now: float) -> None:
@@ -310,7 +309,8 @@ class Moves:
         went_nowhere = max(abs(message.dX), abs(message.dY), abs(message.dZ), abs(message.dPsi)) < _NO_MOVE
         return message.error == MoveByError.OK and went_nowhere
 
-    def _on_flying_state(self, message: ardrone3.FlyingStateChanged, now: float) -> None:
+    def on_flying_state(self, message: ardrone3.FlyingStateChanged, now: float) -> None:
+        """Motors that stand end every move."""
         if message.state in MOTORS_OFF:
             self.inherited = False
             self.cancel_to("the motors are off")

@@ -6,6 +6,7 @@ still begin.
 
 from __future__ import annotations
 
+import asyncio
 import math
 from collections.abc import Callable
 
@@ -24,10 +25,30 @@ RAMPING_TIMEOUT = 10.0
 TAKE_OFF_MEMORY = 10.0
 """s after a take-off was given up in which the drone may still carry it out, or already does and could not say so."""
 
+LAND_INSISTS = 10.0
+"""s for which a Landing is repeated while the motors ramp up or the drone rises: ardrone3.xml 1-0-3 promises a landing
+to a drone that takes off, hovers or flies, and none to one whose motors ramp up."""
+
+LAND_MEMORY = 3.0
+"""s after a Landing was withdrawn in which the drone may land all the same, and after a landing was to be ended in
+which the reported landing may be over."""
+
+STAYS_DOWN = 3.0
+"""s after LANDED in which a TakeOff that was to end the landing may still be executed."""
+
+STOP_MOTORS_TIMEOUT = 15.0
+"""s until propellers that turn near the ground stand still: the way down from half a metre is in it."""
+
+FORCED_AFTER = 0.3
+"""s that motors may go on ramping up after a forced disarm before they are cut."""
+
 EMERGENCY_TIMEOUT = 30.0
 """s that cutting the motors is tried for while the link seems to live but delivers nothing."""
 
+_RISING = frozenset({FlyingState.MOTOR_RAMPING, FlyingState.TAKINGOFF, FlyingState.HOVERING, FlyingState.FLYING})
 _TAKEN_OFF = frozenset({FlyingState.TAKINGOFF, FlyingState.HOVERING, FlyingState.FLYING})
+TURNING = frozenset({FlyingState.MOTOR_RAMPING, FlyingState.USERTAKEOFF})
+"""The motors turn and the drone is not in the air."""
 _LANDING = frozenset({FlyingState.LANDING, FlyingState.LANDED, FlyingState.EMERGENCY_LANDING, FlyingState.EMERGENCY})
 _MOTORS_CUT = frozenset({FlyingState.EMERGENCY, FlyingState.LANDED})
 
@@ -49,10 +70,61 @@ class Motors:
         self._launches: set[Expectation[bool]] = set()
         """Waits of take-offs and hand launches whose command may not have left."""
         self._may_take_off_until = -math.inf
+        self._may_land_until = -math.inf
+        """Until when a Landing that was withdrawn may be reported to have begun."""
+        self._doubtful_until = -math.inf
+        """Until when the reported LANDING may be over: its end was asked for."""
+        self._stays_down_until = -math.inf
+        """Until when motors that start are stopped: no take-off that began after the touchdown is wanted."""
 
     def link_lost(self) -> None:
-        """Take-offs that were given up before are no concern of the next connection."""
-        self._may_take_off_until = -math.inf
+        """Commands of before do not count for the next connection."""
+        self._may_take_off_until = self._may_land_until = -math.inf
+        self._doubtful_until = self._stays_down_until = -math.inf
+
+    def on_flying_state(self, message: ardrone3.FlyingStateChanged) -> None:
+        """Stop what starts after a touchdown although nothing that is wanted starts it."""
+        if message.state != FlyingState.LANDING:
+            self._doubtful_until = -math.inf
+        if loop_time() >= self._stays_down_until:
+            return
+        if message.state == FlyingState.MOTOR_RAMPING:
+            self._commander.halt_if_connected(ardrone3.UserTakeOff(0))
+        if message.state in _RISING:
+            self._commander.halt_if_connected(ardrone3.Landing())
+
+    def take_off_wanted(self) -> None:
+        """A command that starts the motors is about to be sent, or motors that start are another's business."""
+        self._stays_down_until = -math.inf
+
+    def landing_doubtful(self) -> None:
+        """The landing is about to be ended: until a state is reported, LANDING proves nothing."""
+        self._doubtful_until = loop_time() + LAND_MEMORY
+
+    def stay_down(self) -> None:
+        """The drone landed before a TakeOff could end the landing: that one must not lift it off again."""
+        self._stays_down_until = loop_time() + STAYS_DOWN
+        self._may_take_off_until = loop_time() + STAYS_DOWN
+
+    async def settle_landing(self, timeout: float) -> bool:
+        """Return True when a Landing that was withdrawn has begun all the same; False when it certainly does not.
+
+        That is known once the drone has received a later command, and then reports nothing.
+        """
+        flies = self._flight.state.flying in _TAKEN_OFF
+        if loop_time() >= self._may_land_until or not flies:
+            return self._flight.state.flying == FlyingState.LANDING
+        answer = self._commander.expect(
+            (ardrone3.FlyingStateChanged,), lambda message: True if message.state in _LANDING else None
+        )
+        try:
+            began = await answer.came(
+                self._commander.halt(ardrone3.CancelMoveTo()), ardrone3.CancelMoveTo.NAME, timeout
+            )
+            self._may_land_until = -math.inf
+        finally:
+            answer.close()
+        return began
 
     @property
     def about_to_fly(self) -> bool:
@@ -139,7 +211,7 @@ class Motors:
     async def land(self, timeout: float) -> None:
         self._commander.require_link()
         self._commander.call_off("the drone is to land")
-        if self._flight.state.flying in _LANDING and not self.about_to_fly:
+        if self._lands and not self.about_to_fly:
             return
         # Level at once, then nothing, from here on and not from the drone's answer on: a positive gaz would cancel
         # the landing.
@@ -149,21 +221,92 @@ class Motors:
         try:
             if self.about_to_fly:
                 await self._catch_take_off(timeout)
-            if self._flight.state.flying in _LANDING:
+            if self._lands:
                 return
             self._end_hand_launch()
-            await self._commander.confirm(
-                ardrone3.Landing(),
-                (ardrone3.FlyingStateChanged,),
-                lambda message: True if message.state in _LANDING else None,
-                timeout,
-            )
+            await self._insist(timeout)
         finally:
             self._sticks.landings_asked -= 1
 
+    @property
+    def _lands(self) -> bool:
+        """True while the drone certainly lands, or has landed."""
+        state = self._flight.state.flying
+        return state in _LANDING and (state != FlyingState.LANDING or loop_time() >= self._doubtful_until)
+
+    async def _insist(self, timeout: float) -> None:
+        """Send Landing until the drone lands: again at each state that shows that the one before did not count.
+
+        Withdrawn when this is cancelled or fails; the drone may have received it all the same (`settle_landing`).
+        """
+        doubtful = self._flight.state.flying == FlyingState.LANDING
+        rising = self._flight.state.flying in TURNING or self._flight.state.flying == FlyingState.TAKINGOFF
+        sent: list[asyncio.Future[None]] = []
+
+        def send() -> None:
+            if not sent or sent[-1].done():
+                sent.append(self._commander.deliver(ardrone3.Landing()))
+
+        def judge(message: ardrone3.FlyingStateChanged) -> bool | None:
+            if message.state in _TAKEN_OFF:
+                send()
+            return True if message.state in _LANDING else None
+
+        answer = self._commander.expect((ardrone3.FlyingStateChanged,), judge)
+        seconds = max(timeout, LAND_INSISTS) if rising else timeout
+        answer.expire_after(seconds, CommandTimeout(ardrone3.Landing.NAME, seconds))
+        try:
+            send()
+            began = doubtful and await answer.came(sent[0], ardrone3.Landing.NAME, timeout)
+            if doubtful and not began and self._flight.state.flying in _LANDING:
+                self._doubtful_until = -math.inf  # it has received the Landing, and reports nothing else
+                return
+            await answer.wait()
+        except BaseException:
+            self._may_land_until = loop_time() + LAND_MEMORY
+            for delivery in sent:
+                self._commander.take_back(delivery, CommandRejected("the landing was withdrawn"))
+            raise
+        finally:
+            answer.close()
+
+    async def stop_motors(self, *, force: bool) -> None:
+        self._commander.require_link()
+        self._commander.call_off("the motors are to stop")
+        self._sticks.let_go()
+        self._sticks.silence()
+        for launch in self._launches:
+            launch.fail(CommandRejected("the motors are to stop"))
+            if launch.token is not None:
+                self._commander.cancel(launch.token)
+        cut: asyncio.Future[None] | None = None
+
+        def judge(message: ardrone3.FlyingStateChanged) -> bool | None:
+            if message.state in _TAKEN_OFF:
+                self._commander.halt(ardrone3.Landing())
+                if cut is not None:  # from here on it would fall
+                    self._commander.take_back(cut, CommandRejected("the drone has left the ground"))
+            return True if message.state in MOTORS_OFF else None
+
+        answer = self._commander.expect((ardrone3.FlyingStateChanged,), judge)
+        answer.expire_after(STOP_MOTORS_TIMEOUT, CommandTimeout(ardrone3.Landing.NAME, STOP_MOTORS_TIMEOUT))
+        self._sticks.landings_asked += 1
+        try:
+            if self._flight.state.flying in TURNING:
+                self._commander.halt(ardrone3.UserTakeOff(0))
+            self._commander.halt(ardrone3.Landing())
+            if force:
+                await asyncio.wait({answer.future}, timeout=FORCED_AFTER)
+                if self._flight.state.flying == FlyingState.MOTOR_RAMPING:
+                    cut = self._commander.deliver(ardrone3.Emergency())
+            await answer.wait()
+        finally:
+            self._sticks.landings_asked -= 1
+            answer.close()
+
     def _end_hand_launch(self) -> None:
         """A drone that idles in a hand has no use for a Landing: it waits to be thrown, or for this."""
-        if self.about_to_fly or self._flight.state.flying in (FlyingState.MOTOR_RAMPING, FlyingState.USERTAKEOFF):
+        if self.about_to_fly or self._flight.state.flying in TURNING:
             self._commander.halt(ardrone3.UserTakeOff(0))
 
     async def _catch_take_off(self, timeout: float) -> None:

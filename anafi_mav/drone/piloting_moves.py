@@ -117,6 +117,7 @@ class GuidedMoves:
         finally:
             if not move.running and self._moves.to is move:  # given up: it must not start later
                 self._moves.cancel_to("given up")
+                move.answer.close()  # not awaited when it was refused before it was sent
                 self._commander.halt_if_connected(ardrone3.CancelMoveTo())
         return move
 

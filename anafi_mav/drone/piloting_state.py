@@ -23,7 +23,7 @@ ON_THE_GROUND = MOTORS_OFF | {FlyingState.MOTOR_RAMPING, FlyingState.USERTAKEOFF
 
 
 class Attitude(msgspec.Struct, frozen=True):
-    """rad: roll + right wing down, pitch + nose up, yaw clockwise from north."""
+    """Attitude, rad: roll + right wing down, pitch + nose up, yaw clockwise from north."""
 
     roll: float
     pitch: float
@@ -31,7 +31,7 @@ class Attitude(msgspec.Struct, frozen=True):
 
 
 class Velocity(msgspec.Struct, frozen=True):
-    """Over ground, m/s."""
+    """Velocity over ground, m/s."""
 
     north: float
     east: float
@@ -39,7 +39,7 @@ class Velocity(msgspec.Struct, frozen=True):
 
 
 class Avoidance(msgspec.Struct, frozen=True):
-    """Obstacle avoidance: what was asked for, what it does, what it could do."""
+    """Obstacle avoidance: requested mode, state, availability."""
 
     mode: obstacle_avoidance.Mode
     state: obstacle_avoidance.State
@@ -47,6 +47,8 @@ class Avoidance(msgspec.Struct, frozen=True):
 
 
 class PilotingState(msgspec.Struct, frozen=True):
+    """Flying state, attitude, motion and limits of the drone."""
+
     flying: FlyingState | None = None
     attitude: Attitude | None = None
     velocity: Velocity | None = None
@@ -55,20 +57,20 @@ class PilotingState(msgspec.Struct, frozen=True):
     height: float | None = None
     """m above the ground below."""
     steady: bool | None = None
-    """The drone lies or hovers still."""
+    """True when the drone lies or hovers still."""
     move_to: MoveToStatus | None = None
-    """What became of the last moveTo."""
+    """Status of the last moveTo."""
     move_target: Position | None = None
-    """Where that moveTo goes or went; altitude above the take-off point."""
+    """Target of that moveTo; altitude above the take-off point."""
     poi: PoiStatus | None = None
     plan: PlayingState | None = None
-    """Whether a flight plan plays."""
+    """State of the flight plan."""
     animation: animation.Type | None = None
-    """What animation flies; NONE: none does."""
+    """The animation under way; NONE: none is flown."""
     following: FollowMeMode | None = None
-    """How it follows a target; NONE: not at all."""
+    """Mode of follow me; NONE: no target is followed."""
     move_missing: int | None = None
-    """What a guided move lacks, as bits of `move.Indicator`; 0 = available. Ai only."""
+    """Requirements that a guided move lacks, bits of `move.Indicator`; 0: available. Ai only."""
     max_tilt: Range | None = None
     """deg."""
     max_vertical_speed: Range | None = None
@@ -80,32 +82,34 @@ class PilotingState(msgspec.Struct, frozen=True):
     max_altitude: Range | None = None
     """m above the take-off point; always enforced."""
     max_distance: Range | None = None
-    """m from home; enforced when `geofence` is on."""
+    """m from `geofence_centre`; enforced when `geofence` is on."""
     geofence: bool | None = None
+    geofence_centre: tuple[float, float] | None = None
+    """deg, deg: what `max_distance` counts from, a controller's GPS or the last take-off (ardrone3.xml 1-2-4)."""
     banked_turn: bool | None = None
     max_horizontal_speed: Range | None = None
     """m/s; reported by later generations only."""
     style: PilotingStyleStyle | None = None
-    """What the sticks are relative to."""
+    """Frame of the sticks."""
     styles: frozenset[PilotingStyleStyle] | None = None
     avoidance: Avoidance | None = None
     """Ai only."""
     ready_for_hand_launch: bool = False
-    """The motors idle and the drone waits to be thrown or let go."""
+    """True when the motors idle and the drone waits to be thrown or released."""
 
     @property
     def motors_on(self) -> bool | None:
-        """Do the motors turn? None when the drone has not said."""
+        """True when the motors turn; None when the drone has not reported it."""
         return None if self.flying is None else self.flying not in MOTORS_OFF
 
     @property
     def in_air(self) -> bool | None:
-        """Is the drone off the ground? None when the drone has not said."""
+        """True when the drone is off the ground; None when it has not reported it."""
         return None if self.flying is None else self.flying not in ON_THE_GROUND
 
     @property
     def limits(self) -> Limits | None:
-        """What 100 % stick is; None before the drone has reported all of it."""
+        """Values at full stick; None before the drone has reported all of them."""
         tilt, yaw, climb = self.max_tilt, self.max_rotation_speed, self.max_vertical_speed
         if tilt is None or yaw is None or climb is None:
             return None
@@ -131,6 +135,11 @@ def _velocity(state: PilotingState, message: ardrone3.SpeedChanged) -> PilotingS
     if not math.isfinite(message.speedX + message.speedY + message.speedZ):
         return replace(state, velocity=None)
     return replace(state, velocity=Velocity(message.speedX, message.speedY, message.speedZ))
+
+
+def _centre(state: PilotingState, message: ardrone3.GeofenceCenterChanged) -> PilotingState:
+    centre = position(message.latitude, message.longitude, 0.0)
+    return replace(state, geofence_centre=None if centre is None else (centre.latitude, centre.longitude))
 
 
 def _move_to(state: PilotingState, message: ardrone3.MoveToChanged) -> PilotingState:
@@ -163,6 +172,7 @@ REDUCERS: Mapping[type[Message], Reducer] = {
     ardrone3.MaxAltitudeChanged: lambda state, message: replace(state, max_altitude=setting(message)),
     ardrone3.MaxDistanceChanged: lambda state, message: replace(state, max_distance=setting(message)),
     ardrone3.NoFlyOverMaxDistanceChanged: lambda state, message: replace(state, geofence=message.shouldNotFlyOver != 0),
+    ardrone3.GeofenceCenterChanged: _centre,
     ardrone3.BankedTurnChanged: lambda state, message: replace(state, banked_turn=message.state != 0),
     ardrone3.MaxHorizontalSpeedChanged: lambda state, message: replace(state, max_horizontal_speed=setting(message)),
     piloting_style.Style: lambda state, message: replace(state, style=message.style),

@@ -7,22 +7,22 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from collections.abc import Callable
 
-from anafi_mav.arsdk.messages.ardrone3 import FlyingState
+from anafi_mav.arsdk.messages.ardrone3 import PCMD, FlyingState
 from anafi_mav.arsdk.messages.common import PlayingState
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone.alerts import spoken
 from anafi_mav.drone.element import Element
 from anafi_mav.drone.expectation import Commander, loop_time
 from anafi_mav.drone.home import Home
 from anafi_mav.drone.piloting_state import PilotingState, in_state
-from anafi_mav.drone.sticks import Percent, Sticks
+from anafi_mav.drone.sticks import CENTRED, Percent, Sticks, is_deflected
 from anafi_mav.errors import LinkLost
 
 log = logging.getLogger("anafi_mav")
 
 RELEASES = 3
-"""PCMDs that say that nobody holds the sticks; they are not acknowledged."""
+"""Centred PCMDs that precede a return; they are not acknowledged."""
 
 _STICKS_DEAD = frozenset(
     {FlyingState.LANDED, FlyingState.LANDING, FlyingState.EMERGENCY, FlyingState.EMERGENCY_LANDING}
@@ -33,12 +33,22 @@ _STICKS_DEAD = frozenset(
 class StickStream:
     """Sends PCMDs while there are any to send. All of it acts at once; a dead stream sends and keeps nothing."""
 
-    def __init__(self, commander: Commander, flight: Element[PilotingState], home: Home) -> None:
+    def __init__(
+        self,
+        commander: Commander,
+        flight: Element[PilotingState],
+        home: Home,
+        pilot_has_source: Callable[[], bool] = lambda: False,
+    ) -> None:
+        """`pilot_has_source` returns True while the pilot at a Skycontroller has the piloting source."""
         self._commander = commander
+        self._pilot_has_source = pilot_has_source
         self._flight = flight
         self._home = home
         self._sticks = Sticks()
         self._timer: asyncio.TimerHandle | None = None
+        self._after_gaz = False
+        """The centred PCMDs that follow the gaz against a landing are sent although the drone is said to land."""
         self.landings_asked = 0
         """Landings that were ordered and have not been answered: nothing is sent that could cancel one."""
 
@@ -48,6 +58,11 @@ class StickStream:
         if self._flight.state.plan == PlayingState.PLAYING:
             return "a flight plan plays"
         return self.dead
+
+    @property
+    def held(self) -> bool:
+        """A setpoint holds the sticks, level or not."""
+        return self._sticks.held
 
     @property
     def dead(self) -> str | None:
@@ -66,6 +81,7 @@ class StickStream:
     def hold(self, position: Percent, age: float) -> None:
         """This position from now on, said `age` s ago: see `Piloting.pilot`. Whoever calls has asked `blocked`."""
         now = loop_time()
+        self._after_gaz = False
         self._sticks.command(position, now, now - age)
         self.pump()
 
@@ -74,12 +90,23 @@ class StickStream:
         self._sticks.centre(loop_time())
         self.pump()
 
+    def send_now(self, position: Percent) -> None:
+        """Send one PCMD in a landing, outside of the 20 Hz grid; whoever calls repeats it, and then centres."""
+        if self._flight.state.flying == FlyingState.LANDING and not self.landings_asked:
+            self._send(self._sticks.single(position, loop_time()))
+
+    def centre_after_gaz(self) -> None:
+        """Centre for two seconds, in a landing too: a firmware that keeps the last PCMD must not keep the gaz."""
+        self._after_gaz = True
+        self.centre()
+
     def pump(self) -> None:
         """Send the PCMD that is due and come back for the next."""
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
-        if self.dead is not None:
+        lands = self._flight.state.flying == FlyingState.LANDING and not self.landings_asked
+        if self.dead is not None and not (lands and self._after_gaz and self._commander.connected):
             self._sticks.stop()
         now = loop_time()
         pcmd = self._sticks.due(now)
@@ -96,22 +123,26 @@ class StickStream:
 
     def silence(self) -> None:
         """No more PCMDs: something else flies the drone now."""
+        self._after_gaz = False
         self._sticks.stop()
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
 
     def release(self) -> None:
-        """Take the hands off: a return waits for a PCMD with flag 0 (rth.xml 146-0-11)."""
-        if self._sticks.active and self.dead is None:
+        """Send centred PCMDs, then none: a return waits for flag 0 (rth.xml 146-0-11), whoever sent flag 1 last.
+
+        Not while the pilot at a Skycontroller has the piloting source: the sticks that count are his.
+        """
+        if self.dead is None and not self._pilot_has_source():
             for _ in range(RELEASES):
-                self._commander.send(self._sticks.released(loop_time()))
+                self._commander.send(self._sticks.single(CENTRED, loop_time()))
         self.silence()
 
-    def _send(self, message: Message) -> None:
+    def _send(self, message: PCMD) -> None:
         """For what is worth sending only while there is a link; its loss is reported elsewhere."""
         try:
-            self._commander.send(message)
+            self._commander.send(message, stops=not is_deflected(message))
         except LinkLost as error:
             log.debug("%s not sent: %s", message.NAME, error)
             self._sticks.stop()

@@ -25,16 +25,20 @@ _SAME_PLACE_DEG = 1e-7
 
 
 class PoiState(msgspec.Struct, frozen=True):
+    """The point of interest that the drone looks at."""
+
     status: PoiStatus | None = None
     target: Position | None = None
     """Altitude above the take-off point."""
     mode: PoiMode | None = None
-    """Whether the camera follows too."""
+    """Relation of the gimbal to the place."""
     missing: frozenset[Indicator] | None = None
     """What it lacks; empty = available. Ai only."""
 
 
 class Poi(Commanding[PoiState]):
+    """A place that the drone looks at while a pilot flies it."""
+
     NOTHING = PoiState()
     REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = {
         ardrone3.PilotedPOIV2: lambda state, m: replace(
@@ -51,10 +55,10 @@ class Poi(Commanding[PoiState]):
         mode: PoiMode = PoiMode.LOCKED_GIMBAL,
         timeout: float = ANSWER_TIMEOUT,
     ) -> None:
-        """Look at a place (deg, deg, m above take-off); returns when the drone does, or waits for its hover to do it.
+        """Look at a place (deg, deg, m above take-off); returns when the drone does, or will once it hovers.
 
         LOCKED_GIMBAL points the camera too, FREE_GIMBAL leaves it to the gimbal's verbs. Raises `CommandRejected` when
-        it is unavailable: not flying, or no GPS. A start that is given up is taken back.
+        it is unavailable: not flying, or no GPS. A start that times out or is cancelled is withdrawn.
         """
         if position(latitude, longitude, altitude) is None:
             raise LocalProtocolError(f"no place on earth: {latitude}, {longitude}, {altitude}")
@@ -74,7 +78,7 @@ class Poi(Commanding[PoiState]):
         await self._commander.begin(command, (ardrone3.PilotedPOIV2,), judge, timeout, ardrone3.StopPilotedPOI())
 
     async def stop(self, timeout: float = ANSWER_TIMEOUT) -> None:
-        """Look anywhere; returns at once when there is no point, nor one on its way to the drone."""
+        """End looking at the place; returns at once when there is none."""
         self._require(self.state.status, "points of interest")
         self._commander.call_off("stopped", ardrone3.StopPilotedPOI)
         await self._commander.halted(ardrone3.StopPilotedPOI.NAME, timeout)

@@ -14,14 +14,14 @@ from anafi_mav.drone.element import Element, Reducer
 
 
 class Model(msgspec.Struct, frozen=True):
-    """A member of the family, by the number it announces itself with (discovery's model.id)."""
+    """A model of the ANAFI family, by the number in its announcement (discovery's model.id)."""
 
     id: int
     key: str
     """Short name as used in configurations: "4k"."""
     title: str
     protobuf: bool = False
-    """It speaks protobuf too, and tells some of its states only when it is asked in it."""
+    """True for models that report some of their states in protobuf only, on request."""
 
 
 MODELS: Mapping[int, Model] = {
@@ -37,6 +37,8 @@ MODELS: Mapping[int, Model] = {
 
 
 class ProductState(msgspec.Struct, frozen=True):
+    """Names and numbers of the drone."""
+
     name: str | None = None
     """The name its owner gave it, also the name of its Wi-Fi."""
     firmware: str | None = None
@@ -64,7 +66,7 @@ class ProductState(msgspec.Struct, frozen=True):
 
 
 class Identity(msgspec.Struct, frozen=True):
-    """Who answered at the drone's address."""
+    """Model, serial number and versions of a drone."""
 
     model: Model
     serial: str
@@ -74,6 +76,8 @@ class Identity(msgspec.Struct, frozen=True):
 
 
 class Product(Element[ProductState]):
+    """The drone as a product. No verbs: `Drone.identity` sums it up."""
+
     NOTHING = ProductState()
     REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = {
         common.ProductNameChanged: lambda state, message: replace(state, name=message.name),

@@ -59,9 +59,12 @@ class Commanding(Element[StateT]):
         timeout: float = ANSWER_TIMEOUT,
     ) -> T:
         """Send a setting and return what the judge makes of its answer."""
-        # One at a time: the answers of two could not be told apart.
-        async with self._setting_locks.setdefault(answer, asyncio.Lock()):
+        async with self._setting_lock(answer):
             return await self._commander.confirm(command, (answer,), judge, timeout)
+
+    def _setting_lock(self, answer: type[Message]) -> asyncio.Lock:
+        """One change at a time: the answers of two could not be told apart."""
+        return self._setting_locks.setdefault(answer, asyncio.Lock())
 
     def _order(self, subject: Hashable, command: Message) -> int:
         """Send a target that is not acknowledged; every older one for the same subject is over."""

@@ -15,17 +15,21 @@ from anafi_mav.drone.settings import Commanding
 
 
 class SoundState(msgspec.Struct, frozen=True):
+    """The alert sound."""
+
     playing: bool | None = None
 
 
 class Sound(Commanding[SoundState]):
+    """The alert sound, to find a drone."""
+
     NOTHING = SoundState()
     REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = {
         ardrone3.AlertSound: lambda state, message: SoundState(message.state == AlertSoundState.PLAYING)
     }
 
     async def start(self) -> None:
-        """Returns when it beeps."""
+        """Start the alert sound; returns when the drone beeps."""
         self._require(self.state.playing, "alert sound")
         await self._change(
             ardrone3.StartAlertSound(),
@@ -34,7 +38,7 @@ class Sound(Commanding[SoundState]):
         )
 
     async def stop(self) -> None:
-        """Returns when it is silent."""
+        """Stop the alert sound; returns when the drone is silent."""
         self._require(self.state.playing, "alert sound")
         await self._change(
             ardrone3.StopAlertSound(),

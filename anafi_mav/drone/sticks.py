@@ -32,7 +32,7 @@ the heading has just left; then the newest position waits, older ones are never 
 
 
 class PilotingCommand(msgspec.Struct, frozen=True):
-    """What a pilot wants, in aerospace signs (FRD body, and up for the climb). Values beyond the limits are clipped."""
+    """Position of the sticks in aerospace signs (FRD body, + up for the climb); clipped to the limits."""
 
     roll_deg: float = 0.0
     """Tilt, + right."""
@@ -45,7 +45,7 @@ class PilotingCommand(msgspec.Struct, frozen=True):
 
 
 class Limits(msgspec.Struct, frozen=True):
-    """What 100 % is: the drone's own settings, as it reported them."""
+    """Values at full stick: the drone's own settings."""
 
     tilt_deg: float
     yaw_rate_dps: float
@@ -84,6 +84,11 @@ def _share(value: float, limit: float) -> int:
     return round(clip(100.0 * value / limit, -100.0, 100.0)) if limit > 0.0 else 0
 
 
+def is_deflected(pcmd: PCMD) -> bool:
+    """True when any stick of this PCMD is off its middle."""
+    return bool(pcmd.roll or pcmd.pitch or pcmd.yaw or pcmd.gaz)
+
+
 class Sticks:
     """When to send which stick position. `deadline` says when `due` has something, `due` hands it out once."""
 
@@ -105,6 +110,11 @@ class Sticks:
     def active(self) -> bool:
         """Is there anything left to send?"""
         return self._remaining != 0
+
+    @property
+    def held(self) -> bool:
+        """A setpoint holds the sticks, level or not."""
+        return self._remaining is None
 
     @property
     def deadline(self) -> float | None:
@@ -143,11 +153,21 @@ class Sticks:
         self._next = self._next + PERIOD if now - self._next < PERIOD else now + PERIOD
         self._paid_until = max(self._paid_until, now) + MIN_SPACING
         self._last = self._position
-        return PCMD(1, *self._position, self._stamp(now))
+        return self._pcmd(self._position, now)
 
-    def released(self, now: float) -> PCMD:
-        """A PCMD that says that nobody holds the sticks: its flag tells the drone to ignore roll and pitch."""
-        return PCMD(0, *CENTRED, self._stamp(now))
+    def single(self, position: Percent, now: float) -> PCMD:
+        """Return one PCMD outside of the 20 Hz grid."""
+        self._last = position
+        return self._pcmd(position, now)
+
+    def _pcmd(self, position: Percent, now: float) -> PCMD:
+        """Build a PCMD whose flag is 1 only where roll or pitch is deflected, as Parrot's own programs send it.
+
+        With flag 0 the drone holds its place, and begins a return or a point of interest that waits for it to hover
+        (GroundSDK PilotingCommand, Olympe; ardrone3.xml 1-0-2, 1-0-5; rth.xml 146-0-11). With flag 1 and no deflection
+        it is asked for 0 degrees of tilt, which wind carries away.
+        """
+        return PCMD(int(position.roll != 0 or position.pitch != 0), *position, self._stamp(now))
 
     def _stamp(self, now: float) -> int:
         """timestampAndSeqNum: a counter in the top byte, milliseconds below; the drone keeps statistics of it."""

@@ -40,10 +40,12 @@ LONGEST_PERIOD = 255
 
 
 class StorageState(msgspec.Struct, frozen=True):
+    """One memory card or internal memory."""
+
     feature: str | None = None
-    """Which of Parrot's features reports it."""
+    """Parrot's feature that reports it."""
     removable: bool | None = None
-    """A card; None: the drone has only this one and does not say."""
+    """True for a card; None: the only one, not reported."""
     name: str | None = None
     capacity: int | None = None
     """Bytes."""
@@ -59,13 +61,13 @@ class StorageState(msgspec.Struct, frozen=True):
     formats: frozenset[FormattingType] | None = None
     uuid: str | None = None
     step: FormattingStep | None = None
-    """What a running format does."""
+    """Step of a format under way."""
     percent: int | None = None
-    """How much of that step is done."""
+    """Progress of that step."""
 
     @property
     def ready(self) -> bool | None:
-        """Can media be stored? None when the drone has not said."""
+        """True when media can be stored; None when the drone has not reported it."""
         if self.physical is None or self.file_system is None:
             return None
         return self.physical == PhyState.AVAILABLE and self.file_system == FsState.READY
@@ -178,7 +180,7 @@ def _v3_list(state: Storages, message: v3.StorageList) -> Storages:
 
 
 class Storage(Commanding[Storages]):
-    """All storages of the drone by id; the verbs mean the one where media go unless told another."""
+    """All storages of the drone by id; the verbs use the one for media unless `id` says another."""
 
     NOTHING: ClassVar[Storages] = {}
     REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = {
@@ -242,7 +244,7 @@ class Storage(Commanding[Storages]):
 
     @property
     def main(self) -> int:
-        """Id of the storage where media go: the card if there is one, else the first."""
+        """Id of the storage for media: the card if there is one, else the first."""
         ids = [id for id, one in self.state.items() if one.removable]
         return min(ids or self.state or [0])
 
@@ -260,7 +262,7 @@ class Storage(Commanding[Storages]):
         return [about(id) for id, one in self.state.items() if one.feature is None]
 
     async def start_monitoring(self, period_s: int = 1, id: int | None = None) -> int:
-        """Let the drone report the free space every so many seconds; returns the bytes that are free now."""
+        """Have the free space reported every `period_s` seconds; return the free bytes now."""
         if not 1 <= period_s <= LONGEST_PERIOD:
             raise LocalProtocolError(f"expected a period of 1 to {LONGEST_PERIOD} s, got {period_s}")
         speech, storage = self._told(id)
@@ -272,6 +274,7 @@ class Storage(Commanding[Storages]):
         )
 
     async def stop_monitoring(self, id: int | None = None) -> None:
+        """End the reports of the free space."""
         speech, storage = self._told(id)
         await self._change(
             speech.stop(storage),
@@ -286,9 +289,9 @@ class Storage(Commanding[Storages]):
         id: int | None = None,
         timeout: float = FORMAT_TIMEOUT,
     ) -> None:
-        """Erase everything; returns when the drone has done it. `timeout` is without news from it.
+        """Erase everything; returns when that is complete. `timeout` counts from the last report of progress.
 
-        Raises `CommandRejected` when the drone denies it (it flies, or records) or fails.
+        Raises `CommandRejected` when the drone refuses (it flies or records) or fails.
         """
         speech, storage = self._told(id)
         known = self[storage]

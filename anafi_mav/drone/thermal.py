@@ -33,7 +33,7 @@ MAX_COLOURS = 256
 
 
 class Colour(msgspec.Struct, frozen=True):
-    """One colour of the palette and where it stands in it; all 0 to 1."""
+    """One colour of the palette and its position there; all 0 to 1."""
 
     red: float
     green: float
@@ -42,7 +42,7 @@ class Colour(msgspec.Struct, frozen=True):
 
 
 class Palette(msgspec.Struct, frozen=True):
-    """How temperatures become places in the palette."""
+    """Relation of temperatures to positions in the palette."""
 
     mode: PaletteMode = PaletteMode.RELATIVE
     lowest_k: float = 0.0
@@ -50,13 +50,15 @@ class Palette(msgspec.Struct, frozen=True):
     outside: ColorizationMode = ColorizationMode.EXTENDED
     """Colours of what is colder or hotter than the bounds (mode ABSOLUTE)."""
     range: RelativeRangeMode = RelativeRangeMode.UNLOCKED
-    """Whether the bounds follow the picture (mode RELATIVE)."""
+    """Relation of the bounds to the picture (mode RELATIVE)."""
     spot: SpotType = SpotType.HOT
     spot_threshold: float = 0.0
     """0 to 1 (mode SPOT)."""
 
 
 class ThermalState(msgspec.Struct, frozen=True):
+    """Settings and state of the thermal camera."""
+
     mode: ThermalMode | None = None
     """BLENDED and STANDARD make the thermal camera the one that is streamed and recorded."""
     modes: frozenset[ThermalMode] | None = None
@@ -93,6 +95,8 @@ def _colour(state: ThermalState, message: thermal.PalettePart) -> ThermalState:
 
 
 class Thermal(Commanding[ThermalState]):
+    """The thermal camera's own settings. ANAFI Thermal and USA."""
+
     NOTHING = ThermalState()
     REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = {
         thermal.Mode: lambda state, m: replace(state, mode=m.mode),
@@ -107,11 +111,12 @@ class Thermal(Commanding[ThermalState]):
     }
 
     async def set_mode(self, mode: ThermalMode) -> ThermalMode:
+        """Switch the thermal camera on or off, or blend it with the visible picture."""
         self._require(self.state.mode, "thermal camera")
         return await self._change(thermal.SetMode(mode), thermal.Mode, lambda m: ThermalMode(m.mode))
 
     async def set_rendering(self, mode: RenderingMode, blending: float | None = None) -> tuple[RenderingMode, float]:
-        """What the thermal picture is mixed from; `blending` None keeps the share. Returns both as they are then."""
+        """Set the mixture of thermal and visible picture; `blending` None keeps its share. Return both."""
         self._require(self.state.rendering, "thermal camera")
         share = (self.state.blending or 0.0) if blending is None else number(blending, "share of the thermal picture")
         return await self._change(
@@ -121,6 +126,7 @@ class Thermal(Commanding[ThermalState]):
         )
 
     async def set_palette(self, palette: Palette) -> Palette:
+        """Set the relation of temperatures to colours; return that of the drone."""
         self._require(self.state.palette, "thermal camera")
         number(palette.lowest_k + palette.highest_k + palette.spot_threshold, "palette")
         command = thermal.SetPaletteSettings(
@@ -135,7 +141,7 @@ class Thermal(Commanding[ThermalState]):
         return await self._change(command, thermal.PaletteSettings, _palette)
 
     async def set_colours(self, colours: Sequence[Colour]) -> tuple[Colour, ...]:
-        """The colours of the palette; returns those that the drone has then."""
+        """Set the colours of the palette; return those of the drone."""
         self._require(self.state.mode, "thermal camera")
         if not 1 <= len(colours) <= MAX_COLOURS:
             raise LocalProtocolError(f"expected 1 to {MAX_COLOURS} colours, got {len(colours)}")
@@ -159,13 +165,13 @@ class Thermal(Commanding[ThermalState]):
             answer.close()
 
     async def set_emissivity(self, emissivity: float) -> float:
-        """0 to 1: how much of what the things radiate is their own."""
+        """Set the emissivity of the objects, 0 to 1."""
         self._require(self.state.emissivity, "thermal camera")
         command = thermal.SetEmissivity(number(emissivity, "emissivity"))
         return await self._change(command, thermal.Emissivity, lambda m: float(m.emissivity))
 
     async def set_background(self, kelvin: float) -> float:
-        """Temperature of what the things reflect."""
+        """Set the temperature of the background that objects reflect, K."""
         self._require(self.state.background_k, "thermal camera")
         return await self._change(
             thermal.SetBackgroundTemperature(number(kelvin, "temperature")),
@@ -174,20 +180,20 @@ class Thermal(Commanding[ThermalState]):
         )
 
     async def set_sensitivity(self, sensitivity: Sensitivity) -> Sensitivity:
-        """HIGH sees hotter things, LOW finer differences."""
+        """Set the sensitivity: HIGH covers hotter objects, LOW finer differences."""
         self._require(self.state.sensitivity, "thermal camera")
         return await self._change(
             thermal.SetSensitivity(sensitivity), thermal.Sensitivity, lambda m: Sensitivity(m.current_range)
         )
 
     async def set_shutter(self, trigger: ShutterTrigger) -> ShutterTrigger:
-        """Whether the sensor is levelled by itself or by `trigger_shutter`."""
+        """Set if the sensor calibrates itself or by `trigger_shutter`."""
         self._require(self.state.shutter, "thermal camera")
         return await self._change(
             thermal.SetShutterMode(trigger), thermal.ShutterMode, lambda m: ShutterTrigger(m.current_trigger)
         )
 
     def trigger_shutter(self) -> None:
-        """Level the sensor now. The drone has no answer to it."""
+        """Calibrate the sensor now. The drone does not confirm it."""
         self._require(self.state.shutter, "thermal camera")
         self._commander.send(thermal.TriggShutter())

@@ -49,37 +49,39 @@ _CLOCK_WRAP = 1 << 32
 
 
 class VideoFrame(msgspec.Struct, frozen=True):
-    """What was said with one picture."""
+    """Metadata of one picture."""
 
     metadata: FrameMetadata
     arrived: float
     """s on the loop's clock."""
     taken: float
-    """s on a clock of the drone's, whose zero is arbitrary: differences between two are exact, whatever the way to us
-    did to the pictures."""
+    """s on a clock of the drone, whose zero is arbitrary: differences between two are exact, whatever delayed the
+    pictures on their way."""
 
     @property
     def attitude(self) -> Attitude | None:
-        """Of the drone, as in `PilotingState`; None: not said."""
+        """Attitude of the drone, as in `PilotingState`; None: unknown."""
         return attitude(self.metadata.drone_quat)
 
     @property
     def camera_attitude(self) -> Attitude | None:
-        """Of the picture; None: not said."""
+        """Attitude of the picture; None: unknown."""
         return attitude(self.metadata.quat)
 
 
 class VideoState(msgspec.Struct, frozen=True):
+    """The live video."""
+
     playing: bool = False
-    """Pictures come."""
+    """True while pictures arrive."""
     shown: Shown | None = None
-    """Which stream, as the drone describes it."""
+    """The stream, as the drone describes it."""
     frame: VideoFrame | None = None
-    """The newest; None when none has come for a second."""
+    """The newest; None when none arrived within the last second."""
     rate_hz: float | None = None
-    """Of pictures that say something, over the last second."""
+    """Pictures with metadata per second, over the last second."""
     problem: str = ""
-    """Why none come, although somebody wants them; empty: none, or not known yet."""
+    """Reason why no pictures arrive for a watcher; empty: none, or not known yet."""
 
 
 FrameCallback: TypeAlias = Callable[[VideoFrame], None]
@@ -97,7 +99,7 @@ def attitude(quat: tuple[float, float, float, float] | None) -> Attitude | None:
 
 
 class Video(Element[VideoState]):
-    """The live video. One stream at a time: who comes second shares it."""
+    """The live video, undecoded, with the metadata of each picture. One stream at a time, shared by all its users."""
 
     NOTHING = VideoState()
     REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = {}
@@ -146,8 +148,9 @@ class Video(Element[VideoState]):
 
     @asynccontextmanager
     async def watching(self, title: str | None = None, timeout: float = START_TIMEOUT) -> AsyncIterator[None]:
-        """Have the video run for the length of a block, which begins when pictures come; it goes on through
-        interruptions, of the link too, until the last one who watches has left.
+        """Run the video for the length of a block, which begins with the first picture.
+
+        It continues through interruptions, of the link too, until the last block has ended.
 
         `title` names a stream ("DefaultVideo", "Front camera"); None: the drone's own choice, or what runs already.
         Raises `CommandRejected` when another stream is being watched, `NotSupported` when the drone has no such
@@ -174,9 +177,9 @@ class Video(Element[VideoState]):
                 await self._ended()
 
     def subscribe(self, callback: FrameCallback) -> Callable[[], None]:
-        """Call this with what every picture says, once the state has it. Returns the function that ends it.
+        """Call `callback` with the metadata of every picture, after the state is updated.
 
-        It does not make the video run. What it raises is logged and goes no further.
+        Returns the function that ends it. It does not start the video. What the callback raises is logged.
         """
         self._frame_callbacks = (*self._frame_callbacks, callback)
 
@@ -186,7 +189,7 @@ class Video(Element[VideoState]):
         return undo
 
     def subscribe_pictures(self, callback: PictureCallback) -> Callable[[], None]:
-        """As `subscribe`, with the pictures: H.264, to be decoded by whoever wants to see them."""
+        """Call `callback` with every picture, H.264, undecoded; return the function that ends it."""
         self._picture_callbacks = (*self._picture_callbacks, callback)
 
         def undo() -> None:
@@ -195,7 +198,7 @@ class Video(Element[VideoState]):
         return undo
 
     async def next_frame(self, timeout: float = STALE) -> VideoFrame:
-        """What the next picture says. Raises `CommandTimeout` when none comes, or none that says anything."""
+        """Return the metadata of the next picture. Raises `CommandTimeout` when none arrives."""
         came: asyncio.Future[VideoFrame] = asyncio.get_running_loop().create_future()
         undo = self.subscribe(lambda frame: None if came.done() else came.set_result(frame))
         try:

@@ -52,16 +52,16 @@ LIVE = "live"
 
 
 class Shown(msgspec.Struct, frozen=True):
-    """A stream as its server describes it; what it does not say is None."""
+    """A stream as the video server describes it; None: not described."""
 
     title: str
-    """By which it is chosen: "DefaultVideo", "Front camera", ..."""
+    """Name for `Video.watching`: "DefaultVideo", "Front camera", …"""
     offered: tuple[str, ...]
     """The titles of all streams of this drone."""
     fov_deg: tuple[float, float] | None = None
     """Horizontal and vertical field of view of the unzoomed picture."""
     principal_point: tuple[float, float] | None = None
-    """Where the optical axis meets the picture, of its width and height."""
+    """Intersection of the optical axis with the picture, share of its width and height."""
     distortion: tuple[float, ...] | None = None
     """Radial r1, r2, r3 and tangential t1, t2."""
     sps: bytes = b""

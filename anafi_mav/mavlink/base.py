@@ -54,6 +54,8 @@ class EndpointUrl:
     """Port, 0 for any free one; the baud rate of a serial line."""
     flavour: str | None = None
     """The autopilot that clients of this endpoint want to see."""
+    frames: str = "one"
+    """MAVLink frames per datagram, "one" or "many". A byte stream has no datagrams."""
 
 
 class Sink(Protocol):
@@ -109,7 +111,8 @@ class Endpoint(ABC):
 class Outbox:
     """The frames of one turn of the loop leave together: a fleet's telemetry is thousands of small ones a second.
 
-    `limit` bytes at most go at once; the frame that would exceed them begins the next lot. What answers something that
+    `limit` bytes at most go at once; the frame that would exceed them begins the next lot. With a limit of 0 nothing
+    is gathered: each frame leaves alone and at once. What answers something that
     has just been read does not wait for the next turn: whoever reads does so `with` the outbox, and at the end of that
     block everything leaves.
     """
@@ -132,6 +135,9 @@ class Outbox:
 
     def add(self, raw: bytes) -> None:
         """A frame, to leave when this turn is over."""
+        if not self._limit:
+            self._write(raw)
+            return
         if self._size + len(raw) > self._limit and self._frames:
             self._give()
         self._frames.append(raw)

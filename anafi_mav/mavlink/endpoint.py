@@ -2,6 +2,7 @@
 
     udpout://HOST:PORT      udpin://HOST:PORT      tcpin://HOST:PORT      tcpout://HOST:PORT
     serial://DEVICE:BAUD    each with ?flavour=px4, ?flavour=ardupilot or ?flavour=standard
+    The two of UDP also with frames=one or frames=many; two options are joined by &.
 
 The names are MAVSDK's. An endpoint listens on the address in its URL and no other: beyond loopback only if that says
 so.
@@ -25,6 +26,9 @@ from anafi_mav.mavlink.udp import UdpIn, UdpOut
 FLAVOURS = ("px4", "ardupilot", "standard")
 """Autopilots that a client can be shown."""
 
+FRAMES = ("one", "many")
+"""MAVLink frames per UDP datagram."""
+
 MAX_PORT = 65535
 MAX_BAUD = 4_000_000
 """What USB bridges go up to."""
@@ -40,11 +44,22 @@ class Scheme:
     factory: Callable[[EndpointUrl, Sink, Clock], Endpoint]
     listens: bool = False
     """It waits for clients at an address of this machine. Port 0, any free one, makes sense."""
+    datagrams: bool = False
+    """It sends datagrams, so that `frames` makes sense."""
+
+    @property
+    def options(self) -> dict[str, tuple[str, ...]]:
+        """Option name → its possible values."""
+        return {"flavour": FLAVOURS, "frames": FRAMES} if self.datagrams else {"flavour": FLAVOURS}
 
 
 SCHEMES: dict[str, Scheme] = {
-    "udpout": Scheme("HOST:PORT", "send to HOST:PORT and hear its answers (QGroundControl, MAVSDK)", UdpOut),
-    "udpin": Scheme("HOST:PORT", "listen on HOST:PORT, answer whoever speaks MAVLink there", UdpIn, listens=True),
+    "udpout": Scheme(
+        "HOST:PORT", "send to HOST:PORT and hear its answers (QGroundControl, MAVSDK)", UdpOut, datagrams=True
+    ),
+    "udpin": Scheme(
+        "HOST:PORT", "listen on HOST:PORT, answer whoever speaks MAVLink there", UdpIn, listens=True, datagrams=True
+    ),
     "tcpin": Scheme("HOST:PORT", "serve TCP clients on HOST:PORT (MAVProxy, Mission Planner)", TcpIn, listens=True),
     "tcpout": Scheme("HOST:PORT", "connect to a TCP server, again and again", TcpOut),
     "serial": Scheme("DEVICE:BAUD", "a serial line, e.g. serial:///dev/ttyUSB0:57600", SerialLine),
@@ -71,14 +86,14 @@ def parse_endpoint(url: str) -> EndpointUrl:
         place = _LINE.fullmatch(parts["rest"])
         if place is None or not 0 < int(place["number"]) <= MAX_BAUD:
             raise ConfigError("", f"{url!r}: expected {form}, e.g. serial:///dev/ttyUSB0:57600")
-        return EndpointUrl(url, name, place["device"], int(place["number"]), _flavour(url, parts["query"]))
+        return EndpointUrl(url, name, place["device"], int(place["number"]), **_options(url, scheme, parts["query"]))
     place = _PLACE.fullmatch(parts["rest"])
     if place is None:
         raise ConfigError("", f"{url!r}: expected {form}, e.g. {name}://127.0.0.1:14550")
     port, lowest = int(place["number"]), 0 if scheme.listens else 1
     if not lowest <= port <= MAX_PORT:
         raise ConfigError("", f"{url!r}: expected a port from {lowest} to {MAX_PORT}")
-    return EndpointUrl(url, name, place["v6"] or place["host"], port, _flavour(url, parts["query"]))
+    return EndpointUrl(url, name, place["v6"] or place["host"], port, **_options(url, scheme, parts["query"]))
 
 
 def is_open_to_network(url: EndpointUrl) -> bool:
@@ -96,16 +111,20 @@ def make_endpoint(url: EndpointUrl, sink: Sink, clock: Clock) -> Endpoint:
     return SCHEMES[url.scheme].factory(url, sink, clock)
 
 
-def _flavour(url: str, query: str | None) -> str | None:
+def _options(url: str, scheme: Scheme, query: str | None) -> dict[str, str]:
+    """The options after "?". Raises `ConfigError` for an unknown, repeated or wrong one."""
     if query is None:
-        return None
+        return {}
+    known = scheme.options
     try:
-        options = parse_qsl(query, strict_parsing=True, keep_blank_values=True)
+        pairs = parse_qsl(query, strict_parsing=True, keep_blank_values=True)
     except ValueError:
-        options = []
-    if len(options) != 1 or options[0][0] != "flavour":
-        raise ConfigError("", f"{url!r}: expected no option but ?flavour={'|'.join(FLAVOURS)}")
-    flavour = options[0][1]
-    if flavour not in FLAVOURS:
-        raise ConfigError("", f"{url!r}: expected flavour {' or '.join(FLAVOURS)}, got {flavour!r}")
-    return flavour
+        pairs = []
+    options = dict(pairs)
+    if not pairs or len(options) != len(pairs) or not options.keys() <= known.keys():
+        forms = " and ".join(f"{name}={'|'.join(values)}" for name, values in known.items())
+        raise ConfigError("", f"{url!r}: expected no option but ?{forms}, each once")
+    for name, value in options.items():
+        if value not in known[name]:
+            raise ConfigError("", f"{url!r}: expected {name} {' or '.join(known[name])}, got {value!r}")
+    return options

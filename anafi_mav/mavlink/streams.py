@@ -5,7 +5,7 @@ The defaults are intervals at most: a message leaves when there is news, and no 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Generic, TypeVar
 from weakref import WeakKeyDictionary
 
@@ -33,9 +33,10 @@ DEFAULT_INTERVALS: Mapping[int, float] = {
     mav.MAVLINK_MSG_ID_DISTANCE_SENSOR: 0.2,
     mav.MAVLINK_MSG_ID_SYSTEM_TIME: 1.0,
     mav.MAVLINK_MSG_ID_EKF_STATUS_REPORT: 1.0,
-    mav.MAVLINK_MSG_ID_CURRENT_MODE: 2.0,
+    # These two leave at each change, and stations of before 2024 count each of them as lost: their dialect lacks them.
+    mav.MAVLINK_MSG_ID_CURRENT_MODE: 5.0,
+    mav.MAVLINK_MSG_ID_AVAILABLE_MODES_MONITOR: 10.0,
     mav.MAVLINK_MSG_ID_ORBIT_EXECUTION_STATUS: 0.8,
-    mav.MAVLINK_MSG_ID_AVAILABLE_MODES_MONITOR: 3.3,
     mav.MAVLINK_MSG_ID_CURRENT_EVENT_SEQUENCE: 1.0,
     # Only while setpoints or moves are flown.
     mav.MAVLINK_MSG_ID_ATTITUDE_TARGET: 0.5,
@@ -107,8 +108,14 @@ class _Lane(Generic[ChannelT]):
 class Streams(Generic[ChannelT]):
     """The intervals of one vehicle's messages on every channel. A channel that is gone is forgotten by itself."""
 
-    def __init__(self, defaults: Mapping[int, float] = DEFAULT_INTERVALS) -> None:
+    def __init__(
+        self,
+        defaults: Mapping[int, float] = DEFAULT_INTERVALS,
+        without: Callable[[ChannelT], Collection[int]] = lambda channel: (),
+    ) -> None:
+        """`without` names the message ids that a channel does not have by default."""
         self._defaults = dict(defaults)
+        self._without = without
         self._channels: WeakKeyDictionary[ChannelT, dict[int, _Stream]] = WeakKeyDictionary()
         self._asked: Sequence[ChannelT] = ()
         """The channels last asked about, to which the next two belong."""
@@ -120,7 +127,7 @@ class Streams(Generic[ChannelT]):
     def interval(self, channel: ChannelT, id: int) -> float | None:
         """Seconds between two messages on this channel; None: not streamed."""
         stream = self._channels.get(channel, {}).get(id)
-        return self._defaults.get(id) if stream is None else stream.interval
+        return self._default(channel, id) if stream is None else stream.interval
 
     def set(self, channel: ChannelT, id: int, interval: float | None) -> None:
         """Stream at this interval (s, above 0) on this channel, or not at all (None)."""
@@ -187,5 +194,8 @@ class Streams(Generic[ChannelT]):
             streams = self._channels.setdefault(channel, {})
         stream = streams.get(id)
         if stream is None:
-            stream = streams[id] = _Stream(self._defaults.get(id))
+            stream = streams[id] = _Stream(self._default(channel, id))
         return stream
+
+    def _default(self, channel: ChannelT, id: int) -> float | None:
+        return None if id in self._without(channel) else self._defaults.get(id)

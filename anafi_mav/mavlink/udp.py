@@ -27,9 +27,13 @@ from anafi_mav.mavlink.channel import Channel
 logger = logging.getLogger(__name__)
 
 MAX_DATAGRAM = 512
-"""Bytes of frames that share a datagram. Who reads into a smaller buffer loses the rest: gomavlib (mavp2p) has 512,
+"""Bytes of frames that share a datagram with `frames=many`. A smaller buffer loses the rest: gomavlib has 512,
 mavlink-router 1120, MAVSDK 2048 (gomavlib pkg/frame/reader.go, mavlink-router endpoint.cpp, MAVSDK
 udp_connection.hpp). A frame has 280 at most."""
+
+ONE_FRAME = 0
+"""The limit of an `Outbox` that gathers nothing. The default: gomavlib since 3.3.2, and so mavp2p, reads the first
+frame of a datagram and loses the others."""
 
 PEER_SILENCE = 30.0
 """s after which a peer of `udpin` is gone: thirty heartbeats missed (MAVLink heartbeat.md: 1 Hz, four or five missed
@@ -40,6 +44,10 @@ PEER_REPLACEABLE = 5.0
 
 SWEEP_EVERY = 5.0
 """s between looks for silent peers."""
+
+
+def _datagram_limit(url: EndpointUrl) -> int:
+    return MAX_DATAGRAM if url.frames == "many" else ONE_FRAME
 
 
 class _Datagrams(asyncio.DatagramProtocol):
@@ -95,7 +103,7 @@ class UdpOut(Endpoint):
 
     def __init__(self, url: EndpointUrl, sink: Sink, clock: Clock) -> None:
         super().__init__(url, sink, clock)
-        self._outbox = Outbox(self._write, MAX_DATAGRAM)
+        self._outbox = Outbox(self._write, _datagram_limit(url))
         self.channel = Channel(url.text, self._outbox.add, flavour=url.flavour, datagrams=True)
         self._transport: asyncio.DatagramTransport | None = None
         self._reopening: asyncio.Task[None] | None = None
@@ -238,7 +246,7 @@ class UdpIn(Endpoint):
         peer = self._peers.get(address)
         if peer is None:
             # Not a peer before it has sent something true: garbage must not open channels.
-            outbox = Outbox(self._writer(address), MAX_DATAGRAM)
+            outbox = Outbox(self._writer(address), _datagram_limit(self.parsed))
             channel = Channel(f"{self.url} from {address[0]}:{address[1]}", outbox.add, datagrams=True)
             channel.flavour = self.parsed.flavour
             frames = channel.receive(data)

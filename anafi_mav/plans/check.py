@@ -197,7 +197,8 @@ class _Follower:
         height = max(self._limits.return_height, to.height, self._here.height)
         if height > to.height:
             yield _warning(
-                f"an Ai begins at {height:g} m: it rises there first, goes over to above it and sinks", origin
+                f"an Ai begins at {height:g} m above take-off: it rises there first, goes over to above it and sinks",
+                origin,
             )
         yield from self._go(replace(self._here, height=height), origin)
         yield from self._go(replace(to, height=height), origin)
@@ -244,7 +245,8 @@ class _Follower:
 
     def _go(self, to: Point, origin: int) -> Iterator[Problem]:
         if to.height > self._limits.max_altitude:
-            yield _error(f"{to.height:g} m is higher than the limit of {self._limits.max_altitude:g} m", origin)
+            limit = self._limits.max_altitude
+            yield _error(f"{to.height:g} m above take-off is higher than the limit of {limit:g} m", origin)
         if to.height < 0.0:
             yield _error(f"{to.height:g} m is below the take-off", origin)
         if self._amsl is not None and self._amsl + to.height > self._model.ceiling:

@@ -53,7 +53,7 @@ def _take_off(pen: Pen, item: Item) -> None:
     if height is None:
         pen.say("it says no height: the drone rises as high as it does by itself")
     elif height < 0.0:
-        pen.refuse(f"it rises to {height:g} m", 7)
+        pen.refuse(f"it rises to {height:g} m above take-off", 7)
     else:
         up = replace(pen.place, height=max(height, pen.place.height))
         if height > pen.place.height or heading is not None:
@@ -104,15 +104,25 @@ def _condition_delay(pen: Pen, item: Item) -> None:
     pen.wait(seconds)
 
 
+def is_relative(reference: float | None) -> bool:
+    """True when param4 of a CONDITION_YAW item makes its angle count from the present heading.
+
+    MAVLink has 1 for that. ArduPilot stores a byte and takes every number but 0 so (ArduCopter mode_auto.cpp do_yaw).
+    """
+    return bool(reference)
+
+
 def _turn(pen: Pen, item: Item) -> None:
     """Only what the drone looks at then: the gateway turns it."""
-    angle, _, way, relative = item.params[:4]
-    if angle is None or relative not in (None, 0.0, 1.0):
-        pen.refuse("it says no angle" if angle is None else f"{relative:g} is neither relative nor absolute",
-                   1 if angle is None else 4)  # fmt: skip
+    angle, _, way, reference = item.params[:4]
+    if angle is None:
+        pen.refuse("it says no angle", 1)
+    if reference is not None and not (reference.is_integer() and 0.0 <= reference <= 0xFF):
+        pen.refuse(f"{reference:g} is neither relative nor absolute", 4)
     if way not in (None, -1.0, 0.0, 1.0):
         pen.refuse(f"{way:g} is no direction to turn in", 3)
-    pen.turn(-angle if relative and way == -1.0 else angle, relative=bool(relative))
+    relative = is_relative(reference)
+    pen.turn(-angle if relative and way == -1.0 else angle, relative=relative)
 
 
 # What sets.

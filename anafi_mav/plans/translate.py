@@ -358,7 +358,9 @@ def _rise(pen: Pen, items: Sequence[Item], first: int) -> None:
     there = pen.destination(items[number])
     climbs = there.height > pen.place.height
     pen.say(
-        f"no item takes off: the drone rises straight to {there.height:g} m first" if climbs else "no item takes off"
+        f"no item takes off: the drone rises straight to {there.height:g} m above take-off first"
+        if climbs
+        else "no item takes off"
     )
     pen.item = first
     pen.take_off(replace(pen.place, height=there.height) if climbs else None)

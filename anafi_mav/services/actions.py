@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Awaitable, Callable, Hashable
+from collections.abc import Awaitable, Callable
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.bounds import FASTEST, SLOWEST
 from anafi_mav.services.commands import Command
 from anafi_mav.services.guided import guided_mode
 from anafi_mav.services.modes import FlightMode
-from anafi_mav.services.refusal import Refused
+from anafi_mav.services.refusal import Refused, Unsupported
+from anafi_mav.services.right import Right
 from anafi_mav.services.targets import height, place
 from anafi_mav.services.vehicle import Vehicle
 
@@ -19,6 +20,7 @@ Handler = Callable[[Vehicle, Command], Awaitable[None]]
 FORCE = 21196
 """param2 of an arm or disarm that overrides checks (MAVLink common.xml MAV_CMD_COMPONENT_ARM_DISARM)."""
 
+CHANGE_MODE = dialect.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
 RELATIVE_YAW = dialect.MAV_DO_REPOSITION_FLAGS_RELATIVE_YAW
 
 
@@ -41,9 +43,9 @@ async def takeoff(vehicle: Vehicle, command: Command) -> None:
     """
     relative = command.flavour.relative_takeoff or (command.x == 0.0 and command.y == 0.0)
     if command.frame is None and relative and not math.isnan(command.z):
-        await vehicle.takeoff.begin(command.z, command.client)
+        await vehicle.take_off(command.z, command.right)
         return
-    await vehicle.takeoff.begin(height(vehicle, command), command.client)
+    await vehicle.take_off(height(vehicle, command), command.right)
 
 
 async def land(vehicle: Vehicle, command: Command) -> None:
@@ -53,15 +55,15 @@ async def land(vehicle: Vehicle, command: Command) -> None:
 
 async def return_to_launch(vehicle: Vehicle, command: Command) -> None:
     """MAV_CMD_NAV_RETURN_TO_LAUNCH."""
-    await vehicle.return_home()
+    await vehicle.return_home(command.right)
 
 
 async def reposition(vehicle: Vehicle, command: Command) -> None:
     """MAV_CMD_DO_REPOSITION: param1 speed in m/s (unset or <= 0: the drone's own), param4 heading in rad, x, y, z.
 
-    param2 bit 1 (MAV_DO_REPOSITION_FLAGS_RELATIVE_YAW): the heading counts from the present one. z obeys the frame: 0
-    and 5 AMSL, 3 and 6 above take-off. ArduPilot's clients send a heading of 0 for none (conformance D1). All unset is
-    pause; a speed alone is refused, for it would not stop anything.
+    param2 bit 0 (CHANGE_MODE): see `_require_change_of_mode`; bit 1 (RELATIVE_YAW): the heading counts from the present
+    one. z obeys the frame: 0 and 5 AMSL, 3 and 6 above take-off. ArduPilot's clients send a heading of 0 for none
+    (conformance D1). All unset is pause, with or without CHANGE_MODE: it stops something. A speed alone is refused.
     """
     speed, flags, yaw = command.params[0], command.params[1], command.params[3]
     if math.isinf(speed) or abs(yaw) > 2.0 * math.pi:
@@ -76,26 +78,42 @@ async def reposition(vehicle: Vehicle, command: Command) -> None:
     if where is None and ato is None and heading is None:
         if speed > 0.0:
             raise Refused("Refused: a speed needs a place, a height or a heading to go to", lasting=True)
-        await vehicle.hold(mode)
+        await vehicle.hold(mode, command.right, pause=True)
         return
-    if heading is not None and math.isfinite(flags) and int(flags) & RELATIVE_YAW:
+    bits = int(flags) if math.isfinite(flags) else 0
+    if not bits & CHANGE_MODE:
+        _require_change_of_mode(vehicle, command)
+    if heading is not None and bits & RELATIVE_YAW:
         attitude = vehicle.drone.piloting.state.attitude
         if attitude is None:
             raise Refused("Refused: the present heading is not known")
         heading += attitude.yaw
+    await vehicle.takeoff.over("Goto")
     await vehicle.guided.reposition(where, ato, heading, speed if speed > 0.0 else None, mode)
+
+
+def _require_change_of_mode(vehicle: Vehicle, command: Command) -> None:
+    """Refuse a reposition without CHANGE_MODE where it would change the mode.
+
+    PX4 supports none without it (Commander.cpp), ArduCopter takes it in Guided (GCS_MAVLink_Copter.cpp).
+    """
+    flavour = command.flavour
+    if not flavour.guided_setpoints:
+        raise Unsupported("Goto refused: flag CHANGE_MODE is missing")
+    if flavour.custom_mode(vehicle.mode) != flavour.custom_mode(FlightMode.GUIDED):
+        raise Refused("Goto refused: not in Guided, no CHANGE_MODE", lasting=True)
 
 
 async def set_mode(vehicle: Vehicle, command: Command) -> None:
     """MAV_CMD_DO_SET_MODE, in the numbers of the sender's flavour."""
-    await change_mode(vehicle, command.mode, command.client)
+    await change_mode(vehicle, command.mode, command.right)
 
 
-async def change_mode(vehicle: Vehicle, mode: FlightMode | None, client: Hashable) -> None:
+async def change_mode(vehicle: Vehicle, mode: FlightMode | None, by: Right) -> None:
     """Enter a mode that some message named; None is one that we do not have."""
     if mode is None:
         raise Refused("Mode refused: an ANAFI has no such mode", lasting=True)
-    await vehicle.set_mode(mode, client)
+    await vehicle.set_mode(mode, by)
 
 
 async def terminate(vehicle: Vehicle, command: Command) -> None:

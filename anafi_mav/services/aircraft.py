@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 
 from anafi_mav.drone import Drone
 from anafi_mav.drone.events import FlyingState, PilotingStyleStyle
@@ -18,7 +18,12 @@ from anafi_mav.services.height import HeightReference
 from anafi_mav.services.helm import Helm
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.place import Place, point_of
+from anafi_mav.services.right import Right
+from anafi_mav.services.roll_sign import RollCheck
 from anafi_mav.services.statustext import Severity
+
+STOP_WAIT = 0.5
+"""s that a command that stops something waits for what it replaces. What has not ended by then can send nothing."""
 
 
 class Aircraft(ABC):
@@ -27,6 +32,8 @@ class Aircraft(ABC):
     def __init__(self, drone: Drone, *, text: Callable[[Severity, str], None], changed: Callable[[], None]) -> None:
         self.drone = drone
         self.height = HeightReference()
+        self.roll = RollCheck()
+        """Verifies the sign of the roll that the drone reports, for the loops over velocity."""
         self.cruise_speed: float | None = None
         """m/s over ground that moves keep to; None: the drone's own (MAV_CMD_DO_CHANGE_SPEED)."""
         self.climb_speed: float | None = None
@@ -41,6 +48,10 @@ class Aircraft(ABC):
         """Says that mode, armed state or health may be others now."""
         self.helms: tuple[Helm, ...] = ()
         """Who can fly the drone for as long as somebody keeps telling them how; one of them at a time."""
+        self.mode_client: Hashable = None
+        """Client that chose the selected mode by name or number; None for modes that something else led to."""
+        self.paused = False
+        """A client has paused: setpoints of every client are ignored until a command or another mode ends it."""
         self._selected = FlightMode.HOLD
 
     # What it is.
@@ -101,6 +112,19 @@ class Aircraft(ABC):
         return self.place if self.on_ground else None
 
     @property
+    def geofence_centre(self) -> Place | None:
+        """Middle of the drone's own geofence: a controller's GPS, else the take-off point (ardrone3.xml 1-2-4).
+
+        On the ground without such a controller it is where the drone stands: the drone still reports its last flight's.
+        """
+        reported, takeoff = self.drone.piloting.state.geofence_centre, self.drone.home.state.takeoff_location
+        if self.on_ground and self.drone.controller.state.position is None:
+            return self.place
+        if reported is not None:
+            return Place(*reported)
+        return self.origin if takeoff is None else Place(takeoff.latitude, takeoff.longitude)
+
+    @property
     def sticks_follow_camera(self) -> bool:
         """What sticks mean depends on where the camera looks (piloting_style.xml): no loop closes over that."""
         return self.drone.piloting.state.style == PilotingStyleStyle.CAMERA_OPERATED
@@ -130,16 +154,17 @@ class Aircraft(ABC):
     # What everybody who flies it needs. Each verb returns when the drone confirmed, or raises.
 
     @abstractmethod
-    async def take_over(self) -> None:
-        """A new intention replaces whatever was going on, and waits until that has let go of the drone.
+    async def take_over(self, limit: float | None = None) -> None:
+        """Replace whatever was going on, and wait for its end: `limit` s at most.
 
-        Without the wait a move that is given up could cancel the one that follows it. Raises `Refused` while the
-        motors are being cut.
+        From now on what is replaced sends nothing but what stops something, and after the wait nothing at all. Without
+        the wait a move that is given up could cancel the one that follows it. Raises `Refused` while the motors are
+        being cut.
         """
 
     @abstractmethod
-    async def hold(self, mode: FlightMode = FlightMode.HOLD) -> None:
-        """Stop and hover, in mode Hold or Position."""
+    async def hold(self, mode: FlightMode = FlightMode.HOLD, by: Right | None = None) -> None:
+        """Stop and hover, in mode Hold, Guided or Position. A landing or return goes on unless `by` ends it."""
 
     @abstractmethod
     async def terminate(self) -> None:
@@ -148,12 +173,13 @@ class Aircraft(ABC):
     def select(self, mode: FlightMode, helm: Helm | None = None) -> None:
         """This is what the vehicle does from now on. Whoever flew it by setpoints or sticks ends, but for `helm`."""
         self.end_helms(helm)
-        self._selected = mode
+        self._selected, self.mode_client = mode, None
+        self.paused = False
         self.changed()
 
     def forget_mode(self) -> None:
         """What was chosen is over: until something else is, the vehicle holds."""
-        self._selected = FlightMode.HOLD
+        self._selected, self.mode_client = FlightMode.HOLD, None
 
     def end_helms(self, helm: Helm | None = None) -> list[asyncio.Task[None]]:
         """Nobody flies by setpoints or sticks any more, but for `helm`; tasks that are about to end."""

@@ -10,6 +10,7 @@ import math
 from anafi_mav import geo
 from anafi_mav.services.aircraft import Aircraft
 from anafi_mav.services.fence_watch import OutsideFence
+from anafi_mav.services.height import ESTIMATE_FLOOR
 from anafi_mav.services.place import Place, point_of
 from anafi_mav.services.refusal import Refused
 
@@ -20,7 +21,23 @@ NOWHERE = 1e-5
 """deg. A place that is so near to 0/0 is no place but numbers that were not set, or integers in the place of floats."""
 
 LOWEST = 1.0
-"""m above take-off: where an ANAFI hovers by itself after take-off. Lower targets are refused, never clamped."""
+"""m above take-off: where an ANAFI hovers by itself after take-off. Lower targets are refused, never clamped, unless
+the drone is as low already (`lowest_height`)."""
+
+FARTHEST = 4000.0
+"""m from the drone's centre. No setting of an ANAFI reaches farther (maximum of its MaxDistance); a place beyond is a
+mistake, also while the drone's own geofence is off."""
+
+
+def lowest_height(vehicle: Aircraft) -> float:
+    """Return the lowest height (m above take-off) of a target.
+
+    Over a slope that falls away, sticks, velocities and missions lead below the take-off point; there the drone may be
+    sent anywhere that is not lower than it flies. A lower target is refused: of the ground there nothing is known, and
+    the height above ground that the drone reports may be an old one.
+    """
+    altitude = vehicle.drone.piloting.state.altitude
+    return LOWEST if altitude is None or not vehicle.in_air else min(LOWEST, altitude)
 
 
 def check_height(vehicle: Aircraft, ato: float) -> None:
@@ -28,8 +45,8 @@ def check_height(vehicle: Aircraft, ato: float) -> None:
     ceiling = vehicle.drone.piloting.state.max_altitude
     if not math.isfinite(ato):
         raise Refused("Refused: the height is not a number", lasting=True)
-    if ato < LOWEST:
-        raise Refused(f"Refused: {ato:.1f} m above take-off is below {LOWEST:g} m", lasting=True)
+    if ato < (lowest := lowest_height(vehicle)):
+        raise Refused(f"Refused: {ato:.1f} m above take-off is below {lowest:.1f} m", lasting=True)
     if ceiling is not None and ato > ceiling.current:
         raise Refused(
             f"Refused: {ato:.1f} m above take-off is above the drone's ceiling of {ceiling.current:g} m",
@@ -45,8 +62,14 @@ def amsl_to_ato(vehicle: Aircraft, amsl: float) -> float:
     """Height above take-off (m) of an AMSL height; raises `Refused` when no bridge is known."""
     ato = vehicle.height.ato(amsl)
     if ato is None:
-        raise Refused("Refused: no GPS fix on the ground, so the take-off point's height above sea level is unknown")
+        raise Refused("Refused: take-off altitude unknown: no GPS fix")
     return ato
+
+
+def check_estimate(vehicle: Aircraft, ato: float) -> None:
+    """Raise `Refused` for an AMSL target that may be the ground because the bridge to AMSL is an estimate."""
+    if vehicle.height.estimated and ato < ESTIMATE_FLOOR:
+        raise Refused(f"Refused: estimated AMSL height {ato:.0f} m < {ESTIMATE_FLOOR:g} m")
 
 
 def check_on_earth(place: Place, what: str) -> None:
@@ -60,16 +83,24 @@ def check_on_earth(place: Place, what: str) -> None:
 def check_place(vehicle: Aircraft, place: Place, *, start: Place | None = None) -> None:
     """Raise `Refused` unless the drone may fly there, and the straight way from `start` if that is given."""
     check_on_earth(place, "Goto")
-    state, centre = vehicle.drone.piloting.state, vehicle.home
-    if state.geofence and state.max_distance is not None and centre is not None:
-        distance = geo.distance(centre.latitude, centre.longitude, place.latitude, place.longitude)
-        if distance > state.max_distance.current:
-            raise Refused(
-                f"Goto refused: {distance:.0f} m from home is beyond the drone's limit of "
-                f"{state.max_distance.current:g} m",
-                lasting=True,
-            )
+    centre, home = vehicle.geofence_centre, vehicle.home
+    around = centre or vehicle.place
+    if around is not None:
+        distance = geo.distance(around.latitude, around.longitude, place.latitude, place.longitude)
+        if distance > FARTHEST:
+            raise Refused(f"Goto refused: {distance:.0f} m away, limit {FARTHEST:g} m", lasting=True)
+        if centre is not None:
+            _check_geofence(vehicle, distance)
     try:
-        vehicle.fence.check_place(point_of(place), point_of(centre), point_of(start))
+        vehicle.fence.check_place(point_of(place), point_of(home), point_of(start))
     except OutsideFence as error:
         raise Refused(f"Goto refused: {error}", lasting=error.lasting) from error
+
+
+def _check_geofence(vehicle: Aircraft, distance: float) -> None:
+    """Raise `Refused` for a place so far (m) from the geofence's centre when the drone's own geofence ends before."""
+    state = vehicle.drone.piloting.state
+    if state.geofence and state.max_distance is not None and distance > state.max_distance.current:
+        raise Refused(
+            f"Goto refused: {distance:.0f} m from geofence centre > {state.max_distance.current:g} m", lasting=True
+        )

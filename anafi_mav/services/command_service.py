@@ -10,7 +10,7 @@ import asyncio
 import itertools
 import logging
 from collections.abc import Callable, Coroutine, Hashable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, NotSupported
@@ -29,7 +29,8 @@ from anafi_mav.services.commands import (
 )
 from anafi_mav.services.flavours import flavour_of
 from anafi_mav.services.modes import FlightMode
-from anafi_mav.services.refusal import Refused
+from anafi_mav.services.refusal import Refused, Unsupported
+from anafi_mav.services.right import Extent, Right
 from anafi_mav.services.service import Action, Host, MessageHandler, Query, Service, client_of
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.targets import UnsupportedFrame
@@ -41,6 +42,7 @@ SETTLE = 0.1
 
 _RESULT_BY_ERROR: tuple[tuple[type[AnafiMavError], int], ...] = (
     (UnsupportedFrame, dialect.MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME),
+    (Unsupported, dialect.MAV_RESULT_UNSUPPORTED),
     (NotSupported, dialect.MAV_RESULT_UNSUPPORTED),
     (CommandRejected, dialect.MAV_RESULT_TEMPORARILY_REJECTED),
     (CommandTimeout, dialect.MAV_RESULT_FAILED),
@@ -90,10 +92,10 @@ class CommandService(Service):
             dialect.MAVLINK_MSG_ID_SET_MODE: self._set_mode,
         }
 
-    async def settle(self) -> None:
-        """The link is lost: let what waited for the drone say how that ended. A restart, for one, has succeeded."""
+    async def settle(self, limit: float = SETTLE) -> None:
+        """Let commands that wait for the drone end, when the link is lost: a restart, for one, has succeeded."""
         if self._running:
-            await asyncio.wait(tuple(self._running), timeout=SETTLE)
+            await asyncio.wait(tuple(self._running), timeout=limit)
 
     def link_down(self) -> None:
         """Whoever waits is told that it failed; the tasks end with the host's."""
@@ -140,9 +142,13 @@ class CommandService(Service):
             self._acknowledge(inbound, command.id, dialect.MAV_RESULT_UNSUPPORTED)
             return
         now, mode = self.host.clock.monotonic(), self.host.vehicle.mode
+        # Before it is known whether it is a retransmission: a program that repeats its Hold is to be noticed.
+        counted = not command.holds or self.host.vehicle.holds.arrive(command.client, now)
+        command = replace(command, at=now, counted=counted)
         repeated = self._desk.retransmission(command.client, command, now, mode)
         if repeated is not None:
-            if not (command.patient and repeated == dialect.MAV_RESULT_IN_PROGRESS):  # else it is said in its time
+            quiet = command.patient or command.is_answered_once  # IN_PROGRESS is sent later, or not at all
+            if not (quiet and repeated == dialect.MAV_RESULT_IN_PROGRESS):
                 self._acknowledge(inbound, command.id, repeated)
             return
         execution = self._desk.begin(command.client, command)
@@ -150,6 +156,8 @@ class CommandService(Service):
 
     async def _execute(self, inbound: Inbound, execution: Execution) -> None:
         command = execution.command
+        if command.id == dialect.MAV_CMD_DO_REPOSITION and self.host.vehicle.takeoff.under_way:
+            self._acknowledge(inbound, command.id, dialect.MAV_RESULT_IN_PROGRESS)  # it waits for the climb's end
         progress = self.host.spawn(self._report_progress(inbound, command))
         result = dialect.MAV_RESULT_FAILED
         try:
@@ -217,6 +225,8 @@ class CommandService(Service):
             work.close()  # cancelled before it began, it would complain that nobody awaited it
 
     async def _report_progress(self, inbound: Inbound, command: Command) -> None:
+        if command.is_answered_once:
+            return
         await asyncio.sleep(MODE_PROGRESS_AFTER if command.patient else PROGRESS_AFTER)
         while True:
             self._acknowledge(inbound, command.id, dialect.MAV_RESULT_IN_PROGRESS)
@@ -233,8 +243,9 @@ class CommandService(Service):
     def _set_mode(self, inbound: Inbound) -> None:
         """SET_MODE has no acknowledgement: the heartbeat shows the mode, a text the refusal."""
         mode: FlightMode | None = flavour_of(inbound.channel).mode_of_number(inbound.message.custom_mode)
-        client = client_of(inbound)
-        self.run(client, change_mode(self.host.vehicle, mode, client))
+        client, vehicle, now = client_of(inbound), self.host.vehicle, self.host.clock.monotonic()
+        counted = mode not in (FlightMode.HOLD, FlightMode.POSITION) or vehicle.holds.arrive(client, now)
+        self.run(client, change_mode(vehicle, mode, Right(client, Extent.ALL, now, counted)))
 
 
 def _bound(handler: Callable[[Any, Command], Any], vehicle: Any) -> Action:

@@ -11,8 +11,9 @@ from collections.abc import Hashable
 from dataclasses import dataclass
 
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.flavours import PX4, Flavour, mode_of_standard
+from anafi_mav.services.flavours import ARDUPILOT, PX4, Flavour, mode_of_standard
 from anafi_mav.services.modes import HOVERING, FlightMode
+from anafi_mav.services.right import Extent, Right
 
 RESEND_WINDOW = 3.5
 """s after an action succeeded in which the same one from the same client is a retransmission: MAVSDK resends 3 s after
@@ -66,6 +67,22 @@ class Command:
     """Who sent it: (channel, system id, component id)."""
     flavour: Flavour = PX4
     """The autopilot that who sent it believes to speak to."""
+    at: float = 0.0
+    """When it arrived, on the monotonic clock."""
+    counted: bool = True
+    """It `holds`, and its client sent no other such command in the 5 s before."""
+
+    @property
+    def right(self) -> Right:
+        """The right that its client has by it; what it ends of that is for its handler to say."""
+        return Right(self.client, Extent.ALL, self.at, self.counted)
+
+    @property
+    def holds(self) -> bool:
+        """Hold, Pause, Brake, Loiter or Position: a person means it against whatever the drone does."""
+        if self.id in _MODE_COMMANDS:
+            return self.mode in (FlightMode.HOLD, FlightMode.POSITION)
+        return self.id in (dialect.MAV_CMD_DO_REPOSITION, dialect.MAV_CMD_DO_PAUSE_CONTINUE) and self.stops
 
     @property
     def mode(self) -> FlightMode | None:
@@ -80,6 +97,17 @@ class Command:
     def patient(self) -> bool:
         """Who sent it takes IN_PROGRESS amiss, and waits without: it is not said before `MODE_PROGRESS_AFTER`."""
         return self.id == dialect.MAV_CMD_DO_SET_MODE
+
+    @property
+    def is_answered_once(self) -> bool:
+        """True when IN_PROGRESS is never sent: ArduPilot's clients take the first acknowledgement for the final one.
+
+        dronekit2's tests count exactly one; Mission Planner waits up to 25 s for it.
+        """
+        return self.flavour is ARDUPILOT and self.id in (
+            dialect.MAV_CMD_PREFLIGHT_CALIBRATION,
+            dialect.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN,
+        )
 
     @property
     def stops(self) -> bool:

@@ -86,6 +86,12 @@ class EventService(Service):
     def on_event(self, message: Message, now: float) -> None:
         self._stale = True
 
+    def state_changed(self) -> None:
+        """The landing event leaves before the heartbeat that says disarmed: stations take it as an end of a flight."""
+        self._stale = True
+        if self._armed and self.host.vehicle.landed is Landed.ON_GROUND:
+            self._report_landed()
+
     def tick(self, now: float) -> None:
         self._tell_changes()
         if now >= self._next_report + (0.0 if self._stale else LOOK_EVERY - PAUSE):
@@ -100,10 +106,14 @@ class EventService(Service):
             self._send(event, arguments)
 
     def _tell_changes(self) -> None:
-        armed, landed = self.host.vehicle.armed, self.host.vehicle.landed
+        armed = self.host.vehicle.armed
         if armed != self._armed:
             self._armed = armed
             self._send(table.ARMED if armed else table.DISARMED)
+        self._report_landed()
+
+    def _report_landed(self) -> None:
+        landed = self.host.vehicle.landed
         if landed is not self._landed:
             if landed is Landed.IN_AIR and self._landed is Landed.TAKEOFF:
                 self._send(table.TAKEOFF)

@@ -109,6 +109,11 @@ def _of(name: str, values: Any) -> Enum:
     return Enum(name, "uint8_t", entries)
 
 
+_LOW = {int(BatteryAlert.POWER_LEVEL): ("power_level", "critical")}
+"""The check names an alert at its critical level only."""
+
+_BATTERY_ALERTS = _of("battery_alert_t", BatteryAlert)
+
 ENUMS = (
     Enum(
         "health_component_t",
@@ -124,7 +129,7 @@ ENUMS = (
     ),
     _of("takeoff_check_t", TakeoffChecklistType),
     _of("sensor_t", Sensor),
-    _of("battery_alert_t", BatteryAlert),
+    Enum(_BATTERY_ALERTS.name, _BATTERY_ALERTS.type, {**_BATTERY_ALERTS.entries, **_LOW}),
     _of("alert_t", AlertState),
     _of("motor_error_t", MotorError),
 )

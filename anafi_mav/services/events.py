@@ -144,7 +144,9 @@ def report(vehicle: Vehicle) -> Report:
             errors |= part
         else:
             warnings |= part
-    can_run = mode_bits(vehicle.enterable_modes)
+    # Of an armed vehicle whose mode is not among them QGroundControl shows that it cannot fly. An orbit is begun by a
+    # command, and so is never among those that a client may choose.
+    can_run = mode_bits(vehicle.enterable_modes | {vehicle.mode, FlightMode.ORBIT})
     if vehicle.place is None:
         can_run &= ~mode_bits(NEED_POSITION)
     can_arm = 0 if errors else can_run

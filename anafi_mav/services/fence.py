@@ -57,6 +57,11 @@ def _group(item: PlanItem) -> int:
     return 0 if math.isnan(item.params[1]) else int(item.params[1])
 
 
+def _is_void(item: PlanItem) -> bool:
+    """True for a circle of radius 0, in which no vehicle can be. Fence editors send it for a circle not yet drawn."""
+    return (item.command in _CIRCLES or item.command == _HOME_CIRCLE) and item.params[0] == 0.0
+
+
 class FenceKind(PlanKind):
     """The list of fence items."""
 
@@ -69,13 +74,19 @@ class FenceKind(PlanKind):
             if not (math.isfinite(first) and first == int(first) and 3 <= first <= self.capacity):
                 return Fault(dialect.MAV_MISSION_INVALID_PARAM1, f"{first:g} is no number of corners")
         elif item.command in _CIRCLES or item.command == _HOME_CIRCLE:
-            if not (math.isfinite(first) and first > 0.0):
+            if not (math.isfinite(first) and first >= 0.0):  # `taken` leaves one of 0 out
                 return Fault(dialect.MAV_MISSION_INVALID_PARAM1, f"{first:g} is no radius")
         elif item.command != _RETURN_POINT:
             return Fault(dialect.MAV_MISSION_UNSUPPORTED, f"command {item.command} is no part of a fence")
         if not (math.isnan(second) or (math.isfinite(second) and second == int(second))):
             return Fault(dialect.MAV_MISSION_INVALID_PARAM2, f"{second:g} is no inclusion group")
         return None if item.command == _HOME_CIRCLE else place_fault(item)
+
+    def taken(self, items: Sequence[PlanItem], flavour: Flavour) -> Sequence[PlanItem]:
+        return [item for item in items if not _is_void(item)]
+
+    def remarks(self, items: Sequence[PlanItem]) -> Sequence[str]:
+        return [f"Fence circle {number} ignored: radius 0" for number, item in enumerate(items) if _is_void(item)]
 
     def check_plan(self, items: Sequence[PlanItem], flavour: Flavour = PX4) -> Fault | None:
         number = 0

@@ -1,8 +1,9 @@
-"""A circle around the take-off point, handed to the drone as its own geofence: so it holds without the gateway, too.
+"""A circle that is handed to the drone as its own geofence: so it holds without the gateway, too.
 
-An ANAFI knows one fence: not farther from its take-off point than MaxDistance, while NoFlyOverMaxDistance is on. It is
-set when a client's fence says the same, and what was set before comes back when the fence is gone or disabled, unless
-somebody has changed it meanwhile. Zones that the drone cannot express are the gateway's to watch; so is this one.
+An ANAFI knows one fence: not farther from its centre than MaxDistance, while NoFlyOverMaxDistance is on. The centre is
+the controller's GPS, or else the take-off point. The radius is set while a client's fence says the same, and the one
+from before is set again when that fence is gone or disabled or when the centre moves away from it, unless another
+controller has changed it meanwhile. Zones that the drone cannot express are the gateway's to watch; so is this one.
 """
 
 from __future__ import annotations
@@ -15,14 +16,17 @@ from typing import Any
 from anafi_mav import geo
 from anafi_mav.drone import Range
 from anafi_mav.errors import AnafiMavError
-from anafi_mav.plans.zones import Circle, LatLon
+from anafi_mav.plans.zones import Circle
 from anafi_mav.services.fence_watch import Reaction
 from anafi_mav.services.service import Host
 from anafi_mav.services.statustext import Severity
 
 NEAR, FAR = 5.0, 10.0
-"""m between the take-off point and the middle of a circle that count as the same place, and as another one: readings
-of GPS on the ground differ by some metres."""
+"""m between the drone's centre and the middle of a circle that count as the same place. While the drone stands its
+centre is a reading of GPS that wanders by some metres, and FAR ends what NEAR began; later NEAR counts alone."""
+
+SETTLED = 30.0
+"""s that a centre has to be near again before the circle is handed over once more: a pilot who walks has GPS, too."""
 
 SAME = 0.5
 """m by which the drone's radius may differ from the one that was set."""
@@ -42,51 +46,51 @@ class FenceMirror:
         self._task: asyncio.Task[None] | None = None
         self._failed: tuple[float | None, float] | None = None
         """What was wanted when it failed, and when."""
+        self._moved_at = -math.inf
+        """When the centre was last seen elsewhere while the circle was the drone's."""
 
     def link_down(self) -> None:
         self._task = self._failed = None
+        self._moved_at = -math.inf
 
     def update(self, now: float) -> None:
         """See whether the drone's geofence has to change."""
         if self._task is not None and not self._task.done():
             return
-        known, wanted = self.wanted()
+        known, wanted, away = self.wanted()
         mirrored = self._remembered()
         present = None if mirrored is None else mirrored["radius"]
         if not known or wanted == present:
             return
         if self._failed is not None and self._failed[0] == wanted and now - self._failed[1] < RETRY:
             return
+        if wanted is not None and now - self._moved_at < SETTLED:
+            return
+        if away is not None:
+            self._moved_at = now
+            self._host.text(Severity.WARNING, f"Drone's fence circle ends: its centre is {away:.0f} m off")
         self._task = self._host.spawn(self._change(wanted, mirrored, now))
 
-    def wanted(self) -> tuple[bool, float | None]:
-        """(known, radius): the radius that says what the fence says, None for none. Not known: leave all as it is."""
+    def wanted(self) -> tuple[bool, float | None, float | None]:
+        """(known, radius, away): the radius that says what the fence says, None for none. Not known: leave all as it
+        is. `away` is how far the drone's centre is from the circle's (m), when that is why there is none."""
         vehicle = self._host.vehicle
         watch, state = vehicle.fence, self._host.drone.piloting.state
         zones = [zone for zone in watch.zones.zones if zone.inclusion]
         circle = zones[0] if len(zones) == 1 else None
         if not isinstance(circle, Circle) or watch.action is Reaction.NONE:
-            return True, None
+            return True, None, None
         setting = state.max_distance
         if setting is None or state.geofence is None or not setting.min <= circle.radius <= setting.max:
-            return True, None
+            return True, None, None
         middle = vehicle.home.point if circle.centre is None and vehicle.home is not None else circle.centre
-        start = self._takeoff_point()
-        if start is None or middle is None:
-            return False, None
-        away = geo.distance(*start, *middle)
-        limit = NEAR if self._remembered() is None else FAR
-        return True, circle.radius if away <= limit else None
-
-    def _takeoff_point(self) -> LatLon | None:
-        """The middle of the drone's geofence: where it took off, on the ground where it will."""
-        vehicle = self._host.vehicle
-        if vehicle.on_ground:
-            return None if vehicle.place is None else vehicle.place.point
-        location = self._host.drone.home.state.takeoff_location
-        if location is not None:
-            return location.latitude, location.longitude
-        return None if vehicle.origin is None else vehicle.origin.point
+        centre = vehicle.geofence_centre
+        if centre is None or middle is None:
+            return False, None, None
+        away = geo.distance(*centre.point, *middle)
+        wanders = vehicle.on_ground and centre == vehicle.place
+        limit = FAR if wanders and self._remembered() is not None else NEAR
+        return (True, circle.radius, None) if away <= limit else (True, None, away)
 
     async def _change(self, radius: float | None, mirrored: Mapping[str, Any] | None, now: float) -> None:
         try:
@@ -109,9 +113,7 @@ class FenceMirror:
         await self._remember({"radius": radius, "distance": before["distance"], "geofence": before["geofence"]})
         confirmed = await piloting.set_max_distance(radius)
         await piloting.set_geofence(True)
-        self._host.text(
-            Severity.NOTICE, f"Fence: the drone keeps to {confirmed:g} m around its take-off point by itself, too"
-        )
+        self._host.text(Severity.NOTICE, f"Fence: the drone keeps to {confirmed:g} m around its centre by itself, too")
 
     async def _restore(self, mirrored: Mapping[str, Any]) -> None:
         piloting = self._host.drone.piloting

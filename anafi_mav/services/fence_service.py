@@ -108,7 +108,7 @@ class FenceService(Service):
             None if state.max_altitude is None else state.max_altitude.current,
             None if home is None else home.point,
             airborne=not vehicle.on_ground and vehicle.flying_state is not None,
-            flying=vehicle.in_air and not vehicle.returning,
+            flying=vehicle.in_air and vehicle.mode is not FlightMode.RETURN,
             steering=not own_way and state.plan != PlayingState.PLAYING,
             orders=vehicle.orders,
         )
@@ -132,11 +132,12 @@ class FenceService(Service):
         verdict = self._watch.verdict
         assert verdict is not None
         head = "Fence ahead" if verdict.ahead else "Fence breach"
+        controller = self.host.drone.controller
         if action is Reaction.WARN:
             self.host.text(Severity.WARNING, f"{head}: {verdict.text}")
-        elif self.host.drone.controller.pilot_flies:
-            # He has the drone, and no order of ours would reach it.
-            self.host.text(Severity.CRITICAL, f"{head}: {verdict.text}; the pilot at the Skycontroller flies")
+        elif controller.pilot_has_source or controller.pilot_acquired_control:
+            # A person flies, or can at once: nothing of ours acts against him.
+            self.host.text(Severity.CRITICAL, f"{head}: {verdict.text}: pilot in control")
             self._watch.done(self.host.vehicle.orders)
         else:
             self.host.text(Severity.CRITICAL, f"{head}: {verdict.text}: {action.value}")

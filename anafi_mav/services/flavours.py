@@ -54,6 +54,8 @@ class Flavour:
     float_plans: bool = False
     """Items of plans are requested with MISSION_REQUEST, which clients of this family answer in either form; otherwise
     with MISSION_REQUEST_INT."""
+    always_continues: bool = False
+    """A mission goes on after each item: autocontinue 0 means 1, and is read back as 1 (ArduPilot; PX4 stops there)."""
     partial_plans: bool = False
     """Clients replace single items of a plan (MISSION_WRITE_PARTIAL_LIST)."""
     relative_takeoff: bool = False
@@ -62,6 +64,8 @@ class Flavour:
     """Clients of this family send 0 for what they do not set; NaN elsewhere."""
     guided_setpoints: bool = False
     """Setpoints fly the drone in mode Guided, without a mode of their own."""
+    unstreamed: frozenset[int] = frozenset()
+    """Message ids that a client of this family gets on change and on request only, not at an interval by default."""
     title: str = ""
     """How the autopilot calls itself in its banner; empty: it does not."""
 
@@ -117,7 +121,8 @@ PX4 = Flavour(
     numbers=_PX4_NUMBERS,
     modes=_PX4_MODES,
     version=(1, 16, 0),
-    # A development build: QGroundControl nags about official releases that are older than the newest (conformance A2).
+    # A development build: of an official one that is older than the newest QGroundControl says so in a dialog at each
+    # connect (FirmwarePlugin::checkIfIsLatestStable), in either family. It shows "1.16.0dev" for it.
     version_type=dialect.FIRMWARE_VERSION_TYPE_DEV,
     bytewise=True,
 )
@@ -150,18 +155,22 @@ ARDUPILOT = Flavour(
         9: FlightMode.LAND,
         _POSHOLD: FlightMode.POSITION,
         _BRAKE: FlightMode.HOLD,
+        20: FlightMode.GUIDED,  # GUIDED_NOGPS takes attitudes alone, and ours takes them with or without GPS
         21: FlightMode.RETURN,  # SMART_RTL: an ANAFI has one way home
         23: FlightMode.FOLLOW,
     },
     version=(4, 5, 7),
-    version_type=dialect.FIRMWARE_VERSION_TYPE_OFFICIAL,
+    version_type=dialect.FIRMWARE_VERSION_TYPE_DEV,
     bytewise=False,
     zero_home=True,
     float_plans=True,
+    always_continues=True,
     partial_plans=True,
     relative_takeoff=True,
     zero_is_unset=True,
     guided_setpoints=True,
+    # ArduCopter sends home when it is set; programs take one that arrives later for news (dronekit2's own tests).
+    unstreamed=frozenset({dialect.MAVLINK_MSG_ID_HOME_POSITION}),
     title="ArduCopter V4.5.7",
 )
 

@@ -16,7 +16,7 @@ from anafi_mav.drone import PilotingCommand, events
 from anafi_mav.drone.events import Message
 from anafi_mav.errors import LinkLost
 from anafi_mav.services.aircraft import Aircraft
-from anafi_mav.services.bounds import amsl_to_ato, check_height, check_on_earth, check_place
+from anafi_mav.services.bounds import LOWEST, amsl_to_ato, check_estimate, check_height, check_on_earth, check_place
 from anafi_mav.services.follow import (
     PATIENCE,
     REACH,
@@ -33,6 +33,7 @@ from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.offboard_control import Controller, Motion
 from anafi_mav.services.place import Place
 from anafi_mav.services.refusal import Refused
+from anafi_mav.services.roll_sign import ROLL_INVERTED
 from anafi_mav.services.statustext import Severity
 
 
@@ -51,6 +52,8 @@ class FollowFlight:
         self._timer: asyncio.TimerHandle | None = None
         self._follower = Follower(self.settings)
         self._controller = Controller(self._motion())
+        self._kept_height: float | None = None
+        """m above take-off, kept while the target asks for a height that is too low."""
 
     @property
     def engaged(self) -> bool:
@@ -66,12 +69,14 @@ class FollowFlight:
             raise Refused("Follow refused: the drone returns home")
         if vehicle.place is None:
             raise Refused("Follow refused: no GPS fix")
-        if vehicle.drone.controller.pilot_flies:
+        if vehicle.drone.controller.pilot_acquired_control:
             raise Refused("Follow refused: the pilot at the Skycontroller flies")
         if vehicle.drone.piloting.limits is None:
             raise Refused("Follow refused: the drone has not reported what full tilt and speed are")
         if vehicle.sticks_follow_camera:
             raise Refused("Follow refused: the drone's piloting style makes its sticks relative to the camera")
+        if vehicle.roll.inverted:
+            raise Refused(f"Follow refused: {ROLL_INVERTED}")
         await vehicle.take_over()
         await vehicle.drone.piloting.cancel_return_home()
         if not vehicle.in_air or vehicle.returning:
@@ -81,6 +86,7 @@ class FollowFlight:
         self.state = TRANSITIONS[self.state][Event.ENGAGE]
         self._leader = None
         self._follower = Follower(self.settings)
+        self._kept_height = None
         self._controller = Controller(self._motion())
         self._heard_at = self._clock.monotonic()
         self._watch(PATIENCE)
@@ -139,10 +145,12 @@ class FollowFlight:
         if limits is None:
             return
         reason = None
-        if vehicle.drone.controller.pilot_flies:
+        if vehicle.drone.controller.pilot_acquired_control:
             reason = "the pilot at the Skycontroller flies"
         elif vehicle.sticks_follow_camera:
             reason = "the drone's sticks have become relative to the camera"
+        elif vehicle.roll.inverted:
+            reason = ROLL_INVERTED
         if reason is not None:
             self.end()
             vehicle.select(FlightMode.HOLD)
@@ -161,7 +169,11 @@ class FollowFlight:
         vehicle.drone.piloting.pilot(sticks)
 
     def _height(self) -> float:
-        """m above take-off that the drone belongs at; raises `Refused` when that is not known or not allowed."""
+        """Return the height (m above take-off) to fly at; raises `Refused` when that is not known or not allowed.
+
+        A target that asks for less than `LOWEST` is followed at the height that the drone had then: programs send an
+        altitude of 0 for one that they do not know.
+        """
         settings, state = self.settings, self._vehicle.drone.piloting.state
         height = settings.height
         if settings.altitude_mode is AltitudeMode.TERRAIN:
@@ -172,6 +184,16 @@ class FollowFlight:
             if self._follower.altitude is None:
                 raise Refused("Refused: the target does not tell its altitude")
             height += amsl_to_ato(self._vehicle, self._follower.altitude)
+        if height < LOWEST:
+            if self._kept_height is None:
+                self._kept_height = state.altitude
+            if self._kept_height is None:
+                raise Refused("Refused: the drone's height is not known")
+            self.complain(f"Follow height kept: {height:.0f} m above take-off is too low")
+            return self._kept_height
+        self._kept_height = None
+        if settings.altitude_mode is AltitudeMode.TARGET:
+            check_estimate(self._vehicle, height)
         check_height(self._vehicle, height)
         return height
 

@@ -73,6 +73,7 @@ async def _fly_item(host: Host, inbound: Inbound) -> None:
                 raise Refused("Goto refused: the item is no way point", lasting=True)
             where = Place(item.x / scale, item.y / scale)
             check_on_earth(where, "Goto")
+            await vehicle.takeoff.over("Goto")
             await vehicle.guided.reposition(where, ato, None, mode=guided_mode(flavour))
         else:
             await change_altitude(vehicle, ato, flavour)
@@ -192,6 +193,8 @@ class GuidedService(Service):
             raise Refused("Turn refused: param1 is an angle of up to 360 degrees", lasting=True)
         if math.isinf(rate) or rate < 0.0 or 0.0 < rate < SLOWEST_TURN or math.isinf(way):
             raise Refused(f"Turn refused: param2 is {SLOWEST_TURN:g} deg/s or more, param3 -1, 0 or 1", lasting=True)
+        if not (math.isnan(relative) or relative in (0.0, 1.0)):  # ArduCopter refuses it too
+            raise Refused("Turn refused: param4 is 0 (absolute) or 1", lasting=True)
         vehicle = self.host.vehicle
         attitude = vehicle.drone.piloting.state.attitude
         if not vehicle.in_air or attitude is None:
@@ -214,13 +217,16 @@ class GuidedService(Service):
         if command.params[0] == 0.0:
             goto = vehicle.guided.goto or self._interrupted
             mission = vehicle.mission.flying or self._mission_interrupted
-            await vehicle.hold(guided_mode(command.flavour))
+            await vehicle.hold(guided_mode(command.flavour), command.right, pause=True)
             self._paused = None if goto is None else (goto, vehicle.orders)
             self._mission_paused = vehicle.orders if mission else None
         elif command.params[0] == 1.0:
             goto = self._interrupted
             if self._mission_interrupted:
-                await vehicle.set_mode(FlightMode.MISSION, command.client)
+                await vehicle.set_mode(FlightMode.MISSION, command.right)
+                return
+            if goto is None and vehicle.paused:
+                vehicle.paused = False  # setpoints may fly it again
                 return
             if goto is None:
                 raise Refused("Continue refused: nothing was paused, or something else was ordered since")
@@ -284,16 +290,17 @@ class GuidedService(Service):
             where = place(command)
             if where is None:
                 raise Refused("Home refused: it has no place", lasting=True)
-            ato = height(vehicle, command) or 0.0
+            ato = height(vehicle, command, flown=False) or 0.0
         check_on_earth(where, "Home")
         async with vehicle.home_choice:
             before = home.state.preferred_type
             try:
                 await home.set_preferred_type(RthHomeType.CUSTOM)
-                await home.set_custom_location(where.latitude, where.longitude, ato)
+                given = await home.set_custom_location(where.latitude, where.longitude, ato)
             except BaseException:
                 # The custom home of some other day must not stay: a return that replaces this waits until it is gone.
                 if before is not None and before != RthHomeType.CUSTOM:
                     await asyncio.wait([self.host.spawn(self._prefer(before))])
                 raise
+        vehicle.return_end.set_home(given, "set home")
         self.host.text(Severity.NOTICE, "Home set: the drone returns there until its home type is changed")

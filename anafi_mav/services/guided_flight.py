@@ -80,15 +80,15 @@ class GuidedFlight:
         mode: FlightMode = FlightMode.HOLD,
     ) -> None:
         """Go to a place, height (m above take-off) and heading (rad); None keeps what is, a place that is being flown
-        to too (as PX4 does). Returns when it moves.
+        to too (as PX4 does). Returns when it moves; a change of height without a GPS fix returns at its end.
 
         `speed` (m/s over ground) counts for this move only. `mode` is Hold or Guided.
         """
         vehicle = self._vehicle
-        if place is None and ato is None and yaw is None and speed is None:
-            await vehicle.hold(mode)
-            return
         here, present = vehicle.place, vehicle.drone.piloting.state.altitude
+        if here is None and place is None and ato is not None:
+            await self._climb(ato, yaw, mode)
+            return
         if here is None:
             raise Refused("Goto refused: no GPS fix")
         if ato is None:
@@ -110,8 +110,8 @@ class GuidedFlight:
             raise Refused("Goto refused: the drone is not in the air")
         if not checked:
             check_place(vehicle, goto.place, start=vehicle.place)
-        if vehicle.returning_by_itself:
-            raise Refused("Goto refused: the drone returns home by itself")
+        if vehicle.returning:
+            raise Refused("Goto refused: drone is returning")
         await vehicle.take_over()
         await vehicle.drone.piloting.cancel_return_home()
         if not vehicle.in_air or vehicle.returning:  # no await from here to the moveTo
@@ -133,23 +133,42 @@ class GuidedFlight:
         if (move := vehicle.drone.piloting.move) is not None:
             move.ended.add_done_callback(lambda ended: self._on_arrival(goto.place, ended))
 
+    async def _climb(self, ato: float, yaw: float | None, mode: FlightMode) -> None:
+        """Go straight up or down to a height (m above take-off) by a moveBy, which needs no GPS fix.
+
+        Returns at the end of the move: a moveBy reports nothing before. The height is the barometer's, and the drone
+        may drift sideways as it does when it hovers without a fix.
+        """
+        vehicle = self._vehicle
+        check_height(vehicle, ato)
+        await self._begin("Goto", mode)
+        state = vehicle.drone.piloting.state
+        if state.altitude is None:
+            raise Refused("Goto refused: the drone's height is not known")
+        turn = 0.0 if yaw is None or state.attitude is None else units.wrap_pi(yaw - state.attitude.yaw)
+        await vehicle.drone.piloting.move_by(0.0, 0.0, state.altitude - ato, turn)
+
+    async def _begin(self, what: str, mode: FlightMode) -> None:
+        """Stop the drone for a moveBy. Raises `Refused`, with `what` for the text."""
+        vehicle = self._vehicle
+        if not vehicle.in_air:
+            raise Refused(f"{what} refused: the drone is not in the air")
+        if vehicle.returning:
+            raise Refused(f"{what} refused: drone is returning")
+        await vehicle.take_over()
+        await vehicle.drone.piloting.stop()
+        await vehicle.drone.piloting.cancel_return_home()
+        if not vehicle.in_air or vehicle.returning:
+            raise Refused(f"{what} refused: the drone does something else now")
+        vehicle.select(mode)
+
     async def turn(self, angle: float, rate_dps: float | None, mode: FlightMode) -> None:
         """Turn by `angle` (rad, clockwise +) where the drone hovers, at `rate_dps` (None: the drone's own).
 
         Returns when it has turned.
         """
-        vehicle = self._vehicle
-        if not vehicle.in_air:
-            raise Refused("Turn refused: the drone is not in the air")
-        if vehicle.returning_by_itself:
-            raise Refused("Turn refused: the drone returns home by itself")
-        await vehicle.take_over()
-        await vehicle.drone.piloting.stop()
-        await vehicle.drone.piloting.cancel_return_home()
-        if not vehicle.in_air or vehicle.returning:
-            raise Refused("Turn refused: the drone does something else now")
-        vehicle.select(mode)
-        await vehicle.drone.piloting.move_by(0.0, 0.0, 0.0, angle, turn_rate_dps=rate_dps)
+        await self._begin("Turn", mode)
+        await self._vehicle.drone.piloting.move_by(0.0, 0.0, 0.0, angle, turn_rate_dps=rate_dps)
 
     def forget_arrival(self) -> None:
         """Something else is ordered: the drone is where it says it is."""

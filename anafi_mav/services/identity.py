@@ -11,7 +11,7 @@ from anafi_mav.drone import Drone
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import Command
-from anafi_mav.services.flavours import Flavour, flavour_of
+from anafi_mav.services.flavours import ARDUPILOT, Flavour, flavour_of
 from anafi_mav.services.service import MessageHandler, Request, Service
 
 
@@ -32,11 +32,22 @@ def _version(text: str) -> int:
     return min(numbers[0], 255) << 24 | min(numbers[1], 255) << 16 | min(numbers[2], 255) << 8
 
 
+def _custom_version(firmware: str, flavour: Flavour) -> bytes:
+    """The ANAFI's firmware as each family's stations read flight_custom_version.
+
+    Those of ArduPilot take it as 8 characters. Those of PX4 show bytes 2, 1, 0 as major, minor, patch; behind them is
+    what tells one release of anafi-mav from another (QGroundControl InitialConnectStateMachine.cc).
+    """
+    if flavour is ARDUPILOT:
+        return firmware.encode(errors="replace")[:8].ljust(8, b"\0")
+    return _version(firmware).to_bytes(4, "little")[1:] + hashlib.sha256(__version__.encode()).digest()[:5]
+
+
 def autopilot_version(drone: Drone, flavour: Flavour, capabilities: int) -> dialect.MAVLink_message:
     """AUTOPILOT_VERSION. The serial number is the unique id; its hash is the older 64-bit one.
 
     flight_sw_version is the release that the flavour follows, middleware_sw_version is anafi-mav's own,
-    os_sw_version the ANAFI's firmware.
+    os_sw_version the ANAFI's firmware, and so is flight_custom_version, which ground stations show.
     """
     identity = drone.identity
     serial = identity.serial.encode()
@@ -48,7 +59,7 @@ def autopilot_version(drone: Drone, flavour: Flavour, capabilities: int) -> dial
         _version(__version__),
         _version(firmware),
         identity.model.id,
-        hashlib.sha256(__version__.encode()).digest()[:8],
+        _custom_version(firmware, flavour),
         bytes(8),
         bytes(8),
         0x19CF,  # Parrot's USB vendor id

@@ -6,6 +6,7 @@ from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.link_loss import GcsWatch, LossAction
+from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.service import Host, Service
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.vehicle import Landed
@@ -31,14 +32,14 @@ class LinkLossService(Service):
             self.host.text(Severity.NOTICE, "Ground station is back")
 
     def _lost(self) -> None:
-        vehicle, policy = self.host.vehicle, self.host.vehicle.gcs_loss
+        vehicle, policy, controller = self.host.vehicle, self.host.vehicle.gcs_loss, self.host.drone.controller
         silence = f"No ground station for {policy.after:g} s"
         if vehicle.landed not in (Landed.IN_AIR, Landed.TAKEOFF):
             self.host.text(Severity.WARNING, silence)
-        elif self.host.drone.controller.pilot_flies:
-            self.host.text(Severity.WARNING, f"{silence}: the pilot at the Skycontroller flies on")
-        elif vehicle.returning:
+        elif vehicle.mode is FlightMode.RETURN:
             self.host.text(Severity.WARNING, f"{silence}: the drone is returning")
+        elif controller.pilot_has_source or controller.pilot_acquired_control:
+            self.host.text(Severity.WARNING, f"{silence}: pilot in control")
         else:
             self.host.text(Severity.CRITICAL, f"{silence}: {policy.action.name.lower()}")
             self.host.act(LinkLossService, self._act(policy.action))

@@ -10,7 +10,7 @@ import contextlib
 import math
 from collections.abc import Awaitable, Callable, Mapping
 
-from anafi_mav.drone.events import CalibrationAxis
+from anafi_mav.drone.events import CalibrationAxis, MagnetoCalibrationStateChanged, Message
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.commands import Command
@@ -26,15 +26,19 @@ VERSION = 2
 
 _NO_SUCH = "an ANAFI has the magnetometer's and the gimbal's only"
 
+RESTART_WAIT = 15.0
+"""s after which a drone that was to restart should have disconnected."""
+
 _RESTART = 1.0
 """param1 of MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN."""
 
-_SIDES: dict[CalibrationAxis | None, str] = {
-    CalibrationAxis.X_AXIS: "roll: turn it about its long axis",
-    CalibrationAxis.Y_AXIS: "pitch: turn it head over heels",
-    CalibrationAxis.Z_AXIS: "yaw: turn it like a top",
+_SIDES: dict[CalibrationAxis | None, tuple[str, str]] = {
+    CalibrationAxis.X_AXIS: ("front", "roll: turn it about its long axis"),
+    CalibrationAxis.Y_AXIS: ("left", "pitch: turn it nose over tail"),
+    CalibrationAxis.Z_AXIS: ("down", "yaw: turn it about its vertical axis"),
 }
-"""What to do with the drone in hand, by the axis that the drone wants to be turned about (arsdk common.xml 0-14-2)."""
+"""By the axis that the drone wants to be turned about (arsdk common.xml 0-14-2): the side that is down in PX4's picture
+of that turn, and what to do with the drone in hand. QGroundControl shows the pictures of CAL_MAG_SIDES."""
 
 
 Work = Callable[[], Awaitable[None]]
@@ -109,19 +113,35 @@ class MaintenanceService(Service):
         await self._told("mag", turn, element.abort_magnetometer)
 
     async def _watch_axes(self) -> None:
-        """Say which way to turn the drone, and how far it has come, whenever that changes."""
-        told: tuple[CalibrationAxis | None, int] | None = None
+        """Send which way to turn the drone, which axes are done and the progress, whenever one of them changes.
+
+        Axes that were done before count for nothing: what a drone reports of them until its first news is of the last
+        calibration.
+        """
+        done: frozenset[CalibrationAxis] | None = None
+        axis: CalibrationAxis | None = None
+        fresh = False
         news = asyncio.Event()
-        undo = self.host.drone.subscribe(lambda message, now: news.set())
+
+        def hear(message: Message, now: float) -> None:
+            nonlocal fresh
+            fresh = fresh or isinstance(message, MagnetoCalibrationStateChanged)
+            news.set()
+
+        undo = self.host.drone.subscribe(hear)
         try:
             while True:
                 state = self.host.drone.calibration.state
-                now = (state.axis, len(state.done or ()))
-                if told is None or now[1] != told[1]:
-                    self._say(f"progress <{100 * now[1] // len(_SIDES)}>")
-                if now != told and now[0] in _SIDES:
-                    self._say(_SIDES[now[0]])
-                told = now
+                now = (state.done or frozenset()) if fresh else frozenset()
+                for finished in sorted(now - (done or frozenset())):
+                    self._say(f"{_SIDES[finished][0]} side done, rotate to a different side")
+                if done is None or len(now) != len(done):
+                    self._say(f"progress <{100 * len(now) // len(_SIDES)}>")
+                if state.axis != axis and state.axis in _SIDES:
+                    side, what = _SIDES[state.axis]
+                    self._say(what)
+                    self._say(f"{side} orientation detected")
+                done, axis = now, state.axis
                 news.clear()
                 await news.wait()
         finally:
@@ -132,14 +152,23 @@ class MaintenanceService(Service):
         await self._told("level", gimbal.calibrate, gimbal.cancel_calibration)
 
     async def _reboot(self, command: Command) -> None:
-        """MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: param1 1. Accepted when the drone falls silent over it."""
+        """MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: param1 1. ACCEPTED once the drone has received it, as on every autopilot.
+
+        dronekit2 waits half a second for the acknowledgement, and the link is lost later. A text follows if it is not.
+        """
         if command.params[0] != _RESTART:
             raise Refused("Refused: an ANAFI can only be restarted", lasting=True)
         await self._on_ground(self._restart)
 
     async def _restart(self) -> None:
         self.host.text(Severity.NOTICE, "The drone restarts")
-        await self.host.drone.reboot()
+        await self.host.drone.request_reboot()
+        self.host.spawn(self._watch_restart())
+
+    async def _watch_restart(self) -> None:
+        """Report a drone that received the command and stays connected. The loss of the link cancels this."""
+        await asyncio.sleep(RESTART_WAIT)
+        self.host.text(Severity.ERROR, "Restart failed: drone is still connected")
 
     def _say(self, text: str, severity: Severity = Severity.INFO) -> None:
         self.host.text(severity, f"[cal] {text}")

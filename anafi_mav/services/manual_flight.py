@@ -201,7 +201,7 @@ class ManualFlight:
                 reason = "they do not arm, a command does"
         elif mode is not FlightMode.POSITION:
             reason = f"they fly the drone in mode Position, this is {mode.value}" if meant else None
-        elif vehicle.drone.controller.pilot_flies:
+        elif vehicle.drone.controller.pilot_acquired_control:
             reason = "the pilot at the Skycontroller flies"
         else:
             return True

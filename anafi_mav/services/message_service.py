@@ -50,7 +50,7 @@ class MessageService(Service):
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
-        self._intervals: Streams[Channel] = Streams()
+        self._intervals: Streams[Channel] = Streams(without=lambda channel: flavour_of(channel).unstreamed)
         self._table: Mapping[int, Stream] = {}
         self._requests: Mapping[int, Request] = {}
         self._news = News()
@@ -58,9 +58,9 @@ class MessageService(Service):
         """Those that are news for some message."""
         self._repeated: tuple[int, ...] = ()
         self._on_change: list[int] = []
-        self._changed_at = 0.0
-        """When the state changed last that the messages of `_on_change` tell."""
         self._linked_at = 0.0
+        self._stamped: dict[int, float] = {}
+        """The time (s, monotonic) in the last message of each kind: it never goes back."""
         self._failed: dict[int, float] = {}
         """When it was last logged that a message cannot be made."""
 
@@ -95,7 +95,7 @@ class MessageService(Service):
         }
 
     def link_up(self) -> None:
-        self._linked_at = self._changed_at = self.host.clock.monotonic()
+        self._linked_at = self.host.clock.monotonic()
         self._news.reset(self._linked_at)
 
     def link_down(self) -> None:
@@ -123,8 +123,7 @@ class MessageService(Service):
             self._leave(id, due, self._times(id))
 
     def state_changed(self) -> None:
-        """They are told at once."""
-        self._changed_at = self.host.clock.monotonic()
+        """They leave at once."""
         for id in self._on_change:
             self._leave(id, self.host.channels, self._times(id))
 
@@ -133,18 +132,19 @@ class MessageService(Service):
     def _tell_news(self) -> None:
         ids, at = self._news.take()
         due = self._intervals.due_on(self.host.channels, ids, at)
-        if due:
-            times = self.host.times(at)
-            for id, channels in due:
-                self._leave(id, channels, times)
+        for id, channels in due:
+            self._leave(id, channels, self._stamp(id, at))
 
     def _times(self, id: int) -> Times:
-        """When the newest of the fields of a message was true: what is old does not look new."""
-        stream = self._table[id]
-        if not stream.news and not stream.on_change:
-            return self.host.times()
-        told = self._news.at(id) or self._linked_at
-        return self.host.times(max(told, self._changed_at) if stream.on_change else told)
+        """When the newest of the fields of a message was true. A state that has not changed is true now."""
+        if self._table[id].is_repeated:
+            return self._stamp(id, self.host.clock.monotonic())
+        return self._stamp(id, self._news.at(id) or self._linked_at)
+
+    def _stamp(self, id: int, at: float) -> Times:
+        """The time for a message of this kind; an event that was handled late does not put it back."""
+        at = self._stamped[id] = max(at, self._stamped.get(id, at))
+        return self.host.times(at)
 
     def _leave(self, id: int, to: Sequence[Channel], times: Times) -> None:
         stream = self._table[id]

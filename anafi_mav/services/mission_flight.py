@@ -20,8 +20,8 @@ from anafi_mav.plans.translate import Leg
 from anafi_mav.services.aircraft import Aircraft
 from anafi_mav.services.mission_course import Course
 from anafi_mav.services.mission_files import FilesOnDrone
-from anafi_mav.services.mission_path import check_path, lay_out
-from anafi_mav.services.mission_progress import Progress, State
+from anafi_mav.services.mission_path import WayPoint, check_path, lay_out, way_points
+from anafi_mav.services.mission_progress import ENDINGS, Progress, State
 from anafi_mav.services.mission_record import Keeper, Record
 from anafi_mav.services.mission_steps import fly_step
 from anafi_mav.services.mission_waits import ArmWait, EndWatch, StoreWait
@@ -179,6 +179,13 @@ class MissionFlight:
         """A landing or a return that begins now is the plan's own."""
         return self.progress.ending
 
+    @property
+    def returns(self) -> bool:
+        """A return that begins now is that of the mission's last item, done already or about to be."""
+        drone = self._vehicle.drone
+        by_plan = drone.home.state.reason == events.ReturnReason.FLIGHTPLAN and drone.flight_plan.state.uid == self._uid
+        return self.progress.ending or (by_plan and self.progress.returned)
+
     # The beginning.
 
     def _require_freedom(self) -> None:
@@ -187,7 +194,7 @@ class MissionFlight:
             raise Refused("Mission refused: the drone is landing")
         if vehicle.returning_by_itself:
             raise Refused("Mission refused: the drone returns home by itself")
-        if vehicle.drone.controller.pilot_flies:
+        if vehicle.drone.controller.pilot_acquired_control:
             raise Refused("Mission refused: the pilot at the Skycontroller flies")
         if not vehicle.in_air and not vehicle.on_ground:
             raise Refused("Mission refused: the drone is neither on the ground nor flying yet")
@@ -393,6 +400,7 @@ class MissionFlight:
     def _on_playing(self, message: events.MavlinkFilePlayingStateChanged) -> None:
         progress = self.progress
         if message.state == PlayingState.PLAYING:
+            self._end_watch.end()
             if self._starting is not None:
                 (leg, line), self._starting = self._starting, None
                 progress.begin(leg, line)
@@ -419,10 +427,20 @@ class MissionFlight:
                 self._leg_over()
             elif progress.ending and progress.at_last_line and message.state == PlayingState.STOPPED:
                 self._end_watch.begin()
-            elif self._vehicle.drone.controller.pilot_flies:
+            elif self._vehicle.drone.controller.pilot_acquired_control:
                 self._break_off("the pilot at the Skycontroller flies")
+            elif message.state == PlayingState.STOPPED and (last := self._last_way_point(progress.leg)) is not None:
+                self._end_watch.begin(last)
             else:
                 self._break_off("the drone has stopped it")
+
+    def _last_way_point(self, leg: Leg) -> WayPoint | None:
+        """Return the way point that a file ends at; None while others are left, or when it lands or returns."""
+        progress = self.progress
+        points, left = [*way_points(leg)], [*way_points(leg, progress.line)]
+        if progress.items[leg.origins[-1]].command in ENDINGS or len(left) > 1 or not points:
+            return None
+        return points[-1]
 
     def _executed(self, line: int) -> None:
         done = self.progress.executed(line)
@@ -440,9 +458,10 @@ class MissionFlight:
         self._end_watch.look()
 
     def _ended(self, begun: bool) -> None:
-        """The drone has stopped its plan, and then begun to land or to return as the last line says, or it has not."""
+        """The drone has stopped its plan without reporting its last line; `begun`: it has been flown all the same."""
         if begun:
-            self._executed(self.progress.line + 1)
+            if (leg := self.progress.leg) is not None:
+                self._executed(len(leg.origins) - 1)
             self._leg_over()
         else:
             self._break_off("the drone has stopped it")

@@ -42,8 +42,13 @@ _RESULTS = {
 _NOTHING = Report((), (), ())
 
 
+FIRST_LABEL = 1
+"""The number of our item 0 in texts. On a station's map item 0 is home, whether or not it is sent to the vehicle
+(QGroundControl FirmwarePlugin::sendHomePositionToVehicle): seq + 1 for PX4's clients, seq for ArduPilot's."""
+
+
 def offset(flavour: Flavour) -> int:
-    """What a client of this flavour calls our item 0."""
+    """Return the seq of our item 0 in messages to clients of this flavour."""
     return 1 if flavour.zero_home else 0
 
 
@@ -114,7 +119,7 @@ class MissionKind(PlanKind):
         result = _RESULTS.get(fault.kind)
         if result is None:
             result = dialect.MAV_MISSION_INVALID_PARAM1 - 1 + (fault.param or 1)
-        return Fault(result, f"item {fault.item + offset(flavour)}: {fault.reason}")
+        return Fault(result, f"item {fault.item + FIRST_LABEL}: {fault.reason}")
 
     def examined(self, items: Sequence[PlanItem]) -> Examined:
         """A mission, and what it is to the drone; the last one is known, whichever thread asked."""
@@ -131,9 +136,14 @@ class MissionKind(PlanKind):
         return (self._home(), *(_shifted(_with_zero(item), 1) for item in items))
 
     def taken(self, items: Sequence[PlanItem], flavour: Flavour) -> Sequence[PlanItem]:
+        if flavour.always_continues:
+            items = [msgspec.structs.replace(item, autocontinue=1) for item in items]
         if not flavour.zero_home:
             return items
         return [_shifted(_without_zero(item), -1) for item in items[1:]]
+
+    def label(self, seq: int, flavour: Flavour) -> int:
+        return seq - offset(flavour) + FIRST_LABEL
 
     def always_shown(self, seq: int, flavour: Flavour) -> PlanItem | None:
         """dronekit reads home as item 0, and waits for it when there is nothing else; ArduCopter always has it."""

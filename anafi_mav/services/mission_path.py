@@ -14,8 +14,9 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.plans.plan import Item
 from anafi_mav.plans.translate import Cursor, Leg, Start, Step, translate
 from anafi_mav.services.aircraft import Aircraft
-from anafi_mav.services.bounds import check_place
+from anafi_mav.services.bounds import check_estimate, check_place
 from anafi_mav.services.fence_watch import OutsideFence
+from anafi_mav.services.height import ESTIMATE_FLOOR
 from anafi_mav.services.place import Place
 from anafi_mav.services.refusal import Refused
 from anafi_mav.units import DEG_PER_RAD
@@ -23,7 +24,12 @@ from anafi_mav.units import DEG_PER_RAD
 BREATH = 20
 """Way points after which others get their turn: a large polygon takes a while."""
 
-_COMMAND, _LATITUDE, _LONGITUDE, _HEIGHT = 3, 8, 9, 10
+ACCEPTANCE = 5.0
+"""m around a way point that names no radius (Parrot's flight plan page)."""
+
+_AMSL_FRAMES = (dialect.MAV_FRAME_GLOBAL, dialect.MAV_FRAME_GLOBAL_INT)
+
+_COMMAND, _RADIUS, _LATITUDE, _LONGITUDE, _HEIGHT = 3, 5, 8, 9, 10
 """Columns of a line (arsdk.md §3.3, Parrot's flight plan page)."""
 
 
@@ -36,6 +42,8 @@ class WayPoint:
     place: Place
     ato: float
     """m above the take-off point."""
+    radius: float
+    """m around it that count as reached."""
 
 
 def _start(vehicle: Aircraft) -> Start:
@@ -71,7 +79,22 @@ async def lay_out(
         raise Refused(f"Mission refused: {where}{error.problem}") from error
     if not flight.parts:
         raise Refused("Mission refused: nothing of it is left to fly")
+    _check_estimates(vehicle, items, flight.parts, number)
     return [*flight.parts], flight.rest
+
+
+def _check_estimates(vehicle: Aircraft, items: Sequence[Item], parts: Sequence[Leg | Step], number: int) -> None:
+    """Raise `Refused` when the bridge to AMSL is an estimate and an item's AMSL height may be the ground."""
+    if not vehicle.height.estimated:
+        return
+    for part in parts:
+        for point in way_points(part) if isinstance(part, Leg) else ():
+            if items[point.item].frame in _AMSL_FRAMES:
+                try:
+                    check_estimate(vehicle, point.ato)
+                except Refused as error:
+                    reason = f"estimated AMSL < {ESTIMATE_FLOOR:g} m"
+                    raise Refused(f"Mission refused: item {point.item + number}: {reason}") from error
 
 
 def lines_of(leg: Leg) -> list[str]:
@@ -86,7 +109,8 @@ def way_points(leg: Leg, after: int = -1) -> Iterator[WayPoint]:
         columns = line.split("\t")
         if int(columns[_COMMAND]) == dialect.MAV_CMD_NAV_WAYPOINT:
             place = Place(float(columns[_LATITUDE]), float(columns[_LONGITUDE]))
-            yield WayPoint(item, place, float(columns[_HEIGHT]))
+            radius = float(columns[_RADIUS])
+            yield WayPoint(item, place, float(columns[_HEIGHT]), radius if radius > 0.0 else ACCEPTANCE)
 
 
 async def check_path(vehicle: Aircraft, parts: Sequence[Leg | Step], after: int, number: int) -> None:
@@ -110,7 +134,9 @@ def _check(vehicle: Aircraft, start: Place | None, point: WayPoint, number: int)
     try:
         check_place(vehicle, point.place, start=start)
         if ceiling is not None and point.ato > ceiling.current:
-            raise Refused(f"{point.ato:.1f} m is above the drone's ceiling of {ceiling.current:g} m", lasting=True)
+            raise Refused(
+                f"{point.ato:.1f} m above take-off is above the drone's ceiling of {ceiling.current:g} m", lasting=True
+            )
         vehicle.fence.check_height(point.ato)
     except (Refused, OutsideFence) as error:
         reason = str(error).removeprefix("Goto refused: ")

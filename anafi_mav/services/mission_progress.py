@@ -87,8 +87,15 @@ class Progress:
         """Of it, the one that was executed last."""
         self.jumps: dict[int, int] = {}
         """Items that jump, and how often each was done since the mission or its current item was chosen."""
+        self._chosen = False
+        """A client has set the current item since the mission was uploaded."""
         self._skipped: set[int] = set()
         """Lines that the drone has left out."""
+
+    @property
+    def is_untouched(self) -> bool:
+        """True while the mission has not begun and no client has set its current item."""
+        return self.state is State.READY and not self._chosen
 
     @property
     def first(self) -> int:
@@ -109,6 +116,14 @@ class Progress:
         return self.items[leg.origins[self.line + 1]].command in ENDINGS
 
     @property
+    def returned(self) -> bool:
+        """The drone has executed the whole file, and its last line was a return."""
+        leg = self.leg
+        if leg is None or not self.leg_done or self.state not in (State.ACTIVE, State.COMPLETE):
+            return False
+        return self.items[leg.origins[-1]].command == dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH
+
+    @property
     def at_last_line(self) -> bool:
         """All but one line of the file are executed."""
         return self.leg is not None and self.line == len(self.leg.origins) - 2
@@ -118,7 +133,7 @@ class Progress:
         self.state = TRANSITIONS[self.state][Event.TAKE if items else Event.CLEAR]
         self.items = tuple(items)
         self._forget()
-        self.current, self.jumps = 0, {}
+        self.current, self.jumps, self._chosen = 0, {}, False
 
     def choose(self, item: int, *, anew: bool = True) -> None:
         """Begin there next time, with loops that have all their turns before them unless it goes on like that anyway.
@@ -129,7 +144,7 @@ class Progress:
             raise ValueError(f"the mission has no item {item}")
         self.state = TRANSITIONS[self.state][Event.CHOOSE]
         self._forget()
-        self.current = item
+        self.current, self._chosen = item, True
         if anew:
             self.jumps = {}
 

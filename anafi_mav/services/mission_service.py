@@ -16,7 +16,7 @@ from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import Command
 from anafi_mav.services.flavours import flavour_of
-from anafi_mav.services.mission_kind import offset
+from anafi_mav.services.mission_kind import FIRST_LABEL, offset
 from anafi_mav.services.mission_progress import MAVLINK_STATES, State
 from anafi_mav.services.mission_record import Record
 from anafi_mav.services.modes import FlightMode
@@ -51,11 +51,14 @@ class MissionService(Service):
         self._flight.news = self._tell
         self._flight.reached = self._tell_reached
         self._flight.say = self._say
-        self._flight.first_number = _first_number
+        self._flight.first_number = lambda client: FIRST_LABEL
         self._flight.spawn = host.spawn
         self._flight.keeper.write = self._remember
         self._saved = -math.inf
         self._unsaved = False
+        self._sent: tuple[object, ...] | None = None
+        """What the last MISSION_CURRENT of ours said; None: the next one leaves whatever it says."""
+        self._sent_item: int | None = None
 
     def messages(self) -> Mapping[int, MessageHandler]:
         return {dialect.MAVLINK_MSG_ID_MISSION_SET_CURRENT: self._set_current}
@@ -67,7 +70,7 @@ class MissionService(Service):
         }
 
     def streams(self) -> Mapping[int, Stream]:
-        return {dialect.MAVLINK_MSG_ID_MISSION_CURRENT: Stream(self._current, on_change=True, flavoured=True)}
+        return {dialect.MAVLINK_MSG_ID_MISSION_CURRENT: Stream(self._current, flavoured=True)}
 
     def link_up(self) -> None:
         memory = self.host.memory
@@ -75,6 +78,7 @@ class MissionService(Service):
         record = Record.read(kept, self._flight.progress.items)
         if kept is not None and record is None:
             self.host.text(Severity.WARNING, f"flown mission in {memory.path}: ignored, it is not of the mission there")
+        self._sent = self._sent_item = None
         self._flight.link_up(record)
 
     def link_down(self) -> None:
@@ -88,6 +92,7 @@ class MissionService(Service):
 
     def state_changed(self) -> None:
         self._flight.on_vehicle()
+        self._tell()
 
     def tick(self, now: float) -> None:
         if self._unsaved and now - self._saved >= SAVE_EVERY:
@@ -100,13 +105,14 @@ class MissionService(Service):
         """MAV_CMD_MISSION_START: the mission begins or goes on, as by its mode. Only the whole of it."""
         if any(value not in (0.0, KEEP) and not math.isnan(value) for value in command.params[:2]):
             raise Refused("Mission refused: a part of it cannot be started, set the current item first", lasting=True)
-        await self.host.vehicle.set_mode(FlightMode.MISSION, command.client)
+        await self.host.vehicle.set_mode(FlightMode.MISSION, command.right)
 
     async def _choose(self, command: Command) -> None:
         """MAV_CMD_DO_SET_MISSION_CURRENT: param1 the item, -1 none; param2 1 begins anew after the end."""
         item, anew = command.params[:2]
         flight = self._flight
         await flight.storing.over()
+        self._sent = None
         if not flight.there:
             raise Refused("Current item refused: there is no mission", lasting=True)
         if math.isinf(item) or (not math.isnan(item) and item != int(item)):
@@ -120,6 +126,7 @@ class MissionService(Service):
     def _set_current(self, inbound: Inbound) -> None:
         """MISSION_SET_CURRENT: MISSION_CURRENT answers it, or a text."""
         client = client_of(inbound)
+        self._sent = None
         self.host.act(client, self._flight.choose(client, _ours(inbound.message.seq, client)))
 
     # What is told.
@@ -128,9 +135,11 @@ class MissionService(Service):
         """MISSION_CURRENT."""
         progress, ids = vehicle.mission.progress, vehicle.plan_ids
         there = progress.state is not State.NONE
+        # ArduPilot is at home, its item 0, until the mission begins or a client sets another one.
+        at_home = times.flavour.zero_home and progress.is_untouched
         mode = IN_MISSION_MODE if vehicle.mode is FlightMode.MISSION else NOT_IN_MISSION_MODE
         return dialect.MAVLink_mission_current_message(
-            progress.current + offset(times.flavour) if there else 0,
+            progress.current + offset(times.flavour) if there and not at_home else 0,
             len(progress.items) if there else NO_TOTAL,
             MAVLINK_STATES[progress.state],
             mode if there else 0,
@@ -140,20 +149,30 @@ class MissionService(Service):
         )
 
     def _tell(self) -> None:
-        times = self.host.times()
-        self.host.send_by_flavour(lambda flavour: self._current(self.host.vehicle, times.for_flavour(flavour)))
+        """MISSION_CURRENT, when it says something else than the last one; then, for a new item, a HEARTBEAT.
+
+        QGroundControl takes an item for flown to when a HEARTBEAT in mode Mission follows it
+        (MissionManager::_handleHeartbeat). Without one it offers to resume a mission that is complete.
+        """
+        vehicle, times = self.host.vehicle, self.host.times()
+        progress, ids = vehicle.mission.progress, vehicle.plan_ids
+        in_mission = vehicle.mode is FlightMode.MISSION
+        said = progress.state, progress.current, progress.is_untouched, len(progress.items), in_mission
+        state = (*said, *sorted(ids.items()))
+        if state == self._sent:
+            return
+        self._sent = state
+        self.host.send_by_flavour(lambda flavour: self._current(vehicle, times.for_flavour(flavour)))
+        if in_mission and progress.current != self._sent_item:
+            self.host.send_heartbeat()
+        self._sent_item = progress.current
 
     def _tell_reached(self, item: int) -> None:
         self.host.send_by_flavour(lambda flavour: dialect.MAVLink_mission_item_reached_message(item + offset(flavour)))
 
     def _say(self, severity: Severity, text: Callable[[int], str]) -> None:
-        """To each what counts items as they do."""
-        firsts = {offset(flavour_of(channel)) for channel in self.host.channels}
-        if len(firsts) <= 1:
-            self.host.text(severity, text(*firsts or (0,)))
-            return
-        for channel in self.host.channels:
-            self.host.text(severity, text(offset(flavour_of(channel))), channel)
+        """A text to all, with the items' numbers as maps show them."""
+        self.host.text(severity, text(FIRST_LABEL))
 
     # What outlives the gateway.
 

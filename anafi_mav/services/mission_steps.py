@@ -8,6 +8,7 @@ from anafi_mav import units
 from anafi_mav.errors import CommandRejected
 from anafi_mav.mavlink import dialect
 from anafi_mav.plans.plan import Item
+from anafi_mav.plans.rules_flight import is_relative
 from anafi_mav.services.aircraft import Aircraft
 from anafi_mav.services.turns import heading_of
 
@@ -29,12 +30,12 @@ async def fly_step(vehicle: Aircraft, item: Item) -> None:
 
 
 async def _turn(vehicle: Aircraft, item: Item) -> None:
-    """param1 deg, param2 deg/s (unset or 0: the drone's own), param3 way, param4 1: from the present heading."""
-    angle, rate, way, relative = item.params[:4]
+    """param1 deg, param2 deg/s (unset or 0: the drone's own), param3 way, param4 not 0: from the present heading."""
+    angle, rate, way, reference = item.params[:4]
     attitude = vehicle.drone.piloting.state.attitude
     if attitude is None:
         raise CommandRejected("the drone does not tell its heading")
-    turn = heading_of(angle or 0.0, way or 0.0, relative == 1.0, attitude.yaw * units.DEG_PER_RAD)
+    turn = heading_of(angle or 0.0, way or 0.0, is_relative(reference), attitude.yaw * units.DEG_PER_RAD)
     await vehicle.drone.piloting.move_by(0.0, 0.0, 0.0, turn * units.RAD_PER_DEG, turn_rate_dps=rate or None)
 
 

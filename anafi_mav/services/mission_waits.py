@@ -5,11 +5,14 @@ from __future__ import annotations
 
 import asyncio
 import functools
+import math
 from collections.abc import Callable, Hashable, Iterator
 from contextlib import contextmanager
 
-from anafi_mav.drone.events import FlyingState, ForcedLandingReason
+from anafi_mav import geo
+from anafi_mav.drone.events import AlertState, FlyingState, ForcedLandingReason, PlayError
 from anafi_mav.services.aircraft import Aircraft
+from anafi_mav.services.mission_path import WayPoint
 from anafi_mav.services.mission_progress import Progress
 from anafi_mav.services.refusal import Refused
 
@@ -17,8 +20,10 @@ ARM_WAIT = 10.0
 """s that a mission waits for somebody to arm: QGroundControl chooses the mode first and arms when it is shown."""
 
 END_WAIT = 2.0
-"""s within which a drone whose plan has ended with a landing or a return has begun it."""
+"""s within which a drone whose plan has ended has reported the last line, or begun its landing or return."""
 
+GPS_MARGIN = 2.0
+"""m beyond the radius of a way point at which a drone that has stopped there may report itself."""
 
 STORE_WAIT = 5.0
 """s that an order waits for a mission to be stored, which takes a thread some milliseconds and a disk its time."""
@@ -86,9 +91,11 @@ class ArmWait:
 
 
 class EndWatch:
-    """The plan's last line lands or returns, and the drone has stopped without a word on it: has it begun that?
+    """Decides whether a plan that the drone has stopped without reporting its last line is complete.
 
-    A landing or a return of another cause is none of the mission's.
+    Parrot does not document whether the last MissionItemExecuted precedes the state stopped. A last line that lands or
+    returns is done when the drone has begun that; one of another cause is not the mission's. Any other last line is
+    done when the drone is at the last way point and nothing is wrong. The report itself may also be late.
     """
 
     def __init__(self, vehicle: Aircraft, progress: Progress, ended: Callable[[bool], None]) -> None:
@@ -96,6 +103,7 @@ class EndWatch:
         self._vehicle = vehicle
         self._progress = progress
         self._ended = ended
+        self._target: WayPoint | None = None
         self._timer: asyncio.TimerHandle | None = None
 
     @property
@@ -103,9 +111,11 @@ class EndWatch:
         """It is watched."""
         return self._timer is not None
 
-    def begin(self) -> None:
-        """The drone has stopped its plan before the last line."""
+    def begin(self, target: WayPoint | None = None) -> None:
+        """The drone has stopped its plan before the last line. `target`: the last way point of a plan that ends there,
+        None when the last line lands or returns."""
         self.end()
+        self._target = target
         late = functools.partial(self.look, last=True)
         self._timer = asyncio.get_running_loop().call_later(END_WAIT, late)
         self.look()
@@ -114,16 +124,41 @@ class EndWatch:
         """Landing, return or flying state may have changed."""
         if self._timer is None:
             return
-        begun = self._progress.at_last_line and self._lands_or_returns
-        if begun or last:
+        target = self._target
+        if target is None:
+            begun = self._progress.at_last_line and self._lands_or_returns
+            if begun or last:
+                self.end()
+                self._ended(begun)
+        elif last or self._is_in_trouble:
             self.end()
-            self._ended(begun)
+            self._ended(not self._is_in_trouble and self._is_at(target))
 
     def end(self) -> None:
         """Watch no more."""
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
+
+    @property
+    def _is_in_trouble(self) -> bool:
+        """True when the drone may have stopped for another reason than the plan's end."""
+        vehicle, alerts = self._vehicle, self._vehicle.drone.alerts.state
+        return (
+            not vehicle.in_air
+            or vehicle.drone.home.state.returning
+            or vehicle.drone.controller.pilot_acquired_control
+            or alerts.alert not in (None, AlertState.NONE)
+            or alerts.forced_landing not in (None, ForcedLandingReason.NONE)
+            or vehicle.drone.flight_plan.state.error not in (None, PlayError.NONE)
+        )
+
+    def _is_at(self, target: WayPoint) -> bool:
+        place, ato = self._vehicle.place, self._vehicle.drone.piloting.state.altitude
+        if place is None or ato is None:
+            return False
+        away = math.hypot(geo.distance(*place.point, *target.place.point), ato - target.ato)
+        return away <= target.radius + GPS_MARGIN
 
     @property
     def _lands_or_returns(self) -> bool:

@@ -112,6 +112,8 @@ class ModesService(Service):
         super().__init__(host)
         self._offered: frozenset[FlightMode] | None = None
         self._sequence = 0
+        self._sent: tuple[FlightMode, FlightMode | None] | None = None
+        """Mode and intended mode of the last CURRENT_MODE that announced a change."""
 
     def requests(self) -> Mapping[int, Request]:
         return {dialect.MAVLINK_MSG_ID_AVAILABLE_MODES: self._available}
@@ -121,14 +123,27 @@ class ModesService(Service):
 
     def streams(self) -> Mapping[int, Stream]:
         return {
-            dialect.MAVLINK_MSG_ID_CURRENT_MODE: Stream(current_mode, on_change=True, flavoured=True),
+            dialect.MAVLINK_MSG_ID_CURRENT_MODE: Stream(current_mode, flavoured=True),
             dialect.MAVLINK_MSG_ID_AVAILABLE_MODES_MONITOR: Stream(self._monitor),
         }
 
     def link_up(self) -> None:
         self._offered = self.host.vehicle.enterable_modes
+        self._sent = None
+
+    def state_changed(self) -> None:
+        self._announce()
+
+    def _announce(self) -> None:
+        """CURRENT_MODE once per change; the stream repeats it, rarely."""
+        vehicle, times = self.host.vehicle, self.host.times()
+        state = vehicle.mode, vehicle.intended
+        if state != self._sent:
+            self._sent = state
+            self.host.send_by_flavour(lambda flavour: current_mode(vehicle, times.for_flavour(flavour)))
 
     def tick(self, now: float) -> None:
+        self._announce()
         offered = self.host.vehicle.enterable_modes
         if offered != self._offered:
             self._offered = offered
@@ -150,4 +165,4 @@ class ModesService(Service):
 
     async def _set_standard(self, command: Command) -> None:
         """MAV_CMD_DO_SET_STANDARD_MODE: param1 MAV_STANDARD_MODE."""
-        await change_mode(self.host.vehicle, command.mode, command.client)
+        await change_mode(self.host.vehicle, command.mode, command.right)

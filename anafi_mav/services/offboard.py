@@ -14,11 +14,22 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Hashable
+from typing import NamedTuple
 
-from anafi_mav.services.offboard_setpoints import MotionSetpoint, Setpoint
+from anafi_mav.services.offboard_setpoints import NOTHING, MotionSetpoint, Setpoint
 
 SILENCE = 0.45
 """s without a setpoint until the drone is told to hover, so that it has been told within half a second."""
+
+GUIDED_TIMEOUT = 1.5
+"""s that a velocity of ArduPilot's Guided lasts, unless a client sets another (dronekit's documents send one a
+second; ArduCopter's GUID_TIMEOUT is 3 s)."""
+
+SHORTEST_TIMEOUT, LONGEST_TIMEOUT = 0.5, 3.0
+"""s that it can be set to."""
+
+TOLD_EARLY = 0.5 - SILENCE
+"""s before the end of a timeout at which the drone is commanded to hover."""
 
 TOGETHER = 0.5
 """s within which a second setpoint makes a stream of the first."""
@@ -81,6 +92,32 @@ def ends(setpoint: Setpoint) -> bool:
     return isinstance(setpoint, MotionSetpoint) and setpoint.moves
 
 
+def lasts(setpoint: Setpoint, guided_timeout: float | None) -> float:
+    """Return the s of silence after which a setpoint is over. `guided_timeout`: of ArduPilot's Guided; None elsewhere.
+
+    It counts for velocities and yaw rates alone: a tilt or an acceleration that outlives its sender gains speed.
+    """
+    if guided_timeout is None or not isinstance(setpoint, MotionSetpoint):
+        return SILENCE
+    steers = setpoint.velocity != NOTHING or setpoint.yaw_rate is not None
+    alone = setpoint.position == NOTHING and setpoint.acceleration == NOTHING
+    return guided_timeout - TOLD_EARLY if steers and alone else SILENCE
+
+
+class _Heard(NamedTuple):
+    """A program's newest setpoint."""
+
+    setpoint: Setpoint
+    at: float
+    lasts: float = SILENCE
+    """s of silence after which it is over."""
+
+    @property
+    def over(self) -> float:
+        """When it is over."""
+        return self.at + self.lasts
+
+
 class OffboardStream:
     """The newest setpoints, their age, and whose of them fly the drone."""
 
@@ -88,7 +125,7 @@ class OffboardStream:
         self.state = State.IDLE
         self.pilot: Hashable = None
         """Whose setpoints fly the drone while the session is engaged."""
-        self._heard: dict[Hashable, tuple[Setpoint, float]] = {}
+        self._heard: dict[Hashable, _Heard] = {}
         self._fell_silent: tuple[Hashable, float] | None = None
         """Whose stream of positions silence ended last, and when it had lasted too long."""
 
@@ -101,16 +138,20 @@ class OffboardStream:
     def setpoint(self) -> Setpoint | None:
         """The pilot's newest setpoint; None while none is flown."""
         heard = self._heard.get(self.pilot) if self.flying else None
-        return None if heard is None else heard[0]
+        return None if heard is None else heard.setpoint
 
     def age(self, now: float) -> float:
         """Seconds since the pilot's newest setpoint; 0 while none is flown."""
-        return now - self._heard[self.pilot][1] if self.flying else 0.0
+        return now - self._heard[self.pilot].at if self.flying else 0.0
+
+    def stick_age(self, now: float) -> float:
+        """`age` for sticks, which are over `SILENCE` after it is 0: a setpoint that lasts longer stays young longer."""
+        return max(0.0, self.age(now) - (self._heard[self.pilot].lasts - SILENCE)) if self.flying else 0.0
 
     def follows(self, sender: Hashable, now: float) -> bool:
         """This program's last setpoint is so young that one that arrives now is of the same stream."""
         heard = self._heard.get(sender)
-        return heard is not None and now - heard[1] < TOGETHER
+        return heard is not None and now - heard.at < TOGETHER
 
     def straggles(self, sender: Hashable, now: float) -> bool:
         """A position of this program may be one of a stream that has ended: it is flown as a part of it."""
@@ -121,15 +162,18 @@ class OffboardStream:
     def newest(self, sender: Hashable) -> Setpoint | None:
         """What this program asked for last."""
         heard = self._heard.get(sender)
-        return None if heard is None else heard[0]
+        return None if heard is None else heard.setpoint
 
-    def receive(self, sender: Hashable, setpoint: Setpoint, now: float) -> bool:
-        """A usable setpoint arrived. False: somebody else flies, or too many want to."""
+    def receive(self, sender: Hashable, setpoint: Setpoint, now: float, lasts: float = SILENCE) -> bool:
+        """A usable setpoint arrived; it is over after `lasts` s of silence.
+
+        False: somebody else flies, or too many want to.
+        """
         if sender not in self._heard and len(self._heard) >= MAX_PILOTS:
             self._prune(now)
             if len(self._heard) >= MAX_PILOTS:
                 return False
-        self._heard[sender] = (setpoint, now)
+        self._heard[sender] = _Heard(setpoint, now, lasts)
         if self.state is State.ENGAGED and sender != self.pilot:
             return False
         self.state = TRANSITIONS[self.state][Event.SETPOINT]
@@ -143,7 +187,7 @@ class OffboardStream:
         fresh = {sender: heard for sender, heard in self._heard.items() if self._is_fresh(heard, now)}
         if client in fresh:
             return client
-        return max(fresh, key=lambda sender: fresh[sender][1], default=None)
+        return max(fresh, key=lambda sender: fresh[sender].at, default=None)
 
     def engage(self, pilot: Hashable) -> None:
         """Setpoints begin to fly the drone, those of a `candidate`."""
@@ -151,7 +195,7 @@ class OffboardStream:
 
     def engage_single(self, pilot: Hashable, setpoint: Setpoint, said: float) -> None:
         """This one setpoint of a program is flown to its end, however old it has become until its turn came."""
-        self._heard[pilot] = (setpoint, said)
+        self._heard[pilot] = _Heard(setpoint, said)
         if self.state is State.IDLE:
             self.state = TRANSITIONS[self.state][Event.SETPOINT]
         self.state, self.pilot = TRANSITIONS[self.state][Event.ENGAGE_SINGLE], pilot
@@ -165,8 +209,8 @@ class OffboardStream:
         if self.state in (State.IDLE, State.SINGLE):
             return None
         if self.state is State.ENGAGED:
-            return self._heard[self.pilot][1] + SILENCE
-        return max(at for _, at in self._heard.values()) + SILENCE
+            return self._heard[self.pilot].over
+        return max(heard.over for heard in self._heard.values())
 
     def expire(self, now: float) -> bool:
         """True when silence just ended an engaged session: the drone must hover now."""
@@ -174,7 +218,7 @@ class OffboardStream:
         if deadline is None or now < deadline:
             return False
         engaged = self.state is State.ENGAGED
-        if engaged and ends(self._heard[self.pilot][0]):
+        if engaged and ends(self._heard[self.pilot].setpoint):
             self._fell_silent = self.pilot, now
         self._prune(now)
         self.pilot = None
@@ -192,5 +236,5 @@ class OffboardStream:
         }
 
     @staticmethod
-    def _is_fresh(heard: tuple[Setpoint, float], now: float) -> bool:
-        return now < heard[1] + SILENCE
+    def _is_fresh(heard: _Heard, now: float) -> bool:
+        return now < heard.over

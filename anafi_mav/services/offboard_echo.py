@@ -85,11 +85,6 @@ def _over_ground(vector: tuple[float | None, float | None, float | None], turn: 
     return [ahead * cos - aside * sin, ahead * sin + aside * cos, z]
 
 
-def _boot_ms(vehicle: Vehicle, times: Times) -> int:
-    """When the setpoint arrived; for a place that a command named, now."""
-    return (times.boot_ms - round(vehicle.offboard.age * 1000.0)) & 0xFFFFFFFF
-
-
 def local_target(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
     """POSITION_TARGET_LOCAL_NED, in LOCAL_NED."""
     target = _target(vehicle)
@@ -104,7 +99,7 @@ def local_target(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | No
         )
     down = NAN if target.height is None else -target.height
     return dialect.MAVLink_position_target_local_ned_message(
-        _boot_ms(vehicle, times), dialect.MAV_FRAME_LOCAL_NED, target.mask(), north, east, down, *target.tail()
+        times.boot_ms, dialect.MAV_FRAME_LOCAL_NED, target.mask(), north, east, down, *target.tail()
     )
 
 
@@ -114,7 +109,7 @@ def global_target(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | N
     if target is None or target.place is None:
         return None
     return dialect.MAVLink_position_target_global_int_message(
-        _boot_ms(vehicle, times),
+        times.boot_ms,
         dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT,
         target.mask(),
         units.deg_e7(target.place.latitude),
@@ -133,7 +128,7 @@ def attitude_target(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message |
     yaw = heading if flight.yaw is None else flight.yaw
     share = units.clip(sticks.climb_mps / limits.climb_mps, -1.0, 1.0) if limits.climb_mps > 0.0 else 0.0
     return dialect.MAVLink_attitude_target_message(
-        _boot_ms(vehicle, times),
+        times.boot_ms,
         dialect.ATTITUDE_TARGET_TYPEMASK_BODY_ROLL_RATE_IGNORE
         | dialect.ATTITUDE_TARGET_TYPEMASK_BODY_PITCH_RATE_IGNORE,
         units.quaternion_from_euler(sticks.roll_deg * units.RAD_PER_DEG, sticks.pitch_deg * units.RAD_PER_DEG, yaw),

@@ -2,7 +2,8 @@
 
 An attitude or a velocity reaches the sticks the moment it arrives, and again whenever the drone tells how it moves. A
 position is a move that the drone makes by itself (`offboard_moves`). A timer turns the pilot's silence into a hover,
-which ends a move as well.
+which ends a move as well. On the ground a setpoint that climbs takes the drone off (`setpoint_takeoff`); nothing is
+flown before it hovers.
 """
 
 from __future__ import annotations
@@ -16,26 +17,52 @@ from typing import Any, NamedTuple
 from anafi_mav import units
 from anafi_mav.clock import Clock
 from anafi_mav.drone import Limits, PilotingCommand, events
-from anafi_mav.drone.events import Message
+from anafi_mav.drone.events import FlyingState, Message
 from anafi_mav.errors import AnafiMavError, LinkLost
 from anafi_mav.services.aircraft import Aircraft
+from anafi_mav.services.clients import system_of
 from anafi_mav.services.modes import FlightMode
-from anafi_mav.services.offboard import OffboardStream, State, ends
-from anafi_mav.services.offboard_control import STILL, WIND, Controller, Motion, tilt_for, turn_towards
+from anafi_mav.services.offboard import GUIDED_TIMEOUT, SILENCE, OffboardStream, State, ends, lasts
+from anafi_mav.services.offboard_control import (
+    CAUTIOUS_TILT,
+    STILL,
+    WIND,
+    Controller,
+    Motion,
+    tilt_for,
+    tilt_limit,
+    turn_towards,
+)
 from anafi_mav.services.offboard_goals import Goal, demand, resolve
 from anafi_mav.services.offboard_moves import OffboardMoves
 from anafi_mav.services.offboard_setpoints import NOTHING, AttitudeSetpoint, MotionSetpoint, Setpoint
 from anafi_mav.services.refusal import Refused
+from anafi_mav.services.roll_sign import ROLL_INVERTED
+from anafi_mav.services.setpoint_takeoff import Launcher, Phase, SetpointTakeoff, Step, climbs
 from anafi_mav.services.statustext import Severity
 
 WARN_AGAIN = 1.0
 """m/s by which a velocity has to be higher than the last one whose tilt was worth a word."""
 
+TILT_HELD = f"Tilt limit {CAUTIOUS_TILT * units.DEG_PER_RAD:.0f} deg: roll sign not verified yet"
+
 SINGLE_WAIT = 2.0
 """s that a single setpoint may wait until what was under way has let go of the drone; then it is out of date."""
 
-HEARD = (events.AttitudeChanged, events.SpeedChanged, events.AltitudeChanged, events.GpsLocationChanged)
-"""What tells how the drone moves."""
+PAUSED = "paused by a client"
+"""Why setpoints in Guided are ignored after a pause."""
+
+HEARD = (
+    events.AttitudeChanged,
+    events.SpeedChanged,
+    events.AltitudeChanged,
+    events.GpsLocationChanged,
+    events.FlyingStateChanged,
+)
+"""What tells how the drone moves, and that it hovers after a take-off."""
+
+_BEFORE_TAKEOFF = (FlyingState.LANDED, FlyingState.MOTOR_RAMPING)
+"""States in which silence disarms a drone that setpoints take off."""
 
 
 class _Course(NamedTuple):
@@ -49,8 +76,10 @@ class _Course(NamedTuple):
 class OffboardFlight:
     """The setpoints of programs on one vehicle, and the drone flown by those of its pilot."""
 
-    def __init__(self, vehicle: Aircraft, clock: Clock) -> None:
-        self.motion = Motion()
+    def __init__(self, vehicle: Aircraft, clock: Clock, takeoff: Launcher) -> None:
+        self.guided_timeout = GUIDED_TIMEOUT
+        """s that a velocity lasts in ArduPilot's Guided (a parameter)."""
+        self.motion = Motion(vehicle.roll)
         """How the drone moves; whoever else flies it by sticks uses it too."""
         self.complain: Callable[[str], None] = lambda text: vehicle.text(Severity.WARNING, text)
         """Says what is wrong with something that arrives many times a second."""
@@ -60,6 +89,8 @@ class OffboardFlight:
         """The sticks that setpoints hold at present; None while they hold none."""
         self._vehicle = vehicle
         self._clock = clock
+        self._takeoff = takeoff
+        self._lift = SetpointTakeoff()
         self._stream = OffboardStream()
         self._timer: asyncio.TimerHandle | None = None
         self._engaging: asyncio.Task[None] | None = None
@@ -94,11 +125,6 @@ class OffboardFlight:
         """The heading (rad from north) that is turned to or held; None when none is."""
         return self._course.yaw if self.engaged else None
 
-    @property
-    def age(self) -> float:
-        """s since the setpoint that is being flown arrived."""
-        return self._stream.age(self._clock.monotonic())
-
     # What programs ask for.
 
     def receive(self, sender: Hashable, setpoint: Setpoint, *, guided: bool = False) -> str | None:
@@ -108,13 +134,17 @@ class OffboardFlight:
         Returns None, or one sentence on why nobody listens.
         """
         now = self._clock.monotonic()
-        if isinstance(setpoint, MotionSetpoint) and (reason := self._objection(sender, setpoint)):
+        stands = self._stands
+        moves = isinstance(setpoint, MotionSetpoint) and (not stands or climbs(setpoint, self._vehicle.height.ato))
+        if moves and isinstance(setpoint, MotionSetpoint) and (reason := self._objection(sender, setpoint)):
             return reason
         follows = self._stream.follows(sender, now)
-        if not self._stream.receive(sender, setpoint, now):
+        if not self._stream.receive(sender, setpoint, now, lasts(setpoint, self.guided_timeout if guided else None)):
             return "another program flies"
         if self._timer is None:
             self._watch()
+        if stands:
+            return self._on_ground(sender, setpoint, now, guided=guided)
         pilot = self.engaged and sender == self._stream.pilot
         if pilot and self._stream.state is State.SINGLE and (follows or not ends(setpoint)):
             self._stream.engage(sender)
@@ -126,8 +156,103 @@ class OffboardFlight:
             return self._begin_guided(sender, setpoint, now, follows=follows)
         return None
 
+    # On the ground.
+
+    @property
+    def _stands(self) -> bool:
+        """The drone is on the ground, and can take off from there."""
+        return self._vehicle.flying_state == FlyingState.LANDED
+
+    def _on_ground(self, sender: Hashable, setpoint: Setpoint, now: float, *, guided: bool) -> str | None:
+        """A setpoint for a drone that stands: only a climb of the client that armed and engaged is anything to it.
+
+        Returns why a setpoint that climbs takes nothing off, or None. ArduCopter flies attitudes alone from the ground.
+        """
+        vehicle, lift = self._vehicle, self._lift
+        if guided and isinstance(setpoint, MotionSetpoint):
+            self._end_count(sender)
+            return "take off first"
+        if not climbs(setpoint, vehicle.height.ato):
+            self._end_count(sender)
+            return None
+        if lift.phase in (Phase.LIFTING, Phase.JOINED):
+            return None
+        if guided:
+            engaged = vehicle.selected is FlightMode.GUIDED and vehicle.mode_client == sender
+        else:
+            pilot = self._stream.state is State.ENGAGED and sender == self._stream.pilot
+            engaged = pilot and vehicle.mode_client == sender
+        if not engaged:
+            return "take off first, or choose Guided" if guided else None
+        if not self._takeoff.is_armed_by(sender):
+            return "this client has not armed"
+        if (reason := self._grounded) is not None:
+            return reason
+        step = lift.climb(sender, now, SILENCE)
+        if step is Step.WARN:
+            vehicle.text(Severity.WARNING, f"Takeoff by setpoints of system {system_of(sender)} in 1 s")
+        elif step is Step.TAKE_OFF:
+            lift.begin(sender, Phase.LIFTING)
+            self.act(sender, self._take_off(sender))
+        return None
+
+    @property
+    def _grounded(self) -> str | None:
+        """Why setpoints do not take the drone off; None when they do."""
+        if problems := self._vehicle.prearm_problems():
+            return "; ".join(problems)
+        try:
+            self._require_freedom("Takeoff")
+        except Refused as refusal:
+            return refusal.reason.partition("efused: ")[2]
+        return None
+
+    def _end_count(self, sender: Hashable) -> None:
+        """One setpoint that does not climb ends the second of the client that sent it."""
+        if self._lift.phase is Phase.COUNTING and self._lift.client == sender:
+            self._lift.stop()
+            self._vehicle.text(Severity.NOTICE, "Takeoff by setpoints cancelled: no climb")
+
+    async def _take_off(self, sender: Hashable) -> None:
+        """The second is over: the drone takes off, and the newest setpoint is flown from its first hover on."""
+        vehicle, lift = self._vehicle, self._lift
+        afterwards = FlightMode.GUIDED if vehicle.selected is FlightMode.GUIDED else FlightMode.HOLD
+        try:
+            await vehicle.take_over()
+            fresh = self._stream.candidate(sender, self._clock.monotonic()) == sender
+            if not (self._stands and fresh and self._takeoff.is_armed_by(sender)):
+                raise Refused("Takeoff by setpoints refused: they have stopped")
+            self._join(sender, Phase.LIFTING, afterwards)
+            await self._takeoff.launch()
+        except AnafiMavError as error:
+            if lift.phase is Phase.LIFTING:
+                self.end()
+            vehicle.text(Severity.ERROR, f"Takeoff by setpoints failed: {error}")
+
+    def _join(self, pilot: Hashable, phase: Phase, afterwards: FlightMode) -> None:
+        """The session begins, and flies once the drone hovers at the end of the take-off."""
+        self._afterwards = afterwards
+        self._stream.engage(pilot)
+        self._lift.begin(pilot, phase)
+        self._vehicle.select(FlightMode.OFFBOARD, self)
+        self._watch()
+
+    def after_takeoff(self) -> None:
+        """The drone hovers, or a take-off has ended: fly what is fresh at this moment."""
+        vehicle = self._vehicle
+        if self._lift.phase not in (Phase.LIFTING, Phase.JOINED) or self._takeoff.under_way:
+            return
+        if vehicle.in_air:
+            self._lift.stop()
+            if self.engaged and not vehicle.returning:
+                self._begin(FlightMode.OFFBOARD)
+        elif self._lift.phase is Phase.JOINED:
+            self._lift.stop()
+
     def _objection(self, sender: Hashable, setpoint: MotionSetpoint) -> str | None:
         """Why a position cannot be flown to; None when it can, or is being flown to."""
+        if self._vehicle.roll.inverted and setpoint.needs_loop:
+            return ROLL_INVERTED
         if setpoint.position == NOTHING:
             return None
         if sender == self._stream.pilot and self._goal is not None and self._goal.is_of(setpoint):
@@ -138,18 +263,27 @@ class OffboardFlight:
             return refusal.reason.partition("efused: ")[2] or refusal.reason
         return None
 
+    def streamed_for(self, client: Hashable) -> bool:
+        """True when there are setpoints that mode Offboard would fly for this client."""
+        return self._stream.candidate(client, self._clock.monotonic()) is not None
+
     async def engage(self, client: Hashable) -> None:
         """Mode Offboard begins for this client; returns when its setpoints fly the drone, or raises `Refused`."""
         self._require_freedom("Offboard")
         candidate = self._stream.candidate(client, self._clock.monotonic())
         if candidate is None:
-            raise Refused("Offboard refused: no setpoints arrive")
+            reason = ROLL_INVERTED if self._vehicle.roll.inverted else "no setpoints arrive"
+            raise Refused(f"Offboard refused: {reason}")
         if self._stream.state is State.ENGAGED and candidate == self._stream.pilot:
             return  # it flies already, and goes on without a jolt
+        if self._takeoff.under_way:
+            self._join(candidate, Phase.JOINED, FlightMode.HOLD)
+            return
         await self._vehicle.take_over()
-        await self._vehicle.drone.piloting.cancel_return_home()
+        if not self._stands:
+            await self._vehicle.drone.piloting.cancel_return_home()
         pilot = self._stream.candidate(client, self._clock.monotonic())
-        if pilot is None or not self._vehicle.in_air or self._vehicle.returning:
+        if pilot is None or not (self._vehicle.in_air or self._stands) or self._vehicle.returning:
             raise Refused("Offboard refused: the setpoints stopped, or the drone is not free to fly them")
         self._afterwards = FlightMode.HOLD
         self._stream.engage(pilot)
@@ -157,11 +291,14 @@ class OffboardFlight:
 
     def _require_freedom(self, what: str) -> None:
         vehicle = self._vehicle
-        if not vehicle.in_air:
-            raise Refused(f"{what} refused: take off first, setpoints do not lift an ANAFI off the ground")
+        lifting = self._takeoff.under_way or self._lift.phase is Phase.LIFTING
+        if not (vehicle.in_air or self._stands or lifting):
+            raise Refused(f"{what} refused: take off first")
+        if vehicle.drone.piloting.about_to_fly and not lifting:
+            raise Refused(f"{what} refused: drone is about to take off")
         if vehicle.returning:
             raise Refused(f"{what} refused: the drone returns home")
-        if vehicle.drone.controller.pilot_flies:
+        if vehicle.drone.controller.pilot_acquired_control:
             raise Refused(f"{what} refused: the pilot at the Skycontroller flies")
         if vehicle.drone.piloting.limits is None:
             raise Refused(f"{what} refused: the drone has not reported what full tilt and speed are")
@@ -172,8 +309,12 @@ class OffboardFlight:
 
     def _begin_guided(self, sender: Hashable, setpoint: Setpoint, now: float, *, follows: bool) -> str | None:
         mode = self._vehicle.mode
+        if self._takeoff.under_way and self._vehicle.selected is FlightMode.GUIDED:
+            return None  # at its end the next setpoint is flown
         if not self._vehicle.in_air:
             return "take off first"
+        if self._vehicle.paused:
+            return PAUSED
         if mode is not FlightMode.GUIDED:
             return f"setpoints fly the drone in mode Guided, this is {mode.value}"
         self._alone = ends(setpoint) and not (follows or self._stream.straggles(sender, now))
@@ -185,6 +326,8 @@ class OffboardFlight:
         """A setpoint in mode Guided takes the drone over from whatever it does in that mode."""
         try:
             self._require_freedom("Setpoint")
+            if self._vehicle.paused:
+                raise Refused(f"Setpoint refused: {PAUSED}")
             if self._vehicle.mode is not FlightMode.GUIDED:  # ended by what arrived together with the setpoint
                 raise Refused(f"Setpoint refused: this is {self._vehicle.mode.value}")
             await self._vehicle.take_over()
@@ -209,6 +352,8 @@ class OffboardFlight:
 
     def end(self) -> list[asyncio.Task[None]]:
         """Whoever flew by setpoints flies no more, and the last one does not fly on. Tasks that are about to end."""
+        if self._lift.stop() is Phase.COUNTING:
+            self._vehicle.text(Severity.NOTICE, "Takeoff by setpoints cancelled")
         if not self.engaged:
             return []
         self._stream.disengage()
@@ -223,10 +368,11 @@ class OffboardFlight:
     def link_down(self) -> None:
         """Setpoints of before count for nothing."""
         self._cancel_timer()
+        self._lift.stop()
         self._moves.forget()
         self._goal = self.flown = None
         self._stream = OffboardStream()
-        self.motion = Motion()
+        self.motion = Motion(self._vehicle.roll)
         self._controller = Controller(self.motion)
 
     # What the drone tells.
@@ -235,7 +381,9 @@ class OffboardFlight:
         """How the drone moves: the loops close on it."""
         piloting, motion = self._vehicle.drone.piloting.state, self.motion
         kind = type(message)
-        if kind is events.AttitudeChanged:
+        if kind is events.FlyingStateChanged:
+            self.after_takeoff()
+        elif kind is events.AttitudeChanged:
             if (attitude := piloting.attitude) is None:
                 motion.forget_attitude()
             else:
@@ -265,7 +413,8 @@ class OffboardFlight:
         self._controller = Controller(self.motion)
         self._goal, self._course = None, _Course(False, None, None)
         self._warned_of = STILL
-        self._vehicle.drone.piloting.hover()  # ends a moveTo or moveBy of ours, which would ignore sticks
+        if self._vehicle.in_air:
+            self._vehicle.drone.piloting.hover()  # ends a moveTo or moveBy of ours, which would ignore sticks
         self._vehicle.select(mode, self)
         self._fly()
 
@@ -273,14 +422,16 @@ class OffboardFlight:
         """Do what the pilot's newest setpoint asks for at this moment."""
         vehicle, setpoint = self._vehicle, self._stream.setpoint
         limits = vehicle.drone.piloting.limits
-        if setpoint is None or limits is None:
+        if setpoint is None or limits is None or not vehicle.in_air or self._lift.phase is Phase.JOINED:
             return
         reason = None
-        if vehicle.drone.controller.pilot_flies:
+        if vehicle.drone.controller.pilot_acquired_control:
             # He moved a stick. That he let go of it again does not give the drone back to the program.
             reason = "the pilot at the Skycontroller flies"
         elif vehicle.sticks_follow_camera:
             reason = "the drone's sticks have become relative to the camera"
+        elif vehicle.roll.inverted and isinstance(setpoint, MotionSetpoint) and setpoint.needs_loop:
+            reason = ROLL_INVERTED
         if reason is not None:
             self.end()
             vehicle.select(FlightMode.HOLD)
@@ -318,7 +469,10 @@ class OffboardFlight:
         if speed > self._warned_of:
             self._warned_of = speed + WARN_AGAIN
             needed = tilt_for(speed) * units.DEG_PER_RAD
-            if needed > limits.tilt_deg:
+            allowed = tilt_limit(limits, self.motion) * units.DEG_PER_RAD
+            if allowed < min(needed, limits.tilt_deg):
+                self.complain(TILT_HELD)
+            elif needed > limits.tilt_deg:
                 self.complain(
                     f"MaxTilt of {limits.tilt_deg:.0f} degrees does not hold {speed:.1f} m/s against {WIND:g} m/s of "
                     f"wind, {math.ceil(needed)} would"
@@ -328,7 +482,7 @@ class OffboardFlight:
         sticks = self._controller.sticks(wanted, limits, now)
         if sticks is None:
             raise Refused("the drone does not tell how it moves")
-        if self._controller.short_of is not None:
+        if self._controller.short_of is not None and self.motion.trusts_tilt:
             self.complain(f"MaxTilt of {limits.tilt_deg:.0f} degrees is too little for this setpoint")
         return sticks
 
@@ -356,19 +510,35 @@ class OffboardFlight:
         if self._moves.active:
             self._moves.stop()
         self.flown = sticks
-        self._vehicle.drone.piloting.pilot(sticks, age=self._stream.age(now))
+        self._vehicle.drone.piloting.pilot(sticks, age=self._stream.stick_age(now))
 
     # Silence.
 
     def _expired(self) -> None:
         self._timer = None
-        if self._stream.expire(self._clock.monotonic()):
-            self.flown = None
-            self._moves.forget()
-            self._vehicle.drone.piloting.hover()
-            self._vehicle.select(self._afterwards)
-            self._vehicle.text(Severity.WARNING, "Offboard setpoints stopped: hovering")
+        lifted, phase = self._lift.client, self._lift.phase
+        expired = self._stream.expire(self._clock.monotonic())
+        counted = phase is Phase.COUNTING and self._stream.newest(lifted) is None
+        if (expired and phase is Phase.LIFTING and self._vehicle.flying_state in _BEFORE_TAKEOFF) or counted:
+            self._lift.stop()
+            self._vehicle.select(self._afterwards if expired else self._vehicle.selected)
+            self._vehicle.text(Severity.WARNING, "Setpoints stopped on the ground: disarming")
+            self.act(lifted, self._takeoff.abort())
+        elif expired:
+            self._stopped(joined=phase is Phase.JOINED)
         self._watch()
+
+    def _stopped(self, *, joined: bool) -> None:
+        """The pilot's silence has lasted too long. `joined`: a take-off that is not the pilot's setpoints' goes on."""
+        vehicle = self._vehicle
+        self._lift.stop()
+        self.flown = None
+        self._moves.forget()
+        if not (self._stands or joined):
+            vehicle.drone.piloting.hover()
+        vehicle.select(self._afterwards)
+        what = "" if self._stands else ": takeoff goes on" if joined else ": hovering"
+        vehicle.text(Severity.WARNING, f"Offboard setpoints stopped{what}")
 
     def _watch(self) -> None:
         """Come back when those that matter have been silent for too long."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from anafi_mav import geo
 from anafi_mav.services.aircraft import Aircraft
-from anafi_mav.services.bounds import amsl_to_ato, check_height, check_place
+from anafi_mav.services.bounds import amsl_to_ato, check_estimate, check_height, check_place
 from anafi_mav.services.offboard_control import Axis, Demand, Motion
 from anafi_mav.services.offboard_setpoints import MotionSetpoint, Origin, Vector
 from anafi_mav.services.place import Place
@@ -52,13 +52,14 @@ def resolve(setpoint: MotionSetpoint, vehicle: Aircraft, motion: Motion) -> Goal
     if height is not None:
         if setpoint.origin is Origin.SEA:
             height = amsl_to_ato(vehicle, height)
+            check_estimate(vehicle, height)
         check_height(vehicle, height)
     place: Place | None = None
     north = east = None
     if x is not None or y is not None:
         if setpoint.origin is Origin.LOCAL:
             if vehicle.origin is None:
-                raise Refused("Refused: no GPS fix so far, so the local frame has no origin")
+                raise Refused("Refused: take-off place unknown: no local frame")
             place = _local_place(vehicle.origin, x, y, vehicle.place)
         else:
             place = Place(x or 0.0, y or 0.0)

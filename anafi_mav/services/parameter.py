@@ -19,7 +19,7 @@ Limits = tuple[float, float]
 """The smallest and the largest value that may be written."""
 
 UNKNOWN = -1
-"""What a whole number says when its value is not known; a float says NaN."""
+"""The value of a parameter that is not known. Never NaN: stations show it, compare it, and write it back."""
 
 TOLERANCE = 1e-4
 """Of a limit, relative to its unit: one that went through single precision and was scaled is still itself."""
@@ -34,7 +34,7 @@ class Parameter:
     short: str
     """What it is, for a line in a list."""
     read: Callable[[Host], float]
-    """NaN: not known."""
+    """NaN: not known, and shown as `UNKNOWN`."""
     write: Callable[[Host, float], Awaitable[object]] | None = None
     """Sets it; returns when the drone confirmed, or raises an `AnafiMavError`. None: read only."""
     limits: Callable[[Host], Limits | None] | None = None
@@ -72,12 +72,12 @@ class Parameter:
             raise ValueError(f"{self.name} is longer than {NAME_LENGTH} characters")
 
     def value(self, host: Host) -> float:
-        """The value as a client is told it: fits the type, whole numbers are whole."""
+        """Return the value for the wire: finite, fits the type, whole where the type is."""
         value = self.read(host)
-        if not self.kind.whole:
-            return value
         if not math.isfinite(value):
             return UNKNOWN
+        if not self.kind.whole:
+            return value
         low, high = self.kind.limits
         return min(max(round(value), low), high)
 

@@ -16,8 +16,10 @@ from anafi_mav.drone.events import Axis, PreciseHomeMode, RthEndingBehavior, Rth
 from anafi_mav.drone.events import ObstacleAvoidanceMode as AvoidanceMode
 from anafi_mav.services.bounds import LOWEST
 from anafi_mav.services.link_loss import LossAction
+from anafi_mav.services.offboard import GUIDED_TIMEOUT, LONGEST_TIMEOUT, SHORTEST_TIMEOUT
 from anafi_mav.services.parameter import Limits, Parameter, bounds, current, number, own
 from anafi_mav.services.parameter_codec import Kind
+from anafi_mav.services.return_end import LONGEST_WAIT, SHORTEST_WAIT, EndOfReturn
 from anafi_mav.services.service import Host
 
 OFF_ON = {0: "Off", 1: "On"}
@@ -223,7 +225,7 @@ RETURN_END_ALTITUDE = _range(
 RETURN_ENDING = Parameter(
     "ANF_RTH_END",
     Kind.INT32,
-    "How a return ends",
+    "End of the drone's own returns",
     read=lambda host: number(host.drone.home.state.ending),
     write=lambda host, value: host.drone.home.set_ending(RthEndingBehavior(int(value))),
     values={int(RthEndingBehavior.LANDING): "Landing", int(RthEndingBehavior.HOVERING): "Hovering"},
@@ -231,6 +233,7 @@ RETURN_ENDING = Parameter(
     present=lambda drone: drone.home.state.ending is not None,
     group=HOME,
     source=events.ReturnEnding.NAME,
+    long="Those that it begins by itself, and any when gateway or link dies on the way. Landing: any return lands.",
 )
 
 
@@ -458,8 +461,8 @@ GCS_LOSS = Parameter(
     values={action.value: action.name.capitalize() for action in LossAction},
     polled=True,
     group=GATEWAY,
-    long="Once a ground station has been heard. Not while the pilot at a Skycontroller flies. "
-    "When the drone's link was lost and is back, the time begins anew.",
+    long="Once a ground station has been heard. Behind a Skycontroller, while nothing of ours flies the drone, a text "
+    "is all, even if its pilot does not hold it. When the drone's link was lost and is back, the time begins anew.",
     default=float(LossAction.NOTHING),
     source="gateway",
 )
@@ -477,6 +480,73 @@ GCS_LOSS_TIME = Parameter(
     decimals=1,
     group=GATEWAY,
     default=10.0,
+    source="gateway",
+)
+
+
+def put_end_of_return(host: Host, value: float) -> None:
+    """Set what a commanded return ends in."""
+    host.vehicle.return_end.ending = EndOfReturn(int(value))
+
+
+def put_return_wait(host: Host, value: float) -> None:
+    """Set the wait above home, s."""
+    host.vehicle.return_end.wait = value
+
+
+RETURN_LANDING = Parameter(
+    "ANF_RTL_END",
+    Kind.INT32,
+    "End of a return that a client or the gateway commanded",
+    read=lambda host: float(host.vehicle.return_end.ending),
+    write=own(put_end_of_return),
+    put=put_end_of_return,
+    values={int(EndOfReturn.LAND): "Land", int(EndOfReturn.HOVER): "Hover"},
+    polled=True,
+    group=GATEWAY,
+    long="The gateway lands the drone above a home that is certain, else it hovers and a text gives the reason. "
+    "Nothing is written on the drone: ANF_RTH_END stays its own.",
+    default=float(EndOfReturn.LAND),
+    source="gateway",
+)
+RETURN_WAIT = Parameter(
+    "ANF_RTL_WAIT",
+    Kind.REAL32,
+    "Wait above home before the landing of ANF_RTL_END",
+    read=lambda host: host.vehicle.return_end.wait,
+    write=own(put_return_wait),
+    put=put_return_wait,
+    limits=lambda host: (0.0, LONGEST_WAIT),
+    polled=True,
+    unit="s",
+    step=1.0,
+    decimals=1,
+    group=GATEWAY,
+    long=f"At least {SHORTEST_WAIT:g} s, also where this is less.",
+    default=SHORTEST_WAIT,
+    source="gateway",
+)
+
+
+def _put_guided_time(host: Host, value: float) -> None:
+    host.vehicle.offboard.guided_timeout = value
+
+
+GUIDED_TIME = Parameter(
+    "ANF_GUIDED_T",
+    Kind.REAL32,
+    "Silence after which a velocity of ArduPilot's Guided ends in a hover",
+    read=lambda host: host.vehicle.offboard.guided_timeout,
+    write=own(_put_guided_time),
+    put=_put_guided_time,
+    limits=lambda host: (SHORTEST_TIMEOUT, LONGEST_TIMEOUT),
+    polled=True,
+    unit="s",
+    step=0.1,
+    decimals=1,
+    group=GATEWAY,
+    long="Velocities and yaw rates alone; attitudes and accelerations last 0.5 s, as all does in PX4's Offboard.",
+    default=GUIDED_TIMEOUT,
     source="gateway",
 )
 
@@ -507,4 +577,7 @@ NATIVE: tuple[Parameter, ...] = (
     CLIMB_SPEED,
     GCS_LOSS,
     GCS_LOSS_TIME,
+    RETURN_LANDING,
+    RETURN_WAIT,
+    GUIDED_TIME,
 )

@@ -2,7 +2,7 @@
 
 Names, types and units are ArduCopter 4.5's (centimetres and centidegrees where it has them). QGroundControl's setup
 pages, Mission Planner and MAVProxy look for these (conformance E3). As with PX4's names, none is inert: what cannot be
-followed cannot be written, what an ANAFI does not tell is NaN or -1.
+followed cannot be written, what an ANAFI does not report reads -1.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 
 from anafi_mav.drone import events
-from anafi_mav.drone.events import RthEndingBehavior
 from anafi_mav.services.link_loss import LossAction
 from anafi_mav.services.parameter import Limits, Parameter, current, fact, mapped, number, twin
 from anafi_mav.services.parameter_codec import Kind
@@ -19,35 +18,41 @@ from anafi_mav.services.parameter_table import (
     CRUISE_SPEED,
     GCS_LOSS,
     GCS_LOSS_TIME,
+    GUIDED_TIME,
     MAX_ALTITUDE,
     MAX_DISTANCE,
     MAX_TILT,
     RETURN_ALTITUDE,
     RETURN_BY_ITSELF,
     RETURN_END_ALTITUDE,
-    RETURN_ENDING,
+    RETURN_LANDING,
+    RETURN_WAIT,
     TILT_RATE,
     VERTICAL_SPEED,
     YAW_RATE,
+    put_end_of_return,
 )
 from anafi_mav.services.parameter_table_fence import FENCE_ARDUPILOT
-from anafi_mav.services.refusal import Refused
+from anafi_mav.services.parameter_table_setup import SETUP_ARDUPILOT
+from anafi_mav.services.return_end import EndOfReturn
 from anafi_mav.services.service import Host
+from anafi_mav.services.statustext import Severity
 from anafi_mav.services.takeoff import AUTO_DISARM
 
 FACTS = "ArduPilot facts"
 
-UNTOLD = "An ANAFI does not tell it."
+UNTOLD = "An ANAFI does not report it."
+
+DRONE_WARNS = "0: ArduPilot's word for no threshold. The drone warns of a low battery by levels of its own."
 
 CM = 100.0
 """cm in a m, centidegrees in a degree."""
 
 
 def _final_altitude(host: Host) -> float:
-    home = host.drone.home.state
-    if home.ending == RthEndingBehavior.LANDING:
+    if host.vehicle.return_end.ending is EndOfReturn.LAND:
         return 0.0
-    return current(home.ending_altitude) * CM
+    return current(host.drone.home.state.ending_altitude) * CM
 
 
 def _final_limits(host: Host) -> Limits | None:
@@ -56,32 +61,30 @@ def _final_limits(host: Host) -> Limits | None:
 
 
 async def _set_final_altitude(host: Host, value: float) -> None:
-    home = host.drone.home
-    if value == 0.0:
-        await home.set_ending(RthEndingBehavior.LANDING)
-        return
-    setting = home.state.ending_altitude
-    if setting is not None and value < setting.min * CM:
-        raise Refused(f"Refused: a return ends at {setting.min:g} m at least, or with 0 on the ground", lasting=True)
-    await home.set_ending_altitude(value / CM)
-    await home.set_ending(RthEndingBehavior.HOVERING)
+    """Above 0 a return hovers at ANF_RTH_END_ALT, which is the drone's, whatever the number: a text says so."""
+    put_end_of_return(host, EndOfReturn.LAND if value == 0.0 else EndOfReturn.HOVER)
+    height = _final_altitude(host)
+    if math.isfinite(height) and abs(value - height) >= 1.0:
+        host.text(Severity.NOTICE, f"RTL_ALT_FINAL: hovers at {height / CM:.0f} m (ANF_RTH_END_ALT)")
 
 
 FINAL_ALTITUDE = Parameter(
     "RTL_ALT_FINAL",
     Kind.INT16,
-    "Height at which a return ends, 0: it lands",
+    "Height at which a commanded return ends, 0: it lands",
     read=_final_altitude,
     write=_set_final_altitude,
     limits=_final_limits,
-    news=(events.ReturnEndingAltitude, events.ReturnEnding),
-    present=lambda drone: RETURN_END_ALTITUDE.present(drone) and RETURN_ENDING.present(drone),
+    news=(events.ReturnEndingAltitude,),
+    polled=True,
+    derived=True,
+    present=RETURN_END_ALTITUDE.present,
     unit="cm",
     step=CM,
     decimals=0,
-    group=RETURN_END_ALTITUDE.group,
-    native=RETURN_END_ALTITUDE.name,
-    source=RETURN_END_ALTITUDE.source,
+    group=RETURN_LANDING.group,
+    native=RETURN_LANDING.name,
+    source=RETURN_LANDING.source,
 )
 
 TWINS: tuple[Parameter, ...] = (
@@ -98,6 +101,7 @@ TWINS: tuple[Parameter, ...] = (
     twin(MAX_DISTANCE, "FENCE_RADIUS"),
     twin(RETURN_ALTITUDE, "RTL_ALT", Kind.INT32, scale=CM, unit="cm", decimals=0),
     FINAL_ALTITUDE,
+    twin(RETURN_WAIT, "RTL_LOIT_TIME", Kind.INT32, scale=1000.0, unit="ms", decimals=0),
     mapped(
         RETURN_BY_ITSELF,
         "BATT_FS_LOW_ACT",
@@ -113,6 +117,7 @@ TWINS: tuple[Parameter, ...] = (
         {0: LossAction.NOTHING, 1: LossAction.RETURN, 5: LossAction.LAND, 7: LossAction.HOLD},
     ),
     twin(GCS_LOSS_TIME, "FS_GCS_TIMEOUT"),
+    twin(GUIDED_TIME, "GUID_TIMEOUT"),
 )
 
 
@@ -152,12 +157,12 @@ FACTS_ARDUPILOT: tuple[Parameter, ...] = (
         source=events.BatteryCapacity.NAME,
     ),
     _fact("BATT_FS_CRT_ACT", 1, "Battery almost empty: the drone lands", values={1: "Land"}),
-    _untold("BATT_LOW_VOLT", "Voltage that is low", unit="V"),
-    _untold("BATT_CRT_VOLT", "Voltage that is critical", unit="V"),
-    _untold("BATT_LOW_MAH", "Charge that is low", unit="mAh"),
-    _untold("BATT_CRT_MAH", "Charge that is critical", unit="mAh"),
+    *(
+        _fact(f"BATT_{level}_{unit}", 0.0, "Threshold: none", Kind.REAL32, unit=name, long=DRONE_WARNS)
+        for level in ("LOW", "CRT")
+        for unit, name in (("VOLT", "V"), ("MAH", "mAh"))
+    ),
     _untold("LAND_SPEED", "Speed of a landing", Kind.INT16, unit="cm/s"),
-    _fact("RTL_LOIT_TIME", 0, "Wait above home: none", Kind.INT32, unit="ms"),
     _fact("COMPASS_DEV_ID", 1, "Compass: the drone has one", Kind.INT32),
     _fact("COMPASS_DEV_ID2", 0, "Second compass: none", Kind.INT32),
     _fact("COMPASS_DEV_ID3", 0, "Third compass: none", Kind.INT32),
@@ -207,4 +212,4 @@ FACTS_ARDUPILOT: tuple[Parameter, ...] = (
     ),
 )
 
-ARDUPILOT_NAMES: tuple[Parameter, ...] = (*TWINS, *FENCE_ARDUPILOT, *FACTS_ARDUPILOT)
+ARDUPILOT_NAMES: tuple[Parameter, ...] = (*TWINS, *FENCE_ARDUPILOT, *FACTS_ARDUPILOT, *SETUP_ARDUPILOT)

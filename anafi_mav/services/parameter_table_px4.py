@@ -2,7 +2,7 @@
 
 QGroundControl calls a vehicle without some of these not set up, and complains of others when it opens a page
 (conformance A5). None of them is inert: a value that nothing would follow is a fact and cannot be written, one that an
-ANAFI does not tell is NaN or -1.
+ANAFI does not report reads -1. What only fills a page of QGroundControl is in `parameter_table_setup`.
 """
 
 from __future__ import annotations
@@ -28,21 +28,25 @@ from anafi_mav.services.parameter_table import (
     RETURN_ALTITUDE,
     RETURN_BY_ITSELF,
     RETURN_END_ALTITUDE,
-    RETURN_ENDING,
+    RETURN_LANDING,
     TAKEOFF_HEIGHT,
     TILT_RATE,
     VERTICAL_SPEED,
     YAW_RATE,
+    put_end_of_return,
+    put_return_wait,
 )
 from anafi_mav.services.parameter_table_fence import FENCE_PX4
 from anafi_mav.services.parameter_table_follow import FOLLOW_PX4
+from anafi_mav.services.parameter_table_setup import SETUP_PX4
 from anafi_mav.services.refusal import Refused
+from anafi_mav.services.return_end import LONGEST_WAIT, EndOfReturn
 from anafi_mav.services.service import Host
 from anafi_mav.services.takeoff import AUTO_DISARM
 
 FACTS = "PX4 facts"
 
-UNTOLD = "An ANAFI does not tell it."
+UNTOLD = "An ANAFI does not report it."
 
 
 def _calibrated(host: Host) -> float:
@@ -89,6 +93,43 @@ FENCE_RADIUS = Parameter(
 )
 
 
+HOVERS = -1.0
+"""RTL_LAND_DELAY of a return that ends hovering."""
+
+
+def _land_delay(host: Host) -> float:
+    end = host.vehicle.return_end
+    return HOVERS if end.ending is EndOfReturn.HOVER else end.wait
+
+
+async def _set_land_delay(host: Host, value: float) -> None:
+    if HOVERS < value < 0.0:
+        raise Refused("Refused: RTL_LAND_DELAY is -1 to hover, or 0 and more to land", lasting=True)
+    if value == HOVERS:
+        put_end_of_return(host, EndOfReturn.HOVER)
+    else:
+        put_end_of_return(host, EndOfReturn.LAND)
+        put_return_wait(host, value)
+
+
+LAND_DELAY = Parameter(
+    "RTL_LAND_DELAY",
+    Kind.REAL32,
+    "Wait above home before landing, -1: a commanded return ends hovering",
+    read=_land_delay,
+    write=_set_land_delay,
+    limits=lambda host: (HOVERS, LONGEST_WAIT),
+    polled=True,
+    derived=True,
+    unit="s",
+    step=1.0,
+    decimals=1,
+    group=RETURN_LANDING.group,
+    native=RETURN_LANDING.name,
+    source=RETURN_LANDING.source,
+)
+
+
 def _flight_time_us(host: Host) -> int | None:
     seconds = host.drone.product.state.total_flight_s
     return None if seconds is None else seconds * 1_000_000
@@ -112,14 +153,7 @@ TWINS: tuple[Parameter, ...] = (
     twin(TAKEOFF_HEIGHT, "MIS_TAKEOFF_ALT"),
     twin(RETURN_ALTITUDE, "RTL_RETURN_ALT"),
     twin(RETURN_END_ALTITUDE, "RTL_DESCEND_ALT"),
-    mapped(
-        RETURN_ENDING,
-        "RTL_LAND_DELAY",
-        Kind.REAL32,
-        {-1: "Hover at home", 0: "Land at once"},
-        {-1: int(events.RthEndingBehavior.HOVERING), 0: int(events.RthEndingBehavior.LANDING)},
-        unit="s",
-    ),
+    LAND_DELAY,
     twin(MAX_TILT, "MPC_TILTMAX_AIR"),
     twin(MAX_TILT, "MPC_MAN_TILT_MAX"),
     twin(TILT_RATE, "MC_ROLLRATE_MAX"),
@@ -171,6 +205,15 @@ FACTS_PX4: tuple[Parameter, ...] = (
     _fact("CAL_MAG2_ID", 0, "Third magnetometer: none"),
     _fact("COM_RC_IN_MODE", 1, "Sticks come by MAVLink"),
     _fact("COM_RC_LOSS_T", SILENCE, "Silence of the sticks until the drone hovers", Kind.REAL32, unit="s", decimals=2),
+    _fact(
+        "COM_OF_LOSS_T",
+        0.5,
+        "Silence of setpoints until the drone hovers",
+        Kind.REAL32,
+        unit="s",
+        decimals=1,
+        long="Stricter than PX4's 1.0 s.",
+    ),
     _fact("NAV_RCL_ACT", 1, "Sticks lost: hold", values={1: "Hold"}),
     _fact("COM_DISARM_PRFLT", AUTO_DISARM, "Disarms when no take-off follows", Kind.REAL32, unit="s", decimals=0),
     _fact("COM_DISARM_LAND", 0, "Disarmed the moment it has landed", Kind.REAL32, unit="s"),
@@ -217,4 +260,4 @@ FACTS_PX4: tuple[Parameter, ...] = (
     ),
 )
 
-PX4_NAMES: tuple[Parameter, ...] = (*TWINS, *FENCE_PX4, *FOLLOW_PX4, *FACTS_PX4)
+PX4_NAMES: tuple[Parameter, ...] = (*TWINS, *FENCE_PX4, *FOLLOW_PX4, *FACTS_PX4, *SETUP_PX4)

@@ -8,6 +8,7 @@ MAVLink parameter.md, conformance A5, C4, R12, R13.
 from __future__ import annotations
 
 import asyncio
+import math
 import struct
 from collections import deque
 from collections.abc import Collection, Iterable, Iterator, Mapping
@@ -49,6 +50,10 @@ MAX_PACKED = 8
 
 KEY = "parameters"
 """In the drone's memory: those of the gateway's own settings that are kept, by native name."""
+
+REFUSAL_EVERY = 0.5
+"""s between texts to one channel about writes that were refused: one for a user who changes a value, a few for a
+program that loads a whole file."""
 
 MAX_WAITING = 512
 """Writes that wait for their turn: a whole list, from two clients. What comes beyond that comes again (1 s later)."""
@@ -137,6 +142,8 @@ class ParameterService(Service):
         self._seen = b""
         """Their values at the last look."""
         self._trickle = Trickle(host)
+        self._refused_at: dict[Channel, float] = {}
+        """When a text was last sent about a refused write."""
         self._waiting: deque[tuple[Inbound, Parameter, float]] = deque()
         self._writers: set[asyncio.Task[None]] = set()
         self._kept_of: str | None = None
@@ -185,6 +192,7 @@ class ParameterService(Service):
 
     def channel_closed(self, channel: Channel) -> None:
         self._trickle.closed(channel)
+        self._refused_at.pop(channel, None)
 
     def hears(self) -> Collection[type[Message]]:
         return self._by_news.keys()
@@ -305,17 +313,17 @@ class ParameterService(Service):
         parameter = listed.parameters[index]
         # ArduPilot's clients do not know the types: ArduPilot itself looks at the name alone.
         if flavour.bytewise and message.param_type != parameter.kind.mav:
-            self._refuse(inbound, dialect.MAV_PARAM_ERROR_TYPE_MISMATCH)
+            self._refuse(inbound, dialect.MAV_PARAM_ERROR_TYPE_MISMATCH, "wrong type")
             return
         value = carried(message.param_value, parameter.kind, bytewise=flavour.bytewise)
         if parameter.write is None:
             if value == parameter.value(self.host):
                 self._answer(inbound)
             else:
-                self._refuse(inbound, dialect.MAV_PARAM_ERROR_READ_ONLY)
+                self._refuse(inbound, dialect.MAV_PARAM_ERROR_READ_ONLY, "read only")
             return
         if not parameter.accepts(self.host, value):
-            self._refuse(inbound, dialect.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE)
+            self._refuse(inbound, dialect.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, "out of range")
             return
         self._queue(inbound, parameter, value)
 
@@ -385,9 +393,14 @@ class ParameterService(Service):
         listed = self._lists[flavour_of(inbound.channel).name]
         self.host.send(listed.message(listed.index[name_of(inbound.message.param_id)]), inbound.channel)
 
-    def _refuse(self, inbound: Inbound, error: int) -> None:
+    def _refuse(self, inbound: Inbound, error: int, why: str) -> None:
+        """PARAM_ERROR, which QGroundControl 4 does not know, the value that holds, and a text to the sender."""
         self._error(inbound, error)
         self._answer(inbound)
+        now = self.host.clock.monotonic()
+        if now - self._refused_at.get(inbound.channel, -math.inf) >= REFUSAL_EVERY:
+            self._refused_at[inbound.channel] = now
+            self.host.text(Severity.WARNING, f"{name_of(inbound.message.param_id)} not set: {why}", inbound.channel)
 
     def _error(self, inbound: Inbound, error: int) -> None:
         message: Any = inbound.message

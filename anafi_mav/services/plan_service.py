@@ -17,7 +17,7 @@ from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.plans.parrot import Version
 from anafi_mav.services.fence import FenceKind, summary
-from anafi_mav.services.flavours import flavour_of
+from anafi_mav.services.flavours import PX4, flavour_of
 from anafi_mav.services.guided import fly_item, is_guided_item
 from anafi_mav.services.memory import NOT_KEPT
 from anafi_mav.services.mission_kind import MissionKind
@@ -53,6 +53,7 @@ class PlanService(Service):
     def capabilities(self) -> int:
         return (
             dialect.MAV_PROTOCOL_CAPABILITY_MISSION_INT
+            | dialect.MAV_PROTOCOL_CAPABILITY_MISSION_FLOAT  # MISSION_ITEM and MISSION_REQUEST are accepted too
             | dialect.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
             | dialect.MAV_PROTOCOL_CAPABILITY_MISSION_RALLY
         )
@@ -74,7 +75,7 @@ class PlanService(Service):
         """Why a plan that was kept is not taken."""
         for number, item in enumerate(items):
             if (fault := kind.check_item(item)) is not None:
-                return f"item {number}: {fault.reason}"
+                return f"item {kind.label(number, PX4)}: {fault.reason}"
         fault = self._mission.examine(items) if kind is self._mission else kind.check_plan(items)
         return None if fault is None else fault.reason
 
@@ -208,5 +209,5 @@ class PlanService(Service):
             vehicle.fence.take(items)
         elif kind == RallyKind.mission_type:
             if items and vehicle.rally.purpose is Return.HOME and items != vehicle.rally.items:
-                self.host.text(Severity.INFO, f"{len(items)} rally points kept and not used: RTL_TYPE says home")
+                self.host.text(Severity.INFO, f"Rally points not used: RTL_TYPE is home ({len(items)})")
             vehicle.rally.take(items)

@@ -144,6 +144,14 @@ class PlanKind:
         """The plan in a list that a client of this flavour sent; the inverse of `shown`."""
         return items
 
+    def remarks(self, items: Sequence[PlanItem]) -> Sequence[str]:
+        """Warnings about a list that a client sent and that is accepted: items that `taken` leaves out."""
+        return ()
+
+    def label(self, seq: int, flavour: Flavour) -> int:
+        """Return the number of an item of this seq in texts."""
+        return seq
+
     def always_shown(self, seq: int, flavour: Flavour) -> PlanItem | None:
         """What stands at a place of the list even when it is empty; None: nothing."""
         return None
@@ -290,7 +298,8 @@ class PlanTransfer:
         item = item_of(message)
         fault = item if isinstance(item, Fault) else self.kind.check_item(item)
         if fault is not None:
-            return self._refuse(Fault(fault.result, f"item {message.seq}: {fault.reason}"), now)
+            number = self.kind.label(message.seq, peer.flavour)
+            return self._refuse(Fault(fault.result, f"item {number}: {fault.reason}"), now)
         assert isinstance(item, PlanItem)
         upload.items[message.seq : message.seq + 1] = [item]
         if upload.requests.came():
@@ -303,7 +312,8 @@ class PlanTransfer:
         self.state = TRANSITIONS[self.state][Event.LAST_ITEM]
         self._upload = None
         self._committing = _Done(peer, now, upload.requests.last, ECHOES if upload.lossy else 0)
-        return [Commit({self.kind.mission_type: items}, peer, self.kind.mission_type)]
+        remarks = [Say(Severity.WARNING, text) for text in self.kind.remarks(upload.items)]
+        return [*remarks, Commit({self.kind.mission_type: items}, peer, self.kind.mission_type)]
 
     def clear(self, peer: Peer, now: float) -> list[Effect]:
         """MISSION_CLEAR_ALL, or MISSION_COUNT of 0: acknowledged also when there is nothing to clear."""
@@ -411,7 +421,7 @@ class PlanTransfer:
                 return [
                     self._ack(upload.peer, dialect.MAV_MISSION_OPERATION_CANCELLED),
                     Say(Severity.WARNING, f"{self.kind.name.capitalize()} upload given up: "
-                        f"item {upload.requests.expected} does not come"),
+                        f"item {self.kind.label(upload.requests.expected, upload.peer.flavour)} does not come"),
                 ]  # fmt: skip
             return [self._request(upload, now)]
         if upload is None and done is not None and done.echoes > 0 and now >= done.due:

@@ -12,6 +12,7 @@ import math
 from anafi_mav.drone import Position
 from anafi_mav.drone.events import RthHomeType
 from anafi_mav.errors import AnafiMavError
+from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.rally import RallyPoint, RallyPoints, Return
 from anafi_mav.services.service import Host, Service
 from anafi_mav.services.statustext import Severity
@@ -65,7 +66,7 @@ class RallyService(Service):
         if self._taken_over():
             self._task = self.host.spawn(self._leave())
             return
-        if vehicle.returning or not (vehicle.in_air or vehicle.on_ground):
+        if vehicle.mode is FlightMode.RETURN or not (vehicle.in_air or vehicle.on_ground):
             return  # a return under way, or a landing, keeps its end
         chosen = self._choose(now) if vehicle.in_air else None
         if chosen is not None:
@@ -130,6 +131,7 @@ class RallyService(Service):
                 await self._restore()
             else:
                 self._chosen = point
+                self.host.vehicle.return_end.set_home(self._given, f"rally point {point.number}")
                 self.host.text(Severity.NOTICE, f"Returns end at rally point {point.number}")
 
     async def _leave(self) -> None:

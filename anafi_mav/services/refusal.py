@@ -13,3 +13,14 @@ class Refused(AnafiMavError):
         self.reason = reason
         self.lasting = lasting
         self.critical = critical
+
+
+class Unfinished(AnafiMavError):
+    """A command was accepted for later, and what it waited for has failed: MAV_RESULT_FAILED."""
+
+
+class Unsupported(Refused):
+    """The vehicle has no such command, or not with these parameters: MAV_RESULT_UNSUPPORTED."""
+
+    def __init__(self, reason: str) -> None:
+        super().__init__(reason, lasting=True)

@@ -57,6 +57,9 @@ class Host(Protocol):
     def send(self, message: dialect.MAVLink_message, to: Channel | Sequence[Channel] | None = None) -> None:
         """Send as the autopilot to one channel, to some, or to all. Nothing is sent while the link is down."""
 
+    def send_heartbeat(self) -> None:
+        """Send one more HEARTBEAT to all."""
+
     def send_by_flavour(
         self, build: Callable[[Flavour], dialect.MAVLink_message | None], to: Sequence[Channel] | None = None
     ) -> None:
@@ -142,6 +145,9 @@ class Service:
 
     def on_event(self, message: Message, now: float) -> None:
         """The drone said this; its states know it already."""
+
+    def received(self, inbound: Inbound) -> None:
+        """A message that names this system as its target has arrived, before it is handled."""
 
     def heartbeat(self, inbound: Inbound) -> None:
         """Somebody's heartbeat, a ground station's or anybody else's: the one message that is for every service."""

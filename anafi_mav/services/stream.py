@@ -14,7 +14,7 @@ from anafi_mav.services.vehicle import Vehicle
 
 
 class Times(msgspec.Struct, frozen=True):
-    """When the fields of a message were true, since the gateway started; and for whom it is made."""
+    """When the newest field of a message was true, since the gateway started; and for whom it is made."""
 
     boot_ns: int
     flavour: Flavour = PX4
@@ -44,8 +44,8 @@ class Stream:
     news: tuple[type[Message], ...] = ()
     """The drone's events that make it new. It leaves when one of them comes, and carries that moment's time."""
     repeated: bool = False
-    """A state message: it also leaves at its interval without news, still with the time of the last. What has no news
-    is one in any case."""
+    """A state message: it also leaves at its interval without news, and then carries the time of sending. What has no
+    news is one in any case."""
     on_change: bool = False
     """A state message that also leaves at once when the vehicle's mode, armed or landed state changes."""
     flavoured: bool = False

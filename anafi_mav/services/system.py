@@ -19,8 +19,11 @@ from anafi_mav.drone.events import Message
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound, Node
+from anafi_mav.services import takeoff_point_service
+from anafi_mav.services.aborted_return_service import AbortedReturnService
 from anafi_mav.services.banner import BannerService
 from anafi_mav.services.command_service import CommandService
+from anafi_mav.services.compass_service import CompassService
 from anafi_mav.services.event_service import EventService
 from anafi_mav.services.fence_service import FenceService
 from anafi_mav.services.flavours import Flavour, flavour_of
@@ -28,6 +31,7 @@ from anafi_mav.services.flight_record import FlightRecordService
 from anafi_mav.services.follow_service import FollowService
 from anafi_mav.services.ftp_service import FtpService
 from anafi_mav.services.guided import GuidedService
+from anafi_mav.services.height import TakeoffRecord
 from anafi_mav.services.high_latency import HighLatencyService
 from anafi_mav.services.identity import IdentityService
 from anafi_mav.services.link_loss_service import LinkLossService
@@ -45,10 +49,12 @@ from anafi_mav.services.orbit import OrbitService
 from anafi_mav.services.parameters import ParameterService
 from anafi_mav.services.plan_service import PlanService
 from anafi_mav.services.rally_service import RallyService
+from anafi_mav.services.roll_sign_service import RollSignService
 from anafi_mav.services.service import MessageHandler, Service
 from anafi_mav.services.shell import ShellService
 from anafi_mav.services.statustext import Severity, TextNumbers
 from anafi_mav.services.stream import Times
+from anafi_mav.services.takeoff_point_service import TakeoffPointService
 from anafi_mav.services.telemetry import CHANGES, TelemetryService
 from anafi_mav.services.time_service import TimeService
 from anafi_mav.services.tune import TuneService
@@ -63,6 +69,7 @@ SERVICES: tuple[type[Service], ...] = (
     ModesService,
     GuidedService,
     MaintenanceService,
+    CompassService,
     OrbitService,
     TelemetryService,
     ParameterService,
@@ -72,29 +79,46 @@ SERVICES: tuple[type[Service], ...] = (
     MissionService,
     FenceService,
     RallyService,
+    RollSignService,
     OffboardService,
     ManualControlService,
     FollowService,
     TimeService,
     BannerService,
     WarningService,
+    AbortedReturnService,
     HighLatencyService,
     LogService,
     ShellService,
     TuneService,
     NodeStatusService,
     FlightRecordService,
+    TakeoffPointService,
     VideoTelemetryService,
 )
 """What a system consists of, beside commands and messages themselves."""
 
 AUTOPILOT = dialect.MAV_COMP_ID_AUTOPILOT1
 
+ABSENT = frozenset({dialect.MAV_COMP_ID_WINCH})
+"""Components that no ANAFI has and whose commands are answered all the same: MAVSDK sends DO_WINCH to the winch, waits
+for an answer from there and repeats it for seconds. Not a camera or a gimbal: clients take an answer for its presence.
+"""
+
+COMMANDS = (dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND_INT)
+
 HEARTBEAT_EVERY = 1.0
 """s (MAVLink heartbeat.md)."""
 
+MISSION_OVER = 0.25
+"""s after the end of a mission before a heartbeat says Hold. A return or landing that follows by itself, at the end of
+the plan or for a low battery, is reported by then, and stations announce one change of mode instead of two."""
+
 LOOK_EVERY = 0.1
 """s between looks at the other periodic messages; none of them is wanted more often."""
+
+DESCENT_WAIT = 1.5
+"""s that a landing or return may take to be confirmed when the gateway ends: it is not withdrawn."""
 
 STATUS_EVERY = 5.0
 """s before the same complaint is repeated as text."""
@@ -130,6 +154,8 @@ class System:
         self._tasks: set[asyncio.Task[None]] = set()
         self._last_state: tuple[FlightMode, bool, Health, Landed] | None = None
         self._next_heartbeat = 0.0
+        self._mission_over: asyncio.TimerHandle | None = None
+        """Runs while heartbeats still say Mission."""
         self._complained: dict[str, float] = {}
         self._hushed: set[Channel] = set()
         self._told: tuple[Sequence[Channel], Sequence[Channel]] = ([], [])
@@ -161,11 +187,13 @@ class System:
         self._ftp.take_tables(_joined(service.files() for service in self.services))
         self._handlers: dict[int, MessageHandler] = _joined(service.messages() for service in self.services)
         self._handlers[dialect.MAVLINK_MSG_ID_HEARTBEAT] = self._heard
+        self._receiving = [service for service in self.services if type(service).received is not Service.received]
         self._ticking = [service for service in self.services if type(service).tick is not Service.tick]
         self._updates: dict[type[Message], Callable[[], None]] = {
             events.FlyingStateChanged: self.vehicle.on_flying_state,
-            events.GpsLocationChanged: self.vehicle.on_position,
+            events.GpsLocationChanged: self.vehicle.on_location,
             events.FlightId: self.vehicle.on_position,
+            events.TakeoffLocation: self.vehicle.on_takeoff_location,
             events.ReturnStateChanged: self.vehicle.on_return,
         }
         """What the vehicle makes of an event, before the services hear of it."""
@@ -179,11 +207,10 @@ class System:
         self.active = True
         self._undo = self.drone.subscribe(self._on_event)
         self._node.own(self.sysid)
-        self.vehicle.on_flying_state()
-        self.vehicle.on_position()
         self._last_state = None
         if (problem := self.memory.load(self.drone.identity.serial)) is not None:
             self.text(Severity.WARNING, problem)
+        self.vehicle.link_up(TakeoffRecord.read(self.memory.settings.get(takeoff_point_service.KEY)))
         for service in self.services:
             service.link_up()
         self._listeners.clear()
@@ -204,6 +231,9 @@ class System:
             self._undo = None
         if self._ticker is not None:
             self._ticker.cancel()
+        if self._mission_over is not None:
+            self._mission_over.cancel()
+            self._mission_over = None
         for service in self.services:
             service.link_down()
         for task in tuple(self._tasks):
@@ -213,10 +243,16 @@ class System:
         self._node.disown(self.sysid)
 
     async def let_go(self) -> None:
-        """The gateway ends: nothing of ours goes on, a flying drone is left hovering. Clients must not be heard."""
+        """The gateway ends: a flying drone is left hovering, or returning or landing where it does that already.
+
+        Clients must not be heard.
+        """
         if not self.active:
             return
-        await self._commands.end_all()
+        if self.vehicle.descends:
+            await self._commands.settle(DESCENT_WAIT)
+        else:
+            await self._commands.end_all()
         await self.vehicle.let_go()
 
     # Host.
@@ -276,6 +312,11 @@ class System:
             for message in self._texts.messages(severity, text):
                 self.send(message, to)
 
+    def announce(self, severity: Severity, text: str) -> None:
+        """Send a STATUSTEXT about the drone's link to every client, also while that link is down."""
+        for message in self._texts.messages(severity, text):
+            self._node.send(message, sysid=self.sysid, compid=AUTOPILOT, to=self.channels)
+
     def complain(self, text: str) -> None:
         """A warning about something that arrives many times a second: said every `STATUS_EVERY` seconds at most."""
         now = self.clock.monotonic()
@@ -303,12 +344,14 @@ class System:
 
     # The heart.
 
-    def _heartbeat(self) -> None:
+    def send_heartbeat(self) -> None:
+        """Send one more HEARTBEAT to all."""
         vehicle = self.vehicle
         base = dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
         if vehicle.armed:
             base |= dialect.MAV_MODE_FLAG_SAFETY_ARMED
-        mode, health = vehicle.mode, vehicle.health.value
+        mode = FlightMode.MISSION if self._mission_over is not None else vehicle.mode
+        health = vehicle.health.value
         self.send_by_flavour(
             lambda flavour: dialect.MAVLink_heartbeat_message(
                 dialect.MAV_TYPE_QUADROTOR, flavour.autopilot, base, flavour.custom_mode(mode), health, 3
@@ -321,7 +364,7 @@ class System:
             now = self.clock.monotonic()
             if now >= self._next_heartbeat:
                 self._next_heartbeat = max(self._next_heartbeat + HEARTBEAT_EVERY, now + HEARTBEAT_EVERY / 2)
-                self._heartbeat()
+                self.send_heartbeat()
             if now >= next_look:
                 next_look = now + LOOK_EVERY
                 for service in self._ticking:
@@ -355,18 +398,46 @@ class System:
         return tuple(listeners)
 
     def _changed(self, *, force: bool = False) -> None:
-        """Mode, armed state or health may have changed: clients wait for it, so tell them at once."""
+        """Mode, armed state or health may have changed: clients wait for it, so tell them at once.
+
+        The heartbeat is first, but for a disarming: QGroundControl believes a landing of an armed vehicle only
+        (Vehicle::_setLanding), so EXTENDED_SYS_STATE and the landing event leave before it.
+        """
         if not self.active:
             return
-        vehicle = self.vehicle
+        vehicle, last = self.vehicle, self._last_state
         state = (vehicle.mode, vehicle.armed, vehicle.health, vehicle.landed)
-        if state != self._last_state:
-            self._last_state = state
-            self._heartbeat()
-        elif not force:
+        changed = state != last
+        if not changed and not force:
             return
+        self._last_state = state
+        disarmed = last is not None and last[1] and not vehicle.armed
+        if changed:
+            self._hold_mode(last)
+            if not disarmed:
+                self.send_heartbeat()
         for service in self.services:
             service.state_changed()
+        if disarmed:
+            self.send_heartbeat()
+
+    def _hold_mode(self, last: tuple[FlightMode, bool, Health, Landed] | None) -> None:
+        """Let heartbeats say Mission a little longer when a mission has ended in the air and the drone hovers."""
+        vehicle = self.vehicle
+        hovers = vehicle.armed and vehicle.mode in (FlightMode.HOLD, FlightMode.GUIDED)
+        if self._mission_over is not None:
+            if hovers:
+                return
+            self._mission_over.cancel()
+            self._mission_over = None
+        elif hovers and last is not None and last[0] is FlightMode.MISSION:
+            self._mission_over = asyncio.get_running_loop().call_later(MISSION_OVER, self._show_mode)
+
+    def _show_mode(self) -> None:
+        """The mission is over and nothing has followed."""
+        self._mission_over = None
+        if self.active:
+            self.send_heartbeat()
 
     # What clients send.
 
@@ -378,9 +449,14 @@ class System:
         handler = self._handlers.get(message.get_msgId())
         if handler is None or getattr(message, "target_system", 0) not in (0, self.sysid):
             return
-        if getattr(message, "target_component", 0) not in (0, AUTOPILOT):
-            return
-        handler(inbound)
+        component = getattr(message, "target_component", 0)
+        if component in (0, AUTOPILOT):
+            if getattr(message, "target_system", 0) == self.sysid:
+                for service in self._receiving:
+                    service.received(inbound)
+            handler(inbound)
+        elif component in ABSENT and message.get_msgId() in COMMANDS and message.target_system == self.sysid:
+            self._node.send(_unsupported(inbound), sysid=self.sysid, compid=component, to=inbound.channel)
 
     def _heard(self, inbound: Inbound) -> None:
         for service in self.services:
@@ -391,6 +467,15 @@ class System:
         self._hushed.discard(channel)
         for service in self.services:
             service.channel_closed(channel)
+
+
+def _unsupported(inbound: Inbound) -> dialect.MAVLink_command_ack_message:
+    return dialect.MAVLink_command_ack_message(
+        inbound.message.command,
+        dialect.MAV_RESULT_UNSUPPORTED,
+        target_system=inbound.sysid,
+        target_component=inbound.compid,
+    )
 
 
 def _joined(tables: Any) -> dict[Any, Any]:

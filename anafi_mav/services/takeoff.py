@@ -12,11 +12,11 @@ from typing import Any
 
 from anafi_mav.drone.events import AltitudeChanged, FlyingState, FlyingStateChanged
 from anafi_mav.errors import AnafiMavError, CommandRejected
-from anafi_mav.services.aircraft import Aircraft
+from anafi_mav.services.aircraft import STOP_WAIT, Aircraft
 from anafi_mav.services.bounds import check_height
 from anafi_mav.services.flying import AIRBORNE
 from anafi_mav.services.modes import FlightMode
-from anafi_mav.services.refusal import Refused
+from anafi_mav.services.refusal import Refused, Unfinished
 from anafi_mav.services.statustext import Severity
 
 AUTO_DISARM = 10.0
@@ -28,8 +28,14 @@ ARM_WAIT = 10.0
 CLIMB_WAIT = 15.0
 """s for the drone to hover after it took off, before the climb to the asked height is given up."""
 
+TAKEOFF_WAIT = 30.0
+"""s that a command waits for the end of a take-off."""
+
 ALTITUDE_WAIT = 3.0
 """s for the drone to tell its height, which it does five times a second."""
+
+LOW = 0.5
+"""m above take-off below which a drone that takes off is disarmed by a landing."""
 
 CLOSE_ENOUGH = 0.1
 """m from the height of a take-off that are no reason for a move."""
@@ -47,6 +53,14 @@ class Takeoff:
         self._tell_armed = armed
         """Who waited for this client to arm begins."""
         self._armed = False
+        self._armed_by: set[Hashable] = set()
+        """Clients that have armed since the vehicle was disarmed last."""
+        self.ended: Callable[[], None] = lambda: None
+        """Called when an accepted take-off has ended, at its height or not."""
+        self._waiting: asyncio.Task[Any] | None = None
+        """The command that waits for the end of a take-off."""
+        self._reached = False
+        """The last take-off has reached its height."""
         self._climbing = False
         self._pending: tuple[float, Hashable] | None = None
         """Height of a take-off that waits for its client to arm, and the client."""
@@ -64,6 +78,15 @@ class Takeoff:
     def climbing(self) -> bool:
         """The climb that follows the drone's own take-off is under way."""
         return self._climbing
+
+    @property
+    def under_way(self) -> bool:
+        """An accepted take-off has not reached its height yet."""
+        return self._background is not None and not self._background.done()
+
+    def is_armed_by(self, client: Hashable) -> bool:
+        """Has this client armed the vehicle for the flight that begins now?"""
+        return self._armed and client in self._armed_by
 
     # What clients ask for. Each returns when the drone confirmed, or raises.
 
@@ -84,7 +107,10 @@ class Takeoff:
             await vehicle.take_over()
             await vehicle.drone.piloting.hand_launch()
             return
+        if not self._armed:
+            self._armed_by.clear()
         self._armed = True
+        self._armed_by.add(client)
         self._rearm_disarm_timer()
         vehicle.changed()
         if self._pending is not None and self._pending[1] == client:
@@ -95,23 +121,37 @@ class Takeoff:
             self._tell_armed(client)
 
     async def disarm(self, *, force: bool) -> None:
-        """Disarm on the ground. In the air only `force` with `allow_kill` does it: the motors stop, the drone falls."""
+        """Disarm on the ground; propellers that turn there stop first, with `force` by cutting the motors if need be.
+
+        In the air only `force` with `allow_kill` does it: the motors stop, the drone falls.
+        """
         vehicle = self._vehicle
         if vehicle.on_ground:
-            await vehicle.take_over()
+            await vehicle.take_over(STOP_WAIT)
             await vehicle.drone.piloting.land()  # a take-off that is on its way to the drone must not follow
             if not vehicle.on_ground:
                 raise Refused("Disarm refused: the drone had just taken off, it lands")
             self._armed = False
             vehicle.changed()
             return
-        if vehicle.flying_state == FlyingState.USERTAKEOFF:
-            await vehicle.take_over()
-            await vehicle.drone.piloting.cancel_hand_launch()
+        if self._turns_near_ground:
+            await vehicle.take_over(STOP_WAIT)
+            await vehicle.drone.piloting.stop_motors(force=force)
+            self._armed = False
+            vehicle.changed()
             return
         if not force:
             raise Refused("Disarm refused: the drone is in the air")
         await vehicle.terminate()
+
+    @property
+    def _turns_near_ground(self) -> bool:
+        """The propellers turn, and the drone stands or has hardly left the ground."""
+        vehicle = self._vehicle
+        if vehicle.flying_state is FlyingState.TAKINGOFF:
+            height = vehicle.drone.piloting.state.altitude
+            return height is not None and height < LOW
+        return vehicle.flying_state in (FlyingState.MOTOR_RAMPING, FlyingState.USERTAKEOFF)
 
     async def begin(self, ato: float | None, client: Hashable = None) -> None:
         """Take off to `ato` m (None: `height`). Returns when the drone confirmed that it takes off.
@@ -134,6 +174,41 @@ class Takeoff:
         if vehicle.selected is not FlightMode.GUIDED:
             vehicle.forget_mode()
         self._start_background(self._climb(height))
+
+    async def launch(self) -> None:
+        """Take off to the drone's own height, for setpoints; returns when the drone confirmed it."""
+        if problems := self._vehicle.prearm_problems():
+            raise Refused("PreArm: " + "; ".join(problems))
+        await self._lift_off()
+
+    async def abort(self) -> None:
+        """Disarm a drone that stands, land one that is about to leave the ground: its setpoints have stopped."""
+        await self._vehicle.take_over()
+        await self._vehicle.drone.piloting.land()
+        self._armed = False
+        self._vehicle.changed()
+
+    async def over(self, what: str) -> None:
+        """Wait until an accepted take-off has reached its height; return at once when there is none.
+
+        Of several commands that wait the newest stays, the others are cancelled. Raises `Unfinished` when the take-off
+        fails, or lasts for longer than `TAKEOFF_WAIT`.
+        """
+        task = self._background
+        if task is None or task.done():
+            return
+        if self._waiting is not None:
+            self._waiting.cancel()
+        current = self._waiting = asyncio.current_task()
+        try:
+            await asyncio.wait({task}, timeout=TAKEOFF_WAIT)
+        finally:
+            if self._waiting is current:
+                self._waiting = None
+        if not task.done():
+            raise Unfinished(f"{what} failed: takeoff not over after {TAKEOFF_WAIT:.0f} s")
+        if task.cancelled() or not self._reached:
+            raise Unfinished(f"{what} failed: takeoff has not reached its height")
 
     # What ends it.
 
@@ -204,6 +279,7 @@ class Takeoff:
                 raise CommandRejected("the drone does something else now")
             if abs(height - present) > CLOSE_ENOUGH:
                 await vehicle.drone.piloting.move_by(0.0, 0.0, present - height, 0.0)
+            self._reached = True
         except AnafiMavError as error:
             vehicle.text(Severity.ERROR, f"Climb to {height:g} m given up: {error}")
         finally:
@@ -213,10 +289,16 @@ class Takeoff:
 
     def _start_background(self, work: Coroutine[Any, Any, None]) -> None:
         self.end()
+        self._reached = False
         task = asyncio.get_running_loop().create_task(work)
         self._background = task
         self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
+        task.add_done_callback(self._done)
+
+    def _done(self, task: asyncio.Task[None]) -> None:
+        self._tasks.discard(task)
+        if not self.under_way:
+            self.ended()
 
     # What lapses.
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.bounds import amsl_to_ato
+from anafi_mav.services.bounds import amsl_to_ato, check_estimate
 from anafi_mav.services.commands import Command
 from anafi_mav.services.flavours import ARDUPILOT
 from anafi_mav.services.place import Place
@@ -34,14 +34,14 @@ class UnsupportedFrame(Refused):
         super().__init__(f"Refused: positions in frame {frame} are not supported", lasting=True)
 
 
-def height(vehicle: Vehicle, command: Command) -> float | None:
+def height(vehicle: Vehicle, command: Command, *, flown: bool = True) -> float | None:
     """Height above take-off (m) of a command's z; None when z is unset. COMMAND_LONG has AMSL.
 
-    Raises `Refused`, `UnsupportedFrame`.
+    `flown`: the drone is to fly at this height. Raises `Refused`, `UnsupportedFrame`.
     """
     if math.isnan(command.z):
         return None
-    return height_in_frame(vehicle, command.z, command.frame, amsl=is_amsl(command))
+    return height_in_frame(vehicle, command.z, command.frame, amsl=is_amsl(command), flown=flown)
 
 
 def is_amsl(command: Command) -> bool:
@@ -49,12 +49,15 @@ def is_amsl(command: Command) -> bool:
     return command.id in ALWAYS_AMSL and command.flavour is not ARDUPILOT
 
 
-def height_in_frame(vehicle: Vehicle, z: float, frame: int | None, *, amsl: bool = False) -> float:
+def height_in_frame(vehicle: Vehicle, z: float, frame: int | None, *, amsl: bool = False, flown: bool = True) -> float:
     """Height above take-off (m) of `z` in a MAV_FRAME (None: AMSL). Raises `Refused`, `UnsupportedFrame`."""
     if not math.isfinite(z):
         raise Refused("Refused: the height is not a number", lasting=True)
     if frame in _AMSL_FRAMES or (amsl and frame in _RELATIVE_FRAMES):
-        return amsl_to_ato(vehicle, z)
+        ato = amsl_to_ato(vehicle, z)
+        if flown:
+            check_estimate(vehicle, ato)
+        return ato
     if frame in _RELATIVE_FRAMES:
         return z
     raise UnsupportedFrame(frame)

@@ -12,6 +12,8 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from msgspec.structs import replace
+
 from anafi_mav import geo, units
 from anafi_mav.drone import events
 from anafi_mav.drone.events import MoveToStatus
@@ -29,9 +31,17 @@ MOVING = 0.5
 """m/s. Slower than this the course over ground is noise and is reported as unknown."""
 
 
+def _attitude(vehicle: Vehicle) -> Attitude | None:
+    """Attitude with the right wing down +, also of a drone that is known to report roll the other way."""
+    state = vehicle.drone.piloting.state.attitude
+    if state is None or not vehicle.roll.inverted:
+        return state
+    return replace(state, roll=-state.roll)
+
+
 def attitude(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
     """ATTITUDE. ARSDK reports no body rates: NaN."""
-    state = vehicle.drone.piloting.state.attitude
+    state = _attitude(vehicle)
     if state is None:
         return None
     return dialect.MAVLink_attitude_message(
@@ -41,7 +51,7 @@ def attitude(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
 
 def attitude_quaternion(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
     """ATTITUDE_QUATERNION, (w, x, y, z)."""
-    state = vehicle.drone.piloting.state.attitude
+    state = _attitude(vehicle)
     if state is None:
         return None
     w, x, y, z = units.quaternion_from_euler(state.roll, state.pitch, state.yaw)
@@ -58,9 +68,9 @@ def amsl(vehicle: Vehicle) -> float | None:
 
 
 def global_position_int(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
-    """GLOBAL_POSITION_INT; only with a GPS fix, for 0/0 is a place."""
+    """GLOBAL_POSITION_INT; only with a GPS fix, for 0/0 is a place, and in flight with a location that is not old."""
     place, state, height = vehicle.place, vehicle.drone.piloting.state, amsl(vehicle)
-    if place is None or height is None or state.altitude is None or state.velocity is None:
+    if vehicle.position_is_old or place is None or height is None or state.altitude is None or state.velocity is None:
         return None
     return dialect.MAVLink_global_position_int_message(
         times.boot_ms,
@@ -78,7 +88,7 @@ def global_position_int(vehicle: Vehicle, times: Times) -> dialect.MAVLink_messa
 def local_position_ned(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
     """LOCAL_POSITION_NED: metres north, east and down of where the drone last took off."""
     place, origin, state = vehicle.place, vehicle.origin, vehicle.drone.piloting.state
-    if place is None or origin is None or state.altitude is None or state.velocity is None:
+    if vehicle.position_is_old or place is None or origin is None or state.altitude is None or state.velocity is None:
         return None
     north, east = geo.offset(origin.latitude, origin.longitude, place.latitude, place.longitude)
     velocity = state.velocity
@@ -103,7 +113,10 @@ def odometry(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
     """ODOMETRY: LOCAL_POSITION_NED and the attitude in one, the velocity along the drone's axes. Rates and covariances
     are not told: NaN."""
     place, origin, state = vehicle.place, vehicle.origin, vehicle.drone.piloting.state
-    if place is None or origin is None or state.altitude is None or state.velocity is None or state.attitude is None:
+    leaning = _attitude(vehicle)
+    if vehicle.position_is_old or place is None or origin is None:
+        return None
+    if state.altitude is None or state.velocity is None or leaning is None:
         return None
     north, east = geo.offset(origin.latitude, origin.longitude, place.latitude, place.longitude)
     return dialect.MAVLink_odometry_message(
@@ -113,8 +126,8 @@ def odometry(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
         north,
         east,
         -state.altitude,
-        list(units.quaternion_from_euler(state.attitude.roll, state.attitude.pitch, state.attitude.yaw)),
-        *_to_body(state.velocity, state.attitude),
+        list(units.quaternion_from_euler(leaning.roll, leaning.pitch, leaning.yaw)),
+        *_to_body(state.velocity, leaning),
         NAN,
         NAN,
         NAN,
@@ -243,7 +256,7 @@ def extended_sys_state(vehicle: Vehicle, times: Times) -> dialect.MAVLink_messag
 
 def home_position(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
     """HOME_POSITION. Its altitude is the take-off point's, whatever the home type; x and y are in the local frame."""
-    home, origin = vehicle.home, vehicle.origin
+    home, origin = vehicle.home or vehicle.origin, vehicle.origin
     ground = vehicle.height.takeoff_amsl
     if home is None or ground is None:
         return None

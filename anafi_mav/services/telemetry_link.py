@@ -25,8 +25,9 @@ PX4_FULL, ARDUPILOT_FULL = 100, 254
 
 
 def rc_channels(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
-    """RC_CHANNELS for its rssi: the quality of the drone's radio. An ANAFI has no channels to show."""
-    quality = vehicle.drone.link.state.quality
+    """RC_CHANNELS for its rssi: the quality of the drone's radio, behind a Skycontroller. An ANAFI has no channels to
+    show, and without sticks there is no radio of theirs: unknown."""
+    quality = vehicle.drone.link.state.quality if vehicle.drone.controller.present else None
     full = ARDUPILOT_FULL if times.flavour is ARDUPILOT else PX4_FULL
     rssi = UNKNOWN_U8 if quality is None else round(full * quality / BEST_QUALITY)
     channels = {f"chan{number}_raw": UNUSED_CHANNEL for number in range(1, 19)}
@@ -45,14 +46,17 @@ def _signal(dbm: int, times: Times) -> int:
 
 
 def radio_status(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
-    """RADIO_STATUS: what the drone receives. What its controller receives, noise and errors are not told.
+    """RADIO_STATUS: what the drone receives. What its controller receives, noise and errors are not reported.
 
-    There is no buffer on the way that clients could overfill, hence 100 % free.
+    MAVLink's unknown is 255, which QGroundControl shows as -1 dBm, as if a strong signal had been measured. Its clients
+    get 0: no signal is 0 dBm, and it is what QGroundControl shows before a radio has reported. There is no buffer on
+    the way that clients could overfill, hence 100 % free.
     """
     dbm = vehicle.drone.link.state.rssi_dbm
     if dbm is None or dbm >= 0:
         return None
-    return dialect.MAVLink_radio_status_message(_signal(dbm, times), UNKNOWN_U8, 100, UNKNOWN_U8, UNKNOWN_U8, 0, 0)
+    unknown = UNKNOWN_U8 if times.flavour is ARDUPILOT else 0
+    return dialect.MAVLink_radio_status_message(_signal(dbm, times), unknown, 100, unknown, unknown, 0, 0)
 
 
 def onboard_computer_status(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:

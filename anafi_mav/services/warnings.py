@@ -15,6 +15,7 @@ from anafi_mav.drone.events import (
     AlertLevel,
     AlertState,
     AutoTriggerReason,
+    BatteryAlert,
     BatteryAlertChanged,
     FlyingState,
     FlyingStateChanged,
@@ -39,6 +40,13 @@ def _when(seconds: int | None) -> str:
     return "now" if not seconds else f"in {seconds} s"
 
 
+def _battery(alert: BatteryAlert, level: AlertLevel, percent: int | None) -> str:
+    if alert != BatteryAlert.POWER_LEVEL:
+        return f"Battery {spoken(alert)}: {spoken(level)}"
+    left = "" if percent is None else f" ({percent} %)"
+    return f"Battery {'low' if level == AlertLevel.WARNING else spoken(level)}{left}"
+
+
 def standing(drone: Drone) -> Iterator[tuple[Hashable, Severity, str]]:
     """(what about, how serious, the text) of each warning that holds."""
     alerts, battery, home = drone.alerts.state, drone.battery.state, drone.home.state
@@ -53,7 +61,7 @@ def standing(drone: Drone) -> Iterator[tuple[Hashable, Severity, str]]:
     for alert, level in battery.alerts.items():
         if level > AlertLevel.NONE:
             severity = _LEVELS.get(level, Severity.CRITICAL)
-            yield ("battery", alert, level), severity, f"Battery {spoken(alert)}: {spoken(level)}"
+            yield ("battery", alert, level), severity, _battery(alert, level, battery.percent)
     for name, degree in (("Wind", alerts.wind), ("Vibration", alerts.vibration), ("Icing", alerts.icing)):
         if degree is not None and degree > WarningLevel.OK:
             yield (name, degree), _LEVELS.get(degree, Severity.CRITICAL), f"{name}: {spoken(degree)}"

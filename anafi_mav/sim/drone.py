@@ -21,6 +21,7 @@ from anafi_mav.arsdk.rtsp import DEFAULT_PORT as RTSP_PORT
 from anafi_mav.arsdk.session import OnMessage
 from anafi_mav.arsdk.wire import Buffer, Message, UnknownMessage
 from anafi_mav.errors import ConfigError
+from anafi_mav.sim import quirks
 from anafi_mav.sim.air import Air
 from anafi_mav.sim.body import Body
 from anafi_mav.sim.faults import Faults
@@ -31,6 +32,7 @@ from anafi_mav.sim.model import MODELS
 from anafi_mav.sim.motion import Pose
 from anafi_mav.sim.place import Origin
 from anafi_mav.sim.power import Battery
+from anafi_mav.sim.quirks import Quirk
 from anafi_mav.sim.rtsp import VideoServer
 from anafi_mav.sim.skycontroller import MODELS as SKYCONTROLLERS
 from anafi_mav.sim.skycontroller import Skycontroller
@@ -44,6 +46,9 @@ POSE_PERIOD = 0.1
 HTTP_PORT = 80
 SKYCONTROLLER_PORTS = 100
 """A Skycontroller offers the TCP ports of its drone this much higher: HTTP at 180."""
+
+SESSION_KEPT = 8.0
+"""s of silence after which a session of the quirk `handshake-refused-8s` is no obstacle (libarsdk: four times 2 s)."""
 
 SHUTDOWN_TIME, REBOOT_TIME = 1.0, 10.0
 """s from the order to reboot until the drone is gone, and until it is back. Assumed: an aircraft takes longer."""
@@ -83,6 +88,8 @@ class DroneSpec:
     """The generation of the Skycontroller in front of it, whose address `address` then is; None: there is none."""
     wind: WindSpec = CALM
     """What blows from the start."""
+    firmware_quirks: tuple[str, ...] = ()
+    """Names of the `Quirk`s that its firmware has from the start."""
 
     def __post_init__(self) -> None:
         if self.model not in MODELS:
@@ -112,6 +119,7 @@ class DroneSpec:
                 raise ConfigError("skycontroller", f"expected {expected}, got {self.skycontroller}")
             if self.model == "ai" and self.skycontroller == 3:
                 raise ConfigError("skycontroller", "expected another model than ai, which a Skycontroller 3 cannot fly")
+        quirks.named(self.firmware_quirks, "firmware_quirk")
         if self.serial is not None and not 5 <= len(self.serial) <= 32:
             raise ConfigError("serial", f"expected 5 to 32 characters, got {self.serial!r}")
 
@@ -133,7 +141,7 @@ class SimulatedDrone:
         self.spec = spec
         self.identity = identity
         self.log = log
-        self.faults = Faults()
+        self.faults = Faults(quirks=quirks.named(spec.firmware_quirks, "firmware_quirk"))
         self.faults.on_mute = self._mute_link
         self.wind = Wind(spec.wind, random.Random(chance.getrandbits(64)))
         """Set its `spec` to let it blow."""
@@ -274,6 +282,7 @@ class SimulatedDrone:
                 versions=spec.versions,
                 on_session=self._on_session,
             )
+        self._server.refuses = self._refuses
         self._mute_link(self.faults.mute)
         if spec.http_port is not None:
             await self._start_web(spec.http_port)
@@ -338,7 +347,7 @@ class SimulatedDrone:
             self.skycontroller.tick(now)
         if session is not None and self._in_reach:
             for message in self._telemetry.due(now):
-                if message.NAME not in self.faults.untold:
+                if not self._unreported(message):
                     session.send(message)
         if now >= self._next_pose:
             self._next_pose = max(self._next_pose + POSE_PERIOD, now)
@@ -365,6 +374,12 @@ class SimulatedDrone:
         self.log.add(now, "pose", "true", args)
 
     # -- the link
+
+    def _refuses(self) -> bool:
+        """A firmware that keeps a controller's session, silent or not, refuses the handshake of the next one."""
+        session = self._session
+        keeps = Quirk.HANDSHAKE_REFUSED_8S in self.faults.quirks
+        return keeps and session is not None and self._clock() - session.last_received < SESSION_KEPT
 
     def _mute_link(self, mute: bool) -> None:
         if self._server is not None:
@@ -469,11 +484,18 @@ class SimulatedDrone:
 
     def _send_all(self, session: DeviceSession, messages: list[Message], end: Message) -> None:
         for message in messages:
-            session.send(message)
+            if not self._unreported(message):
+                session.send(message)
         session.send(end)
 
+    def _unreported(self, message: Message) -> bool:
+        """True for an event that this firmware does not send."""
+        if isinstance(message, common.FlightId) and Quirk.NO_FLIGHT_ID in self.faults.quirks:
+            return True
+        return message.NAME in self.faults.untold
+
     def _emit(self, message: Message) -> None:
-        if message.NAME in self.faults.untold:
+        if self._unreported(message):
             return
         if message.BUFFER is not Buffer.NON_ACK:
             self.log.add_message(self._clock(), "event", message)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from anafi_mav.arsdk.messages.alarms import TakeoffChecklistType
 from anafi_mav.arsdk.messages.ardrone3 import MotorError, WarningLevel
 from anafi_mav.arsdk.messages.common import FlightPlanComponent
+from anafi_mav.sim.quirks import Quirk
 
 
 @dataclass(frozen=True)
@@ -65,6 +66,8 @@ class Faults:
     it finds when it is told to start."""
     storage_full: bool = False
     """No room for a photo more."""
+    quirks: frozenset[Quirk] = frozenset()
+    """Ways in which this firmware differs from the simulated one."""
     untold: frozenset[str] = frozenset()
     """Names of events that this firmware does not send, at once, telemetry included: what is not written down another
     one may not tell."""

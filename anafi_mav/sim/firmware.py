@@ -19,7 +19,10 @@ from anafi_mav.sim.flight import Flight
 from anafi_mav.sim.flight import Identity as Identity
 from anafi_mav.sim.follow_me import COMMANDS as FOLLOW_ME
 from anafi_mav.sim.machine import AIRBORNE, GUIDED, LANDED, Event
-from anafi_mav.sim.safety import checklist
+from anafi_mav.sim.quirks import Quirk
+
+LATE_TAKE_OFF = 1.0
+"""s by which a firmware with the quirk `takeoff-from-ground-late` executes a TakeOff late."""
 
 
 class Firmware(Flight):
@@ -61,7 +64,8 @@ class Firmware(Flight):
         deaf = self.flight_plan.playing or self.animations.running or self.follow.flies
         if self.state not in AIRBORNE or self.state is FlyingState.TAKINGOFF or deaf:
             return
-        if sticks.gaz > 0 and self.state is FlyingState.LANDING:
+        ignores_gaz = Quirk.LANDING_IGNORES_GAZ in self.faults.quirks
+        if sticks.gaz > 0 and self.state is FlyingState.LANDING and not ignores_gaz:
             self._fire(Event.CLIMB)
         self.guidance.pilot(sticks, now)
 
@@ -70,30 +74,35 @@ class Firmware(Flight):
         self._fire(Event.THROWN)
 
     def _take_off(self, message: Message) -> None:
-        if self.state is not LANDED:
-            return
-        if self.blockers():
-            for event in checklist(self.blockers()):
-                self._emit(event)
-            return
-        self._fire(Event.TAKE_OFF)
+        if Quirk.TAKEOFF_FROM_GROUND_LATE in self.faults.quirks:
+            self._late_take_off = self.time + LATE_TAKE_OFF
+        else:
+            self._execute_take_off()
 
     def _user_take_off(self, message: ardrone3.UserTakeOff) -> None:
         if not message.state:
-            self._fire(Event.USER_TAKE_OFF_CANCEL)
+            if not self._ramps_on:
+                self._fire(Event.USER_TAKE_OFF_CANCEL)
         elif self.state is LANDED and self.blockers():
-            self._take_off(message)
+            self._execute_take_off()
         else:
             self._fire(Event.USER_TAKE_OFF)
 
     def _smart(self, message: Message) -> None:
-        if self.state is LANDED:
+        takes_off = self.state is LANDED or (self.state is FlyingState.LANDING and self.model.modern)
+        if takes_off:
             self._take_off(message)
         else:
             self._land(message)
 
     def _land(self, message: Message) -> None:
-        self._fire(Event.LAND)
+        if not self._ramps_on:
+            self._fire(Event.LAND)
+
+    @property
+    def _ramps_on(self) -> bool:
+        """True when nothing but an Emergency stops the motors that ramp up."""
+        return self.state is FlyingState.MOTOR_RAMPING and Quirk.RAMPING_IGNORES_LANDING in self.faults.quirks
 
     def _emergency(self, message: Message) -> None:
         self._fire(Event.EMERGENCY)
@@ -117,6 +126,7 @@ class Firmware(Flight):
 
     def _controller_gps(self, message: ardrone3.SendControllerGPS) -> None:
         self.homing.set_pilot(message.latitude, message.longitude, message.altitude)
+        self.guidance.apply_limits()
 
     def _cancel_auto_trigger(self, message: Message) -> None:
         for event in self.endurance.cancel():

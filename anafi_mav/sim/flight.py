@@ -39,7 +39,8 @@ from anafi_mav.sim.place import Origin
 from anafi_mav.sim.plan_store import FlightPlanStore
 from anafi_mav.sim.poi import Poi
 from anafi_mav.sim.power import Battery
-from anafi_mav.sim.safety import Alarms, Warnings, check_changed
+from anafi_mav.sim.quirks import Quirk
+from anafi_mav.sim.safety import Alarms, Warnings, check_changed, checklist
 from anafi_mav.sim.settings import Settings
 from anafi_mav.sim.wind import WindWatch
 
@@ -104,8 +105,8 @@ class Flight:
         self.alarms = Alarms()
         self.warnings = Warnings()
         self.endurance = Endurance(model, self.settings)
-        self.homing = Homing(body, origin, self.settings, emit)
-        self.guidance = Guidance(model, body, origin, self.settings, self.homing, emit)
+        self.homing = Homing(body, origin, self.settings, emit, self.faults)
+        self.guidance = Guidance(model, body, origin, self.settings, self.homing, emit, self.faults)
         self.flight_plan = FlightPlan(model, body, origin, self.settings, self, self.operator, emit, note, self.faults)
         self.poi = Poi(origin, emit, self.operator.aim, lambda: self.settings.yaw_rate, model.modern)
         self.follow = FollowMe(body, origin, self.settings, emit, self.operator.aim, model.airframe.max_speed)
@@ -123,6 +124,8 @@ class Flight:
         self._timer = 0.0
         """End of the motors' ramp, or of the pause after an emergency."""
         self._grounded = False
+        self._late_take_off: float | None = None
+        """When a TakeOff is executed that this firmware executes late."""
         self._return_at: float | None = None
         self._alone = False
         """Nobody is there, and a flight plan plays on."""
@@ -205,8 +208,9 @@ class Flight:
 
     def motion_report(self) -> list[Message]:
         pose = self.pose
+        roll = -pose.roll if Quirk.ROLL_INVERTED in self.faults.quirks else pose.roll
         return [
-            ardrone3.AttitudeChanged(pose.roll, pose.pitch, pose.yaw),
+            ardrone3.AttitudeChanged(roll, pose.pitch, pose.yaw),
             ardrone3.SpeedChanged(pose.vn, pose.ve, pose.vd),
             ardrone3.AltitudeChanged(pose.up),
         ]
@@ -245,6 +249,9 @@ class Flight:
         self.guidance.watch_sticks(now)
         self._unseen += elapsed
         before = self.state
+        if self._late_take_off is not None and self.time >= self._late_take_off:
+            self._late_take_off = None
+            self._execute_take_off()
         if self._unseen >= SENSOR_PERIOD:
             self._update_sensors(self._unseen)
             self._unseen = 0.0
@@ -418,7 +425,7 @@ class Flight:
                 if before in AIRBORNE:
                     self._body.fall()
                 self._sound_alarm(Type.USER_EMERGENCY, True)
-            case Event.CLIMB:
+            case Event.CLIMB | Event.ABORT_LANDING:
                 self._body.hover()
             case Event.RAMPED_UP | Event.THROWN:
                 self._body.take_off()
@@ -446,6 +453,7 @@ class Flight:
     def _end_flight(self) -> None:
         self._body.off()
         self.guidance.release_sticks()
+        self.guidance.forget_flag()
         self._return_at = None
         for type in (Type.HORIZONTAL_GEOFENCE_REACHED, Type.VERTICAL_GEOFENCE_REACHED, Type.USER_EMERGENCY):
             self._sound_alarm(type, False)
@@ -497,6 +505,16 @@ class Flight:
     def airborne(self) -> bool:
         """In the air and ready to be told where to go."""
         return self.state in GUIDED
+
+    def _execute_take_off(self) -> None:
+        """Take off from the ground, or end a landing."""
+        if self.state is FlyingState.LANDING and Quirk.LANDING_IGNORES_TAKEOFF not in self.faults.quirks:
+            self._fire(Event.ABORT_LANDING)
+        elif self.state is LANDED and self.blockers():
+            for event in checklist(self.blockers()):
+                self._emit(event)
+        elif self.state is LANDED:
+            self._fire(Event.TAKE_OFF)
 
     def plan_take_off(self) -> None:
         self._fire(Event.TAKE_OFF)

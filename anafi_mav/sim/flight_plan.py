@@ -25,6 +25,7 @@ from anafi_mav.sim.place import Origin
 from anafi_mav.sim.plan_camera import COMMANDS, PlanCamera
 from anafi_mav.sim.plan_file import Command, Item, PlanFileError, read
 from anafi_mav.sim.poi import look
+from anafi_mav.sim.quirks import Quirk
 from anafi_mav.sim.settings import Settings
 from anafi_mav.units import DEG_PER_RAD, RAD_PER_DEG
 
@@ -302,13 +303,24 @@ class FlightPlan:
             self._next()
 
     def _next(self) -> None:
-        self._emit(common.MissionItemExecuted(self._index))
         self._begun = False
         if self._index + 1 < len(self._items):
+            self._emit(common.MissionItemExecuted(self._index))
             self._index += 1
         else:
             self._leave()
-            self._end()
+            self._end_with_last_line()
+
+    def _end_with_last_line(self) -> None:
+        """The plan is over; real firmware may report its last line before that, afterwards, or not at all."""
+        quirks, report = self._faults.quirks, common.MissionItemExecuted(self._index)
+        late = Quirk.STOPPED_BEFORE_EXECUTED in quirks
+        reported = Quirk.LAST_ITEM_NOT_REPORTED not in quirks
+        if reported and not late:
+            self._emit(report)
+        self._end()
+        if reported and late:
+            self._emit(report)
 
     def _done(self, item: Item, pose: Pose, arrived: bool, time: float) -> bool:
         if self._target is not None and item.command in _MOVING and item.command is not Command.PANORAMA:
@@ -427,8 +439,7 @@ class FlightPlan:
         return self._finish(self._pilot.plan_return)
 
     def _finish(self, then: Callable[[], None]) -> bool:
-        self._emit(common.MissionItemExecuted(self._index))
-        self._end()
+        self._end_with_last_line()
         then()
         return False
 

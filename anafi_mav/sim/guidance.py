@@ -14,11 +14,13 @@ from anafi_mav.arsdk.messages.ardrone3 import MoveByError, MoveToStatus
 from anafi_mav.arsdk.messages.rth import RthEndingBehavior
 from anafi_mav.arsdk.wire import Message
 from anafi_mav.sim.body import Body
+from anafi_mav.sim.faults import Faults
 from anafi_mav.sim.homing import Homing
 from anafi_mav.sim.model import Model
 from anafi_mav.sim.motion import Pose
 from anafi_mav.sim.moves import MoveBy, MoveTo, asked_speeds, own_speeds
 from anafi_mav.sim.place import Origin
+from anafi_mav.sim.quirks import Quirk
 from anafi_mav.sim.settings import Settings
 from anafi_mav.units import RAD_PER_DEG, clip
 
@@ -40,6 +42,7 @@ class Guidance:
         settings: Settings,
         homing: Homing,
         emit: Callable[[Message], None],
+        faults: Faults,
     ) -> None:
         self._model = model
         self._body = body
@@ -47,6 +50,9 @@ class Guidance:
         self._settings = settings
         self._homing = homing
         self._emit = emit
+        self._faults = faults
+        self._tilting = False
+        """The last PCMD had flag 1: counts only for a firmware that remembers it."""
         self._move: MoveBy | MoveTo | None = None
         self._sticks_until = 0.0
         self._sticks_used = False
@@ -56,12 +62,13 @@ class Guidance:
         self._progress: tuple[float, Pose, float] | None = None
         """When, where and with which heading a move was last seen to get on."""
         self.take_off_place = (0.0, 0.0)
-        """North, east: the middle of the fence."""
+        """North, east."""
 
     @property
     def busy(self) -> bool:
         """Somebody wants to move."""
-        return self._move is not None or self._homing.flying or self._sticks_used
+        remembered = self._tilting and Quirk.FLAG_REMEMBERED in self._faults.quirks
+        return self._move is not None or self._homing.flying or self._sticks_used or remembered
 
     @property
     def heading_for_place(self) -> bool:
@@ -74,13 +81,20 @@ class Guidance:
         self._body.limits(
             tilt_rate=settings.number("max_tilt_rate") * RAD_PER_DEG, ceiling=settings.number("max_altitude")
         )
-        self._body.fence(settings.number("max_distance") if settings["geofence"] else None, self.take_off_place)
+        self._body.fence(settings.number("max_distance") if settings["geofence"] else None, self.fence_centre)
+
+    @property
+    def fence_centre(self) -> tuple[float, float]:
+        """North, east: where the controller is, or where the drone took off."""
+        pilot = self._homing.pilot
+        return self.take_off_place if pilot is None else self._origin.offset(pilot.latitude, pilot.longitude)
 
     def fence_margin(self, north: float, east: float) -> float:
         """m between a place and the fence; infinite without one."""
         if not self._settings["geofence"]:
             return float("inf")
-        off_north, off_east = north - self.take_off_place[0], east - self.take_off_place[1]
+        centre = self.fence_centre
+        off_north, off_east = north - centre[0], east - centre[1]
         return self._settings.number("max_distance") - float((off_north**2 + off_east**2) ** 0.5)
 
     # -- time
@@ -122,6 +136,7 @@ class Guidance:
         """PCMD: percent of the limits; pitch + is nose down. Without `flag` roll and pitch do not count."""
         if self._homing.flying:
             return
+        self._tilting = bool(sticks.flag & 1)
         settings = self._settings
         tilt = settings.number("max_tilt") * RAD_PER_DEG if sticks.flag & 1 else 0.0
         yaw_rate = _share(sticks.yaw) * settings.number("max_rotation_speed") * RAD_PER_DEG
@@ -147,6 +162,10 @@ class Guidance:
         if yaw_rate is not None or self._stare is not None:
             self._stare = yaw_rate
             self._body.stick_yaw(yaw_rate or 0.0)
+
+    def forget_flag(self) -> None:
+        """No PCMD of the flight that has ended counts in the next one."""
+        self._tilting = False
 
     def release_sticks(self) -> None:
         self._sticks_used = False

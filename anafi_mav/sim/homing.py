@@ -16,8 +16,10 @@ from anafi_mav.arsdk.messages import ardrone3, rth
 from anafi_mav.arsdk.messages.rth import RthEndingBehavior, RthHomeType, RthState, StateReason
 from anafi_mav.arsdk.wire import Message
 from anafi_mav.sim.body import Body
+from anafi_mav.sim.faults import Faults
 from anafi_mav.sim.motion import Pose, Turn
 from anafi_mav.sim.place import Origin
+from anafi_mav.sim.quirks import Quirk
 from anafi_mav.sim.settings import HOME_TYPES, Settings
 from anafi_mav.units import RAD_PER_DEG
 
@@ -54,8 +56,16 @@ class Phase(enum.Enum):
 class Homing:
     """Home and the return. `emit` takes the events, `body` does the flying."""
 
-    def __init__(self, body: Body, origin: Origin, settings: Settings, emit: Callable[[Message], None]) -> None:
+    def __init__(
+        self,
+        body: Body,
+        origin: Origin,
+        settings: Settings,
+        emit: Callable[[Message], None],
+        faults: Faults,
+    ) -> None:
         self._body = body
+        self._faults = faults
         self._origin = origin
         self._settings = settings
         self._emit = emit
@@ -86,6 +96,12 @@ class Homing:
         return places.get(self.type, self.takeoff)
 
     @property
+    def geofence_centre(self) -> tuple[float, float] | None:
+        """deg, deg: the controller's place, if not known the take-off's (ardrone3.xml 1-2-4)."""
+        centre = self.takeoff if self.pilot is None else self.pilot
+        return None if centre is None else centre[:2]
+
+    @property
     def home_offset(self) -> tuple[float, float] | None:
         """The same as (north, east) in the simulator's plane, m; None also while the drone has no fix."""
         home = self.home
@@ -113,8 +129,10 @@ class Homing:
         """GPSSettings.SendControllerGPS. What is no place is not heard."""
         if not _somewhere(latitude, longitude, altitude):
             return
-        self.pilot = Location(latitude, longitude, altitude)
+        before, self.pilot = self.geofence_centre, Location(latitude, longitude, altitude)
         self._emit(ardrone3.GPSFixStateChanged(int(self._fix)))
+        if self.geofence_centre != before:
+            self._emit(ardrone3.GeofenceCenterChanged(*self.pilot[:2]))
         self._emit(ardrone3.HomeTypeAvailabilityChanged(ardrone3.AvailableHomeType.PILOT, 1))
         if self.type is RthHomeType.PILOT:
             self.preference_changed()
@@ -134,10 +152,9 @@ class Homing:
     def _places(self) -> list[Message]:
         messages: list[Message] = [self._home_changed()]
         if self.takeoff is not None:
-            messages += [
-                rth.TakeoffLocation(*self.takeoff, int(self.fixed_before_takeoff)),
-                ardrone3.GeofenceCenterChanged(*self.takeoff[:2]),
-            ]
+            messages.append(rth.TakeoffLocation(*self.takeoff, int(self.fixed_before_takeoff)))
+        if (centre := self.geofence_centre) is not None:
+            messages.append(ardrone3.GeofenceCenterChanged(*centre))
         return messages
 
     def settings_report(self) -> list[Message]:
@@ -260,7 +277,10 @@ class Homing:
             self._go(north, east, min(self._settings.number("rth_hovering_altitude"), self._height))
         else:
             self._stop_body()
-            self._set(RthState.AVAILABLE, StateReason.FINISHED)
+            if Quirk.RTH_FINISHED_MISSING in self._faults.quirks:
+                self._state = (RthState.AVAILABLE, StateReason.ENABLED)
+            else:
+                self._set(RthState.AVAILABLE, StateReason.FINISHED)
             ending: RthEndingBehavior = self._settings["rth_ending"]
             return ending
         return None

@@ -21,6 +21,7 @@ class Event(enum.Enum):
     LAND = "command Landing, or the end of a return home that is to land"
     EMERGENCY = "command Emergency"
     CLIMB = "positive gaz in a PCMD"
+    ABORT_LANDING = "command TakeOff, or SmartTakeOffLand on the Ai, in a landing"
     FORCED_LANDING = "battery empty"
     RAMPED_UP = "motors at speed, take-off wanted"
     IDLING = "motors at speed, hand launch wanted"
@@ -80,6 +81,7 @@ TRANSITIONS: dict[FlyingState, dict[Event, FlyingState]] = {
     },
     LANDING: {
         Event.CLIMB: FLYING,
+        Event.ABORT_LANDING: FLYING,
         Event.TOUCHDOWN: LANDED,
         Event.FORCED_LANDING: EMERGENCY_LANDING,
         Event.EMERGENCY: EMERGENCY,

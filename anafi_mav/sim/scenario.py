@@ -32,6 +32,7 @@ from anafi_mav.errors import ConfigError
 from anafi_mav.sim.faults import Faults, Impairment
 from anafi_mav.sim.motion import Pose
 from anafi_mav.sim.power import Battery
+from anafi_mav.sim.quirks import QUIRKS
 from anafi_mav.sim.wind import GUSTS, Wind, WindSpec
 
 MAX_STEPS = 1000
@@ -95,6 +96,7 @@ class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True, rename={"for
     refuse_take_off: list[str] | UnsetType = UNSET
     refuse_plan: list[str] | UnsetType = UNSET
     storage_full: bool | UnsetType = UNSET
+    firmware_quirks: list[str] | UnsetType = UNSET
     wind: Blow | UnsetType = UNSET
     throw: bool | UnsetType = UNSET
 
@@ -247,6 +249,8 @@ def _changes(step: Step) -> Iterable[tuple[str, Any]]:
         yield "refuse_take_off", frozenset(_CHECKS[name] for name in step.refuse_take_off)
     if step.refuse_plan is not UNSET:
         yield "refuse_plan", frozenset(_PARTS[name] for name in step.refuse_plan)
+    if step.firmware_quirks is not UNSET:
+        yield "quirks", frozenset(QUIRKS[name] for name in step.firmware_quirks)
     if step.link is not UNSET:
         for name, direction in (("up", step.link.up), ("down", step.link.down)):
             chosen = direction or step.link.both
@@ -280,6 +284,7 @@ def _check(path: str, step: Step) -> None:
     for key, chosen, choice in (
         ("refuse_take_off", step.refuse_take_off, _CHECKS),
         ("refuse_plan", step.refuse_plan, _PARTS),
+        ("firmware_quirks", step.firmware_quirks, QUIRKS),
     ):
         for index, name in enumerate([] if chosen is UNSET else chosen):
             _one_of(f"{path}.{key}[{index}]", name, choice)

@@ -35,6 +35,8 @@ RETURN_HOME, TAKEOFF_LAND, RESET_CAMERA, RESET_ZOOM = range(4)
 
 ATTITUDE_PERIOD = 0.05
 """s between two attitudes of the controller: 20 Hz (anafi_ros)."""
+PLACE_PERIOD = 1.0
+"""s between two reports of the controller's place to the drone."""
 STICKS_PERIOD = 0.05
 """s between two PCMDs of the controller's own."""
 LETTING_GO = 10
@@ -83,6 +85,8 @@ class Skycontroller:
         """Percent."""
         self.attitude = (0.0, 0.0, 0.0)
         """Roll, pitch, yaw in rad of the thing in the pilot's hands."""
+        self.position: tuple[float, float, float] | None = None
+        """deg, deg, m above sea level; None while its GPS has no fix. See `locate`."""
         self.source = Source.SKY_CONTROLLER
         self.axes = [0] * 6
         """Percent that each axis is deflected."""
@@ -107,6 +111,7 @@ class Skycontroller:
         self._radio = True
         self._now = 0.0
         self._next_attitude = 0.0
+        self._next_place = 0.0
         self._next_sticks = 0.0
         self._to_let_go = 0
 
@@ -168,6 +173,18 @@ class Skycontroller:
             return camera.ResetZoom(0)
         return None
 
+    def locate(self, latitude: float, longitude: float, altitude: float) -> None:
+        """Carry the controller to a place (deg, deg, m above sea level) where its GPS has a fix."""
+        self.position = (latitude, longitude, altitude)
+        self._note("controller gps", {"latitude": latitude, "longitude": longitude})
+        self._tell(*self._place_messages())
+        self._next_place = self._now
+
+    def _place_messages(self) -> list[Message]:
+        if self.position is None:
+            return [skyctrl.GpsFixChanged(0), skyctrl.GpsPositionChanged(500.0, 500.0, 500.0, 500.0)]
+        return [skyctrl.GpsFixChanged(1), skyctrl.GpsPositionChanged(*self.position, 0.0)]
+
     # -- the radio between controller and drone
 
     @property
@@ -209,6 +226,9 @@ class Skycontroller:
         if now >= self._next_attitude:
             self._next_attitude = max(self._next_attitude + ATTITUDE_PERIOD, now)
             self._tell(skyctrl.AttitudeChanged(*_quaternion(*self.attitude)))
+        if self.position is not None and self._radio and now >= self._next_place:
+            self._next_place = now + PLACE_PERIOD
+            self._forward(ardrone3.SendControllerGPS(*self.position, 2.0, 3.0), now)
         while self._calibration and now >= self._calibration[0][0]:
             self._tell(skyctrl.MagnetoCalibrationStateV2(self._calibration.pop(0)[1]))
         if self.source is not Source.SKY_CONTROLLER or now < self._next_sticks:
@@ -334,8 +354,7 @@ class Skycontroller:
             skyctrl.PilotingSource(self.source),
             skyctrl.BatteryChanged(self.battery),
             skyctrl.BatteryState(skyctrl.BatteryStatus.DISCHARGING),
-            skyctrl.GpsFixChanged(0),
-            skyctrl.GpsPositionChanged(500.0, 500.0, 500.0, 500.0),
+            *self._place_messages(),
             skyctrl.MagnetoCalibrationQualityUpdatesState(0),
             skyctrl.MagnetoCalibrationState(skyctrl.CalibrationStatus.CALIBRATED, 255, 255, 255),
             skyctrl.MagnetoCalibrationStateV2(skyctrl.State.CALIBRATED),

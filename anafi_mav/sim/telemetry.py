@@ -10,6 +10,7 @@ from __future__ import annotations
 from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.arsdk.wire import Message
 from anafi_mav.sim.firmware import Firmware
+from anafi_mav.sim.quirks import Quirk
 
 RATE = 5.0
 """Hz of the aircraft."""
@@ -37,7 +38,8 @@ class Telemetry:
             messages += firmware.follow.telemetry()
             messages.append(ardrone3.AltitudeAboveGroundChanged(firmware.pose.up))
         if self._position.due(now):
-            messages += firmware.position_report()
+            if Quirk.GPS_LOCATION_STOPS not in firmware.faults.quirks:
+                messages += firmware.position_report()
             messages.append(firmware.battery.voltage())
         return messages
 

@@ -13,6 +13,8 @@ from support.world import loopback
 
 from anafi_mav import geo
 
+pytestmark = pytest.mark.third_party
+
 HOME = (48.8789, 2.3677, 35.0)
 SCRIPT = Path(__file__).with_name("dronekit_flight.py")
 

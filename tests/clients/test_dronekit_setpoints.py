@@ -12,6 +12,8 @@ from support.product import program
 from support.setpoints import allow_speed, held
 from support.world import world
 
+pytestmark = pytest.mark.third_party
+
 SCRIPT = Path(__file__).with_name("dronekit_setpoints.py")
 
 

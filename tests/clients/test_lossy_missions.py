@@ -12,6 +12,8 @@ from support.plans import ACCEPTED, MISSION, Item, content, download, mission, u
 from support.product import program
 from support.world import HOME, UDP_PORT, World, world
 
+pytestmark = pytest.mark.third_party
+
 SCRIPT = Path(__file__).with_name("mavsdk_lossy.py")
 
 COUNT = 500

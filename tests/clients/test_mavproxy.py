@@ -18,6 +18,8 @@ from support.world import loopback
 
 from anafi_mav import geo
 
+pytestmark = pytest.mark.third_party
+
 HOME = (48.8789, 2.3677, 35.0)
 MAVPROXY = shutil.which("mavproxy.py", path=str(Path(sys.executable).parent)) or "mavproxy.py"
 

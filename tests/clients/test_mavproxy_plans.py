@@ -17,6 +17,8 @@ from support.world import HOME, World, world
 
 from anafi_mav.mavlink import dialect as newer
 
+pytestmark = pytest.mark.third_party
+
 MAVPROXY = shutil.which("mavproxy.py", path=str(Path(sys.executable).parent)) or "mavproxy.py"
 PLACE = (HOME[0], HOME[1])
 

@@ -17,6 +17,8 @@ from support.params import fetch
 from support.product import Process, program
 from support.world import World, world
 
+pytestmark = pytest.mark.third_party
+
 MAVPROXY = shutil.which("mavproxy.py", path=str(Path(sys.executable).parent)) or "mavproxy.py"
 
 

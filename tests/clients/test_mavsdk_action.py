@@ -9,6 +9,8 @@ import pytest
 from support.product import program
 from support.world import world
 
+pytestmark = pytest.mark.third_party
+
 SCRIPT = Path(__file__).with_name("mavsdk_action.py")
 
 

@@ -13,6 +13,8 @@ from support.world import loopback
 
 from anafi_mav import geo
 
+pytestmark = pytest.mark.third_party
+
 EXAMPLE = Path(__file__).parents[2] / "examples" / "takeoff_goto_land.py"
 HOME = (48.8789, 2.3677, 35.0)
 

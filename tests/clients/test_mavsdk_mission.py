@@ -14,6 +14,8 @@ from support.world import HOME, World, world
 from anafi_mav.plans import files
 from anafi_mav.services.mission_items import to_wire
 
+pytestmark = pytest.mark.third_party
+
 SCRIPT = Path(__file__).with_name("mavsdk_mission.py")
 SAMPLES = sorted((Path(__file__).parents[2] / "missions").glob("*.plan"))
 

@@ -11,6 +11,8 @@ from support.plans import FENCE, RALLY, download
 from support.product import program
 from support.world import HOME, world
 
+pytestmark = pytest.mark.third_party
+
 SCRIPT = Path(__file__).with_name("mavsdk_plans.py")
 
 

@@ -11,6 +11,8 @@ from support.params import fetch
 from support.product import Process, program
 from support.world import world
 
+pytestmark = pytest.mark.third_party
+
 SCRIPT = Path(__file__).with_name("mavsdk_setup.py")
 
 

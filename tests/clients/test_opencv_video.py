@@ -11,6 +11,8 @@ import pytest
 from support.process import simulator_process
 from support.world import loopback
 
+pytestmark = pytest.mark.third_party
+
 SCRIPT = """
 import json, os, sys
 os.environ["OPENCV_FFMPEG_CAPTURE_OPTIONS"] = "rtsp_transport;udp"

@@ -22,6 +22,8 @@ from support.world import HOME, loopback
 
 from anafi_mav.plans import files
 
+pytestmark = pytest.mark.third_party
+
 SCRIPT = Path(__file__).with_name("mavsdk_fleet_missions.py")
 MISSIONS = Path(__file__).parents[2] / "missions"
 

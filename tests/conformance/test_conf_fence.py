@@ -22,6 +22,7 @@ from support.plans import FENCE, RALLY, Item, around, circle, clear, content, do
 from support.world import HOME, MODES, World, world
 
 from anafi_mav import geo
+from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.config import Config, DroneConfig
 from anafi_mav.gateway import Gateway
 from anafi_mav.units import quaternion_from_euler
@@ -236,7 +237,7 @@ async def test_conf_076_warned_and_nothing_else() -> None:
 
 
 async def test_conf_076_the_pilot_at_the_skycontroller_has_the_last_word() -> None:
-    """He leans on his stick. The drone holds once, then his sticks are his again: he flies on, and is warned."""
+    """His sticks have the drone: nothing acts against him, he is warned."""
     async with world(speed=1.0, skycontroller=3) as w:
         assert (await upload(w.client, square(PLACE, 20.0), FENCE)).type == TAKEN
         await w.take_off()
@@ -247,7 +248,7 @@ async def test_conf_076_the_pilot_at_the_skycontroller_has_the_last_word() -> No
         await said(w.client, "Fence ahead: ", since=mark, timeout=20.0)
         await said(w.client, "Fence breach: ", since=mark, timeout=20.0)
         await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 24.0, 20.0)
-        assert len([text for text in texts(w.client, mark) if text.endswith(": hold")]) == 1
+        assert [text for text in texts(w.client, mark) if text.endswith(": hold")] == []
 
 
 @both
@@ -451,6 +452,52 @@ async def test_the_next_gateway_puts_the_geofence_back() -> None:
             await until(lambda: own_fence(w) == (100.0, 0))
 
 
+# Its centre behind a Skycontroller with GPS is the pilot (S10).
+
+CENTRE = "ardrone3.GPSSettingsState.GeofenceCenterChanged"
+
+
+async def pilot_goes_to(w: World, north: float) -> None:
+    """Carry the Skycontroller to a place so many metres north of the take-off; the drone reports its new centre."""
+    pilot, place = w.drone.skycontroller, around(PLACE, (north, 0.0))[0]
+    assert pilot is not None
+    pilot.locate(*place, HOME[2])
+    await w.drone.wait_log(
+        lambda e: e.name == CENTRE and geo.distance(e.args["latitude"], e.args["longitude"], *place) < 0.1, 5.0
+    )
+
+
+@both
+async def test_goto_within_the_drones_limit_of_the_pilot_is_flown_and_beyond_it_refused(flavour: str) -> None:
+    async with world(flavour=flavour, skycontroller=3) as w:
+        w.drone.firmware.receive(ardrone3.MaxDistance(60.0), 0.0)
+        w.drone.firmware.receive(ardrone3.NoFlyOverMaxDistance(1), 0.0)
+        await w.take_off()
+        await pilot_goes_to(w, 50.0)
+        mark = w.client.mark()
+        for north, result in ((-20.0, DENIED), (90.0, ACCEPTED)):
+            place = around(PLACE, (north, 0.0))[0]
+            ack = await w.client.command(REPOSITION, -1, 1, 0, NAN, x=place[0], y=place[1], z=6.0, frame=3)
+            assert ack.result == result, (north, texts(w.client, mark))
+        assert "Goto refused: 70 m from geofence centre > 60 m" in texts(w.client, mark)
+        assert len(w.commands("ardrone3.Piloting.moveTo")) == 1
+
+
+async def test_fence_circle_is_the_drones_own_only_while_its_centre_is_near() -> None:
+    async with world(skycontroller=3) as w:
+        assert (await upload(w.client, [circle(PLACE, 60.0)], FENCE)).type == TAKEN
+        await until(lambda: own_fence(w) == (60.0, 1))
+        await pilot_goes_to(w, 4.0)
+        await w.take_off()
+        await w.client.wait("HEARTBEAT")
+        await w.client.wait("HEARTBEAT")
+        assert own_fence(w) == (60.0, 1)
+        mark = w.client.mark()
+        await pilot_goes_to(w, 7.0)
+        await said(w.client, "Drone's fence circle ends: its centre is 7 m off", since=mark)
+        await until(lambda: own_fence(w) == (100.0, 0))
+
+
 # Rally points.
 
 
@@ -461,7 +508,7 @@ async def test_conf_077_rally_points_are_kept_and_not_used(flavour: str) -> None
         points = [rally(around(PLACE, (60.0, 0.0))[0], 15.0), rally(around(PLACE, (0.0, 80.0))[0], 20.0)]
         mark = w.client.mark()
         assert (await upload(w.client, points, RALLY)).type == TAKEN
-        await said(w.client, "2 rally points kept and not used", since=mark)
+        await said(w.client, "Rally points not used: RTL_TYPE is home (2)", since=mark)
         assert [content(item) for item in await download(w.client, RALLY)] == [item.content for item in points]
         await w.take_off()
         for _ in range(3):

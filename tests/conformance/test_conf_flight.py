@@ -170,6 +170,8 @@ async def test_conf_025_return_to_its_end(flavour: str, end: int) -> None:
         client = w.client
         value = await write(client, "ANF_RTH_END", end, 6 if flavour == "px4" else 9, flavour)
         assert value_of(value, flavour) == end
+        if end == newer.ANAFI_RETURN_END_HOVERING:  # the gateway would land it
+            await write(client, "ANF_RTL_END", 1, 6 if flavour == "px4" else 9, flavour)
         assert (await client.command(511, newer.MAVLINK_MSG_ID_ANAFI_HOME, 20_000)).result == ACCEPTED
         await client.wait("ANAFI_HOME", lambda m: (m.end, m.min_altitude, m.hovering_altitude) == (end, 20.0, 10.0))
         await w.take_off()
@@ -205,7 +207,10 @@ async def test_conf_025_return_to_its_end(flavour: str, end: int) -> None:
             assert at_home(w)
             assert w.drone.pose.up == pytest.approx(10.0, abs=0.3)
             assert (await client.command(21)).result == ACCEPTED
-        await client.heartbeat(lambda beat: beat.custom_mode == w.modes.land and beat.base_mode & ARMED, since=flying)
+            flying = client.mark()
+        # A landing that is a return's own is shown as Return to its end.
+        mode = w.modes.land if end == newer.ANAFI_RETURN_END_HOVERING else w.modes.returning
+        await client.heartbeat(lambda beat: beat.custom_mode == mode and beat.base_mode & ARMED, since=flying)
         await client.heartbeat(lambda beat: not beat.base_mode & ARMED, since=flying, timeout=20.0)
         assert w.drone.flying_state.name == "LANDED"
         assert at_home(w)

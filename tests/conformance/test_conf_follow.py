@@ -91,6 +91,25 @@ async def test_conf_107_a_target_leads(flavour: str) -> None:
         assert (pose.vn, pose.ve) == pytest.approx((1.06, 1.06), abs=0.4)
 
 
+async def test_follow_target_that_asks_for_less_than_1_m_is_followed_at_the_present_height() -> None:
+    """MAVSDK's example sends an altitude of 0, which above sea level is far below the ground."""
+    async with world(speed=1.0) as w:
+        await w.take_off(6.0)
+        allow_speed(w)
+        target_mode = struct.unpack("<f", struct.pack("<i", 2))[0]  # an INT32 travels as the bits of a float
+        await write(w, "FLW_TGT_ALT_M", target_mode, dialect.MAV_PARAM_TYPE_INT32)
+        await w.client.wait("GLOBAL_POSITION_INT", lambda m: abs(m.relative_alt / 1000 - w.drone.pose.up) < 0.1)
+        assert await follow(w.client, "px4") == 0
+        mark = w.client.mark()
+        async with streaming(w.client, target(30.0, 0.0, altitude=0.0), 0.5):
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["vn"] > 1.0, 10.0)
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 15.0, 20.0)
+            await w.client.wait(
+                "STATUSTEXT", lambda m: "Follow height kept: -27 m above take-off" in m.text, since=mark
+            )
+        assert w.drone.pose.up == pytest.approx(6.0, abs=0.5)
+
+
 @both
 async def test_a_target_that_falls_silent_is_hovered_for(flavour: str) -> None:
     async with world(speed=1.0, flavour=flavour) as w:
@@ -152,7 +171,7 @@ async def test_where_it_may_not_fly_it_does_not_follow() -> None:
         assert await follow(w.client, "px4") == 0
         began = now()
         for seen, text in [
-            (target(60.0, 0.0), "beyond the drone's limit"),
+            (target(60.0, 0.0), "from geofence centre > "),
             (target(0.0, 0.0, place=(0.0, 0.0)), "both 0"),
             (target(900.0, 0.0), "900 m away"),
             (target(10.0, 0.0, (60.0, 0.0)), "60 m/s"),

@@ -152,6 +152,15 @@ async def test_conf_143_condition_yaw_turns_the_way_that_is_asked_for() -> None:
         assert move["max_yaw_rotation_speed"] == 60.0
 
 
+@pytest.mark.parametrize("reference", [3.0, 0.5, -1.0, math.inf])
+async def test_conf_143_condition_yaw_of_an_unknown_reference_is_denied(reference: float) -> None:
+    """Taken for absolute it would turn the wrong way; ArduCopter refuses it too."""
+    async with world() as w:
+        await w.take_off(5.0)
+        assert (await w.client.command(YAW, 90, 60, 1, reference)).result == DENIED
+        assert sent(w, "move.extended_move_by") == []
+
+
 async def test_conf_143_condition_yaw_on_the_way() -> None:
     async with world() as w:
         await w.take_off(10.0)

@@ -201,9 +201,9 @@ async def test_conf_015_capabilities(flavour: str) -> None:
         mark = w.client.mark()
         await w.client.command(512, 148)
         bits = (await w.client.wait("AUTOPILOT_VERSION", since=mark)).capabilities
-        # MISSION_INT 4, COMMAND_INT 8, FTP 32, SET_ATTITUDE_TARGET 64, SET_POSITION_TARGET_LOCAL_NED 128 and
-        # _GLOBAL_INT 256, MAVLINK2 8192, FENCE 16384, RALLY 32768; PARAM_ENCODE_BYTEWISE 16 or _C_CAST 131072
-        served = 4 | 8 | 32 | 64 | 128 | 256 | 8192 | 16384 | 32768
+        # MISSION_FLOAT 1, MISSION_INT 4, COMMAND_INT 8, FTP 32, SET_ATTITUDE_TARGET 64, SET_POSITION_TARGET_LOCAL_NED
+        # 128 and _GLOBAL_INT 256, MAVLINK2 8192, FENCE 16384, RALLY 32768; PARAM_ENCODE_BYTEWISE 16 or _C_CAST 131072
+        served = 1 | 4 | 8 | 32 | 64 | 128 | 256 | 8192 | 16384 | 32768
         encoding = 16 if flavour == "px4" else 131072
         assert bits == served | encoding
     async with world(flavour=flavour, allow_kill=True) as w:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import pytest
@@ -82,18 +83,23 @@ async def test_conf_129_a_calibration_is_cancelled(way: str) -> None:
 
 @both
 async def test_conf_148_reboot(flavour: str) -> None:
-    """Accepted, then silence, then a vehicle that says anew who it is."""
-    async with world(flavour=flavour) as w:
+    """Accepted once, within dronekit's half a second, then silence, then a vehicle that identifies itself again."""
+    async with world(flavour=flavour, speed=1.0) as w:
         for wrong in (2, 3, 0, math.nan):
             assert (await w.client.command(REBOOT, wrong)).result == DENIED
-        assert (await w.client.command(REBOOT, 1, timeout=15.0)).result == ACCEPTED
+        mark = w.client.mark()
+        assert (await w.client.command(REBOOT, 1)).result == ACCEPTED
         assert len(w.commands("common.Common.Reboot")) == 1
+        w.simulator.speed = 3.0
+        power = await w.drone.wait_log(lambda e: e.name == "power", 20.0)
+        assert power.args["on"] is False
+        await w.drone.wait_log(lambda e: e.name == "power" and e.args["on"], 40.0)
         silent = w.client.mark()
         beat = await w.client.heartbeat(lambda beat: True, since=silent, timeout=40.0)
         assert not beat.base_mode & ARMED
-        at = next(at for at, m in w.client.received[silent:] if m.get_type() == "HEARTBEAT")
-        last = max(at for at, m in w.client.received[:silent] if m.get_type() == "HEARTBEAT")
-        assert at - last > 1.5  # a regular heartbeat was missing
+        beats = [at for at, m in w.client.received if m.get_type() == "HEARTBEAT"]
+        assert max(after - before for before, after in itertools.pairwise(beats)) > 1.5  # regular ones were missing
+        assert [m.result for _, m in w.client.since(mark, "COMMAND_ACK") if m.command == REBOOT] == [ACCEPTED]
         mark = w.client.mark()
         assert (await w.client.command(dialect.MAV_CMD_REQUEST_MESSAGE, 148)).result == ACCEPTED
         await w.client.wait("AUTOPILOT_VERSION", since=mark)

@@ -230,13 +230,13 @@ async def test_conf_126_what_happens() -> None:
         mark = w.client.mark()
         await w.take_off(3.0)
         assert (await w.client.command(21)).result == ACCEPTED
-        await w.client.wait("EVENT", lambda m: events.read(m)[0] == "landing_detected", since=mark, timeout=20.0)
+        await w.client.wait("EVENT", lambda m: events.read(m)[0] == "disarmed", since=mark, timeout=20.0)
         names = [events.read(m)[0] for _, m in w.client.since(mark, "EVENT")]
         assert [name for name in names if "summary" not in name] == [
             "armed",
             "takeoff_detected",
-            "disarmed",
             "landing_detected",
+            "disarmed",
         ]
 
 

@@ -18,11 +18,11 @@ from support.missions import (
     LAND,
     PAUSED,
     RTL,
-    first,
     mode,
     put,
     reached,
     said,
+    settled,
     start,
     state,
     takeoff,
@@ -32,7 +32,8 @@ from support.plans import Item
 from support.trouble import return_by_itself
 from support.world import ARMED, World, world
 
-from anafi_mav.arsdk.messages import common
+from anafi_mav.arsdk.messages import ardrone3, common
+from anafi_mav.sim.quirks import Quirk
 
 WAIT = Item(93, 0.0, 0.0, p1=2.0, frame=2)
 
@@ -85,11 +86,10 @@ async def test_conf_073_an_end_that_the_drone_does_not_tell(flavour: str, model:
         await state(w, COMPLETE, since=mark)
         assert reached(w) == [0, 1, 2, 3]
         await mode(w, w.modes.land if last is LAND else w.modes.returning, since=mark)
-        if last is LAND:
-            await w.client.heartbeat(lambda beat: not beat.base_mode & ARMED, since=mark, timeout=40.0)
-        else:
-            await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.idle, timeout=40.0)
-        assert told_after(w, entry) == []
+        await w.client.heartbeat(lambda beat: not beat.base_mode & ARMED, since=mark, timeout=40.0)
+        assert told_after(w, entry) == (
+            [] if last is LAND else ["ardrone3.Piloting.Landing"]
+        )  # above home: ANF_RTL_END
         lines = [e.args["idx"] for e in w.drone.log if e.name == common.MissionItemExecuted.NAME]
         assert lines == [*range(len(w.drone.firmware.flight_plan._items) - 1)]
         assert reached(w) == [0, 1, 2, 3]
@@ -120,7 +120,7 @@ async def test_conf_074_a_plan_that_is_stopped_before_its_landing_is_paused(flav
         stop = w.drone.firmware.flight_plan.stop
         mark, entry = await to_the_last_line(w, last, lambda: stop(hover=True))
         await state(w, PAUSED, seq=3, since=mark)
-        await said(w, f"Mission paused at item {3 + first(w)}: the drone has stopped"[:50], since=mark)
+        await said(w, "Mission paused at item 4: the drone has stopped"[:50], since=mark)
         await mode(w, w.modes.idle, since=mark)
         assert reached(w) == [0, 1, 2]
         assert told_after(w, entry) == []
@@ -135,3 +135,80 @@ async def test_conf_074_a_return_of_the_batterys_at_the_last_line_is_not_the_pla
         await mode(w, w.modes.returning, since=mark)
         assert reached(w) == [0, 1, 2]
         assert told_after(w, entry) == []
+
+
+# A last line that is a way point or a wait (S8).
+
+PLAIN = {
+    "way-point": [takeoff(6.0), way(9.0, 0.0, 6.0), way(9.0, 9.0, 6.0)],
+    "wait": [takeoff(6.0), way(9.0, 9.0, 6.0), Item(93, 0.0, 0.0, p1=1.0, frame=2)],
+}
+plain = pytest.mark.parametrize("items", PLAIN.values(), ids=PLAIN)
+EXECUTED = common.MissionItemExecuted.NAME
+
+
+def lines_reported(w: World) -> list[int]:
+    return [entry.args["idx"] for entry in w.drone.log if entry.name == EXECUTED]
+
+
+@both
+@pytest.mark.parametrize("model", ["4k", "ai"])
+@plain
+async def test_mission_whose_last_line_is_not_reported_completes_at_the_last_way_point(
+    flavour: str, model: str, items: list[Item]
+) -> None:
+    async with world(flavour=flavour, model=model, web=True) as w:
+        w.drone.faults.quirks = frozenset({Quirk.LAST_ITEM_NOT_REPORTED})
+        await put(w, items)
+        await start(w)
+        await state(w, COMPLETE, since=0)
+        assert reached(w) == [0, 1, 2]
+        await mode(w, w.modes.idle)
+        last = len(w.drone.firmware.flight_plan._items) - 1
+        assert lines_reported(w) == [*range(last)]
+        await settled(w, (9.0, 9.0, 6.0))
+        assert [m.text for _, m in w.client.since(0, "STATUSTEXT") if "paused" in m.text] == []
+
+
+@plain
+async def test_mission_whose_last_line_is_reported_after_stopped_completes(items: list[Item]) -> None:
+    async with world(web=True) as w:
+        w.drone.faults.quirks = frozenset({Quirk.STOPPED_BEFORE_EXECUTED})
+        await put(w, items)
+        await start(w)
+        await state(w, COMPLETE, since=0)
+        assert reached(w) == [0, 1, 2]
+        assert [m.text for _, m in w.client.since(0, "STATUSTEXT") if "paused" in m.text] == []
+
+
+@pytest.mark.parametrize("last", [LAND, RTL], ids=["land", "return"])
+@pytest.mark.parametrize("quirk", [Quirk.LAST_ITEM_NOT_REPORTED, Quirk.STOPPED_BEFORE_EXECUTED])
+async def test_mission_with_quirk_that_lands_or_returns_completes(quirk: Quirk, last: Item) -> None:
+    async with world(web=True) as w:
+        w.drone.faults.quirks = frozenset({quirk})
+        await put(w, [takeoff(6.0), way(9.0, 0.0, 6.0), last])
+        await start(w)
+        await state(w, COMPLETE, since=0)
+        assert reached(w) == [0, 1, 2]
+
+
+async def test_mission_stopped_on_the_way_to_its_last_way_point_is_paused() -> None:
+    """Another controller stops it 60 m before its end: nothing is there to be claimed."""
+    async with world(web=True) as w:
+        await put(w, [takeoff(6.0), way(9.0, 0.0, 6.0), way(80.0, 0.0, 6.0)])
+        await start(w)
+        await state(w, ACTIVE, seq=2, since=0)
+        w.drone.firmware.flight_plan.stop(hover=True)
+        await state(w, PAUSED, seq=2)
+        await said(w, "Mission paused at item 3: the drone has stopped it")
+        assert reached(w) == [0, 1]
+
+
+async def test_mission_stopped_by_an_alert_at_its_last_way_point_is_paused() -> None:
+    async with world(web=True) as w:
+        w.drone.faults.quirks = frozenset({Quirk.LAST_ITEM_NOT_REPORTED})
+        await put(w, PLAIN["wait"])
+        while_it_waits(w, lambda: w.drone._emit(ardrone3.AlertStateChanged(ardrone3.AlertState.CRITICAL_BATTERY)))
+        await start(w)
+        await state(w, PAUSED, seq=2, since=0)
+        assert reached(w) == [0, 1]

@@ -170,7 +170,7 @@ async def test_an_ai_leaves_out_a_way_point_that_it_cannot_reach() -> None:
         somebody_else(w, ardrone3.MaxDistance(20.0))
         somebody_else(w, ardrone3.NoFlyOverMaxDistance(1))
         skipped = await w.drone.wait_log(lambda e: e.name == "flight_plan.waypoint_skipped", timeout=30.0)
-        await said(w, "item 2 was out of reach")
+        await said(w, "item 3 was out of reach")
         await state(w, COMPLETE, since=0)
         assert reached(w) == [0, 1, 3]
         assert skipped.args["item"] == 3, "a line of its file"

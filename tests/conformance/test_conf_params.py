@@ -86,7 +86,7 @@ async def test_conf_042_parameter_list(flavour: str) -> None:
         assert {m.get_srcComponent() for m in values} == {1}
         assert {m.param_id for m in values} >= {*NATIVE, *(A5_PX4 if flavour == "px4" else WANTED_ARDUPILOT)}
         # Settings of a later generation, and what only the Ai has, are nothing that a 4K would show.
-        assert not {m.param_id for m in values} & {"ANF_HORI_SPEED", "ANF_OBS_AVOID", "COM_OBS_AVOID"}
+        assert not {m.param_id for m in values} & {"ANF_HORI_SPEED", "ANF_OBS_AVOID"}
 
 
 @both
@@ -206,7 +206,6 @@ TWINS_PX4 = [
     ("GF_MAX_VER_DIST", 80.0, REAL32, "ANF_MAX_ALT", 80.0, "ardrone3.PilotingSettings.MaxAltitude", {"current": 80.0}),
     ("GF_MAX_HOR_DIST", 500.0, REAL32, "ANF_GEOFENCE", 1.0, FENCE, {"shouldNotFlyOver": 1}),
     ("RTL_DESCEND_ALT", 5.0, REAL32, "ANF_RTH_END_ALT", 5.0, "rth.set_ending_hovering_altitude", {"altitude": 5.0}),
-    ("RTL_LAND_DELAY", 0.0, REAL32, "ANF_RTH_END", 0.0, "rth.set_ending_behavior", {"ending_behavior": 0}),
     ("COM_LOW_BAT_ACT", 2, INT32, "ANF_RTH_AUTO", 0.0, "rth.set_auto_trigger_mode", {"mode": 0}),
 ]  # fmt: skip
 
@@ -218,7 +217,6 @@ TWINS_ARDUPILOT = [
     ("FENCE_RADIUS", 500.0, REAL32, "ANF_MAX_DIST", 500.0, "ardrone3.PilotingSettings.MaxDistance", {"value": 500.0}),
     ("FENCE_TYPE", 3, INT8, "ANF_GEOFENCE", 1.0, FENCE, {"shouldNotFlyOver": 1}),
     ("RTL_ALT", 4000, INT32, "ANF_RTH_ALT", 40.0, "rth.set_min_altitude", {"altitude": 40.0}),
-    ("RTL_ALT_FINAL", 0, INT16, "ANF_RTH_END", 0.0, "rth.set_ending_behavior", {"ending_behavior": 0}),
     ("BATT_FS_LOW_ACT", 0, INT8, "ANF_RTH_AUTO", 0.0, "rth.set_auto_trigger_mode", {"mode": 0}),
 ]  # fmt: skip
 

@@ -11,6 +11,7 @@ import json
 import sys
 import time
 import urllib.request
+from pathlib import Path
 
 from olympe.features.video.pdraw import Callbacks, StreamInfo, video_frame_type
 from olympe.messages import camera, camera2
@@ -21,6 +22,9 @@ from olympe_look import NAMES, Look, Watch
 
 
 class Video(Look, Visit):
+    log: Path
+    """The simulator's."""
+
     def together(self, names: list[str]) -> None:
         """All streams in one session."""
         watches = {name: Watch() for name in names}
@@ -73,9 +77,19 @@ class Video(Look, Visit):
             (media,) = json.load(answer)
         watch = self.play(name, media["replay_url"])
         self.say("replay", watch.wait(1))
+        self.say("replay finished", self.wait_for_end_of_recording())
         watch.wait_for_silence(4.0)
         self.stop("replay", watch)
         self.result["streams"]["replay"]["duration"] = media["duration"]
+
+    def wait_for_end_of_recording(self) -> bool:
+        """Wait until the simulator has sent the last picture: it writes its log beside our folder."""
+        deadline = time.monotonic() + LIMIT
+        while '"finished"' not in self.log.read_text(encoding="utf-8"):
+            if time.monotonic() > deadline:
+                return False
+            time.sleep(0.1)  # another process writes the file
+        return True
 
     def watch_all(self) -> None:
         self.begin("video")
@@ -94,9 +108,10 @@ class Video(Look, Visit):
 
 
 def main() -> None:
-    *where, _folder = sys.argv[1:]
+    *where, folder = sys.argv[1:]
     quiet()
     visit = Video(*where)
+    visit.log = Path(folder).with_name("sim.jsonl")
     if visit.connect():
         visit.watch_all()
         visit.begin("end")

@@ -25,7 +25,7 @@ UNHEARD = {
 }
 """Payloads of the commands of Olympe that are nothing to the simulated aircraft and controllers."""
 
-pytestmark = olympe.needed
+pytestmark = [pytest.mark.third_party, olympe.needed]
 
 
 # The controllers are those that Parrot sells with the models, and the fourth in front of an older one. Olympe's wire

@@ -29,6 +29,7 @@ CLONE_NEWNET = 0x40000000
 SCRIPT = Path(__file__).with_name("olympe_device.py")
 
 pytestmark = [
+    pytest.mark.third_party,
     pytest.mark.skipif(sys.platform != "linux", reason=f"network namespaces are Linux's, this is {sys.platform}"),
     pytest.mark.skipif(
         importlib.util.find_spec("olympe") is None,

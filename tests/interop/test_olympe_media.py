@@ -11,7 +11,7 @@ from support import olympe
 from support.process import simulator_process
 from support.world import loopback
 
-pytestmark = olympe.needed
+pytestmark = [pytest.mark.third_party, olympe.needed]
 
 
 @pytest.mark.parametrize("via", ["drone", "skycontroller"])

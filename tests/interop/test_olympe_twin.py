@@ -24,10 +24,13 @@ PORT = 8080
 WITHIN = 1.0
 """m."""
 
-pytestmark = pytest.mark.skipif(
-    importlib.util.find_spec("olympe") is None,
-    reason="Olympe is not installed: package parrot-olympe exists for x86-64 Linux, Python < 3.12",
-)
+pytestmark = [
+    pytest.mark.third_party,
+    pytest.mark.skipif(
+        importlib.util.find_spec("olympe") is None,
+        reason="Olympe is not installed: package parrot-olympe exists for x86-64 Linux, Python < 3.12",
+    ),
+]
 
 Point = tuple[float, float, float]
 

@@ -17,7 +17,7 @@ from anafi_mav.units import quaternion_from_euler
 
 SPEED = "2"
 
-pytestmark = olympe.needed
+pytestmark = [pytest.mark.third_party, olympe.needed]
 
 
 Pose = dict[str, float]

@@ -76,7 +76,7 @@ ITEMS: dict[int, Item] = {
     54: Item("_HASH_CHECK by QGroundControl's algorithm", PX4),
     55: Item("PARAM_SET of _HASH_CHECK stops the list", PX4),
     56: Item("AVAILABLE_MODES one by one and all; out of range DENIED"),
-    57: Item("CURRENT_MODE on change and every two seconds, as the heartbeat says"),
+    57: Item("CURRENT_MODE on change and every five seconds, as the heartbeat says"),
     58: Item("AVAILABLE_MODES_MONITOR tells that the list has changed"),
     59: Item("DO_SET_STANDARD_MODE"),
     60: Item("PROTOCOL_VERSION on request"),

@@ -69,10 +69,13 @@ def reached(w: World, since: int = 0) -> list[int]:
 async def state(
     w: World, wanted: int, *, seq: int | None = None, since: int | None = None, timeout: float = 30.0
 ) -> Any:
-    """Wait for a MISSION_CURRENT with a mission_state, and the current item counted from 0."""
+    """Wait for a MISSION_CURRENT with a mission_state, and the current item counted from 0.
+
+    Before a start ArduPilot's is 0, which is home.
+    """
     return await w.client.wait(
         "MISSION_CURRENT",
-        lambda m: whole(m).mission_state == wanted and seq in (None, m.seq - first(w)),
+        lambda m: whole(m).mission_state == wanted and seq in (None, max(m.seq - first(w), 0)),
         since=since,
         timeout=timeout,
     )

@@ -56,3 +56,26 @@ async def simulator_process(address: str, log: Path, *arguments: str) -> AsyncIt
             held.process.send_signal(signal.SIGCONT)
             held.process.terminate()
             await held.process.wait()
+
+
+@asynccontextmanager
+async def gateway_process(config: Path, limit: float) -> AsyncIterator[asyncio.subprocess.Process]:
+    """A gateway for the length of a block, whose event loop may stall for `limit` s behind a Skycontroller.
+
+    Real time counts for it: the limit is longer than the machine makes it wait.
+    """
+    code = f"import sys; from anafi_mav.arsdk import watchdog; from anafi_mav.cli import main; watchdog.LIMIT = {limit}"
+    process = await asyncio.create_subprocess_exec(
+        sys.executable, "-c", f"{code}; sys.exit(main(sys.argv[1:]))", "run", "-c", str(config),
+        stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.PIPE,
+    )  # fmt: skip
+    try:
+        assert process.stdout is not None
+        while not (line := await asyncio.wait_for(process.stdout.readline(), 100.0)).startswith(b"ready"):
+            assert line, "the gateway ended before it was ready"
+        yield process
+    finally:
+        if process.returncode is None:
+            process.send_signal(signal.SIGCONT)
+            process.terminate()
+            await process.wait()

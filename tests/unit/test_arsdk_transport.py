@@ -21,6 +21,8 @@ from anafi_mav.arsdk.transport import (
     LinkDown,
     Received,
     Role,
+    Silent,
+    Speaks,
     Transport,
     Undelivered,
 )
@@ -612,3 +614,68 @@ def test_no_bytes_of_a_peer_raise(role: Role, version: int, seed: int) -> None:
     assert sum(count for name, count in victim.counters.items() if name.startswith("garbage.")) > 100
     victim.receive(corpus[0], 1.2)
     assert any(frame.id == 1 for frame in frames(victim, victim.outgoing(1.2)))
+
+
+def test_a_fading_link_drops_what_waits_and_goes_on_when_the_peer_speaks() -> None:
+    transport = Transport(Role.CONTROLLER, 3, 0.0, ping_after=0.5, silence_limit=2.5, fades=True)
+    transport.send(tilt(1.0), 0.0)
+    transport.outgoing(0.0)
+    waiting = transport.send(tilt(2.0), 0.1)
+    for now in (0.5, 1.0, 1.5):
+        assert transport.expire(now) == []
+        transport.outgoing(now)
+    events = transport.expire(2.0)
+    assert events[-1] == Silent("3 pings unanswered, nothing received for 2.0 s")
+    assert Undelivered(waiting, "the link is silent") in events
+    # Only pings, however long, and nothing that is asked for meanwhile.
+    transport.send(tilt(3.0), 2.1)
+    transport.send(STICKS, 2.1)
+    for step in range(1, 20):
+        now = 2.0 + 0.5 * step
+        assert transport.expire(now) == []
+        assert {frame.id for frame in frames(transport, transport.outgoing(now))} <= {0}
+    spoken = transport.receive(data_frame(3, 126, 0, HOVERING), 12.0)
+    assert spoken == [Speaks(), Received(HOVERING)]
+    (answer,) = frames(transport, transport.outgoing(12.0))
+    assert answer.type == FrameType.ACK
+    transport.send(tilt(4.0), 12.0)
+    (frame,) = frames(transport, transport.outgoing(12.0))
+    assert (frame.seq, frame.payload[1:]) == (1, wire.encode(tilt(4.0)))
+
+
+# What another process sends for us.
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_frames_encoded_ahead_are_those_that_would_be_sent_next(version: int) -> None:
+    transport = Transport(Role.CONTROLLER, version, 0.0)
+    transport.send(tilt(1.0), 0.0)
+    transport.outgoing(0.0)
+    transport.receive(ack(version, 11, 0), 0.0)
+    ahead = transport.encode_ahead((tilt(2.0), tilt(3.0)))
+    assert [seq for seq, _ in ahead] == ([1, 2] if version == 1 else [1])
+    transport.send(tilt(2.0), 0.0)
+    transport.send(tilt(3.0), 0.0)
+    assert transport.outgoing(0.0) == [ahead[0][1]]
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_abandoned_commands_are_undelivered_and_their_numbers_not_used_again(version: int) -> None:
+    transport = Transport(Role.CONTROLLER, version, 0.0)
+    tokens = [transport.send(tilt(1.0), 0.0)]
+    transport.outgoing(0.0)
+    tokens.append(transport.send(tilt(2.0), 0.0))
+    transport.abandon("the host stalled", skip=2)
+    assert transport.outgoing(10.0) == []
+    assert transport.receive(b"", 0.1) == [Undelivered(token, "the host stalled") for token in tokens]
+    transport.send(tilt(3.0), 0.2)
+    assert [frame.seq for frame in frames(transport, transport.outgoing(0.2))] == [3]
+
+
+def test_silence_while_the_host_stalls_is_not_the_peers() -> None:
+    transport = Transport(Role.CONTROLLER, 3, 0.0, ping_after=0.5, silence_limit=2.5)
+    assert transport.expire(5.0) == []  # 4.5 s late
+    assert transport.deadline() == pytest.approx(5.5)
+    for now in (5.5, 6.0):
+        assert transport.expire(now) == []
+    assert [type(event) for event in transport.expire(6.5)] == [LinkDown]

@@ -115,7 +115,8 @@ def test_check_knows_how_the_drone_is_set(flight: Path, capsys: pytest.CaptureFi
     assert capsys.readouterr().out.splitlines()[-1].startswith("flight.plan: an ANAFI 4K flies it, ")
     assert main(["plan", "check", str(flight), "--model", "4k", "--max-altitude", "22"]) == 1
     assert (
-        capsys.readouterr().out.splitlines()[-1] == "flight.plan: error: item 8: 25 m is higher than the limit of 22 m"
+        capsys.readouterr().out.splitlines()[-1]
+        == "flight.plan: error: item 8: 25 m above take-off is higher than the limit of 22 m"
     )
     assert main(["plan", "check", str(flight), "--model", "4k", "--max-distance", "15"]) == 1
     assert "flight.plan: error: item 5: " in capsys.readouterr().out

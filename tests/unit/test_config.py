@@ -71,7 +71,7 @@ def test_every_value_survives() -> None:
         " rtsp_port: 555}\n"
         "  - {name: b, sysid: 2, sim: {home: [-33, 151, -2], address: 127.0.42.9, speed: 4, telemetry_rate: 30,"
         " seed: 7, protocol: 1, http_port: 8080, rtsp_port: 8555, skycontroller: 4, storage: 500k, scenario: bad-day.yaml,"
-        " wind: {speed: 8, direction: 270, gusts: 0.2}}}\n",
+        " wind: {speed: 8, direction: 270, gusts: 0.2}, firmware_quirks: [roll-inverted]}}\n",
         "fleet.yaml",
     )
     assert config == Config(
@@ -103,6 +103,7 @@ def test_every_value_survives() -> None:
                     storage="500k",
                     scenario="bad-day.yaml",
                     wind=WindConfig(speed=8.0, direction=270.0, gusts=0.2),
+                    firmware_quirks=("roll-inverted",),
                 ),
             ),
         ),

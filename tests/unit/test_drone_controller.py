@@ -143,11 +143,12 @@ async def test_both_are_read(crew: Crew) -> None:
 async def test_connecting_and_taking_off_leaves_the_sticks_to_the_pilot(crew: Crew) -> None:
     await crew.take_off()
     crew.drone.piloting.hover()
-    await crew.sees(lambda: crew.sc.dropped >= 5)  # what hover sends besides would have come before
+    await crew.drone.piloting.return_home()
     assert crew.told("setPilotingSource") == []
     assert crew.told("grab") == []
     crew.sc.stick(PITCH, 50)
     await crew.until(lambda entry: entry.kind == "command" and "PCMD" in entry.name)
+    assert crew.sc.dropped == 0  # no stick position of ours, level or not
 
 
 async def test_a_setpoint_takes_the_source_and_silence_gives_it_back(crew: Crew) -> None:
@@ -180,14 +181,14 @@ async def test_a_stick_of_the_pilot_takes_the_drone_at_once(crew: Crew) -> None:
         await crew.sees(lambda: crew.sc.source is Source.SKY_CONTROLLER)
         await crew.grabbed(0)
         assert now() - moved < 0.25
-        assert crew.drone.controller.pilot_flies
+        assert crew.drone.controller.pilot_acquired_control
         # The user goes on, and is not heard: it is the pilot who flies.
         flown = now()
         await crew.until(lambda entry: entry.t > flown + PILOT_KEEPS + 0.5)
         assert crew.sc.source is Source.SKY_CONTROLLER
         assert set(crew.sticks(flown)) == {0}
     crew.sc.stick(ROLL, 0)
-    await crew.hears(lambda: not crew.drone.controller.pilot_flies)
+    await crew.hears(lambda: not crew.drone.controller.pilot_acquired_control)
     # After a pause the user may have it again.
     async with crew.piloting():
         await crew.sees(lambda: crew.sc.source is Source.CONTROLLER)
@@ -485,7 +486,7 @@ async def test_a_controller_that_takes_the_source_back_ends_a_move() -> None:
         device.say(skyctrl.PilotingSource(Source.SKY_CONTROLLER))
         await device.until(ardrone3.CancelMoveTo)
         assert drone.piloting.move is None
-        assert drone.controller.pilot_flies
+        assert drone.controller.pilot_acquired_control
         device.say(ended(move))
         assert await asyncio.wait_for(move.result(), 3.0) is MoveEnd.CANCELED
         # The axes of the sticks are given back too: otherwise nobody would fly.
@@ -537,3 +538,52 @@ async def test_a_return_that_never_began_does_not_hold_the_source() -> None:
             await drone.piloting.return_home(timeout=0.2)
         await device.until(skyctrl.SetPilotingSource, 2)
         assert sources(device) == [Source.CONTROLLER, Source.SKY_CONTROLLER]
+
+
+def times_of(device: ScriptedDevice, kind: type[Message]) -> float:
+    return device.times(kind)[-1]
+
+
+async def test_axes_after_end_of_move_go_back_within_half_a_second() -> None:
+    async with behind() as (drone, device):
+        device.script[ardrone3.MoveTo] = under_way
+        move = await drone.piloting.move_to(48.0, 2.0, 5.0)
+        await asyncio.sleep(1.73)  # no multiple of any period
+        assert device.got(mapper.Grab)[-1].axes == STICKS
+        device.say(ended(move))
+        end = now()
+        await device.until(mapper.Grab, 2)
+        assert device.got(mapper.Grab)[-1].axes == 0
+        assert times_of(device, mapper.Grab) - end <= 0.5
+
+
+async def test_axes_while_level_setpoints_hold_the_sticks_stay_grabbed() -> None:
+    """Only so is a stick of the pilot seen against a program that happens to hover."""
+    async with behind() as (drone, device):
+        drone.piloting.pilot(FORWARD)
+        await device.until(mapper.Grab)
+        for _ in range(30):
+            drone.piloting.pilot(PilotingCommand())
+            await asyncio.sleep(0.05)
+        assert [m.axes for m in device.got(mapper.Grab)] == [STICKS]
+        device.say(mapper.GrabAxisEvent(PITCH, 60))
+        await device.until(mapper.Grab, 2)
+        assert device.got(mapper.Grab)[-1].axes == 0
+
+
+async def test_source_of_an_earlier_connection_is_given_back() -> None:
+    async with behind() as (_, device):
+        device.say(skyctrl.PilotingSource(Source.CONTROLLER))
+        await device.until(skyctrl.SetPilotingSource)
+        assert sources(device) == [Source.SKY_CONTROLLER]
+        assert device.got(mapper.Grab)[-1].axes == 0
+
+
+async def test_stall_of_the_host_ends_what_flies() -> None:
+    async with behind() as (drone, device):
+        device.script[ardrone3.MoveTo] = under_way
+        await drone.piloting.move_to(48.0, 2.0, 5.0)
+        drone.controller.stalled()
+        await device.until(ardrone3.CancelMoveTo)
+        assert drone.controller.pilot_acquired_control
+        assert not drone.controller.taken

@@ -153,8 +153,19 @@ async def test_a_home_that_this_drone_does_not_have(device: ScriptedDevice, dron
         await drone.home.set_preferred_type(RthHomeType.PILOT)
     with pytest.raises(LocalProtocolError):
         await drone.home.set_custom_location(500.0, 500.0, 0.0)
-    # A place too far away is met with silence, and an event about another place is no answer.
+
+
+async def test_custom_home_that_the_drone_refuses_is_refused_before_the_timeout(
+    device: ScriptedDevice, drone: Drone
+) -> None:
+    """It reports the place that it keeps, or nothing; one that has not received the command is another matter."""
     device.script[rth.SetCustomLocation] = lambda _: [rth.CustomLocation(1.0, 1.0, 0.0)]
+    with pytest.raises(CommandRejected, match="does not accept the place"):
+        await drone.home.set_custom_location(48.5, 2.25, 0.0, timeout=60.0)
+    device.script[rth.SetCustomLocation] = lambda _: []
+    with pytest.raises(CommandRejected, match="does not accept the place"):
+        await drone.home.set_custom_location(48.5, 2.25, 0.0, timeout=60.0)
+    device.session.air = lambda data, inward, hand_on: None if inward else hand_on(data)
     with pytest.raises(CommandTimeout):
         await drone.home.set_custom_location(48.5, 2.25, 0.0, timeout=0.3)
 

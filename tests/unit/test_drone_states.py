@@ -343,6 +343,15 @@ CHECK = TakeoffChecklistType
             ["battery too cold", "alert critical battery", "motor error temperature"],
         ),
         (AlertsState(alert=AlertState.LOW_BATTERY), BatteryState(), CalibrationState(), []),
+        # An emergency stop of before, and alerts that the drone's own list does not share.
+        (AlertsState(alert=AlertState.USER), BatteryState(), CalibrationState(), []),
+        (AlertsState(alert=AlertState.TOO_MUCH_ANGLE), BatteryState(), CalibrationState(), ["alert too much angle"]),
+        (
+            AlertsState(alert=AlertState.TOO_MUCH_ANGLE, checklist={CHECK.DRONE_INCLINATION_TOO_HIGH: False}),
+            BatteryState(alerts={BatteryAlert.POWER_LEVEL: AlertLevel.CRITICAL}),
+            CalibrationState(),
+            ["battery power level"],
+        ),
     ],
 )
 def test_reasons_against_a_takeoff(

@@ -134,8 +134,28 @@ def test_centred_sticks_are_sent_for_two_seconds() -> None:
     assert len(sent) == 40
     assert sent[0][0] == 5.02
     assert sent[-1][0] == pytest.approx(5.02 + 1.95)
-    assert all((p.flag, p.roll, p.pitch, p.yaw, p.gaz) == (1, 0, 0, 0, 0) for _, p in sent)
+    assert all((p.flag, p.roll, p.pitch, p.yaw, p.gaz) == (0, 0, 0, 0, 0) for _, p in sent)
     assert not sticks.active
+
+
+# GroundSDK PilotingCommand, Olympe: 1 only while the drone is asked to tilt
+FLAGS = [
+    (Percent(1, 0, 0, 0), 1),
+    (Percent(0, -1, 0, 0), 1),
+    (Percent(5, -5, 100, 100), 1),
+    (Percent(0, 0, 100, 0), 0),
+    (Percent(0, 0, 0, -100), 0),
+    (CENTRED, 0),
+]
+
+
+@pytest.mark.parametrize(("position", "flag"), FLAGS)
+def test_pcmd_flag_is_one_only_while_roll_or_pitch_is_deflected(position: Percent, flag: int) -> None:
+    sticks = Sticks()
+    sticks.command(position, 1.0)
+    pcmd = sticks.due(1.0)
+    assert pcmd is not None
+    assert (pcmd.flag, pcmd.roll, pcmd.pitch, pcmd.yaw, pcmd.gaz) == (flag, *position)
 
 
 def test_a_command_ends_the_centring_and_stop_ends_all() -> None:
@@ -172,6 +192,6 @@ def test_the_stamp_counts_and_tells_the_milliseconds() -> None:
     assert pcmd.timestampAndSeqNum == 0x04000000 + 1
 
 
-def test_released_sticks_say_so_in_the_flag() -> None:
-    pcmd = Sticks().released(0.0)
+def test_single_pcmd_of_centred_sticks_has_flag_zero() -> None:
+    pcmd = Sticks().single(CENTRED, 0.0)
     assert (pcmd.flag, pcmd.roll, pcmd.pitch, pcmd.yaw, pcmd.gaz) == (0, 0, 0, 0, 0)

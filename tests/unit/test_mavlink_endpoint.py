@@ -65,6 +65,12 @@ def test_good_urls(url: str, scheme: str, place: str, number: int, flavour: str 
         ("tcpin://127.0.0.1:5760?flavour=px4&flavour=px4", "no option but"),
         ("tcpin://127.0.0.1:5760?", "no option but"),
         ("tcpin://127.0.0.1:5760?px4", "no option but"),
+        ("tcpin://127.0.0.1:5760?frames=many", "no option but ?flavour=px4|ardupilot|standard, each once"),
+        ("serial:///dev/ttyUSB0:57600?frames=one", "no option but ?flavour=px4|ardupilot|standard, each once"),
+        ("udpin://127.0.0.1:1?frames=2", "expected frames one or many, got '2'"),
+        ("udpin://127.0.0.1:1?frames=", "expected frames one or many, got ''"),
+        ("udpout://127.0.0.1:1?frames=many&frames=one", "frames=one|many, each once"),
+        ("udpout://127.0.0.1:1?flavour=px4&datagrams=many", "and frames=one|many, each once"),
     ],
 )
 def test_bad_urls(url: str, expected: str) -> None:
@@ -73,6 +79,22 @@ def test_bad_urls(url: str, expected: str) -> None:
     assert caught.value.key_path == ""
     assert expected in caught.value.problem
     assert repr(url) in caught.value.problem
+
+
+@pytest.mark.parametrize(
+    ("query", "flavour", "frames"),
+    [
+        ("", None, "one"),
+        ("?frames=one", None, "one"),
+        ("?frames=many", None, "many"),
+        ("?flavour=ardupilot&frames=many", "ardupilot", "many"),
+        ("?frames=many&flavour=px4", "px4", "many"),
+    ],
+)
+@pytest.mark.parametrize("scheme", ["udpin", "udpout"])
+def test_udp_url_with_options_keeps_each(scheme: str, query: str, flavour: str | None, frames: str) -> None:
+    url = parse_endpoint(f"{scheme}://127.0.0.1:14550{query}")
+    assert (url.flavour, url.frames) == (flavour, frames)
 
 
 def test_every_scheme_makes_its_endpoint_and_says_what_it_is() -> None:

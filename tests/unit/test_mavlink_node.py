@@ -340,16 +340,19 @@ async def test_closing_ends_every_connection_and_frees_the_port() -> None:
     socket.create_server((host, 5760)).close()
 
 
+@pytest.mark.parametrize(("query", "most"), [("", 40), ("?frames=one", 40), ("?frames=many", 4)])
 @pytest.mark.parametrize("scheme", ["udpout", "udpin"])
-async def test_frames_of_one_turn_share_datagrams(scheme: str) -> None:
-    """As few as a reader with 512 bytes can take; in their order, nothing waits for the next turn."""
+async def test_frames_of_one_iteration_leave_in_order_in_as_many_datagrams_as_configured(
+    scheme: str, query: str, most: int
+) -> None:
+    """One frame per datagram, or as many as a reader with 512 bytes can take. Nothing waits for the next iteration."""
     host = loopback()
     loop = asyncio.get_running_loop()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client:
         client.setblocking(False)
         client.bind((host, 0))
         port = client.getsockname()[1] if scheme == "udpout" else udp_port(host)
-        async with desk(f"{scheme}://{host}:{port}") as d:
+        async with desk(f"{scheme}://{host}:{port}{query}") as d:
             if scheme == "udpin":
                 await loop.sock_connect(client, (host, port))
                 await loop.sock_sendall(client, BEAT.pack(stock.MAVLink(None, 255, 190)))
@@ -366,7 +369,7 @@ async def test_frames_of_one_turn_share_datagrams(scheme: str) -> None:
                     sequence += [message.get_seq() for message in parser.parse_buffer(data)]
                 assert sequence == list(range(first, first + 40))
                 assert max(sizes) <= 512
-                assert len(sizes) <= 4  # of 40 frames with 40 and 26 bytes
+                assert len(sizes) == 40 if most == 40 else len(sizes) <= most  # of 40 frames with 40 and 26 bytes
             d.node.send(ATTITUDE, sysid=7, compid=1)
             data = await asyncio.wait_for(loop.sock_recv(client, 2048), 2.0)
             assert len(data) == 12 + 28

@@ -234,7 +234,7 @@ WRONG_MISSIONS = {
     "waits.plan": "item 1: it waits to be continued, which the drone does not",
     "jump-too-far.waypoints": "item 2: it jumps to an item that is not there",
     "beyond-fence.plan": "item 1: the way there leaves the fence (inclusion circle 0)",
-    "too-high.plan": "item 1: 450 m is higher than the limit of 150 m",
+    "too-high.plan": "item 1: 450 m above take-off is higher than the limit of 150 m",
     "too-fast.plan": "item 1: 40 m/s is more than the 15 that an ANAFI 4K flies",
     "too-far.plan": "item 2: it is 4.5 km from home, where no setting lets the drone fly",
     "below-ground.plan": "item 1: -10 m is below the take-off",

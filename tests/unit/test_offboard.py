@@ -17,12 +17,14 @@ from anafi_mav.services.offboard import (
     Event,
     OffboardStream,
     State,
+    lasts,
 )
 from anafi_mav.services.offboard_control import turn_towards
 from anafi_mav.services.offboard_setpoints import (
     AttitudeSetpoint,
     MotionSetpoint,
     Origin,
+    Setpoint,
     attitude_setpoint,
     global_setpoint,
     local_setpoint,
@@ -107,6 +109,36 @@ def test_an_offboard_session_ends_with_its_setpoints() -> None:
     assert stream.state is State.IDLE
     assert stream.setpoint is None
     assert not stream.expire(99.0)
+
+
+@pytest.mark.parametrize(
+    ("setpoint", "guided", "seconds"),
+    [
+        (MotionSetpoint(Origin.LOCAL, velocity=(1.0, 0.0, 0.0)), 1.5, 1.45),
+        (MotionSetpoint(Origin.LOCAL, yaw_rate=0.3), 3.0, 2.95),
+        (MotionSetpoint(Origin.LOCAL, velocity=(1.0, 0.0, 0.0), yaw=1.0), 0.5, 0.45),
+        (MotionSetpoint(Origin.LOCAL, velocity=(1.0, 0.0, 0.0)), None, 0.45),
+        (MotionSetpoint(Origin.LOCAL, velocity=(1.0, 0.0, 0.0), acceleration=(1.0, 0.0, 0.0)), 1.5, 0.45),
+        (MotionSetpoint(Origin.LOCAL, velocity=(1.0, 0.0, 0.0), position=(9.0, 0.0, 0.0)), 1.5, 0.45),
+        (MotionSetpoint(Origin.LOCAL, acceleration=(1.0, 0.0, 0.0)), 1.5, 0.45),
+        (LEVEL, 1.5, 0.45),
+    ],
+)
+def test_silence_that_ends_a_setpoint_is_longer_for_velocities_of_guided_alone(
+    setpoint: Setpoint, guided: float | None, seconds: float
+) -> None:
+    assert lasts(setpoint, guided) == pytest.approx(seconds)
+
+
+def test_sticks_of_a_velocity_stay_young_until_shortly_before_its_end() -> None:
+    """The layer below centres sticks of half a second: it must not before a velocity of 1.5 s is over."""
+    stream, velocity = OffboardStream(), MotionSetpoint(Origin.LOCAL, velocity=(1.0, 0.0, 0.0))
+    stream.receive("a", velocity, 10.0, 1.45)
+    stream.engage("a")
+    assert [round(stream.stick_age(10.0 + age), 2) for age in (0.0, 0.5, 1.0, 1.2, 1.45)] == [0.0, 0.0, 0.0, 0.2, 0.45]
+    assert not stream.receive("b", LEVEL, 11.4)  # the pilot's velocity still flies
+    assert not stream.expire(11.44)
+    assert stream.expire(11.45)
 
 
 def test_silence_of_a_stream_that_flies_nothing_changes_nothing() -> None:

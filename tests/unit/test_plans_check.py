@@ -58,14 +58,14 @@ def test_heights() -> None:
     items = (UP, waypoint(1, 0, 120.0), waypoint(2, 0, -3.0), BACK)
     assert told(found(*items)) == ["item 2: -3 m is below the take-off"]
     assert told(found(*items, limits=Limits(max_altitude=100.0))) == [
-        "item 1: 120 m is higher than the limit of 100 m",
+        "item 1: 120 m above take-off is higher than the limit of 100 m",
         "item 2: -3 m is below the take-off",
     ]
     assert told(found(UP, waypoint(1, 0, 120.0), BACK, home=Point(LAT, LON, 4400.0))) == [
         "item 1: 4520 m above the sea is higher than an ANAFI 4K flies"
     ]
     assert told(found(UP, waypoint(1, 0, 135.0, frame=GLOBAL), BACK, limits=Limits(max_altitude=99.0))) == [
-        "item 1: 100 m is higher than the limit of 99 m"
+        "item 1: 100 m above take-off is higher than the limit of 99 m"
     ]
 
 
@@ -137,11 +137,11 @@ def test_how_an_ai_begins() -> None:
     low = Item(22, RELATIVE, (0.0, 0.0, 0.0, None, None, None, 10.0))
     findings = found(low, waypoint(1, 0, 10.0), BACK, model="ai", limits=Limits(return_height=30.0))
     assert told(findings, Severity.WARNING) == [
-        "item 0: an Ai begins at 30 m: it rises there first, goes over to above it and sinks"
+        "item 0: an Ai begins at 30 m above take-off: it rises there first, goes over to above it and sinks"
     ]
     assert told(found(low, waypoint(1, 0, 10.0), BACK), Severity.WARNING) == []
     high = found(low, waypoint(1, 0, 10.0), BACK, model="ai", limits=Limits(max_altitude=25.0, return_height=30.0))
-    assert told(high) == ["item 0: 30 m is higher than the limit of 25 m"]
+    assert told(high) == ["item 0: 30 m above take-off is higher than the limit of 25 m"]
 
 
 def test_what_the_gateway_flies_is_told() -> None:

@@ -113,7 +113,7 @@ def test_without_a_take_off_it_is_put_in_front_and_told() -> None:
     assert [line.split()[1] for line in lines(flight)] == ["22", "16", "178", "16"]
     assert lines(flight)[1] == f"3 16 0.0 1.0 0.0 30.0 {LAT} {LON} 20.0"  # straight up
     assert flight.parts[0].done == ((), (), (0,), (1,))
-    assert flight.notes == (Loss("no item takes off: the drone rises straight to 20 m first", 1),)
+    assert flight.notes == (Loss("no item takes off: the drone rises straight to 20 m above take-off first", 1),)
     assert examine(items, 1).approximations == flight.notes
     in_the_air = translate(items, 1, AIR)
     assert [line.split()[1] for line in lines(in_the_air)] == ["178", "16"]

@@ -97,7 +97,7 @@ def test_a_survey_as_qgroundcontrol_writes_it(version: Version) -> None:
     items = [action(530, 0.0, 2.0), action(1000, -90.0, 0.0, None, None, 0.0, None, 0.0), GO,
              action(206, 25.0, 0.0, 1.0), waypoint(3, 0), action(206, 0.0, 0.0, 1.0)]  # fmt: skip
     assert examine(items, version).approximations == (
-        Loss("no item takes off: the drone rises straight to 20 m first", 2),
+        Loss("no item takes off: the drone rises straight to 20 m above take-off first", 2),
     )
     found = read(items, version)
     assert [int(item.command) for item in found] == [205, 16, 50001, 2000, 16, 2001, 50001, 2000]

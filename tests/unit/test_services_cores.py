@@ -10,7 +10,7 @@ import pytest
 from anafi_mav.mavlink import dialect
 from anafi_mav.services import commands
 from anafi_mav.services.flavours import ARDUPILOT, PX4
-from anafi_mav.services.height import HeightReference
+from anafi_mav.services.height import HeightReference, TakeoffRecord
 from anafi_mav.services.link_loss import GcsWatch
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.statustext import Severity, TextNumbers
@@ -124,32 +124,109 @@ def test_after_a_landing_elsewhere_the_next_flight_counts_from_there() -> None:
     height = HeightReference()
     height.on_ground(45.0, 0.0)
     height.take_off()
-    height.in_flight("first")
+    height.in_flight("first", 45.0, 0.0)
     height.on_ground(35.0, -10.0)
     assert height.amsl(-10.0) == 35.0  # where it stands
     assert height.ato(55.0) == 20.0  # of a target for the next flight
     height.take_off()
-    height.in_flight("second")
+    height.in_flight("second", 35.0, 0.0)
     assert height.amsl(0.0) == 35.0
     assert height.ato(55.0) == 20.0
 
 
-def test_the_latch_belongs_to_one_flight() -> None:
+def record(flight_id: str = "flight 1", *, estimated: bool = False) -> TakeoffRecord:
+    return TakeoffRecord(flight_id, 35.0, estimated)
+
+
+def test_height_kept_of_the_same_flight_counts() -> None:
     height = HeightReference()
     height.on_ground(35.0, 0.0)
-    height.in_flight("")
-    height.in_flight("flight 1")
-    height.link_down(flying=True)
-    height.in_flight("flight 1")
-    assert height.takeoff_amsl == 35.0
-    height.in_flight("flight 2")
+    height.in_flight("", 36.0, 1.0)
+    height.in_flight("flight 1", 39.0, 1.0)
+    assert (height.takeoff_amsl, height.estimated, height.flight_id) == (35.0, False, "flight 1")
+    height.link_down()
     assert height.takeoff_amsl is None
+    height.recall(record())
+    assert not height.in_flight("flight 1", 60.0, 20.0)
+    assert (height.takeoff_amsl, height.estimated) == (35.0, False)
+
+
+@pytest.mark.parametrize(
+    ("kept", "flight"), [(record("flight 1"), "flight 2"), (record("flight 1"), ""), (None, "flight 1"), (None, None)]
+)
+def test_height_kept_of_another_flight_is_estimated_once(kept: TakeoffRecord | None, flight: str | None) -> None:
+    height = HeightReference()
+    height.recall(kept)
+    assert not height.in_flight(flight, None, 20.0)
+    assert height.takeoff_amsl is None
+    assert height.in_flight(flight, 60.0, 20.0)
+    assert (height.takeoff_amsl, height.estimated) == (40.0, True)
+    assert not height.in_flight(flight, 75.0, 20.0)
+    assert height.takeoff_amsl == 40.0
+    height.on_ground(36.0, 0.5)
+    assert (height.takeoff_amsl, height.estimated) == (35.5, False)
+
+
+def test_height_estimate_is_replaced_when_the_flight_is_named_late() -> None:
+    height = HeightReference()
+    height.recall(record("flight 1"))
+    assert height.in_flight("", 60.0, 20.0)
+    assert not height.in_flight("flight 1", 61.0, 20.0)
+    assert (height.takeoff_amsl, height.estimated) == (35.0, False)
+
+
+def test_height_estimate_that_was_kept_stays_an_estimate() -> None:
+    height = HeightReference()
+    height.recall(record(estimated=True))
+    assert not height.in_flight("flight 1", 60.0, 20.0)
+    assert (height.takeoff_amsl, height.estimated) == (35.0, True)
+
+
+def test_height_of_a_seen_takeoff_survives_a_late_flight_id() -> None:
+    """A firmware may still report the id of the flight before when this one has begun."""
+    height = HeightReference()
+    height.on_ground(35.0, 0.0)
+    height.take_off()
+    height.in_flight("flight 1", 40.0, 2.0)
+    height.in_flight("flight 2", 41.0, 3.0)
+    assert (height.takeoff_amsl, height.estimated, height.flight_id) == (35.0, False, "flight 2")
+
+
+def test_height_of_a_landing_without_fix_counts_from_the_drones_own_height() -> None:
+    height = HeightReference()
+    height.on_ground(45.0, 0.0)
+    height.take_off()
+    height.on_ground(None, -10.0)
+    height.take_off()
+    assert height.takeoff_amsl == 35.0
+
+
+@pytest.mark.parametrize(
+    "kept",
+    [
+        None,
+        7,
+        {"flight_id": "", "amsl": 1.0, "estimated": False},
+        {"flight_id": "a", "amsl": float("inf"), "estimated": False},
+        {"flight_id": "a", "amsl": 1.0, "estimated": False, "latitude": 2.0},
+        {"flight_id": "a", "amsl": 1.0, "estimated": False, "latitude": 91.0, "longitude": 0.0},
+        {"flight_id": "a", "amsl": 1.0, "estimated": False, "latitude": float("nan"), "longitude": 0.0},
+    ],
+)
+def test_takeoff_record_that_is_none_is_not_read(kept: object) -> None:
+    assert TakeoffRecord.read(kept) is None
+
+
+def test_takeoff_record_is_read_as_written() -> None:
+    whole = TakeoffRecord("a", 35.0, True, 48.0, 2.0)
+    assert TakeoffRecord.read(whole.written) == whole
+    assert TakeoffRecord.read(record().written) == record()
 
 
 def test_a_silence_on_the_ground_ends_the_latch() -> None:
     height = HeightReference()
     height.on_ground(35.0, 0.0)
-    height.link_down(flying=False)
+    height.link_down()
     assert height.takeoff_amsl is None
 
 

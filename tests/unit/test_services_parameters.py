@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 import struct
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from MAVProxy.modules.lib.param_ftp import ftp_param_decode
 
+from anafi_mav.drone.battery import BatteryState
 from anafi_mav.mavlink.frames import pack
 from anafi_mav.services.flavours import ARDUPILOT, FLAVOURS, PX4
 from anafi_mav.services.parameter_codec import (
@@ -22,6 +25,7 @@ from anafi_mav.services.parameter_codec import (
     packed_file,
     param_value,
 )
+from anafi_mav.services.parameter_table_setup import SETUP_PX4
 from anafi_mav.services.parameters import parameters_of
 
 
@@ -132,7 +136,9 @@ def test_names(field: str | bytes, name: str) -> None:
 def test_the_tables_are_sound(flavour: object) -> None:
     parameters = parameters_of(flavour)  # type: ignore[arg-type]
     names = [one.name for one in parameters]
-    assert names == sorted(set(names))
+    assert names == sorted(names)
+    # One of the two is a model's that can avoid obstacles, the other everyone else's (`parameter_table_setup`).
+    assert [name for name in set(names) if names.count(name) > 1] == ([] if flavour is ARDUPILOT else ["COM_OBS_AVOID"])
     native = {one.name for one in parameters if one.name.startswith("ANF_")}
     for one in parameters:
         assert one.name.replace("_", "").isalnum()
@@ -143,3 +149,21 @@ def test_the_tables_are_sound(flavour: object) -> None:
             assert one.kind in (Kind.INT32, Kind.REAL32)  # all that PX4 has
         if one.write is not None:  # a choice, a range, or both can be shown to a user
             assert one.values or one.limits is not None
+
+
+def battery_parameters(model: str, state: BatteryState) -> dict[str, float]:
+    battery, identity = SimpleNamespace(state=state), SimpleNamespace(model=SimpleNamespace(key=model))
+    host: Any = SimpleNamespace(drone=SimpleNamespace(battery=battery, identity=identity))
+    return {one.name: one.value(host) for one in SETUP_PX4 if one.name.startswith("BAT1_")}
+
+
+def test_battery_parameters_are_those_that_the_battery_reports() -> None:
+    reported = BatteryState(cell_count=4, cell_min_mv=3300, cell_max_mv=4400)
+    values = battery_parameters("ai", reported)
+    assert (values["BAT1_N_CELLS"], values["BAT1_V_EMPTY"], values["BAT1_V_CHARGED"]) == (4, 3.3, 4.4)
+
+
+def test_battery_parameters_without_a_report_are_the_models_or_unknown() -> None:
+    values = battery_parameters("4k", BatteryState())
+    assert (values["BAT1_N_CELLS"], values["BAT1_V_EMPTY"], values["BAT1_V_CHARGED"]) == (2, -1, -1)
+    assert battery_parameters("later", BatteryState())["BAT1_N_CELLS"] == -1

@@ -176,6 +176,7 @@ def vehicle(**elements: Any) -> Any:
 def test_rssi_in_the_scale_of_the_family(quality: int) -> None:
     # fifths of 100, and of 254: 50.8, 101.6, 152.4, 203.2, 254
     told = vehicle(link=LinkState(quality=quality))
+    told.drone.controller = SimpleNamespace(present=True)
     for flavour, full in (
         (PX4, [20, 40, 60, 80, 100]),
         (STANDARD, [20, 40, 60, 80, 100]),
@@ -184,6 +185,13 @@ def test_rssi_in_the_scale_of_the_family(quality: int) -> None:
         message: Any = telemetry_link.rc_channels(told, NOW.for_flavour(flavour))
         assert message.rssi == full[quality - 1]
         assert message.time_boot_ms == 1234
+
+
+def test_rssi_without_a_skycontroller_is_unknown() -> None:
+    told = vehicle(link=LinkState(quality=5))
+    told.drone.controller = SimpleNamespace(present=False)
+    message: Any = telemetry_link.rc_channels(told, NOW)
+    assert (message.rssi, message.chancount) == (255, 0)
 
 
 @pytest.mark.parametrize(

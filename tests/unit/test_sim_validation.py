@@ -8,6 +8,7 @@ import re
 import signal
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -212,10 +213,11 @@ async def test_flights_on_a_machine_that_stands_still_are_invalid() -> None:
     process = await asyncio.create_subprocess_exec(sys.executable, *words, stdout=pipe, stderr=pipe)
     ending = asyncio.create_task(process.communicate())
     try:
-        while not (await asyncio.wait({ending}, timeout=0.6))[0]:
-            process.send_signal(signal.SIGSTOP)
-            await asyncio.wait({ending}, timeout=0.6)
-            process.send_signal(signal.SIGCONT)
+        with suppress(ProcessLookupError):  # it may end between the wait and the signal
+            while not (await asyncio.wait({ending}, timeout=0.6))[0]:
+                process.send_signal(signal.SIGSTOP)
+                await asyncio.wait({ending}, timeout=0.6)
+                process.send_signal(signal.SIGCONT)
         out, err = await ending
     finally:
         if process.returncode is None:

@@ -36,6 +36,8 @@ class PoiMode(OpenEnum):
 
 
 class FlyingState(OpenEnum):
+    """Flying state (ardrone3.xml 1-4-1)."""
+
     LANDED = 0
     TAKINGOFF = 1
     HOVERING = 2

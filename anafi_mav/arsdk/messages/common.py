@@ -44,6 +44,8 @@ class MavlinkType(OpenEnum):
 
 
 class PlayingState(OpenEnum):
+    """State of a flight plan (common.xml 0-12-0)."""
+
     PLAYING = 0
     STOPPED = 1
     PAUSED = 2

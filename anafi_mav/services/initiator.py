@@ -1,0 +1,79 @@
+"""Who began the landing or return that the drone flies: a client, the drone, or the pilot at the Skycontroller.
+
+The drone does not report it. It is concluded from what was commanded through the gateway, from the reported reasons of
+a return, and from whether there is a Skycontroller at all. No I/O; time is handed in.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+
+REPORTED_WITHIN = 15.0
+"""s after a Landing was sent in which a landing that begins is that one (it is repeated for 10 s)."""
+
+ENDS_IN_LANDING = 3.0
+"""s after the end of a return in which a landing that begins is its end."""
+
+
+class Initiator(enum.Enum):
+    """Who began it."""
+
+    CLIENT = "a client, or the gateway for it"
+    DRONE = "the drone"
+    PILOT = "the pilot at the Skycontroller"
+
+
+class Initiators:
+    """Keeps who began the present landing, and who began the present or last return."""
+
+    def __init__(self) -> None:
+        self.landing: Initiator | None = None
+        """None while the drone does not land."""
+        self.returning: Initiator | None = None
+        """None while the drone does not return."""
+        self._land_sent = -math.inf
+        self._return_sent = -math.inf
+        self._returned: tuple[Initiator, float] | None = None
+        """Who began the return that ended last, and when it ended."""
+
+    def land_commanded(self, now: float) -> None:
+        """A Landing is about to be sent."""
+        self._land_sent = now
+
+    def return_commanded(self, now: float) -> None:
+        """A return is about to be commanded."""
+        self._return_sent = now
+
+    def on_landing(self, now: float, *, plan_lands: bool, skycontroller: bool) -> None:
+        """The drone has begun to land. `plan_lands`: its flight plan ends so."""
+        if now - self._land_sent <= REPORTED_WITHIN or plan_lands:
+            self.landing = Initiator.CLIENT
+        elif self.returning is not None:
+            self.landing = self.returning
+        elif self._returned is not None and now - self._returned[1] <= ENDS_IN_LANDING:
+            self.landing = self._returned[0]
+        else:
+            self.landing = Initiator.PILOT if skycontroller else Initiator.DRONE
+
+    def on_landing_over(self, *, unsent: bool) -> None:
+        """The drone does not land: it stands, or flies again. `unsent`: no Landing waits for its answer."""
+        if self.landing is not None and unsent:
+            self._land_sent = -math.inf
+        self.landing = None
+
+    def on_return(self, now: float, *, by_itself: bool, by_plan: bool, skycontroller: bool) -> None:
+        """The drone returns; `by_itself` and `by_plan` are what it reports as the reason."""
+        if by_itself:
+            self.returning = Initiator.DRONE
+        elif by_plan or not skycontroller or now - self._return_sent <= REPORTED_WITHIN:
+            self.returning = Initiator.CLIENT
+        elif self.returning is not Initiator.CLIENT:
+            self.returning = Initiator.PILOT
+
+    def on_return_over(self, now: float) -> None:
+        """The drone does not return."""
+        if self.returning is not None:
+            self._returned = self.returning, now
+            self.returning = None
+            self._return_sent = -math.inf

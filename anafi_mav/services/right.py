@@ -1,0 +1,41 @@
+"""The right of a client to end a landing or a return.
+
+Handlers of client messages pass it to `Vehicle.hold`, `set_mode` and the like. What the gateway does by itself
+(station loss, fence, silence of setpoints, end of a mission, its own end) has none, and so never ends either.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Hashable
+from dataclasses import dataclass
+
+
+class Extent(enum.Enum):
+    """Which landings and returns a right covers. A forced landing is covered by none."""
+
+    COMMANDED = "a landing or return that a client commanded"
+    """Modes Guided, Return, Offboard and Mission; the joystick override."""
+    ALL = "these, and a landing or return that the drone began"
+    """Hold, Pause, Brake, Loiter, Position."""
+
+
+@dataclass(frozen=True)
+class Right:
+    """One client's right, given by one message of it."""
+
+    client: Hashable
+    """(channel, system id, component id)."""
+    extent: Extent
+    at: float = 0.0
+    """When its message arrived, on the monotonic clock."""
+    counted: bool = True
+    """The client sent no other Hold in the 5 s before: only then does it end a return that the drone began."""
+
+    @property
+    def system(self) -> int:
+        """MAVLink system id of the client, for texts; 0 when it is unknown."""
+        match self.client:
+            case (_, int(system), _):
+                return system
+        return 0

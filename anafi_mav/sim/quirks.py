@@ -1,0 +1,66 @@
+"""Ways in which a real firmware may differ from the simulated one, each switched on by name.
+
+The simulated firmware behaves as Parrot's XML files, Olympe and GroundSDK let expect. Where they are silent or
+contradict each other, a quirk is the other reading, so that a controller can be tested against both.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Iterable
+
+from anafi_mav.errors import ConfigError
+
+
+class Quirk(enum.Enum):
+    """A deviation of the simulated firmware. The value is its name on the command line and in files."""
+
+    description: str
+    """One sentence for the documentation."""
+
+    def __new__(cls, name: str, description: str) -> Quirk:
+        quirk = object.__new__(cls)
+        quirk._value_ = name
+        quirk.description = description
+        return quirk
+
+    LANDING_IGNORES_TAKEOFF = ("landing-ignores-takeoff", "TakeOff does not end a landing")
+    LANDING_IGNORES_GAZ = ("landing-ignores-gaz", "positive gaz in a PCMD does not end a landing")
+    TAKEOFF_FROM_GROUND_LATE = (
+        "takeoff-from-ground-late",
+        "TakeOff is executed one second late, whatever the flying state is by then",
+    )
+    HANDSHAKE_REFUSED_8S = (
+        "handshake-refused-8s",
+        "the session of a silent controller lives for 8 s, and a handshake is refused until then",
+    )
+    RTH_FINISHED_MISSING = ("rth-finished-missing", "rth.state never reports the reason finished")
+    LAST_ITEM_NOT_REPORTED = ("last-item-not-reported", "MissionItemExecuted is absent for a plan's last line")
+    STOPPED_BEFORE_EXECUTED = (
+        "stopped-before-executed",
+        "the state stopped of a plan that has ended is reported before MissionItemExecuted of its last line",
+    )
+    FLAG_REMEMBERED = (
+        "flag-remembered",
+        "the flag of the last PCMD counts until the next PCMD: with flag 1 the drone never hovers, and a return or "
+        "point of interest waits for ever",
+    )
+    RAMPING_IGNORES_LANDING = (
+        "ramping-ignores-landing",
+        "Landing and UserTakeOff(0) do nothing while the motors ramp up",
+    )
+    NO_FLIGHT_ID = ("no-flight-id", "FlightId is never reported")
+    GPS_LOCATION_STOPS = ("gps-location-stops", "GpsLocationChanged is no longer sent although the drone reports a fix")
+    ROLL_INVERTED = ("roll-inverted", "AttitudeChanged.roll is positive with the left wing down")
+
+
+QUIRKS = {quirk.value: quirk for quirk in Quirk}
+"""Quirks by name."""
+
+
+def named(names: Iterable[str], key_path: str) -> frozenset[Quirk]:
+    """Return the quirks with these names. Raises `ConfigError` at `key_path` for an unknown name."""
+    for name in (names := tuple(names)):
+        if name not in QUIRKS:
+            raise ConfigError(key_path, f"expected one of {', '.join(QUIRKS)}, got {name[:60]!r}")
+    return frozenset(QUIRKS[name] for name in names)

@@ -1,0 +1,337 @@
+"""Take-off by setpoints, and what waits for a take-off: judged by the commands that the simulated drone received."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.flavours import both
+from support.mav import NAN, Client
+from support.setpoints import (
+    NO_ACCELERATION,
+    NO_POSITION,
+    NO_VELOCITY,
+    NO_YAW,
+    NO_YAW_RATE,
+    POSITION_ONLY,
+    VELOCITY_ONLY,
+    attitude,
+    heard,
+    local,
+    said,
+    streaming,
+    texts,
+)
+from support.world import ARMED, HOLD, HOME, OFFBOARD, World, world
+
+from anafi_mav import geo
+
+ACCEPTED, FAILED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_FAILED
+CANCELLED = 6
+"""MAV_RESULT_CANCELLED, which pymavlink's stock dialect does not have."""
+ARM, TAKEOFF, LAND = (
+    dialect.MAV_CMD_COMPONENT_ARM_DISARM,
+    dialect.MAV_CMD_NAV_TAKEOFF,
+    dialect.MAV_CMD_NAV_LAND,
+)
+GOTO, SET_MODE = dialect.MAV_CMD_DO_REPOSITION, dialect.MAV_CMD_DO_SET_MODE
+ACCELERATION_ONLY = NO_POSITION | NO_VELOCITY | NO_YAW | NO_YAW_RATE
+IDLE = local(VELOCITY_ONLY)
+"""A velocity of nothing: what MAVSDK's examples stream before they engage."""
+
+
+async def ready(client: Client, flavour: str, *, arm: bool = True) -> None:
+    """Arm and engage, while setpoints stream."""
+    if arm:
+        assert (await client.command(ARM, 1)).result == ACCEPTED
+    numbers = (1, 6, 0) if flavour == "px4" else (1, 4)
+    assert (await client.command(SET_MODE, *numbers)).result == ACCEPTED
+
+
+async def lifted(w: World) -> Any:
+    return await w.drone.wait_log(lambda e: e.kind == "command" and e.name.endswith(".TakeOff"), 5.0)
+
+
+class Program:
+    """What a program sends at present."""
+
+    def __init__(self, setpoint: Any) -> None:
+        self.setpoint = setpoint
+
+    def __call__(self) -> Any:
+        return self.setpoint
+
+
+@pytest.mark.parametrize(
+    ("setpoint", "seen"),
+    [
+        (local(POSITION_ONLY, at=(8.0, 0.0, -5.0)), lambda pose: pose["north"] > 7.0 and pose["up"] > 4.5),
+        (local(VELOCITY_ONLY, v=(1.0, 0.0, -1.0)), lambda pose: pose["north"] > 2.0 and pose["up"] > 3.0),
+        (local(ACCELERATION_ONLY, a=(0.0, 0.0, -1.0)), lambda pose: pose["up"] > 3.0),
+        (local(NO_ACCELERATION | NO_YAW | NO_YAW_RATE, at=(4.0, 0.0, -4.0)), lambda pose: pose["north"] > 3.0),
+        (attitude(pitch=-0.1, thrust=0.7), lambda pose: pose["up"] > 3.0 and pose["north"] > 1.0),
+    ],
+    ids=["position", "velocity", "acceleration", "position and velocity", "attitude"],
+)
+async def test_offboard_setpoint_that_climbs_takes_off_and_is_flown(
+    setpoint: Any, seen: Callable[[dict[str, float]], bool]
+) -> None:
+    """MAVSDK's examples: arm, stream something that stands still, engage on the ground, then climb."""
+    async with world(clients=2) as w:
+        program, mark = Program(IDLE), w.clients[1].mark()
+        async with streaming(w.client, program):
+            await ready(w.client, "px4")
+            await w.client.heartbeat(lambda beat: beat.custom_mode == OFFBOARD)
+            program.setpoint = setpoint
+            await said(w.clients[1], "Takeoff by setpoints of system 255 in 1 s", mark)
+            begun = asyncio.get_running_loop().time()
+            assert heard(w, "TakeOff") == []
+            takeoff = await lifted(w)
+            assert takeoff.t - begun > 0.8
+            await w.drone.wait_log(lambda e: e.kind == "pose" and seen(e.args), 15.0)
+            hovering = next(e for e in w.drone.log if e.name.endswith("FlyingStateChanged") and e.args["state"] == 2)
+            early = [e for e in heard(w, "PCMD", "moveTo", "moveBy") if e.t < hovering.t and any(e.args.values())]
+            assert [e for e in early if not e.name.endswith("PCMD") or e.args["gaz"] or e.args["pitch"]] == []
+            await w.client.heartbeat(lambda beat: beat.custom_mode == OFFBOARD and beat.base_mode & ARMED)
+        await said(w.client, "Offboard setpoints stopped: hovering")
+
+
+async def test_guided_attitude_with_thrust_takes_off() -> None:
+    """dronekit's set_attitude_target example: GUIDED_NOGPS, arm, thrust."""
+    async with world(flavour="ardupilot") as w:
+        assert (await w.client.command(SET_MODE, 1, 20)).result == ACCEPTED
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        async with streaming(w.client, attitude(thrust=0.7), every=0.2):
+            await lifted(w)
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["up"] > 3.0, 15.0)
+
+
+@pytest.mark.parametrize(
+    "setpoint",
+    [local(POSITION_ONLY, at=(0.0, 0.0, -5.0)), local(VELOCITY_ONLY, v=(0.0, 0.0, -1.0)), attitude(thrust=0.5)],
+    ids=["position", "velocity", "attitude that holds"],
+)
+async def test_guided_setpoint_on_the_ground_is_reported_and_not_flown(setpoint: Any) -> None:
+    async with world(flavour="ardupilot") as w:
+        await ready(w.client, "ardupilot")
+        mark = w.client.mark()
+        async with streaming(w.client, setpoint):
+            if setpoint.get_msgId() != dialect.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET:
+                await said(w.client, "Setpoint refused: take off first", mark)
+            await asyncio.sleep(1.5)
+        assert heard(w, "TakeOff") == []
+
+
+@both
+async def test_setpoint_takeoff_needs_the_arming_of_the_same_client(flavour: str) -> None:
+    """Another client arms, to look at something: no motor turns."""
+    async with world(flavour=flavour, clients=2) as w, streaming(w.client, attitude(thrust=0.7)):
+        await ready(w.client, flavour, arm=False)
+        assert (await w.clients[1].command(ARM, 1)).result == ACCEPTED
+        await said(w.client, "Setpoint refused: this client has not armed", 0)
+        await asyncio.sleep(1.5)
+        assert heard(w, "TakeOff") == []
+
+
+@both
+async def test_setpoint_takeoff_needs_the_mode_of_the_same_client(flavour: str) -> None:
+    """A ground station chooses the mode while an armed program streams a climb: nothing takes off."""
+    async with world(flavour=flavour, clients=2) as w, streaming(w.client, attitude(thrust=0.7)):
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        await ready(w.clients[1], flavour, arm=False)
+        await asyncio.sleep(1.5)
+        assert heard(w, "TakeOff") == []
+
+
+@both
+@pytest.mark.parametrize("how", ["disarm", "hold", "no climb", "gap"])
+async def test_second_before_a_setpoint_takeoff_can_be_ended(flavour: str, how: str) -> None:
+    """By any client's disarm or Hold, by one setpoint that does not climb, by a gap: no motor turns."""
+    async with world(flavour=flavour, clients=2) as w:
+        program, mark = Program(attitude(thrust=0.4)), w.client.mark()
+        stop = (1, 4, 3) if flavour == "px4" else (1, 17)
+        async with streaming(w.client, program):
+            await ready(w.client, flavour)
+            program.setpoint = attitude(thrust=0.7)
+            await said(w.client, "Takeoff by setpoints of system 255", mark)
+            if how == "disarm":
+                assert (await w.clients[1].command(ARM, 0)).result == ACCEPTED
+            elif how == "hold":
+                assert (await w.clients[1].command(SET_MODE, *stop)).result == ACCEPTED
+            elif how == "no climb":
+                program.setpoint = attitude(thrust=0.5)
+            if how != "gap":
+                await said(w.client, "Takeoff by setpoints cancelled", mark)
+                await asyncio.sleep(1.3)
+        if how == "gap":
+            await said(w.client, "Setpoints stopped on the ground: disarming", mark)
+            await w.client.heartbeat(lambda beat: not beat.base_mode & ARMED, since=mark)
+            await asyncio.sleep(1.3)
+        assert heard(w, "TakeOff") == []
+
+
+@pytest.mark.parametrize("moment", ["motor ramping", "taking off"])
+async def test_silence_in_a_setpoint_takeoff_disarms_on_the_ground_and_hovers_in_the_air(moment: str) -> None:
+    async with world(speed=1.0) as w:
+        program, mark = Program(IDLE), w.client.mark()
+        async with streaming(w.client, program):
+            await ready(w.client, "px4")
+            program.setpoint = attitude(thrust=0.7)
+            await lifted(w)
+            if moment == "taking off":
+                await w.drone.wait_log(lambda e: e.name.endswith("FlyingStateChanged") and e.args["state"] == 1, 5.0)
+        if moment == "motor ramping":
+            await said(w.client, "Setpoints stopped on the ground: disarming", mark)
+            await w.client.heartbeat(lambda beat: not beat.base_mode & ARMED, since=mark, timeout=15.0)
+            assert w.drone.flying_state.name == "LANDED"
+            return
+        await said(w.client, "Offboard setpoints stopped: hovering", mark)
+        await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD and beat.base_mode & ARMED, timeout=10.0)
+        assert heard(w, "Landing") == []
+        assert w.drone.pose.up == pytest.approx(1.0, abs=0.5)
+
+
+async def test_after_a_landing_setpoints_need_another_arming() -> None:
+    async with world() as w:
+        program = Program(IDLE)
+        async with streaming(w.client, program):
+            await ready(w.client, "px4")
+            program.setpoint = attitude(thrust=0.7)
+            await lifted(w)
+            await w.client.heartbeat(lambda beat: beat.custom_mode == OFFBOARD and beat.base_mode & ARMED)
+            await w.drone.wait_log(lambda e: e.name.endswith("FlyingStateChanged") and e.args["state"] == 3, 10.0)
+            assert (await w.client.command(LAND)).result == ACCEPTED
+            await w.client.heartbeat(lambda beat: not beat.base_mode & ARMED, timeout=15.0)
+            await ready(w.client, "px4", arm=False)
+            await said(w.client, "Setpoint refused: this client has not armed", 0)
+            await asyncio.sleep(1.5)
+            assert len(heard(w, "TakeOff")) == 1
+
+
+async def test_prearm_problem_keeps_setpoints_on_the_ground() -> None:
+    async with world() as w:
+        program, mark = Program(IDLE), w.client.mark()
+        async with streaming(w.client, program):
+            await ready(w.client, "px4")
+            w.drone.faults.magneto_required = True
+            await said(w.client, "magnetometer", mark)
+            program.setpoint = attitude(thrust=0.7)
+            await said(w.client, "Setpoint refused: ", mark)
+            await asyncio.sleep(1.3)
+        assert heard(w, "TakeOff") == []
+
+
+# What waits for an accepted take-off.
+
+
+def place(north: float) -> dict[str, float]:
+    latitude, longitude = geo.destination(*HOME[:2], north, 0.0)
+    return {"x": latitude, "y": longitude}
+
+
+async def rising(w: World, height: float = 6.0) -> None:
+    """A take-off is accepted, and the drone has hardly left the ground."""
+    if w.flavour == "ardupilot":
+        assert (await w.client.command(SET_MODE, 1, 4)).result == ACCEPTED
+    assert (await w.client.command(ARM, 1)).result == ACCEPTED
+    assert (await w.client.command(TAKEOFF, x=0.0, y=0.0, z=height)).result == ACCEPTED
+
+
+@both
+async def test_goto_during_takeoff_waits_for_the_climb(flavour: str) -> None:
+    """MAVSDK's goto example: IN_PROGRESS at once, the climb to its height first, then the goto."""
+    async with world(flavour=flavour) as w:
+        await rising(w)
+        mark = w.client.mark()
+        ack = await w.client.command(GOTO, -1, 1, 0, NAN, frame=6, **place(12.0), z=8.0, timeout=20.0)
+        assert ack.result == ACCEPTED
+        results = [m.result for _, m in w.client.since(mark, "COMMAND_ACK") if m.command == GOTO]
+        assert results[0] == dialect.MAV_RESULT_IN_PROGRESS
+        (climb,) = heard(w, "moveBy")
+        end = next(e for e in w.drone.log if e.name.endswith("moveByEnd"))
+        (goto,) = heard(w, "moveTo")
+        assert climb.t < end.t < goto.t
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 11.0, 20.0)
+
+
+async def test_of_two_gotos_during_takeoff_the_newest_is_flown() -> None:
+    async with world(clients=2) as w:
+        await rising(w)
+        w.client.send_command(GOTO, -1, 1, 0, NAN, frame=6, **place(30.0), z=8.0)
+        await w.client.wait("COMMAND_ACK", lambda m: m.command == GOTO)
+        mark = w.client.mark()
+        ack = await w.clients[1].command(GOTO, -1, 1, 0, NAN, frame=6, **place(6.0), z=8.0, timeout=20.0)
+        assert ack.result == ACCEPTED
+        await w.client.wait("COMMAND_ACK", lambda m: (m.command, m.result) == (GOTO, CANCELLED), since=mark)
+        assert len(heard(w, "moveTo")) == 1
+
+
+@pytest.mark.parametrize("how", ["hold", "land"])
+async def test_goto_that_waits_for_a_takeoff_is_cancelled(how: str) -> None:
+    async with world(clients=2) as w:
+        await rising(w, 9.0)
+        await w.drone.wait_log(lambda e: e.name.endswith("FlyingStateChanged") and e.args["state"] in (2, 3), 10.0)
+        mark = w.client.mark()
+        w.client.send_command(GOTO, -1, 1, 0, NAN, frame=6, **place(30.0), z=8.0)
+        await w.client.wait("COMMAND_ACK", lambda m: m.command == GOTO, since=mark)
+        other = w.clients[1]
+        ack = await (other.command(SET_MODE, 1, 4, 3) if how == "hold" else other.command(LAND))
+        assert ack.result == ACCEPTED
+        await w.client.wait("COMMAND_ACK", lambda m: (m.command, m.result) == (GOTO, CANCELLED), since=mark)
+        assert heard(w, "moveTo") == []
+
+
+async def test_goto_that_waits_fails_with_the_takeoff() -> None:
+    """The drone lands by itself in the climb: the goto is answered, and not flown later."""
+    async with world() as w:
+        await rising(w, 20.0)
+        mark = w.client.mark()
+        w.client.send_command(GOTO, -1, 1, 0, NAN, frame=6, **place(30.0), z=8.0)
+        await w.client.wait("COMMAND_ACK", lambda m: m.command == GOTO, since=mark)
+        w.drone.faults.battery = 1
+        ack = await w.client.wait(
+            "COMMAND_ACK",
+            lambda m: m.command == GOTO and m.result != dialect.MAV_RESULT_IN_PROGRESS,
+            since=mark,
+            timeout=30.0,
+        )
+        assert ack.result == FAILED
+        assert heard(w, "moveTo") == []
+
+
+async def test_offboard_during_takeoff_is_accepted_and_flies_after_the_climb() -> None:
+    async with world() as w:
+        async with streaming(w.client, local(VELOCITY_ONLY, v=(2.0, 0.0, 0.0))):
+            await rising(w)
+            assert (await w.client.command(SET_MODE, 1, 6, 0)).result == ACCEPTED
+            await w.client.heartbeat(lambda beat: beat.custom_mode == OFFBOARD, timeout=15.0)
+            end = next(e for e in w.drone.log if e.name.endswith("moveByEnd"))
+            moved = [e for e in heard(w, "PCMD") if e.args["pitch"] > 0]
+            assert all(e.t > end.t for e in moved)
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 2.0, 10.0)
+        assert w.drone.pose.up == pytest.approx(6.0, abs=0.5)
+
+
+async def test_offboard_that_falls_silent_during_takeoff_leaves_the_climb() -> None:
+    async with world(speed=1.0) as w:
+        mark = w.client.mark()
+        async with streaming(w.client, local(VELOCITY_ONLY, v=(2.0, 0.0, 0.0))):
+            await rising(w, 4.0)
+            assert (await w.client.command(SET_MODE, 1, 6, 0)).result == ACCEPTED
+        await said(w.client, "Offboard setpoints stopped: takeoff goes on", mark)
+        await w.at_height(4.0)
+        assert [e for e in heard(w, "PCMD") if e.args["pitch"]] == []
+
+
+async def test_guided_stream_during_takeoff_flies_after_the_climb_without_complaint() -> None:
+    async with world(flavour="ardupilot") as w:
+        mark = w.client.mark()
+        await rising(w)
+        async with streaming(w.client, local(VELOCITY_ONLY, v=(2.0, 0.0, 0.0))):
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 2.0, 20.0)
+        end = next(e for e in w.drone.log if e.name.endswith("moveByEnd"))
+        assert all(e.t > end.t for e in heard(w, "PCMD") if e.args["pitch"] > 0)
+        assert "Setpoint refused" not in " ".join(texts(w.client, mark))

@@ -1,0 +1,133 @@
+"""A pilot at a Skycontroller beside MAVLink clients: who has control, judged by what the simulated drone received."""
+
+from __future__ import annotations
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.params import write
+from support.plans import ACCEPTED as TAKEN
+from support.plans import FENCE, square, upload
+from support.trouble import ACCEPTED, REJECTED, RTL, goto, heard
+from support.world import HOME, World, world
+
+from anafi_mav.arsdk.messages.skyctrl import Source
+
+PITCH_STICK = 3
+"""Its axis at the Skycontroller (mapper.xml)."""
+
+ACTS = ("Landing", "return_to_home", "abort", "CancelMoveTo", "moveBy", "moveTo")
+"""What a failsafe could command, by the last part of Parrot's names."""
+
+RETURN_ACTION, LAND_ACTION = 2, 5
+"""Values of ANF_GCS_LOSS and ANF_FENCE_ACTION."""
+
+generations = pytest.mark.parametrize("generation", [3, 4])
+
+
+def sticks(w: World, since: float) -> list[int]:
+    """Pitch of each PCMD that the drone received after a moment."""
+    return [entry.args["pitch"] for entry in w.commands("ardrone3.Piloting.PCMD") if entry.t > since]
+
+
+async def source_is(w: World, source: Source) -> None:
+    """Wait until the Skycontroller gives the sticks to one side."""
+    pilot = w.drone.skycontroller
+    assert pilot is not None
+    if pilot.source is not source:
+        await w.drone.wait_log(lambda entry: pilot.source is source, 20.0)
+
+
+async def to_the_pilot(w: World) -> None:
+    """Take off, until nothing of ours flies and the axes are the pilot's again."""
+    await w.take_off()
+    await source_is(w, Source.SKY_CONTROLLER)
+
+
+async def greeted(w: World) -> None:
+    """Wait for the last text that a client is greeted with."""
+    w.client.send(dialect.MAVLink_heartbeat_message(dialect.MAV_TYPE_GCS, 8, 0, 0, 4, 3))
+    await w.client.wait("STATUSTEXT", lambda m: "firmware" in m.text, since=0, timeout=10.0)
+
+
+@generations
+async def test_station_loss_while_pilot_has_source_only_warns(generation: int) -> None:
+    async with world(skycontroller=generation) as w:
+        pilot = w.drone.skycontroller
+        assert pilot is not None
+        await write(w.client, "ANF_GCS_LOSS", RETURN_ACTION, dialect.MAV_PARAM_TYPE_INT32)
+        await write(w.client, "ANF_GCS_LOSS_T", 2.0)
+        w.client.send(dialect.MAVLink_heartbeat_message(dialect.MAV_TYPE_GCS, 8, 0, 0, 4, 3))
+        await to_the_pilot(w)
+        w.client.send(dialect.MAVLink_heartbeat_message(dialect.MAV_TYPE_GCS, 8, 0, 0, 4, 3))
+        before, mark = heard(w, *ACTS), w.client.mark()
+        pilot.stick(PITCH_STICK, 60)
+        await w.client.wait("STATUSTEXT", lambda m: "No ground station" in m.text, since=mark, timeout=10.0)
+        text = [m.text for _, m in w.client.since(mark, "STATUSTEXT") if "No ground" in m.text]
+        assert text == ["No ground station for 2 s: pilot in control"]
+        north = w.drone.pose.north
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > north + 3.0, 10.0)
+        assert heard(w, *ACTS) == before
+
+
+async def test_station_loss_while_goto_flies_behind_skycontroller_acts() -> None:
+    async with world(skycontroller=3) as w:
+        await write(w.client, "ANF_GCS_LOSS", RETURN_ACTION, dialect.MAV_PARAM_TYPE_INT32)
+        await write(w.client, "ANF_GCS_LOSS_T", 2.0)
+        await to_the_pilot(w)
+        assert await goto(w, 200.0, 10.0) == ACCEPTED
+        w.client.send(dialect.MAVLink_heartbeat_message(dialect.MAV_TYPE_GCS, 8, 0, 0, 4, 3))
+        await w.drone.wait_log(lambda e: e.name == "rth.return_to_home", 20.0)
+
+
+async def test_fence_while_pilot_has_source_only_warns() -> None:
+    async with world(skycontroller=3) as w:
+        pilot = w.drone.skycontroller
+        assert pilot is not None
+        await write(w.client, "ANF_FENCE_ACTION", LAND_ACTION, dialect.MAV_PARAM_TYPE_INT32)
+        assert (await upload(w.client, square((HOME[0], HOME[1]), 20.0), FENCE)).type == TAKEN
+        await to_the_pilot(w)
+        before, mark = heard(w, *ACTS), w.client.mark()
+        pilot.stick(PITCH_STICK, 60)
+        text = await w.client.wait("STATUSTEXT", lambda m: "Fence" in m.text, since=mark, timeout=20.0)
+        assert text.severity == dialect.MAV_SEVERITY_CRITICAL
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 25.0, 20.0)
+        assert heard(w, *ACTS) == before
+
+
+async def test_goto_right_after_pilots_stick_is_refused() -> None:
+    async with world(skycontroller=3) as w:
+        pilot = w.drone.skycontroller
+        assert pilot is not None
+        await to_the_pilot(w)
+        assert await goto(w, 60.0, 10.0) == ACCEPTED
+        await source_is(w, Source.CONTROLLER)
+        pilot.stick(PITCH_STICK, 40)
+        await source_is(w, Source.SKY_CONTROLLER)
+        assert await goto(w, 70.0, 10.0) == REJECTED  # another place, or it counts as a retransmission
+
+
+async def test_return_while_pilot_has_source_sends_no_pcmd() -> None:
+    """No hand of ours on the sticks: they are the pilot's, level or not."""
+    async with world(skycontroller=3) as w:
+        pilot = w.drone.skycontroller
+        assert pilot is not None
+        await to_the_pilot(w)
+        began, dropped = w.drone.log[-1].t, pilot.dropped
+        assert (await w.client.command(RTL)).result == ACCEPTED
+        assert (await w.client.command(dialect.MAV_CMD_DO_SET_MODE, 1, 4, 3)).result == ACCEPTED
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.t > began + 1.0)
+        assert pilot.dropped == dropped
+        assert sticks(w, began) == []
+
+
+async def test_first_texts_behind_skycontroller_say_that_failsafes_only_warn() -> None:
+    async with world(skycontroller=3) as w:
+        await greeted(w)
+        texts = [m.text for _, m in w.client.since(0, "STATUSTEXT")]
+        assert texts[:2] == [
+            "Skycontroller in control until a client flies",
+            "Until then station loss and fence only warn",
+        ]
+    async with world() as w:
+        await greeted(w)
+        assert not [m for _, m in w.client.since(0, "STATUSTEXT") if "Skycontroller" in m.text]

@@ -1,0 +1,138 @@
+"""The gateway's process is stopped in flight: what the pilot at a Skycontroller can do then, by the simulator's log."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import signal
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any, cast
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.missions import CORNERS, put, start
+from support.process import gateway_process
+from support.trouble import ACCEPTED, PX4_OFFBOARD, goto, heard
+from support.world import HOME, WEB_PORT, World, loopback
+
+from anafi_mav.arsdk.messages.skyctrl import Source
+from anafi_mav.gateway import Gateway
+from anafi_mav.sim import DroneSpec, Simulator
+from anafi_mav.sim.faults import Impairment
+from anafi_mav.units import quaternion_from_euler
+
+PITCH_STICK = 3
+"""Its axis at the Skycontroller (mapper.xml)."""
+
+LIMIT = 2.5
+"""s that the gateway's event loop may stall: more than this machine makes it wait."""
+
+BAD_AIR = Impairment(loss=0.25, delay=0.2)
+
+
+@asynccontextmanager
+async def apart(folder: Path, generation: int | None) -> AsyncIterator[tuple[World, asyncio.subprocess.Process]]:
+    """A simulated drone here, and its gateway as a process of its own."""
+    drone, address = loopback(), loopback()
+    spec = DroneSpec(address=drone, home=HOME, http_port=WEB_PORT, skycontroller=generation)
+    config = folder / "fleet.yaml"
+    config.write_text(
+        f"drones: [{{name: alpha, sysid: 1, address: {drone}, http_port: {WEB_PORT}}}]\n"
+        f"endpoints: ['tcpin://{address}:5760']\n"
+    )
+    async with Simulator([spec], speed=2.0, seed=1) as simulator, gateway_process(config, LIMIT) as process:
+        w = World(simulator, cast(Gateway, None), address)
+        try:
+            await w.connect()
+            await w.client.heartbeat(lambda beat: True, since=0, timeout=20.0)
+            await w.client.wait("GLOBAL_POSITION_INT", since=0)
+            yield w, process
+        finally:
+            with contextlib.suppress(ProcessLookupError):
+                process.send_signal(signal.SIGCONT)
+            for client in w.clients:
+                await client.close()
+
+
+async def set_out(w: World, way: str) -> asyncio.Task[Any] | None:
+    """Have something of ours fly; the task that keeps it flying, if it needs one."""
+    if way == "mission":
+        await put(w, CORNERS)
+        await start(w)
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 2.0, 40.0)
+        return None
+    await w.take_off()
+    if way == "goto":
+        assert await goto(w, 200.0, 10.0) == ACCEPTED
+        return None
+
+    async def stream() -> None:
+        while True:
+            rotation = list(quaternion_from_euler(0.0, -0.05, 0.0))
+            w.client.send(dialect.MAVLink_set_attitude_target_message(0, 1, 1, 0b111, rotation, 0.0, 0.0, 0.0, 0.5))
+            await asyncio.sleep(0.05)  # the client's setpoint rate
+
+    task = asyncio.ensure_future(stream())
+    await w.drone.wait_log(lambda e: e.kind == "pose", 5.0)
+    assert (await w.client.command(dialect.MAV_CMD_DO_SET_MODE, *PX4_OFFBOARD)).result == ACCEPTED
+    return task
+
+
+def given_back(w: World) -> bool:
+    pilot = w.drone.skycontroller
+    assert pilot is not None
+    return pilot.source is Source.SKY_CONTROLLER and pilot.grabbed_axes == 0
+
+
+async def sees(w: World, true: Any, timeout: float = 20.0) -> None:
+    """Wait until this is true of the simulated aircraft: looked at with every line of its log."""
+    if not true():
+        await w.drone.wait_log(lambda entry: true(), timeout)
+
+
+@pytest.mark.parametrize("generation", [3, 4])
+@pytest.mark.parametrize("way", ["goto", "mission", "offboard"])
+async def test_pilot_has_sticks_while_gateway_is_stopped(tmp_path: Path, way: str, generation: int) -> None:
+    async with apart(tmp_path, generation) as (w, gateway):
+        pilot = w.drone.skycontroller
+        assert pilot is not None
+        task = await set_out(w, way)
+        try:
+            await sees(w, lambda: pilot.source is Source.CONTROLLER and pilot.grabbed_axes != 0)
+            w.drone.faults.up = w.drone.faults.down = BAD_AIR
+            commands = [e.name for e in w.drone.log if e.kind == "command"]
+            gateway.send_signal(signal.SIGSTOP)
+            await sees(w, lambda: given_back(w))
+            assert w.drone.session is not None  # by the watchdog: the Skycontroller has not missed the gateway yet
+            # His stick reaches the drone, and nothing else was ended for him.
+            pilot.stick(PITCH_STICK, 50)
+            await w.drone.wait_log(lambda e: e.name.endswith("PCMD") and e.args["pitch"] == 50, 10.0)
+            new = [e.name for e in w.drone.log if e.kind == "command"][len(commands) :]
+            assert {name for name in new if not name.endswith("PCMD")} == set()
+            w.drone.faults.up = w.drone.faults.down = Impairment()
+            gateway.send_signal(signal.SIGCONT)
+            if way == "goto":
+                await sees(w, lambda: heard(w, "CancelMoveTo") != [])
+            elif way == "mission":
+                await sees(w, lambda: heard(w, "Pause", "Stop") != [])
+            # The client goes on, and the pilot keeps the drone.
+            await w.client.heartbeat(lambda beat: True, timeout=10.0)
+            assert given_back(w)
+        finally:
+            if task is not None:
+                task.cancel()
+
+
+async def test_stopped_gateway_with_nothing_flying_sends_nothing(tmp_path: Path) -> None:
+    async with apart(tmp_path, 3) as (w, gateway):
+        pilot = w.drone.skycontroller
+        assert pilot is not None
+        await w.take_off()
+        await sees(w, lambda: given_back(w))
+        before = [e.t for e in w.drone.log if e.kind == "controller"]
+        gateway.send_signal(signal.SIGSTOP)
+        stopped = w.drone.log[len(w.drone.log) - 1].t
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.t > stopped + 2.0 * LIMIT, 30.0)
+        assert [e.t for e in w.drone.log if e.kind == "controller"] == before
