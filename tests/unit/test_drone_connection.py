@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator
+from pathlib import Path
 
 import pytest
 from support.world import loopback
@@ -100,6 +101,16 @@ async def test_cancelled_block_stops_the_move(real: SimulatedDrone) -> None:
     with pytest.raises(asyncio.CancelledError):
         await task
     assert commands(real, "CancelMoveTo") == ["CancelMoveTo"]
+
+
+async def test_flight_plan_is_paused_when_the_block_ends() -> None:
+    address, plan = loopback(), Path(__file__).parents[2] / "missions" / "delivery.v1.mavlink"
+    spec = DroneSpec(address=address, home=HOME, http_port=8080, rtsp_port=None)
+    async with Simulator([spec], speed=4.0, seed=1) as simulator:
+        async with connect(address, http_port=8080) as drone:
+            await drone.flight_plan.start(await drone.flight_plan.upload(plan.read_bytes()))
+            await drone.wait_for(FlyingState.FLYING)
+        assert commands(simulator.drones[0], "Pause", "Stop") == ["Pause"]
 
 
 async def test_landing_continues_after_the_block(real: SimulatedDrone) -> None:
