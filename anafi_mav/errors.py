@@ -30,6 +30,14 @@ class LinkLost(AnafiMavError, ConnectionError):
         self.reason = reason
 
 
+class HandshakeRefused(LinkLost):
+    """What answers there refuses the connection; `status` is its number for why, which Parrot does not explain."""
+
+    def __init__(self, where: str, status: int) -> None:
+        super().__init__(f"{where} refused the connection (status {status})")
+        self.status = status
+
+
 class CommandTimeout(AnafiMavError, TimeoutError):
     """The drone did not confirm a command in time. ARSDK has no refusal: silence is how a drone says no.
 

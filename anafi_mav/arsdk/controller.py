@@ -17,7 +17,7 @@ from anafi_mav.arsdk.session import OnMessage, Session, reason_of
 from anafi_mav.arsdk.transport import Role, Transport
 from anafi_mav.arsdk.watchdog import Watchdog
 from anafi_mav.arsdk.wire import Message
-from anafi_mav.errors import LinkLost, RemoteProtocolError
+from anafi_mav.errors import HandshakeRefused, LinkLost, RemoteProtocolError
 
 log = logging.getLogger("anafi_mav.arsdk")
 
@@ -43,6 +43,8 @@ class ControllerSession(Session):
         super().__init__(transport, on_message)
         self.on_stall: Callable[[], None] = lambda: None
         """Called when the host stalled and the watchdog has sent what stood by."""
+        self.closed_by_peer = False
+        """The session ended because the other side closed its TCP connection."""
         self._watchdog: Watchdog | None = None
         self._starting: asyncio.Task[None] | None = None
         self._standby: Sequence[Message] = ()
@@ -56,6 +58,7 @@ class ControllerSession(Session):
         with contextlib.suppress(OSError):
             while await reader.read(handshake.MAX_JSON):
                 pass
+        self.closed_by_peer = not self.lost.done()
         self.end("the drone closed the connection")
 
     def end(self, reason: str) -> None:
@@ -155,18 +158,30 @@ async def connect(
     on_message: OnMessage,
     ping_after: float = 0.5,
     silence_limit: float | None = 2.5,
+    fades: bool = False,
     timeout: float = 3.0,
 ) -> ControllerSession:
     """Connect to the drone at `host`.
 
     `handshake_port` None means the one that discovery tells. `versions` is the (lowest, highest) ARSDK protocol
     version offered. `local_address` and `interface` bind all our sockets; None: whatever routes to the drone.
-    `on_message` may be called before this returns. Raises `LinkLost` when nobody answers within `timeout` seconds or
-    the drone refuses, `RemoteProtocolError` when what answers is no drone.
+    `on_message` may be called before this returns; `fades`: see `Transport`.
+
+    Raises `LinkLost` when nothing answers within `timeout` seconds, `HandshakeRefused` when the drone refuses,
+    `RemoteProtocolError` when what answers is no drone.
     """
     handshake.check_versions(versions)
     opening = _connect(
-        host, discovery_port, handshake_port, versions, local_address, interface, on_message, ping_after, silence_limit
+        host,
+        discovery_port,
+        handshake_port,
+        versions,
+        local_address,
+        interface,
+        on_message,
+        ping_after,
+        silence_limit,
+        fades,
     )
     try:
         return await asyncio.wait_for(opening, timeout)
@@ -188,6 +203,7 @@ async def _connect(
     on_message: OnMessage,
     ping_after: float,
     silence_limit: float | None,
+    fades: bool,
 ) -> ControllerSession:
     reader, writer = await _open(host, discovery_port, local_address, interface)
     try:
@@ -223,6 +239,7 @@ async def _connect(
         asyncio.get_running_loop().time(),
         ping_after=ping_after,
         silence_limit=silence_limit,
+        fades=fades,
         gives_up=False,  # who waits for a command takes it back in time; an order to stop has to arrive
     )
     session = ControllerSession(transport, on_message, device, (reader, writer))
@@ -245,7 +262,7 @@ async def _shake_hands(
     finally:
         writer.close()
     if reply.status != 0:
-        raise LinkLost(f"{host}:{port} refused the connection (status {reply.status})")
+        raise HandshakeRefused(f"{host}:{port}", reply.status)
     if not request.proto_v_min <= reply.proto_v <= request.proto_v_max:
         raise RemoteProtocolError(
             f"{host}:{port} chose protocol version {reply.proto_v}, "

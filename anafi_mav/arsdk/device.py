@@ -53,6 +53,8 @@ class Mutable:
 
     def __init__(self) -> None:
         self.session = None
+        self.refuses: Callable[[], bool] = lambda: False
+        """Asked at each handshake; True: it is refused."""
         self._mute = False
 
     @property
@@ -192,6 +194,8 @@ class DeviceServer(Mutable):
             return _refusal(f"{peer} speaks protocol versions {request.proto_v_min} to {request.proto_v_max}")
         if request.device_id not in ("", self.info.serial):
             return _refusal(f"{peer} asks for {request.device_id!r}, this is {self.info.serial!r}")
+        if self.refuses():
+            return _refusal(f"{peer}: the session of another controller is alive")
         if self.session is not None:
             self.session.end("another controller connected")
             await self.session.close()

@@ -18,7 +18,7 @@ from anafi_mav.arsdk.mux_udp import UdpTunnel
 from anafi_mav.arsdk.session import OnMessage, reason_of
 from anafi_mav.arsdk.transport import Role, Transport
 from anafi_mav.arsdk.watchdog import Watchdog
-from anafi_mav.errors import LinkLost, RemoteProtocolError
+from anafi_mav.errors import HandshakeRefused, LinkLost, RemoteProtocolError
 
 log = logging.getLogger("anafi_mav.arsdk")
 
@@ -162,6 +162,7 @@ class MuxControllerSession(ControllerSession):
                     if frame.channel == mux.TRANSPORT:
                         self.datagram_received(frame.payload, PEER)
                 frames = await self._stream.read()
+        self.closed_by_peer = not self.lost.done()
         self.end("the Skycontroller closed the connection")
 
 
@@ -175,6 +176,7 @@ async def connect(
     on_message: OnMessage,
     ping_after: float = 0.5,
     silence_limit: float | None = 2.5,
+    fades: bool = False,
 ) -> MuxControllerSession:
     """Connect to the device behind the mux at `host`; who calls limits the time. Otherwise as `controller.connect`."""
     try:
@@ -189,7 +191,7 @@ async def connect(
         stream.write(mux.BACKEND, mux.encode_pomp(mux.CONN_REQ, [("%s", text) for text in texts]))
         (status, text), early = await _answer(stream, mux.BACKEND, mux.CONN_RESP, (int, str))
         if status != 0:
-            raise LinkLost(f"{host}:{port} refused the connection (status {status})")
+            raise HandshakeRefused(f"{host}:{port}", status)
         version = _version(text)
         if not versions[0] <= version <= versions[1]:
             raise RemoteProtocolError(f"{host}:{port} chose protocol version {version}, offered were {versions}")
@@ -199,6 +201,7 @@ async def connect(
             asyncio.get_running_loop().time(),
             ping_after=ping_after,
             silence_limit=silence_limit,
+            fades=fades,
             gives_up=False,  # who waits for a command takes it back in time; an order to stop has to arrive
         )
     except BaseException:
@@ -249,19 +252,28 @@ async def connect_either(
     local_address: str | None = None,
     interface: str | None = None,
     on_message: OnMessage,
+    fades: bool = False,
     timeout: float = 3.0,
     **options: Any,
 ) -> ControllerSession:
     """As `controller.connect`; where nothing listens on the discovery port, a Skycontroller 4 is tried on the mux."""
     try:
         return await controller.connect(
-            host, local_address=local_address, interface=interface, on_message=on_message, timeout=timeout, **options
+            host,
+            local_address=local_address,
+            interface=interface,
+            on_message=on_message,
+            fades=fades,
+            timeout=timeout,
+            **options,
         )
     except LinkLost as error:
         if not isinstance(error.__cause__, ConnectionRefusedError):
             raise
         refused = error
-    attempt = connect(host, port=mux_port, local_address=local_address, interface=interface, on_message=on_message)
+    attempt = connect(
+        host, port=mux_port, local_address=local_address, interface=interface, on_message=on_message, fades=fades
+    )
     try:
         return await asyncio.wait_for(attempt, timeout)
     except asyncio.TimeoutError:
@@ -425,6 +437,9 @@ class MuxServer(Mutable):
             return session
         if id != mux.CONN_REQ or len(arguments) < 4 or not all(isinstance(one, str) for one in arguments):
             return session
+        if self.refuses():
+            self._refuse(stream)
+            return session
         before = self.session
         if before is not None:
             before.end("another controller connected")
@@ -432,6 +447,10 @@ class MuxServer(Mutable):
         if isinstance(before, MuxDeviceSession) and before.stream is not stream:
             before.stream.writer.close()
         return self._accept(stream, cast("list[str]", arguments))
+
+    def _refuse(self, stream: Stream) -> None:
+        refusal: list[tuple[str, mux.Argument]] = [("%d", handshake.REJECTED), ("%s", "")]
+        stream.write(mux.BACKEND, mux.encode_pomp(mux.CONN_RESP, refusal))
 
     def _accept(self, stream: Stream, arguments: list[str]) -> MuxDeviceSession | None:
         name, kind, serial, text = arguments[:4]
@@ -446,8 +465,7 @@ class MuxServer(Mutable):
         request = ConnectRequest(name, kind, 0, serial, 0, low, high)
         version = handshake.pick_version(request, self._versions)
         if version is None or serial not in ("", self.info.serial):
-            refusal: list[tuple[str, mux.Argument]] = [("%d", handshake.REJECTED), ("%s", "")]
-            stream.write(mux.BACKEND, mux.encode_pomp(mux.CONN_RESP, refusal))
+            self._refuse(stream)
             return None
         transport = Transport(Role.DEVICE, version, asyncio.get_running_loop().time(), ping_after=self._ping_after)
         peer = stream.writer.get_extra_info("peername")[0]

@@ -17,7 +17,17 @@ from typing import TypeAlias, cast
 
 from typing_extensions import assert_never
 
-from anafi_mav.arsdk.transport import Delivered, Event, Garbage, LinkDown, Received, Transport, Undelivered
+from anafi_mav.arsdk.transport import (
+    Delivered,
+    Event,
+    Garbage,
+    LinkDown,
+    Received,
+    Silent,
+    Speaks,
+    Transport,
+    Undelivered,
+)
 from anafi_mav.arsdk.wire import Message, UnknownMessage
 
 log = logging.getLogger("anafi_mav.arsdk")
@@ -59,6 +69,10 @@ class Session(asyncio.DatagramProtocol):
         self._peer = peer
         self.on_delivered: Callable[[int, bool], None] = lambda token, arrived: None
         """Told what became of each acknowledged command, by the token of `send`: received, or given up (version 1)."""
+        self.on_silent: Callable[[str], None] = lambda reason: None
+        """Called when the peer is not heard any more; nothing but pings and answers is sent until it speaks."""
+        self.on_speaks: Callable[[], None] = lambda: None
+        """Called when it is heard again, before its messages."""
         self._endpoint: asyncio.DatagramTransport | None = None
         self._closed = asyncio.Event()
         self._timer: asyncio.TimerHandle | None = None
@@ -84,6 +98,16 @@ class Session(asyncio.DatagramProtocol):
     def version(self) -> int:
         """Negotiated protocol version."""
         return self._transport.version
+
+    @property
+    def last_received(self) -> float:
+        """Loop time at which the peer was heard last; the beginning of the session if never."""
+        return self._transport.last_received
+
+    @property
+    def silent(self) -> bool:
+        """The peer is not heard, and commands are dropped."""
+        return self._transport.silent
 
     @property
     def counters(self) -> Counter[str]:
@@ -190,6 +214,10 @@ class Session(asyncio.DatagramProtocol):
                     log.debug("message %d undelivered: %s", token, reason)
                 case Garbage(reason):
                     log.debug("unreadable bytes from the peer: %s", reason)
+                case Silent(reason):
+                    self.on_silent(reason)
+                case Speaks():
+                    self.on_speaks()
                 case LinkDown(reason):
                     self.end(reason)
                 case _:

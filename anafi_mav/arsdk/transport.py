@@ -97,13 +97,23 @@ class Garbage(msgspec.Struct, frozen=True):
     reason: str
 
 
+class Silent(msgspec.Struct, frozen=True):
+    """The peer is not heard any more. Commands are dropped until it speaks; only pings and answers are sent."""
+
+    reason: str
+
+
+class Speaks(msgspec.Struct, frozen=True):
+    """The peer is heard again after a silence."""
+
+
 class LinkDown(msgspec.Struct, frozen=True):
     """The link is dead. Nothing is sent or received any more; a new connection needs a new transport."""
 
     reason: str
 
 
-Event: TypeAlias = Received | Delivered | Undelivered | Garbage | LinkDown
+Event: TypeAlias = Received | Delivered | Undelivered | Garbage | Silent | Speaks | LinkDown
 
 _ACK, _NOACK, _WITHACK = int(FrameType.ACK), int(FrameType.NOACK), int(FrameType.WITHACK)
 
@@ -142,7 +152,8 @@ class Transport:
     """One connection. Construct it when the handshake is done; `version` is the negotiated protocol version.
 
     A ping goes out when nothing was received for `ping_after` seconds, and again every `ping_after`. The link is
-    down after three unanswered pings, or when nothing was received for `silence_limit` seconds.
+    down after three unanswered pings, or when nothing was received for `silence_limit` seconds. With `fades` it is
+    silent then: everything queued is dropped, and the session goes on when the peer speaks again.
 
     Call `outgoing` after every `receive`, `send`, `cancel` and `expire`.
     """
@@ -156,6 +167,7 @@ class Transport:
         ping_after: float = 2.0,
         silence_limit: float | None = None,
         gives_up: bool = True,
+        fades: bool = False,
     ) -> None:
         """`gives_up` False: a controller of version 1 repeats every command for ever, too."""
         if version not in VERSIONS:
@@ -185,7 +197,19 @@ class Transport:
         self._ping_due = now + ping_after
         self._ping_seq = -1
         self._unanswered = 0
+        self._fades = fades
+        self._silent = False
         self._down = False
+
+    @property
+    def last_received(self) -> float:
+        """When the peer was heard last, s; the beginning of the session if never."""
+        return self._last_received
+
+    @property
+    def silent(self) -> bool:
+        """The peer has not been heard for too long, and commands are dropped."""
+        return self._silent
 
     # -- receiving
 
@@ -200,6 +224,9 @@ class Transport:
             self._last_received = now
             self._ping_due = now + self._ping_after
             self._unanswered = 0
+            if self._silent:
+                self._silent = False
+                events.append(Speaks())
         for type, id, seq, payload in frames:
             if id in self._received_ids and type != _ACK:
                 if type == _WITHACK:
@@ -267,7 +294,8 @@ class Transport:
     def send(self, message: Message | UnknownMessage, now: float) -> int:
         """Queue a message; the token names it in `cancel`, `Delivered` and `Undelivered`.
 
-        An unknown message travels in the acknowledged queue. A HIGH_PRIO message overtakes what waits there.
+        An unknown message travels in the acknowledged queue. A HIGH_PRIO message takes the place of everything that was
+        not delivered, in the same queue: its own (12) is read by no Parrot program that we know.
         Raises `LocalProtocolError` when it cannot be encoded or is too long for its queue. On a link that is down
         the message is counted and forgotten.
         """
@@ -277,8 +305,8 @@ class Transport:
         if len(data) > longest:
             raise LocalProtocolError(f"{type(message).__name__} has {len(data)} bytes, its queue takes {longest}")
         token = next(self._tokens)
-        if self._down:
-            self.counters["dropped.down"] += 1
+        if self._down or self._silent:
+            self.counters["dropped.down" if self._down else "dropped.silent"] += 1
         elif buffer is Buffer.NON_ACK:
             if len(self._noack) >= MAX_QUEUED_NOACK:
                 self._noack.popleft()
@@ -289,6 +317,9 @@ class Transport:
         return token
 
     def _enqueue(self, buffer: Buffer, token: int, data: bytes) -> None:
+        if buffer is Buffer.HIGH_PRIO:
+            # Nothing of before may follow it, nor may it wait for the acknowledgement of what is in flight.
+            self.abandon("overtaken")
         queue = self._queues[(_LOW_PRIO_ID if buffer is Buffer.LOW_PRIO else _ACK_ID)[self.role]]
         if len(queue.waiting) >= MAX_QUEUED:
             self.counters["dropped.full"] += 1
@@ -418,7 +449,9 @@ class Transport:
             return None
         if self._pending:
             return self._last_received
-        deadline = min(self._ping_due, self._last_received + self._silence_limit)
+        deadline = self._ping_due
+        if not self._silent:
+            deadline = min(deadline, self._last_received + self._silence_limit)
         for queue in self._queues.values():
             if queue.due < deadline:
                 deadline = queue.due
@@ -437,14 +470,28 @@ class Transport:
             # The host stalled, and what arrived meanwhile may not have been read yet: that is no silence of the peer's.
             self._last_received += late
         silence = now - self._last_received
-        if silence >= self._silence_limit:
-            self._go_down(f"nothing received for {silence:.1f} s", events)
+        if self._silent:
+            if now >= self._ping_due:
+                self._send_ping(now)
+        elif silence >= self._silence_limit:
+            self._lose(f"nothing received for {silence:.1f} s", now, events)
         elif now >= self._ping_due:
             if self._unanswered >= MAX_UNANSWERED_PINGS:
-                self._go_down(f"{self._unanswered} pings unanswered, nothing received for {silence:.1f} s", events)
+                self._lose(f"{self._unanswered} pings unanswered, nothing received for {silence:.1f} s", now, events)
             else:
                 self._send_ping(now)
         return events
+
+    def _lose(self, reason: str, now: float, events: list[Event]) -> None:
+        """The peer is not heard any more."""
+        if not self._fades:
+            self._go_down(reason, events)
+            return
+        self.abandon("the link is silent")
+        events.extend(self._take_pending())
+        self._silent = True
+        self._send_ping(now)
+        events.append(Silent(reason))
 
     def _send_ping(self, now: float) -> None:
         self._unanswered += 1

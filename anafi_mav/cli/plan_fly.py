@@ -26,7 +26,7 @@ class Ended(AnafiMavError):
 
 def fly(arguments: argparse.Namespace) -> int:
     """Fly it. Raises `Refused`, `CommandRejected`, `LinkLost` and `Ended`."""
-    sysid, plan = plan_options.sysid_of(arguments), plan_options.load(arguments)
+    plan, sysid = plan_options.load(arguments), plan_options.sysid_of(arguments)
     if not plan.items:
         raise PlanError(arguments.file.name, "it has no mission: nothing to fly")
     interrupts.run(_fly(arguments, sysid, plan))

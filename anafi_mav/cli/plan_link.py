@@ -85,7 +85,7 @@ def _without_heading(item: Item) -> Item:
 
 def upload(arguments: argparse.Namespace) -> int:
     """Hand it over; 1 when the gateway took it and cannot store it. Raises `Refused` with the vehicle's reason."""
-    sysid, plan = plan_options.sysid_of(arguments), plan_options.load(arguments)
+    plan, sysid = plan_options.load(arguments), plan_options.sysid_of(arguments)
     texts = interrupts.run(_upload(arguments, sysid, plan))
     return 1 if NOT_KEPT in texts else 0
 
@@ -173,6 +173,8 @@ def download(arguments: argparse.Namespace) -> int:
     """Fetch mission, fence and rally points into one file. Raises `Refused`."""
     sysid = plan_options.sysid_of(arguments)
     plan_options.target_format(arguments.out, arguments.model)
+    plan_files.may_replace(arguments.out, force=arguments.force)
+    arguments.force = True  # it has been asked, before the vehicle was
     plan = interrupts.run(_download(arguments, sysid))
     plan_files.store(plan, arguments, Path("the vehicle's plan"))
     return 0

@@ -49,17 +49,23 @@ def model_argument(parser: argparse.ArgumentParser) -> None:
 
 
 def load(arguments: argparse.Namespace) -> Plan:
-    """The plan that the arguments name. Raises `PlanError` and `ConfigError`."""
+    """The plan that the arguments name. Raises `PlanError`, and only then `ConfigError` for an option."""
+    data = files.read(arguments.file)
     model = version(arguments.model)
     if model is None and arguments.file.suffix.lower() == PARROT:
         raise ConfigError("--model", f"expected one of {', '.join(MODELS)}: a {PARROT} file does not say its drone")
+    return files.parse(data, arguments.file.name, model or 2, height_of(arguments))
+
+
+def height_of(arguments: argparse.Namespace) -> float | None:
+    """The height of a line on a map, m above take-off. Raises `ConfigError`."""
     height = None
     if arguments.height is not None:
         wanted = f"metres above take-off, up to {MAX_HEIGHT:g}"
         height = options.number("--height", arguments.height, wanted)
         if not 0.0 < height <= MAX_HEIGHT:
             raise ConfigError("--height", f"expected {wanted}, got {arguments.height}")
-    return files.load(arguments.file, model or 2, height)
+    return height
 
 
 def version(model: str | None) -> Version | None:
@@ -94,6 +100,10 @@ def check_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `anafi-mav plan check`."""
     usual = Limits()
     source_arguments(parser)
+    parser.add_argument(
+        "-c", "--config", type=Path, metavar="FILE", help="check for the models of this fleet; left out: for all"
+    )
+    json_argument(parser)
     parser.add_argument(
         "--max-altitude",
         default=f"{usual.max_altitude:g}",
@@ -148,22 +158,34 @@ def sysid_of(arguments: argparse.Namespace) -> int | None:
     return sysid
 
 
+def json_argument(parser: argparse.ArgumentParser) -> None:
+    """The same for programs."""
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+
+
+def force_argument(parser: argparse.ArgumentParser) -> None:
+    """Permission to replace a file."""
+    parser.add_argument("--force", action="store_true", help="replace OUT without asking")
+
+
 def show_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `anafi-mav plan show`."""
     source_arguments(parser)
+    json_argument(parser)
 
 
 def convert_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `anafi-mav plan convert`."""
     source_arguments(parser)
     out_argument(parser)
+    force_argument(parser)
 
 
 def plot_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `anafi-mav plan plot`."""
     source_arguments(parser)
     parser.add_argument(
-        "-o", "--output", type=Path, required=True, metavar="FILE", help=f"one of {', '.join(plot.SUFFIXES)}"
+        "-o", "--output", type=Path, metavar="FILE", help=f"required; one of {', '.join(plot.SUFFIXES)}"
     )
 
 
@@ -176,5 +198,6 @@ def upload_arguments(parser: argparse.ArgumentParser) -> None:
 def download_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `anafi-mav plan download`."""
     out_argument(parser)
+    force_argument(parser)
     model_argument(parser)
     link_arguments(parser)

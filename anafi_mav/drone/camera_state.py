@@ -64,9 +64,9 @@ class ExposureSettings(msgspec.Struct, frozen=True):
 
     mode: ExposureMode | None = None
     shutter_s: float | None = None
-    """Where the shutter is set by hand."""
+    """Shutter time for the modes that set it by hand."""
     iso: float | None = None
-    """Where the sensitivity is set by hand."""
+    """Sensitivity for the modes that set it by hand."""
     max_iso: float | None = None
     metering: Metering | None = None
 

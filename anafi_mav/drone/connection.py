@@ -61,7 +61,7 @@ async def connect(
         try:
             await _settle(drone)
         except AnafiMavError as error:
-            log.warning("%s: not settled before the connection ended: %s", drone.name, error)
+            log.warning("%s: state unknown when the connection ended: %s", drone.name, error)
         finally:
             await drone.close()
 
@@ -76,14 +76,15 @@ async def _settle(drone: Drone) -> None:
     flying = piloting.state.flying
     if flying in _STANDING or flying in _LANDING:
         return
-    if home.state.returning or (drone.controller.present and not drone.controller.taken):
-        log.warning("%s: left in the air: %s", drone.name, "returning home" if home.state.returning else "its pilot's")
+    if home.state.returning or drone.controller.pilot_has_source:
+        doing = "returns home" if home.state.returning else "the Skycontroller's pilot flies"
+        log.warning("%s: left in the air: %s", drone.name, doing)
         return
     try:
         await piloting.stop()
-    finally:
         delay = home.state.delay_s
         after = "its own delay" if delay is None else f"{delay} s"
         log.warning("%s: left in the air: hovers, returns home after %s if it knows home", drone.name, after)
+    finally:
         if drone.connected:
             await asyncio.wait([drone.lost], timeout=HOVER_TIME)

@@ -134,6 +134,17 @@ class Controller(Element[ControllerState]):
             self._timer.cancel()
             self._timer = None
 
+    def link_silent(self) -> None:
+        """The Skycontroller is not heard; what it is stays known, what we took is not ours any more."""
+        present, model = self.present, self.model
+        self.link_lost()
+        self.present, self.model = present, model
+
+    def link_heard(self) -> None:
+        """It is heard again, and may not have missed us: what we took goes back."""
+        if self.present:
+            self._send_back()
+
     # -- who flies
 
     @property

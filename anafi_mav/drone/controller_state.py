@@ -58,7 +58,7 @@ class ControllerState(msgspec.Struct, frozen=True):
     battery: BatteryStatus | None = None
     attitude: Attitude | None = None
     position: Position | None = None
-    """Where the controller is; altitude above mean sea level."""
+    """Place of the controller; altitude above mean sea level."""
     magnetometer: CalibrationStatus | None = None
     link: Connection | None = None
     """To the drone."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import datetime
@@ -17,7 +18,7 @@ from typing import Any, TypeAlias, TypeVar
 from anafi_mav.arsdk import mux_link
 from anafi_mav.arsdk.controller import ControllerSession
 from anafi_mav.arsdk.handshake import DISCOVERY_PORT
-from anafi_mav.arsdk.messages import ardrone3, common, drone_manager, skyctrl
+from anafi_mav.arsdk.messages import ardrone3, common, drone_manager, rth, skyctrl
 from anafi_mav.arsdk.messages import flight_plan as modern_plan
 from anafi_mav.arsdk.messages.animation import Type as AnimationType
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState, PoiStatus
@@ -37,13 +38,13 @@ from anafi_mav.drone.camera import Camera
 from anafi_mav.drone.controller import MODELS as CONTROLLERS
 from anafi_mav.drone.controller import Controller, is_motion
 from anafi_mav.drone.element import Element, Reducer
-from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander
+from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, loop_time
 from anafi_mav.drone.features import Feature, Support, features
 from anafi_mav.drone.flight_plan import FlightPlan
 from anafi_mav.drone.follow_me import FollowMe
 from anafi_mav.drone.gimbal import Gimbal
 from anafi_mav.drone.gps import Gps
-from anafi_mav.drone.home import Home
+from anafi_mav.drone.home import Home, modern
 from anafi_mav.drone.link import Link
 from anafi_mav.drone.media import Media
 from anafi_mav.drone.moves import Move
@@ -74,6 +75,10 @@ WAIT_TIMEOUT = 30.0
 
 CONTROLLER_PORTS = 100
 """A Skycontroller 3 has the TCP ports of its drone this much higher (Olympe, libarsdkctrl arsdk_device.c)."""
+
+HANDSHAKE_AFTER = 4.0
+"""s of silence before the first new handshake. libarsdk keeps a silent session for 8 s, and an earlier handshake could
+throw out one that was only fading."""
 
 CONTROLLER_TIMEOUT = 5.0
 """s that a Skycontroller may take to find its drone; then it is asked anew, so that its own state is fresh."""
@@ -130,6 +135,7 @@ class Drone:
         self.piloting = Piloting(self._commander, self.home, self.takeoff_blockers)
         self.controller = Controller(self._commander, self._user_moves, self._pilot_takes_over, self._stand_by)
         self.piloting.pilot_has_source = lambda: self.controller.pilot_has_source
+        self.flight_plan.model = lambda: self._model
         self.piloting.is_modern = lambda: self._model.protobuf
         self._commander.gate = self._allows
         self._elements: tuple[Element[Any], ...] = (
@@ -162,16 +168,33 @@ class Drone:
             **self.piloting.reactions(),
             **self.controller.reactions(),
             common.MavlinkFilePlayingStateChanged: self._plan_says,
+            common.Disconnection: self._on_dismissal,
             drone_manager.ConnectionState: self._controller_says,
             device_manager.State: self._controller_says,
         }
         self._subscribers: tuple[Callback, ...] = ()
 
         self._session: ControllerSession | None = None
+        self._fading: ControllerSession | None = None
+        """A session that is silent, and goes on when the drone is heard again before a new handshake has succeeded."""
+        self._heard: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        """Done when the fading session is heard again, or has ended."""
+        self.handshake_at = -math.inf
+        """Loop time of the newest handshake."""
+        self.last_heard = -math.inf
+        """Loop time at which the drone was heard last before its link was lost."""
+        self.may_be_displaced = False
+        """The link was lost as another controller's handshake would end it."""
+        self._dismissed: common.DisconnectionCause | None = None
+        """Cause with which the drone announced the end of the connection."""
+        self._hover_due = False
+        """What flew at the beginning of a silence is to be stopped when it is over."""
         self._opening = False
         self._complete = False
         self._counters: Counter[str] = Counter()
         self._model = Model(0, "", "")
+        self._reports_rth_state = False
+        """rth.state has been received on this connection, so that its legacy twin says nothing more."""
         self._announced_serial = ""
         self._announced_name = ""
         self._lost: asyncio.Future[str] = asyncio.get_running_loop().create_future()
@@ -188,15 +211,11 @@ class Drone:
             raise LocalProtocolError(f"{self.name} is connected, or about to be")
         self._opening = True
         try:
+            session = await self._open()
+            if session is None:
+                log.info("%s: heard again", self.name)
+                return
             self._reset()
-            session = await mux_link.connect_either(
-                self.address,
-                discovery_port=self._discovery_port,
-                handshake_port=self._handshake_port,
-                local_address=self._local_address,
-                interface=self._interface,
-                on_message=self._receive,
-            )
             self._begin(session)
             try:
                 await self._find_web_server(session)
@@ -209,14 +228,135 @@ class Drone:
                 raise
             self._complete = True
             self.video.link_up(self._video_route(session))
+            self._hover_after_silence()
         finally:
             self._opening = False
         log.info("%s: connected to %s, protocol %d", self.name, self.identity, session.version)
 
+    async def _open(self) -> ControllerSession | None:
+        """Open a session; None: the silent one of before goes on, since the drone has been heard again.
+
+        The drone may keep a silent session for 8 s (libarsdk) and a handshake would end it, so that the first one
+        waits. Until one has succeeded the silent session is listened to. Raises as `connect`.
+        """
+        fading = self._fading
+        if fading is not None:
+            rest = fading.last_received + HANDSHAKE_AFTER - loop_time()
+            await asyncio.wait({self._heard}, timeout=max(rest, 0.0))
+            if self._resume(fading):
+                return None
+        attempt = asyncio.ensure_future(
+            mux_link.connect_either(
+                self.address,
+                discovery_port=self._discovery_port,
+                handshake_port=self._handshake_port,
+                local_address=self._local_address,
+                interface=self._interface,
+                on_message=_ignore,
+                fades=True,
+            )
+        )
+        try:
+            either: set[asyncio.Future[Any]] = {attempt} if fading is None else {attempt, self._heard}
+            await asyncio.wait(either, return_when=asyncio.FIRST_COMPLETED)
+            if not attempt.done() and fading is not None and self._resume(fading):
+                return None
+            session = await attempt
+        except BaseException:
+            # Nobody takes what it may have opened.
+            if attempt.done() and not attempt.cancelled() and attempt.exception() is None:
+                await attempt.result().close()
+            raise
+        finally:
+            attempt.cancel()
+            await asyncio.wait([attempt])
+        self._drop_fading("replaced by a new session")
+        self.handshake_at, self._dismissed, self.may_be_displaced = loop_time(), None, False
+        session.on_message = self._receive
+        return session
+
+    def _resume(self, session: ControllerSession) -> bool:
+        """Go on with a session that was silent. False: it is still silent, or has ended."""
+        if session is not self._fading or session.silent or session.lost.done():
+            return False
+        self._fading = None
+        self._session = session
+        self._lost = asyncio.get_running_loop().create_future()
+        self._commander.attach(session)
+        self._complete = True
+        self.controller.link_heard()
+        self.video.link_up(self._video_route(session))
+        self._hover_after_silence()
+        return True
+
+    def _hover_after_silence(self) -> None:
+        """Stop what flies on from before a silence; a flight plan, a landing and a return go on by themselves."""
+        due, self._hover_due = self._hover_due, False
+        piloting = self.piloting.state
+        free = piloting.flying in (FlyingState.HOVERING, FlyingState.FLYING) and not self.home.state.returning
+        if due and free and piloting.plan != PlayingState.PLAYING:
+            with contextlib.suppress(LinkLost):
+                self.piloting.hover()
+
+    def _on_silent(self, session: ControllerSession, reason: str) -> None:
+        """The drone is not heard. For all others the link is lost; the session may go on."""
+        self._note_loss(session, silent=True)
+        if session is not self._session or not self._complete:
+            session.end(reason)
+            return
+        self._fading = session
+        self._heard = asyncio.get_running_loop().create_future()
+        self._hover_due = True
+        self._disconnected(reason, silent=True)
+
+    def _on_speaks(self, session: ControllerSession) -> None:
+        if session is self._fading and not self._heard.done():
+            self._heard.set_result(None)
+
+    def _drop_fading(self, reason: str) -> None:
+        fading, self._fading = self._fading, None
+        if fading is not None:
+            fading.end(reason)
+
+    def _note_loss(self, session: ControllerSession, *, silent: bool) -> None:
+        """Keep what tells a loss by another controller's handshake, which silences us, from others.
+
+        The one connection of a Skycontroller 4 is closed by it. What loses the drone behind it, and a drone that is
+        switched off, is none.
+        """
+        self.last_heard = session.last_received
+        known = self._dismissed in (common.DisconnectionCause.OFF_BUTTON, common.DisconnectionCause.RESET_FACTORY)
+        closed = session.closed_by_peer and isinstance(session, mux_link.MuxControllerSession)
+        self.may_be_displaced = not known and (silent or closed or self._dismissed is not None)
+
+    def _on_dismissal(self, message: common.Disconnection, now: float) -> None:
+        self._dismissed = message.cause
+        log.warning("%s: the drone ends the connection: %s", self.name, spoken(message.cause))
+
+    @property
+    def dismissed(self) -> bool:
+        """The drone announced the end of the connection, and not because it is switched off."""
+        return self.may_be_displaced and self._dismissed is not None
+
+    async def heard_again(self) -> bool:
+        """Wait until a silent session is heard again, or a new handshake is due. False: it is not heard."""
+        if self._fading is None:
+            return False
+        rest = self._fading.last_received + HANDSHAKE_AFTER - loop_time()
+        await asyncio.wait({self._heard}, timeout=max(rest, 0.0))
+        return self._fading is not None and not self._fading.silent
+
+    async def pause(self, seconds: float) -> None:
+        """Wait before the next `connect`, no longer than until a silent session is heard again."""
+        if self._fading is None:
+            await asyncio.sleep(seconds)
+        else:
+            await asyncio.wait({self._heard}, timeout=seconds)
+
     def _reset(self) -> None:
         for element in self._elements:
             element.reset()
-        self._complete = False
+        self._complete = self._reports_rth_state = False
         if self._lost.done():
             self._lost = asyncio.get_running_loop().create_future()
 
@@ -233,6 +373,8 @@ class Drone:
             session.on_stall = self.controller.stalled
             session.watch()
         session.lost.add_done_callback(partial(self._on_lost, session))
+        session.on_silent = partial(self._on_silent, session)
+        session.on_speaks = partial(self._on_speaks, session)
 
     async def _find_web_server(self, session: ControllerSession) -> None:
         """The drone's own, a hundred ports up at a Skycontroller 3, or behind the mux of a Skycontroller 4."""
@@ -353,21 +495,37 @@ class Drone:
             self.piloting.hover()
 
     def _on_lost(self, session: ControllerSession, reason: asyncio.Future[str]) -> None:
+        if session is self._fading:
+            self._fading = None
+            if not self._heard.done():
+                self._heard.set_result(None)
         if session is not self._session:
             return
-        why = "closed" if reason.cancelled() else reason.result()
+        if not session.silent:
+            self._note_loss(session, silent=False)
+        self._disconnected("closed" if reason.cancelled() else reason.result(), silent=False)
+
+    def _disconnected(self, why: str, *, silent: bool) -> None:
+        """Every wait ends, and nothing of before is sent again."""
         log.info("%s: link lost: %s", self.name, why)
         self._session = None
         self._complete = False
         self._commander.detach(why)
         self.piloting.link_lost()
-        self.controller.link_lost()
+        if silent:
+            self.controller.link_silent()
+        else:
+            self.controller.link_lost()
         self.video.link_lost()
         if not self._lost.done():
             self._lost.set_result(why)
 
     async def close(self) -> None:
         """End the connection; commands sent just before still leave. Does nothing without one."""
+        fading = self._fading
+        self._drop_fading("closed")
+        if fading is not None:
+            await fading.close()
         session = self._session
         if session is not None:
             try:
@@ -384,6 +542,11 @@ class Drone:
     def connected(self) -> bool:
         """True when the link is up and the drone has sent all its states."""
         return self._complete
+
+    @property
+    def fading(self) -> bool:
+        """The drone is not heard, and its session goes on if it is heard again."""
+        return self._fading is not None
 
     @property
     def lost(self) -> asyncio.Future[str]:
@@ -411,10 +574,10 @@ class Drone:
         )
 
     async def request_reboot(self, timeout: float = REBOOT_TIMEOUT) -> None:
-        """Send the command to restart; return when the drone has acknowledged its receipt, which is all that it says.
+        """Send the command to restart; return when the drone has acknowledged its receipt, its only confirmation.
 
-        Raises `CommandRejected` unless the drone has reported that it stands; `LinkLost` or `CommandTimeout` when the
-        command has not arrived. Cancelled, it is not sent again.
+        Raises `CommandRejected` unless the drone has reported that it is landed; `LinkLost` or `CommandTimeout` when
+        the command has not arrived. Cancelled, it is not sent again.
         """
         if not self.connected:
             raise LinkLost("not connected")
@@ -534,6 +697,10 @@ class Drone:
         if isinstance(message, UnknownMessage):
             self._counters["unknown message"] += 1
             return
+        if isinstance(message, rth.State):
+            self._reports_rth_state = True
+        elif isinstance(message, ardrone3.NavigateHomeStateChanged) and not self._reports_rth_state:
+            message = modern(message)
         kind = type(message)
         for element, reducer in self._routes.get(kind, ()):
             element.state = reducer(element.state, message)
@@ -548,6 +715,10 @@ class Drone:
                 log.exception("%s: a subscriber failed on %s", self.name, message.NAME)
         if message_log.isEnabledFor(logging.DEBUG):
             message_log.debug("%s: %r", self.name, message)
+
+
+def _ignore(message: Message | UnknownMessage, now: float) -> None:
+    """What a session says before it is ours; all states are asked for afterwards."""
 
 
 def _starts_motors(message: Message) -> bool:

@@ -20,7 +20,7 @@ class GpsState(msgspec.Struct, frozen=True):
     satellites: int | None = None
     """Satellites in use."""
     location: Position | None = None
-    """Where the drone is, altitude above mean sea level; None also when the drone reports it as unknown."""
+    """Place of the drone, altitude above mean sea level; None also when the drone reports it as unknown."""
     latitude_accuracy: int | None = None
     """m, one standard deviation."""
     longitude_accuracy: int | None = None

@@ -38,7 +38,12 @@ _IN_FLIGHT = frozenset({FlyingState.HOVERING, FlyingState.FLYING})
 
 
 class Piloting(PilotingSettings):
-    """Takes off, lands, moves, returns, hovers. `pilot` and `hover` act at once; all others are coroutines."""
+    """The verbs that fly the drone. `pilot` and `hover` act at once; all others are coroutines.
+
+    A coroutine returns when the drone has confirmed it. It raises `CommandRejected` when the drone, or its reported
+    state, refuses; `CommandTimeout` when the drone stays silent; `LinkLost` when the link is lost meanwhile. A command
+    that has not been delivered by then is withdrawn.
+    """
 
     NOTHING = PilotingState()
     REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = REDUCERS
@@ -102,12 +107,12 @@ class Piloting(PilotingSettings):
 
     @property
     def move(self) -> Move | None:
-        """Our moveTo that has not ended."""
+        """The moveTo of this program that has not ended."""
         return self._moves.to
 
     @property
     def moving(self) -> bool:
-        """A moveTo or moveBy of ours has not ended."""
+        """True while a moveTo or moveBy of this program has not ended."""
         return self._moves.to is not None or bool(self._moves.by)
 
     @property
@@ -117,7 +122,7 @@ class Piloting(PilotingSettings):
 
     @property
     def sticks_blocked(self) -> str | None:
-        """Why no setpoint is sent at present; None when the sticks work."""
+        """Reason why no stick position is sent at present; None when `pilot` works."""
         return self._sticks.blocked
 
     @property
@@ -127,9 +132,9 @@ class Piloting(PilotingSettings):
 
     @property
     def about_to_fly(self) -> bool:
-        """The drone stands, but a take-off of ours is on its way to it, or was and cannot be taken back.
+        """True when the drone is landed and a take-off of this program may still begin.
 
-        The same goes for a hand launch and a flight plan.
+        It has been sent, or was and cannot be withdrawn; the same holds for a hand launch and a flight plan.
         """
         return self._motors.about_to_fly
 
@@ -141,27 +146,27 @@ class Piloting(PilotingSettings):
     # -- up and down
 
     async def take_off(self, timeout: float = ANSWER_TIMEOUT) -> None:
-        """Motors on and up to about a metre; returns when the drone says that it is taking off.
+        """Start the motors and rise to about a metre; returns when the drone reports that it is taking off.
 
-        A drone refuses by silence; `CommandRejected` then tells what it has reported against a take-off.
+        A drone refuses by silence; `CommandRejected` then names what it has reported against a take-off.
         """
         await self._motors.take_off(timeout)
 
     async def hand_launch(self, timeout: float = ANSWER_TIMEOUT) -> None:
-        """Motors idle, for a drone that is thrown or let go by a hand; returns when it waits for that.
+        """Let the motors idle for a throw or release by hand; returns when the drone waits for that.
 
-        Refused as a take-off is. It flies as soon as it leaves the hand; `cancel_hand_launch` ends the wait.
+        Refused as a take-off is. The drone flies as soon as it leaves the hand; `cancel_hand_launch` ends the wait.
         """
         await self._motors.hand_launch(timeout)
 
     async def cancel_hand_launch(self, timeout: float = ANSWER_TIMEOUT) -> None:
-        """Stop the idling motors; returns when they stand, at once when they do and nothing is to start them."""
+        """Stop the idling motors; returns when they stand, at once when they do and nothing may start them."""
         await self._motors.cancel_hand_launch(timeout)
 
     async def land(self, timeout: float = ANSWER_TIMEOUT) -> None:
         """Land here; returns when the drone is landing, at once when it is or has landed.
 
-        A drone that stands but is `about_to_fly` is watched until it certainly stays there, or is made to land.
+        A drone that is `about_to_fly` is watched until it certainly stays on the ground, or has been made to land.
         """
         await self._motors.land(timeout)
 
@@ -191,11 +196,11 @@ class Piloting(PilotingSettings):
         self._motors.take_off_wanted()
 
     async def emergency(self) -> None:
-        """Cut the motors, wherever the drone is: in the air it falls. Returns when the drone says that they are.
+        """Cut the motors at once: in the air the drone falls. Returns when it reports that they are cut.
 
-        Cancelling this does not take it back: it is repeated while there is a link, as Parrot does (arsdk-ng: timeout
-        policy RETRY), for at most `piloting_motors.EMERGENCY_TIMEOUT` while somebody waits for it. What waits to be
-        sent is taken back.
+        Cancelling this does not withdraw it: it is repeated while there is a link, as Parrot does (arsdk-ng: timeout
+        policy RETRY), for at most `piloting_motors.EMERGENCY_TIMEOUT` while a caller waits. Commands that wait to be
+        sent are withdrawn.
         """
         await self._motors.emergency()
 
@@ -213,8 +218,8 @@ class Piloting(PilotingSettings):
         """Fly a straight line relative to the body (m) while turning clockwise by `turn` (rad).
 
         `turn_rate_dps` (deg/s) limits the turn; None leaves it to the drone.
-        Returns at the end of the move what was flown. Without a `timeout` the time given grows with the move.
-        Giving up, by time or by cancellation of this coroutine, stops the drone.
+        Returns at the end of the move the distance flown. Without a `timeout` the time allowed grows with the move.
+        A timeout or the cancellation of this coroutine stops the drone.
         """
         return await self._guided.move_by(front, right, down, turn, timeout, turn_rate_dps)
 
@@ -231,8 +236,8 @@ class Piloting(PilotingSettings):
         """Fly to a place (deg, deg, m above take-off); returns when the drone is on its way.
 
         `heading_deg` (clockwise from north) is turned to on the way; None keeps the heading. `horizontal_speed`
-        and `vertical_speed` (m/s) limit the speed; None leaves it to the drone. `Move.result` tells how it ends. A
-        newer moveTo replaces an older one.
+        and `vertical_speed` (m/s) limit the speed; None leaves it to the drone. `Move.result` waits for the
+        end. A newer moveTo replaces an older one.
         """
         return await self._guided.move_to(
             latitude, longitude, altitude, heading_deg, horizontal_speed, vertical_speed, timeout
@@ -241,11 +246,11 @@ class Piloting(PilotingSettings):
     # -- home
 
     async def return_home(self, timeout: float = ANSWER_TIMEOUT) -> Move | None:
-        """Fly home; returns when the drone is on its way or about to be. None: it was returning already."""
+        """Fly home; returns when the return is running or pending. None: the drone was returning already."""
         return await self._returns.return_home(timeout)
 
     async def cancel_return_home(self, timeout: float = ANSWER_TIMEOUT, *, even_its_own: bool = False) -> None:
-        """Stop a return that a user asked for, through us or not, also one that has not begun yet.
+        """Stop a return that a user commanded, through this program or not, also one that has not begun yet.
 
         One that the drone began by itself is stopped only with `even_its_own`, else `CommandRejected` is raised.
         """
@@ -258,12 +263,11 @@ class Piloting(PilotingSettings):
     # -- sticks, and the end of everything
 
     def pilot(self, command: PilotingCommand | None, age: float = 0.0) -> None:
-        """Hold these sticks: a PCMD leaves now and every 50 ms, for `sticks.HOLD_LIMIT` unless it is said again.
+        """Hold a stick position: a PCMD leaves now and every 50 ms, for 0.5 s (`sticks.HOLD_LIMIT`) unless repeated.
 
-        `age` (s) is how long ago it was said: a setpoint that is corrected on the way is not a new one. None lets the
-        sticks go (centred for two seconds), and so does silence. A setpoint takes over from a moveTo or
-        moveBy of ours, during which the drone would ignore it. Nothing is sent and nothing kept while
-        `sticks_blocked`.
+        None centres the sticks for two seconds, and so does the end of the repetition. `age` (s) is the time since the
+        position was set: one that is corrected on the way is not a new one. A position ends a moveTo or moveBy of
+        this program, during which the drone would ignore it. Nothing is sent and nothing kept while `sticks_blocked`.
         Raises `NotSupported` before the drone has reported its limits, `LinkLost` without a link.
         """
         self._commander.require_link()
@@ -284,13 +288,13 @@ class Piloting(PilotingSettings):
             self._sticks.pump()
 
     def hover(self) -> None:
-        """Stop now, whatever we had started, and stay: takes effect before it returns.
+        """Stop everything that this program began, and hover: takes effect before it returns.
 
         Cancels moveTo and moveBys (those of an earlier connection or another controller too, as far as the drone
-        tells), a running point of interest, an animation, the following of a target, a playing flight plan (it is
-        paused) and a return that was asked for through us, and whatever of these has been asked for and has not begun;
-        then centres the sticks for two seconds, since a PCMD alone neither stops a moveTo nor is it acknowledged. A
-        landing or a return that the drone began by itself goes on. Raises `LinkLost` without a link.
+        reports them), a running point of interest, an animation, the following of a target, a playing flight plan (it
+        is paused) and a return that this program commanded, also those that have not begun; then centres the sticks
+        for two seconds, since a PCMD alone neither stops a moveTo nor is it acknowledged. A landing and a return that
+        the drone began by itself continue. Raises `LinkLost` without a link.
         """
         self._commander.require_link()
         state = self.state
@@ -313,7 +317,7 @@ class Piloting(PilotingSettings):
         self._sticks.centre()
 
     async def stop(self, timeout: float = ANSWER_TIMEOUT) -> None:
-        """`hover`, then wait until the drone has confirmed the end of what was running."""
+        """Hover, and return when the drone has confirmed the end of everything that was running."""
         answers = []
         if (self._moves.to is not None and self._moves.to.running) or self.state.move_to == MoveToStatus.RUNNING:
             answers.append(self._commander.expect((ardrone3.MoveToChanged,), _ends_move_to))

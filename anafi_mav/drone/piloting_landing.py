@@ -14,7 +14,7 @@ from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.drone.element import Element
 from anafi_mav.drone.expectation import Commander, loop_time
 from anafi_mav.drone.piloting_motors import Motors
-from anafi_mav.drone.piloting_state import PilotingState, in_state
+from anafi_mav.drone.piloting_state import PilotingState
 from anafi_mav.drone.piloting_sticks import StickStream
 from anafi_mav.drone.sticks import PERIOD, Percent
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout
@@ -29,6 +29,9 @@ ALREADY_LANDED = "already landed"
 
 STILL_LANDING = "drone still landing"
 """The reason of a failure: neither the end of the landing nor LANDED was reported in time."""
+
+MOTORS_CUT, FORCED = "motors cut", "forced landing"
+"""The reasons of a refusal: what the landing has become."""
 
 SMART_WAIT = 1.5
 """s for SmartTakeOffLand alone to end a landing, before gaz is tried."""
@@ -63,21 +66,23 @@ class LandingEnd:
         self._motors.landing_doubtful()
         try:
             if take_off and self._is_modern():
-                # It toggles: were the landing ended by gaz before it arrives, it would begin another one.
                 answer.token = self._commander.send(ardrone3.SmartTakeOffLand())
+                # It toggles: were the landing ended by gaz before it arrives, it would begin another one.
                 await asyncio.wait({answer.future}, timeout=SMART_WAIT)
                 self._commander.cancel(answer.token)
             elif take_off:
                 answer.token = self._commander.send(ardrone3.TakeOff())
             await self._hold_gaz(answer.future)
             await answer.wait()
-        except CommandTimeout:
-            raise CommandRejected(STILL_LANDING) from None
-        except CommandRejected:
-            if take_off:
-                self._motors.stay_down()
+        except BaseException as error:
+            if answer.token is not None:
+                self._motors.take_off_withdrawn()
+            if isinstance(error, CommandTimeout):
+                raise CommandRejected(STILL_LANDING) from None
             raise
         finally:
+            if answer.token is not None:  # whatever ended this: it must not arrive on the ground
+                self._commander.cancel(answer.token)
             answer.close()
             self._sticks.centre_after_gaz()
 
@@ -95,6 +100,8 @@ def _judge(message: ardrone3.FlyingStateChanged) -> bool | AnafiMavError | None:
             return None
         case FlyingState.LANDED:
             return CommandRejected(ALREADY_LANDED)
-        case FlyingState.EMERGENCY | FlyingState.EMERGENCY_LANDING:
-            return CommandRejected(in_state(message.state))
+        case FlyingState.EMERGENCY:
+            return CommandRejected(MOTORS_CUT)
+        case FlyingState.EMERGENCY_LANDING:
+            return CommandRejected(FORCED)
     return True

@@ -33,7 +33,7 @@ class PilotingSettings(Commanding[PilotingState]):
         return await self._set(ardrone3.MaxDistance(metres), ardrone3.MaxDistanceChanged, self.state.max_distance)
 
     async def set_geofence(self, on: bool) -> bool:
-        """Switch the geofence, which keeps the drone within `max_distance` of home."""
+        """Switch the geofence, which keeps the drone within `max_distance` of `PilotingState.geofence_centre`."""
         self._require(self.state.geofence, ardrone3.NoFlyOverMaxDistance.NAME)
         return await self._change(
             ardrone3.NoFlyOverMaxDistance(int(on)),

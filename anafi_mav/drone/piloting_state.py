@@ -61,7 +61,7 @@ class PilotingState(msgspec.Struct, frozen=True):
     move_to: MoveToStatus | None = None
     """Status of the last moveTo."""
     move_target: Position | None = None
-    """Where that moveTo goes or went; altitude above the take-off point."""
+    """Target of that moveTo; altitude above the take-off point."""
     poi: PoiStatus | None = None
     plan: PlayingState | None = None
     """State of the flight plan."""

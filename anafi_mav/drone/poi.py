@@ -31,7 +31,7 @@ class PoiState(msgspec.Struct, frozen=True):
     target: Position | None = None
     """Altitude above the take-off point."""
     mode: PoiMode | None = None
-    """Whether the camera follows too."""
+    """Relation of the gimbal to the place."""
     missing: frozenset[Indicator] | None = None
     """What it lacks; empty = available. Ai only."""
 

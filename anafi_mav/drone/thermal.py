@@ -50,7 +50,7 @@ class Palette(msgspec.Struct, frozen=True):
     outside: ColorizationMode = ColorizationMode.EXTENDED
     """Colours of what is colder or hotter than the bounds (mode ABSOLUTE)."""
     range: RelativeRangeMode = RelativeRangeMode.UNLOCKED
-    """Whether the bounds follow the picture (mode RELATIVE)."""
+    """Relation of the bounds to the picture (mode RELATIVE)."""
     spot: SpotType = SpotType.HOT
     spot_threshold: float = 0.0
     """0 to 1 (mode SPOT)."""

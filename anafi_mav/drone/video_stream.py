@@ -61,7 +61,7 @@ class Shown(msgspec.Struct, frozen=True):
     fov_deg: tuple[float, float] | None = None
     """Horizontal and vertical field of view of the unzoomed picture."""
     principal_point: tuple[float, float] | None = None
-    """Where the optical axis meets the picture, of its width and height."""
+    """Intersection of the optical axis with the picture, share of its width and height."""
     distortion: tuple[float, ...] | None = None
     """Radial r1, r2, r3 and tangential t1, t2."""
     sps: bytes = b""

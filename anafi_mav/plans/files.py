@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import enum
 import os
+import stat
 import tempfile
 from pathlib import Path
 
@@ -31,13 +32,30 @@ def load(path: Path, version: parrot.Version = 2, height: float | None = None) -
 
     `version` is that of a Parrot file, `height` (m above take-off) that of a line on a map: these files do not say.
     """
+    return parse(read(path), path.name, version, height)
+
+
+def read(path: Path) -> bytes:
+    """The content of a file, for `parse`. Raises `PlanError`, also for what is no file: a pipe would be waited for."""
     source = path.name
+    flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
     try:
-        with path.open("rb") as file:
-            data = file.read(MAX_BYTES + 1)
+        with os.fdopen(os.open(path, flags), "rb") as file:
+            mode = os.fstat(file.fileno()).st_mode
+            if not stat.S_ISREG(mode):
+                kind = next((what for is_kind, what in _KINDS if is_kind(mode)), "something else")
+                raise PlanError(source, f"expected a file, got {kind}")
+            return file.read(MAX_BYTES + 1)
     except OSError as error:
         raise PlanError(source, error.strerror or str(error)) from error
-    return parse(data, source, version, height)
+
+
+_KINDS = (
+    (stat.S_ISFIFO, "a pipe"),
+    (stat.S_ISCHR, "a device"),
+    (stat.S_ISBLK, "a device"),
+    (stat.S_ISSOCK, "a socket"),
+)
 
 
 def parse(data: bytes, source: str, version: parrot.Version = 2, height: float | None = None) -> Plan:

@@ -95,7 +95,7 @@ def _along(lines: list[list[Any]], source: str, height: float | None) -> Plan:
         raise PlanError(source, f"it has {len(lines) or 'no'} lines, expected one")
     (line,) = lines
     if height is None:
-        raise PlanError(source, "it is a line on a map: a height above take-off has to be said for it")
+        raise PlanError(source, "it is a line on a map: a height above take-off has to be said for it, by --height")
     if not 0 < len(line) <= MAX_ITEMS:
         raise PlanError(source, f"its line has {len(line)} points, expected 1 to {MAX_ITEMS}")
     items = []

@@ -366,11 +366,14 @@ class Pen:
         self._put(SET_VIEW_MODE, *values[: 2 if self.version == 1 else 3])
 
     def _put_gimbal(self, pitch: float | None, roll: float | None, yaw: float | None) -> None:
-        if self.version == 1:
-            if pitch is not None:  # that version has no word for "as it is"
-                self._put(common.MAV_CMD_DO_MOUNT_CONTROL, pitch)
-        else:
-            self._put(common.MAV_CMD_DO_MOUNT_CONTROL, pitch, roll, yaw, None, None, None, _TARGETING)
+        command = common.MAV_CMD_DO_MOUNT_CONTROL
+        if self.version == 1 and pitch is None:  # that version has no word for "as it is"
+            return
+        values = (pitch,) if self.version == 1 else (pitch, roll, yaw, None, None, None, _TARGETING)
+        last = self._lines[-1] if self._lines else None
+        if last is not None and last.command == command and last.params[: len(values)] == values:
+            return  # once is enough: a file of ours that is read again has the line that looking ahead brings
+        self._put(command, *values)
 
     def _put_roi(self, point: Point) -> None:
         if self.version == 2:

@@ -7,6 +7,7 @@ QGroundControl MissionItem.cc, SimpleMissionItem.cc, GeoFenceController.cc, Tran
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -60,6 +61,7 @@ def read(text: str | bytes, source: str) -> Plan:
     """The plan in a file. Raises `PlanError`."""
     try:
         document = msgspec.json.decode(text)
+        json.loads(text, object_pairs_hook=_once)  # which of two values counts, no reader could say
     except (ValueError, RecursionError) as error:
         raise PlanError(source, f"no JSON: {error}") from error
     reader = _Reader(source)
@@ -67,6 +69,14 @@ def read(text: str | bytes, source: str) -> Plan:
         return reader.plan(document)
     except _Trouble as error:
         raise PlanError(source, str(error), reader.item) from error
+
+
+def _once(pairs: list[tuple[str, Any]]) -> None:
+    """Raise `ValueError` for an object that has a key twice."""
+    if len(dict(pairs)) < len(pairs):
+        keys = [key for key, _ in pairs]
+        twice = next(key for key in keys if keys.count(key) > 1)
+        raise ValueError(f"the key {twice[:40]!r} stands twice in one object")
 
 
 class _Reader:

@@ -19,6 +19,7 @@ from anafi_mav.services.helm import Helm
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.place import Place, point_of
 from anafi_mav.services.right import Right
+from anafi_mav.services.roll_sign import RollCheck
 from anafi_mav.services.statustext import Severity
 
 STOP_WAIT = 0.5
@@ -31,6 +32,8 @@ class Aircraft(ABC):
     def __init__(self, drone: Drone, *, text: Callable[[Severity, str], None], changed: Callable[[], None]) -> None:
         self.drone = drone
         self.height = HeightReference()
+        self.roll = RollCheck()
+        """Verifies the sign of the roll that the drone reports, for the loops over velocity."""
         self.cruise_speed: float | None = None
         """m/s over ground that moves keep to; None: the drone's own (MAV_CMD_DO_CHANGE_SPEED)."""
         self.climb_speed: float | None = None

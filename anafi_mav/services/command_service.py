@@ -76,6 +76,10 @@ class CommandService(Service):
         self._actions = {id: _bound(handler, vehicle) for id, handler in ACTIONS.items()}
         self._actions.update(actions)
 
+    def acts_on(self, command: int) -> bool:
+        """True for a command that changes what the vehicle does, and is no query."""
+        return command in self._actions
+
     def capabilities(self) -> int:
         cut = dialect.MAV_PROTOCOL_CAPABILITY_FLIGHT_TERMINATION if self.host.vehicle.allow_kill else 0
         return dialect.MAV_PROTOCOL_CAPABILITY_COMMAND_INT | cut

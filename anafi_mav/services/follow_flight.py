@@ -33,6 +33,7 @@ from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.offboard_control import Controller, Motion
 from anafi_mav.services.place import Place
 from anafi_mav.services.refusal import Refused
+from anafi_mav.services.roll_sign import ROLL_INVERTED
 from anafi_mav.services.statustext import Severity
 
 
@@ -74,6 +75,8 @@ class FollowFlight:
             raise Refused("Follow refused: the drone has not reported what full tilt and speed are")
         if vehicle.sticks_follow_camera:
             raise Refused("Follow refused: the drone's piloting style makes its sticks relative to the camera")
+        if vehicle.roll.inverted:
+            raise Refused(f"Follow refused: {ROLL_INVERTED}")
         await vehicle.take_over()
         await vehicle.drone.piloting.cancel_return_home()
         if not vehicle.in_air or vehicle.returning:
@@ -146,6 +149,8 @@ class FollowFlight:
             reason = "the pilot at the Skycontroller flies"
         elif vehicle.sticks_follow_camera:
             reason = "the drone's sticks have become relative to the camera"
+        elif vehicle.roll.inverted:
+            reason = ROLL_INVERTED
         if reason is not None:
             self.end()
             vehicle.select(FlightMode.HOLD)

@@ -40,8 +40,6 @@ class Initiators:
     def land_commanded(self, now: float) -> None:
         """A Landing is about to be sent."""
         self._land_sent = now
-        if self.landing is not None:
-            self.landing = Initiator.CLIENT
 
     def return_commanded(self, now: float) -> None:
         """A return is about to be commanded."""

@@ -157,7 +157,8 @@ class MissionService(Service):
         vehicle, times = self.host.vehicle, self.host.times()
         progress, ids = vehicle.mission.progress, vehicle.plan_ids
         in_mission = vehicle.mode is FlightMode.MISSION
-        state = (progress.state, progress.current, len(progress.items), in_mission, *sorted(ids.items()))
+        said = progress.state, progress.current, progress.is_untouched, len(progress.items), in_mission
+        state = (*said, *sorted(ids.items()))
         if state == self._sent:
             return
         self._sent = state

@@ -8,7 +8,9 @@ horizontal velocity is closed here, on the drone's own speed, which it tells fiv
   begins in wind does not have to learn it first, and one that runs into the limit of its tilt does not wind up;
 - a velocity is asked for by a push in proportion to the error, against the air's, and on top of it the acceleration
   that the setpoint names. The error is the one that will be left when the tilt has followed: it lags by `TILT_LAG`;
-- a position asks for a velocity; where the drone is, is its GPS location carried on by its speed.
+- a position asks for a velocity; where the drone is, is its GPS location carried on by its speed;
+- until the sign of the reported roll is verified (`roll_sign`) nothing is derived from the tilt: the loop knows the
+  last speed alone, counts with calm air, and leans by `CAUTIOUS_TILT` at most.
 
 The climb rate loop is the drone's own, heights ask for one by their error. Nothing here limits more than the drone's
 own MaxTilt, MaxVerticalSpeed and MaxRotationSpeed do.
@@ -23,6 +25,7 @@ from dataclasses import dataclass
 
 from anafi_mav import geo, units
 from anafi_mav.drone import Limits, PilotingCommand
+from anafi_mav.services.roll_sign import RollCheck, Sign
 
 G = 9.81
 
@@ -76,6 +79,10 @@ STILL = 0.05
 LEAST_TILT = 0.01
 """Share of full tilt that an axis keeps while it is to move. An ANAFI takes a stick at zero as the wish to stop and
 brakes hard (arsdk 2.1), which a velocity that needs no push at the moment does not mean."""
+
+CAUTIOUS_TILT, CAUTIOUS_GAIN = 10.0 * units.RAD_PER_DEG, 1.2
+"""rad, and acceleration per velocity error (1/s), while the sign of roll is not verified: without the speed that the
+tilt leads to, a speed is some tenths of a second old."""
 
 SATURATED_FOR = 1.5
 """s at the limit of the tilt after which that is worth a word: any step in speed leans on it for a moment."""
@@ -131,7 +138,8 @@ class Demand:
 class Motion:
     """How the drone moves, as far as its reports tell, and what the air does to it."""
 
-    def __init__(self) -> None:
+    def __init__(self, roll: RollCheck | None = None) -> None:
+        self._roll = roll or RollCheck(Sign.RIGHT)
         self.yaw: float | None = None
         """rad, clockwise from north, as last told; None: unknown."""
         self.height: float | None = None
@@ -219,13 +227,22 @@ class Motion:
     def air_at(self, north: float, east: float) -> tuple[float, float]:
         """What the air would do at another speed over ground (m/s): drag grows with the square of that through the air.
 
-        The estimate tells how fast the drone is through the air now; only the difference is the model's.
+        The estimate tells how fast the drone is through the air now; only the difference is the model's. Without a
+        roll to trust there is no estimate, and the air counts as calm.
         """
+        if not self.trusts_tilt:
+            speed = math.hypot(north, east)
+            return -_DRAG * speed * north, -_DRAG * speed * east
         strength = math.sqrt(_DRAG * math.hypot(*self.air))
         through = (0.0, 0.0) if strength == 0.0 else (-self.air[0] / strength, -self.air[1] / strength)
         there = (through[0] + north - self._velocity[0], through[1] + east - self._velocity[1])
         speed = math.hypot(*there)
         return -_DRAG * speed * there[0], -_DRAG * speed * there[1]
+
+    @property
+    def trusts_tilt(self) -> bool:
+        """True when the sign of the reported roll is verified."""
+        return self._roll.trusted
 
     def push(self) -> tuple[float, float]:
         """m/s2 north and east that the drone's tilt gives."""
@@ -248,7 +265,9 @@ class Motion:
         return (self.yaw or 0.0) + self.turning * min(now - self._attitude_at, STALE)
 
     def velocity(self, at: float) -> tuple[float, float]:
-        """m/s north and east, carried on to a moment by tilt and air."""
+        """m/s north and east, carried on to a moment by tilt and air; as last reported while roll is not verified."""
+        if not self.trusts_tilt:
+            return self._velocity[0], self._velocity[1]
         ahead = max(0.0, min(at - self._velocity_at, STALE))
         north, east = (v + (p + a) * ahead for v, p, a in zip(self._velocity, self.push(), self.air, strict=False))
         return north, east
@@ -311,12 +330,13 @@ class Controller:
             wish[i] = (axis.velocity or 0.0) + towards[i] if closed[i] else velocity[i]
             push[i] = axis.acceleration or 0.0
         air = _turned(*motion.air_at(*_turned(wish[0], wish[1], frame)), -frame)
+        gain = VELOCITY_GAIN if motion.trusts_tilt else CAUTIOUS_GAIN
         for i in range(2):
             if closed[i]:
-                push[i] += VELOCITY_GAIN * (wish[i] - velocity[i]) - air[i]
+                push[i] += gain * (wish[i] - velocity[i]) - air[i]
         if demand.body:  # axes that turn take the velocity along, which is an acceleration
             push = [push[0] - motion.turning * wish[1], push[1] + motion.turning * wish[0]]
-        most = G * math.tan(limits.tilt_deg * units.RAD_PER_DEG)
+        most = G * math.tan(tilt_limit(limits, motion))
         size = math.hypot(*push)
         self._note_saturation(size > most, math.hypot(wish[0] - velocity[0], wish[1] - velocity[1]), now)
         if size > most:
@@ -366,6 +386,12 @@ class Controller:
         if demand.yaw is not None and self.motion.knows_heading(now):
             return turn_towards(demand.yaw, self.motion.heading(now), rate)
         return rate
+
+
+def tilt_limit(limits: Limits, motion: Motion) -> float:
+    """Return the tilt (rad) that a loop may ask for."""
+    tilt = limits.tilt_deg * units.RAD_PER_DEG
+    return tilt if motion.trusts_tilt else min(tilt, CAUTIOUS_TILT)
 
 
 def turn_towards(yaw: float, heading: float, feed_forward: float = 0.0) -> float:

@@ -23,16 +23,28 @@ from anafi_mav.services.aircraft import Aircraft
 from anafi_mav.services.clients import system_of
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.offboard import GUIDED_TIMEOUT, SILENCE, OffboardStream, State, ends, lasts
-from anafi_mav.services.offboard_control import STILL, WIND, Controller, Motion, tilt_for, turn_towards
+from anafi_mav.services.offboard_control import (
+    CAUTIOUS_TILT,
+    STILL,
+    WIND,
+    Controller,
+    Motion,
+    tilt_for,
+    tilt_limit,
+    turn_towards,
+)
 from anafi_mav.services.offboard_goals import Goal, demand, resolve
 from anafi_mav.services.offboard_moves import OffboardMoves
 from anafi_mav.services.offboard_setpoints import NOTHING, AttitudeSetpoint, MotionSetpoint, Setpoint
 from anafi_mav.services.refusal import Refused
+from anafi_mav.services.roll_sign import ROLL_INVERTED
 from anafi_mav.services.setpoint_takeoff import Launcher, Phase, SetpointTakeoff, Step, climbs
 from anafi_mav.services.statustext import Severity
 
 WARN_AGAIN = 1.0
 """m/s by which a velocity has to be higher than the last one whose tilt was worth a word."""
+
+TILT_HELD = f"Tilt limit {CAUTIOUS_TILT * units.DEG_PER_RAD:.0f} deg: roll sign not verified yet"
 
 SINGLE_WAIT = 2.0
 """s that a single setpoint may wait until what was under way has let go of the drone; then it is out of date."""
@@ -67,7 +79,7 @@ class OffboardFlight:
     def __init__(self, vehicle: Aircraft, clock: Clock, takeoff: Launcher) -> None:
         self.guided_timeout = GUIDED_TIMEOUT
         """s that a velocity lasts in ArduPilot's Guided (a parameter)."""
-        self.motion = Motion()
+        self.motion = Motion(vehicle.roll)
         """How the drone moves; whoever else flies it by sticks uses it too."""
         self.complain: Callable[[str], None] = lambda text: vehicle.text(Severity.WARNING, text)
         """Says what is wrong with something that arrives many times a second."""
@@ -239,6 +251,8 @@ class OffboardFlight:
 
     def _objection(self, sender: Hashable, setpoint: MotionSetpoint) -> str | None:
         """Why a position cannot be flown to; None when it can, or is being flown to."""
+        if self._vehicle.roll.inverted and setpoint.needs_loop:
+            return ROLL_INVERTED
         if setpoint.position == NOTHING:
             return None
         if sender == self._stream.pilot and self._goal is not None and self._goal.is_of(setpoint):
@@ -258,7 +272,8 @@ class OffboardFlight:
         self._require_freedom("Offboard")
         candidate = self._stream.candidate(client, self._clock.monotonic())
         if candidate is None:
-            raise Refused("Offboard refused: no setpoints arrive")
+            reason = ROLL_INVERTED if self._vehicle.roll.inverted else "no setpoints arrive"
+            raise Refused(f"Offboard refused: {reason}")
         if self._stream.state is State.ENGAGED and candidate == self._stream.pilot:
             return  # it flies already, and goes on without a jolt
         if self._takeoff.under_way:
@@ -357,7 +372,7 @@ class OffboardFlight:
         self._moves.forget()
         self._goal = self.flown = None
         self._stream = OffboardStream()
-        self.motion = Motion()
+        self.motion = Motion(self._vehicle.roll)
         self._controller = Controller(self.motion)
 
     # What the drone tells.
@@ -415,6 +430,8 @@ class OffboardFlight:
             reason = "the pilot at the Skycontroller flies"
         elif vehicle.sticks_follow_camera:
             reason = "the drone's sticks have become relative to the camera"
+        elif vehicle.roll.inverted and isinstance(setpoint, MotionSetpoint) and setpoint.needs_loop:
+            reason = ROLL_INVERTED
         if reason is not None:
             self.end()
             vehicle.select(FlightMode.HOLD)
@@ -452,7 +469,10 @@ class OffboardFlight:
         if speed > self._warned_of:
             self._warned_of = speed + WARN_AGAIN
             needed = tilt_for(speed) * units.DEG_PER_RAD
-            if needed > limits.tilt_deg:
+            allowed = tilt_limit(limits, self.motion) * units.DEG_PER_RAD
+            if allowed < min(needed, limits.tilt_deg):
+                self.complain(TILT_HELD)
+            elif needed > limits.tilt_deg:
                 self.complain(
                     f"MaxTilt of {limits.tilt_deg:.0f} degrees does not hold {speed:.1f} m/s against {WIND:g} m/s of "
                     f"wind, {math.ceil(needed)} would"
@@ -462,7 +482,7 @@ class OffboardFlight:
         sticks = self._controller.sticks(wanted, limits, now)
         if sticks is None:
             raise Refused("the drone does not tell how it moves")
-        if self._controller.short_of is not None:
+        if self._controller.short_of is not None and self.motion.trusts_tilt:
             self.complain(f"MaxTilt of {limits.tilt_deg:.0f} degrees is too little for this setpoint")
         return sticks
 

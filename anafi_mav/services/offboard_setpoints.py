@@ -116,6 +116,14 @@ class MotionSetpoint:
         )
 
     @property
+    def needs_loop(self) -> bool:
+        """True when it is flown by a loop over the horizontal velocity."""
+        if self.moves:
+            return False
+        placed = self.position[:2] != (None, None)
+        return placed or any(part for part in (*self.velocity[:2], *self.acceleration[:2]))
+
+    @property
     def on_earth(self) -> bool:
         """Positions are latitudes and longitudes."""
         return self.origin in (Origin.SEA, Origin.TAKEOFF)

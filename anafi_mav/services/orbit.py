@@ -36,9 +36,10 @@ from anafi_mav.services.circle import (
 from anafi_mav.services.commands import Command
 from anafi_mav.services.guided_flight import Goto
 from anafi_mav.services.modes import FlightMode
-from anafi_mav.services.offboard_control import Controller
+from anafi_mav.services.offboard_control import Controller, tilt_limit
 from anafi_mav.services.place import Place
 from anafi_mav.services.refusal import Refused
+from anafi_mav.services.roll_sign import ROLL_INVERTED
 from anafi_mav.services.service import Action, Host, Service
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.stream import Stream, Times
@@ -110,12 +111,16 @@ class OrbitService(Service):
         here = vehicle.place
         if not vehicle.in_air:
             raise Refused("Orbit refused: the drone is not in the air")
+        if vehicle.returning:
+            raise Refused("Orbit refused: drone is returning")
         if here is None:
             raise Refused("Orbit refused: no GPS fix")
         if vehicle.drone.controller.pilot_acquired_control:
             raise Refused("Orbit refused: the pilot at the Skycontroller flies")
         if vehicle.sticks_follow_camera:
             raise Refused("Orbit refused: the drone's piloting style makes its sticks relative to the camera")
+        if vehicle.roll.inverted:
+            raise Refused(f"Orbit refused: {ROLL_INVERTED}")
         start = entry(circle, here)
         for point in outline(circle, here):
             check_place(vehicle, point)
@@ -183,13 +188,13 @@ class OrbitService(Service):
         limits = self.host.drone.piloting.limits
         if limits is None:
             raise Refused("Orbit refused: the drone has not reported what full tilt and speed are")
-        most = fastest(circle.radius, limits.tilt_deg)
+        tilt = tilt_limit(limits, self.host.vehicle.offboard.motion) * units.DEG_PER_RAD
+        most = fastest(circle.radius, tilt)
         if circle.speed <= most:
             return circle
-        self.host.text(
-            Severity.NOTICE,
-            f"Orbit at {most:.1f} m/s: MaxTilt of {limits.tilt_deg:.0f} degrees leaves no room for {circle.speed:.1f}",
-        )
+        name = "MaxTilt" if tilt >= limits.tilt_deg else "unverified roll"
+        text = f"Orbit at {most:.1f} m/s, not {circle.speed:.1f}: {name}, {tilt:.0f} deg"
+        self.host.text(Severity.NOTICE, text)
         return replace(circle, speed=most)
 
     async def _approach(self, move: Move, lap: Lap) -> None:
@@ -231,6 +236,8 @@ class OrbitService(Service):
             self._give_up("the pilot at the Skycontroller flies", Severity.WARNING)
         elif vehicle.sticks_follow_camera:
             self._give_up("the drone's sticks have become relative to the camera", Severity.WARNING)
+        elif vehicle.roll.inverted:
+            self._give_up(ROLL_INVERTED, Severity.WARNING)
         elif sticks is None:
             self._give_up("nobody knows where the drone is", Severity.WARNING)
         elif lap.done:

@@ -49,6 +49,7 @@ from anafi_mav.services.orbit import OrbitService
 from anafi_mav.services.parameters import ParameterService
 from anafi_mav.services.plan_service import PlanService
 from anafi_mav.services.rally_service import RallyService
+from anafi_mav.services.roll_sign_service import RollSignService
 from anafi_mav.services.service import MessageHandler, Service
 from anafi_mav.services.shell import ShellService
 from anafi_mav.services.statustext import Severity, TextNumbers
@@ -78,6 +79,7 @@ SERVICES: tuple[type[Service], ...] = (
     MissionService,
     FenceService,
     RallyService,
+    RollSignService,
     OffboardService,
     ManualControlService,
     FollowService,
@@ -310,6 +312,11 @@ class System:
             for message in self._texts.messages(severity, text):
                 self.send(message, to)
 
+    def announce(self, severity: Severity, text: str) -> None:
+        """Send a STATUSTEXT about the drone's link to every client, also while that link is down."""
+        for message in self._texts.messages(severity, text):
+            self._node.send(message, sysid=self.sysid, compid=AUTOPILOT, to=self.channels)
+
     def complain(self, text: str) -> None:
         """A warning about something that arrives many times a second: said every `STATUS_EVERY` seconds at most."""
         now = self.clock.monotonic()
@@ -433,6 +440,21 @@ class System:
             self.send_heartbeat()
 
     # What clients send.
+
+    def listen(self, on: bool) -> None:
+        """Have messages to this system delivered while it does not exist, or no longer."""
+        if on:
+            self._node.own(self.sysid)
+        elif not self.active:
+            self._node.disown(self.sysid)
+
+    def commands(self, inbound: Inbound) -> bool:
+        """True for a command to this system by its id that is no query, also while the system does not exist."""
+        message = inbound.message
+        if message.get_msgId() == dialect.MAVLINK_MSG_ID_SET_MODE:
+            return bool(message.target_system == self.sysid)
+        known = message.get_msgId() in COMMANDS and message.target_system == self.sysid
+        return known and self._commands.acts_on(message.command)
 
     def receive(self, inbound: Inbound) -> None:
         """A message from a client. Not addressed to our autopilot: not for us, and never answered."""

@@ -12,6 +12,8 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from msgspec.structs import replace
+
 from anafi_mav import geo, units
 from anafi_mav.drone import events
 from anafi_mav.drone.events import MoveToStatus
@@ -29,9 +31,17 @@ MOVING = 0.5
 """m/s. Slower than this the course over ground is noise and is reported as unknown."""
 
 
+def _attitude(vehicle: Vehicle) -> Attitude | None:
+    """Attitude with the right wing down +, also of a drone that is known to report roll the other way."""
+    state = vehicle.drone.piloting.state.attitude
+    if state is None or not vehicle.roll.inverted:
+        return state
+    return replace(state, roll=-state.roll)
+
+
 def attitude(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
     """ATTITUDE. ARSDK reports no body rates: NaN."""
-    state = vehicle.drone.piloting.state.attitude
+    state = _attitude(vehicle)
     if state is None:
         return None
     return dialect.MAVLink_attitude_message(
@@ -41,7 +51,7 @@ def attitude(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
 
 def attitude_quaternion(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
     """ATTITUDE_QUATERNION, (w, x, y, z)."""
-    state = vehicle.drone.piloting.state.attitude
+    state = _attitude(vehicle)
     if state is None:
         return None
     w, x, y, z = units.quaternion_from_euler(state.roll, state.pitch, state.yaw)
@@ -103,9 +113,10 @@ def odometry(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
     """ODOMETRY: LOCAL_POSITION_NED and the attitude in one, the velocity along the drone's axes. Rates and covariances
     are not told: NaN."""
     place, origin, state = vehicle.place, vehicle.origin, vehicle.drone.piloting.state
+    leaning = _attitude(vehicle)
     if vehicle.position_is_old or place is None or origin is None:
         return None
-    if state.altitude is None or state.velocity is None or state.attitude is None:
+    if state.altitude is None or state.velocity is None or leaning is None:
         return None
     north, east = geo.offset(origin.latitude, origin.longitude, place.latitude, place.longitude)
     return dialect.MAVLink_odometry_message(
@@ -115,8 +126,8 @@ def odometry(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
         north,
         east,
         -state.altitude,
-        list(units.quaternion_from_euler(state.attitude.roll, state.attitude.pitch, state.attitude.yaw)),
-        *_to_body(state.velocity, state.attitude),
+        list(units.quaternion_from_euler(leaning.roll, leaning.pitch, leaning.yaw)),
+        *_to_body(state.velocity, leaning),
         NAN,
         NAN,
         NAN,

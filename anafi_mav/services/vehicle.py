@@ -26,6 +26,7 @@ from anafi_mav.drone.events import (
     ReturnReason,
     RthHomeType,
 )
+from anafi_mav.drone.piloting_landing import ALREADY_LANDED
 from anafi_mav.errors import CommandRejected
 from anafi_mav.services.aborted_return import AbortedReturn
 from anafi_mav.services.aircraft import STOP_WAIT, Aircraft
@@ -37,6 +38,7 @@ from anafi_mav.services.height import ESTIMATE_ERROR, TakeoffRecord
 from anafi_mav.services.helm import Helm
 from anafi_mav.services.hold_rule import APART, HoldRule
 from anafi_mav.services.initiator import Initiator, Initiators
+from anafi_mav.services.joystick_override import Override
 from anafi_mav.services.link_loss import LossPolicy
 from anafi_mav.services.manual_flight import ManualFlight
 from anafi_mav.services.mission_flight import MissionFlight
@@ -50,8 +52,23 @@ from anafi_mav.services.right import Extent, Right
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.takeoff import Takeoff
 
+FORCED = "forced landing"
+LANDS, PILOT_LANDS = "drone is landing", "Skycontroller pilot is landing"
+RETURNS, PILOT_RETURNS = "drone is returning", "Skycontroller pilot is returning"
+RETURNS_BY_ITSELF, MOTOR_DOWN = "drone is returning by itself", "drone returns, motor down"
+NOT_COUNTED = f"again within {APART:g} s"
+UNENDABLE = (FORCED, LANDS, PILOT_LANDS, RETURNS, PILOT_RETURNS, RETURNS_BY_ITSELF, MOTOR_DOWN, NOT_COUNTED)
+"""Why a landing or a return is not ended."""
+
 POSITION_OLD = 3.0
 """s without a GPS location, which an ANAFI reports once a second, after which the last one is no position in flight."""
+
+
+GOOD_ACCURACY = 5
+"""m of one standard deviation of GPS altitude that AMSL heights can be used with, without a text."""
+
+_AUTO = (FlightMode.MISSION, FlightMode.FOLLOW, FlightMode.ORBIT, FlightMode.RETURN, FlightMode.LAND)
+"""Modes in which the drone flies without setpoints of a client."""
 
 
 class Landed(enum.Enum):
@@ -118,7 +135,7 @@ class Vehicle(Aircraft):
         self.guided = GuidedFlight(self)
         self.offboard = OffboardFlight(self, clock, self.takeoff)
         self.takeoff.ended = self.offboard.after_takeoff
-        self.manual = ManualFlight(self, clock)
+        self.manual = ManualFlight(self, clock, lambda: self.overridable)
         self.follow = FollowFlight(self, lambda: self.offboard.motion, clock)
         self.plan_ids: dict[int, int] = {}
         """Opaque ids of the plans that are in force, by MAV_MISSION_TYPE."""
@@ -167,6 +184,17 @@ class Vehicle(Aircraft):
         if state in AIRBORNE and self.drone.piloting.state.plan == PlayingState.PLAYING:
             return FlightMode.MISSION
         return self._selected
+
+    @property
+    def overridable(self) -> Override:
+        """What flies the drone, as far as a joystick may take over from it; whether a landing or return ends, `hold`
+        decides."""
+        mode = self.mode
+        if self.offboard.engaged and mode in (FlightMode.OFFBOARD, FlightMode.GUIDED):
+            return Override.OFFBOARD
+        if mode in _AUTO or (mode in (FlightMode.HOLD, FlightMode.GUIDED) and self.drone.piloting.moving):
+            return Override.AUTO
+        return Override(0)
 
     @property
     def health(self) -> Health:
@@ -237,12 +265,15 @@ class Vehicle(Aircraft):
         """Fly home by the drone's own return. A landing goes on unless `by` ends it."""
         if self.on_ground:
             raise Refused("Return refused: the drone is on the ground")
-        if self.landing:
-            self._require_endable("Return", by)
+        commanded = None if by is None else replace(by, extent=Extent.COMMANDED)
+        if lands := self.landing:
+            self._require_endable("Return", commanded)
         await self.take_over()
-        if self.flying_state in LANDING:
+        if lands or self.landing:
             with self._selected_no_more(FlightMode.HOLD):
-                await self._end_landing("Return", by)
+                if await self.drone.piloting.settle_landing():
+                    self._require_endable("Return", commanded)
+                    await self._end_landing("Return", commanded)
         self._initiators.return_commanded(self._clock.monotonic())
         self._returns_sent += 1
         attempt = self.return_end.command()
@@ -263,6 +294,7 @@ class Vehicle(Aircraft):
         `pause`: setpoints of every client are ignored from now on, see `paused`.
         """
         self._require_endable(mode.value, by)
+        own = self.returning_by_itself
         rising = self.drone.piloting.about_to_fly
         latched = self.paused and (pause or mode is self.mode)
         before, self.paused = self.paused, self.paused or pause
@@ -270,7 +302,7 @@ class Vehicle(Aircraft):
             await self.take_over(STOP_WAIT)
             if not self.on_ground or rising:
                 with self._selected_no_more(mode):
-                    await self._stop(mode.value, by)
+                    await self._stop(mode.value, by, own=own)
         except BaseException:
             self.paused = before
             raise
@@ -287,7 +319,10 @@ class Vehicle(Aircraft):
         self._require_endable("Takeoff", by)
         await self.take_over(STOP_WAIT)
         with self._selected_no_more(FlightMode.HOLD):
-            await self._end_landing("Takeoff", by, take_off=True)
+            if await self.drone.piloting.settle_landing():
+                await self._end_landing("Takeoff", by, take_off=True)
+        if self.on_ground:
+            raise Refused(f"Landing not aborted: {ALREADY_LANDED}")
         self.select(FlightMode.HOLD)
 
     async def set_mode(self, mode: FlightMode, by: Right) -> None:
@@ -303,7 +338,7 @@ class Vehicle(Aircraft):
             case FlightMode.LAND:
                 await self.land()
             case FlightMode.RETURN:
-                await self.return_home(commanded)
+                await self.return_home(by)
             case FlightMode.TAKEOFF:
                 await self.take_off(None, by)
             case FlightMode.OFFBOARD:
@@ -348,27 +383,29 @@ class Vehicle(Aircraft):
         if self.landing:
             initiator = self._initiators.landing or Initiator.CLIENT
             if self._forced_landing:
-                raise Refused(f"{what} refused: forced landing")
+                raise Refused(f"{what} refused: {FORCED}")
             if initiator is Initiator.PILOT:
-                raise Refused(f"{what} refused: Skycontroller pilot is landing")
+                raise Refused(f"{what} refused: {PILOT_LANDS}")
             if by is None or (initiator is Initiator.DRONE and not all_of_them):
-                raise Refused(f"{what} refused: drone is landing")
+                raise Refused(f"{what} refused: {LANDS}")
         elif self.returning:
             initiator = self._initiators.returning or Initiator.CLIENT
             if self.returning_by_itself:
                 self._require_own_endable(what, by if all_of_them else None)
             elif initiator is Initiator.PILOT:
-                raise Refused(f"{what} refused: Skycontroller pilot is returning")
+                raise Refused(f"{what} refused: {PILOT_RETURNS}")
             elif by is None:
-                raise Refused(f"{what} refused: drone is returning")
+                raise Refused(f"{what} refused: {RETURNS}")
+        elif by is None and self._returns_sent > 0:
+            raise Refused(f"{what} refused: {RETURNS}")
 
     def _require_own_endable(self, what: str, by: Right | None) -> None:
         if by is None:
-            raise Refused(f"{what} refused: drone is returning by itself")
+            raise Refused(f"{what} refused: {RETURNS_BY_ITSELF}")
         if self.drone.home.state.reason == ReturnReason.MOTOR_DOWN:
-            raise Refused(f"{what} refused: drone returns, motor down")
+            raise Refused(f"{what} refused: {MOTOR_DOWN}")
         if not by.counted:
-            raise Refused(f"{what} refused: again within {APART:g} s")
+            raise Refused(f"{what} refused: {NOT_COUNTED}")
 
     async def _free(self, what: str, by: Right) -> None:
         """End a landing or return that `by` may end; returns when the drone hovers, at once when it does neither."""
@@ -378,13 +415,15 @@ class Vehicle(Aircraft):
             with self._selected_no_more(FlightMode.HOLD):
                 await self._stop(what, by)
 
-    async def _stop(self, what: str, by: Right | None) -> None:
-        """Hover, and end the landing or return that `by` may end. The right was checked for what was reported then."""
+    async def _stop(self, what: str, by: Right | None, *, own: bool = False) -> None:
+        """Hover, and end the landing or return that `by` may end.
+
+        `own`: the drone returned by itself when the command arrived. A return that it begins afterwards goes on.
+        """
         piloting, home = self.drone.piloting, self.drone.home
         await self._end_landing(what, by)
         announced = None if by is None else self._announced_for(by)
-        if self.returning_by_itself:
-            assert by is not None, "checked before"
+        if own and by is not None and self.returning_by_itself:
             reason = home.state.reason
             await piloting.cancel_return_home(even_its_own=True)
             self._return_aborted(by, reason)
@@ -463,6 +502,7 @@ class Vehicle(Aircraft):
             self.takeoff.end_climb()
         elif state in TAKING_OFF and before in ON_GROUND:
             self.height.take_off()
+            self._report_accuracy()
             if (place := self.place) is not None:
                 self.origin = place
             if self.drone.home.state.takeoff_location != self._takeoff_before:
@@ -489,6 +529,12 @@ class Vehicle(Aircraft):
                 self.origin = self.place
         elif self.flying_state is not None and self.height.in_flight(self.drone.product.state.flight_id, amsl, ato):
             self.text(Severity.WARNING, f"Take-off altitude estimated: GPS only (+-{ESTIMATE_ERROR:g} m)")
+
+    def _report_accuracy(self) -> None:
+        """Report that AMSL heights of this flight will be wrong by as much as GPS is at its beginning."""
+        gps = self.drone.gps.state
+        if gps.fixed and gps.altitude_accuracy is not None and gps.altitude_accuracy > GOOD_ACCURACY:
+            self.text(Severity.WARNING, f"Take-off altitude inaccurate: GPS +-{gps.altitude_accuracy} m")
 
     def on_takeoff_location(self) -> None:
         """Adopt the take-off place that the drone reports for the present flight as origin of the local frame."""

@@ -114,6 +114,8 @@ class _Shot:
     number: int
     scene: Scene
     date: str
+    captured: float
+    """When it was taken."""
     due: float
     """When it has arrived there."""
 
@@ -281,7 +283,7 @@ class Capture:
         """A shot."""
         shoot.count += 1
         scene = self._studio.scene()
-        shoot.taken.append(_Shot(shoot.count, scene, self._date(time), time + SAVE_TIME))
+        shoot.taken.append(_Shot(shoot.count, scene, self._date(time), time, time + SAVE_TIME))
         shoot.last = (scene.north, scene.east)
         if shoot.mode is CameraPhotoMode.TIME_LAPSE and not shoot.shots:
             shoot.shots.append(time + shoot.interval)
@@ -311,7 +313,10 @@ class Capture:
         written: list[Resource] = []
         full = bool(shots) and shots[-1].number >= MAX_RESOURCES
         for shot in shots:
-            files = [media.develop(shoot.media, kind, shot.number, shot.scene, shot.date) for kind in shoot.kinds]
+            files = [
+                media.develop(shoot.media, kind, shot.number, shot.scene, shot.date, captured=shot.captured)
+                for kind in shoot.kinds
+            ]
             size = sum(file.size for file in files)
             if size > room:
                 full = True
@@ -336,10 +341,11 @@ class Capture:
         return max(0.0, shoot.shots[0] - time)
 
     def _tell(self, shoot: _Shoot, result: PhotoResult, time: float) -> Message:
+        # camera.xml has a count with photo_taken; Olympe 7's photo example reads it off photo_saved.
         shoot.told_at = time
         shoot.result = self._photo(
             result,
-            shoot.count & 0xFF if result is PhotoResult.PHOTO_TAKEN else 0,
+            shoot.count & 0xFF if result in (PhotoResult.PHOTO_TAKEN, PhotoResult.PHOTO_SAVED) else 0,
             shoot.media.id if result is PhotoResult.PHOTO_SAVED else "",
         )
         return shoot.result

@@ -47,6 +47,9 @@ HTTP_PORT = 80
 SKYCONTROLLER_PORTS = 100
 """A Skycontroller offers the TCP ports of its drone this much higher: HTTP at 180."""
 
+SESSION_KEPT = 8.0
+"""s of silence after which a session of the quirk `handshake-refused-8s` is no obstacle (libarsdk: four times 2 s)."""
+
 SHUTDOWN_TIME, REBOOT_TIME = 1.0, 10.0
 """s from the order to reboot until the drone is gone, and until it is back. Assumed: an aircraft takes longer."""
 
@@ -279,6 +282,7 @@ class SimulatedDrone:
                 versions=spec.versions,
                 on_session=self._on_session,
             )
+        self._server.refuses = self._refuses
         self._mute_link(self.faults.mute)
         if spec.http_port is not None:
             await self._start_web(spec.http_port)
@@ -370,6 +374,12 @@ class SimulatedDrone:
         self.log.add(now, "pose", "true", args)
 
     # -- the link
+
+    def _refuses(self) -> bool:
+        """A firmware that keeps a controller's session, silent or not, refuses the handshake of the next one."""
+        session = self._session
+        keeps = Quirk.HANDSHAKE_REFUSED_8S in self.faults.quirks
+        return keeps and session is not None and self._clock() - session.last_received < SESSION_KEPT
 
     def _mute_link(self, mute: bool) -> None:
         if self._server is not None:

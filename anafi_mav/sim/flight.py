@@ -86,6 +86,9 @@ class Flight:
         self.battery = Battery(model)
         self.payload = Payload(model, identity.name, identity.run_id, emit, self._scene)
         self.plans = FlightPlanStore()
+        self.plans.refuses = lambda: (
+            Quirk.UPLOAD_REFUSED_WHILE_PAUSED in faults.quirks and self.flight_plan.state is common.PlayingState.PAUSED
+        )
         self.pose = _REST
         self.time = 0.0
         self._body = body
@@ -208,8 +211,9 @@ class Flight:
 
     def motion_report(self) -> list[Message]:
         pose = self.pose
+        roll = -pose.roll if Quirk.ROLL_INVERTED in self.faults.quirks else pose.roll
         return [
-            ardrone3.AttitudeChanged(pose.roll, pose.pitch, pose.yaw),
+            ardrone3.AttitudeChanged(roll, pose.pitch, pose.yaw),
             ardrone3.SpeedChanged(pose.vn, pose.ve, pose.vd),
             ardrone3.AltitudeChanged(pose.up),
         ]

@@ -15,7 +15,7 @@ from typing import Any
 from anafi_mav.arsdk.messages import mediastore
 from anafi_mav.arsdk.messages.mediastore import MediastoreState
 from anafi_mav.arsdk.wire import Message
-from anafi_mav.sim import picture
+from anafi_mav.sim import picture, xmp
 from anafi_mav.sim.picture import Scene
 
 FIRST_ID = 10_000_001
@@ -50,6 +50,8 @@ class Resource:
     storage: int
     seconds: float = 0.0
     """Length of a video."""
+    captured: float = 0.0
+    """s after the drone's start that a photo was taken."""
     size: int = field(init=False)
     """Bytes."""
 
@@ -66,10 +68,11 @@ class Resource:
         """The file."""
         if self.kind is Kind.MP4:
             return picture.mp4(self.scene, self.seconds)
+        packet = xmp.packet(self.scene, self.camera, self.captured)
         if self.kind is Kind.DNG:
-            return picture.dng(self.scene, self.number, self.camera, _exif_date(self.date))
+            return picture.dng(self.scene, self.number, self.camera, _exif_date(self.date), packet)
         note = picture.exif(self.scene, self.camera, _exif_date(self.date))
-        return picture.jpeg(self.scene, self.number, exif=note)
+        return picture.jpeg(self.scene, self.number, exif=note, xmp=xmp.HEADER + packet)
 
     def thumbnail(self) -> bytes:
         """A smaller JPEG of it."""
@@ -206,9 +209,18 @@ class MediaStore:
         self._next_id += 1
         return media
 
-    def develop(self, media: Media, kind: Kind, number: int, scene: Scene, date: str, seconds: float = 0.0) -> Resource:
+    def develop(
+        self,
+        media: Media,
+        kind: Kind,
+        number: int,
+        scene: Scene,
+        date: str,
+        seconds: float = 0.0,
+        captured: float = 0.0,
+    ) -> Resource:
         """A file of `media` that is not written yet: its size is known."""
-        return Resource(media.id, kind, number, scene, date, self._camera, self._storage, seconds)
+        return Resource(media.id, kind, number, scene, date, self._camera, self._storage, seconds, captured)
 
     def add(self, media: Media, resources: list[Resource]) -> None:
         """Write files, and tell of them.

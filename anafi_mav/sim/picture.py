@@ -1,8 +1,8 @@
 """The files that the simulated cameras write: small, but what their names say.
 
-A photo is a baseline JPEG with Exif, one flat colour for each block of 8 x 8 pixels: sky above the horizon, ground
-below, tilted as the camera saw it. A DNG is a TIFF with the same picture in linear samples. A video is an MP4 whose
-track holds one such JPEG a second (ISO 14496-1 object type 0x6C), so that any player shows it.
+A photo is a baseline JPEG with Exif and XMP, one flat colour for each block of 8 x 8 pixels: sky above the horizon,
+ground below, tilted as the camera saw it. A DNG is a TIFF with the same picture in linear samples. A video is an MP4
+whose track holds one such JPEG a second (ISO 14496-1 object type 0x6C), so that any player shows it.
 """
 
 from __future__ import annotations
@@ -32,7 +32,8 @@ _SHADE = 60.0
 """How much darker the sky is in the south."""
 _SKY, _GROUND = (190, 150, 110), (100, 115, 130)
 """Y, Cb, Cr."""
-_UNKNOWN = 500.0
+UNKNOWN = 500.0
+"""Coordinate that is not known, as everywhere in ARSDK."""
 
 Colour = tuple[int, int, int]
 
@@ -41,10 +42,10 @@ Colour = tuple[int, int, int]
 class Scene:
     """What the camera sees and from where."""
 
-    latitude: float = _UNKNOWN
+    latitude: float = UNKNOWN
     """deg; 500: not known, as everywhere in ARSDK."""
-    longitude: float = _UNKNOWN
-    altitude: float = _UNKNOWN
+    longitude: float = UNKNOWN
+    altitude: float = UNKNOWN
     """m above mean sea level"""
     pitch: float = 0.0
     """deg of the camera against the horizon, up."""
@@ -94,8 +95,16 @@ def _segment(marker: int, payload: bytes) -> bytes:
     return struct.pack(">BBH", 0xFF, marker, len(payload) + 2) + payload
 
 
-def jpeg(scene: Scene, mark: int = 0, *, width: int = WIDTH, height: int = HEIGHT, exif: bytes | None = None) -> bytes:
-    """A picture; sizes are multiples of 8."""
+def jpeg(
+    scene: Scene,
+    mark: int = 0,
+    *,
+    width: int = WIDTH,
+    height: int = HEIGHT,
+    exif: bytes | None = None,
+    xmp: bytes | None = None,
+) -> bytes:
+    """A picture; sizes are multiples of 8. `xmp` is the payload of an APP1 segment of its own, behind that of Exif."""
     bits: list[str] = []
     before = [0, 0, 0]
     for colour in blocks(scene, mark, width, height):
@@ -113,6 +122,8 @@ def jpeg(scene: Scene, mark: int = 0, *, width: int = WIDTH, height: int = HEIGH
     scan = int(text, 2).to_bytes(len(text) // 8, "big").replace(b"\xff", b"\xff\0")
     components = b"".join(bytes((id, 0x11, 0)) for id in (1, 2, 3))
     head = _segment(0xE0, b"JFIF\0\1\1\0\0\1\0\1\0\0") if exif is None else _segment(0xE1, b"Exif\0\0" + exif)
+    if xmp is not None:
+        head += _segment(0xE1, xmp)
     return b"".join(
         (
             b"\xff\xd8",
@@ -182,7 +193,7 @@ def _degrees(tag: int, angle: float) -> Entry:
 def exif(scene: Scene, make_model: str, date: str) -> bytes:
     """The TIFF in a photo's APP1: who took it, when ("YYYY:MM:DD HH:MM:SS") and, if it knew, where."""
     entries = [_text(0x010F, "Parrot"), _text(0x0110, make_model), _text(0x0132, date)]
-    if scene.latitude == _UNKNOWN:
+    if scene.latitude == UNKNOWN:
         return _HEADER + _directory(entries, 8)
     place = [
         (0x0000, _BYTE, 4, b"\2\3\0\0"),
@@ -199,7 +210,7 @@ def exif(scene: Scene, make_model: str, date: str) -> bytes:
     return _HEADER + _directory([*entries, _long(0x8825, pointer)], 8) + _directory(place, pointer)
 
 
-def dng(scene: Scene, mark: int, make_model: str, date: str) -> bytes:
+def dng(scene: Scene, mark: int, make_model: str, date: str, xmp: bytes) -> bytes:
     """A raw picture: linear samples, uncompressed."""
     colours = list(blocks(scene, mark, RAW_WIDTH * _BLOCK, RAW_HEIGHT * _BLOCK))
     samples = b"".join(bytes(_rgb(colour)) for colour in colours)
@@ -220,6 +231,7 @@ def dng(scene: Scene, mark: int, make_model: str, date: str) -> bytes:
             _long(0x0116, RAW_HEIGHT),
             _long(0x0117, len(samples)),
             _text(0x0132, date),
+            (0x02BC, _BYTE, len(xmp), xmp),
             (0xC612, _BYTE, 4, b"\1\4\0\0"),
             _text(0xC614, make_model),
             _rationals(0xC628, 1.0, 1.0, 1.0),

@@ -52,10 +52,12 @@ ZOOM = Item(531, 0.0, 0.0, p1=2.0, p2=50.0, frame=2)
 """Half of what the camera can."""
 
 
-async def lost_and_back(w: World) -> None:
-    """The link is lost, the vehicle disappears, and both come back."""
+async def lost_and_back(w: World, *, noticed: bool = False) -> None:
+    """The link is lost, the vehicle disappears, and both come back; `noticed`: the drone has missed the gateway too."""
     w.drone.faults.mute = True
     await w.client.silence("HEARTBEAT", 2.0)  # the system is gone when its heartbeat is
+    if noticed:
+        await w.drone.wait_log(lambda e: (e.kind, e.name) == ("session", "lost"), 10.0)
     w.drone.faults.mute = False
     await w.client.heartbeat(lambda beat: True, timeout=20.0)
 
@@ -90,7 +92,7 @@ async def test_conf_122_the_drone_returns_when_the_link_is_lost() -> None:
         await start(w)
         await said(w, "the drone returns home")
         await state(w, ACTIVE, seq=2, since=0)
-        await lost_and_back(w)
+        await lost_and_back(w, noticed=True)
         mark = w.client.mark()
         await state(w, PAUSED, seq=2, since=mark)
         assert reached(w) == [0, 1]
@@ -239,7 +241,7 @@ async def test_conf_122_ctrl_c_pauses_the_mission(tmp_path: Path) -> None:
 async def test_items_that_the_gateway_flies_between_two_files() -> None:
     async with world(web=True) as w:
         await put(w, [takeoff(6.0), way(10.0, 0.0, 6.0), TURN, ZOOM, way(10.0, 10.0, 6.0)])
-        await said(w, "tem 2: CONDITION_YAW")  # the next piece of it
+        await said(w, "tem 3: CONDITION_YAW")  # the next piece of it
         await start(w)
         await state(w, COMPLETE, since=0)
         assert reached(w) == [0, 1, 2, 3, 4]

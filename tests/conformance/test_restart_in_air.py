@@ -99,7 +99,7 @@ async def test_restart_in_flight_without_flight_id_refuses_low_mission_items_abo
         await put(w, [way(6.0, 0.0, 18.0), Item(16, HOME[0] + 9 * METRE, HOME[1], z=HOME[2] + 12.0, frame=GLOBAL)])
         ack = await w.client.command(dialect.MAV_CMD_MISSION_START, 0, 0)
         assert ack.result == REJECTED
-        await said(w, "Mission refused: item 1: estimated AMSL < 15 m")
+        await said(w, "Mission refused: item 2: estimated AMSL < 15 m")
         assert w.commands("common.Mavlink.Start") == []
 
 

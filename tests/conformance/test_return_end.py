@@ -26,7 +26,7 @@ from anafi_mav.arsdk.messages import ardrone3, rth
 from anafi_mav.sim.faults import Impairment
 from anafi_mav.sim.quirks import Quirk
 
-ACCEPTED = dialect.MAV_RESULT_ACCEPTED
+ACCEPTED, REJECTED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_TEMPORARILY_REJECTED
 RTL, LAND = dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH, dialect.MAV_CMD_NAV_LAND
 GOTO, SET_HOME, SET_MODE = dialect.MAV_CMD_DO_REPOSITION, dialect.MAV_CMD_DO_SET_HOME, dialect.MAV_CMD_DO_SET_MODE
 PX4_HOLD = (1, 4, 3)
@@ -116,9 +116,12 @@ async def test_return_ended_by_another_clients_hold_does_not_land() -> None:
         await away(w)
         mark = await go_home(w)
         other = await w.connect(sysid=254)
-        assert (await other.command(SET_MODE, *PX4_HOLD)).result == ACCEPTED
         place = geo.destination(*HOME[:2], 3.0, 0.0)
-        ack = await other.command(GOTO, -1, 1, 0, NAN, frame=6, x=place[0], y=place[1], z=5.0)
+        goto = (GOTO, -1, 1, 0, NAN)
+        ack = await other.command(*goto, frame=6, x=place[0], y=place[1], z=5.0)
+        assert ack.result == REJECTED  # a goto does not end a return
+        assert (await other.command(SET_MODE, *PX4_HOLD)).result == ACCEPTED
+        ack = await other.command(*goto, frame=6, x=place[0], y=place[1], z=6.0)
         assert ack.result == ACCEPTED
         w.drone._emit(rth.State(rth.RthState.AVAILABLE, rth.StateReason.FINISHED))
         await w.drone.wait_log(lambda e: e.name.endswith("moveToChanged") and e.args["status"] == 1, 20.0)

@@ -43,6 +43,12 @@ async def to_the_pilot(w: World) -> None:
     await source_is(w, Source.SKY_CONTROLLER)
 
 
+async def greeted(w: World) -> None:
+    """Wait for the last text that a client is greeted with."""
+    w.client.send(dialect.MAVLink_heartbeat_message(dialect.MAV_TYPE_GCS, 8, 0, 0, 4, 3))
+    await w.client.wait("STATUSTEXT", lambda m: "firmware" in m.text, since=0, timeout=10.0)
+
+
 @generations
 async def test_station_loss_while_pilot_has_source_only_warns(generation: int) -> None:
     async with world(skycontroller=generation) as w:
@@ -116,10 +122,12 @@ async def test_return_while_pilot_has_source_sends_no_pcmd() -> None:
 
 async def test_first_texts_behind_skycontroller_say_that_failsafes_only_warn() -> None:
     async with world(skycontroller=3) as w:
+        await greeted(w)
         texts = [m.text for _, m in w.client.since(0, "STATUSTEXT")]
         assert texts[:2] == [
             "Skycontroller in control until a client flies",
             "Until then station loss and fence only warn",
         ]
     async with world() as w:
+        await greeted(w)
         assert not [m for _, m in w.client.since(0, "STATUSTEXT") if "Skycontroller" in m.text]

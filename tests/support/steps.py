@@ -5,7 +5,10 @@ from __future__ import annotations
 import asyncio
 import itertools
 import math
+import tempfile
+from contextlib import AsyncExitStack
 from dataclasses import dataclass
+from pathlib import Path
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -16,6 +19,7 @@ from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
 from anafi_mav.sim.model import MODELS
 from anafi_mav.sim.wind import WindSpec
 from support.mav import Client
+from support.roll import remember_roll
 from support.world import HOLD, HOME, TAKE_OFF_SPEED, TAKEOFF, loopback
 
 VELOCITY_ONLY = 0x9C7
@@ -69,11 +73,18 @@ async def velocity_step(
         DroneSpec(model=model, address=loopback(), home=HOME, http_port=None, telemetry_rate=rate) for model in MODELS
     ]
     address = loopback()
+    folder = tempfile.TemporaryDirectory()
     config = Config(
         endpoints=(f"tcpin://{address}:5760",),
         drones=tuple(DroneConfig(name=s.model, sysid=i + 1, address=s.address) for i, s in enumerate(specs)),
+        state=folder.name,
     )
-    async with Simulator(specs, seed=1) as simulator, Gateway(config) as gateway:
+    async with AsyncExitStack() as stack:
+        stack.callback(folder.cleanup)
+        simulator = await stack.enter_async_context(Simulator(specs, seed=1))
+        for drone in simulator.drones:
+            remember_roll(Path(folder.name), drone)
+        gateway = await stack.enter_async_context(Gateway(config))
         assert await gateway.ready(10.0), gateway.lines()
         client = await Client().connect(5760, address)
         try:

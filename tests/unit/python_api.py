@@ -20,7 +20,8 @@ INTERNAL = frozenset(
 INTERNAL_OF = {
     "Drone": {"moves_started", "counters"},
     "Move": {"answer", "end", "ended", "is_to", "running", "under_way"},
-    "Piloting": {"set_min_altitude"},
+    "Piloting": {"moves_started", "set_min_altitude", "settle_landing", "sticks_held", "take_off_wanted"},
+    "Home": {"request_states"},
     "Video": {"close"},
 }
 """The same, of one class."""

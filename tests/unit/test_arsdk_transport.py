@@ -21,6 +21,8 @@ from anafi_mav.arsdk.transport import (
     LinkDown,
     Received,
     Role,
+    Silent,
+    Speaks,
     Transport,
     Undelivered,
 )
@@ -113,15 +115,19 @@ def test_messages_of_one_turn_share_a_frame(version: int) -> None:
     assert [frame.id for frame in frames(transport, transport.outgoing(0.0))] == [127, 126]
 
 
-def test_emergency_overtakes_what_waits() -> None:
-    transport = Transport(Role.CONTROLLER, 1, 0.0)
-    transport.send(tilt(1), 0.0)
+@pytest.mark.parametrize("version", [1, 2, 3])
+def test_emergency_takes_the_place_of_all_that_was_not_delivered(version: int) -> None:
+    transport = Transport(Role.CONTROLLER, version, 0.0)
+    flying = transport.send(tilt(1), 0.0)
     transport.outgoing(0.0)
-    transport.send(tilt(2), 0.0)
+    waiting = transport.send(tilt(2), 0.0)
+    transport.send(STICKS, 0.0)
     transport.send(ardrone3.Emergency(), 0.0)
-    transport.receive(ack(1, 11, 0), 0.01)
-    (frame,) = frames(transport, transport.outgoing(0.01))
-    assert wire.decode(frame.payload) == ardrone3.Emergency()
+    (frame,) = frames(transport, transport.outgoing(0.0))  # without waiting for the acknowledgement of the first
+    assert wire.encode(ardrone3.Emergency()) in frame.payload
+    events = transport.receive(ack(version, 11, 1), 0.01)
+    assert {event.token for event in events if isinstance(event, Undelivered)} == {flying, waiting}
+    assert frames(transport, transport.outgoing(1.0)) == []
 
 
 def test_emergency_does_not_cut_a_split_command() -> None:
@@ -612,6 +618,33 @@ def test_no_bytes_of_a_peer_raise(role: Role, version: int, seed: int) -> None:
     assert sum(count for name, count in victim.counters.items() if name.startswith("garbage.")) > 100
     victim.receive(corpus[0], 1.2)
     assert any(frame.id == 1 for frame in frames(victim, victim.outgoing(1.2)))
+
+
+def test_a_fading_link_drops_what_waits_and_goes_on_when_the_peer_speaks() -> None:
+    transport = Transport(Role.CONTROLLER, 3, 0.0, ping_after=0.5, silence_limit=2.5, fades=True)
+    transport.send(tilt(1.0), 0.0)
+    transport.outgoing(0.0)
+    waiting = transport.send(tilt(2.0), 0.1)
+    for now in (0.5, 1.0, 1.5):
+        assert transport.expire(now) == []
+        transport.outgoing(now)
+    events = transport.expire(2.0)
+    assert events[-1] == Silent("3 pings unanswered, nothing received for 2.0 s")
+    assert Undelivered(waiting, "the link is silent") in events
+    # Only pings, however long, and nothing that is asked for meanwhile.
+    transport.send(tilt(3.0), 2.1)
+    transport.send(STICKS, 2.1)
+    for step in range(1, 20):
+        now = 2.0 + 0.5 * step
+        assert transport.expire(now) == []
+        assert {frame.id for frame in frames(transport, transport.outgoing(now))} <= {0}
+    spoken = transport.receive(data_frame(3, 126, 0, HOVERING), 12.0)
+    assert spoken == [Speaks(), Received(HOVERING)]
+    (answer,) = frames(transport, transport.outgoing(12.0))
+    assert answer.type == FrameType.ACK
+    transport.send(tilt(4.0), 12.0)
+    (frame,) = frames(transport, transport.outgoing(12.0))
+    assert (frame.seq, frame.payload[1:]) == (1, wire.encode(tilt(4.0)))
 
 
 # What another process sends for us.

@@ -287,6 +287,7 @@ async def test_the_link_is_lost_in_silence_and_found_again(drone: Drone, real: S
         await asyncio.sleep(0)  # what the timer has set off takes some turns of the loop to be told
     assert lost.done()
     assert "nothing received for" in lost.result()
+    assert drone.fading
     assert await journey.result() is MoveEnd.LINK_LOST
     real.faults.mute = False
     reconnected = now()
@@ -294,4 +295,7 @@ async def test_the_link_is_lost_in_silence_and_found_again(drone: Drone, real: S
     assert drone.connected
     assert drone.moves_started == ()
     assert drone.piloting.state.in_air
-    assert commands(real, since=reconnected) == ["CurrentDateTime", "AllStates", "AllSettings"]
+    # The session of before goes on; what flew is stopped, and nothing resumes.
+    await real.wait_log(lambda entry: entry.name.endswith("moveBy"), since=reconnected)
+    sent = commands(real, since=reconnected)
+    assert [name for name in sent if name != "PCMD"] == ["CancelMoveTo", "moveBy"]

@@ -40,11 +40,11 @@ def test_landing_long_after_the_command_is_not_its() -> None:
     assert lands(who, skycontroller=True) is PILOT
 
 
-def test_landing_that_is_commanded_again_becomes_the_clients() -> None:
+def test_landing_of_the_pilot_stays_his_when_a_client_commands_it_too() -> None:
     who = Initiators()
     assert lands(who, skycontroller=True) is PILOT
     who.land_commanded(101.0)
-    assert who.landing is CLIENT
+    assert who.landing is PILOT
 
 
 def test_landing_after_a_return_belongs_to_who_began_the_return() -> None:

@@ -15,6 +15,7 @@ from anafi_mav.plans import files, parrot
 from anafi_mav.plans.files import Format
 from anafi_mav.plans.path import place_of
 from anafi_mav.plans.plan import WAYPOINT, Item, Loss, Plan
+from anafi_mav.plans.twin import twin
 from anafi_mav.sim import plan_file
 
 MISSIONS = Path(__file__).parents[2] / "missions"
@@ -190,6 +191,18 @@ def test_a_samples_twin_is_current(path: Path, version: parrot.Version, tmp_path
     wanted = [place_of(item) for item in files.load(path).items if item.command == WAYPOINT]
     assert [place for place in wanted if place is not None and place not in places] == []
     assert all(0.0 < item.altitude <= 30.0 for item in ways)
+
+
+@pytest.mark.parametrize(("path", "version"), TWINS, ids=lambda value: getattr(value, "stem", None))
+def test_a_samples_twin_read_and_written_again_stays_the_same(path: Path, version: parrot.Version) -> None:
+    """Through Parrot's file, QGroundControl's and Parrot's again, as often as somebody converts it."""
+    kept = path.with_name(f"{path.stem}.v{version}.mavlink").read_bytes()
+    plan = files.parse(kept, path.name, version)
+    for _ in range(3):
+        editable = files.encode(plan, Format.QGC)[0]
+        again, _ = twin(files.parse(editable, path.name), version, path.name)
+        assert again == kept
+        plan = files.parse(again, path.name, version)
 
 
 def test_a_twin_of_what_a_gateway_flies_is_none(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

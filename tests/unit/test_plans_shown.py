@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +13,8 @@ from plan_samples import FLIGHT, document, encoded, structure_scan, waypoint
 
 from anafi_mav.errors import PlanError
 from anafi_mav.plans import files, path, plot, table
-from anafi_mav.plans.plan import RELATIVE, Item, Plan
+from anafi_mav.plans.plan import RELATIVE, Item, Plan, Point
+from anafi_mav.plans.shots import Kind, shots
 
 LINE = [[2.3677, 48.8789], [2.3687, 48.8789, 120.0], [2.3687, 48.8799]]
 KML = """<?xml version="1.0" encoding="UTF-8"?>
@@ -73,6 +75,94 @@ def test_a_picture(tmp_path: Path, suffix: str) -> None:
         text = target.read_text()
         assert text.count("<!-- stay inside -->") == 1
         assert "<!-- height above take-off -->" in text
+
+
+MISSIONS = Path(__file__).parents[2] / "missions"
+
+
+def test_shots_of_a_survey_are_on_its_lanes() -> None:
+    found = shots(files.load(MISSIONS / "survey.plan"))
+    assert {kind for kind, _, _ in found.ways} == {Kind.PHOTOS}
+    assert len(found.ways) == 7  # four lanes and what joins them, not the way there
+    assert found.looks == ()
+
+
+def test_shots_of_an_orbit_are_a_video_and_its_target() -> None:
+    """From the way point before the region of interest; the video ends where it began."""
+    found = shots(files.load(MISSIONS / "orbit.plan"))
+    assert [kind for kind, _, _ in found.ways] == [Kind.VIDEO] * 8
+    assert found.ways[0][1] == found.ways[-1][2] == (48.8790349, 2.3677)
+    assert found.looks == (((48.8790349, 2.3677), (48.8792597, 2.3677)),)
+    assert found.photos == ()
+
+
+def test_shots_of_an_inspection_are_photos_where_they_are_taken() -> None:
+    plan = files.load(MISSIONS / "inspection.plan")
+    found = shots(plan)
+    assert found.ways == ()
+    assert set(found.photos) <= {(stop.latitude, stop.longitude) for stop in path.way(plan)}
+    assert len(found.photos) == sum(item.command == 2000 for item in plan.items)
+
+
+def test_profile_of_a_plan_has_climb_and_return() -> None:
+    """There and back along a line: 20 m north of home at 30 m, then home."""
+    home = Point(48.8789, 2.3677, 35.0)
+    items = (
+        Item(22, 3, (0.0, 0.0, 0.0, None, home.latitude, home.longitude, 10.0)),
+        waypoint(20.0, 0.0, 30.0),
+        Item(20, 2, (0.0,) * 7),
+    )
+    plan = Plan(items, home)
+    flown, back = plot.profile_of(plan, list(path.way(plan)))
+    away = flown[-1][0]
+    assert flown[:3] == [(0.0, 0.0), (0.0, 10.0), (0.0, 10.0)]
+    assert flown[3] == (away, 30.0)
+    assert back[0] == back[1] == (away, 30.0)
+    assert back[2] == (pytest.approx(2.0 * away), 30.0)
+    low = replace(plan, items=(items[0], items[2]))
+    # A return climbs to the height that it is set to.
+    assert plot.profile_of(low, list(path.way(low)))[1] == [(0.0, 10.0), (0.0, 20.0), (0.0, 20.0)]
+    assert plot.profile_of(replace(plan, items=items[:2]), list(path.way(plan)))[1] == []
+
+
+@pytest.mark.parametrize(
+    ("metres", "wanted"), [(17.6, 10.0), (20.0, 20.0), (9.9, 5.0), (1.0, 1.0), (0.0, 0.1), (730.0, 500.0)]
+)
+def test_scale_bar_has_a_round_length(metres: float, wanted: float) -> None:
+    assert plot.round_length(metres) == pytest.approx(wanted)
+
+
+@pytest.mark.parametrize("name", ["orbit", "inspection", "survey"])
+def test_scale_bar_of_a_picture_is_as_long_as_it_says(name: str) -> None:
+    """Measured where it counts: on the map as it is drawn, after both axes have got one scale."""
+    figure = pytest.importorskip("matplotlib.figure", reason="the extra `plots` is not installed").Figure(
+        figsize=(8, 9)
+    )
+    plan = files.load(MISSIONS / f"{name}.plan")
+    chart = figure.subplots(2, 1)[0]
+    assert plan.home is not None
+    plot._map(chart, plan, list(path.way(plan)), (plan.home.latitude, plan.home.longitude))
+    importlib.import_module("matplotlib.backends.backend_agg").FigureCanvasAgg(figure).draw()
+    (bar,) = (line for line in chart.lines if line.get_gid() == "scale")
+    (text,) = (text for text in chart.texts if text.get_text().endswith(" m") and text.get_text()[0].isdigit())
+    ends = bar.get_transform().transform(list(zip(*bar.get_data(), strict=True)))
+    (left, _), (right, _) = chart.transData.inverted().transform(ends)
+    assert right - left == pytest.approx(float(text.get_text().removesuffix(" m")))
+    assert chart.get_xlim()[0] <= left < right <= chart.get_xlim()[1]
+
+
+def test_picture_shows_direction_climb_return_photos_north_and_scale(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib", reason="the extra `plots` is not installed")
+    for name, wanted in (
+        ("survey", {"return", "photos on the way", "take-off to 25 m", "N", "return, at 20 m or higher"}),
+        ("orbit", {"video", "looked at", "return"}),
+        ("inspection", {"photo", "home"}),
+    ):
+        target = tmp_path / f"{name}.svg"
+        plot.draw(files.load(MISSIONS / f"{name}.plan"), name, target)
+        text = target.read_text()
+        assert [words for words in wanted if f"<!-- {words} -->" not in text] == []
+        assert 'id="scale"' in text
 
 
 def test_pictures_that_cannot_be() -> None:

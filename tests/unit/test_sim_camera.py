@@ -371,7 +371,7 @@ def test_a_photo(bench: Bench) -> None:
         camera.PhotoProgress(0, PhotoResult.TAKING_PHOTO, 0, ""),
         camera.PhotoProgress(0, PhotoResult.PHOTO_TAKEN, 1, ""),
         mediastore.Counters(0, 1, 0, 1),
-        camera.PhotoProgress(0, PhotoResult.PHOTO_SAVED, 0, "10000001"),
+        camera.PhotoProgress(0, PhotoResult.PHOTO_SAVED, 1, "10000001"),
         camera.PhotoState(0, Availability.AVAILABLE, State.INACTIVE),
     ]
     (media,) = bench.firmware.payload.media
@@ -426,7 +426,7 @@ def test_the_files_of_a_burst_arrive_one_by_one(bench: Bench) -> None:
 def test_a_bracketing_is_told_at_its_end(bench: Bench, preset: BracketingPreset, count: int) -> None:
     told = shoot(bench, photo_mode(CameraPhotoMode.BRACKETING, bracketing=preset))
     results = [(m.result.name, m.photo_count) for m in told if isinstance(m, camera.PhotoProgress)]
-    assert results == [("TAKING_PHOTO", 0), ("PHOTO_TAKEN", count), ("PHOTO_SAVED", 0)]
+    assert results == [("TAKING_PHOTO", 0), ("PHOTO_TAKEN", count), ("PHOTO_SAVED", count)]
     assert mediastore.Counters(0, 1, 0, count) in told
 
 
@@ -439,7 +439,7 @@ def test_a_time_lapse_goes_on_until_it_is_stopped(bench: Bench) -> None:
     delays = [delay.remaining for delay in bench.of(camera.NextPhotoDelay)]
     assert delays[:4] == pytest.approx([1.6, 1.1, 0.6, 0.1], abs=0.06)
     assert bench.send(camera.StopPhoto(0)) == [
-        camera.PhotoProgress(0, PhotoResult.PHOTO_SAVED, 0, "10000001"),
+        camera.PhotoProgress(0, PhotoResult.PHOTO_SAVED, 3, "10000001"),
         camera.PhotoState(0, Availability.AVAILABLE, State.INACTIVE),
     ]
     (media,) = bench.firmware.payload.media

@@ -64,7 +64,7 @@ def test_a_photo_knows_where_and_when() -> None:
 
 
 def test_a_raw_photo_is_a_tiff_with_a_version() -> None:
-    data = picture.dng(PARIS, 1, "ANAFI", "2026:11:21 10:11:12")
+    data = picture.dng(PARIS, 1, "ANAFI", "2026:11:21 10:11:12", b"<x/>")
     assert struct.unpack_from("<2sHI", data) == (b"II", 42, 8)
     (count,) = struct.unpack_from("<H", data, 8)
     tags = {}
