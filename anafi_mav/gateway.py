@@ -32,6 +32,7 @@ from anafi_mav.services.flying import ON_GROUND
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.system import System
 from anafi_mav.state_lock import FILE, HeldDrone, StateLock, state_folder
+from anafi_mav.subject import DRONE
 
 logger = logging.getLogger(__name__)
 
@@ -68,6 +69,7 @@ class _Supervised:
 
     async def run(self) -> None:
         """Keep the drone connected until cancelled."""
+        DRONE.set(self.config.name)
         try:
             await self._run()
         finally:

@@ -18,7 +18,7 @@ from anafi_mav.arsdk.handshake import DISCOVERY_PORT, HANDSHAKE_PORT, DeviceInfo
 from anafi_mav.arsdk.interface import bind_to_interface, networks, open_connection
 from anafi_mav.arsdk.mux_link import look_either
 from anafi_mav.arsdk.rtsp import DEFAULT_PORT as RTSP_PORT
-from anafi_mav.cli import consent, interrupts, options
+from anafi_mav.cli import consent, interrupts, log, options
 from anafi_mav.cli.addresses import spot
 from anafi_mav.cli.terminal import say, say_json
 from anafi_mav.drone import Drone
@@ -86,6 +86,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Examine, print a line for each check; 1 when one of them is wrong."""
+    log.set_up()
     place = Place(
         **spot(arguments.address),
         http_port=_port("--http-port", arguments.http_port),

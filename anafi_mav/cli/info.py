@@ -13,7 +13,7 @@ from typing import Any
 import msgspec
 
 from anafi_mav.arsdk.wire import Message
-from anafi_mav.cli import consent, interrupts
+from anafi_mav.cli import consent, interrupts, log
 from anafi_mav.cli.addresses import spot
 from anafi_mav.cli.terminal import complain, say, say_json
 from anafi_mav.drone import Drone
@@ -38,6 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Connect, print, disconnect. Raises `LinkLost` when no drone answers."""
+    log.set_up()
     place = spot(arguments.address)
     held = consent.gateway_of(arguments.state, place["address"], place.get("interface"))
     if held is not None:

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import msgspec
 
-from anafi_mav.cli import heap, options, sim_validate
+from anafi_mav.cli import heap, log, options, sim_validate
 from anafi_mav.cli.options import integer, number
 from anafi_mav.cli.terminal import say
 from anafi_mav.errors import ConfigError
@@ -78,6 +78,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Simulate until SIGINT or SIGTERM. Raises `ConfigError` before anything is started."""
+    log.set_up()
     if arguments.action == "validate":
         return sim_validate.run(arguments)
     if arguments.fleet is not None:

@@ -18,7 +18,7 @@ from typing import Any, TypeAlias, TypeVar
 from anafi_mav.arsdk import mux_link
 from anafi_mav.arsdk.controller import ControllerSession
 from anafi_mav.arsdk.handshake import DISCOVERY_PORT
-from anafi_mav.arsdk.messages import ardrone3, common, drone_manager, skyctrl
+from anafi_mav.arsdk.messages import ardrone3, common, drone_manager, rth, skyctrl
 from anafi_mav.arsdk.messages import flight_plan as modern_plan
 from anafi_mav.arsdk.messages.animation import Type as AnimationType
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState, PoiStatus
@@ -44,7 +44,7 @@ from anafi_mav.drone.flight_plan import FlightPlan
 from anafi_mav.drone.follow_me import FollowMe
 from anafi_mav.drone.gimbal import Gimbal
 from anafi_mav.drone.gps import Gps
-from anafi_mav.drone.home import Home
+from anafi_mav.drone.home import Home, modern
 from anafi_mav.drone.link import Link
 from anafi_mav.drone.media import Media
 from anafi_mav.drone.moves import Move
@@ -135,6 +135,7 @@ class Drone:
         self.piloting = Piloting(self._commander, self.home, self.takeoff_blockers)
         self.controller = Controller(self._commander, self._user_moves, self._pilot_takes_over, self._stand_by)
         self.piloting.pilot_has_source = lambda: self.controller.pilot_has_source
+        self.flight_plan.model = lambda: self._model
         self.piloting.is_modern = lambda: self._model.protobuf
         self._commander.gate = self._allows
         self._elements: tuple[Element[Any], ...] = (
@@ -192,6 +193,8 @@ class Drone:
         self._complete = False
         self._counters: Counter[str] = Counter()
         self._model = Model(0, "", "")
+        self._reports_rth_state = False
+        """rth.state has been received on this connection, so that its legacy twin says nothing more."""
         self._announced_serial = ""
         self._announced_name = ""
         self._lost: asyncio.Future[str] = asyncio.get_running_loop().create_future()
@@ -354,7 +357,7 @@ class Drone:
     def _reset(self) -> None:
         for element in self._elements:
             element.reset()
-        self._complete = False
+        self._complete = self._reports_rth_state = False
         if self._lost.done():
             self._lost = asyncio.get_running_loop().create_future()
 
@@ -695,6 +698,10 @@ class Drone:
         if isinstance(message, UnknownMessage):
             self._counters["unknown message"] += 1
             return
+        if isinstance(message, rth.State):
+            self._reports_rth_state = True
+        elif isinstance(message, ardrone3.NavigateHomeStateChanged) and not self._reports_rth_state:
+            message = modern(message)
         kind = type(message)
         for element, reducer in self._routes.get(kind, ()):
             element.state = reducer(element.state, message)

@@ -160,7 +160,7 @@ class CommandService(Service):
 
     async def _execute(self, inbound: Inbound, execution: Execution) -> None:
         command = execution.command
-        if command.id == dialect.MAV_CMD_DO_REPOSITION and self.host.vehicle.takeoff.under_way:
+        if command.id == dialect.MAV_CMD_DO_REPOSITION and self.host.vehicle.takeoff.rises:
             self._acknowledge(inbound, command.id, dialect.MAV_RESULT_IN_PROGRESS)  # it waits for the climb's end
         progress = self.host.spawn(self._report_progress(inbound, command))
         result = dialect.MAV_RESULT_FAILED

@@ -26,6 +26,7 @@ from anafi_mav.drone.events import (
     ReturnReason,
     RthHomeType,
 )
+from anafi_mav.drone.piloting_landing import ALREADY_LANDED
 from anafi_mav.errors import CommandRejected
 from anafi_mav.services.aborted_return import AbortedReturn
 from anafi_mav.services.aircraft import STOP_WAIT, Aircraft
@@ -62,6 +63,9 @@ UNENDABLE = (FORCED, LANDS, PILOT_LANDS, RETURNS, PILOT_RETURNS, RETURNS_BY_ITSE
 POSITION_OLD = 3.0
 """s without a GPS location, which an ANAFI reports once a second, after which the last one is no position in flight."""
 
+
+GOOD_ACCURACY = 5
+"""m of one standard deviation of GPS altitude that AMSL heights can be used with, without a text."""
 
 _AUTO = (FlightMode.MISSION, FlightMode.FOLLOW, FlightMode.ORBIT, FlightMode.RETURN, FlightMode.LAND)
 """Modes in which the drone flies without setpoints of a client."""
@@ -315,7 +319,10 @@ class Vehicle(Aircraft):
         self._require_endable("Takeoff", by)
         await self.take_over(STOP_WAIT)
         with self._selected_no_more(FlightMode.HOLD):
-            await self._end_landing("Takeoff", by, take_off=True)
+            if await self.drone.piloting.settle_landing():
+                await self._end_landing("Takeoff", by, take_off=True)
+        if self.on_ground:
+            raise Refused(f"Landing not aborted: {ALREADY_LANDED}")
         self.select(FlightMode.HOLD)
 
     async def set_mode(self, mode: FlightMode, by: Right) -> None:
@@ -495,6 +502,7 @@ class Vehicle(Aircraft):
             self.takeoff.end_climb()
         elif state in TAKING_OFF and before in ON_GROUND:
             self.height.take_off()
+            self._report_accuracy()
             if (place := self.place) is not None:
                 self.origin = place
             if self.drone.home.state.takeoff_location != self._takeoff_before:
@@ -521,6 +529,12 @@ class Vehicle(Aircraft):
                 self.origin = self.place
         elif self.flying_state is not None and self.height.in_flight(self.drone.product.state.flight_id, amsl, ato):
             self.text(Severity.WARNING, f"Take-off altitude estimated: GPS only (+-{ESTIMATE_ERROR:g} m)")
+
+    def _report_accuracy(self) -> None:
+        """Report that AMSL heights of this flight will be wrong by as much as GPS is at its beginning."""
+        gps = self.drone.gps.state
+        if gps.fixed and gps.altitude_accuracy is not None and gps.altitude_accuracy > GOOD_ACCURACY:
+            self.text(Severity.WARNING, f"Take-off altitude inaccurate: GPS +-{gps.altitude_accuracy} m")
 
     def on_takeoff_location(self) -> None:
         """Adopt the take-off place that the drone reports for the present flight as origin of the local frame."""
