@@ -94,6 +94,7 @@ class Calibration(Commanding[CalibrationState]):
             common.MagnetoCalibrationStartedChanged,
             lambda message: None if message.started else True,
             timeout,
+            stops=True,
         )
 
     async def magnetometer_done(self, timeout: float = TURNING_TIMEOUT) -> None:

@@ -315,10 +315,12 @@ class Commander:
         answers: Sequence[type[Message]],
         judge: Callable[[Any], T | AnafiMavError | None],
         timeout: float = ANSWER_TIMEOUT,
+        *,
+        stops: bool = False,
     ) -> T:
-        """Send a command and return what the judge makes of the answer."""
+        """Send a command and return what the judge makes of the answer. `stops`: see `send`."""
         expectation = self.expect(answers, judge)
-        self.dispatch(expectation, command, timeout)
+        self.dispatch(expectation, command, timeout, stops=stops)
         return await expectation.wait()
 
     async def begin(
@@ -382,10 +384,10 @@ class Commander:
         """What was given up has not begun, and will not: the drone has received the order against it and is quiet."""
         self._given_up.pop(undo, None)
 
-    def dispatch(self, expectation: Expectation[Any], command: Message, timeout: float) -> None:
-        """Send the command whose answer is expected."""
+    def dispatch(self, expectation: Expectation[Any], command: Message, timeout: float, *, stops: bool = False) -> None:
+        """Send the command whose answer is expected. `stops`: see `send`."""
         try:
-            expectation.token = self.send(command)
+            expectation.token = self.send(command, stops=stops)
         except BaseException:
             expectation.close()
             raise

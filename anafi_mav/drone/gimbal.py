@@ -307,6 +307,7 @@ class Gimbal(Commanding[Gimbals]):
             lambda message: (
                 True if message.gimbal_id == id and message.state != GimbalCalibrationState.IN_PROGRESS else None
             ),
+            stops=True,
         )
 
     # -- inside

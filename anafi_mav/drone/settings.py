@@ -57,10 +57,12 @@ class Commanding(Element[StateT]):
         answer: type[Message],
         judge: Callable[[Any], T | AnafiMavError | None],
         timeout: float = ANSWER_TIMEOUT,
+        *,
+        stops: bool = False,
     ) -> T:
-        """Send a setting and return what the judge makes of its answer."""
+        """Send a setting and return what the judge makes of its answer. `stops`: it ends something that goes on."""
         async with self._setting_lock(answer):
-            return await self._commander.confirm(command, (answer,), judge, timeout)
+            return await self._commander.confirm(command, (answer,), judge, timeout, stops=stops)
 
     def _setting_lock(self, answer: type[Message]) -> asyncio.Lock:
         """One change at a time: the answers of two could not be told apart."""

@@ -1,4 +1,4 @@
-"""The files that a vehicle shows over MAVLink FTP, by path. Nothing is on a disk: each is made when it is asked for."""
+"""The files that a vehicle shows over MAVLink FTP, by path. None is on a disk: each is made on request."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from urllib.parse import parse_qs
 
+from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.flavours import Flavour
 from anafi_mav.services.ftp import Entry
 
@@ -26,6 +27,10 @@ class ServedFile:
     """The only one that is shown it; None: all are."""
     metadata: int | None = None
     """COMP_METADATA_TYPE. Such a file is made once for each connection, and served compressed as well."""
+    write: Callable[[Inbound, bytes], bool] | None = None
+    """Replaces it with what the sender of a message has written; False when that cannot be used. None: read only."""
+    room: int = 0
+    """Bytes that may be written to it."""
 
 
 class FileTree:
@@ -48,7 +53,7 @@ class FileTree:
     def read(self, path: str) -> bytes | None:
         """The content; None when there is no such file."""
         plain, _, query = path.partition("?")
-        maker = self._makers.get(_absolute(plain) or "")
+        maker = self._makers.get(absolute(plain) or "")
         if maker is None:
             return None
         try:
@@ -57,9 +62,21 @@ class FileTree:
             return None
         return maker({name: values[-1] for name, values in words.items()})
 
+    def room(self, path: str) -> int | None:
+        """None: the files of the tree itself can only be read."""
+        return None
+
+    def write(self, path: str, content: bytes) -> bool:
+        """False, likewise."""
+        return False
+
+    def has(self, path: str) -> bool:
+        """True for a file."""
+        return absolute(path) in self._makers
+
     def list(self, path: str) -> list[Entry] | None:
         """The entries; None when there is no such directory."""
-        directory = _absolute(path)
+        directory = absolute(path)
         names = None if directory is None else self._directories.get(directory)
         if directory is None or names is None:
             return None
@@ -71,7 +88,7 @@ class FileTree:
         return entries
 
 
-def _absolute(path: str) -> str | None:
+def absolute(path: str) -> str | None:
     """The path from the root, without what means nothing; None for one that wants out of it."""
     parts = [part for part in path.split("/") if part not in ("", ".")]
     return None if ".." in parts else "/" + "/".join(parts)

@@ -1,10 +1,11 @@
-"""MAVLink FTP: the server's side of the protocol over files that can only be read. I/O-free.
+"""MAVLink FTP: the server's side of the protocol, over files of which some can be replaced as a whole. I/O-free.
 
 `FtpServer.receive` takes the payload of a FILE_TRANSFER_PROTOCOL and returns the payload of the answer; a burst is then
 taken part by part with `burst`. What files there are is asked of a `Files`. Protocol: MAVLink ftp.md.
 
 Every answer follows from the request and the file alone, which stays as it was when it was opened. So an answer that
-was lost is simply made again when its request comes again.
+was lost is simply made again when its request comes again. A file that is written becomes valid when its session is
+terminated, and not before.
 """
 
 from __future__ import annotations
@@ -65,14 +66,11 @@ class Opcode(enum.IntEnum):
 
 ACK, NAK = dialect.MAV_FTP_OPCODE_ACK, dialect.MAV_FTP_OPCODE_NAK
 
-_WRITING = frozenset(
+_PROTECTED = frozenset(
     {
-        Opcode.CREATE_FILE,
-        Opcode.WRITE_FILE,
         Opcode.REMOVE_FILE,
         Opcode.CREATE_DIRECTORY,
         Opcode.REMOVE_DIRECTORY,
-        Opcode.OPEN_FILE_WO,
         Opcode.TRUNCATE_FILE,
         Opcode.RENAME,
     }
@@ -98,6 +96,7 @@ class State(enum.Enum):
     CLOSED = "closed"
     OPEN = "open"
     BURSTING = "bursting"
+    WRITING = "writing"
 
 
 class Event(enum.Enum):
@@ -105,6 +104,8 @@ class Event(enum.Enum):
     READ = "read"
     BURST = "burst"
     BURST_ENDS = "burst ends"
+    CREATE = "create"
+    WRITE = "write"
     TERMINATE = "terminate"
     EXPIRE = "expire"
 
@@ -112,9 +113,11 @@ class Event(enum.Enum):
 TRANSITIONS: Mapping[State, Mapping[Event, State]] = {
     State.CLOSED: {
         Event.OPEN: State.OPEN,
+        Event.CREATE: State.WRITING,
     },
     State.OPEN: {
         Event.OPEN: State.OPEN,
+        Event.CREATE: State.WRITING,
         Event.READ: State.OPEN,
         Event.BURST: State.BURSTING,
         Event.TERMINATE: State.CLOSED,
@@ -122,14 +125,23 @@ TRANSITIONS: Mapping[State, Mapping[Event, State]] = {
     },
     State.BURSTING: {
         Event.OPEN: State.OPEN,
+        Event.CREATE: State.WRITING,
         Event.READ: State.OPEN,
         Event.BURST: State.BURSTING,
         Event.BURST_ENDS: State.OPEN,
         Event.TERMINATE: State.CLOSED,
         Event.EXPIRE: State.CLOSED,
     },
+    State.WRITING: {
+        Event.OPEN: State.OPEN,
+        Event.CREATE: State.WRITING,
+        Event.WRITE: State.WRITING,
+        Event.TERMINATE: State.CLOSED,
+        Event.EXPIRE: State.CLOSED,
+    },
 }
-"""What is not here does not happen: reading a closed session is answered with INVALID_SESSION."""
+"""What is not here does not happen: reading a closed session is answered with INVALID_SESSION, and so is writing to one
+that was opened to read."""
 
 
 @dataclass(frozen=True)
@@ -150,12 +162,24 @@ class Files(Protocol):
     def list(self, path: str) -> list[Entry] | None:
         """The entries, always in the same order; None when there is no such directory."""
 
+    def room(self, path: str) -> int | None:
+        """Bytes that a client may write to a file; None when it can only be read, or there is none."""
+
+    def write(self, path: str, content: bytes) -> bool:
+        """Replace a file that has `room`; False when the content cannot be used."""
+
 
 @dataclass
 class _Session:
     state: State = State.CLOSED
     path: str = ""
     content: bytes = b""
+    written: bytearray = field(default_factory=bytearray)
+    """What has arrived of a file that is being written."""
+    room: int = 0
+    """Bytes that it may have."""
+    created: int = -1
+    """Sequence number of the request that created it."""
     used: float = 0.0
     """When its client last asked for something."""
     burst_seq: int = 0
@@ -283,7 +307,11 @@ class FtpServer:
                 client.sessions.clear()
                 return self._ack(request)
             case Opcode.TERMINATE_SESSION:
-                return self._terminate(client, request)
+                return self._terminate(client, request, files)
+            case Opcode.CREATE_FILE | Opcode.OPEN_FILE_WO:
+                return self._create(client, request, files, now)
+            case Opcode.WRITE_FILE:
+                return self._write(client, request, now)
             case Opcode.OPEN_FILE_RO:
                 return self._open(client, request, files, now)
             case Opcode.READ_FILE:
@@ -297,18 +325,62 @@ class FtpServer:
                 if content is None:
                     return Error.FILE_NOT_FOUND
                 return self._ack(request, struct.pack("<I", crc32(content)))
-            case opcode if opcode in _WRITING:
+            case opcode if opcode in _PROTECTED:
                 return Error.FILE_PROTECTED
         return Error.UNKNOWN_COMMAND
 
-    def _terminate(self, client: _Client, request: Request) -> bytes | Error:
+    def _terminate(self, client: _Client, request: Request, files: Files) -> bytes | Error:
         session = client.sessions.pop(request.session, None)
         this = (request.seq, request.session)
         if session is None and client.terminated != this:
             return Error.INVALID_SESSION
         if session is not None:
+            writing = session.state is State.WRITING
             session.step(Event.TERMINATE)
+            if writing and not files.write(session.path, bytes(session.written)):
+                return Error.FAIL
         client.terminated = this
+        return self._ack(request)
+
+    def _session_for(self, client: _Client, request: Request, now: float) -> _Session | Error:
+        """The session in which a file is to be opened or created."""
+        session = client.sessions.get(request.session)
+        if session is None:
+            if len(client.sessions) >= MAX_SESSIONS:
+                return Error.NO_SESSIONS_AVAILABLE
+            session = client.sessions[request.session] = _Session()
+        elif session.path != request.path and now - session.used < TAKEOVER:
+            return Error.NO_SESSIONS_AVAILABLE
+        return session
+
+    def _create(self, client: _Client, request: Request, files: Files, now: float) -> bytes | Error:
+        """Begin to replace a file. A copy of the request that did so must not drop what has been written since."""
+        room = files.room(request.path)
+        if room is None:
+            return Error.FILE_PROTECTED
+        session = self._session_for(client, request, now)
+        if isinstance(session, Error):
+            return session
+        if session.state is not State.WRITING or session.created != request.seq:
+            session.step(Event.CREATE)
+            session.path, session.content, session.written = request.path, b"", bytearray()
+            session.room, session.created = room, request.seq
+        session.used = now
+        return self._ack(request)
+
+    def _write(self, client: _Client, request: Request, now: float) -> bytes | Error:
+        """Take a part of a file, in any order and more than once."""
+        session = client.sessions.get(request.session)
+        if session is None or session.state is not State.WRITING:
+            return Error.INVALID_SESSION
+        data = request.data[: request.size]
+        end = request.offset + len(data)
+        if end > session.room:
+            return Error.FAIL
+        session.step(Event.WRITE)
+        session.used = now
+        session.written.extend(bytes(max(end - len(session.written), 0)))
+        session.written[request.offset : end] = data
         return self._ack(request)
 
     def _open(self, client: _Client, request: Request, files: Files, now: float) -> bytes | Error:
@@ -316,20 +388,16 @@ class FtpServer:
         content = files.read(path)
         if content is None:
             return Error.FILE_NOT_FOUND
-        session = client.sessions.get(request.session)
-        if session is None:
-            if len(client.sessions) >= MAX_SESSIONS:
-                return Error.NO_SESSIONS_AVAILABLE
-            session = client.sessions[request.session] = _Session()
-        elif session.path != path and now - session.used < TAKEOVER:
-            return Error.NO_SESSIONS_AVAILABLE
+        session = self._session_for(client, request, now)
+        if isinstance(session, Error):
+            return session
         session.step(Event.OPEN)
         session.path, session.content, session.used = path, content, now
         return self._ack(request, struct.pack("<I", len(content)))
 
     def _read(self, client: _Client, request: Request, now: float) -> bytes | Error:
         session = client.sessions.get(request.session)
-        if session is None:
+        if session is None or session.state is State.WRITING:
             return Error.INVALID_SESSION
         session.step(Event.READ)
         session.used = now
@@ -338,7 +406,7 @@ class FtpServer:
 
     def _begin_burst(self, client: _Client, request: Request, now: float) -> bytes | Error:
         session = client.sessions.get(request.session)
-        if session is None:
+        if session is None or session.state is State.WRITING:
             return Error.INVALID_SESSION
         session.used = now
         if request.offset >= len(session.content):

@@ -13,7 +13,7 @@ from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services import metadata
 from anafi_mav.services.commands import Command
-from anafi_mav.services.files import FileTree, Query, ServedFile
+from anafi_mav.services.files import FileTree, Query, ServedFile, absolute
 from anafi_mav.services.flavours import FLAVOURS, Flavour, flavour_of
 from anafi_mav.services.ftp import FtpServer
 from anafi_mav.services.identity import capability_bits
@@ -27,7 +27,7 @@ EXPIRE_EVERY = 1.0
 
 
 class FtpService(Service):
-    """Serves the files of all services of the system, to read only."""
+    """Serves the files of all services of the system; those of plans can be written."""
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
@@ -86,8 +86,8 @@ class FtpService(Service):
 
     def _receive(self, inbound: Inbound) -> None:
         who = client_of(inbound)
-        tree = self._trees[flavour_of(inbound.channel).name]
-        answer = self._server.receive(who, bytes(inbound.message.payload), tree, inbound.now)
+        files = _ClientFiles(self._trees[flavour_of(inbound.channel).name], self._files, inbound)
+        answer = self._server.receive(who, bytes(inbound.message.payload), files, inbound.now)
         if answer is None:
             return
         self.host.send(_message(answer, inbound), inbound.channel)
@@ -161,6 +161,29 @@ class FtpService(Service):
             (identity.hardware or "").encode()[:23],
             identity.serial.encode()[:31],
         )
+
+
+class _ClientFiles:
+    """The files of one client's flavour, and the client, for what it writes."""
+
+    def __init__(self, tree: FileTree, files: Mapping[str, ServedFile], inbound: Inbound) -> None:
+        self.read = tree.read
+        self.list = tree.list
+        self._tree = tree
+        self._files = files
+        self._inbound = inbound
+
+    def room(self, path: str) -> int | None:
+        file = self._writable(path)
+        return None if file is None else file.room
+
+    def write(self, path: str, content: bytes) -> bool:
+        file = self._writable(path)
+        return file is not None and file.write is not None and file.write(self._inbound, content)
+
+    def _writable(self, path: str) -> ServedFile | None:
+        file = self._files.get(absolute(path) or "") if self._tree.has(path) else None
+        return None if file is None or file.write is None else file
 
 
 def _compressed(content: bytes | None) -> bytes | None:

@@ -114,7 +114,7 @@ class PlanDesk:
         open_still = any(self.transfers[kind].state is State.STORING for kind in commit.plans)
         for kind, items in commit.plans.items():
             effects += self.transfers[kind].stored(items, now, fault)
-        if open_still:
+        if open_still and commit.acknowledged:
             result = dialect.MAV_MISSION_ACCEPTED if fault is None else fault.result
             transfer = self.transfers.get(commit.mission_type)
             identity = transfer.opaque_id if fault is None and transfer is not None else 0

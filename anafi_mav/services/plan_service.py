@@ -10,20 +10,23 @@ import asyncio
 import logging
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
+from functools import partial
 
 from anafi_mav import units
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.plans.parrot import Version
+from anafi_mav.services import plan_files
 from anafi_mav.services.fence import FenceKind, summary
-from anafi_mav.services.flavours import PX4, flavour_of
+from anafi_mav.services.files import Query, ServedFile
+from anafi_mav.services.flavours import ARDUPILOT, PX4, Flavour, flavour_of
 from anafi_mav.services.guided import fly_item, is_guided_item
 from anafi_mav.services.memory import NOT_KEPT
 from anafi_mav.services.mission_kind import MissionKind
 from anafi_mav.services.plan_desk import MESSAGES, PlanDesk
 from anafi_mav.services.plan_items import Fault, PlanItem
-from anafi_mav.services.plan_transfer import Changed, Commit, Effect, Peer, PlanKind, Reply, Say
+from anafi_mav.services.plan_transfer import MAX_ITEMS, Changed, Commit, Effect, Peer, PlanKind, Reply, Say
 from anafi_mav.services.rally import RallyKind, Return
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
 from anafi_mav.services.statustext import Severity
@@ -61,6 +64,40 @@ class PlanService(Service):
     def messages(self) -> Mapping[int, MessageHandler]:
         return dict.fromkeys(MESSAGES, self._receive)
 
+    def files(self) -> Mapping[str, ServedFile]:
+        return {
+            path: ServedFile(
+                partial(self._packed, kind),
+                flavour=ARDUPILOT,
+                write=partial(self._written, kind),
+                room=plan_files.size_of(MAX_ITEMS),
+            )
+            for kind, path in plan_files.PATHS.items()
+        }
+
+    def _packed(self, kind: int, flavour: Flavour, query: Query) -> bytes:
+        transfer = self._desk.transfers[kind]
+        return plan_files.pack_plan(transfer.kind.shown(transfer.items, flavour), kind)
+
+    def _written(self, kind: int, inbound: Inbound, content: bytes) -> bool:
+        """A client has written the file of a list. What is wrong with it is a text; the list then stays."""
+        transfer = self._desk.transfers[kind]
+        items = plan_files.unpack_plan(content, kind)
+        if isinstance(items, Fault):
+            outcome: list[Effect] | Fault = items
+        else:
+            outcome = transfer.replace(items, self._peer(inbound), self.host.clock.monotonic())
+        if isinstance(outcome, Fault):
+            self.host.complain(f"{transfer.kind.name.capitalize()} refused: {outcome.reason}")
+            return False
+        self._perform(outcome)
+        return True
+
+    def _peer(self, inbound: Inbound) -> _ChannelPeer:
+        return _ChannelPeer(
+            client_of(inbound), inbound.sysid, inbound.compid, flavour_of(inbound.channel), inbound.channel
+        )
+
     def link_up(self) -> None:
         memory = self.host.memory
         for kind, transfer in self._desk.transfers.items():
@@ -94,10 +131,7 @@ class PlanService(Service):
         if message.get_msgId() in _ITEMS and is_guided_item(message):
             fly_item(self.host, inbound)
             return
-        peer = _ChannelPeer(
-            client_of(inbound), inbound.sysid, inbound.compid, flavour_of(inbound.channel), inbound.channel
-        )
-        self._perform(self._desk.receive(message, peer, self.host.clock.monotonic()))
+        self._perform(self._desk.receive(message, self._peer(inbound), self.host.clock.monotonic()))
 
     def _perform(self, effects: Sequence[Effect]) -> None:
         for effect in effects:

@@ -98,6 +98,8 @@ class Commit:
     peer: Peer
     mission_type: int
     """Of the acknowledgement: a list's own, or that of all of them."""
+    acknowledged: bool = True
+    """A MISSION_ACK follows; not for a list that came as a file."""
 
 
 @dataclass(frozen=True)
@@ -314,6 +316,25 @@ class PlanTransfer:
         self._committing = _Done(peer, now, upload.requests.last, ECHOES if upload.lossy else 0)
         remarks = [Say(Severity.WARNING, text) for text in self.kind.remarks(upload.items)]
         return [*remarks, Commit({self.kind.mission_type: items}, peer, self.kind.mission_type)]
+
+    def replace(self, sent: Sequence[PlanItem], peer: Peer, now: float) -> list[Effect] | Fault:
+        """A client has sent the whole list at once, as a file: what to do, or why it is refused."""
+        if self.kind.refusal is not None:
+            return self.kind.refusal
+        if self.state is State.STORING or self._busy(peer, now):
+            return Fault(dialect.MAV_MISSION_DENIED, "another client transfers it just now")
+        if len(sent) > self.kind.capacity:
+            return Fault(dialect.MAV_MISSION_NO_SPACE, f"{len(sent)} items are more than {self.kind.capacity}")
+        for seq, item in enumerate(sent):
+            if (fault := self.kind.check_item(item)) is not None:
+                return Fault(fault.result, f"item {seq}: {fault.reason}")
+        items = tuple(self.kind.taken(sent, peer.flavour))
+        if (fault := self.kind.check_plan(items, peer.flavour)) is not None:
+            return fault
+        self.begin_clear(peer, now)
+        remarks = [Say(Severity.WARNING, text) for text in self.kind.remarks(sent)]
+        commit = Commit({self.kind.mission_type: items}, peer, self.kind.mission_type, acknowledged=False)
+        return [*remarks, commit]
 
     def clear(self, peer: Peer, now: float) -> list[Effect]:
         """MISSION_CLEAR_ALL, or MISSION_COUNT of 0: acknowledged also when there is nothing to clear."""

@@ -6,6 +6,7 @@ import asyncio
 import re
 import shutil
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -41,10 +42,10 @@ async def typed(mavproxy: Process, command: str, pattern: str, timeout: float = 
     return await mavproxy.line(lambda line: re.search(pattern, line) is not None, since=since, timeout=timeout)
 
 
-async def listed(mavproxy: Process, what: str) -> list[int]:
-    """The commands that `fence list`, `rally list` or `wp list` prints."""
+async def listed(mavproxy: Process, what: str, how: str = "list") -> list[int]:
+    """The commands that `fence list`, `rally list`, `wp list` or `wp ftp` prints."""
     since = len(mavproxy.lines)
-    await typed(mavproxy, f"{what} list", r"Saved \d+ waypoints to |Saved \w+ items to ")
+    await typed(mavproxy, f"{what} {how}", r"Saved \d+ waypoints to |Saved \w+ items to ")
     rows = [re.search(r"\b(\d+) \d+ -?\d+\.\d{10} ", line) for line in mavproxy.lines[since:]]
     return [int(row[1]) for row in rows if row is not None]
 
@@ -152,6 +153,15 @@ async def test_conf_119_142_missions(tmp_path: Path) -> None:
             assert same(await changed(w, MISSION, command, mavproxy), wanted)
             await mavproxy.line(lambda line: "Loaded 8 waypoints in" in line)
             assert await listed(mavproxy, "wp") == [item.command for item in wanted]
+
+            # As a file over MAVLink FTP, both ways.
+            assert await listed(mavproxy, "wp", "ftp") == [item.command for item in wanted]
+            higher = [replace(item, z=7.0) if item.command == 16 and item.frame == 3 else item for item in wanted]
+            load = f"wp ftpload {waypoint_file(tmp_path / 'higher.txt', higher)}"
+            assert same(await changed(w, MISSION, load, mavproxy), higher)
+            await mavproxy.line(lambda line: "Sent waypoint of length 8 in" in line)
+            command = f"wp load {waypoint_file(tmp_path / 'lower.txt', wanted)}"  # MAVProxy has written way.txt since
+            assert same(await changed(w, MISSION, command, mavproxy), wanted)
 
             # Edited in place, by MISSION_WRITE_PARTIAL_LIST: one item, two items, a parameter.
             edited = await changed(w, MISSION, "wp changealt 6 9", mavproxy)

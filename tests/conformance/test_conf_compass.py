@@ -56,10 +56,14 @@ async def test_compass_calibration_is_cancelled_by_its_command() -> None:
         assert (await w.client.command(ACCEPT)).result == REJECTED
 
 
-async def test_compass_calibration_is_ended_by_a_takeoff() -> None:
-    async with world(flavour="ardupilot") as w:
+async def test_compass_calibration_forbids_arming_until_another_command_ends_it() -> None:
+    async with world(flavour="ardupilot", speed=1.0) as w:
+        mark = w.client.mark()
         assert (await w.client.command(START)).result == ACCEPTED
-        await w.take_off(5.0)
+        assert (await w.client.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)).result == REJECTED
+        zeros = {"x": 0.0, "y": 0.0, "z": 0.0}
+        assert (await w.client.command(dialect.MAV_CMD_PREFLIGHT_CALIBRATION, 0, 0, 0, 0, **zeros)).result == ACCEPTED
+        await w.client.wait("MAG_CAL_REPORT", since=mark)
         assert asked(w) == [1, 0]
 
 

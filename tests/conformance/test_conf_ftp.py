@@ -99,8 +99,9 @@ async def test_conf_113_no_way_out_and_nothing_to_write() -> None:
         ):
             for opcode in (OPEN, CRC, LIST):
                 assert (await ftp.ask(opcode, path)).error == NOT_FOUND
-        for opcode in (6, 7, 8, 9, 10, 11, 12, 13):
+        for opcode in (6, 8, 9, 10, 11, 12, 13):
             assert (await ftp.ask(opcode, b"/parameter.json")).error == PROTECTED
+        assert (await ftp.ask(7, b"/parameter.json")).error == NO_SESSION
         assert (await ftp.ask(77)).error == 7
         assert await ftp.download("/general.json")  # all as it was
 

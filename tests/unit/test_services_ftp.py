@@ -85,9 +85,14 @@ def test_every_transition(state: State, event: Event) -> None:
         Event.BURST: State.BURSTING,
         Event.TERMINATE: State.CLOSED,
         Event.EXPIRE: State.CLOSED,
+        Event.CREATE: State.WRITING,
     }
     if state is State.CLOSED:
-        assert TRANSITIONS[state].get(event) is (State.OPEN if event is Event.OPEN else None)
+        assert TRANSITIONS[state].get(event) is {Event.OPEN: State.OPEN, Event.CREATE: State.WRITING}.get(event)
+    elif event is Event.WRITE:
+        assert TRANSITIONS[state].get(event) is (State.WRITING if state is State.WRITING else None)
+    elif state is State.WRITING and event in (Event.READ, Event.BURST):
+        assert event not in TRANSITIONS[state]
     elif event is Event.BURST_ENDS:
         assert TRANSITIONS[state].get(event) is (State.OPEN if state is State.BURSTING else None)
     else:
@@ -219,7 +224,6 @@ def test_crc() -> None:
     "opcode",
     [
         Opcode.CREATE_FILE,
-        Opcode.WRITE_FILE,
         Opcode.REMOVE_FILE,
         Opcode.CREATE_DIRECTORY,
         Opcode.REMOVE_DIRECTORY,
@@ -230,6 +234,13 @@ def test_crc() -> None:
 )
 def test_nothing_can_be_written(opcode: Opcode) -> None:
     assert Bench().ask(request(opcode, b"/data.bin")).error == Error.FILE_PROTECTED
+
+
+def test_write_without_a_created_file_is_an_invalid_session() -> None:
+    b = Bench()
+    assert b.ask(request(Opcode.WRITE_FILE, b"x")).error == Error.INVALID_SESSION
+    b.ask(request(Opcode.OPEN_FILE_RO, b"/data.bin"))
+    assert b.ask(request(Opcode.WRITE_FILE, b"x")).error == Error.INVALID_SESSION
 
 
 def test_odd_requests() -> None:

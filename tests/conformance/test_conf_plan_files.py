@@ -1,0 +1,107 @@
+"""Missions, fences and rally points as ArduPilot's files: read and written over MAVLink FTP, as MAVProxy does it."""
+
+from __future__ import annotations
+
+import struct
+
+import pytest
+from support.ftp import ACK, NAK, NOT_FOUND, OPEN, TERMINATE, Ftp
+from support.plans import FENCE, MISSION, RALLY, Item, circle, content, download, rally, upload
+from support.world import HOME, World, world
+
+from anafi_mav.services.plan_files import PATHS, unpack_plan
+from anafi_mav.services.plan_items import PlanItem
+
+CREATE, WRITE = 6, 7
+PLACE = (HOME[0], HOME[1])
+LISTS = {
+    MISSION: [Item(16, *HOME), Item(22, *PLACE, z=6.0, frame=3), Item(16, HOME[0] + 1e-4, HOME[1], z=8.0, frame=3)],
+    FENCE: [circle(PLACE, 80.0), circle(PLACE, 9.0, inclusion=False)],
+    RALLY: [rally(PLACE, 20.0), rally((PLACE[0] + 0.001, PLACE[1]), 25.0)],
+}
+
+
+def file_of(items: list[Item], kind: int, *, autocontinue: int = 1) -> bytes:
+    """By hand: header, then payloads of MISSION_ITEM_INT in the order of the wire."""
+    rows = [
+        struct.pack(
+            "<ffffiifHHBBBBBB", item.p1, item.p2, item.p3, item.p4, *item.content[6:8], item.z,
+            seq, item.command, 1, 1, item.frame, 0, autocontinue, kind,
+        )
+        for seq, item in enumerate(items)
+    ]  # fmt: skip
+    return struct.pack("<HHHHH", 0x763D, kind, 0, 0, len(items)) + b"".join(rows)
+
+
+async def write(w: World, kind: int, data: bytes) -> tuple[int, bytes]:
+    """Replace a file; opcode and data of the last answer."""
+    ftp = Ftp(w.client)
+    assert (await ftp.ask(CREATE, PATHS[kind].encode())).opcode == ACK
+    for offset in range(0, len(data), 200):
+        assert (await ftp.ask(WRITE, data[offset : offset + 200], offset=offset)).opcode == ACK
+    end = await ftp.ask(TERMINATE)
+    return end.opcode, end.data
+
+
+@pytest.mark.parametrize("kind", LISTS)
+async def test_list_is_read_as_a_file_by_an_ardupilot_client(kind: int) -> None:
+    async with world(flavour="ardupilot") as w:
+        assert (await upload(w.client, LISTS[kind], kind)).type == 0
+        found = unpack_plan(await Ftp(w.client).download(PATHS[kind]), kind)
+        read = await download(w.client, kind)
+        assert isinstance(found, list)
+        assert all(isinstance(item, PlanItem) for item in found)
+        assert [(item.command, item.frame, *item.params, item.x, item.y, item.z) for item in found] == [
+            content(message) for message in read
+        ]
+
+
+@pytest.mark.parametrize("kind", LISTS)
+async def test_file_of_a_list_replaces_it_without_a_mission_ack(kind: int) -> None:
+    async with world(flavour="ardupilot") as w:
+        mark = w.client.mark()
+        assert await write(w, kind, file_of(LISTS[kind], kind, autocontinue=0)) == (ACK, b"")
+        word = {MISSION: "Mission: 2 items", FENCE: "Fence: 1 inclusion circle", RALLY: None}[kind]
+        if word is not None:
+            await w.client.wait("STATUSTEXT", lambda m: word in m.text, since=mark)
+        assert w.client.since(mark, "MISSION_ACK") == []
+        read = await download(w.client, kind)
+        wanted = [item.content for item in LISTS[kind]]
+        assert [content(message) for message in read][1:] == wanted[1:]  # item 0 of a mission is home as it is
+        assert all(message.autocontinue == 1 for message in read[1:]) or kind != MISSION
+        assert await write(w, kind, file_of([], kind)) == (ACK, b"")
+        assert await download(w.client, kind) == []
+
+
+@pytest.mark.parametrize(
+    ("kind", "data", "reason"),
+    [
+        (MISSION, b"", "Mission refused: the file has no header"),
+        (MISSION, file_of(LISTS[MISSION], MISSION)[:-1], "Mission refused: the file has not its 3 items"),
+        (FENCE, file_of([circle(PLACE, -5.0)], FENCE), "Fence refused: item 0: -5 is no radius"),
+    ],
+)
+async def test_file_that_is_not_good_leaves_the_list_and_says_why(kind: int, data: bytes, reason: str) -> None:
+    async with world(flavour="ardupilot") as w:
+        assert (await upload(w.client, LISTS[kind], kind)).type == 0
+        mark = w.client.mark()
+        assert (await write(w, kind, data))[0] == NAK
+        await w.client.wait("STATUSTEXT", lambda m: m.text == reason, since=mark)
+        assert len(await download(w.client, kind)) == len(LISTS[kind])
+
+
+async def test_mission_that_cannot_be_flown_is_refused_by_a_text() -> None:
+    """It is examined after the file is closed."""
+    async with world(flavour="ardupilot") as w:
+        mark = w.client.mark()
+        assert await write(w, MISSION, file_of([Item(16, *HOME), Item(84, *PLACE)], MISSION)) == (ACK, b"")
+        await w.client.wait("STATUSTEXT", lambda m: m.text.startswith("Mission refused: item 1: "), since=mark)
+        assert await download(w.client, MISSION) == []
+
+
+async def test_files_of_lists_are_ardupilots_alone() -> None:
+    async with world() as w:
+        ftp = Ftp(w.client)
+        for path in PATHS.values():
+            assert (await ftp.ask(OPEN, path.encode())).error == NOT_FOUND
+            assert (await ftp.ask(CREATE, path.encode())).opcode == NAK
