@@ -210,9 +210,10 @@ class Gateway:
         await self.close()
 
     async def open(self) -> None:
-        """Lock the state folder and open every endpoint, and no more; `start` does it where this has not. Raises
-        `ConfigError`; nothing is left open. It is a step of its own for the command line, which starts a simulator only
-        when all endpoints are."""
+        """Lock the state folder and open every endpoint. Raises `ConfigError`; nothing is then left open or locked.
+
+        `start` does it where this has not. It is a step of its own for the command line, which starts a simulator only
+        when all endpoints are open."""
         if self._node.endpoints:
             return
         self._lock_state()

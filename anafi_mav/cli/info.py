@@ -64,7 +64,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 async def _serial(address: str, interface: str | None = None) -> str:
-    """The serial number of the device there, which tells it without being taken; empty when it does not."""
+    """Return the serial number in the introduction of the device there; empty when it gives none."""
     try:
         return (await look_either(address, interface=interface)).serial
     except (AnafiMavError, OSError):
