@@ -49,6 +49,7 @@ from anafi_mav.services.rally import RallyPoints
 from anafi_mav.services.refusal import Refused
 from anafi_mav.services.return_end import ReturnEnd
 from anafi_mav.services.right import Extent, Right
+from anafi_mav.services.roll_sign import INVERTED
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.takeoff import Takeoff
 
@@ -63,6 +64,8 @@ UNENDABLE = (FORCED, LANDS, PILOT_LANDS, RETURNS, PILOT_RETURNS, RETURNS_BY_ITSE
 POSITION_OLD = 3.0
 """s without a GPS location, which an ANAFI reports once a second, after which the last one is no position in flight."""
 
+
+ESTIMATED = f"Take-off altitude estimated: GPS only (+-{ESTIMATE_ERROR:g} m)"
 
 GOOD_ACCURACY = 5
 """m of one standard deviation of GPS altitude that AMSL heights can be used with, without a text."""
@@ -532,7 +535,7 @@ class Vehicle(Aircraft):
             if self.origin is None:
                 self.origin = self.place
         elif self.flying_state is not None and self.height.in_flight(self.drone.product.state.flight_id, amsl, ato):
-            self.text(Severity.WARNING, f"Take-off altitude estimated: GPS only (+-{ESTIMATE_ERROR:g} m)")
+            self.text(Severity.WARNING, ESTIMATED)
 
     def _report_accuracy(self) -> None:
         """Report that AMSL heights of this flight will be wrong by as much as GPS is at its beginning."""
@@ -564,6 +567,12 @@ class Vehicle(Aircraft):
         if home.type == RthHomeType.TAKEOFF and home.location is not None:
             return Place(home.location.latitude, home.location.longitude)
         return None
+
+    @property
+    def standing_warnings(self) -> list[str]:
+        """Texts that stay true for a while: a client that connects later gets them with its banner."""
+        warnings = [ESTIMATED] if self.height.estimated and not self.on_ground else []
+        return [*warnings, INVERTED] if self.roll.inverted else warnings
 
     @property
     def takeoff_record(self) -> TakeoffRecord | None:

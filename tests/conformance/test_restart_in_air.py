@@ -51,7 +51,8 @@ async def flying(tmp_path: Path, height: float, *quirks: Quirk) -> AsyncIterator
             await w.client.heartbeat(lambda beat: beat.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED, since=0)
             await w.client.wait("GLOBAL_POSITION_INT", since=0)
             yield w
-            await w.client.close()
+            for client in w.clients:
+                await client.close()
             await simulator.close()
 
 
@@ -88,6 +89,9 @@ async def test_restart_in_flight_without_flight_id_estimates_and_keeps_away_from
         refusal = "Refused: estimated AMSL height 12 m < 15 m"
         await w.client.wait("STATUSTEXT", lambda m: m.text == refusal, since=mark)
         assert w.commands("ardrone3.Piloting.moveTo") == []
+        late = await w.connect(sysid=254)
+        late.send(dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+        await late.wait("STATUSTEXT", lambda m: m.text.startswith(ESTIMATED), since=0)
         assert await goto(w, 10.0, HOME[2] + 18.0, GLOBAL) == ACCEPTED
         await at(w.drone, 10.0, 18.0)
         assert await goto(w, 0.0, 5.0, RELATIVE) == ACCEPTED  # above take-off: no bridge is needed

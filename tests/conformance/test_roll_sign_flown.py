@@ -14,8 +14,8 @@ from support.world import HOLD, HOME, World, loopback, world
 
 from anafi_mav.config import Config, DroneConfig
 from anafi_mav.gateway import Gateway
-from anafi_mav.services.roll_sign import Sign
-from anafi_mav.services.roll_sign_service import INVERTED, VERIFIED
+from anafi_mav.services.roll_sign import INVERTED, Sign
+from anafi_mav.services.roll_sign_service import VERIFIED
 from anafi_mav.sim import DroneSpec, Simulator
 from anafi_mav.sim.quirks import Quirk
 
