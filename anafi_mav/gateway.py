@@ -22,14 +22,17 @@ from typing_extensions import Self
 from anafi_mav.arsdk.rtsp import DEFAULT_PORT as RTSP_PORT
 from anafi_mav.clock import Clock, SystemClock
 from anafi_mav.config import Config, DroneConfig
-from anafi_mav.drone import Drone
+from anafi_mav.drone import Drone, events
+from anafi_mav.drone.contention import Contention
 from anafi_mav.drone.rest import HTTP_PORT
 from anafi_mav.errors import AnafiMavError, ConfigError, HandshakeRefused
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound, Node
+from anafi_mav.services.flying import ON_GROUND
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.system import System
-from anafi_mav.state_lock import FILE, HeldDrone, StateLock, state_folder
+from anafi_mav.state_lock import FILE, HeldDrone, Holder, StateLock, state_folder
+from anafi_mav.subject import DRONE
 
 logger = logging.getLogger(__name__)
 
@@ -42,6 +45,16 @@ CANCEL_WAIT = 0.1
 
 HOVER_TIME = 2.0
 """s that closing stays with a flying drone after its moves have ended: as long as hover centres the sticks."""
+
+
+def state_in_use(folder: Path, holder: Holder) -> ConfigError:
+    """Return the error of a gateway whose state folder another one holds."""
+    drones = "".join(f", {drone.name} at {drone.address}" for drone in holder.drones)
+    return ConfigError(
+        "state",
+        f"expected a folder that no other gateway uses, but the gateway with process id {holder.pid}{drones}, "
+        f"holds {folder / FILE}; end that gateway, or name another folder for this one",
+    )
 
 
 class _Supervised:
@@ -57,9 +70,16 @@ class _Supervised:
         self.problem = ""
         """Why the last attempt to connect failed; empty while connected."""
         self.task: asyncio.Task[None] | None = None
+        self._contention = Contention()
+        self._judged = drone.handshake_at
+        """The handshake whose loss was judged last."""
+        self._asked: asyncio.Future[int] | None = None
+        """While another controller has the drone: done with the system id of a client that wants it back."""
+        drone.subscribe(self._on_event)
 
     async def run(self) -> None:
         """Keep the drone connected until cancelled."""
+        DRONE.set(self.config.name)
         try:
             await self._run()
         finally:
@@ -70,6 +90,7 @@ class _Supervised:
         while True:
             try:
                 await self.drone.connect()
+                self._contention.connected(airborne=self.drone.piloting.state.flying not in ON_GROUND)
                 if self.problem:  # it was reported at this level
                     logger.warning("%s: connected", self.config.name)
                 self.problem, pause = "", RETRY_FIRST
@@ -99,6 +120,47 @@ class _Supervised:
                 self.first_attempt.set()
                 await self.drone.pause(pause)
                 pause = min(2.0 * pause, RETRY_LAST)
+            await self._contend()
+
+    async def _contend(self) -> None:
+        """Judge a connection that was lost, and stay away for a while if another controller has taken the drone."""
+        drone, contention = self.drone, self._contention
+        if drone.handshake_at == self._judged or await drone.heard_again():
+            return
+        self._judged = drone.handshake_at
+        age = drone.last_heard - drone.handshake_at
+        if not drone.may_be_displaced or not contention.lost(age, dismissed=drone.dismissed):
+            return
+        self._report(Severity.CRITICAL, "Another controller has taken the drone")
+        away = contention.stay_away()
+        if away is None:
+            return
+        await drone.close()
+        self._report(Severity.NOTICE, f"Reconnecting in {away:.0f} s, or on a command")
+        self.problem = f"another controller has taken the drone, staying away for {away:.0f} s"
+        self._asked = asked = asyncio.get_running_loop().create_future()
+        self.system.listen(True)
+        try:
+            await asyncio.wait({asked}, timeout=away)
+        finally:
+            self._asked = None
+            self.system.listen(False)
+        if asked.done():
+            self._report(Severity.NOTICE, f"Reconnecting: command of system {asked.result()}")
+
+    def _report(self, severity: Severity, text: str) -> None:
+        logger.log(logging.WARNING, "%s: %s", self.config.name, text)
+        self.system.announce(severity, text)
+
+    def receive(self, inbound: Inbound) -> None:
+        """Give the system a client's message; a command to it ends the time that another controller is left alone."""
+        if self._asked is not None and not self._asked.done() and self.system.commands(inbound):
+            self._asked.set_result(inbound.sysid)
+        self.system.receive(inbound)
+
+    def _on_event(self, message: events.Message, now: float) -> None:
+        if type(message) is events.FlyingStateChanged and message.state in ON_GROUND:
+            self._contention.on_ground()
 
     def held(self) -> HeldDrone:
         """Return what the lock file says of this drone."""
@@ -148,9 +210,10 @@ class Gateway:
         await self.close()
 
     async def open(self) -> None:
-        """Lock the state folder and open every endpoint, and no more; `start` does it where this has not. Raises
-        `ConfigError`; nothing is left open. It is a step of its own for the command line, which starts a simulator only
-        when all endpoints are."""
+        """Lock the state folder and open every endpoint. Raises `ConfigError`; nothing is then left open or locked.
+
+        `start` does it where this has not. It is a step of its own for the command line, which starts a simulator only
+        when all endpoints are open."""
         if self._node.endpoints:
             return
         self._lock_state()
@@ -173,12 +236,7 @@ class Gateway:
             logger.warning("state folder cannot be used: %s", self._state_problem)
             return
         if holder is not None:
-            drones = "".join(f", {drone.name} at {drone.address}" for drone in holder.drones)
-            raise ConfigError(
-                "state",
-                f"expected a folder that no other gateway uses, but the gateway with process id {holder.pid}{drones}, "
-                f"holds {self._state / FILE}; end that gateway, or name another folder for this one",
-            )
+            raise state_in_use(self._state, holder)
         self._lock = lock
 
     def _unlock_state(self) -> None:
@@ -287,7 +345,7 @@ class Gateway:
     def _receive(self, inbound: Inbound) -> None:
         for supervised in self._supervised:
             try:
-                supervised.system.receive(inbound)
+                supervised.receive(inbound)
             except AnafiMavError as error:  # this drone's link may just have died; the others hear it all the same
                 logger.debug("%s: %s not handled: %s", supervised.config.name, inbound.message.get_type(), error)
             except Exception:

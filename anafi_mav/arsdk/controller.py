@@ -43,6 +43,8 @@ class ControllerSession(Session):
         super().__init__(transport, on_message)
         self.on_stall: Callable[[], None] = lambda: None
         """Called when the host stalled and the watchdog has sent what stood by."""
+        self.closed_by_peer = False
+        """The session ended because the other side closed its TCP connection."""
         self._watchdog: Watchdog | None = None
         self._starting: asyncio.Task[None] | None = None
         self._standby: Sequence[Message] = ()
@@ -56,6 +58,7 @@ class ControllerSession(Session):
         with contextlib.suppress(OSError):
             while await reader.read(handshake.MAX_JSON):
                 pass
+        self.closed_by_peer = not self.lost.done()
         self.end("the drone closed the connection")
 
     def end(self, reason: str) -> None:

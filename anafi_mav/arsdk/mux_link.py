@@ -162,6 +162,7 @@ class MuxControllerSession(ControllerSession):
                     if frame.channel == mux.TRANSPORT:
                         self.datagram_received(frame.payload, PEER)
                 frames = await self._stream.read()
+        self.closed_by_peer = not self.lost.done()
         self.end("the Skycontroller closed the connection")
 
 

@@ -236,16 +236,18 @@ class Master:
         address = await self._resolve(host, _TCP, port)
 
         async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-            task = asyncio.current_task()
-            assert task is not None
-            self._tasks.add(task)
             try:
                 await self._serve(reader, writer, address, port)
             finally:
-                self._tasks.discard(task)
                 writer.close()
 
-        server = await asyncio.start_server(serve, "127.0.0.1", 0)
+        def accept(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            # A task of ours: one that `start_server` makes prints a traceback when it is cancelled (Python 3.11.7).
+            task = asyncio.create_task(serve(reader, writer))
+            self._tasks.add(task)
+            task.add_done_callback(self._tasks.discard)
+
+        server = await asyncio.start_server(accept, "127.0.0.1", 0)
         if self._shut:
             server.close()
             raise LinkLost("not connected")

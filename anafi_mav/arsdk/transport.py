@@ -294,7 +294,8 @@ class Transport:
     def send(self, message: Message | UnknownMessage, now: float) -> int:
         """Queue a message; the token names it in `cancel`, `Delivered` and `Undelivered`.
 
-        An unknown message travels in the acknowledged queue. A HIGH_PRIO message overtakes what waits there.
+        An unknown message travels in the acknowledged queue. A HIGH_PRIO message takes the place of everything that was
+        not delivered, in the same queue: its own (12) is read by no Parrot program that we know.
         Raises `LocalProtocolError` when it cannot be encoded or is too long for its queue. On a link that is down
         the message is counted and forgotten.
         """
@@ -316,6 +317,9 @@ class Transport:
         return token
 
     def _enqueue(self, buffer: Buffer, token: int, data: bytes) -> None:
+        if buffer is Buffer.HIGH_PRIO:
+            # Nothing of before may follow it, nor may it wait for the acknowledgement of what is in flight.
+            self.abandon("overtaken")
         queue = self._queues[(_LOW_PRIO_ID if buffer is Buffer.LOW_PRIO else _ACK_ID)[self.role]]
         if len(queue.waiting) >= MAX_QUEUED:
             self.counters["dropped.full"] += 1

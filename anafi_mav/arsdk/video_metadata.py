@@ -163,6 +163,7 @@ class FrameMetadata(msgspec.Struct, frozen=True, kw_only=True):
     """m/s."""
     battery_percentage: int | None = None
     flying_state: FlyingState | None = None
+    """An enum of the video's own with the numbers of ARSDK's: compare with `==`."""
     piloting_mode: PilotingMode | None = None
     animation_in_progress: bool = False
     position: Ned | None = None

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from anafi_mav.arsdk.handshake import DeviceInfo
 from anafi_mav.arsdk.interface import networks
 from anafi_mav.arsdk.mux_link import look_either
-from anafi_mav.cli import interrupts
+from anafi_mav.cli import interrupts, log
 from anafi_mav.cli.addresses import spot
 from anafi_mav.cli.terminal import complain, say, say_json
 from anafi_mav.drone.controller import MODELS as CONTROLLERS
@@ -72,6 +72,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Look everywhere at once. 1 when nothing is there."""
+    log.set_up()
     timeout = _timeout(arguments.timeout)
     wanted = [_place(text) for text in arguments.addresses]
     finds = interrupts.run(discover(places(wanted, networks()), timeout))

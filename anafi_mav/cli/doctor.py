@@ -18,7 +18,7 @@ from anafi_mav.arsdk.handshake import DISCOVERY_PORT, HANDSHAKE_PORT, DeviceInfo
 from anafi_mav.arsdk.interface import bind_to_interface, networks, open_connection
 from anafi_mav.arsdk.mux_link import look_either
 from anafi_mav.arsdk.rtsp import DEFAULT_PORT as RTSP_PORT
-from anafi_mav.cli import consent, interrupts, options
+from anafi_mav.cli import consent, interrupts, log, options
 from anafi_mav.cli.addresses import spot
 from anafi_mav.cli.terminal import say, say_json
 from anafi_mav.drone import Drone
@@ -86,6 +86,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Examine, print a line for each check; 1 when one of them is wrong."""
+    log.set_up()
     place = Place(
         **spot(arguments.address),
         http_port=_port("--http-port", arguments.http_port),
@@ -94,7 +95,11 @@ def run(arguments: argparse.Namespace) -> int:
     findings, device = interrupts.run(before_handshake(place))
     held = consent.gateway_of(arguments.state, place.address, place.interface, "" if device is None else device.serial)
     if held is not None:
-        findings.append(wrong("gateway", held, "its drones are left to it" + consent.GATEWAY_RETRIES))
+        findings.append(
+            ok("gateway", str(held))
+            if held.drone.serial
+            else wrong("gateway", str(held), "its own lines say why" + consent.GATEWAY_RETRIES)
+        )
     if not arguments.json:
         for finding in findings:
             _print(finding)
@@ -109,7 +114,9 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.json:
         say_json({"findings": [finding._asdict() for finding in findings], "not_asked": list(unasked)})
     elif unasked:
-        why = "" if device is None or held is not None else f"; {consent.WARNING}: with --take it is done"
+        why = "" if device is None else f"; {consent.WARNING}: with --take it is done"
+        if held is not None:
+            why = "; the gateway has the drone, and its drones are left to it"
         say(f"{', '.join(unasked)}: not asked{why}")
     return 1 if any(finding.wrong for finding in findings) else 0
 

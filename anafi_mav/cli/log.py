@@ -13,6 +13,7 @@ from collections.abc import Callable
 from types import TracebackType
 
 from anafi_mav.printable import printable
+from anafi_mav.subject import DRONE
 
 FORMAT = "%(asctime)s %(levelname)s %(name)s: %(message)s"
 
@@ -26,9 +27,12 @@ _NUMBER = re.compile(r"\d+(\.\d+)?")
 
 
 class CleanFormatter(logging.Formatter):
-    """Formats a record as one line of printable text; a traceback follows line by line."""
+    """Formats a record as one line of printable text with its drone; a traceback follows line by line."""
 
     def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802
+        subject = DRONE.get()
+        if subject and not record.message.startswith(subject):
+            record.message = f"{subject}: {record.message}"
         record.message = printable(record.message)
         return super().formatMessage(record)
 
@@ -41,7 +45,7 @@ class CleanFormatter(logging.Formatter):
 class RepeatFilter(logging.Filter):
     """Drops a line that differs from an earlier one in its numbers only, and counts it.
 
-    The first argument of a record is its drone by convention, so that two drones never count as one.
+    The first argument of a record is its drone by convention, or `subject` knows it: two drones never count as one.
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
@@ -53,8 +57,8 @@ class RepeatFilter(logging.Filter):
     def filter(self, record: logging.LogRecord) -> bool:
         if record.levelno < logging.INFO or record.exc_info:
             return True
-        subject = str(record.args[0]) if isinstance(record.args, tuple) and record.args else ""
-        key = (record.name, record.levelno, subject, _NUMBER.sub("#", record.getMessage()))
+        first = str(record.args[0]) if isinstance(record.args, tuple) and record.args else ""
+        key = (record.name, record.levelno, DRONE.get() + first, _NUMBER.sub("#", record.getMessage()))
         now = self._clock()
         written, dropped = self._lines.get(key, (None, 0))
         if written is not None and now - written < REPEAT_EVERY:
@@ -68,7 +72,7 @@ class RepeatFilter(logging.Filter):
         return True
 
 
-def set_up(level: int) -> None:
+def set_up(level: int = logging.WARNING) -> None:
     """Write the log of this process to stderr, from this level on."""
     handler = logging.StreamHandler()
     handler.setFormatter(CleanFormatter(FORMAT))

@@ -61,7 +61,7 @@ async def connect(
         try:
             await _settle(drone)
         except AnafiMavError as error:
-            log.warning("%s: not settled before the connection ended: %s", drone.name, error)
+            log.warning("%s: state unknown when the connection ended: %s", drone.name, error)
         finally:
             await drone.close()
 
@@ -82,9 +82,9 @@ async def _settle(drone: Drone) -> None:
         return
     try:
         await piloting.stop()
-    finally:
         delay = home.state.delay_s
         after = "its own delay" if delay is None else f"{delay} s"
         log.warning("%s: left in the air: hovers, returns home after %s if it knows home", drone.name, after)
+    finally:
         if drone.connected:
             await asyncio.wait([drone.lost], timeout=HOVER_TIME)

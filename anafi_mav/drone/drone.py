@@ -8,6 +8,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import datetime
@@ -17,7 +18,7 @@ from typing import Any, TypeAlias, TypeVar
 from anafi_mav.arsdk import mux_link
 from anafi_mav.arsdk.controller import ControllerSession
 from anafi_mav.arsdk.handshake import DISCOVERY_PORT
-from anafi_mav.arsdk.messages import ardrone3, common, drone_manager, skyctrl
+from anafi_mav.arsdk.messages import ardrone3, common, drone_manager, rth, skyctrl
 from anafi_mav.arsdk.messages import flight_plan as modern_plan
 from anafi_mav.arsdk.messages.animation import Type as AnimationType
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState, PoiStatus
@@ -43,7 +44,7 @@ from anafi_mav.drone.flight_plan import FlightPlan
 from anafi_mav.drone.follow_me import FollowMe
 from anafi_mav.drone.gimbal import Gimbal
 from anafi_mav.drone.gps import Gps
-from anafi_mav.drone.home import Home
+from anafi_mav.drone.home import Home, modern
 from anafi_mav.drone.link import Link
 from anafi_mav.drone.media import Media
 from anafi_mav.drone.moves import Move
@@ -110,6 +111,7 @@ class Drone:
         self._clock = clock or SystemClock()
 
         self._commander = Commander()
+        self._commander.name = self.name
         self._http_port = http_port
         self._rtsp_port = rtsp_port
         self._rest = Rest(address, http_port, local_address, interface)
@@ -134,6 +136,7 @@ class Drone:
         self.piloting = Piloting(self._commander, self.home, self.takeoff_blockers)
         self.controller = Controller(self._commander, self._user_moves, self._pilot_takes_over, self._stand_by)
         self.piloting.pilot_has_source = lambda: self.controller.pilot_has_source
+        self.flight_plan.model = lambda: self._model
         self.piloting.is_modern = lambda: self._model.protobuf
         self._commander.gate = self._allows
         self._elements: tuple[Element[Any], ...] = (
@@ -166,6 +169,7 @@ class Drone:
             **self.piloting.reactions(),
             **self.controller.reactions(),
             common.MavlinkFilePlayingStateChanged: self._plan_says,
+            common.Disconnection: self._on_dismissal,
             drone_manager.ConnectionState: self._controller_says,
             device_manager.State: self._controller_says,
         }
@@ -176,12 +180,22 @@ class Drone:
         """A session that is silent, and goes on when the drone is heard again before a new handshake has succeeded."""
         self._heard: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         """Done when the fading session is heard again, or has ended."""
+        self.handshake_at = -math.inf
+        """Loop time of the newest handshake."""
+        self.last_heard = -math.inf
+        """Loop time at which the drone was heard last before its link was lost."""
+        self.may_be_displaced = False
+        """The link was lost as another controller's handshake would end it."""
+        self._dismissed: common.DisconnectionCause | None = None
+        """Cause with which the drone announced the end of the connection."""
         self._hover_due = False
         """What flew at the beginning of a silence is to be stopped when it is over."""
         self._opening = False
         self._complete = False
         self._counters: Counter[str] = Counter()
         self._model = Model(0, "", "")
+        self._reports_rth_state = False
+        """rth.state has been received on this connection, so that its legacy twin says nothing more."""
         self._announced_serial = ""
         self._announced_name = ""
         self._lost: asyncio.Future[str] = asyncio.get_running_loop().create_future()
@@ -258,6 +272,7 @@ class Drone:
             attempt.cancel()
             await asyncio.wait([attempt])
         self._drop_fading("replaced by a new session")
+        self.handshake_at, self._dismissed, self.may_be_displaced = loop_time(), None, False
         session.on_message = self._receive
         return session
 
@@ -286,12 +301,14 @@ class Drone:
 
     def _on_silent(self, session: ControllerSession, reason: str) -> None:
         """The drone is not heard. For all others the link is lost; the session may go on."""
+        self._note_loss(session, silent=True)
         if session is not self._session or not self._complete:
             session.end(reason)
             return
         self._fading = session
         self._heard = asyncio.get_running_loop().create_future()
-        self._hover_due = True
+        # Where the pilot at a Skycontroller has control, nothing of ours flies, and a hover would be against him.
+        self._hover_due = not self.controller.pilot_has_source
         self._disconnected(reason, silent=True)
 
     def _on_speaks(self, session: ControllerSession) -> None:
@@ -303,6 +320,34 @@ class Drone:
         if fading is not None:
             fading.end(reason)
 
+    def _note_loss(self, session: ControllerSession, *, silent: bool) -> None:
+        """Keep what tells a loss by another controller's handshake, which silences us, from others.
+
+        The one connection of a Skycontroller 4 is closed by it. What loses the drone behind it, and a drone that is
+        switched off, is none.
+        """
+        self.last_heard = session.last_received
+        known = self._dismissed in (common.DisconnectionCause.OFF_BUTTON, common.DisconnectionCause.RESET_FACTORY)
+        closed = session.closed_by_peer and isinstance(session, mux_link.MuxControllerSession)
+        self.may_be_displaced = not known and (silent or closed or self._dismissed is not None)
+
+    def _on_dismissal(self, message: common.Disconnection, now: float) -> None:
+        self._dismissed = message.cause
+        log.warning("%s: the drone ends the connection: %s", self.name, spoken(message.cause))
+
+    @property
+    def dismissed(self) -> bool:
+        """The drone announced the end of the connection, and not because it is switched off."""
+        return self.may_be_displaced and self._dismissed is not None
+
+    async def heard_again(self) -> bool:
+        """Wait until a silent session is heard again, or a new handshake is due. False: it is not heard."""
+        if self._fading is None:
+            return False
+        rest = self._fading.last_received + HANDSHAKE_AFTER - loop_time()
+        await asyncio.wait({self._heard}, timeout=max(rest, 0.0))
+        return self._fading is not None and not self._fading.silent
+
     async def pause(self, seconds: float) -> None:
         """Wait before the next `connect`, no longer than until a silent session is heard again."""
         if self._fading is None:
@@ -313,7 +358,7 @@ class Drone:
     def _reset(self) -> None:
         for element in self._elements:
             element.reset()
-        self._complete = False
+        self._complete = self._reports_rth_state = False
         if self._lost.done():
             self._lost = asyncio.get_running_loop().create_future()
 
@@ -458,6 +503,8 @@ class Drone:
                 self._heard.set_result(None)
         if session is not self._session:
             return
+        if not session.silent:
+            self._note_loss(session, silent=False)
         self._disconnected("closed" if reason.cancelled() else reason.result(), silent=False)
 
     def _disconnected(self, why: str, *, silent: bool) -> None:
@@ -652,6 +699,10 @@ class Drone:
         if isinstance(message, UnknownMessage):
             self._counters["unknown message"] += 1
             return
+        if isinstance(message, rth.State):
+            self._reports_rth_state = True
+        elif isinstance(message, ardrone3.NavigateHomeStateChanged) and not self._reports_rth_state:
+            message = modern(message)
         kind = type(message)
         for element, reducer in self._routes.get(kind, ()):
             element.state = reducer(element.state, message)

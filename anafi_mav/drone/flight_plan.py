@@ -21,6 +21,7 @@ from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone.alerts import spoken
 from anafi_mav.drone.element import Reducer, members, with_item
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, loop_time
+from anafi_mav.drone.product import Model
 from anafi_mav.drone.rest import Rest
 from anafi_mav.drone.settings import Commanding
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost, NotSupported, RemoteProtocolError
@@ -125,6 +126,8 @@ class FlightPlan(Commanding[FlightPlanState]):
     def __init__(self, commander: Commander, rest: Rest) -> None:
         super().__init__(commander)
         self._rest = rest
+        self.model: Callable[[], Model] = lambda: Model(0, "", "")
+        """Which drone it is; the drone sets it."""
         self._starts = 0
         self._asked: str | None = None
         """The plan whose start was asked for last."""
@@ -146,7 +149,13 @@ class FlightPlan(Commanding[FlightPlanState]):
 
     @property
     def version(self) -> int:
-        """Version of the file format that this drone flies: 1, or 2 on the Ai."""
+        """Version of the file format that this drone flies: 1, or 2 on the Ai.
+
+        The model decides. Of a model that is not known, the events that the Ai alone is known to send.
+        """
+        known = self.model().plan_version
+        if known is not None:
+            return known
         return 1 if self.state.missing is None and self.state.capabilities is None else 2
 
     @property

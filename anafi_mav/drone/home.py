@@ -35,6 +35,8 @@ _SAME_PLACE_DEG = 1e-7
 
 _RETURNING = (RthState.IN_PROGRESS, RthState.PENDING)
 _ASKED_FOR = (StateReason.USER_REQUEST, StateReason.FLIGHTPLAN)
+_NO_CAUSE = (StateReason.FINISHED, StateReason.STOPPED, StateReason.DISABLED, StateReason.ENABLED)
+"""Reasons of other states. A drone may report one of them with a return that was under way before the connection."""
 
 
 class HomeState(msgspec.Struct, frozen=True):
@@ -93,9 +95,16 @@ class HomeState(msgspec.Struct, frozen=True):
     def returning_by_itself(self) -> bool:
         """True when the drone began the return for a reason of its own (battery, lost link, …).
 
-        A return that a user or the end of a flight plan commanded is not.
+        A return that a user or the end of a flight plan commanded is not, nor one whose cause is not reported, so that
+        a person can end it like any other.
         """
-        return self.rth in _RETURNING and self.reason not in _ASKED_FOR
+        return self.rth in _RETURNING and self.reason not in (*_ASKED_FOR, *_NO_CAUSE)
+
+
+def modern(message: ardrone3.NavigateHomeStateChanged) -> rth.State:
+    """Return what rth.state would report, of a firmware that sends the older event alone."""
+    legacy = message.reason == ardrone3.NavigateHomeReason.ICING
+    return rth.State(RthState(message.state), StateReason.ICING if legacy else StateReason(message.reason))
 
 
 def _auto_trigger(state: HomeState, message: rth.RthAutoTrigger) -> HomeState:

@@ -20,11 +20,12 @@ from typing import Any
 
 import msgspec
 
+from anafi_mav import geo
 from anafi_mav.arsdk.messages import ardrone3, rth
 from anafi_mav.arsdk.messages.ardrone3 import MoveByError, MoveToStatus
 from anafi_mav.arsdk.messages.rth import StateReason
 from anafi_mav.arsdk.wire import Message
-from anafi_mav.drone.element import Position
+from anafi_mav.drone.element import Position, position
 from anafi_mav.drone.expectation import Expectation
 from anafi_mav.drone.home import Home
 from anafi_mav.drone.piloting_state import MOTORS_OFF
@@ -39,6 +40,8 @@ STRAY_FOR = 2.0
 _SAME_PLACE_DEG = 1e-7
 """About a centimetre. The drone echoes a target as it got it; this tolerates a detour through single precision."""
 _SAME_HEIGHT = 1e-3
+_ROUNDED = 1.0
+"""m by which the echo of the only moveTo that is waited for may differ from its target."""
 _APART, _APART_SHARE = 2e-3, 2e-6
 """m, and share of the height, between two moveTos that are told apart by it: twice what `_same` lets pass."""
 _NO_MOVE = 1e-3
@@ -75,12 +78,14 @@ class Displacement(msgspec.Struct, frozen=True):
 class Move:
     """A move under way. `target` is set for a moveTo only; its altitude is above the take-off point."""
 
-    __slots__ = ("answer", "ended", "running", "target")
+    __slots__ = ("answer", "echo", "ended", "running", "target")
 
     def __init__(self, answer: Expectation[Any], target: Position | None = None) -> None:
         self.answer = answer
         """The wait of the verb that started it."""
         self.target = target
+        self.echo: Position | None = None
+        """The target as the drone reports it, where that differs from `target`."""
         self.running = False
         """The drone said that it is under way."""
         self.ended: asyncio.Future[MoveEnd] = asyncio.get_running_loop().create_future()
@@ -102,7 +107,15 @@ class Move:
 
     def is_to(self, message: ardrone3.MoveToChanged) -> bool:
         """Does this event speak of this move's target?"""
-        return self.target is not None and _same(message, self.target)
+        return any(place is not None and _same(message, place) for place in (self.target, self.echo))
+
+    def may_be_to(self, message: ardrone3.MoveToChanged) -> bool:
+        """True when this event's target is this move's but for rounding, as by a detour through another frame."""
+        target = self.target
+        if target is None or position(message.latitude, message.longitude, message.altitude) is None:
+            return False
+        away = geo.distance(target.latitude, target.longitude, message.latitude, message.longitude)
+        return math.hypot(away, target.altitude - message.altitude) <= _ROUNDED
 
 
 def _same(one: ardrone3.MoveToChanged | Position, other: Position) -> bool:
@@ -250,7 +263,11 @@ class Moves:
     def _on_move_to(self, message: ardrone3.MoveToChanged, now: float) -> None:
         move = self.to
         if message.status == MoveToStatus.RUNNING:
-            if move is not None and move.is_to(message):
+            if move is None:
+                return
+            if not move.is_to(message) and not move.running and self._is_alone and move.may_be_to(message):
+                move.echo = position(message.latitude, message.longitude, message.altitude)
+            if move.is_to(message):
                 self._under_way(move)
             return
         how = _MOVE_TO_ENDS.get(message.status)
@@ -273,6 +290,11 @@ class Moves:
         self.to, self._older = self._older, None
         move.end(how)
         move.answer.fail(CommandRejected(f"the drone answered the moveTo with {how.value}"))
+
+    @property
+    def _is_alone(self) -> bool:
+        """True when no other moveTo of ours is left that the drone's next event could be about."""
+        return not self._unheard and self._older is None and self._cancelling is None
 
     def _under_way(self, move: Move) -> None:
         """The newest moveTo is being flown, so that all before it are over."""

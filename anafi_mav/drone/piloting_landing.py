@@ -66,21 +66,23 @@ class LandingEnd:
         self._motors.landing_doubtful()
         try:
             if take_off and self._is_modern():
-                # It toggles: were the landing ended by gaz before it arrives, it would begin another one.
                 answer.token = self._commander.send(ardrone3.SmartTakeOffLand())
+                # It toggles: were the landing ended by gaz before it arrives, it would begin another one.
                 await asyncio.wait({answer.future}, timeout=SMART_WAIT)
                 self._commander.cancel(answer.token)
             elif take_off:
                 answer.token = self._commander.send(ardrone3.TakeOff())
             await self._hold_gaz(answer.future)
             await answer.wait()
-        except CommandTimeout:
-            raise CommandRejected(STILL_LANDING) from None
-        except CommandRejected:
-            if take_off:
-                self._motors.stay_down()
+        except BaseException as error:
+            if answer.token is not None:
+                self._motors.take_off_withdrawn()
+            if isinstance(error, CommandTimeout):
+                raise CommandRejected(STILL_LANDING) from None
             raise
         finally:
+            if answer.token is not None:  # whatever ended this: it must not arrive on the ground
+                self._commander.cancel(answer.token)
             answer.close()
             self._sticks.centre_after_gaz()
 

@@ -74,18 +74,22 @@ class Motors:
         """Until when a Landing that was withdrawn may be reported to have begun."""
         self._doubtful_until = -math.inf
         """Until when the reported LANDING may be over: its end was asked for."""
+        self._withdrawn_until = -math.inf
+        """Until when a TakeOff against a landing that was withdrawn may arrive, or be executed."""
         self._stays_down_until = -math.inf
         """Until when motors that start are stopped: no take-off that began after the touchdown is wanted."""
 
     def link_lost(self) -> None:
         """Commands of before do not count for the next connection."""
         self._may_take_off_until = self._may_land_until = -math.inf
-        self._doubtful_until = self._stays_down_until = -math.inf
+        self._doubtful_until = self._stays_down_until = self._withdrawn_until = -math.inf
 
     def on_flying_state(self, message: ardrone3.FlyingStateChanged) -> None:
         """Stop what starts after a touchdown although nothing that is wanted starts it."""
         if message.state != FlyingState.LANDING:
             self._doubtful_until = -math.inf
+        if message.state == FlyingState.LANDED and loop_time() < self._withdrawn_until:
+            self._stay_down()
         if loop_time() >= self._stays_down_until:
             return
         if message.state == FlyingState.MOTOR_RAMPING:
@@ -94,17 +98,21 @@ class Motors:
             self._commander.halt_if_connected(ardrone3.Landing())
 
     def take_off_wanted(self) -> None:
-        """A command that starts the motors is about to be sent, or motors that start are another's business."""
-        self._stays_down_until = -math.inf
+        """A command that starts the motors is about to be sent: those that start from now on are wanted."""
+        self._stays_down_until = self._withdrawn_until = -math.inf
 
     def landing_doubtful(self) -> None:
         """The landing is about to be ended: until a state is reported, LANDING proves nothing."""
         self._doubtful_until = loop_time() + LAND_MEMORY
 
-    def stay_down(self) -> None:
-        """The drone landed before a TakeOff could end the landing: that one must not lift it off again."""
-        self._stays_down_until = loop_time() + STAYS_DOWN
-        self._may_take_off_until = loop_time() + STAYS_DOWN
+    def take_off_withdrawn(self) -> None:
+        """A TakeOff against a landing was withdrawn and may have arrived: a drone that has landed must stay down."""
+        self._withdrawn_until = loop_time() + STAYS_DOWN
+        if self._flight.state.flying == FlyingState.LANDED:
+            self._stay_down()
+
+    def _stay_down(self) -> None:
+        self._stays_down_until = self._may_take_off_until = loop_time() + STAYS_DOWN
 
     async def settle_landing(self, timeout: float) -> bool:
         """Return True when a Landing that was withdrawn has begun all the same; False when it certainly does not.

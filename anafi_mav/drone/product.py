@@ -20,6 +20,8 @@ class Model(msgspec.Struct, frozen=True):
     key: str
     """Short name as used in configurations: "4k"."""
     title: str
+    plan_version: int | None = None
+    """Version of Parrot's flight-plan format that it flies; None when it is not known by the model."""
     protobuf: bool = False
     """True for models that report some of their states in protobuf only, on request."""
 
@@ -27,11 +29,11 @@ class Model(msgspec.Struct, frozen=True):
 MODELS: Mapping[int, Model] = {
     model.id: model
     for model in (
-        Model(0x0914, "4k", "ANAFI 4K"),
-        Model(0x0919, "thermal", "ANAFI Thermal"),
-        Model(0x091A, "ai", "ANAFI Ai", protobuf=True),
+        Model(0x0914, "4k", "ANAFI 4K", 1),
+        Model(0x0919, "thermal", "ANAFI Thermal", 1),
+        Model(0x091A, "ai", "ANAFI Ai", 2, protobuf=True),
         Model(0x091B, "ua", "ANAFI UA"),
-        Model(0x091E, "usa", "ANAFI USA"),
+        Model(0x091E, "usa", "ANAFI USA", 1),
     )
 }
 

@@ -76,6 +76,10 @@ class CommandService(Service):
         self._actions = {id: _bound(handler, vehicle) for id, handler in ACTIONS.items()}
         self._actions.update(actions)
 
+    def acts_on(self, command: int) -> bool:
+        """True for a command that changes what the vehicle does, and is no query."""
+        return command in self._actions
+
     def capabilities(self) -> int:
         cut = dialect.MAV_PROTOCOL_CAPABILITY_FLIGHT_TERMINATION if self.host.vehicle.allow_kill else 0
         return dialect.MAV_PROTOCOL_CAPABILITY_COMMAND_INT | cut
@@ -156,7 +160,7 @@ class CommandService(Service):
 
     async def _execute(self, inbound: Inbound, execution: Execution) -> None:
         command = execution.command
-        if command.id == dialect.MAV_CMD_DO_REPOSITION and self.host.vehicle.takeoff.under_way:
+        if command.id == dialect.MAV_CMD_DO_REPOSITION and self.host.vehicle.takeoff.rises:
             self._acknowledge(inbound, command.id, dialect.MAV_RESULT_IN_PROGRESS)  # it waits for the climb's end
         progress = self.host.spawn(self._report_progress(inbound, command))
         result = dialect.MAV_RESULT_FAILED

@@ -36,7 +36,7 @@ def _custom_version(firmware: str, flavour: Flavour) -> bytes:
     """The ANAFI's firmware as each family's stations read flight_custom_version.
 
     Those of ArduPilot take it as 8 characters. Those of PX4 show bytes 2, 1, 0 as major, minor, patch; behind them is
-    what tells one release of anafi-mav from another (QGroundControl InitialConnectStateMachine.cc).
+    a hash of the release of anafi-mav (QGroundControl InitialConnectStateMachine.cc).
     """
     if flavour is ARDUPILOT:
         return firmware.encode(errors="replace")[:8].ljust(8, b"\0")

@@ -1,7 +1,8 @@
 """The sticks of ground stations: what MANUAL_CONTROL and RC_CHANNELS_OVERRIDE say, and the shell that flies by it.
 
 They fly the drone in mode Position (Loiter in ArduPilot's words) and in no other: a joystick that lies on the table is
-streamed all the time, and a goto or a mission is not ended by it. A stick asks for a share of the drone's own MaxTilt,
+streamed all the time, and a goto or a mission is not ended by it. A stick of PX4's clients that leaves the middle takes
+over and selects that mode (`joystick_override`). A stick asks for a share of the drone's own MaxTilt,
 MaxVerticalSpeed and MaxRotationSpeed (arsdk 2.2):
 
 - MANUAL_CONTROL: x forward, y right, r clockwise, each -1000..1000; z 0..1000 with 500 in the middle, which holds the
@@ -18,16 +19,20 @@ import asyncio
 import contextlib
 import enum
 import math
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Coroutine, Hashable
 from dataclasses import dataclass, replace
+from typing import Any
 
 from anafi_mav.clock import Clock
 from anafi_mav.drone import PilotingCommand
 from anafi_mav.errors import LinkLost
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.aircraft import Aircraft
+from anafi_mav.services.clients import system_of
+from anafi_mav.services.joystick_override import JoystickOverride, Override
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.offboard import SILENCE
+from anafi_mav.services.right import Extent, Right
 from anafi_mav.services.statustext import Severity
 
 DEAD_ZONE = 0.03
@@ -148,7 +153,13 @@ def _beyond_dead_zone(share: float) -> float:
 class ManualFlight:
     """The sticks of ground stations on one vehicle, and the drone flown by those who move them."""
 
-    def __init__(self, vehicle: Aircraft, clock: Clock) -> None:
+    def __init__(self, vehicle: Aircraft, clock: Clock, overridable: Callable[[], Override]) -> None:
+        """`overridable` returns what flies the drone now, as far as a joystick may take over from it."""
+        self.act: Callable[[Hashable, Coroutine[Any, Any, None]], asyncio.Task[None]]
+        """Runs an action of a client, in its turn among the commands; set by the service."""
+        self.override = JoystickOverride()
+        self._overridable = overridable
+        self._overriding = False
         self.complain: Callable[[str], None] = lambda text: vehicle.text(Severity.WARNING, text)
         self.state = State.IDLE
         self._vehicle = vehicle
@@ -157,9 +168,15 @@ class ManualFlight:
         self._said = -math.inf
         self._timer: asyncio.TimerHandle | None = None
 
-    def receive(self, sender: Hashable, sticks: Sticks) -> None:
-        """Where somebody's sticks are now."""
+    def receive(self, sender: Hashable, sticks: Sticks, *, overrides: bool = False) -> None:
+        """Take a client's stick positions. With `overrides` they may take the drone over from what flies it."""
         vehicle = self._vehicle
+        if overrides and self._takes_over(sender, sticks):
+            self._overriding = True
+            self.act(sender, self._override(sender, sticks)).add_done_callback(self._overridden)
+        if self._overriding:
+            return
+        sticks = replace(sticks, climb=self.override.climb(sender, sticks.climb))
         if self.state is State.HELD and sender != self._pilot:
             if not sticks.centred:
                 self.complain("Sticks ignored: somebody else's are in use")
@@ -185,6 +202,25 @@ class ManualFlight:
                 climb_mps=sticks.climb * limits.climb_mps,
             )
         )
+
+    def _takes_over(self, sender: Hashable, sticks: Sticks) -> bool:
+        """True at the moment at which this client's joystick takes the drone over."""
+        largest = max(abs(sticks.forward), abs(sticks.right), abs(sticks.turn))
+        if not self.override.moved(sender, largest, self._clock.monotonic()) or self._overriding:
+            return False
+        if self._vehicle.drone.controller.pilot_acquired_control:
+            return False
+        return bool(self._overridable() & self.override.sources)
+
+    async def _override(self, sender: Hashable, sticks: Sticks) -> None:
+        """Stop what flies, in mode Position, and let the joystick fly. Raises as `Vehicle.hold`."""
+        await self._vehicle.hold(FlightMode.POSITION, Right(sender, Extent.COMMANDED))
+        self.override.take_over(sender, sticks.climb)
+        self._vehicle.text(Severity.WARNING, f"Joystick override by system {system_of(sender) or 0}: Position")
+
+    def _overridden(self, task: asyncio.Task[None]) -> None:
+        """Sticks count again: the drone was taken over, or another action came in between."""
+        self._overriding = False
 
     def silent(self, sender: Hashable) -> None:
         """Somebody's sticks are gone."""
@@ -217,6 +253,8 @@ class ManualFlight:
     def link_down(self) -> None:
         """Nobody holds the sticks of a drone that is gone."""
         self._cancel_timer()
+        self.override.forget()
+        self._overriding = False
         self.state, self._pilot, self._said = State.IDLE, None, -math.inf
 
     def _let_go(self, event: Event) -> None:

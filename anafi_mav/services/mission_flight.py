@@ -223,6 +223,8 @@ class MissionFlight:
         await check_path(vehicle, course.parts, line, number)
         head = course.parts[0]
         if not resumes and isinstance(head, Leg):
+            if plan.state.playing == PlayingState.PAUSED:
+                await plan.stop()  # some firmware may take no file while another one is paused (GroundSDK stops first)
             head, uid, line = await self._files.beginning_with(head, items)
             course.parts[0] = head
         self._beginning = True

@@ -15,6 +15,7 @@ from anafi_mav.drone import MODELS, Drone, Range, events
 from anafi_mav.drone.events import Axis, PreciseHomeMode, RthEndingBehavior, RthHomeType
 from anafi_mav.drone.events import ObstacleAvoidanceMode as AvoidanceMode
 from anafi_mav.services.bounds import LOWEST
+from anafi_mav.services.joystick_override import Override
 from anafi_mav.services.link_loss import LossAction
 from anafi_mav.services.offboard import GUIDED_TIMEOUT, LONGEST_TIMEOUT, SHORTEST_TIMEOUT
 from anafi_mav.services.parameter import Limits, Parameter, bounds, current, number, own
@@ -550,6 +551,47 @@ GUIDED_TIME = Parameter(
     source="gateway",
 )
 
+
+def _put_override(host: Host, value: float) -> None:
+    host.vehicle.manual.override.sources = Override(int(value))
+
+
+def _put_override_stick(host: Host, value: float) -> None:
+    host.vehicle.manual.override.threshold = value / 100.0
+
+
+RC_OVERRIDE = Parameter(
+    "ANF_RC_OVERRIDE",
+    Kind.INT32,
+    "What a joystick of PX4's clients takes the drone over from",
+    read=lambda host: float(host.vehicle.manual.override.sources),
+    write=own(_put_override),
+    put=_put_override,
+    values={0: "Nothing", 1: "Goto, mission, follow, orbit, return, landing", 2: "Offboard", 3: "All of these"},
+    polled=True,
+    group=GATEWAY,
+    long="A stick that leaves the middle after half a second there selects Position. The throttle alone does not. "
+    "Returns and landings only if a client commanded them. ArduPilot's clients have none, as in ArduCopter.",
+    default=float(Override.AUTO),
+    source="gateway",
+)
+RC_OVERRIDE_STICK = Parameter(
+    "ANF_RC_STICK_OV",
+    Kind.REAL32,
+    "Deflection from which a joystick takes over",
+    read=lambda host: host.vehicle.manual.override.threshold * 100.0,
+    write=own(_put_override_stick),
+    put=_put_override_stick,
+    limits=lambda host: (10.0, 80.0),
+    polled=True,
+    unit="%",
+    step=1.0,
+    decimals=0,
+    group=GATEWAY,
+    default=30.0,
+    source="gateway",
+)
+
 NATIVE: tuple[Parameter, ...] = (
     MAX_TILT,
     TILT_RATE,
@@ -580,4 +622,6 @@ NATIVE: tuple[Parameter, ...] = (
     RETURN_LANDING,
     RETURN_WAIT,
     GUIDED_TIME,
+    RC_OVERRIDE,
+    RC_OVERRIDE_STICK,
 )

@@ -25,6 +25,8 @@ from anafi_mav.services.parameter_table import (
     MAX_CRUISE_SPEED,
     MAX_DISTANCE,
     MAX_TILT,
+    RC_OVERRIDE,
+    RC_OVERRIDE_STICK,
     RETURN_ALTITUDE,
     RETURN_BY_ITSELF,
     RETURN_END_ALTITUDE,
@@ -177,6 +179,14 @@ TWINS: tuple[Parameter, ...] = (
     mapped(AVOIDANCE, "COM_OBS_AVOID", Kind.INT32, {0: "Off", 1: "On"}, {0: 0, 1: 1}),
     mapped(GCS_LOSS, "NAV_DLL_ACT", Kind.INT32, GCS_LOSS.values, {number: number for number in GCS_LOSS.values}),
     twin(GCS_LOSS_TIME, "COM_DL_LOSS_T", Kind.INT32, decimals=0),
+    mapped(
+        RC_OVERRIDE,
+        "COM_RC_OVERRIDE",
+        Kind.INT32,
+        RC_OVERRIDE.values,
+        {number: number for number in RC_OVERRIDE.values},
+    ),
+    twin(RC_OVERRIDE_STICK, "COM_RC_STICK_OV"),
 )
 
 

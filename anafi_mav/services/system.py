@@ -441,6 +441,21 @@ class System:
 
     # What clients send.
 
+    def listen(self, on: bool) -> None:
+        """Have messages to this system delivered while it does not exist, or no longer."""
+        if on:
+            self._node.own(self.sysid)
+        elif not self.active:
+            self._node.disown(self.sysid)
+
+    def commands(self, inbound: Inbound) -> bool:
+        """True for a command to this system by its id that is no query, also while the system does not exist."""
+        message = inbound.message
+        if message.get_msgId() == dialect.MAVLINK_MSG_ID_SET_MODE:
+            return bool(message.target_system == self.sysid)
+        known = message.get_msgId() in COMMANDS and message.target_system == self.sysid
+        return known and self._commands.acts_on(message.command)
+
     def receive(self, inbound: Inbound) -> None:
         """A message from a client. Not addressed to our autopilot: not for us, and never answered."""
         if not self.active:

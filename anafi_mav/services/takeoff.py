@@ -7,6 +7,7 @@ armed state that nothing follows lapses, and so does a take-off that waits for i
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from collections.abc import Callable, Coroutine, Hashable
 from typing import Any
 
@@ -39,6 +40,8 @@ LOW = 0.5
 
 CLOSE_ENOUGH = 0.1
 """m from the height of a take-off that are no reason for a move."""
+
+_RISING = (FlyingState.MOTOR_RAMPING, FlyingState.TAKINGOFF)
 
 
 class Takeoff:
@@ -83,6 +86,11 @@ class Takeoff:
     def under_way(self) -> bool:
         """An accepted take-off has not reached its height yet."""
         return self._background is not None and not self._background.done()
+
+    @property
+    def rises(self) -> bool:
+        """A take-off is under way, or the drone rises to its first hover after a Hold has ended one."""
+        return self.under_way or self._vehicle.flying_state in _RISING
 
     def is_armed_by(self, client: Hashable) -> bool:
         """Has this client armed the vehicle for the flight that begins now?"""
@@ -189,26 +197,38 @@ class Takeoff:
         self._vehicle.changed()
 
     async def over(self, what: str) -> None:
-        """Wait until an accepted take-off has reached its height; return at once when there is none.
+        """Wait until an accepted take-off has reached its height; return at once when the drone does not rise.
 
-        Of several commands that wait the newest stays, the others are cancelled. Raises `Unfinished` when the take-off
-        fails, or lasts for longer than `TAKEOFF_WAIT`.
+        Where a Hold has ended the climb, the drone still rises to its own height: then for its first hover. (MAVSDK's
+        goto_location sends Hold first.) Of several commands that wait the newest stays, the others are cancelled.
+        Raises `Unfinished` when the take-off fails, or lasts for longer than `TAKEOFF_WAIT`.
         """
-        task = self._background
-        if task is None or task.done():
+        if not self.rises:
             return
         if self._waiting is not None:
             self._waiting.cancel()
         current = self._waiting = asyncio.current_task()
+        end = asyncio.get_running_loop().create_task(self._until_risen())
         try:
-            await asyncio.wait({task}, timeout=TAKEOFF_WAIT)
+            await asyncio.wait({end}, timeout=TAKEOFF_WAIT)
+            if not end.done():
+                raise Unfinished(f"{what} failed: takeoff not over after {TAKEOFF_WAIT:.0f} s")
+            if not end.result():
+                raise Unfinished(f"{what} failed: takeoff has not reached its height")
         finally:
+            end.cancel()
             if self._waiting is current:
                 self._waiting = None
-        if not task.done():
-            raise Unfinished(f"{what} failed: takeoff not over after {TAKEOFF_WAIT:.0f} s")
-        if task.cancelled() or not self._reached:
-            raise Unfinished(f"{what} failed: takeoff has not reached its height")
+
+    async def _until_risen(self) -> bool:
+        """Wait for the end of a take-off, or of a rise. True: it has reached its height. Never raises."""
+        if self.under_way:
+            assert self._background is not None
+            await asyncio.wait({self._background})
+            return self._reached
+        with contextlib.suppress(AnafiMavError):
+            await self._vehicle.drone.expect(FlyingStateChanged, lambda m: m.state not in _RISING, TAKEOFF_WAIT)
+        return self._vehicle.in_air
 
     # What ends it.
 

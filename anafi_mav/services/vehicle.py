@@ -28,6 +28,7 @@ from anafi_mav.drone.events import (
     RthHomeType,
     RthState,
 )
+from anafi_mav.drone.piloting_landing import ALREADY_LANDED
 from anafi_mav.errors import CommandRejected
 from anafi_mav.services.aborted_return import AbortedReturn
 from anafi_mav.services.aircraft import STOP_WAIT, Aircraft
@@ -39,6 +40,7 @@ from anafi_mav.services.height import ESTIMATE_ERROR, TakeoffRecord
 from anafi_mav.services.helm import Helm
 from anafi_mav.services.hold_rule import APART, HoldRule
 from anafi_mav.services.initiator import Initiator, Initiators
+from anafi_mav.services.joystick_override import Override
 from anafi_mav.services.link_loss import LossPolicy
 from anafi_mav.services.manual_flight import ManualFlight
 from anafi_mav.services.mission_flight import MissionFlight
@@ -65,6 +67,13 @@ LANDS_AFTER_RETURN = 2.0
 
 POSITION_OLD = 3.0
 """s without a GPS location, which an ANAFI reports once a second, after which the last one is no position in flight."""
+
+
+GOOD_ACCURACY = 5
+"""m of one standard deviation of GPS altitude that AMSL heights can be used with, without a text."""
+
+_AUTO = (FlightMode.MISSION, FlightMode.FOLLOW, FlightMode.ORBIT, FlightMode.RETURN, FlightMode.LAND)
+"""Modes in which the drone flies without setpoints of a client."""
 
 
 class Landed(enum.Enum):
@@ -133,7 +142,7 @@ class Vehicle(Aircraft):
         self.guided = GuidedFlight(self)
         self.offboard = OffboardFlight(self, clock, self.takeoff)
         self.takeoff.ended = self.offboard.after_takeoff
-        self.manual = ManualFlight(self, clock)
+        self.manual = ManualFlight(self, clock, lambda: self.overridable)
         self.follow = FollowFlight(self, lambda: self.offboard.motion, clock)
         self.plan_ids: dict[int, int] = {}
         """Opaque ids of the plans that are in force, by MAV_MISSION_TYPE."""
@@ -190,6 +199,17 @@ class Vehicle(Aircraft):
             return False
         orders, until = self._lands_next
         return orders == self.orders and self._clock.monotonic() < until
+
+    @property
+    def overridable(self) -> Override:
+        """What flies the drone, as far as a joystick may take over from it; whether a landing or return ends, `hold`
+        decides."""
+        mode = self.mode
+        if self.offboard.engaged and mode in (FlightMode.OFFBOARD, FlightMode.GUIDED):
+            return Override.OFFBOARD
+        if mode in _AUTO or (mode in (FlightMode.HOLD, FlightMode.GUIDED) and self.drone.piloting.moving):
+            return Override.AUTO
+        return Override(0)
 
     @property
     def health(self) -> Health:
@@ -314,7 +334,10 @@ class Vehicle(Aircraft):
         self._require_endable("Takeoff", by)
         await self.take_over(STOP_WAIT)
         with self._selected_no_more(FlightMode.HOLD):
-            await self._end_landing("Takeoff", by, take_off=True)
+            if await self.drone.piloting.settle_landing():
+                await self._end_landing("Takeoff", by, take_off=True)
+        if self.on_ground:
+            raise Refused(f"Landing not aborted: {ALREADY_LANDED}")
         self.select(FlightMode.HOLD)
 
     async def set_mode(self, mode: FlightMode, by: Right) -> None:
@@ -361,6 +384,10 @@ class Vehicle(Aircraft):
     def descends(self) -> bool:
         """The drone lands or returns, or has been commanded to and has not answered."""
         return self.landing or self.returning or self._returns_sent > 0
+
+    @property
+    def descent(self) -> str | None:
+        return LANDS if self.landing else RETURNS if self.descends else None
 
     @property
     def _forced_landing(self) -> bool:
@@ -494,6 +521,7 @@ class Vehicle(Aircraft):
             self.takeoff.end_climb()
         elif state in TAKING_OFF and before in ON_GROUND:
             self.height.take_off()
+            self._report_accuracy()
             if (place := self.place) is not None:
                 self.origin = place
             if self.drone.home.state.takeoff_location != self._takeoff_before:
@@ -520,6 +548,12 @@ class Vehicle(Aircraft):
                 self.origin = self.place
         elif self.flying_state is not None and self.height.in_flight(self.drone.product.state.flight_id, amsl, ato):
             self.text(Severity.WARNING, f"Take-off altitude estimated: GPS only (+-{ESTIMATE_ERROR:g} m)")
+
+    def _report_accuracy(self) -> None:
+        """Report that AMSL heights of this flight will be wrong by as much as GPS is at its beginning."""
+        gps = self.drone.gps.state
+        if gps.fixed and gps.altitude_accuracy is not None and gps.altitude_accuracy > GOOD_ACCURACY:
+            self.text(Severity.WARNING, f"Take-off altitude inaccurate: GPS +-{gps.altitude_accuracy} m")
 
     def on_takeoff_location(self) -> None:
         """Adopt the take-off place that the drone reports for the present flight as origin of the local frame."""

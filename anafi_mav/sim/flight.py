@@ -86,6 +86,9 @@ class Flight:
         self.battery = Battery(model)
         self.payload = Payload(model, identity.name, identity.run_id, emit, self._scene)
         self.plans = FlightPlanStore()
+        self.plans.refuses = lambda: (
+            Quirk.UPLOAD_REFUSED_WHILE_PAUSED in faults.quirks and self.flight_plan.state is common.PlayingState.PAUSED
+        )
         self.pose = _REST
         self.time = 0.0
         self._body = body

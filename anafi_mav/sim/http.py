@@ -225,6 +225,8 @@ class WebServer:
             return _refuse(400, f"expected text: {error}")
         if "\0" in text:
             return _refuse(400, "expected text, got a NUL byte")
+        if self._plans.refuses():
+            return _refuse(403, "expected no flight plan to be paused")
         # Whether it can be flown is looked at when it is started, as on the aircraft.
         return web.json_response(self._plans.put(data, self._date()))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 MAX_PLANS = 100
@@ -24,6 +24,8 @@ class FlightPlanStore:
     """Plans by uid, oldest first."""
 
     def __init__(self) -> None:
+        self.refuses: Callable[[], bool] = lambda: False
+        """True while the firmware takes no file."""
         self._plans: dict[str, StoredPlan] = {}
         self._count = 0
 

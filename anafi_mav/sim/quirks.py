@@ -51,6 +51,10 @@ class Quirk(enum.Enum):
     )
     NO_FLIGHT_ID = ("no-flight-id", "FlightId is never reported")
     GPS_LOCATION_STOPS = ("gps-location-stops", "GpsLocationChanged is no longer sent although the drone reports a fix")
+    UPLOAD_REFUSED_WHILE_PAUSED = (
+        "upload-refused-while-paused",
+        "the web server takes no flight plan while another one is paused",
+    )
     ROLL_INVERTED = ("roll-inverted", "AttitudeChanged.roll is positive with the left wing down")
 
 

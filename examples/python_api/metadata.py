@@ -1,4 +1,4 @@
-"""Read what the drone says with each picture of its live video, 30 times a second. Nothing is decoded.
+"""Read the metadata of each picture of the live video, 30 times a second. Nothing is decoded.
 
     anafi-mav sim --rtsp-port 8554                               # in one terminal
     python examples/python_api/metadata.py --rtsp-port 8554      # in another

@@ -241,7 +241,7 @@ async def test_conf_122_ctrl_c_pauses_the_mission(tmp_path: Path) -> None:
 async def test_items_that_the_gateway_flies_between_two_files() -> None:
     async with world(web=True) as w:
         await put(w, [takeoff(6.0), way(10.0, 0.0, 6.0), TURN, ZOOM, way(10.0, 10.0, 6.0)])
-        await said(w, "tem 2: CONDITION_YAW")  # the next piece of it
+        await said(w, "tem 3: CONDITION_YAW")  # the next piece of it
         await start(w)
         await state(w, COMPLETE, since=0)
         assert reached(w) == [0, 1, 2, 3, 4]

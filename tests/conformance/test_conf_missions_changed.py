@@ -49,6 +49,7 @@ from support.plans import (
 from support.world import HOME, World, world
 
 from anafi_mav.services.memory import Memory
+from anafi_mav.sim.quirks import Quirk
 
 ERROR, INVALID = 1, 5
 
@@ -304,3 +305,17 @@ async def test_conf_074_an_edited_mission_is_flown_with_the_new_numbers(flavour:
         assert [e.args["state"] for e in w.drone.log if e.name == "plan" and e.t > new.t][-1] == "stopped"
         await mode(w, w.modes.idle, since=mark)
         await settled(w, (0.0, 14.0, 6.0))
+
+
+async def test_mission_uploaded_while_another_is_paused_is_flown_by_a_drone_that_takes_no_file_then() -> None:
+    """The paused plan is stopped before the upload, as GroundSDK does."""
+    async with world(web=True) as w:
+        w.drone.faults.quirks = frozenset({Quirk.UPLOAD_REFUSED_WHILE_PAUSED})
+        await on_the_way(w, 2)
+        assert (await w.client.command(dialect.MAV_CMD_DO_REPOSITION, -1, 1, 0)).result == dialect.MAV_RESULT_ACCEPTED
+        await state(w, PAUSED, seq=2)
+        mark = w.client.mark()
+        await put(w, [way(6.0, 0.0, 6.0), way(0.0, 6.0, 6.0)])
+        assert (await w.client.command(dialect.MAV_CMD_MISSION_START, 0, 0)).result == dialect.MAV_RESULT_ACCEPTED
+        await state(w, COMPLETE, since=mark)
+        assert reached(w, mark) == [0, 1]

@@ -17,7 +17,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.flavours import both
 from support.ftp import Ftp
 from support.mav import Client
-from support.missions import COMPLETE, MISSION_MODE, ROUND, first, mode, put, said, start, state
+from support.missions import ACTIVE, COMPLETE, MISSION_MODE, ROUND, first, mode, put, said, start, state, takeoff, way
 from support.params import fetch, read, send_set, value_of
 from support.world import ARMED, HOLD, HOME, World, world
 
@@ -315,3 +315,29 @@ async def test_critical_battery_is_one_line_of_the_arming_report() -> None:
         assert len(named) == 1
         texts = [m.text for _, m in w.client.since(mark, "STATUSTEXT") if m.text.startswith("PreArm")]
         assert len(texts) == 1
+
+
+async def test_battery_return_in_a_mission_is_one_change_of_mode() -> None:
+    """The drone stops its plan and then begins to return; QGroundControl announces each heartbeat's mode."""
+    async with world(web=True, speed=4.0) as w:
+        await put(w, [takeoff(8.0), way(60.0, 0.0, 8.0), way(200.0, 0.0, 8.0)])
+        mark = w.client.mark()
+        await start(w)
+        await state(w, ACTIVE, seq=2, since=mark)
+        w.drone.faults.battery = 12
+        await mode(w, w.modes.returning, since=mark)
+        modes = [m.custom_mode for _, m in w.client.since(mark, "HEARTBEAT")]
+        begun = modes.index(MISSION_MODE["px4"])
+        assert [number for number, _ in itertools.groupby(modes[begun:])] == [MISSION_MODE["px4"], w.modes.returning]
+
+
+async def test_mission_that_is_paused_shows_hold() -> None:
+    """Heartbeats say Mission for a quarter of a second more, and not longer."""
+    async with world(web=True) as w:
+        await put(w, [takeoff(6.0), way(100.0, 0.0, 6.0)])
+        await start(w)
+        await state(w, ACTIVE, seq=1, since=0)
+        mark = w.client.mark()
+        pause = dialect.MAV_CMD_DO_REPOSITION
+        assert (await w.client.command(pause, -1, 1, 0)).result == dialect.MAV_RESULT_ACCEPTED
+        await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD, since=mark, timeout=1.3)

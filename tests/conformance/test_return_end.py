@@ -116,12 +116,11 @@ async def test_return_ended_by_another_clients_hold_does_not_land() -> None:
         await away(w)
         mark = await go_home(w)
         other = await w.connect(sysid=254)
-        assert (await other.command(SET_MODE, *PX4_HOLD)).result == ACCEPTED
         place = geo.destination(*HOME[:2], 3.0, 0.0)
         goto = (GOTO, -1, 1, 0, NAN)
         ack = await other.command(*goto, frame=6, x=place[0], y=place[1], z=5.0)
         assert ack.result == REJECTED  # a goto does not end a return
-        assert (await other.command(dialect.MAV_CMD_DO_SET_MODE, 1, 4, 3)).result == ACCEPTED
+        assert (await other.command(SET_MODE, *PX4_HOLD)).result == ACCEPTED
         ack = await other.command(*goto, frame=6, x=place[0], y=place[1], z=6.0)
         assert ack.result == ACCEPTED
         w.drone._emit(rth.State(rth.RthState.AVAILABLE, rth.StateReason.FINISHED))

@@ -257,6 +257,19 @@ async def test_goto_during_takeoff_waits_for_the_climb(flavour: str) -> None:
         await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 11.0, 20.0)
 
 
+async def test_goto_after_hold_during_takeoff_waits_for_the_first_hover() -> None:
+    """MAVSDK's goto_location changes to Hold before it sends the target, in this example 1 s after the take-off."""
+    async with world(speed=1.0) as w:
+        await rising(w)
+        assert w.drone.flying_state.name == "TAKINGOFF"
+        assert (await w.client.command(SET_MODE, 1, 4, 3)).result == ACCEPTED
+        mark = w.client.mark()
+        ack = await w.client.command(GOTO, -1, 1, 0, NAN, frame=6, **place(12.0), z=8.0, timeout=20.0)
+        assert ack.result == ACCEPTED
+        assert w.client.since(mark, "COMMAND_ACK")[0][1].result == dialect.MAV_RESULT_IN_PROGRESS
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 8.0, 20.0)
+
+
 async def test_of_two_gotos_during_takeoff_the_newest_is_flown() -> None:
     async with world(clients=2) as w:
         await rising(w)

@@ -9,15 +9,21 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.callers import CALLERS, system_of
 from support.mav import NAN, Client
+from support.missions import LAND as LAND_ITEM
+from support.missions import put, start, takeoff, way
+from support.setpoints import local, streaming
 from support.trouble import (
     ACCEPTED,
     LAND_CMD,
     PX4_HOLD,
+    PX4_OFFBOARD,
     REJECTED,
     RTL,
     SET_MODE,
     TAKEOFF_CMD,
+    goto,
     heard,
     somebody_else,
     watched,
@@ -26,8 +32,6 @@ from support.world import HOLD, LAND, POSITION, RETURN, World, world
 
 from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.errors import AnafiMavError
-from anafi_mav.services.link_loss import LossAction
-from anafi_mav.services.manual_flight import Event
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.right import Extent, Right
 from anafi_mav.sim.faults import Impairment
@@ -35,7 +39,7 @@ from anafi_mav.sim.quirks import Quirk
 
 BAD_AIR = Impairment(loss=0.25, delay=0.2)
 PX4_POSITION = (1, 3, 0)
-PX4_RETURN = (1, 4, 5)
+PX4_MISSION = (1, 4, 4)
 PAUSE = dialect.MAV_CMD_DO_PAUSE_CONTINUE
 
 
@@ -179,6 +183,20 @@ async def test_hold_right_after_land_holds() -> None:
         assert w.drone.pose.up > 5.0
 
 
+async def test_goto_right_after_land_is_refused_and_the_drone_lands() -> None:
+    """The Landing has left and is not answered: a goto does not replace it."""
+    async with world(speed=1.0) as w:
+        await w.take_off(6.0)
+        w.drone.faults.up = w.drone.faults.down = Impairment(delay=0.2)
+        mark = w.client.mark()
+        w.client.send_command(LAND_CMD)
+        await asyncio.sleep(0.1)
+        assert await goto(w, 20.0, 6.0) == REJECTED
+        await text(w.client, "Goto refused: drone is landing", mark)
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landed", 20.0)
+        assert heard(w, "moveTo", "extended_move_to") == []
+
+
 # Not ours to end.
 
 
@@ -217,38 +235,6 @@ async def test_landing_of_a_client_behind_a_skycontroller_is_ended_by_a_client()
 
 
 # Callers without the right.
-
-
-CALLERS: dict[str, Callable[[Any], Any]] = {
-    "link loss hold": lambda system: _service(system, "LinkLossService")._act(LossAction.HOLD),
-    "link loss return": lambda system: _service(system, "LinkLossService")._act(LossAction.RETURN),
-    "fence hold": lambda system: system.vehicle.hold(),
-    "fence return": lambda system: _service(system, "FenceService")._return_or_hold(),
-    "guided end": lambda system: _ended(system.vehicle.offboard.end()),
-    "follow end": lambda system: _ended(system.vehicle.follow.end()),
-    "mission end": lambda system: _ended(system.vehicle.mission.end()),
-    "mission break": lambda system: _call(system.vehicle.mission._break_off, "test"),
-    "setpoints silent": lambda system: _call(system.vehicle.offboard._expired),
-    "sticks silent": lambda system: _call(system.vehicle.manual._let_go, Event.END),
-    "gateway end": lambda system: system.let_go(),
-}
-
-
-async def _call(function: Callable[..., Any], *args: Any) -> None:
-    function(*args)
-
-
-async def _ended(tasks: list[asyncio.Task[None]]) -> None:
-    if tasks:
-        await asyncio.wait(tasks)
-
-
-def _service(system: Any, name: str) -> Any:
-    return next(service for service in system.services if type(service).__name__ == name)
-
-
-def system_of(w: World) -> Any:
-    return w.gateway._supervised[0].system
 
 
 @pytest.mark.parametrize("caller", CALLERS)
@@ -331,3 +317,49 @@ async def _race(stop: str, offset: float, quirks: frozenset[Quirk]) -> None:
             assert now == "landed", flown(w)
         if now in ("hovering", "flying"):
             assert result == ACCEPTED, flown(w)
+
+
+# Modes that begin once the drone hovers.
+
+
+async def test_offboard_with_setpoints_ends_a_landing_and_flies_them() -> None:
+    async with world(speed=1.0) as w:
+        await landing(w, 10.0)
+        async with streaming(w.client, local(0b110111000111, v=(1.0, 0.0, 0.0))):
+            assert (await w.client.command(SET_MODE, *PX4_OFFBOARD)).result == ACCEPTED
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["vn"] > 0.7, 10.0)
+        assert "landed" not in flown(w)
+
+
+async def test_mission_ends_a_landing_and_is_flown() -> None:
+    async with world(speed=2.0, web=True) as w:
+        await put(w, [way(12.0, 0.0, 8.0)])
+        await landing(w, 10.0)
+        assert (await w.client.command(SET_MODE, *PX4_MISSION)).result == ACCEPTED
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 3.0, 15.0)
+        assert "landed" not in flown(w)
+
+
+@pytest.mark.parametrize("mode", [PX4_OFFBOARD, PX4_MISSION])
+async def test_mode_that_cannot_begin_leaves_the_landing_alone(mode: tuple[int, int, int]) -> None:
+    """No setpoints arrive, there is no mission: a command that is refused disturbs nothing."""
+    async with world(speed=1.0) as w:
+        await landing(w, 6.0)
+        before = len(sticks(w))
+        assert (await w.client.command(SET_MODE, *mode)).result == REJECTED
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landed", 20.0)
+        assert all(args[4] <= 0 for args in sticks(w, before))
+        assert flown(w)[-2:] == ["landing", "landed"]
+
+
+async def test_landing_of_a_mission_is_ended_by_hold_and_not_by_its_own_mode() -> None:
+    async with world(speed=2.0, web=True) as w:
+        await put(w, [takeoff(8.0), way(8.0, 0.0, 8.0), LAND_ITEM])
+        await start(w)
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landing", 60.0)
+        await w.client.heartbeat(lambda beat: beat.custom_mode == LAND)
+        await w.client.command(SET_MODE, *PX4_MISSION)
+        assert flown(w)[-1] == "landing"
+        assert (await w.client.command(SET_MODE, *PX4_HOLD)).result == ACCEPTED
+        await watched(2.0)
+        assert flown(w)[-1] in ("flying", "hovering")

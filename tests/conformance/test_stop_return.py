@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from collections.abc import Awaitable, Callable
 from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.callers import CALLERS, system_of
 from support.mav import NAN, Client
 from support.trouble import ACCEPTED, LAND_CMD, PX4_HOLD, REJECTED, RTL, SET_MODE, goto, heard, watched
 from support.world import HOLD, RETURN, World, world
 
 from anafi_mav.arsdk.messages import rth
+from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.messages.rth import RthHomeReachability, StateReason
+from anafi_mav.errors import AnafiMavError
 from anafi_mav.services.hold_rule import APART
 from anafi_mav.sim import power
 from anafi_mav.sim.faults import Impairment
@@ -202,6 +206,36 @@ async def test_return_by_the_skycontrollers_button_is_ended_by_no_client(skycont
         assert await hold(w.client) == REJECTED
         await text(w.client, "Hold refused: Skycontroller pilot is returning", mark)
         assert heard(w, "abort") == []
+
+
+@pytest.mark.parametrize("caller", CALLERS)
+@pytest.mark.parametrize("own", [False, True])
+async def test_no_caller_without_a_clients_right_ends_a_return(caller: str, own: bool) -> None:
+    async with world(speed=1.0) as w:
+        await away(w)
+        if own:
+            by_itself(w)
+        else:
+            assert (await w.client.command(RTL)).result == ACCEPTED
+        await w.client.heartbeat(lambda beat: beat.custom_mode == RETURN)
+        with contextlib.suppress(AnafiMavError):
+            await CALLERS[caller](system_of(w))
+        await watched(0.5)
+        assert heard(w, "abort") == []
+        assert w.drone.firmware.homing.active
+
+
+@pytest.mark.parametrize("command", [RTL, LAND_CMD])
+async def test_gateway_that_ends_withdraws_no_return_or_landing_that_is_not_confirmed(command: int) -> None:
+    async with world(speed=1.0) as w:
+        await away(w)
+        w.drone.faults.up = w.drone.faults.down = Impairment(delay=0.2)
+        w.client.send_command(command)
+        await asyncio.sleep(0.1)
+        await system_of(w).let_go()
+        await watched(0.5)
+        assert heard(w, "abort") == []
+        assert w.drone.firmware.homing.active if command == RTL else w.drone.firmware.state is FlyingState.LANDING
 
 
 # An announced return.

@@ -115,15 +115,19 @@ def test_messages_of_one_turn_share_a_frame(version: int) -> None:
     assert [frame.id for frame in frames(transport, transport.outgoing(0.0))] == [127, 126]
 
 
-def test_emergency_overtakes_what_waits() -> None:
-    transport = Transport(Role.CONTROLLER, 1, 0.0)
-    transport.send(tilt(1), 0.0)
+@pytest.mark.parametrize("version", [1, 2, 3])
+def test_emergency_takes_the_place_of_all_that_was_not_delivered(version: int) -> None:
+    transport = Transport(Role.CONTROLLER, version, 0.0)
+    flying = transport.send(tilt(1), 0.0)
     transport.outgoing(0.0)
-    transport.send(tilt(2), 0.0)
+    waiting = transport.send(tilt(2), 0.0)
+    transport.send(STICKS, 0.0)
     transport.send(ardrone3.Emergency(), 0.0)
-    transport.receive(ack(1, 11, 0), 0.01)
-    (frame,) = frames(transport, transport.outgoing(0.01))
-    assert wire.decode(frame.payload) == ardrone3.Emergency()
+    (frame,) = frames(transport, transport.outgoing(0.0))  # without waiting for the acknowledgement of the first
+    assert wire.encode(ardrone3.Emergency()) in frame.payload
+    events = transport.receive(ack(version, 11, 1), 0.01)
+    assert {event.token for event in events if isinstance(event, Undelivered)} == {flying, waiting}
+    assert frames(transport, transport.outgoing(1.0)) == []
 
 
 def test_emergency_does_not_cut_a_split_command() -> None:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator
+from pathlib import Path
 
 import pytest
+from support.world import loopback
 
 from anafi_mav.drone import CommandTimeout, Drone, FlyingState, LinkLost, connect
 from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
@@ -101,6 +103,16 @@ async def test_cancelled_block_stops_the_move(real: SimulatedDrone) -> None:
     assert commands(real, "CancelMoveTo") == ["CancelMoveTo"]
 
 
+async def test_flight_plan_is_paused_when_the_block_ends() -> None:
+    address, plan = loopback(), Path(__file__).parents[2] / "missions" / "delivery.v1.mavlink"
+    spec = DroneSpec(address=address, home=HOME, http_port=8080, rtsp_port=None)
+    async with Simulator([spec], speed=4.0, seed=1) as simulator:
+        async with connect(address, http_port=8080) as drone:
+            await drone.flight_plan.start(await drone.flight_plan.upload(plan.read_bytes()))
+            await drone.wait_for(FlyingState.FLYING)
+        assert commands(simulator.drones[0], "Pause", "Stop") == ["Pause"]
+
+
 async def test_landing_continues_after_the_block(real: SimulatedDrone) -> None:
     async with connect("127.0.0.1", discovery_port=real.discovery_port) as drone:
         await lift(drone)
@@ -154,6 +166,19 @@ async def test_move_behind_a_skycontroller_is_stopped_and_the_sticks_return_to_t
             await drone.piloting.move_to(HOME[0] + 0.001, HOME[1], 20.0)
         assert commands(real, "CancelMoveTo") == ["CancelMoveTo"]
         assert sources(real) == ["CONTROLLER", "SKY_CONTROLLER"]
+
+
+async def test_block_behind_a_skycontroller_4_ends_without_an_error_of_the_event_loop() -> None:
+    """The web server is reached through a proxy of the mux, whose open connections end with the block."""
+    problems: list[object] = []
+    asyncio.get_running_loop().set_exception_handler(lambda loop, context: problems.append(context))
+    address = loopback()
+    behind = DroneSpec(address=address, home=HOME, http_port=8080, rtsp_port=None, skycontroller=4)
+    async with Simulator([behind], speed=4.0, seed=1):
+        async with connect(address, http_port=8080) as drone:
+            assert await drone.media.list() == ()
+        await asyncio.sleep(0.0)
+    assert problems == []
 
 
 async def test_lost_link_ends_the_block_without_another_error(simulator: Simulator, real: SimulatedDrone) -> None:

@@ -152,13 +152,13 @@ async def test_start_at_of_firmware_that_has_the_older_form_only(device: Scripte
     device.say(modern.Capabilities(1 << modern.SupportedCapabilities.START_AT))
     await heard
     device.script[modern.StartAt] = lambda m: [
-        common.MavlinkFilePlayingStateChanged(PlayingState.PLAYING, m.flightplan_id, MavlinkType.FLIGHT_PLAN_V2)
+        common.MavlinkFilePlayingStateChanged(PlayingState.PLAYING, m.flightplan_id, MavlinkType.FLIGHT_PLAN)
     ]
     await drone.flight_plan.start("abc", item=3)
-    assert device.got(modern.StartAt) == [modern.StartAt("abc", "abc", modern.MavlinkType.FLIGHT_PLAN_V2, 3)]
+    assert device.got(modern.StartAt) == [modern.StartAt("abc", "abc", modern.MavlinkType.FLIGHT_PLAN, 3)]
     # It ended by itself while we asked for a pause.
     device.script[common.Pause] = lambda m: [
-        common.MavlinkFilePlayingStateChanged(PlayingState.STOPPED, "", MavlinkType.FLIGHT_PLAN_V2)
+        common.MavlinkFilePlayingStateChanged(PlayingState.STOPPED, "", MavlinkType.FLIGHT_PLAN)
     ]
     with pytest.raises(CommandRejected, match="ended"):
         await drone.flight_plan.pause()

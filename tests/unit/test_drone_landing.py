@@ -133,6 +133,28 @@ async def test_motors_that_start_after_a_lost_race_are_stopped(drone: Drone, dev
     await device.until(ardrone3.Landing, 2)
 
 
+@pytest.mark.parametrize("modern", [False, True])
+async def test_take_off_command_against_a_landing_is_withdrawn_with_it(
+    drone: Drone, device: ScriptedDevice, modern: bool
+) -> None:
+    """A newer command replaces it while the drone receives nothing: it must not arrive later, on the ground."""
+    drone.piloting.is_modern = lambda: modern
+    await reported(drone, device, FlyingState.LANDING)
+    device.session.mute = True
+    ending = await begun(drone.piloting.end_landing(take_off=True))
+    await asyncio.sleep(0.05)
+    ending.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await ending
+    device.session.mute = False
+    await reported(drone, device, FlyingState.LANDED)
+    for _ in range(2):  # longer than an acknowledgement is waited for
+        await device.quiet(ardrone3.TakeOff)
+    assert device.got(ardrone3.TakeOff) == device.got(ardrone3.SmartTakeOffLand) == []
+    await reported(drone, device, FlyingState.MOTOR_RAMPING)  # had it arrived
+    await device.until(ardrone3.Landing)
+
+
 async def test_a_wanted_take_off_after_a_lost_race_is_not_stopped(drone: Drone, device: ScriptedDevice) -> None:
     await reported(drone, device, FlyingState.LANDING)
     ending = await begun(drone.piloting.end_landing(take_off=True))

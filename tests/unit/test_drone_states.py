@@ -177,6 +177,10 @@ CASES: list[tuple[type[Element[Any]], list[wire.Message], dict[str, Any]]] = [
     ),
     (Home, [rth.State(RthState.PENDING, StateReason.LOW_BATTERY)], {"returning": True, "returning_by_itself": True}),
     (Home, [rth.State(RthState.IN_PROGRESS, StateReason.FLIGHTPLAN)], {"returning_by_itself": False}),
+    (Home, [rth.State(RthState.IN_PROGRESS, StateReason.ENABLED)], {"returning": True, "returning_by_itself": False}),
+    (Home, [rth.State(RthState.IN_PROGRESS, StateReason.STOPPED)], {"returning": True, "returning_by_itself": False}),
+    (Home, [rth.State(RthState.PENDING, StateReason.ICING)], {"returning_by_itself": True}),
+    (Home, [rth.State(RthState.IN_PROGRESS, StateReason(99))], {"returning_by_itself": True}),
     (Home, [rth.State(RthState.AVAILABLE, StateReason.FINISHED)], {"returning": False, "returning_by_itself": False}),
     (
         Home,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import math
 from datetime import datetime
 
@@ -61,6 +62,17 @@ def zeros(device: ScriptedDevice) -> list[ardrone3.PCMD]:
 
 
 # -- the connection
+
+
+async def test_message_log_has_each_command_that_is_sent(
+    drone: Drone, device: ScriptedDevice, caplog: pytest.LogCaptureFixture
+) -> None:
+    """With `-vv` the log is a trace of both directions, which a report from a real aircraft needs."""
+    device.script[ardrone3.MoveTo] = lambda command: [running(command)]
+    with caplog.at_level(logging.DEBUG, "anafi_mav.message"):
+        await drone.piloting.move_to(48.0, 2.0, 10.0)
+    assert any("sent MoveTo(latitude=48.0" in record.getMessage() for record in caplog.records)
+    assert any("MoveToChanged(" in record.getMessage() for record in caplog.records)
 
 
 async def test_connect_asks_for_everything_and_returns_when_it_came(device: ScriptedDevice) -> None:
@@ -449,6 +461,62 @@ async def test_move_to_with_a_speed_takes_the_other_limits_from_the_drone(drone:
     assert device.got(move.ExtendedMoveTo) == [
         move.ExtendedMoveTo(48.0, 2.0, 15.0, move.OrientationMode.HEADING_DURING, 180.0, 5.0, 3.0, 40.0)
     ]
+
+
+async def test_legacy_return_state_counts_until_the_newer_one_is_received(device: ScriptedDevice) -> None:
+    """A firmware that sends NavigateHomeStateChanged alone; icing has another number there."""
+    legacy = ardrone3.NavigateHomeStateChanged
+    states = [one for one in STATES if not isinstance(one, rth.State)]
+    device.script[common.AllStates] = lambda _: [*states, common.AllStatesChanged()]
+    drone = device.drone()
+    await drone.connect()
+    home = drone.home
+    heard = asyncio.ensure_future(drone.expect(rth.State))
+    await asyncio.sleep(0)
+    device.say(legacy(ardrone3.NavigateHomeState.IN_PROGRESS, ardrone3.NavigateHomeReason.ICING))
+    await heard
+    assert (home.state.rth, home.state.reason) == (RthState.IN_PROGRESS, StateReason.ICING)
+    assert home.state.returning_by_itself
+    await reported(drone, device, rth.State(RthState.AVAILABLE, StateReason.STOPPED))
+    await reported(drone, device, legacy(ardrone3.NavigateHomeState.PENDING, ardrone3.NavigateHomeReason.USER_REQUEST))
+    assert home.state.rth == RthState.AVAILABLE
+    await drone.close()
+
+
+def rounded(command: ardrone3.MoveTo, status: MoveToStatus, metres: float) -> ardrone3.MoveToChanged:
+    """An event of a firmware that has the target from its own frame: so many metres north and 1 cm lower."""
+    return ardrone3.MoveToChanged(
+        command.latitude + metres / 111_195.0, command.longitude, command.altitude - 0.01, command.orientation_mode,
+        command.heading, status,
+    )  # fmt: skip
+
+
+async def test_move_to_with_a_rounded_echo_is_under_way_and_ends(drone: Drone, device: ScriptedDevice) -> None:
+    device.script[ardrone3.MoveTo] = lambda command: [rounded(command, MoveToStatus.RUNNING, 0.8)]
+    journey = await drone.piloting.move_to(48.8789, 2.3677, 15.0, timeout=SHORT)
+    device.say(rounded(device.got(ardrone3.MoveTo)[0], MoveToStatus.DONE, 0.8))
+    assert await asyncio.wait_for(journey.result(), 3.0) is MoveEnd.DONE
+
+
+async def test_move_to_with_an_echo_of_another_place_is_not_under_way(drone: Drone, device: ScriptedDevice) -> None:
+    device.script[ardrone3.MoveTo] = lambda command: [rounded(command, MoveToStatus.RUNNING, 1.2)]
+    with pytest.raises(CommandTimeout):
+        await drone.piloting.move_to(48.8789, 2.3677, 15.0, timeout=SHORT)
+
+
+async def test_move_to_takes_no_rounded_echo_while_another_is_unheard(drone: Drone, device: ScriptedDevice) -> None:
+    """The late RUNNING of a move that was cancelled, half a metre from the new one, starts nothing."""
+    await flying(drone, device)
+    first = asyncio.ensure_future(drone.piloting.move_to(48.8789, 2.3677, 15.0))
+    command = await device.until(ardrone3.MoveTo)
+    drone.piloting.hover()
+    with pytest.raises(CommandRejected):
+        await first
+    second = asyncio.ensure_future(drone.piloting.move_to(48.8789 + 0.5 / 111_195.0, 2.3677, 15.0, timeout=SHORT))
+    await device.until(ardrone3.MoveTo, 2)
+    await reported(drone, device, rounded(command, MoveToStatus.RUNNING, 0.1))
+    with pytest.raises(CommandTimeout):
+        await second
 
 
 @pytest.mark.parametrize("status", [MoveToStatus.ERROR, MoveToStatus.CANCELED])

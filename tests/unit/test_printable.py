@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import io
 import logging
 
@@ -10,6 +11,7 @@ import pytest
 from anafi_mav.cli.log import FORMAT, REPEAT_EVERY, CleanFormatter, RepeatFilter
 from anafi_mav.cli.terminal import complain, say
 from anafi_mav.printable import printable
+from anafi_mav.subject import DRONE
 
 
 @pytest.mark.parametrize(
@@ -97,3 +99,29 @@ def test_log_of_a_refusal_ten_times_a_second_is_throttled() -> None:
 
 def test_log_of_messages_is_never_throttled() -> None:
     assert log_of([(0.0, logging.DEBUG, "same", ())] * 3) == ["DEBUG same"] * 3
+
+
+async def test_log_line_of_code_that_knows_no_drone_names_it() -> None:
+    """What a drone's task starts and what its sockets bring is about that drone."""
+    stream = io.StringIO()
+    handler = logging.StreamHandler(stream)
+    handler.setFormatter(CleanFormatter("%(message)s"))
+    handler.addFilter(RepeatFilter())
+    logger = logging.Logger("test")
+    logger.addHandler(handler)
+
+    async def look_after(name: str) -> None:
+        DRONE.set(name)
+        asyncio.get_running_loop().call_soon(logger.warning, "sticks are given back")
+        await asyncio.create_task(asyncio.sleep(0))
+        logger.warning("%s: link lost", name)
+
+    await asyncio.gather(look_after("alpha"), look_after("bravo"))
+    logger.warning("about all")
+    assert sorted(stream.getvalue().splitlines()) == [
+        "about all",
+        "alpha: link lost",
+        "alpha: sticks are given back",
+        "bravo: link lost",
+        "bravo: sticks are given back",
+    ]

@@ -20,13 +20,13 @@ Aim Alerts AlertsState AnafiMavError Angles Animations AnimationsState Antiflick
 BatteryState Blocker BlockerKind Bracketing Burst Calibration CalibrationState Camera CameraKind CameraMode CameraState
 CamerasState Colour CommandRejected CommandTimeout Controller ControllerState Displacement Drone ExposureMode
 ExposureSettings Feature FlightPlan FlightPlanState FlyingState FollowMe FollowMeState FrameMetadata Gimbal
-GimbalAttitude GimbalState Gps GpsState Home HomeState Identity KnownDrone Limits Link LinkLost LinkState
-LocalProtocolError Location MODELS Media MediaItem MediaState Metering Model Move MoveEnd Ned NotSupported Notification
-Palette PhotoFile PhotoFormat PhotoMode PhotoOption PhotoSettings Picture Piloting PilotingCommand PilotingState Place
-PlanOnDrone PlayingState Poi PoiState Position Product ProductState Quaternion Range RecordingMode RecordingOption
-RecordingSettings Recovery RemoteProtocolError Resolution Resource Shown Sound SoundState Storage StorageState Streaming
-Style StyleSettings Support Thermal ThermalState Trajectory Velocity Video VideoFrame VideoState WhiteBalance WifiLink
-connect events
+GimbalAttitude GimbalState Gps GpsState HandshakeRefused Home HomeState Identity KnownDrone Limits Link LinkLost
+LinkState LocalProtocolError Location MODELS Media MediaItem MediaState Metering Model Move MoveEnd Ned NotSupported
+Notification Palette PhotoFile PhotoFormat PhotoMode PhotoOption PhotoSettings Picture Piloting PilotingCommand
+PilotingState Place PlanOnDrone PlayingState Poi PoiState Position Product ProductState Quaternion Range RecordingMode
+RecordingOption RecordingSettings Recovery RemoteProtocolError Resolution Resource Shown Sound SoundState Storage
+StorageState Streaming Style StyleSettings Support Thermal ThermalState Trajectory Velocity Video VideoFrame VideoState
+WhiteBalance WifiLink connect events
 """
 """Names that programs of others import. Removing or renaming one breaks them: it needs a line in the changelog."""
 

@@ -1,0 +1,144 @@
+"""Two controllers want one drone: which one backs off, and the texts to the clients, by the drone's sessions."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.mav import Client
+from support.trouble import GOTO, goto
+from support.world import World, loopback, world
+
+from anafi_mav.arsdk import controller
+from anafi_mav.arsdk.messages import common
+from anafi_mav.config import Config, DroneConfig
+from anafi_mav.errors import LinkLost
+from anafi_mav.gateway import Gateway
+
+TAKEN = "Another controller has taken the drone"
+
+
+@asynccontextmanager
+async def second(w: World, folder: Path) -> AsyncIterator[tuple[Gateway, Client]]:
+    """Another gateway with a client, at the same drone: another machine's, so that no lock file keeps it away."""
+    address = loopback()
+    config = Config(
+        endpoints=(f"tcpin://{address}:5760",),
+        drones=(DroneConfig(name="beta", sysid=2, address=w.drone.address),),
+        state=str(folder / "other"),
+    )
+    client = Client(250)
+    async with Gateway(config) as gateway:
+        await client.connect(5760, address)
+        client.send(dialect.MAVLink_heartbeat_message(dialect.MAV_TYPE_GCS, 8, 0, 0, 4, 3))
+        try:
+            yield gateway, client
+        finally:
+            await client.close()
+
+
+def ups(w: World, since: float = 0.0) -> list[float]:
+    """When sessions of the drone began."""
+    return [e.t for e in w.drone.log if (e.kind, e.name) == ("session", "up") and e.t > since]
+
+
+def now() -> float:
+    return asyncio.get_running_loop().time()
+
+
+async def received(client: Client, text: str, timeout: float = 20.0) -> dialect.MAVLink_message:
+    return await client.wait("STATUSTEXT", lambda m: m.text.startswith(text), since=0, timeout=timeout)
+
+
+async def test_gateway_that_found_the_drone_flying_yields(tmp_path: Path) -> None:
+    async with world(speed=1.0) as w:
+        await w.take_off()
+        async with second(w, tmp_path) as (_, client):
+            text = await received(client, TAKEN)
+            assert (text.severity, text.get_srcSystem()) == (dialect.MAV_SEVERITY_CRITICAL, 2)
+            await received(client, "Reconnecting in ")
+            # The first one has it back, and keeps it.
+            await w.client.heartbeat(lambda beat: True, timeout=10.0)
+            taken = now()
+            assert len(ups(w)) == 3
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.t > taken + 20.0, 30.0)
+            assert len(ups(w)) == 3
+            assert await goto(w, 30.0, 8.0) == 0
+
+
+async def test_gateway_that_yielded_comes_back_at_once_on_a_command(tmp_path: Path) -> None:
+    async with world(speed=1.0) as w:
+        await w.take_off()
+        async with second(w, tmp_path) as (_, client):
+            await received(client, "Reconnecting in ")
+            await w.client.heartbeat(lambda beat: True, timeout=10.0)
+            count, asked = len(ups(w)), now()
+            # What a ground station sends by itself does not count.
+            client.send(dialect.MAVLink_heartbeat_message(dialect.MAV_TYPE_GCS, 8, 0, 0, 4, 3))
+            client.send(dialect.MAVLink_manual_control_message(2, 500, 0, 500, 0, 0))
+            client.send_command(dialect.MAV_CMD_REQUEST_MESSAGE, 148, target=(2, 1))
+            client.send_command(dialect.MAV_CMD_DO_SET_MODE, 1, 4, 3, target=(1, 1))
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.t > asked + 2.0, 10.0)
+            assert len(ups(w)) == count
+            client.send_command(dialect.MAV_CMD_DO_SET_MODE, 1, 4, 3, target=(2, 1))
+            await received(client, "Reconnecting: command of system 250")
+            await w.drone.wait_log(lambda e: len(ups(w)) == count + 1, 3.0)
+
+
+async def test_gateway_from_before_takeoff_yields_after_five_losses() -> None:
+    """A controller that takes the drone a second after each handshake of ours."""
+    async with world(speed=1.0) as w:
+        await w.take_off()
+        await asyncio.sleep(6.0)  # so that the first loss comes after a long connection
+        mine: list[controller.ControllerSession] = []
+
+        async def rival() -> None:
+            while True:
+                with contextlib.suppress(LinkLost):
+                    session = await controller.connect(w.drone.address, on_message=lambda message, now: None)
+                    mine.append(session)
+                    mark = now()
+                    await w.drone.wait_log(lambda e: (e.kind, e.name) == ("session", "up"), 60.0, since=mark)
+                await asyncio.sleep(1.0)
+
+        task = asyncio.ensure_future(rival())
+        try:
+            await received(w.client, "Reconnecting in ", 90.0)
+            texts = [m.text for _, m in w.client.since(0, "STATUSTEXT")]
+            assert texts.count(TAKEN) == 4  # one short connection may have been bad radio
+            # The one before the fight, then a rival and an attempt of ours in turn, and the rival has it.
+            assert len(ups(w)) == 1 + 5 * 2 + 1
+            away = now()
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.t > away + 20.0, 40.0)
+            assert ups(w, away) == []
+            assert GOTO not in [m.command for _, m in w.client.since(0, "COMMAND_ACK")]
+        finally:
+            task.cancel()
+            await asyncio.wait([task])
+            for session in mine:
+                await session.close()
+
+
+@pytest.mark.parametrize(
+    ("cause", "taken"),
+    [(common.DisconnectionCause.UNKNOWN, True), (common.DisconnectionCause.OFF_BUTTON, False)],
+)
+async def test_disconnection_event_tells_a_switched_off_drone_from_a_taken_one(
+    cause: common.DisconnectionCause, taken: bool
+) -> None:
+    async with world(speed=1.0) as w:
+        w.client.send(dialect.MAVLink_heartbeat_message(dialect.MAV_TYPE_GCS, 8, 0, 0, 4, 3))
+        session = w.drone.session
+        assert session is not None
+        mark = w.client.mark()
+        session.send(common.Disconnection(cause))
+        await asyncio.sleep(0.3)  # it has arrived, within 5 s of the handshake
+        w.drone.faults.mute = True
+        await w.client.silence("HEARTBEAT", 4.0)
+        said = [m.text for _, m in w.client.since(mark, "STATUSTEXT") if m.text == TAKEN]
+        assert said == ([TAKEN] if taken else [])

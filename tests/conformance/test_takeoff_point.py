@@ -1,0 +1,36 @@
+"""The take-off point, which all heights above sea level count from."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.world import HOME, World, world
+
+from anafi_mav.arsdk.messages import ardrone3
+from anafi_mav.arsdk.wire import Message
+
+TEXT = "Take-off altitude inaccurate: GPS +-12 m"
+
+
+async def report(w: World, event: Message) -> None:
+    """Let the drone report this five times a second."""
+    while w.drone.session is not None:
+        w.drone.session.send(event)
+        await asyncio.sleep(0.2)  # the drone's own rate
+
+
+@pytest.mark.parametrize("accuracy", [5, 12])
+async def test_takeoff_with_inaccurate_gps_altitude_is_reported(accuracy: int) -> None:
+    async with world() as w:
+        w.drone.faults.untold = frozenset({ardrone3.GpsLocationChanged.NAME})
+        reporting = asyncio.ensure_future(report(w, ardrone3.GpsLocationChanged(*HOME, 1, 1, accuracy)))
+        await w.client.wait("GPS_RAW_INT", lambda m: m.v_acc == accuracy * 1000)
+        mark = w.client.mark()
+        assert (await w.client.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)).result == dialect.MAV_RESULT_ACCEPTED
+        ack = await w.client.command(dialect.MAV_CMD_NAV_TAKEOFF, x=0.0, y=0.0, z=5.0)
+        assert ack.result == dialect.MAV_RESULT_ACCEPTED
+        texts = [m.text for _, m in w.client.since(mark, "STATUSTEXT")]
+        assert (TEXT in texts) is (accuracy == 12)
+        reporting.cancel()

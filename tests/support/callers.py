@@ -1,0 +1,46 @@
+"""What stops, holds or ends something without the right of a client: none of it may end a landing or a return."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+from anafi_mav.services.link_loss import LossAction
+from anafi_mav.services.manual_flight import Event
+from support.world import World
+
+
+def system_of(w: World) -> Any:
+    """The gateway's system of the one drone."""
+    return w.gateway._supervised[0].system
+
+
+def _service(system: Any, name: str) -> Any:
+    return next(service for service in system.services if type(service).__name__ == name)
+
+
+async def _call(function: Callable[..., Any], *args: Any) -> None:
+    function(*args)
+
+
+async def _ended(tasks: list[asyncio.Task[None]]) -> None:
+    if tasks:
+        await asyncio.wait(tasks)
+
+
+CALLERS: dict[str, Callable[[Any], Awaitable[None]]] = {
+    "link loss hold": lambda system: _service(system, "LinkLossService")._act(LossAction.HOLD),
+    "link loss return": lambda system: _service(system, "LinkLossService")._act(LossAction.RETURN),
+    "fence hold": lambda system: system.vehicle.hold(),
+    "fence return": lambda system: _service(system, "FenceService")._return_or_hold(),
+    "guided end": lambda system: _ended(system.vehicle.offboard.end()),
+    "follow end": lambda system: _ended(system.vehicle.follow.end()),
+    "orbit end": lambda system: _ended(_service(system, "OrbitService").end()),
+    "mission end": lambda system: _ended(system.vehicle.mission.end()),
+    "mission break": lambda system: _call(system.vehicle.mission._break_off, "test"),
+    "setpoints silent": lambda system: _call(system.vehicle.offboard._expired),
+    "target silent": lambda system: _call(system.vehicle.follow._expired),
+    "sticks silent": lambda system: _call(system.vehicle.manual._let_go, Event.END),
+    "gateway end": lambda system: system.let_go(),
+}
