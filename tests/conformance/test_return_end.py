@@ -110,6 +110,18 @@ async def test_hold_above_home_cancels_the_landing() -> None:
         assert w.drone.flying_state.name == "HOVERING"
 
 
+async def test_return_commanded_again_above_home_does_not_begin_once_more() -> None:
+    """PX4 and ArduCopter stay in their mode then: a program that sends it every second must come down."""
+    async with world(speed=FAST) as w:
+        await away(w)
+        mark = await go_home(w)
+        await said(w.client, "Landing in 5 s", mark)
+        assert (await w.client.command(SET_MODE, 1, 4, 5)).result == ACCEPTED
+        await landed(w, mark)
+        assert len(w.commands("rth.return_to_home")) == 1
+        assert "cancelled" not in " ".join(texts(w.client, mark))
+
+
 async def test_return_ended_by_another_clients_hold_does_not_land() -> None:
     """The newest command wins, and a finished report of the drone that is late means nothing then."""
     async with world(speed=FAST) as w:
