@@ -283,6 +283,8 @@ class Vehicle(Aircraft):
         """Fly home by the drone's own return. A landing goes on unless `by` ends it."""
         if self.on_ground:
             raise Refused("Return refused: the drone is on the ground")
+        if self.return_end.shown:
+            return  # it waits above home or lands there, and would climb and fly home once more
         commanded = None if by is None else replace(by, extent=Extent.COMMANDED)
         if lands := self.landing:
             self._require_endable("Return", commanded)
