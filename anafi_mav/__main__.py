@@ -1,7 +1,7 @@
 """`anafi-mav` and `python -m anafi_mav`.
 
 Importing a command takes up to a second. Ctrl-C ends the program at once then: nothing has been opened or begun, and a
-traceback out of an import helps nobody. So this module imports nothing before it has made its arrangements.
+traceback out of an import helps no user. So this module imports nothing before it has made its arrangements.
 """
 
 import os

@@ -31,7 +31,7 @@ from anafi_mav.mavlink.node import Inbound, Node
 from anafi_mav.services.flying import ON_GROUND
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.system import System
-from anafi_mav.state_lock import FILE, HeldDrone, StateLock, state_folder
+from anafi_mav.state_lock import FILE, HeldDrone, Holder, StateLock, state_folder
 from anafi_mav.subject import DRONE
 
 logger = logging.getLogger(__name__)
@@ -45,6 +45,16 @@ CANCEL_WAIT = 0.1
 
 HOVER_TIME = 2.0
 """s that closing stays with a flying drone after its moves have ended: as long as hover centres the sticks."""
+
+
+def state_in_use(folder: Path, holder: Holder) -> ConfigError:
+    """Return the error of a gateway whose state folder another one holds."""
+    drones = "".join(f", {drone.name} at {drone.address}" for drone in holder.drones)
+    return ConfigError(
+        "state",
+        f"expected a folder that no other gateway uses, but the gateway with process id {holder.pid}{drones}, "
+        f"holds {folder / FILE}; end that gateway, or name another folder for this one",
+    )
 
 
 class _Supervised:
@@ -200,9 +210,10 @@ class Gateway:
         await self.close()
 
     async def open(self) -> None:
-        """Lock the state folder and open every endpoint, and no more; `start` does it where this has not. Raises
-        `ConfigError`; nothing is left open. It is a step of its own for the command line, which starts a simulator only
-        when all endpoints are."""
+        """Lock the state folder and open every endpoint. Raises `ConfigError`; nothing is then left open or locked.
+
+        `start` does it where this has not. It is a step of its own for the command line, which starts a simulator only
+        when all endpoints are open."""
         if self._node.endpoints:
             return
         self._lock_state()
@@ -225,12 +236,7 @@ class Gateway:
             logger.warning("state folder cannot be used: %s", self._state_problem)
             return
         if holder is not None:
-            drones = "".join(f", {drone.name} at {drone.address}" for drone in holder.drones)
-            raise ConfigError(
-                "state",
-                f"expected a folder that no other gateway uses, but the gateway with process id {holder.pid}{drones}, "
-                f"holds {self._state / FILE}; end that gateway, or name another folder for this one",
-            )
+            raise state_in_use(self._state, holder)
         self._lock = lock
 
     def _unlock_state(self) -> None:

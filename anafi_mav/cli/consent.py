@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import sys
+from typing import NamedTuple
 
 from anafi_mav.state_lock import HeldDrone, Holder, read_holder, state_folder
 
@@ -25,16 +26,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def gateway_of(state: str | None, address: str, interface: str | None, serial: str = "") -> str | None:
-    """Return a clause about the gateway of this machine that holds a drone; None where no gateway does."""
+class Held(NamedTuple):
+    """A gateway of this machine holds the drone."""
+
+    holder: Holder
+    drone: HeldDrone
+
+    def __str__(self) -> str:
+        doing = f"connected to {self.drone.serial}" if self.drone.serial else "not connected, trying"
+        return f"the gateway with process id {self.holder.pid} holds it as {self.drone.name} ({doing})"
+
+
+def gateway_of(state: str | None, address: str, interface: str | None, serial: str = "") -> Held | None:
+    """Return the gateway of this machine that holds a drone, known by its address or its serial number."""
     holder = read_holder(state_folder(state))
     drone = None if holder is None else holder.find(address, interface, serial)
-    return None if holder is None or drone is None else _clause(holder, drone)
-
-
-def _clause(holder: Holder, drone: HeldDrone) -> str:
-    doing = f"connected to {drone.serial}" if drone.serial else "connecting"
-    return f"the gateway with process id {holder.pid} holds it as {drone.name} ({doing})"
+    return None if holder is None or drone is None else Held(holder, drone)
 
 
 def may_connect(address: str, *, take: bool) -> bool | None:

@@ -95,7 +95,11 @@ def run(arguments: argparse.Namespace) -> int:
     findings, device = interrupts.run(before_handshake(place))
     held = consent.gateway_of(arguments.state, place.address, place.interface, "" if device is None else device.serial)
     if held is not None:
-        findings.append(wrong("gateway", held, "its drones are left to it" + consent.GATEWAY_RETRIES))
+        findings.append(
+            ok("gateway", str(held))
+            if held.drone.serial
+            else wrong("gateway", str(held), "its own lines say why" + consent.GATEWAY_RETRIES)
+        )
     if not arguments.json:
         for finding in findings:
             _print(finding)
@@ -110,7 +114,9 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.json:
         say_json({"findings": [finding._asdict() for finding in findings], "not_asked": list(unasked)})
     elif unasked:
-        why = "" if device is None or held is not None else f"; {consent.WARNING}: with --take it is done"
+        why = "" if device is None else f"; {consent.WARNING}: with --take it is done"
+        if held is not None:
+            why = "; the gateway has the drone, and its drones are left to it"
         say(f"{', '.join(unasked)}: not asked{why}")
     return 1 if any(finding.wrong for finding in findings) else 0
 

@@ -12,13 +12,15 @@ from typing import Any
 
 import msgspec
 
+from anafi_mav.arsdk.mux_link import look_either
 from anafi_mav.arsdk.wire import Message
 from anafi_mav.cli import consent, interrupts, log
 from anafi_mav.cli.addresses import spot
 from anafi_mav.cli.terminal import complain, say, say_json
 from anafi_mav.drone import Drone
 from anafi_mav.drone.element import Range
-from anafi_mav.errors import ConfigError
+from anafi_mav.errors import AnafiMavError, ConfigError
+from anafi_mav.state_lock import read_holder, state_folder
 
 LISTEN = 1.2
 """s to listen after the connection: values that the drone sends once a second have arrived by then."""
@@ -41,6 +43,8 @@ def run(arguments: argparse.Namespace) -> int:
     log.set_up()
     place = spot(arguments.address)
     held = consent.gateway_of(arguments.state, place["address"], place.get("interface"))
+    if held is None and read_holder(state_folder(arguments.state)) is not None:  # perhaps by another address
+        held = consent.gateway_of(arguments.state, "", None, interrupts.run(_serial(**place)))
     if held is not None:
         complain(f"{arguments.address}: not connected: {held}{consent.GATEWAY_RETRIES}")
         return 1
@@ -57,6 +61,14 @@ def run(arguments: argparse.Namespace) -> int:
         for line in _lines(facts):
             say(line)
     return 0
+
+
+async def _serial(address: str, interface: str | None = None) -> str:
+    """Return the serial number in the introduction of the device there; empty when it gives none."""
+    try:
+        return (await look_either(address, interface=interface)).serial
+    except (AnafiMavError, OSError):
+        return ""
 
 
 async def _ask(address: str, interface: str | None = None) -> dict[str, Any]:

@@ -16,12 +16,14 @@ import msgspec
 from anafi_mav.cli import heap, log, options
 from anafi_mav.cli.addresses import Ports, Reservations, spot
 from anafi_mav.cli.child import SimulatorProcess
+from anafi_mav.cli.scenarios import load as load_scenario
 from anafi_mav.cli.terminal import complain, say
 from anafi_mav.config import Config, DroneConfig, SimConfig, from_mapping, load, remarks
 from anafi_mav.errors import ConfigError
-from anafi_mav.gateway import Gateway
+from anafi_mav.gateway import Gateway, state_in_use
 from anafi_mav.mavlink.endpoint import is_open_to_network, parse_endpoint
-from anafi_mav.sim import quirks, scenario
+from anafi_mav.sim import quirks
+from anafi_mav.state_lock import read_holder, state_folder
 
 READY_LIMIT = 15.0
 """s after which "ready" is said though a drone has not answered: its connection takes 3 s at most, its settings and
@@ -138,6 +140,10 @@ async def _run(config: Config, sim_log: Path | None) -> list[str]:
     """Run the gateway; return what was wrong with its state folder at the end."""
     interrupts = _Interrupts()
     interrupts.install()
+    folder = state_folder(config.state)
+    holder = read_holder(folder)
+    if folder is not None and holder is not None:  # before its simulated drones are found in the way
+        raise state_in_use(folder, holder)
     async with contextlib.AsyncExitStack() as stack:
         gateway_config, fleet = place(config, stack.enter_context(Reservations()))
         gateway = Gateway(gateway_config)
@@ -276,9 +282,6 @@ def _scenarios(simulated: Mapping[int, SimConfig], addresses: Mapping[int, str])
     for index, sim in simulated.items():
         if sim.scenario is None:
             continue
-        try:
-            scenario.load(Path(sim.scenario)).check_drones(set(addresses.values()))
-        except ConfigError as error:
-            raise ConfigError(f"drones[{index}].sim.scenario", str(error)) from error
+        load_scenario(f"drones[{index}].sim.scenario", Path(sim.scenario), set(addresses.values()))
         paths[addresses[index]] = str(Path(sim.scenario).absolute())
     return paths

@@ -16,9 +16,10 @@ import msgspec
 
 from anafi_mav.cli import heap, log, options, sim_validate
 from anafi_mav.cli.options import integer, number
+from anafi_mav.cli.scenarios import load as load_scenario
 from anafi_mav.cli.terminal import say
 from anafi_mav.errors import ConfigError
-from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator, scenario
+from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
 from anafi_mav.sim.model import MODELS
 from anafi_mav.sim.quirks import QUIRKS
 from anafi_mav.sim.scenario import Scenario
@@ -182,12 +183,9 @@ def _wind(text: str) -> WindSpec:
 def _scenarios(fleet: Fleet) -> dict[str, Scenario]:
     """What each drone goes through, by its address. A file that several have is read once."""
     addresses = {drone.address for drone in fleet.drones}
-    try:
-        read = {path: scenario.load(Path(path)) for path in dict.fromkeys(fleet.scenarios.values())}
-        for found in read.values():
-            found.check_drones(addresses)
-    except ConfigError as error:
-        raise ConfigError("--scenario", str(error)) from error
+    read = {
+        path: load_scenario("--scenario", Path(path), addresses) for path in dict.fromkeys(fleet.scenarios.values())
+    }
     return {address: read[path] for address, path in fleet.scenarios.items()}
 
 

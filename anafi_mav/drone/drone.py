@@ -111,6 +111,7 @@ class Drone:
         self._clock = clock or SystemClock()
 
         self._commander = Commander()
+        self._commander.name = self.name
         self._http_port = http_port
         self._rtsp_port = rtsp_port
         self._rest = Rest(address, http_port, local_address, interface)

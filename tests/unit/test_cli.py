@@ -357,7 +357,7 @@ SIM = "sim: {address: DRONE}"
         ),
         (
             f"{{endpoints: ['tcpin://HOST:5761'], drones: [{{name: a, sysid: 1, {SIM[:-1]}, scenario: bad.yaml}}}}]}}",
-            "drones[0].sim.scenario: steps[0].gps: expected `bool`, got `str`",
+            "drones[0].sim.scenario: FOLDER/bad.yaml: steps[0].gps: expected `bool`, got `str`",
         ),
     ],
 )

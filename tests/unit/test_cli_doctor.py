@@ -253,24 +253,30 @@ async def test_info_without_a_terminal_or_take_is_refused() -> None:
         assert sessions(drone) == 0
 
 
-@pytest.mark.parametrize("name", ["info", "doctor"])
-async def test_drone_of_a_gateway_is_not_taken_even_with_take(name: str) -> None:
+@pytest.mark.parametrize(("name", "status"), [("info", 1), ("doctor", 0)])
+async def test_drone_of_a_gateway_is_not_taken_even_with_take(name: str, status: int) -> None:
     folder = state_folder(None)
     assert folder is not None
     lock = StateLock(folder)
     assert lock.acquire() is None
     async with simulated() as drone:
         lock.write([HeldDrone("alpha", drone.address, None, drone.identity.serial)])
-        async with command(name, drone.address, "--take") as held:
-            assert await held.end() == 1
+        ports = ("--http-port", str(HTTP), "--rtsp-port", str(RTSP)) if name == "doctor" else ()
+        async with command(name, drone.address, "--take", *ports) as held:
+            assert await held.end() == status
         said = "\n".join([*held.lines, *held.complaints])
         assert f"the gateway with process id {os.getpid()} holds it as alpha" in said
         assert sessions(drone) == 0
         # The same aircraft at another address is known by its serial number, which its introduction says.
         lock.write([HeldDrone("alpha", "192.168.42.1", None, drone.identity.serial)])
-        async with command("doctor", drone.address, "--take") as held:
+        async with command(name, drone.address, "--take", *ports) as held:
+            assert await held.end() == status
+        assert "holds it as alpha" in "\n".join([*held.lines, *held.complaints])
+        # One that tries and has not got it is something to look at.
+        lock.write([HeldDrone("alpha", drone.address)])
+        async with command(name, drone.address, "--take", *ports) as held:
             assert await held.end() == 1
-        assert "holds it as alpha" in "\n".join(held.lines)
+        assert "holds it as alpha (not connected, trying)" in "\n".join([*held.lines, *held.complaints])
         assert sessions(drone) == 0
     lock.release()
 

@@ -37,7 +37,7 @@ async def test_second_gateway_on_a_state_folder_is_refused_with_the_process_id(t
         assert held.serial.startswith("PI04")
         before = len(first.entries("session"))
         # The same drone behind other endpoints: what a person starts who believes that the first one has ended.
-        async with product(tmp_path / "two", fleet(loopback(), loopback()), ready=False) as second:
+        async with product(tmp_path / "two", fleet(loopback(), drone), ready=False) as second:
             assert await second.end() == 2
             (complaint,) = second.complaints
             assert complaint.startswith(f"anafi-mav: {tmp_path / 'two' / 'fleet.yaml'}: state: expected a folder that")

@@ -174,7 +174,7 @@ def test_a_file_that_cannot_be_read(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "line"),
     [
-        (["--scenario", "bad.yaml"], "--scenario: steps[0].gps: expected `bool`, got `str`"),
+        (["--scenario", "bad.yaml"], "--scenario: bad.yaml: steps[0].gps: expected `bool`, got `str`"),
         (["--scenario", "none.yaml"], "--scenario: cannot read none.yaml"),
         (["--wind", "8"], "--wind: expected SPEED,DIRECTION or SPEED,DIRECTION,GUSTS like 8,270,0.15, got '8'"),
         (["--wind", "8,x"], "--wind: expected SPEED,DIRECTION or"),
