@@ -639,7 +639,10 @@ class Vehicle(Aircraft):
         return self.return_end.alone if self.descends else None
 
     async def let_go(self) -> None:
-        """The gateway ends: a landing or a return goes on, everything else is ended, and a flying drone hovers."""
+        """The gateway ends: a landing or a return goes on, everything else is ended, and a flying drone hovers.
+
+        One whose sticks are the Skycontroller pilot's is left to him: nothing of ours flies it.
+        """
         if self.descends:
             if not self.landing:
                 self.return_end.end()
@@ -647,7 +650,7 @@ class Vehicle(Aircraft):
         await self.take_over()
         if self.drone.piloting.about_to_fly:
             await self.drone.piloting.land()
-        if not self.on_ground:
+        if not self.on_ground and not self.drone.controller.pilot_has_source:
             await self.drone.piloting.stop()
 
     def _note_landing(self, before: FlyingState | None) -> None:
