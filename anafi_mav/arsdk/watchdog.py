@@ -51,6 +51,8 @@ class Watchdog:
         self._whole: Callable[[], bool] = lambda: True
         self._frames: Sequence[tuple[int, bytes]] = ()
         self._holding = False
+        self._orphaned = False
+        """The child has ended before us."""
         self._kicked = 0.0
         self._timer: asyncio.TimerHandle | None = None
         self._closed = False
@@ -130,9 +132,9 @@ class Watchdog:
 
     def secure(self) -> bool:
         """After a stall, make sure that the child has not acted. False: it has, and nothing may be sent now."""
-        if not self._frames or self._loop.time() - self._kicked < self._limit * STALL:
+        if self._process is None or not self._frames or self._holding:
             return True
-        if self._holding:
+        if self._loop.time() - self._kicked < self._limit * STALL:
             return True
         if not self.acquire():
             return False
@@ -175,9 +177,14 @@ class Watchdog:
         self._say(b"K")
 
     def _say(self, kind: bytes, content: bytes = b"") -> None:
-        # A full pipe: the child does not read, and will find enough in it when it does. A broken one: it has ended.
-        with contextlib.suppress(BlockingIOError, BrokenPipeError):
+        try:
             os.write(self._pipe, RECORD.pack(kind, len(content)) + content)
+        except BlockingIOError:
+            pass  # the child does not read, and will find enough in the full pipe when it does
+        except BrokenPipeError:
+            if not self._orphaned:
+                log.warning("the watchdog over the axes of the Skycontroller has ended")
+            self._orphaned = True
 
     def _look_for_report(self) -> None:
         """The child has the token: go on once it says that it sends nothing more."""

@@ -92,7 +92,7 @@ class Child:
                 if not self._deliver(seq, frame, deadline):
                     break
         self._frames = []
-        with contextlib.suppress(OSError):  # nobody may be left to read it
+        with contextlib.suppress(OSError):  # the gateway may have ended
             os.write(self._report, b"X")
 
     def _write_all(self, deadline: float) -> None:
@@ -108,7 +108,7 @@ class Child:
             time.sleep(REPEAT)  # the pipe of a gateway that has ended stays readable
 
     def _write(self, frame: bytes, deadline: float) -> bool:
-        """Write all of it; False: the stream takes no more."""
+        """Write all of it; False: the stream takes nothing."""
         while frame and (left := deadline - time.monotonic()) > 0.0:
             try:
                 frame = frame[self._link.send(frame) :]

@@ -78,7 +78,7 @@ GOODBYE = 0.5
 
 PILOT_KEEPS = 2.0
 """s that a pilot who moved a stick keeps the drone. A user who goes on commanding without a pause does not get it
-back: the time begins anew with every command, for a joystick that somebody forgot about must not win."""
+back: the time begins again with every command, so that a forgotten joystick does not win."""
 
 
 class Controller(Element[ControllerState]):
@@ -145,7 +145,7 @@ class Controller(Element[ControllerState]):
         if self.present:
             self._send_back()
 
-    # -- who flies
+    # -- control
 
     @property
     def pilot_acquired_control(self) -> bool:
@@ -247,7 +247,7 @@ class Controller(Element[ControllerState]):
     def _on_source(self, message: skyctrl.PilotingSource, now: float) -> None:
         if not self.taken:
             if message.source == Source.CONTROLLER and loop_time() - self._gave_back >= CLAIM_EVERY:
-                # Of an earlier connection: nothing of ours flies, so that nobody would.
+                # Of an earlier connection: nothing of ours flies, and the pilot's sticks are dead.
                 log.warning("the source of piloting was ours without a flight: given back")
                 self._send_back()
         elif message.source == Source.CONTROLLER:

@@ -111,6 +111,7 @@ class Drone:
         self._clock = clock or SystemClock()
 
         self._commander = Commander()
+        self._commander.name = self.name
         self._http_port = http_port
         self._rtsp_port = rtsp_port
         self._rest = Rest(address, http_port, local_address, interface)
@@ -306,7 +307,8 @@ class Drone:
             return
         self._fading = session
         self._heard = asyncio.get_running_loop().create_future()
-        self._hover_due = True
+        # Where the pilot at a Skycontroller has control, nothing of ours flies, and a hover would be against him.
+        self._hover_due = not self.controller.pilot_has_source
         self._disconnected(reason, silent=True)
 
     def _on_speaks(self, session: ControllerSession) -> None:

@@ -9,12 +9,15 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 import weakref
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 from anafi_mav.arsdk.wire import Message, UnknownMessage
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost
+
+message_log = logging.getLogger("anafi_mav.message")
 
 T = TypeVar("T")
 
@@ -142,6 +145,8 @@ class Commander:
     """The way out to the drone while there is one, and everybody who waits for something from it."""
 
     def __init__(self) -> None:
+        self.name = ""
+        """Of the drone, for the log."""
         self._wire: Wire | None = None
         self.gate: Callable[[Message], bool] | None = None
         """Asked before each command; False: it is not sent, as if it were lost on the way. May raise."""
@@ -216,6 +221,8 @@ class Commander:
         self._require_current(stops=stops)
         if self.gate is not None and not self.gate(message):
             return WITHHELD
+        if message_log.isEnabledFor(logging.DEBUG):
+            message_log.debug("%s: sent %r", self.name, message)
         return self._wire.send(message)
 
     def deliver(self, message: Message, *, stops: bool = False) -> asyncio.Future[None]:

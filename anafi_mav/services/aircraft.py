@@ -87,6 +87,11 @@ class Aircraft(ABC):
 
     @property
     @abstractmethod
+    def descent(self) -> str | None:
+        """The reason to refuse what may not end a landing or return: the drone does either, or was commanded to."""
+
+    @property
+    @abstractmethod
     def mode(self) -> FlightMode:
         """What the drone does now."""
 

@@ -80,7 +80,7 @@ class FenceKind(PlanKind):
             return Fault(dialect.MAV_MISSION_UNSUPPORTED, f"command {item.command} is no part of a fence")
         if not (math.isnan(second) or (math.isfinite(second) and second == int(second))):
             return Fault(dialect.MAV_MISSION_INVALID_PARAM2, f"{second:g} is no inclusion group")
-        return None if item.command == _HOME_CIRCLE else place_fault(item)
+        return None if item.command == _HOME_CIRCLE or _is_void(item) else place_fault(item)
 
     def taken(self, items: Sequence[PlanItem], flavour: Flavour) -> Sequence[PlanItem]:
         return [item for item in items if not _is_void(item)]

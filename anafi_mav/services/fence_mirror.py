@@ -68,7 +68,7 @@ class FenceMirror:
             return
         if away is not None:
             self._moved_at = now
-            self._host.text(Severity.WARNING, f"Drone's fence circle ends: its centre is {away:.0f} m off")
+            self._host.text(Severity.WARNING, f"Drone's fence circle ends: centre is {away:.0f} m off")
         self._task = self._host.spawn(self._change(wanted, mirrored, now))
 
     def wanted(self) -> tuple[bool, float | None, float | None]:

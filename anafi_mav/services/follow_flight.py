@@ -65,8 +65,8 @@ class FollowFlight:
         vehicle = self._vehicle
         if not vehicle.in_air:
             raise Refused("Follow refused: take off first")
-        if vehicle.returning:
-            raise Refused("Follow refused: the drone returns home")
+        if (descent := vehicle.descent) is not None:
+            raise Refused(f"Follow refused: {descent}")
         if vehicle.place is None:
             raise Refused("Follow refused: no GPS fix")
         if vehicle.drone.controller.pilot_acquired_control:

@@ -106,12 +106,12 @@ class GuidedFlight:
         `checked`: the place is where the drone is, which needs no leave.
         """
         vehicle = self._vehicle
+        if (descent := vehicle.descent) is not None:
+            raise Refused(f"Goto refused: {descent}")
         if not vehicle.in_air:
             raise Refused("Goto refused: the drone is not in the air")
         if not checked:
             check_place(vehicle, goto.place, start=vehicle.place)
-        if vehicle.returning:
-            raise Refused("Goto refused: drone is returning")
         await vehicle.take_over()
         await vehicle.drone.piloting.cancel_return_home()
         if not vehicle.in_air or vehicle.returning:  # no await from here to the moveTo
@@ -151,10 +151,10 @@ class GuidedFlight:
     async def _begin(self, what: str, mode: FlightMode) -> None:
         """Stop the drone for a moveBy. Raises `Refused`, with `what` for the text."""
         vehicle = self._vehicle
+        if (descent := vehicle.descent) is not None:
+            raise Refused(f"{what} refused: {descent}")
         if not vehicle.in_air:
             raise Refused(f"{what} refused: the drone is not in the air")
-        if vehicle.returning:
-            raise Refused(f"{what} refused: drone is returning")
         await vehicle.take_over()
         await vehicle.drone.piloting.stop()
         await vehicle.drone.piloting.cancel_return_home()

@@ -111,8 +111,8 @@ class OrbitService(Service):
         here = vehicle.place
         if not vehicle.in_air:
             raise Refused("Orbit refused: the drone is not in the air")
-        if vehicle.returning:
-            raise Refused("Orbit refused: drone is returning")
+        if (descent := vehicle.descent) is not None:
+            raise Refused(f"Orbit refused: {descent}")
         if here is None:
             raise Refused("Orbit refused: no GPS fix")
         if vehicle.drone.controller.pilot_acquired_control:

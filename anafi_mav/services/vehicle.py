@@ -371,6 +371,10 @@ class Vehicle(Aircraft):
         return self.landing or self.returning or self._returns_sent > 0
 
     @property
+    def descent(self) -> str | None:
+        return LANDS if self.landing else RETURNS if self.descends else None
+
+    @property
     def _forced_landing(self) -> bool:
         """No command ends this landing."""
         alerts = self.drone.alerts.state

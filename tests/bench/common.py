@@ -18,6 +18,11 @@ from pymavlink import mavutil
 TICKS = os.sysconf("SC_CLK_TCK")
 
 
+def frames_option(words: list[str]) -> tuple[list[str], str]:
+    """The words of a command line without `many`, and the query of an endpoint that it stands for."""
+    return [word for word in words if word != "many"], "?frames=many" if "many" in words else ""
+
+
 def machine() -> str:
     """The machine in one line, as far as it says what it is."""
     model = platform.machine()

@@ -1,9 +1,10 @@
 """Processor time and memory of the gateway for a growing fleet.
 
-    .venv/bin/python tests/bench/fleet.py [SECONDS] [DRONES ...]
+    .venv/bin/python tests/bench/fleet.py [SECONDS] [DRONES ...] [many]
 
 The fleet is one simulator process whose drones stand on the ground and send attitude, speed and height 30 times a
 second. One client listens to everything over UDP. The gateway's figures are its process's own, of SECONDS seconds.
+`many`: with several MAVLink frames per datagram (`frames=many`).
 """
 
 from __future__ import annotations
@@ -15,22 +16,23 @@ import time
 from pathlib import Path
 
 import yaml
-from common import loopback, machine, product, usage
+from common import frames_option, loopback, machine, product, usage
 from pymavlink import mavutil
 
 RATE = 30.0
 
 
 def main() -> None:
-    seconds = float(sys.argv[1]) if len(sys.argv) > 1 else 20.0
-    print(machine())
+    words, query = frames_option(sys.argv[1:])
+    seconds = float(words[0]) if words else 20.0
+    print(machine(), query)
     print("| drones | gateway, share of one core | gateway, MiB | simulator, share of one core | MAVLink messages/s |")
     print("|---|---|---|---|---|")
-    for drones in [int(text) for text in sys.argv[2:]] or [1, 10, 100]:
-        print(measure(drones, seconds), flush=True)
+    for drones in [int(text) for text in words[1:]] or [1, 10, 100]:
+        print(measure(drones, seconds, query), flush=True)
 
 
-def measure(drones: int, seconds: float) -> str:
+def measure(drones: int, seconds: float, query: str) -> str:
     """One row of the table."""
     first, client = loopback(), loopback()
     head, _, last = first.rpartition(".")
@@ -41,7 +43,7 @@ def measure(drones: int, seconds: float) -> str:
     listener = _Listener(f"udpin:{client}:14550")
     with tempfile.TemporaryDirectory() as folder:
         config = Path(folder) / "fleet.yaml"
-        config.write_text(yaml.safe_dump({"endpoints": [f"udpout://{client}:14550"], "drones": fleet}))
+        config.write_text(yaml.safe_dump({"endpoints": [f"udpout://{client}:14550{query}"], "drones": fleet}))
         options = ["--address", first, "--count", str(drones), "--telemetry-rate", str(RATE), "--http-port", "8080"]
         with product("sim", *options) as simulator, product("run", "-c", str(config)) as gateway:
             time.sleep(3.0)  # beyond the connections' own work

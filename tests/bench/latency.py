@@ -1,11 +1,12 @@
 """MAVLink in, ARSDK out: how long the gateway takes, for a setpoint and for a command.
 
-    .venv/bin/python tests/bench/latency.py [SETPOINTS] [COMMANDS]
+    .venv/bin/python tests/bench/latency.py [SETPOINTS] [COMMANDS] [many]
 
 Client, gateway and simulator are three processes. The client notes the monotonic clock before its send; the
 simulator's log has the same clock at the moment its socket was read. So the figures hold two hops over loopback and
 the waking up of two processes besides the gateway's own work. A setpoint is SET_ATTITUDE_TARGET, which becomes PCMD;
 each leans to the other side than the one before. A command is DO_REPOSITION, which becomes moveTo, found by its height.
+`many`: with several MAVLink frames per datagram (`frames=many`).
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import time
 from pathlib import Path
 
 import msgspec
-from common import Client, loopback, machine, product, quantile
+from common import Client, frames_option, loopback, machine, product, quantile
 
 WARM_UP = 40
 """Setpoints that are not counted: a vehicle takes Offboard only while setpoints arrive."""
@@ -28,14 +29,15 @@ def quaternion(roll: float) -> list[float]:
 
 
 def main() -> None:
-    setpoints = int(sys.argv[1]) if len(sys.argv) > 1 else 1000
-    commands = int(sys.argv[2]) if len(sys.argv) > 2 else 100
+    words, query = frames_option(sys.argv[1:])
+    setpoints = int(words[0]) if words else 1000
+    commands = int(words[1]) if len(words) > 1 else 100
     drone, address = loopback(), loopback()
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "sim.jsonl"
         with (
             product("sim", "--address", drone, "--log", str(log), "--http-port", "0"),
-            product("run", "--drone", drone, "--endpoint", f"udpout://{address}:14550"),
+            product("run", "--drone", drone, "--endpoint", f"udpout://{address}:14550{query}"),
         ):
             client = Client(f"udpin:{address}:14550")
             client.take_off(5.0)
@@ -43,7 +45,7 @@ def main() -> None:
             heights = _commands(client, commands)
         entries = [msgspec.json.decode(line) for line in log.read_bytes().splitlines()]
     received = [entry for entry in entries if entry["kind"] == "command"]
-    print(machine())
+    print(machine(), query)
     _say("SET_ATTITUDE_TARGET -> PCMD", _pcmd_delays(rolls, received))
     _say("DO_REPOSITION -> moveTo", _move_delays(heights, received))
 

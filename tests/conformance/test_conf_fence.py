@@ -494,7 +494,7 @@ async def test_fence_circle_is_the_drones_own_only_while_its_centre_is_near() ->
         assert own_fence(w) == (60.0, 1)
         mark = w.client.mark()
         await pilot_goes_to(w, 7.0)
-        await said(w.client, "Drone's fence circle ends: its centre is 7 m off", since=mark)
+        await said(w.client, "Drone's fence circle ends: centre is 7 m off", since=mark)
         await until(lambda: own_fence(w) == (100.0, 0))
 
 

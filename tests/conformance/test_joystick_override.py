@@ -54,7 +54,7 @@ def taken(w: World) -> bool:
 
 
 async def overridden(w: World) -> None:
-    """Every client is told, and shown the mode."""
+    """Every client gets the text and the mode."""
     for client in w.clients:
         await client.wait("STATUSTEXT", lambda m: m.text == TEXT, since=0)
         await client.heartbeat(lambda beat: beat.custom_mode == POSITION)

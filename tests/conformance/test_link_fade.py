@@ -106,7 +106,7 @@ async def test_longer_silence_ends_with_one_session(seconds: float) -> None:
 
 
 async def test_refused_handshake_is_reported_with_its_status() -> None:
-    """The drone is heard by nobody and hears nobody, but its TCP ports answer: as after a fade of its radio."""
+    """No datagram passes either way, but the TCP ports of the drone answer: as after a fade of its radio."""
     async with world(speed=1.0) as w:
         w.drone.faults.quirks = frozenset({Quirk.HANDSHAKE_REFUSED_8S})
         await w.take_off()

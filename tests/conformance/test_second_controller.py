@@ -1,4 +1,4 @@
-"""Two controllers want one drone: who backs off, what the clients are told, by the drone's own list of sessions."""
+"""Two controllers want one drone: which one backs off, and the texts to the clients, by the drone's sessions."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def now() -> float:
     return asyncio.get_running_loop().time()
 
 
-async def told(client: Client, text: str, timeout: float = 20.0) -> dialect.MAVLink_message:
+async def received(client: Client, text: str, timeout: float = 20.0) -> dialect.MAVLink_message:
     return await client.wait("STATUSTEXT", lambda m: m.text.startswith(text), since=0, timeout=timeout)
 
 
@@ -59,9 +59,9 @@ async def test_gateway_that_found_the_drone_flying_yields(tmp_path: Path) -> Non
     async with world(speed=1.0) as w:
         await w.take_off()
         async with second(w, tmp_path) as (_, client):
-            text = await told(client, TAKEN)
+            text = await received(client, TAKEN)
             assert (text.severity, text.get_srcSystem()) == (dialect.MAV_SEVERITY_CRITICAL, 2)
-            await told(client, "Reconnecting in ")
+            await received(client, "Reconnecting in ")
             # The first one has it back, and keeps it.
             await w.client.heartbeat(lambda beat: True, timeout=10.0)
             taken = now()
@@ -75,7 +75,7 @@ async def test_gateway_that_yielded_comes_back_at_once_on_a_command(tmp_path: Pa
     async with world(speed=1.0) as w:
         await w.take_off()
         async with second(w, tmp_path) as (_, client):
-            await told(client, "Reconnecting in ")
+            await received(client, "Reconnecting in ")
             await w.client.heartbeat(lambda beat: True, timeout=10.0)
             count, asked = len(ups(w)), now()
             # What a ground station sends by itself does not count.
@@ -86,7 +86,7 @@ async def test_gateway_that_yielded_comes_back_at_once_on_a_command(tmp_path: Pa
             await w.drone.wait_log(lambda e: e.kind == "pose" and e.t > asked + 2.0, 10.0)
             assert len(ups(w)) == count
             client.send_command(dialect.MAV_CMD_DO_SET_MODE, 1, 4, 3, target=(2, 1))
-            await told(client, "Reconnecting: command of system 250")
+            await received(client, "Reconnecting: command of system 250")
             await w.drone.wait_log(lambda e: len(ups(w)) == count + 1, 3.0)
 
 
@@ -108,7 +108,7 @@ async def test_gateway_from_before_takeoff_yields_after_five_losses() -> None:
 
         task = asyncio.ensure_future(rival())
         try:
-            await told(w.client, "Reconnecting in ", 90.0)
+            await received(w.client, "Reconnecting in ", 90.0)
             texts = [m.text for _, m in w.client.since(0, "STATUSTEXT")]
             assert texts.count(TAKEN) == 4  # one short connection may have been bad radio
             # The one before the fight, then a rival and an attempt of ours in turn, and the rival has it.

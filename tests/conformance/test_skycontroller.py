@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
+
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.missions import CORNERS, put, start
 from support.params import write
 from support.plans import ACCEPTED as TAKEN
 from support.plans import FENCE, square, upload
@@ -11,6 +14,7 @@ from support.trouble import ACCEPTED, REJECTED, RTL, goto, heard
 from support.world import HOME, World, world
 
 from anafi_mav.arsdk.messages.skyctrl import Source
+from anafi_mav.sim.faults import Impairment
 
 PITCH_STICK = 3
 """Its axis at the Skycontroller (mapper.xml)."""
@@ -20,6 +24,8 @@ ACTS = ("Landing", "return_to_home", "abort", "CancelMoveTo", "moveBy", "moveTo"
 
 RETURN_ACTION, LAND_ACTION = 2, 5
 """Values of ANF_GCS_LOSS and ANF_FENCE_ACTION."""
+
+BAD_AIR = Impairment(loss=0.25, delay=0.2)
 
 generations = pytest.mark.parametrize("generation", [3, 4])
 
@@ -131,3 +137,48 @@ async def test_first_texts_behind_skycontroller_say_that_failsafes_only_warn() -
     async with world() as w:
         await greeted(w)
         assert not [m for _, m in w.client.since(0, "STATUSTEXT") if "Skycontroller" in m.text]
+
+
+@generations
+@pytest.mark.parametrize("way", ["goto", "mission"])
+async def test_pilots_stick_in_bad_air_takes_the_drone(generation: int, way: str) -> None:
+    async with world(speed=1.0, skycontroller=generation, web=True) as w:
+        pilot = w.drone.skycontroller
+        assert pilot is not None
+        if way == "mission":
+            await put(w, CORNERS)
+            await start(w)
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 2.0, 40.0)
+        else:
+            await to_the_pilot(w)
+            assert await goto(w, 200.0, 10.0) == ACCEPTED
+        await source_is(w, Source.CONTROLLER)
+        if pilot.grabbed_axes == 0:
+            await w.drone.wait_log(lambda e: pilot.grabbed_axes != 0, 10.0)
+        w.drone.faults.up = w.drone.faults.down = BAD_AIR
+        moved = asyncio.get_running_loop().time()
+        pilot.stick(PITCH_STICK, 60)
+        await w.drone.wait_log(lambda e: pilot.source is Source.SKY_CONTROLLER and pilot.grabbed_axes == 0, 10.0)
+        stopped = {"goto": "CancelMoveTo", "mission": "Pause"}[way]
+        await w.drone.wait_log(lambda e: e.name.endswith(stopped) and e.t >= moved, 10.0)
+        # His stick flies the drone, and nothing of ours follows.
+        await w.drone.wait_log(lambda e: e.name.endswith("PCMD") and e.args["pitch"] == 60, 10.0, since=moved)
+        await asyncio.sleep(5.0)
+        assert pilot.source is Source.SKY_CONTROLLER
+        assert pilot.grabbed_axes == 0
+
+
+@generations
+async def test_silence_while_pilot_flies_sends_nothing_against_him(generation: int) -> None:
+    async with world(speed=1.0, skycontroller=generation) as w:
+        pilot = w.drone.skycontroller
+        assert pilot is not None
+        await to_the_pilot(w)
+        pilot.stick(PITCH_STICK, 60)
+        before = heard(w, *ACTS)
+        w.drone.faults.mute = True
+        await asyncio.sleep(3.2)
+        w.drone.faults.mute = False
+        await w.client.heartbeat(lambda beat: True, timeout=5.0)
+        await asyncio.sleep(2.0)
+        assert heard(w, *ACTS) == before

@@ -75,7 +75,7 @@ async def set_out(w: World, way: str) -> asyncio.Task[Any] | None:
             await asyncio.sleep(0.05)  # the client's setpoint rate
 
     task = asyncio.ensure_future(stream())
-    await w.drone.wait_log(lambda e: e.kind == "pose", 5.0)
+    await asyncio.sleep(0.3)  # setpoints arrive before the command, in one TCP connection
     assert (await w.client.command(dialect.MAV_CMD_DO_SET_MODE, *PX4_OFFBOARD)).result == ACCEPTED
     return task
 
@@ -131,6 +131,8 @@ async def test_stopped_gateway_with_nothing_flying_sends_nothing(tmp_path: Path)
         assert pilot is not None
         await w.take_off()
         await sees(w, lambda: given_back(w))
+        back = w.drone.log[len(w.drone.log) - 1].t
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.t > back + 1.0)  # its acknowledgement has arrived
         before = [e.t for e in w.drone.log if e.kind == "controller"]
         gateway.send_signal(signal.SIGSTOP)
         stopped = w.drone.log[len(w.drone.log) - 1].t

@@ -23,6 +23,7 @@ from support.trouble import (
     RTL,
     SET_MODE,
     TAKEOFF_CMD,
+    goto,
     heard,
     somebody_else,
     watched,
@@ -180,6 +181,20 @@ async def test_hold_right_after_land_holds() -> None:
         await watched(3.0)
         assert flown(w)[-1] == "hovering"
         assert w.drone.pose.up > 5.0
+
+
+async def test_goto_right_after_land_is_refused_and_the_drone_lands() -> None:
+    """The Landing has left and is not answered: a goto does not replace it."""
+    async with world(speed=1.0) as w:
+        await w.take_off(6.0)
+        w.drone.faults.up = w.drone.faults.down = Impairment(delay=0.2)
+        mark = w.client.mark()
+        w.client.send_command(LAND_CMD)
+        await asyncio.sleep(0.1)
+        assert await goto(w, 20.0, 6.0) == REJECTED
+        await text(w.client, "Goto refused: drone is landing", mark)
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landed", 20.0)
+        assert heard(w, "moveTo", "extended_move_to") == []
 
 
 # Not ours to end.

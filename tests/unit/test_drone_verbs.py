@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import math
 from datetime import datetime
 
@@ -61,6 +62,17 @@ def zeros(device: ScriptedDevice) -> list[ardrone3.PCMD]:
 
 
 # -- the connection
+
+
+async def test_message_log_has_each_command_that_is_sent(
+    drone: Drone, device: ScriptedDevice, caplog: pytest.LogCaptureFixture
+) -> None:
+    """With `-vv` the log is a trace of both directions, which a report from a real aircraft needs."""
+    device.script[ardrone3.MoveTo] = lambda command: [running(command)]
+    with caplog.at_level(logging.DEBUG, "anafi_mav.message"):
+        await drone.piloting.move_to(48.0, 2.0, 10.0)
+    assert any("sent MoveTo(latitude=48.0" in record.getMessage() for record in caplog.records)
+    assert any("MoveToChanged(" in record.getMessage() for record in caplog.records)
 
 
 async def test_connect_asks_for_everything_and_returns_when_it_came(device: ScriptedDevice) -> None:

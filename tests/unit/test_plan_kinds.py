@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import msgspec
 import pytest
 from plan_wire import FENCE, MISSION, peer, replies, texts
 
@@ -99,6 +100,15 @@ def test_fence_circle_of_radius_0_is_left_out_with_a_warning(command: int, flavo
     assert desk.transfers[FENCE].items == (good,)
     assert [item.param1 for item in read_back(desk, FENCE, flavour)] == [80.0]
     assert said == ["Fence circle 1 ignored: radius 0", "Fence circle 2 ignored: radius 0"]
+
+
+def test_fence_circle_of_radius_0_needs_no_place() -> None:
+    """MAVSDK's geofence example fills its list with one at 0/0."""
+    void = msgspec.structs.replace(circle(dialect.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, 0.0), x=0, y=0)
+    good = circle(dialect.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, 80.0)
+    ack, said = upload(plans(), [good, void], FENCE, PX4)
+    assert ack.type == ACCEPTED
+    assert said == ["Fence circle 1 ignored: radius 0"]
 
 
 def test_fence_circle_of_negative_radius_is_refused() -> None:
