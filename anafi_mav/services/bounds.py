@@ -62,14 +62,14 @@ def amsl_to_ato(vehicle: Aircraft, amsl: float) -> float:
     """Height above take-off (m) of an AMSL height; raises `Refused` when no bridge is known."""
     ato = vehicle.height.ato(amsl)
     if ato is None:
-        raise Refused("Refused: take-off altitude unknown: no GPS fix")
+        raise Refused("Refused: AMSL unknown: no GPS fix")
     return ato
 
 
 def check_estimate(vehicle: Aircraft, ato: float) -> None:
     """Raise `Refused` for an AMSL target that may be the ground because the bridge to AMSL is an estimate."""
     if vehicle.height.estimated and ato < ESTIMATE_FLOOR:
-        raise Refused(f"Refused: estimated AMSL height {ato:.0f} m < {ESTIMATE_FLOOR:g} m")
+        raise Refused(f"Refused: estimated AMSL: {ato:.0f} m < {ESTIMATE_FLOOR:g} m")
 
 
 def check_on_earth(place: Place, what: str) -> None:
@@ -102,5 +102,5 @@ def _check_geofence(vehicle: Aircraft, distance: float) -> None:
     state = vehicle.drone.piloting.state
     if state.geofence and state.max_distance is not None and distance > state.max_distance.current:
         raise Refused(
-            f"Goto refused: {distance:.0f} m from geofence centre > {state.max_distance.current:g} m", lasting=True
+            f"Goto refused: {distance:.0f} m off fence centre > {state.max_distance.current:g} m", lasting=True
         )
