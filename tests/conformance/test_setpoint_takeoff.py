@@ -100,6 +100,23 @@ async def test_offboard_setpoint_that_climbs_takes_off_and_is_flown(
         await said(w.client, "Offboard setpoints stopped: hovering")
 
 
+async def test_trajectory_that_begins_at_the_ground_takes_off_and_is_flown() -> None:
+    """MAVSDK's offboard_from_csv: ten points a second, the first 10 cm above the ground."""
+    async with world(speed=1.0) as w:
+        mark, begun = w.client.mark(), asyncio.get_running_loop().time()
+
+        def point() -> Any:
+            height = min(max(asyncio.get_running_loop().time() - begun - 1.0, 0.0), 5.0)
+            mask = NO_ACCELERATION | NO_YAW | NO_YAW_RATE
+            return local(mask, at=(0.0, 0.0, -height), v=(0.0, 0.0, -1.0 if height else 0.0))
+
+        async with streaming(w.client, point, every=0.1):
+            await ready(w.client, "px4")
+            await lifted(w)
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["up"] > 4.5, 15.0)
+        assert "is below 1" not in " ".join(texts(w.client, mark))
+
+
 async def test_guided_attitude_with_thrust_takes_off() -> None:
     """dronekit's set_attitude_target example: GUIDED_NOGPS, arm, thrust."""
     async with world(flavour="ardupilot") as w:
