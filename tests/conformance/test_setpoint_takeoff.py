@@ -29,6 +29,7 @@ from support.world import ARMED, HOLD, HOME, OFFBOARD, World, world
 
 from anafi_mav import geo
 from anafi_mav.sim.faults import Impairment
+from anafi_mav.sim.quirks import Quirk
 
 ACCEPTED, FAILED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_FAILED
 CANCELLED = 6
@@ -191,9 +192,11 @@ async def test_second_before_a_setpoint_takeoff_can_be_ended(flavour: str, how: 
         assert heard(w, "TakeOff") == []
 
 
-@pytest.mark.parametrize("moment", ["motor ramping", "taking off"])
+@pytest.mark.parametrize("moment", ["motor ramping", "motor ramping, landing ignored", "taking off"])
 async def test_silence_in_a_setpoint_takeoff_disarms_on_the_ground_and_hovers_in_the_air(moment: str) -> None:
     async with world(speed=1.0) as w:
+        if "ignored" in moment:
+            w.drone.faults.quirks = frozenset({Quirk.RAMPING_IGNORES_LANDING})
         program, mark = Program(IDLE), w.client.mark()
         async with streaming(w.client, program):
             await ready(w.client, "px4")
@@ -201,7 +204,7 @@ async def test_silence_in_a_setpoint_takeoff_disarms_on_the_ground_and_hovers_in
             await lifted(w)
             if moment == "taking off":
                 await w.drone.wait_log(lambda e: e.name.endswith("FlyingStateChanged") and e.args["state"] == 1, 5.0)
-        if moment == "motor ramping":
+        if moment != "taking off":
             await said(w.client, "Setpoints stopped on the ground: disarming", mark)
             await w.client.heartbeat(lambda beat: not beat.base_mode & ARMED, since=mark, timeout=15.0)
             assert w.drone.flying_state.name == "LANDED"
