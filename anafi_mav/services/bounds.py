@@ -40,13 +40,17 @@ def lowest_height(vehicle: Aircraft) -> float:
     return LOWEST if altitude is None or not vehicle.in_air else min(LOWEST, altitude)
 
 
+class TooLow(Refused):
+    """A target below `lowest_height`. A drone that has not taken off yet is lifted above it anyway."""
+
+
 def check_height(vehicle: Aircraft, ato: float) -> None:
     """Raise `Refused` unless a target height (m above take-off) is one the drone may go to."""
     ceiling = vehicle.drone.piloting.state.max_altitude
     if not math.isfinite(ato):
         raise Refused("Refused: the height is not a number", lasting=True)
     if ato < (lowest := lowest_height(vehicle)):
-        raise Refused(f"Refused: {ato:.1f} m above take-off is below {lowest:.1f} m", lasting=True)
+        raise TooLow(f"Refused: {ato:.1f} m above take-off is below {lowest:.1f} m", lasting=True)
     if ceiling is not None and ato > ceiling.current:
         raise Refused(
             f"Refused: {ato:.1f} m above take-off is above the drone's ceiling of {ceiling.current:g} m",

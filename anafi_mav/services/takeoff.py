@@ -191,7 +191,7 @@ class Takeoff:
 
     async def abort(self) -> None:
         """Disarm a drone that stands, land one that is about to leave the ground: its setpoints have stopped."""
-        await self._vehicle.take_over()
+        await self._vehicle.take_over(STOP_WAIT)
         await self._vehicle.drone.piloting.land()
         self._armed = False
         self._vehicle.changed()
