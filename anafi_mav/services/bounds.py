@@ -46,7 +46,7 @@ def check_height(vehicle: Aircraft, ato: float) -> None:
     if not math.isfinite(ato):
         raise Refused("Refused: the height is not a number", lasting=True)
     if ato < (lowest := lowest_height(vehicle)):
-        raise Refused(f"Refused: {ato:.1f} m above take-off is below {lowest:.1f} m", lasting=True)
+        raise Refused(f"Refused: {ato:.1f} m above take-off is below {lowest:.3g} m", lasting=True)
     if ceiling is not None and ato > ceiling.current:
         raise Refused(
             f"Refused: {ato:.1f} m above take-off is above the drone's ceiling of {ceiling.current:g} m",
