@@ -219,7 +219,7 @@ class ReturnEnd:
         """The drone has reported the return as finished."""
         if self._drone_lands:
             attempt.phase = _Phase.LANDING
-            attempt.task = asyncio.get_running_loop().create_task(self._see_landing())
+            attempt.task = asyncio.get_running_loop().create_task(self._see_landing(attempt))
         elif self.ending is EndOfReturn.HOVER:
             self._hover(None)
         elif (reason := self.objection(arrived=True)) is not None:
@@ -257,9 +257,10 @@ class ReturnEnd:
         finally:
             attempt.task = None
 
-    async def _see_landing(self) -> None:
+    async def _see_landing(self, attempt: Attempt) -> None:
         """The drone's own setting says that it lands: see to it that it is not shown for longer than it is true."""
         await asyncio.sleep(SHORTEST_WAIT)
+        attempt.task = None  # from here on `on_flying_state` notices the end of the landing
         if self._vehicle.flying_state not in LANDING:
             self._hover("no landing seen")
 
