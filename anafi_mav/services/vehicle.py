@@ -24,7 +24,9 @@ from anafi_mav.drone.events import (
     ForcedLandingReason,
     PlayingState,
     ReturnReason,
+    RthEndingBehavior,
     RthHomeType,
+    RthState,
 )
 from anafi_mav.drone.piloting_landing import ALREADY_LANDED
 from anafi_mav.errors import CommandRejected
@@ -49,6 +51,7 @@ from anafi_mav.services.rally import RallyPoints
 from anafi_mav.services.refusal import Refused
 from anafi_mav.services.return_end import ReturnEnd
 from anafi_mav.services.right import Extent, Right
+from anafi_mav.services.roll_sign import INVERTED
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.takeoff import Takeoff
 
@@ -60,9 +63,14 @@ NOT_COUNTED = f"again within {APART:g} s"
 UNENDABLE = (FORCED, LANDS, PILOT_LANDS, RETURNS, PILOT_RETURNS, RETURNS_BY_ITSELF, MOTOR_DOWN, NOT_COUNTED)
 """Why a landing or a return is not ended."""
 
+LANDS_AFTER_RETURN = 2.0
+"""s after a return that the drone ends by landing within which the landing begins."""
+
 POSITION_OLD = 3.0
 """s without a GPS location, which an ANAFI reports once a second, after which the last one is no position in flight."""
 
+
+ESTIMATED = f"Take-off altitude estimated: GPS only (+-{ESTIMATE_ERROR:g} m)"
 
 GOOD_ACCURACY = 5
 """m of one standard deviation of GPS altitude that AMSL heights can be used with, without a text."""
@@ -115,6 +123,8 @@ class Vehicle(Aircraft):
         self._clock = clock
         self._located_at = -math.inf
         """When the newest GPS location arrived."""
+        self._lands_next: tuple[int, float] | None = None
+        """A return has finished that the drone ends by landing: the count of orders then, and until when it is due."""
         self._end_others = end_others
         self._initiators = Initiators()
         self._landing_sent = 0
@@ -177,13 +187,21 @@ class Vehicle(Aircraft):
             return FlightMode.RETURN
         if state in LANDING:
             return FlightMode.LAND
-        if self.returning:
+        if self.returning or self._is_about_to_land:
             return FlightMode.RETURN
         if state in TAKING_OFF or (self.takeoff.climbing and not self.on_ground):
             return FlightMode.MISSION if self.mission.flying else FlightMode.TAKEOFF
         if state in AIRBORNE and self.drone.piloting.state.plan == PlayingState.PLAYING:
             return FlightMode.MISSION
         return self._selected
+
+    @property
+    def _is_about_to_land(self) -> bool:
+        """Between a return and its landing the drone reports neither; no mode is shown in between."""
+        if self._lands_next is None or not self.in_air:
+            return False
+        orders, until = self._lands_next
+        return orders == self.orders and self._clock.monotonic() < until
 
     @property
     def overridable(self) -> Override:
@@ -265,6 +283,8 @@ class Vehicle(Aircraft):
         """Fly home by the drone's own return. A landing goes on unless `by` ends it."""
         if self.on_ground:
             raise Refused("Return refused: the drone is on the ground")
+        if self.return_end.shown:
+            return  # it waits above home or lands there, and would climb and fly home once more
         commanded = None if by is None else replace(by, extent=Extent.COMMANDED)
         if lands := self.landing:
             self._require_endable("Return", commanded)
@@ -536,7 +556,7 @@ class Vehicle(Aircraft):
             if self.origin is None:
                 self.origin = self.place
         elif self.flying_state is not None and self.height.in_flight(self.drone.product.state.flight_id, amsl, ato):
-            self.text(Severity.WARNING, f"Take-off altitude estimated: GPS only (+-{ESTIMATE_ERROR:g} m)")
+            self.text(Severity.WARNING, ESTIMATED)
 
     def _report_accuracy(self) -> None:
         """Report that AMSL heights of this flight will be wrong by as much as GPS is at its beginning."""
@@ -554,7 +574,7 @@ class Vehicle(Aircraft):
         """Begin with a drone that has reported all its states. `kept` is of the last flight that was seen."""
         self.height.recall(kept)
         self.on_flying_state()
-        self.on_position()
+        self.on_location()  # the one that it has reported counts for as long as a new one
         if self.flying_state is not None and not self.on_ground:
             self.origin = self._origin_in_flight(kept)
 
@@ -570,6 +590,12 @@ class Vehicle(Aircraft):
         return None
 
     @property
+    def standing_warnings(self) -> list[str]:
+        """Texts that stay true for a while: a client that connects later gets them with its banner."""
+        warnings = [ESTIMATED] if self.height.estimated and not self.on_ground else []
+        return [*warnings, INVERTED] if self.roll.inverted else warnings
+
+    @property
     def takeoff_record(self) -> TakeoffRecord | None:
         """The take-off point of the present flight, to be kept; None on the ground or without a flight id."""
         height, origin = self.height, self.origin
@@ -581,6 +607,10 @@ class Vehicle(Aircraft):
     def on_return(self) -> None:
         """The drone's return began, ended or changed: setpoints and the climb after a take-off never fight it."""
         self._note_return()
+        home = self.drone.home.state
+        finished = home.rth == RthState.AVAILABLE and home.reason == ReturnReason.FINISHED
+        lands = finished and home.ending == RthEndingBehavior.LANDING
+        self._lands_next = (self.orders, self._clock.monotonic() + LANDS_AFTER_RETURN) if lands else None
         if self.returning:
             if self.mission.returns and not (self.returning_by_itself or self.return_end.active):
                 self.return_end.announce(self.return_end.command(), None)  # the mission's last item
@@ -613,7 +643,10 @@ class Vehicle(Aircraft):
         return self.return_end.alone if self.descends else None
 
     async def let_go(self) -> None:
-        """The gateway ends: a landing or a return goes on, everything else is ended, and a flying drone hovers."""
+        """The gateway ends: a landing or a return goes on, everything else is ended, and a flying drone hovers.
+
+        One whose sticks are the Skycontroller pilot's is left to him: nothing of ours flies it.
+        """
         if self.descends:
             if not self.landing:
                 self.return_end.end()
@@ -621,7 +654,7 @@ class Vehicle(Aircraft):
         await self.take_over()
         if self.drone.piloting.about_to_fly:
             await self.drone.piloting.land()
-        if not self.on_ground:
+        if not self.on_ground and not self.drone.controller.pilot_has_source:
             await self.drone.piloting.stop()
 
     def _note_landing(self, before: FlyingState | None) -> None:

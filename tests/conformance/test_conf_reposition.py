@@ -145,7 +145,9 @@ async def test_position_is_not_sent_in_flight_while_gps_locations_have_stopped()
         await asyncio.sleep(POSITION_OLD + 0.5)
         assert w.client.since(mark, "GLOBAL_POSITION_INT")[-1][0] > w.client.received[-1][0] - 1.0
         w.drone.faults.quirks = frozenset()
+        await w.client.wait("GPS_RAW_INT")  # made of each GPS location
         await w.take_off(5.0)
+        assert not [m for _, m in w.client.since(0, "STATUSTEXT") if m.text.startswith("Position unknown")]
         mark = w.client.mark()
         w.drone.faults.quirks = stopped
         await said(w, mark, "Position unknown: no GPS location for 3 s")
@@ -157,3 +159,11 @@ async def test_position_is_not_sent_in_flight_while_gps_locations_have_stopped()
         w.drone.faults.quirks = frozenset()
         await w.client.wait("GLOBAL_POSITION_INT")
         await said(w, mark, "Position known again")
+
+
+async def test_position_is_not_called_unknown_right_after_a_connection() -> None:
+    """The first GPS location after a connection comes within a second; here none comes before the drone flies."""
+    async with world() as w:
+        w.drone.faults.quirks = frozenset({Quirk.GPS_LOCATION_STOPS})
+        await w.take_off(5.0)
+        assert not [m for _, m in w.client.since(0, "STATUSTEXT") if m.text.startswith("Position unknown")]

@@ -28,6 +28,7 @@ from support.setpoints import (
 from support.world import ARMED, HOLD, HOME, OFFBOARD, World, world
 
 from anafi_mav import geo
+from anafi_mav.sim.faults import Impairment
 
 ACCEPTED, FAILED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_FAILED
 CANCELLED = 6
@@ -348,3 +349,20 @@ async def test_guided_stream_during_takeoff_flies_after_the_climb_without_compla
         end = next(e for e in w.drone.log if e.name.endswith("moveByEnd"))
         assert all(e.t > end.t for e in heard(w, "PCMD") if e.args["pitch"] > 0)
         assert "Setpoint refused" not in " ".join(texts(w.client, mark))
+
+
+@both
+async def test_setpoint_takeoff_over_a_bad_link_with_another_client_arming(flavour: str) -> None:
+    """200 ms and 25 % loss to the drone: nothing takes off for the client that did not arm, and then once."""
+    async with world(speed=1.0, flavour=flavour, clients=2) as w:
+        w.drone.faults.up = w.drone.faults.down = Impairment(loss=0.25, delay=0.2)
+        async with streaming(w.client, attitude(thrust=0.7)):
+            await ready(w.client, flavour, arm=False)
+            assert (await w.clients[1].command(ARM, 1)).result == ACCEPTED
+            await said(w.client, "Setpoint refused: this client has not armed", 0)
+            await asyncio.sleep(1.5)
+            assert heard(w, "TakeOff") == []
+            assert (await w.client.command(ARM, 1)).result == ACCEPTED
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["up"] > 3.0, 30.0)
+        w.drone.faults.up = w.drone.faults.down = Impairment()
+        assert len(heard(w, "TakeOff")) == 1

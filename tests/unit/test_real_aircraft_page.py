@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from anafi_mav.services.roll_sign_service import INVERTED, VERIFIED
+from anafi_mav.services.roll_sign import INVERTED
+from anafi_mav.services.roll_sign_service import VERIFIED
 from anafi_mav.sim.quirks import QUIRKS
 
 ROOT = Path(__file__).resolve().parents[2]
