@@ -326,17 +326,19 @@ class Vehicle(Aircraft):
         own = self.returning_by_itself
         rising = self.drone.piloting.about_to_fly
         latched = self.paused and (pause or mode is self.mode)
-        before, self.paused = self.paused, self.paused or pause
+        before, orders = self.paused, self.orders
+        self.paused = before or pause
         try:
             await self.take_over(STOP_WAIT)
             if not self.on_ground or rising:
                 with self._selected_no_more(mode):
                     await self._stop(mode.value, by, own=own)
         except BaseException:
-            self.paused = before
+            if self.orders <= orders + 1:  # else a newer command has replaced this one, and the latch is its own
+                self.paused = before
             raise
         self.select(mode)
-        self.paused = (latched or pause) and not self.on_ground
+        self.paused = (latched or pause) and (rising or not self.on_ground)
         if rising:
             self.text(Severity.WARNING, f"{mode.value}: a take-off may follow, to 1 m")
 
@@ -544,6 +546,8 @@ class Vehicle(Aircraft):
             self._takeoff_before = self.drone.home.state.takeoff_location
         if not self.on_ground:
             self.takeoff.left_ground()
+            if before in ON_GROUND:
+                self.offboard.left_ground()
         self.return_end.on_flying_state()
         self.changed()
 
