@@ -1,7 +1,4 @@
-"""The sign of the reported roll: by hand, sample by sample, and flown in virtual time.
-
-5 degrees of roll push with 9.81 * tan 5 = 0.86 m/s2: 0.17 m/s in each interval of 0.2 s.
-"""
+"""The sign of the reported roll: by hand, sample by sample, and flown in virtual time."""
 
 from __future__ import annotations
 
@@ -22,89 +19,108 @@ from anafi_mav.services.offboard_control import (
     G,
     Motion,
 )
-from anafi_mav.services.roll_sign import ODDS, SAMPLES, RollCheck, Sign
+from anafi_mav.services.roll_sign import OVERTURN, SAMPLES, RollCheck, Sign
 from anafi_mav.services.roll_sign_service import read, written
-
-PUSH = G * math.tan(math.radians(5.0)) * 0.2
-"""m/s that 5 degrees give in an interval."""
 
 
 class Flight:
-    """Reports to a check, five times a second."""
+    """Reports to a check, five times a second, of a drone that follows its lean and is pushed by a wind as well."""
 
     def __init__(self, check: RollCheck, yaw: float = 0.0) -> None:
         self.check, self.yaw, self.now = check, math.radians(yaw), 0.0
         self.right = 0.0
+        self.roll = 0.0
 
-    def lean(self, degrees: float, change: float, times: int = 1) -> bool:
-        """Report a roll, and a speed to the right that changes by so much in each interval. True on a verdict."""
-        verdict = False
-        for _ in range(times):
-            self.now += 0.2
-            self.right += change
-            self.check.on_attitude(math.radians(degrees), self.yaw)
-            north, east = -math.sin(self.yaw) * self.right, math.cos(self.yaw) * self.right
-            verdict = self.check.on_velocity(north, east, self.now) or verdict
-        return verdict
+    def lean(self, degrees: float, *, sign: int = 1, wind: float = 0.0) -> bool:
+        """Report a roll, and the speed to the right after 0.2 s with the mean of this and the last lean.
+
+        `sign` -1: a drone that reports roll the other way round. `wind` pushes to the right, m/s2. True on a verdict.
+        """
+        before, self.roll = self.roll, math.radians(degrees)
+        self.now += 0.2
+        self.right += 0.2 * (sign * G * (math.tan(before) + math.tan(self.roll)) / 2.0 + wind)
+        self.check.on_attitude(self.roll, self.yaw)
+        north, east = -math.sin(self.yaw) * self.right, math.cos(self.yaw) * self.right
+        return self.check.on_velocity(north, east, self.now)
+
+    def rock(self, times: int, degrees: float = 10.0, *, sign: int = 1, wind: float = 0.0) -> int:
+        """Lean this way and that, level in between; the number of verdicts that changed."""
+        turns = (degrees, 0.0, -degrees, 0.0)
+        return sum(self.lean(turns[index % 4], sign=sign, wind=wind) for index in range(times))
 
 
 @pytest.mark.parametrize("yaw", [0.0, 90.0, 200.0])
-@pytest.mark.parametrize("sign", [Sign.RIGHT, Sign.LEFT])
-@pytest.mark.parametrize("side", [1, -1])
-def test_roll_check_after_twenty_samples_of_one_sign_knows_it(yaw: float, sign: Sign, side: int) -> None:
+@pytest.mark.parametrize(("sign", "verdict"), [(1, Sign.RIGHT), (-1, Sign.LEFT)])
+@pytest.mark.parametrize("wind", [0.0, 3.0, -3.0])
+def test_roll_check_after_twenty_changes_of_one_sign_knows_it(
+    yaw: float, sign: int, verdict: Sign, wind: float
+) -> None:
+    """10 degrees push with 9.81 * tan 10 = 1.73 m/s2, their mean with level 0.86: each sample changes by 1.73."""
     check = RollCheck()
     flight = Flight(check, yaw)
-    change = PUSH * side * (1 if sign is Sign.RIGHT else -1)
-    assert not flight.lean(5.0 * side, change, SAMPLES)  # the first report begins the first interval
+    flight.lean(0.0)
+    samples = 0
+    while check.sign is Sign.UNKNOWN:
+        samples += 1
+        assert samples <= 2 * SAMPLES + 2
+        flight.lean((10.0, 0.0, -10.0, 0.0)[samples % 4], sign=sign, wind=wind)
+    assert check.sign is verdict
+    assert samples > SAMPLES
+    assert (check.trusted, check.inverted) == (verdict is Sign.RIGHT, verdict is Sign.LEFT)
+
+
+@pytest.mark.parametrize("wind", [-3.0, -1.0, 3.0])
+def test_roll_check_of_a_steady_lean_in_wind_learns_nothing(wind: float) -> None:
+    """Drag and wind outweigh the lean of a drone that slows down: where it accelerates says nothing of roll's sign."""
+    check = RollCheck()
+    flight = Flight(check)
+    for _ in range(200):
+        flight.lean(8.0, wind=wind)
     assert check.sign is Sign.UNKNOWN
-    assert flight.lean(5.0 * side, change)
-    assert check.sign is sign
-    assert (check.trusted, check.inverted) == (sign is Sign.RIGHT, sign is Sign.LEFT)
+
+
+def test_roll_check_of_small_leans_learns_nothing() -> None:
+    check = RollCheck()
+    Flight(check).rock(400, 3.9)
+    assert check.sign is Sign.UNKNOWN
 
 
 def test_roll_check_with_odds_below_three_to_one_waits() -> None:
     check = RollCheck()
     flight = Flight(check)
-    flight.lean(5.0, PUSH)
-    assert not flight.lean(5.0, -PUSH, 6)
-    assert not flight.lean(5.0, PUSH, 6 * ODDS - 1)
-    assert check.sign is Sign.UNKNOWN
-    assert flight.lean(5.0, PUSH)
-    assert check.sign is Sign.RIGHT
-
-
-@pytest.mark.parametrize(
-    ("degrees", "change"),
-    [
-        pytest.param(3.9, PUSH, id="level"),
-        pytest.param(20.0, 0.05, id="drag and lean in balance"),
-    ],
-)
-def test_roll_check_with_what_says_nothing_learns_nothing(degrees: float, change: float) -> None:
-    check = RollCheck()
-    assert not Flight(check).lean(degrees, change, 200)
+    for _ in range(40):
+        flight.rock(8)
+        flight.rock(8, sign=-1)
     assert check.sign is Sign.UNKNOWN
 
 
-def test_roll_check_leaves_out_intervals_with_a_lean_to_both_sides_or_a_gap() -> None:
+def test_roll_check_leaves_out_intervals_with_a_gap() -> None:
     check = RollCheck()
     flight = Flight(check)
     for _ in range(100):
-        flight.lean(5.0, PUSH)
-        flight.lean(-5.0, PUSH)
-    for _ in range(100):
-        flight.lean(5.0, PUSH)
+        flight.lean(10.0)
+        flight.lean(-10.0)
         flight.now += 1.0
     check.forget_motion()
     assert not check.on_velocity(1.0, 1.0, flight.now)
     assert check.sign is Sign.UNKNOWN
 
 
-def test_roll_check_corrects_a_verdict_that_later_samples_contradict() -> None:
+def test_roll_check_while_the_drone_turns_fast_learns_nothing() -> None:
+    check = RollCheck()
+    flight = Flight(check)
+    for index in range(200):
+        flight.yaw = math.radians(30.0 * index)
+        flight.lean((10.0, 0.0, -10.0, 0.0)[index % 4])
+    assert check.sign is Sign.UNKNOWN
+
+
+def test_roll_check_overturns_a_verdict_after_three_times_the_samples() -> None:
     check = RollCheck(Sign.LEFT)
     flight = Flight(check)
-    flight.lean(5.0, PUSH)
-    assert flight.lean(5.0, PUSH, SAMPLES)
+    flight.rock(OVERTURN // 2)
+    assert check.sign is Sign.LEFT
+    assert flight.rock(2 * OVERTURN) == 1
     assert check.sign is Sign.RIGHT
 
 
