@@ -4,12 +4,16 @@ Importing a command takes up to a second. Ctrl-C ends the program at once then: 
 traceback out of an import helps no user. So this module imports nothing before it has made its arrangements.
 """
 
-import os
-import signal
 import sys
 
 INTERRUPTED = 130
 """Exit status of a program that Ctrl-C has ended, as shells have it."""
+
+try:
+    import os
+    import signal  # which imports others, and is not there yet
+except KeyboardInterrupt:
+    raise SystemExit(INTERRUPTED) from None
 
 
 def main() -> int:

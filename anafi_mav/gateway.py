@@ -31,7 +31,7 @@ from anafi_mav.mavlink.node import Inbound, Node
 from anafi_mav.services.flying import ON_GROUND
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.system import System
-from anafi_mav.state_lock import FILE, HeldDrone, Holder, StateLock, state_folder
+from anafi_mav.state_lock import FILE, NO_LOCKS, HeldDrone, Holder, StateLock, state_folder
 from anafi_mav.subject import DRONE
 
 logger = logging.getLogger(__name__)
@@ -232,6 +232,9 @@ class Gateway:
         try:
             holder = lock.acquire()
         except OSError as error:
+            if error.errno in NO_LOCKS:  # the folder itself may be as good as any
+                logger.warning("%s: cannot be locked: %s", self._state, error.strerror)
+                return
             self._state_problem = f"{self._state}: {error.strerror or error}"
             logger.warning("state folder cannot be used: %s", self._state_problem)
             return

@@ -37,6 +37,9 @@ TRIES, TRY_EVERY = 5, 0.05
 """Attempts and s between them: a program that looks whether the folder is held locks it for an instant, and a file
 that is being written may be read half."""
 
+NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL)
+"""What locking says on a file system that has no locks, like some network drives."""
+
 _HELD = (errno.EWOULDBLOCK, errno.EACCES, errno.EDEADLK)
 """What locking says when another has the lock: flock, fcntl on some systems, msvcrt."""
 

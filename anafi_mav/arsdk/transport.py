@@ -487,11 +487,11 @@ class Transport:
         if not self._fades:
             self._go_down(reason, events)
             return
-        self.abandon("the link is silent")
-        events.extend(self._take_pending())
         self._silent = True
         self._send_ping(now)
-        events.append(Silent(reason))
+        events.append(Silent(reason))  # first: that the link is silent explains the others
+        self.abandon("the link is silent")
+        events.extend(self._take_pending())
 
     def _send_ping(self, now: float) -> None:
         self._unanswered += 1

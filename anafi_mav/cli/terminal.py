@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import sys
 from collections.abc import Callable, Iterator
 from typing import TextIO
@@ -27,9 +28,24 @@ def say(line: str, style: str = "") -> None:
 
 
 def say_json(value: object) -> None:
-    """Print a value as JSON on stdout, indented, with every character outside ASCII as its escape."""
-    for line in json.dumps(value, indent=2).replace("\x7f", "\\u007f").split("\n"):
+    """Print a value as JSON on stdout, indented, with every character outside ASCII as its escape.
+
+    A number that JSON does not have (NaN, infinity) is null.
+    """
+    for line in json.dumps(_plain(value), indent=2, allow_nan=False).replace("\x7f", "\\u007f").split("\n"):
         say(line)
+
+
+def _plain(value: object) -> object:
+    match value:
+        case float() if not math.isfinite(value):
+            return None
+        case dict():
+            return {key: _plain(item) for key, item in value.items()}
+        case list() | tuple():
+            return [_plain(item) for item in value]
+        case _:
+            return value
 
 
 def complain(line: str, style: str = "red") -> None:

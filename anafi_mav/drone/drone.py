@@ -205,8 +205,10 @@ class Drone:
     async def connect(self) -> None:
         """Connect and read all states and settings; returns when the drone has sent them.
 
-        States of an earlier connection are dropped, and none of its commands is sent again. Raises `LinkLost`, or
-        `RemoteProtocolError` when what answers there is no drone.
+        States of an earlier connection are dropped, and none of its commands is sent again. After a silence the first
+        new handshake waits until `HANDSHAKE_AFTER`; if the drone is heard before one has succeeded, its session and
+        states are kept, and it hovers. Raises `LinkLost`, which `HandshakeRefused` is too, or `RemoteProtocolError`
+        when what answers there is no drone.
         """
         if self._session is not None or self._opening:
             raise LocalProtocolError(f"{self.name} is connected, or about to be")

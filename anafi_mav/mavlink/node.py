@@ -24,6 +24,7 @@ from anafi_mav.mavlink.channel import Channel, total
 from anafi_mav.mavlink.endpoint import make_endpoint, parse_endpoint
 from anafi_mav.mavlink.frames import Received, pack
 from anafi_mav.mavlink.router import Router
+from anafi_mav.mavlink.stall import StallWatch
 
 logger = logging.getLogger(__name__)
 message_logger = logging.getLogger("anafi_mav.message")
@@ -65,9 +66,12 @@ class Node:
         self._clock = clock or SystemClock()
         self._router: Router[Channel] = Router()
         self._closed_counters: Counter[str] = Counter()
+        self._stalls: StallWatch | None = None
 
     async def start(self, urls: Sequence[str]) -> None:
         """Open an endpoint for each URL. Raises `ConfigError` with key path "endpoints[i]"; nothing is left open."""
+        self._stalls = StallWatch(self._stalled)
+        self._stalls.start()
         parsed = []
         for index, text in enumerate(urls):
             try:
@@ -89,6 +93,8 @@ class Node:
 
     async def close(self) -> None:
         """Close every endpoint."""
+        if self._stalls is not None:
+            self._stalls.stop()
         while self.endpoints:
             await self.endpoints.pop().close()
 
@@ -145,17 +151,24 @@ class Node:
             self._guarded(self.on_channel, channel, False)
 
     def received(self, channel: Channel, frames: list[Received]) -> None:
-        now = self._clock.monotonic()
+        now, old = self._clock.monotonic(), self._stalls is not None and self._stalls.old
         for received in frames:
             route = self._router.route(channel, received, now)
             if route.forward:
                 raw = received.version_2()
                 for other in route.forward:
                     other.forward(raw, received.id)
-            if route.ours and self.on_message is not None:
+            if not route.ours or self.on_message is None:
+                continue
+            if old:
+                self._closed_counters["stale"] += 1
+            else:
                 message_logger.debug("%s: %s", channel.name, received.message)
                 inbound = Inbound(received.message, channel, received.sysid, received.compid, now)
                 self._guarded(self.on_message, inbound)
+
+    def _stalled(self, seconds: float) -> None:
+        logger.warning("the host stalled for %.1f s: what clients sent meanwhile is dropped", seconds)
 
     def _guarded(self, callback: Callable[..., None], *arguments: object) -> None:
         """Call back. A mistake in a service must not close the socket that brought the message."""

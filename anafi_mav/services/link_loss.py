@@ -51,6 +51,11 @@ class GcsWatch:
             self._heard = now
         self.lost = False
 
+    def stalled(self, seconds: float) -> None:
+        """Leave out a time in which the host could not hear them."""
+        if self._heard is not None:
+            self._heard += seconds
+
     def expire(self, now: float, after: float) -> bool:
         """True at the first look after they have been silent for so long."""
         if self._heard is None or self.lost or now - self._heard < after:

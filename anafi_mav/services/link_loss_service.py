@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
+from anafi_mav.mavlink.stall import STALL
 from anafi_mav.services.link_loss import GcsWatch, LossAction
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.service import Host, Service
@@ -18,11 +21,17 @@ class LinkLossService(Service):
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self._watch = GcsWatch()
+        self._ticked = math.inf
+        """When it was looked at last; infinite before the first look of a connection."""
 
     def link_up(self) -> None:
         self._watch.restart(self.host.clock.monotonic())
+        self._ticked = math.inf
 
     def tick(self, now: float) -> None:
+        if (gap := now - self._ticked) >= STALL:
+            self._watch.stalled(gap)  # what arrived meanwhile was not read: no silence of theirs
+        self._ticked = now
         policy = self.host.vehicle.gcs_loss
         if policy.action is not LossAction.NOTHING and self._watch.expire(now, policy.after):
             self._lost()

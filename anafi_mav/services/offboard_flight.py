@@ -20,6 +20,7 @@ from anafi_mav.drone import Limits, PilotingCommand, events
 from anafi_mav.drone.events import FlyingState, Message
 from anafi_mav.errors import AnafiMavError, LinkLost
 from anafi_mav.services.aircraft import Aircraft
+from anafi_mav.services.bounds import TooLow
 from anafi_mav.services.clients import system_of
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.offboard import GUIDED_TIMEOUT, SILENCE, OffboardStream, State, ends, lasts
@@ -93,6 +94,8 @@ class OffboardFlight:
         self._lift = SetpointTakeoff()
         self._stream = OffboardStream()
         self._timer: asyncio.TimerHandle | None = None
+        self._watched_until = math.inf
+        """When the timer runs out."""
         self._engaging: asyncio.Task[None] | None = None
         self._alone = False
         """What is being engaged is a single setpoint."""
@@ -141,8 +144,9 @@ class OffboardFlight:
         follows = self._stream.follows(sender, now)
         if not self._stream.receive(sender, setpoint, now, lasts(setpoint, self.guided_timeout if guided else None)):
             return "another program flies"
-        if self._timer is None:
-            self._watch()
+        deadline = self._stream.deadline()
+        if self._timer is None or (deadline is not None and deadline < self._watched_until):
+            self._watch()  # the pilot's newest setpoint may last for less time than the one before
         if stands:
             return self._on_ground(sender, setpoint, now, guided=guided)
         pilot = self.engaged and sender == self._stream.pilot
@@ -249,6 +253,12 @@ class OffboardFlight:
         elif self._lift.phase is Phase.JOINED:
             self._lift.stop()
 
+    def left_ground(self) -> None:
+        """The drone takes off. A session that stands by on the ground flies only a take-off that is its own."""
+        if self.engaged and self._lift.phase not in (Phase.LIFTING, Phase.JOINED):
+            self.end()
+            self._vehicle.text(Severity.WARNING, "Offboard ended: not its takeoff")
+
     def _objection(self, sender: Hashable, setpoint: MotionSetpoint) -> str | None:
         """Why a position cannot be flown to; None when it can, or is being flown to."""
         if self._vehicle.roll.inverted and setpoint.needs_loop:
@@ -259,6 +269,8 @@ class OffboardFlight:
             return None
         try:
             resolve(setpoint, self._vehicle, self.motion)
+        except TooLow as refusal:
+            return refusal.reason.partition("efused: ")[2] if self._vehicle.in_air else None
         except Refused as refusal:
             return refusal.reason.partition("efused: ")[2] or refusal.reason
         return None
@@ -277,6 +289,7 @@ class OffboardFlight:
         if self._stream.state is State.ENGAGED and candidate == self._stream.pilot:
             return  # it flies already, and goes on without a jolt
         if self._takeoff.under_way:
+            self._takeoff.displace()
             self._join(candidate, Phase.JOINED, FlightMode.HOLD)
             return
         await self._vehicle.take_over()
@@ -353,6 +366,7 @@ class OffboardFlight:
     def end(self) -> list[asyncio.Task[None]]:
         """Whoever flew by setpoints flies no more, and the last one does not fly on. Tasks that are about to end."""
         if self._lift.stop() is Phase.COUNTING:
+            self._vehicle.mode_client = None  # who counted has to choose the mode once more, and does not count on
             self._vehicle.text(Severity.NOTICE, "Takeoff by setpoints cancelled")
         if not self.engaged:
             return []
@@ -545,6 +559,7 @@ class OffboardFlight:
         self._cancel_timer()
         deadline = self._stream.deadline()
         if deadline is not None:
+            self._watched_until = deadline
             delay = max(deadline - self._clock.monotonic(), 0.0)
             self._timer = asyncio.get_running_loop().call_later(delay, self._expired)
 

@@ -205,7 +205,9 @@ class ReturnEnd:
         attempt = self._attempt
         if attempt is None:
             return
-        if attempt.phase is _Phase.RETURNING:
+        if self._vehicle.flying_state == FlyingState.EMERGENCY_LANDING:
+            self.end()  # by the drone itself, and shown as a landing
+        elif attempt.phase is _Phase.RETURNING:
             self._watch_end(attempt)
         elif attempt.phase is _Phase.WAITING and self._vehicle.flying_state in LANDING:
             attempt.stop()
@@ -219,7 +221,7 @@ class ReturnEnd:
         """The drone has reported the return as finished."""
         if self._drone_lands:
             attempt.phase = _Phase.LANDING
-            attempt.task = asyncio.get_running_loop().create_task(self._see_landing())
+            attempt.task = asyncio.get_running_loop().create_task(self._see_landing(attempt))
         elif self.ending is EndOfReturn.HOVER:
             self._hover(None)
         elif (reason := self.objection(arrived=True)) is not None:
@@ -257,9 +259,10 @@ class ReturnEnd:
         finally:
             attempt.task = None
 
-    async def _see_landing(self) -> None:
+    async def _see_landing(self, attempt: Attempt) -> None:
         """The drone's own setting says that it lands: see to it that it is not shown for longer than it is true."""
         await asyncio.sleep(SHORTEST_WAIT)
+        attempt.task = None
         if self._vehicle.flying_state not in LANDING:
             self._hover("no landing seen")
 
@@ -321,7 +324,7 @@ class ReturnEnd:
             return "Skycontroller"
         if home.type == RthHomeType.TAKEOFF:
             target = home.takeoff_location
-            if not home.fixed_before_takeoff:
+            if target is not None and not home.fixed_before_takeoff:
                 return "home is first fix"
         elif home.type == RthHomeType.CUSTOM:
             target = home.custom_location

@@ -33,6 +33,9 @@ MOST = 200
 ROLL_INVERTED = "roll sign inverted"
 """Why a loop over velocity is refused."""
 
+INVERTED = "Roll sign inverted: velocity control refused"
+"""Text to every client."""
+
 
 class Sign(enum.Enum):
     """What is known of the sign of AttitudeChanged.roll."""

@@ -7,7 +7,7 @@ from typing import Any
 
 from anafi_mav.drone import events
 from anafi_mav.drone.events import Message
-from anafi_mav.services.roll_sign import Sign
+from anafi_mav.services.roll_sign import INVERTED, Sign
 from anafi_mav.services.service import Service
 from anafi_mav.services.statustext import Severity
 
@@ -15,7 +15,6 @@ KEY = "roll_sign"
 """Name of the record in the drone's file."""
 
 VERIFIED = "Roll sign verified"
-INVERTED = "Roll sign inverted: velocity control refused"
 
 
 def written(firmware: str, sign: Sign) -> Mapping[str, Any]:

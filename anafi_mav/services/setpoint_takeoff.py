@@ -46,6 +46,9 @@ class Launcher(Protocol):
     def is_armed_by(self, client: Hashable) -> bool:
         """Has this client armed the vehicle for the flight that begins now?"""
 
+    def displace(self) -> None:
+        """Cancel the command that waits for the end of a take-off."""
+
     async def launch(self) -> None:
         """Take off to the drone's own height; returns when the drone confirmed it."""
 

@@ -173,11 +173,11 @@ class Takeoff:
             raise Refused("Takeoff refused: the drone is in the air")
         if problems := vehicle.prearm_problems():
             raise Refused("PreArm: " + "; ".join(problems))
+        await vehicle.take_over()  # also where it waits for arming: what lifts off then is replaced now
         if not self._armed:
             self._pending = (height, client)
             self._set_timer("_pending_timer", ARM_WAIT, self._lapsed)
             return
-        await vehicle.take_over()
         await self._lift_off()
         if vehicle.selected is not FlightMode.GUIDED:
             vehicle.forget_mode()
@@ -191,7 +191,7 @@ class Takeoff:
 
     async def abort(self) -> None:
         """Disarm a drone that stands, land one that is about to leave the ground: its setpoints have stopped."""
-        await self._vehicle.take_over()
+        await self._vehicle.take_over(STOP_WAIT)
         await self._vehicle.drone.piloting.land()
         self._armed = False
         self._vehicle.changed()
@@ -205,8 +205,7 @@ class Takeoff:
         """
         if not self.rises:
             return
-        if self._waiting is not None:
-            self._waiting.cancel()
+        self.displace()
         current = self._waiting = asyncio.current_task()
         end = asyncio.get_running_loop().create_task(self._until_risen())
         try:
@@ -219,6 +218,12 @@ class Takeoff:
             end.cancel()
             if self._waiting is current:
                 self._waiting = None
+
+    def displace(self) -> None:
+        """Cancel the command that waits for the end of a take-off: a newer one is flown at that end."""
+        waiting, self._waiting = self._waiting, None
+        if waiting is not None:
+            waiting.cancel()
 
     async def _until_risen(self) -> bool:
         """Wait for the end of a take-off, or of a rise. True: it has reached its height. Never raises."""
@@ -270,6 +275,7 @@ class Takeoff:
     async def _lift_off(self) -> None:
         """The drone's own take-off. Until it has succeeded or failed, the armed state does not lapse."""
         self._cancel_timer("_disarm_timer")
+        self._vehicle.paused = False  # a pause that comes from here on ends this take-off
         try:
             await self._vehicle.drone.piloting.take_off()
         finally:

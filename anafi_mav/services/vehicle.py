@@ -51,6 +51,7 @@ from anafi_mav.services.rally import RallyPoints
 from anafi_mav.services.refusal import Refused
 from anafi_mav.services.return_end import ReturnEnd
 from anafi_mav.services.right import Extent, Right
+from anafi_mav.services.roll_sign import INVERTED
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.takeoff import Takeoff
 
@@ -71,6 +72,8 @@ POSITION_OLD = 3.0
 LOCATIONS_MISSED = 3
 """A drone that reports its location more rarely (a slowed simulator) may miss as many."""
 
+
+ESTIMATED = f"Take-off altitude estimated: GPS only (+-{ESTIMATE_ERROR:g} m)"
 
 GOOD_ACCURACY = 5
 """m of one standard deviation of GPS altitude that AMSL heights can be used with, without a text."""
@@ -289,6 +292,8 @@ class Vehicle(Aircraft):
         """Fly home by the drone's own return. A landing goes on unless `by` ends it."""
         if self.on_ground:
             raise Refused("Return refused: the drone is on the ground")
+        if self.return_end.shown:
+            return  # it waits above home or lands there, and would climb and fly home once more
         commanded = None if by is None else replace(by, extent=Extent.COMMANDED)
         if lands := self.landing:
             self._require_endable("Return", commanded)
@@ -321,17 +326,19 @@ class Vehicle(Aircraft):
         own = self.returning_by_itself
         rising = self.drone.piloting.about_to_fly
         latched = self.paused and (pause or mode is self.mode)
-        before, self.paused = self.paused, self.paused or pause
+        before, orders = self.paused, self.orders
+        self.paused = before or pause
         try:
             await self.take_over(STOP_WAIT)
             if not self.on_ground or rising:
                 with self._selected_no_more(mode):
                     await self._stop(mode.value, by, own=own)
         except BaseException:
-            self.paused = before
+            if self.orders <= orders + 1:  # else a newer command has replaced this one, and the latch is its own
+                self.paused = before
             raise
         self.select(mode)
-        self.paused = (latched or pause) and not self.on_ground
+        self.paused = (latched or pause) and (rising or not self.on_ground)
         if rising:
             self.text(Severity.WARNING, f"{mode.value}: a take-off may follow, to 1 m")
 
@@ -539,6 +546,8 @@ class Vehicle(Aircraft):
             self._takeoff_before = self.drone.home.state.takeoff_location
         if not self.on_ground:
             self.takeoff.left_ground()
+            if before in ON_GROUND:
+                self.offboard.left_ground()
         self.return_end.on_flying_state()
         self.changed()
 
@@ -559,7 +568,7 @@ class Vehicle(Aircraft):
             if self.origin is None:
                 self.origin = self.place
         elif self.flying_state is not None and self.height.in_flight(self.drone.product.state.flight_id, amsl, ato):
-            self.text(Severity.WARNING, f"Take-off altitude estimated: GPS only (+-{ESTIMATE_ERROR:g} m)")
+            self.text(Severity.WARNING, ESTIMATED)
 
     def _report_accuracy(self) -> None:
         """Report that AMSL heights of this flight will be wrong by as much as GPS is at its beginning."""
@@ -591,6 +600,12 @@ class Vehicle(Aircraft):
         if home.type == RthHomeType.TAKEOFF and home.location is not None:
             return Place(home.location.latitude, home.location.longitude)
         return None
+
+    @property
+    def standing_warnings(self) -> list[str]:
+        """Texts that stay true for a while: a client that connects later gets them with its banner."""
+        warnings = [ESTIMATED] if self.height.estimated and not self.on_ground else []
+        return [*warnings, INVERTED] if self.roll.inverted else warnings
 
     @property
     def takeoff_record(self) -> TakeoffRecord | None:
@@ -640,7 +655,10 @@ class Vehicle(Aircraft):
         return self.return_end.alone if self.descends else None
 
     async def let_go(self) -> None:
-        """The gateway ends: a landing or a return goes on, everything else is ended, and a flying drone hovers."""
+        """The gateway ends: a landing or a return goes on, everything else is ended, and a flying drone hovers.
+
+        One whose sticks are the Skycontroller pilot's is left to him: nothing of ours flies it.
+        """
         if self.descends:
             if not self.landing:
                 self.return_end.end()
@@ -648,7 +666,7 @@ class Vehicle(Aircraft):
         await self.take_over()
         if self.drone.piloting.about_to_fly:
             await self.drone.piloting.land()
-        if not self.on_ground:
+        if not self.on_ground and not self.drone.controller.pilot_has_source:
             await self.drone.piloting.stop()
 
     def _note_landing(self, before: FlyingState | None) -> None:

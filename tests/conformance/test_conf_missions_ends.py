@@ -33,6 +33,7 @@ from support.trouble import return_by_itself
 from support.world import ARMED, World, world
 
 from anafi_mav.arsdk.messages import ardrone3, common
+from anafi_mav.sim.faults import Impairment
 from anafi_mav.sim.quirks import Quirk
 
 WAIT = Item(93, 0.0, 0.0, p1=2.0, frame=2)
@@ -212,3 +213,16 @@ async def test_mission_stopped_by_an_alert_at_its_last_way_point_is_paused() -> 
         await start(w)
         await state(w, PAUSED, seq=2, since=0)
         assert reached(w) == [0, 1]
+
+
+@pytest.mark.parametrize("quirk", [Quirk.LAST_ITEM_NOT_REPORTED, Quirk.STOPPED_BEFORE_EXECUTED])
+async def test_mission_with_quirk_completes_over_a_bad_link(quirk: Quirk) -> None:
+    """200 ms and a quarter of the datagrams lost, both ways."""
+    async with world(web=True) as w:
+        w.drone.faults.quirks = frozenset({quirk})
+        await put(w, PLAIN["way-point"])
+        await start(w)
+        await state(w, ACTIVE, seq=1, since=0)
+        w.drone.faults.up = w.drone.faults.down = Impairment(loss=0.25, delay=0.2)
+        await state(w, COMPLETE, since=0, timeout=60.0)
+        assert reached(w) == [0, 1, 2]

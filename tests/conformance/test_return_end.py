@@ -17,6 +17,7 @@ from support.mav import NAN, Client
 from support.missions import RTL as RTL_ITEM
 from support.missions import put, start, takeoff, way
 from support.params import read, value_of, write
+from support.plans import RALLY, Item, upload
 from support.setpoints import texts
 from support.trouble import return_by_itself, somebody_else
 from support.world import ARMED, HOLD, HOME, World, world
@@ -108,6 +109,18 @@ async def test_hold_above_home_cancels_the_landing() -> None:
         await asyncio.sleep(5.5)  # longer than what was left
         assert landings(w) == []
         assert w.drone.flying_state.name == "HOVERING"
+
+
+async def test_return_commanded_again_above_home_does_not_begin_once_more() -> None:
+    """PX4 and ArduCopter stay in their mode then: a program that sends it every second must come down."""
+    async with world(speed=FAST) as w:
+        await away(w)
+        mark = await go_home(w)
+        await said(w.client, "Landing in 5 s", mark)
+        assert (await w.client.command(SET_MODE, 1, 4, 5)).result == ACCEPTED
+        await landed(w, mark)
+        assert len(w.commands("rth.return_to_home")) == 1
+        assert "cancelled" not in " ".join(texts(w.client, mark))
 
 
 async def test_return_ended_by_another_clients_hold_does_not_land() -> None:
@@ -326,3 +339,34 @@ async def test_names_of_both_families_are_one_setting(flavour: str) -> None:
             assert value_of(await write(client, "RTL_LOIT_TIME", 9000, INT32, flavour), flavour) == 9000.0
             assert value_of(await read(client, "ANF_RTL_WAIT"), flavour) == 9.0
         assert not [e for e in w.drone.log if e.kind == "command" and e.name.startswith("rth.set_")]
+
+
+async def test_return_to_a_rally_point_lands_there() -> None:
+    async with world(speed=FAST) as w:
+        await write(w.client, "ANF_RTL_TYPE", 1, INT32)
+        place = geo.destination(*HOME[:2], 10.0, 0.0)
+        point = Item(dialect.MAV_CMD_NAV_RALLY_POINT, *place, z=5.0, frame=dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT)
+        assert (await upload(w.client, [point], RALLY)).type == ACCEPTED
+        mark = w.client.mark()
+        await away(w)
+        await said(w.client, "Returns end at rally point 0", mark)
+        mark = await go_home(w)
+        await said(w.client, "Return by system 255: lands at rally point 0", mark)
+        await said(w.client, "Landing place: rally point 0, ", mark)
+        await w.client.heartbeat(lambda beat: not beat.base_mode & ARMED, since=mark, timeout=30.0)
+        assert math.hypot(w.drone.pose.north - 10.0, w.drone.pose.east) < 1.0
+
+
+@both
+async def test_return_over_a_bad_link_ends_landed_once(flavour: str) -> None:
+    """200 ms and 25 % loss both ways: one return, one landing, and the mode is never another one."""
+    async with world(speed=2.0, flavour=flavour) as w:
+        await away(w)
+        w.drone.faults.up = w.drone.faults.down = Impairment(loss=0.25, delay=0.2)
+        mark = w.client.mark()
+        assert (await w.client.command(RTL, timeout=15.0)).result == ACCEPTED
+        await said(w.client, "Landing in 5 s", mark)
+        await landed(w, mark)
+        w.drone.faults.up = w.drone.faults.down = Impairment()
+        assert len(landings(w)) == 1
+        assert len(w.commands("rth.return_to_home")) == 1

@@ -14,10 +14,12 @@ from support.world import HOLD, HOME, World, loopback, world
 
 from anafi_mav.config import Config, DroneConfig
 from anafi_mav.gateway import Gateway
-from anafi_mav.services.roll_sign import Sign
-from anafi_mav.services.roll_sign_service import INVERTED, VERIFIED
+from anafi_mav.services.roll_sign import INVERTED, Sign
+from anafi_mav.services.roll_sign_service import VERIFIED
 from anafi_mav.sim import DroneSpec, Simulator
+from anafi_mav.sim.faults import Impairment
 from anafi_mav.sim.quirks import Quirk
+from anafi_mav.sim.wind import WindSpec
 
 SET_MODE, ORBIT = dialect.MAV_CMD_DO_SET_MODE, dialect.MAV_CMD_DO_ORBIT
 ACCEPTED, REJECTED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_TEMPORARILY_REJECTED
@@ -93,6 +95,27 @@ async def test_velocity_setpoints_with_inverted_roll_end_in_a_hover_and_are_refu
         async with streaming(w.client, local(POSITION_ONLY, at=(6.0, 0.0, -5.0))):
             await engage(w.client, "px4")
             await w.drone.wait_log(lambda e: math.dist((w.drone.pose.north, w.drone.pose.east), (6.0, 0.0)) < 0.7, 20.0)
+
+
+@pytest.mark.parametrize("quirks", [frozenset(), INVERT], ids=["assumed", "inverted"])
+async def test_velocity_setpoints_with_unverified_roll_over_a_bad_link_stay_bounded(quirks: frozenset[Quirk]) -> None:
+    """200 ms and a quarter of the datagrams lost, both ways, in 3 m/s of wind from the side."""
+    async with world(speed=1.0) as w:
+        w.drone.faults.quirks = quirks
+        allow_speed(w)
+        await w.take_off()
+        w.drone.wind.spec = WindSpec(3.0, 90.0)
+        w.drone.faults.up = w.drone.faults.down = Impairment(loss=0.25, delay=0.2)
+        began = w.drone.log[-1].t
+        async with streaming(w.client, east_and_west(w)):
+            await engage(w.client, "px4")
+            await said(w, INVERTED if quirks else VERIFIED)
+            known = w.drone.log[-1].t
+        assert most_tilt(w, began, known) < 13.0
+        speeds = [
+            math.hypot(e.args["vn"], e.args["ve"]) for e in w.drone.log if e.kind == "pose" and began < e.t < known
+        ]
+        assert max(speeds) < 5.5
 
 
 @pytest.mark.parametrize("firmware", ["1.8.2", "1.8.1"])

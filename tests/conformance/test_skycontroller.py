@@ -159,6 +159,7 @@ async def test_pilots_stick_in_bad_air_takes_the_drone(generation: int, way: str
         moved = asyncio.get_running_loop().time()
         pilot.stick(PITCH_STICK, 60)
         await w.drone.wait_log(lambda e: pilot.source is Source.SKY_CONTROLLER and pilot.grabbed_axes == 0, 10.0)
+        await w.client.wait("STATUSTEXT", lambda m: m.text == "Skycontroller pilot has control: stick moved", since=0)
         stopped = {"goto": "CancelMoveTo", "mission": "Pause"}[way]
         await w.drone.wait_log(lambda e: e.name.endswith(stopped) and e.t >= moved, 10.0)
         # His stick flies the drone, and nothing of ours follows.
@@ -181,4 +182,22 @@ async def test_silence_while_pilot_flies_sends_nothing_against_him(generation: i
         w.drone.faults.mute = False
         await w.client.heartbeat(lambda beat: True, timeout=5.0)
         await asyncio.sleep(2.0)
+        assert heard(w, *ACTS) == before
+
+
+async def test_end_of_gateway_while_pilot_flies_sends_nothing_against_him() -> None:
+    async with world(speed=1.0, skycontroller=3) as w:
+        pilot = w.drone.skycontroller
+        assert pilot is not None
+        await to_the_pilot(w)
+        pilot.stick(PITCH_STICK, 60)
+        # After a silence a move of before could be under way, as far as the gateway knows.
+        w.drone.faults.mute = True
+        await asyncio.sleep(3.2)
+        w.drone.faults.mute = False
+        await w.client.heartbeat(lambda beat: True, timeout=5.0)
+        before = heard(w, *ACTS)
+        north = w.drone.pose.north
+        await w.gateway.close()
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > north + 3.0, 20.0)
         assert heard(w, *ACTS) == before

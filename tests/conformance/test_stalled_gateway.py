@@ -13,9 +13,10 @@ from typing import Any, cast
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.missions import CORNERS, put, start
+from support.plans import around
 from support.process import gateway_process
-from support.trouble import ACCEPTED, PX4_OFFBOARD, goto, heard
-from support.world import HOME, WEB_PORT, World, loopback
+from support.trouble import ACCEPTED, GOTO, PX4_OFFBOARD, goto, heard
+from support.world import HOLD, HOME, WEB_PORT, World, loopback
 
 from anafi_mav.arsdk.messages.skyctrl import Source
 from anafi_mav.gateway import Gateway
@@ -28,6 +29,8 @@ PITCH_STICK = 3
 
 LIMIT = 2.5
 """s that the gateway's event loop may stall: more than this machine makes it wait."""
+
+AXES = ("roll", "pitch", "yaw", "gaz")
 
 BAD_AIR = Impairment(loss=0.25, delay=0.2)
 
@@ -68,6 +71,10 @@ async def set_out(w: World, way: str) -> asyncio.Task[Any] | None:
         assert await goto(w, 200.0, 10.0) == ACCEPTED
         return None
 
+    if way == "orbit":
+        assert (await w.client.command(dialect.MAV_CMD_DO_ORBIT, 8.0, 2.0)).result == ACCEPTED
+        return None
+
     async def stream() -> None:
         while True:
             rotation = list(quaternion_from_euler(0.0, -0.05, 0.0))
@@ -93,7 +100,7 @@ async def sees(w: World, true: Any, timeout: float = 20.0) -> None:
 
 
 @pytest.mark.parametrize("generation", [3, 4])
-@pytest.mark.parametrize("way", ["goto", "mission", "offboard"])
+@pytest.mark.parametrize("way", ["goto", "mission", "offboard", "orbit"])
 async def test_pilot_has_sticks_while_gateway_is_stopped(tmp_path: Path, way: str, generation: int) -> None:
     async with apart(tmp_path, generation) as (w, gateway):
         pilot = w.drone.skycontroller
@@ -138,3 +145,29 @@ async def test_stopped_gateway_with_nothing_flying_sends_nothing(tmp_path: Path)
         stopped = w.drone.log[len(w.drone.log) - 1].t
         await w.drone.wait_log(lambda e: e.kind == "pose" and e.t > stopped + 2.0 * LIMIT, 30.0)
         assert [e.t for e in w.drone.log if e.kind == "controller"] == before
+
+
+def deflected(w: World, since: float) -> list[float]:
+    """When stick positions that move the drone reached it after a moment."""
+    return [e.t for e in w.commands("ardrone3.Piloting.PCMD") if e.t > since and any(e.args[axis] for axis in AXES)]
+
+
+async def test_what_clients_sent_to_a_stopped_gateway_is_not_carried_out(tmp_path: Path) -> None:
+    """A program's setpoints and a goto wait in the gateway's socket; the program is gone when it runs again."""
+    async with apart(tmp_path, None) as (w, gateway):
+        task = await set_out(w, "offboard")
+        assert task is not None
+        loop = asyncio.get_running_loop()
+        await w.drone.wait_log(lambda e: e.name.endswith("PCMD") and e.args["pitch"] > 10, 10.0)
+        gateway.send_signal(signal.SIGSTOP)
+        await asyncio.sleep(1.5)  # the program sends on
+        place = around((HOME[0], HOME[1]), (100.0, 0.0))[0]
+        w.client.send_command(GOTO, -1, 1, 0, frame=6, x=place[0], y=place[1], z=10.0)
+        task.cancel()
+        await asyncio.sleep(1.5)
+        back, mark = loop.time(), w.client.mark()
+        gateway.send_signal(signal.SIGCONT)
+        await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD, since=mark, timeout=10.0)
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.t > back + 2.0, 10.0)
+        assert deflected(w, back) == []
+        assert heard(w, "moveTo") == []

@@ -155,11 +155,15 @@ async def test_two_aircraft_with_one_address_fly_at_once(spaces: tuple[str, str,
         inside(left, *options, "--model", "4k", "--log", str(logs[0])),
         inside(right, *options, "--model", "thermal", "--log", str(logs[1])),
         found(home, "discover") as discovery,
-        found(home, "info", f"{AIRCRAFT}%wlan2") as info,
+        found(home, "info", f"{AIRCRAFT}%wlan2", "--take") as info,
+        found(home, "doctor", f"{AIRCRAFT}%wlan1") as examined,
         inside(home, "run", "-c", str(config)) as gateway,
     ):
         assert {drone.interface for drone in from_text("\n".join(discovery), "stdout").drones} == {"wlan1", "wlan2"}
         assert "model: ANAFI Thermal" in info
+        assert "adapter: ok: wlan1" in examined
+        assert any(line.startswith("model: ok: ANAFI 4K") for line in examined)
+        assert not [line for line in examined if "WRONG" in line]
         lines = [line for line in gateway.lines if line.startswith("drone ")]
         assert f"left: system 1 at {AIRCRAFT} on wlan1: ANAFI 4K" in lines[0]
         assert f"right: system 2 at {AIRCRAFT} on wlan2: ANAFI Thermal" in lines[1]

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import sys
 from pathlib import Path
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.mav import Client
 from support.product import product, program
 from support.world import loopback
 
@@ -75,3 +78,23 @@ async def test_unreadable_state_folder_is_reported(tmp_path: Path) -> None:
         assert any("state folder cannot be used" in line for line in p.complaints), p
         p.process.send_signal(signal.SIGTERM)
         assert await p.end() == 1
+
+
+async def test_run_with_every_message_logged_passes_no_escapes_on(tmp_path: Path) -> None:
+    """A client's text, and a parameter's name that no vehicle has, with sequences for the operator's terminal."""
+    address = loopback()
+    async with product(tmp_path, fleet(address, loopback()), "-vv") as p:
+        client = await Client().connect(5760, address)
+        await client.heartbeat(lambda beat: True)
+        client.send(dialect.MAVLink_statustext_message(6, b"\x1b]0;owned\x07 hello\nforged"))
+        client.send(dialect.MAVLink_param_request_read_message(1, 1, b"\x1b[2JX", -1))
+        client.send(dialect.MAVLink_param_request_read_message(1, 1, b"ANF_MODEL", -1))
+        await client.wait("PARAM_VALUE", lambda m: m.param_id == "ANF_MODEL", since=0)
+        await client.close()
+        p.process.send_signal(signal.SIGTERM)
+        assert await p.end() == 0
+    logged = "\n".join(p.complaints)
+    assert "owned" in logged
+    assert not {"\x1b", "\x07"} & set(logged)
+    assert not [line for line in p.complaints if line.startswith("forged")]
+    assert all(re.match(r"\d{4}-\d\d-\d\d [\d:,]+ (DEBUG|INFO|WARNING) [a-z_.]+: ", line) for line in p.complaints)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import io
+import json
 import logging
+import math
 
 import pytest
 
 from anafi_mav.cli.log import FORMAT, REPEAT_EVERY, CleanFormatter, RepeatFilter
-from anafi_mav.cli.terminal import complain, say
+from anafi_mav.cli.terminal import complain, say, say_json
 from anafi_mav.printable import printable
 from anafi_mav.subject import DRONE
 
@@ -125,3 +127,12 @@ async def test_log_line_of_code_that_knows_no_drone_names_it() -> None:
         "bravo: link lost",
         "bravo: sticks are given back",
     ]
+
+
+def test_json_of_a_command_is_json_and_ascii(capsys: pytest.CaptureFixture[str]) -> None:
+    value = {"name": "Zoë\x1b[2J\x7f", "range": (1.5, math.nan, [math.inf]), "none": None}
+    say_json(value)
+    out = capsys.readouterr().out
+    assert out.isascii()
+    assert not {"\x1b", "\x7f"} & set(out)
+    assert json.loads(out) == {"name": value["name"], "range": [1.5, None, [None]], "none": None}

@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from anafi_mav.services.roll_sign_service import INVERTED, VERIFIED
+from anafi_mav.services.roll_sign import INVERTED
+from anafi_mav.services.roll_sign_service import VERIFIED
 from anafi_mav.sim.quirks import QUIRKS
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -51,11 +52,11 @@ def test_new_statustexts_fit_one_message() -> None:
         VERIFIED,
         "Take-off altitude estimated: GPS only (+-10 m)",
         "Take-off altitude inaccurate: GPS +-127 m",
-        "Refused: estimated AMSL height -1234 m < 15 m",
+        "Setpoint refused: estimated AMSL: -1234 m < 15 m",
         "Mission refused: item 5000: estimated AMSL < 15 m",
-        "Refused: take-off altitude unknown: no GPS fix",
-        "Refused: take-off place unknown: no local frame",
-        "Goto refused: 4000 m from geofence centre > 4000 m",
+        "Setpoint refused: AMSL unknown: no GPS fix",
+        "Setpoint refused: take-off place unknown",
+        "Setpoint refused: 4000 m off fence centre > 4000 m",
         "Drone's fence circle ends: centre is 12345 m off",
         "Tilt limit 10 deg: roll sign not verified yet",
         "Offboard refused: roll sign inverted",

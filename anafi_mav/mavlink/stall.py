@@ -1,0 +1,60 @@
+"""Notices that the host stalled: what clients sent meanwhile is old, and must not be carried out as if it were new.
+
+A stopped or overloaded process finds in its sockets what arrived while it could not read: setpoints of a program that
+has ended since, commands whose client has given up waiting. They carry no time of their own.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+
+BEAT = 0.1
+"""s between two signs that the event loop runs."""
+
+STALL = 1.0
+"""s without one after which the host counts as stalled."""
+
+DRAIN = 0.3
+"""s after a stall within which the sockets are emptied of what arrived meanwhile."""
+
+
+class StallWatch:
+    """Watches one event loop between `start` and `stop`."""
+
+    def __init__(self, on_stall: Callable[[float], None]) -> None:
+        """`on_stall` is called with the length of a stall, s, when it is over."""
+        self._loop = asyncio.get_running_loop()
+        self._on_stall = on_stall
+        self._beaten = self._loop.time()
+        self._drained = self._beaten
+        self._timer: asyncio.TimerHandle | None = None
+
+    def start(self) -> None:
+        """Begin to watch."""
+        self._beaten = self._loop.time()
+        self._timer = self._loop.call_later(BEAT, self._beat)
+
+    def stop(self) -> None:
+        """Watch no longer."""
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
+    @property
+    def old(self) -> bool:
+        """True for what is read from a socket now, if it may have arrived during a stall.
+
+        An event loop reads its sockets before it runs its timers: the first look after a stall finds no beat.
+        """
+        now = self._loop.time()
+        return self._timer is not None and (now - self._beaten >= STALL or now < self._drained)
+
+    def _beat(self) -> None:
+        now = self._loop.time()
+        late = now - self._beaten
+        self._beaten = now
+        self._timer = self._loop.call_later(BEAT, self._beat)
+        if late >= STALL:
+            self._drained = now + DRAIN
+            self._on_stall(late)

@@ -1,0 +1,181 @@
+"""Where two features meet: what one client began, and what another one's command, or the drone, makes of it.
+
+Judged by the commands that the simulated drone received and by where it flew.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.mav import NAN
+from support.setpoints import POSITION_ONLY, VELOCITY_ONLY, attitude, engage, heard, local, said, streaming
+from support.trouble import ACCEPTED, CANCELLED, IN_PROGRESS, goto, somebody_else, watched
+from support.world import HOLD, HOME, OFFBOARD, World, world
+
+from anafi_mav import geo
+from anafi_mav.arsdk.messages import ardrone3, rth
+from anafi_mav.sim.faults import Impairment
+
+ARM, TAKEOFF, LAND = dialect.MAV_CMD_COMPONENT_ARM_DISARM, dialect.MAV_CMD_NAV_TAKEOFF, dialect.MAV_CMD_NAV_LAND
+GOTO, SET_MODE, PAUSE = dialect.MAV_CMD_DO_REPOSITION, dialect.MAV_CMD_DO_SET_MODE, dialect.MAV_CMD_DO_PAUSE_CONTINUE
+RTL = dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH
+NORTH = local(VELOCITY_ONLY, v=(2.0, 0.0, 0.0))
+
+
+async def flies_nowhere(w: World, seconds: float = 3.0) -> None:
+    where = w.drone.pose.north
+    await watched(seconds)
+    assert abs(w.drone.pose.north - where) < 1.0
+    assert w.drone.pose.ground_speed < 0.5
+
+
+async def test_pause_that_replaces_another_one_holds_against_setpoints() -> None:
+    """Two stations press Pause at a goto, the answer to the first is on its way: a program that begins is ignored."""
+    async with world(speed=1.0, flavour="ardupilot", clients=2) as w:
+        program = await w.connect(sysid=240)
+        await w.take_off(10.0)
+        assert await goto(w, 200.0, 10.0) == ACCEPTED
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 3.0, 15.0)
+        w.drone.faults.down = Impairment(delay=0.4)
+        w.drone.faults.up = Impairment(delay=0.4)
+        mark = w.clients[1].mark()
+        w.client.send_command(PAUSE, 0)
+        await asyncio.sleep(0.2)
+        w.clients[1].send_command(GOTO, -1, 0, 0, NAN)
+        await asyncio.sleep(0.1)
+        async with streaming(program, NORTH):
+            ack = await w.clients[1].wait(
+                "COMMAND_ACK", lambda m: m.command == GOTO and m.result != IN_PROGRESS, since=mark
+            )
+            assert ack.result == ACCEPTED
+            await w.drone.wait_log(lambda e: w.drone.pose.ground_speed < 0.3, 15.0)
+            await flies_nowhere(w)
+
+
+async def test_pause_while_the_take_off_is_on_its_way_holds_against_setpoints() -> None:
+    """TakeOff has left and is not confirmed: the drone may rise to 1 m, and hovers there."""
+    async with world(speed=1.0, flavour="ardupilot", clients=2) as w, streaming(w.clients[1], NORTH):
+        assert (await w.client.command(SET_MODE, 1, 4)).result == ACCEPTED
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        w.drone.faults.down = Impairment(delay=0.4)
+        w.client.send_command(TAKEOFF, x=0.0, y=0.0, z=5.0)
+        await w.drone.wait_log(lambda e: e.name.endswith(".TakeOff"), 5.0)
+        assert (await w.client.command(PAUSE, 0)).result == ACCEPTED
+        w.drone.faults.down = Impairment()
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "hovering", 15.0)
+        await flies_nowhere(w)
+
+
+async def test_land_in_the_second_before_a_guided_takeoff_ends_it() -> None:
+    """The program streams on, armed and in Guided: Land is as good an end of the second as Hold."""
+    async with world(flavour="ardupilot", clients=2) as w:
+        mark = w.client.mark()
+        assert (await w.client.command(SET_MODE, 1, 4)).result == ACCEPTED
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        async with streaming(w.client, attitude(thrust=0.7)):
+            await said(w.client, "Takeoff by setpoints of system 255", mark)
+            assert (await w.clients[1].command(LAND)).result == ACCEPTED
+            await said(w.client, "Takeoff by setpoints cancelled", mark)
+            await watched(2.5)
+        assert heard(w, "TakeOff") == []
+
+
+async def test_take_off_that_waits_for_arming_replaces_a_session_on_the_ground() -> None:
+    """QGroundControl sends its take-off before it arms; a program in Offboard on the ground streams a velocity."""
+    async with world(clients=2) as w:
+        station = w.clients[1]
+        async with streaming(w.client, NORTH):
+            await engage(w.client, "px4")
+            assert (await station.command(TAKEOFF, x=0.0, y=0.0, z=4.0)).result == ACCEPTED
+            await station.heartbeat(lambda beat: beat.custom_mode == HOLD)
+            assert (await station.command(ARM, 1)).result == ACCEPTED
+            await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "hovering", 15.0)
+            await w.at_height(4.0)
+            await watched(1.5)
+        assert [e for e in heard(w, "PCMD") if e.args["pitch"]] == []
+
+
+async def test_session_on_the_ground_does_not_fly_a_drone_that_somebody_else_takes_off() -> None:
+    """The pilot at a Skycontroller takes off while a program, not armed, is in Offboard: it is his flight."""
+    async with world(clients=1) as w:
+        async with streaming(w.client, NORTH):
+            await engage(w.client, "px4")
+            mark = w.client.mark()
+            somebody_else(w, ardrone3.TakeOff())
+            await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "hovering", 15.0)
+            await said(w.client, "Offboard ended: not its takeoff", mark)
+            await watched(1.5)
+            await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD)
+        assert [e for e in heard(w, "PCMD") if e.args["pitch"]] == []
+
+
+async def test_offboard_in_a_climb_replaces_a_goto_that_waits_for_it() -> None:
+    """The newer of two commands is flown, and the client of the older one receives CANCELLED."""
+    async with world(clients=2) as w:
+        program = w.clients[1]
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        assert (await w.client.command(TAKEOFF, x=0.0, y=0.0, z=6.0)).result == ACCEPTED
+        mark = w.client.mark()
+        place = geo.destination(*HOME[:2], 30.0, 0.0)
+        w.client.send_command(GOTO, -1, 1, 0, NAN, frame=6, x=place[0], y=place[1], z=8.0)
+        await w.client.wait("COMMAND_ACK", lambda m: m.command == GOTO, since=mark)
+        async with streaming(program, local(VELOCITY_ONLY, v=(0.0, 2.0, 0.0))):
+            assert (await program.command(SET_MODE, 1, 6, 0)).result == ACCEPTED
+            await w.client.wait("COMMAND_ACK", lambda m: (m.command, m.result) == (GOTO, CANCELLED), since=mark)
+            await w.client.heartbeat(lambda beat: beat.custom_mode == OFFBOARD, timeout=15.0)
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["east"] > 2.0, 15.0)
+        assert heard(w, "moveTo") == []
+
+
+@pytest.mark.parametrize("kind", ["position", "attitude"])
+async def test_setpoint_after_a_velocity_of_guided_lasts_as_long_as_its_own_kind(kind: str) -> None:
+    """A program that ends its velocities, sends one kind that lasts half a second, and dies."""
+    async with world(speed=1.0, flavour="ardupilot") as w:
+        await w.take_off()
+        loop = asyncio.get_running_loop()
+        last = local(POSITION_ONLY, at=(300.0, 0.0, -10.0)) if kind == "position" else attitude(pitch=-0.15)
+        async with streaming(w.client, NORTH):
+            await watched(1.6)  # just after the watch over them was wound up
+        mark = w.client.mark()
+        async with streaming(w.client, last):
+            pass
+        died = loop.time()
+        await said(w.client, "Offboard setpoints stopped: hovering", mark)
+        assert loop.time() - died < 0.8
+
+
+async def test_landing_at_home_by_the_drones_setting_that_is_ended_elsewhere_is_not_shown_for_ever() -> None:
+    """While Return is shown, station loss and fence leave the drone alone: it has to be true."""
+    async with world(speed=1.0) as w:
+        w.drone.firmware.receive(
+            rth.SetEndingBehavior(rth.RthEndingBehavior.LANDING), asyncio.get_running_loop().time()
+        )
+        await w.take_off(12.0)
+        assert (await w.client.command(RTL)).result == ACCEPTED
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landing", 40.0)
+        await watched(6.0)
+        mark = w.client.mark()
+        somebody_else(w, ardrone3.TakeOff())
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "hovering", 5.0)
+        await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD, since=mark)
+
+
+async def test_silence_before_the_takeoff_waits_half_a_second_for_what_it_replaces() -> None:
+    """A home that is being undone takes five seconds: the motors stop before."""
+    async with world(speed=1.0, clients=2) as w:
+        program: Any = attitude(thrust=0.4)
+        async with streaming(w.client, lambda: program):
+            assert (await w.client.command(ARM, 1)).result == ACCEPTED
+            await engage(w.client, "px4")
+            program = attitude(thrust=0.7)
+            await w.drone.wait_log(lambda e: e.name.endswith(".TakeOff"), 5.0)
+            w.drone.faults.untold = frozenset({rth.CustomLocation.NAME, rth.PreferredHomeType.NAME})
+            w.clients[1].send_command(dialect.MAV_CMD_DO_SET_HOME, 0, frame=0, x=48.88, y=2.37, z=0.0)
+            await w.drone.wait_log(lambda e: e.kind == "command" and e.name.startswith("rth.set"), 5.0)
+        loop = asyncio.get_running_loop()
+        died = loop.time()
+        await w.drone.wait_log(lambda e: e.kind == "command" and e.name.endswith(".Landing"), 10.0)
+        assert loop.time() - died < 1.3

@@ -1,0 +1,35 @@
+"""A stall of the host is noticed before anything that arrived meanwhile is read."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+
+from support.clock import everybodys
+
+from anafi_mav.mavlink.stall import STALL, StallWatch
+
+
+async def test_stall_makes_what_is_read_next_old_until_the_sockets_are_drained() -> None:
+    stalls: list[float] = []
+    watch = StallWatch(stalls.append)
+    watch.start()
+    with everybodys():
+        await asyncio.sleep(0)  # the clock of callbacks that began before goes slower
+        time.sleep(1.2 * STALL)  # noqa: ASYNC251
+        assert watch.old  # before any timer has run
+        assert stalls == []
+        while watch.old:  # noqa: ASYNC110
+            await asyncio.sleep(0.05)
+        assert stalls[0] >= STALL
+    watch.stop()
+
+
+async def test_stopped_watch_finds_nothing_old() -> None:
+    watch = StallWatch(lambda seconds: None)
+    watch.start()
+    watch.stop()
+    with everybodys():
+        await asyncio.sleep(0)  # the clock of callbacks that began before goes slower
+        time.sleep(1.2 * STALL)  # noqa: ASYNC251
+        assert not watch.old
