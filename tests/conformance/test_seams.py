@@ -11,6 +11,9 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.mav import NAN
+from support.params import write
+from support.plans import ACCEPTED as TAKEN
+from support.plans import FENCE, circle, upload
 from support.setpoints import POSITION_ONLY, VELOCITY_ONLY, attitude, engage, heard, local, said, streaming
 from support.trouble import ACCEPTED, CANCELLED, IN_PROGRESS, goto, somebody_else, watched
 from support.world import HOLD, HOME, OFFBOARD, World, world
@@ -179,3 +182,21 @@ async def test_silence_before_the_takeoff_waits_half_a_second_for_what_it_replac
         died = loop.time()
         await w.drone.wait_log(lambda e: e.kind == "command" and e.name.endswith(".Landing"), 10.0)
         assert loop.time() - died < 1.3
+
+
+@pytest.mark.parametrize("action", [3, 5], ids=["return", "land"])
+async def test_hold_while_the_fence_acts_replaces_what_the_fence_commanded(action: int) -> None:
+    """The fence's Landing is not confirmed when a person presses Hold: accepted, the drone hovers, nothing follows."""
+    async with world(speed=1.0) as w:
+        assert (await upload(w.client, [circle((HOME[0], HOME[1]), 20.0)], FENCE)).type == TAKEN
+        await write(w.client, "GF_ACTION", action, 6)
+        await w.take_off(10.0)
+        w.drone.faults.down = w.drone.faults.up = Impairment(delay=0.3)
+        mark = w.client.mark()
+        somebody_else(w, ardrone3.MoveBy(24.0, 0.0, 0.0, 0.0))
+        await said(w.client, "Fence ahead", mark)
+        assert (await w.client.command(SET_MODE, 1, 4, 3, timeout=8.0)).result == ACCEPTED
+        w.drone.faults.down = w.drone.faults.up = Impairment()
+        await watched(1.0)
+        assert w.drone.flying_state.name == "HOVERING"
+        assert w.drone.pose.up > 8.0
