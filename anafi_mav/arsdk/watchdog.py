@@ -81,7 +81,7 @@ class Watchdog:
                 pass_fds=given,
                 start_new_session=True,  # what stops or ends the gateway's group must not reach it
             )
-        except OSError:
+        except BaseException:
             self._close_pipes()
             raise
         finally:
@@ -100,11 +100,13 @@ class Watchdog:
 
     def stand_by(self, frames: Sequence[tuple[int, bytes]]) -> None:
         """Give the child these (sequence number, bytes) instead of the ones before; none: it stands down."""
-        self._frames = frames
-        if self._process is None:
+        began, self._frames = not self._frames, frames
+        if self._process is None or self._closed:
             return
         content = b"".join(FRAME.pack(seq, len(frame)) + frame for seq, frame in frames)
-        self._kicked = self._loop.time()
+        now = self._loop.time()
+        if began or now - self._kicked < self._limit * STALL:  # else `secure` has to find a stall first
+            self._kicked = now
         self._say(b"F", content)
         if frames and self._timer is None:
             self._timer = self._loop.call_later(KICK, self._kick)
@@ -147,7 +149,7 @@ class Watchdog:
         if self._closed:
             return
         self.stand_by(())
-        self._closed = True
+        self._closed, self._holding = True, False
         if self._process is not None:
             self._close_pipes()
 

@@ -105,6 +105,10 @@ class Controller(Element[ControllerState]):
         """Its number in `MODELS`; 0 while there is none."""
         self.taken = False
         """The user of ours flies: source and axes are taken, or about to be."""
+        self.takeovers = 0
+        """Times that the pilot took the drone from our user."""
+        self.takeover_reason = ""
+        """Why the newest of them, in two words."""
         self._confirmed = False
         """The controller has said that the source is ours."""
         self._commander = commander
@@ -215,7 +219,7 @@ class Controller(Element[ControllerState]):
 
     def stalled(self) -> None:
         """The host stalled while the axes were grabbed, and they were given back for us."""
-        self._yield("the host stalled: the pilot at the Skycontroller has the sticks")
+        self._yield("gateway stalled")
 
     async def release(self) -> None:
         """`give_back` for good, before the connection is closed; waits a moment for the controller to say so."""
@@ -242,7 +246,7 @@ class Controller(Element[ControllerState]):
 
     def _on_axis(self, message: mapper.GrabAxisEvent, now: float) -> None:
         if self.taken and STICKS >> message.axis & 1 and abs(message.value) > DEFLECTION:
-            self._yield("the pilot moved a stick of the Skycontroller and flies now")
+            self._yield("stick moved")
 
     def _on_source(self, message: skyctrl.PilotingSource, now: float) -> None:
         if not self.taken:
@@ -253,11 +257,13 @@ class Controller(Element[ControllerState]):
         elif message.source == Source.CONTROLLER:
             self._confirmed = True
         elif self._confirmed:  # otherwise it answers a `give_back` that was followed by a new motion
-            self._yield("the Skycontroller gave the source of piloting to its pilot")
+            self._yield("source taken")
 
     def _yield(self, why: str) -> None:
         """The pilot has the drone, and what the user ordered ends."""
-        log.warning("%s", why)
+        log.warning("the pilot at the Skycontroller has control: %s", why)
+        self.takeovers += 1
+        self.takeover_reason = why
         self.give_back()
         if self._take_over is not None:
             self._take_over()

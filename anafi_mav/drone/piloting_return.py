@@ -56,9 +56,9 @@ class Returns:
                 return CommandRejected(f"return home is unavailable: {spoken(message.reason)}")
             return None
 
-        move = Move(self._commander.expect((rth.State,), judge))
         self._commander.call_off("the drone is to return home")
-        self._sticks.release()
+        self._sticks.release()  # raises while the pilot at a Skycontroller flies: nothing waits for an answer then
+        move = Move(self._commander.expect((rth.State,), judge))
         self._moves.returning = move
         try:
             self._commander.dispatch(move.answer, rth.ReturnToHome(), timeout)

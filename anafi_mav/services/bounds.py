@@ -40,13 +40,17 @@ def lowest_height(vehicle: Aircraft) -> float:
     return LOWEST if altitude is None or not vehicle.in_air else min(LOWEST, altitude)
 
 
+class TooLow(Refused):
+    """A target below `lowest_height`. A drone that has not taken off yet is lifted above it anyway."""
+
+
 def check_height(vehicle: Aircraft, ato: float) -> None:
     """Raise `Refused` unless a target height (m above take-off) is one the drone may go to."""
     ceiling = vehicle.drone.piloting.state.max_altitude
     if not math.isfinite(ato):
         raise Refused("Refused: the height is not a number", lasting=True)
     if ato < (lowest := lowest_height(vehicle)):
-        raise Refused(f"Refused: {ato:.1f} m above take-off is below {lowest:.1f} m", lasting=True)
+        raise TooLow(f"Refused: {ato:.1f} m above take-off is below {lowest:.1f} m", lasting=True)
     if ceiling is not None and ato > ceiling.current:
         raise Refused(
             f"Refused: {ato:.1f} m above take-off is above the drone's ceiling of {ceiling.current:g} m",
@@ -62,14 +66,14 @@ def amsl_to_ato(vehicle: Aircraft, amsl: float) -> float:
     """Height above take-off (m) of an AMSL height; raises `Refused` when no bridge is known."""
     ato = vehicle.height.ato(amsl)
     if ato is None:
-        raise Refused("Refused: take-off altitude unknown: no GPS fix")
+        raise Refused("Refused: AMSL unknown: no GPS fix")
     return ato
 
 
 def check_estimate(vehicle: Aircraft, ato: float) -> None:
     """Raise `Refused` for an AMSL target that may be the ground because the bridge to AMSL is an estimate."""
     if vehicle.height.estimated and ato < ESTIMATE_FLOOR:
-        raise Refused(f"Refused: estimated AMSL height {ato:.0f} m < {ESTIMATE_FLOOR:g} m")
+        raise Refused(f"Refused: estimated AMSL: {ato:.0f} m < {ESTIMATE_FLOOR:g} m")
 
 
 def check_on_earth(place: Place, what: str) -> None:
@@ -102,5 +106,5 @@ def _check_geofence(vehicle: Aircraft, distance: float) -> None:
     state = vehicle.drone.piloting.state
     if state.geofence and state.max_distance is not None and distance > state.max_distance.current:
         raise Refused(
-            f"Goto refused: {distance:.0f} m from geofence centre > {state.max_distance.current:g} m", lasting=True
+            f"Goto refused: {distance:.0f} m off fence centre > {state.max_distance.current:g} m", lasting=True
         )

@@ -20,6 +20,7 @@ from anafi_mav.drone import Limits, PilotingCommand, events
 from anafi_mav.drone.events import FlyingState, Message
 from anafi_mav.errors import AnafiMavError, LinkLost
 from anafi_mav.services.aircraft import Aircraft
+from anafi_mav.services.bounds import TooLow
 from anafi_mav.services.clients import system_of
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.offboard import GUIDED_TIMEOUT, SILENCE, OffboardStream, State, ends, lasts
@@ -268,6 +269,8 @@ class OffboardFlight:
             return None
         try:
             resolve(setpoint, self._vehicle, self.motion)
+        except TooLow as refusal:
+            return refusal.reason.partition("efused: ")[2] if self._vehicle.in_air else None
         except Refused as refusal:
             return refusal.reason.partition("efused: ")[2] or refusal.reason
         return None

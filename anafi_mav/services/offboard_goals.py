@@ -59,7 +59,7 @@ def resolve(setpoint: MotionSetpoint, vehicle: Aircraft, motion: Motion) -> Goal
     if x is not None or y is not None:
         if setpoint.origin is Origin.LOCAL:
             if vehicle.origin is None:
-                raise Refused("Refused: take-off place unknown: no local frame")
+                raise Refused("Refused: take-off place unknown")
             place = _local_place(vehicle.origin, x, y, vehicle.place)
         else:
             place = Place(x or 0.0, y or 0.0)

@@ -47,6 +47,7 @@ from anafi_mav.services.node_status import NodeStatusService
 from anafi_mav.services.offboard_service import OffboardService
 from anafi_mav.services.orbit import OrbitService
 from anafi_mav.services.parameters import ParameterService
+from anafi_mav.services.pilot_service import PilotService
 from anafi_mav.services.plan_service import PlanService
 from anafi_mav.services.rally_service import RallyService
 from anafi_mav.services.roll_sign_service import RollSignService
@@ -95,6 +96,7 @@ SERVICES: tuple[type[Service], ...] = (
     FlightRecordService,
     TakeoffPointService,
     VideoTelemetryService,
+    PilotService,
 )
 """What a system consists of, beside commands and messages themselves."""
 

@@ -70,7 +70,7 @@ def amsl(vehicle: Vehicle) -> float | None:
 def global_position_int(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
     """GLOBAL_POSITION_INT; only with a GPS fix, for 0/0 is a place, and in flight with a location that is not old."""
     place, state, height = vehicle.place, vehicle.drone.piloting.state, amsl(vehicle)
-    if vehicle.position_is_old or place is None or height is None or state.altitude is None or state.velocity is None:
+    if place is None or height is None or state.altitude is None or state.velocity is None:
         return None
     return dialect.MAVLink_global_position_int_message(
         times.boot_ms,
@@ -88,7 +88,7 @@ def global_position_int(vehicle: Vehicle, times: Times) -> dialect.MAVLink_messa
 def local_position_ned(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
     """LOCAL_POSITION_NED: metres north, east and down of where the drone last took off."""
     place, origin, state = vehicle.place, vehicle.origin, vehicle.drone.piloting.state
-    if vehicle.position_is_old or place is None or origin is None or state.altitude is None or state.velocity is None:
+    if place is None or origin is None or state.altitude is None or state.velocity is None:
         return None
     north, east = geo.offset(origin.latitude, origin.longitude, place.latitude, place.longitude)
     velocity = state.velocity
@@ -114,7 +114,7 @@ def odometry(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
     are not told: NaN."""
     place, origin, state = vehicle.place, vehicle.origin, vehicle.drone.piloting.state
     leaning = _attitude(vehicle)
-    if vehicle.position_is_old or place is None or origin is None:
+    if place is None or origin is None:
         return None
     if state.altitude is None or state.velocity is None or leaning is None:
         return None

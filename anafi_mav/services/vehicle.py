@@ -69,6 +69,9 @@ LANDS_AFTER_RETURN = 2.0
 POSITION_OLD = 3.0
 """s without a GPS location, which an ANAFI reports once a second, after which the last one is no position in flight."""
 
+LOCATIONS_MISSED = 3
+"""A drone that reports its location more rarely (a slowed simulator) may miss as many."""
+
 
 ESTIMATED = f"Take-off altitude estimated: GPS only (+-{ESTIMATE_ERROR:g} m)"
 
@@ -123,6 +126,8 @@ class Vehicle(Aircraft):
         self._clock = clock
         self._located_at = -math.inf
         """When the newest GPS location arrived."""
+        self._location_every = 0.0
+        """s between it and the one before."""
         self._lands_next: tuple[int, float] | None = None
         """A return has finished that the drone ends by landing: the count of orders then, and until when it is due."""
         self._end_others = end_others
@@ -171,12 +176,16 @@ class Vehicle(Aircraft):
     @property
     def position_is_old(self) -> bool:
         """True in flight when GPS locations have stopped although the drone reports a fix."""
-        return (
-            self.place is not None
-            and self.flying_state is not None
-            and not self.on_ground
-            and self._clock.monotonic() - self._located_at > POSITION_OLD
-        )
+        gps = self.drone.gps.state
+        if not gps.fixed or gps.location is None or self.flying_state is None or self.on_ground:
+            return False
+        patience = max(POSITION_OLD, LOCATIONS_MISSED * self._location_every)
+        return self._clock.monotonic() - self._located_at > patience
+
+    @property
+    def place(self) -> Place | None:
+        """Where the drone is; None without a fix, and in flight while the newest location is old."""
+        return None if self.position_is_old else super().place
 
     @property
     def mode(self) -> FlightMode:
@@ -544,7 +553,10 @@ class Vehicle(Aircraft):
 
     def on_location(self) -> None:
         """A new GPS location."""
-        self._located_at = self._clock.monotonic()
+        now = self._clock.monotonic()
+        if self._located_at > -math.inf:
+            self._location_every = now - self._located_at
+        self._located_at = now
         self.on_position()
 
     def on_position(self) -> None:
@@ -630,7 +642,7 @@ class Vehicle(Aircraft):
         self.paused = False
         self.intended = None
         self._last_flying = None
-        self._located_at = -math.inf
+        self._located_at, self._location_every = -math.inf, 0.0
         for helm in self.helms:
             helm.link_down()
         self._terminating = False

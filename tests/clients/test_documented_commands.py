@@ -51,17 +51,19 @@ class Command:
 def blocks(text: str) -> list[list[str]]:
     """The lines of each block of code that is of a shell's: fenced without another language, or indented."""
     found: list[list[str]] = []
-    fence: list[str] | None = None
+    fence: tuple[str, list[str]] | None = None
+    """Language and lines of the block that is open."""
     indented: list[str] = []
     for line in [*text.splitlines(), ""]:
         if line.startswith("```"):
             if fence is None:
-                fence = [] if line[3:].strip() in _SHELL else ["not a shell's"]
-            else:
-                found.append(fence)
-                fence = None
+                fence = (line[3:].strip(), [])
+                continue
+            if fence[0] in _SHELL:
+                found.append(fence[1])
+            fence = None
         elif fence is not None:
-            fence.append(line)
+            fence[1].append(line)
         elif line.startswith("    "):
             indented.append(line[4:])
         elif indented:

@@ -479,7 +479,7 @@ async def test_goto_within_the_drones_limit_of_the_pilot_is_flown_and_beyond_it_
             place = around(PLACE, (north, 0.0))[0]
             ack = await w.client.command(REPOSITION, -1, 1, 0, NAN, x=place[0], y=place[1], z=6.0, frame=3)
             assert ack.result == result, (north, texts(w.client, mark))
-        assert "Goto refused: 70 m from geofence centre > 60 m" in texts(w.client, mark)
+        assert "Goto refused: 70 m off fence centre > 60 m" in texts(w.client, mark)
         assert len(w.commands("ardrone3.Piloting.moveTo")) == 1
 
 

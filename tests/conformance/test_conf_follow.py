@@ -171,7 +171,7 @@ async def test_where_it_may_not_fly_it_does_not_follow() -> None:
         assert await follow(w.client, "px4") == 0
         began = now()
         for seen, text in [
-            (target(60.0, 0.0), "from geofence centre > "),
+            (target(60.0, 0.0), "off fence centre > "),
             (target(0.0, 0.0, place=(0.0, 0.0)), "both 0"),
             (target(900.0, 0.0), "900 m away"),
             (target(10.0, 0.0, (60.0, 0.0)), "60 m/s"),

@@ -470,20 +470,20 @@ async def test_from_a_position_to_a_velocity_and_back() -> None:
 
 
 WRONG = [
-    (local(POSITION_ONLY, at=(5.0, 0.0, -0.5)), "0.5 m above take-off is below 1 m"),
-    (local(POSITION_ONLY, at=(5.0, 0.0, 3.0)), "-3.0 m above take-off is below 1 m"),
+    (local(POSITION_ONLY, at=(5.0, 0.0, -0.5)), "0.5 m above take-off is below 1.0 m"),
+    (local(POSITION_ONLY, at=(5.0, 0.0, 3.0)), "-3.0 m above take-off is below 1.0 m"),
     (local(POSITION_ONLY, at=(5.0, 0.0, -151.0)), "151.0 m above take-off is above the drone's ceiling"),
-    (local(POSITION_ONLY, 7, at=(0.0, 0.0, 7.9)), "below 1 m"),
+    (local(POSITION_ONLY, 7, at=(0.0, 0.0, 7.9)), "below 1.0 m"),
     (local(POSITION_ONLY, 12, at=(0.0, 0.0, -250.0)), "ceiling"),
-    (local(POSITION_ONLY, at=(150.0, 0.0, -8.0)), "150 m from geofence centre > 100 m"),
-    (local(POSITION_ONLY, 8, at=(160.0, 0.0, 0.0)), "160 m from geofence centre > 100 m"),
-    (earth(POSITION_ONLY, 6, 170.0, 0.0, 8.0), "170 m from geofence centre > 100 m"),
+    (local(POSITION_ONLY, at=(150.0, 0.0, -8.0)), "150 m off fence centre > 100 m"),
+    (local(POSITION_ONLY, 8, at=(160.0, 0.0, 0.0)), "160 m off fence centre > 100 m"),
+    (earth(POSITION_ONLY, 6, 170.0, 0.0, 8.0), "170 m off fence centre > 100 m"),
     (local(POSITION_ONLY, at=(NAN, 0.0, -8.0)), "not all of its values are numbers"),
     (local(VELOCITY_ONLY, v=(500.0, 0.0, 0.0)), "no ANAFI flies 500 m/s"),
     (local(VELOCITY_ONLY & ~NO_YAW_RATE, yaw_rate=30.0), "no ANAFI turns by 30 rad/s"),
     (earth(POSITION_ONLY, 6, height=8.0, place=(0.0, 0.0)), "latitude and longitude are both 0"),
     (earth(POSITION_ONLY, 6, height=8.0, place=(91.0, 2.0)), "no place on earth"),
-    (earth(POSITION_ONLY, 5, 5.0, 0.0, HOME[2] + 0.7), "0.7 m above take-off is below 1 m"),
+    (earth(POSITION_ONLY, 5, 5.0, 0.0, HOME[2] + 0.7), "0.7 m above take-off is below 1.0 m"),
     (local(0xDFF), "it asks for nothing"),
     (local(0x207, a=(1.0, 0.0, 0.0)), "forces cannot be flown"),
 ]

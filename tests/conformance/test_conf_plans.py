@@ -453,7 +453,7 @@ async def test_conf_069_home_is_item_0_to_ardupilots_clients_alone() -> None:
         assert whole(await count(px4, MISSION)).opaque_id == whole(await count(copter, MISSION)).opaque_id
         # As they are, but for the home that one of them lists.
         totals = [whole(await client.wait("MISSION_CURRENT")) for client in (copter, px4)]
-        assert [(m.seq, m.total, m.mission_state) for m in totals] == [(1, 3, 2), (0, 3, 2)]
+        assert [(m.seq, m.total, m.mission_state) for m in totals] == [(0, 3, 2), (0, 3, 2)]  # before a start
         assert (await upload(px4, plan[1:3], MISSION)).type == ACCEPTED
         assert [content(item)[6] for item in await download(copter, MISSION)] == [i.content[6] for i in plan[:3]]
 
@@ -461,7 +461,8 @@ async def test_conf_069_home_is_item_0_to_ardupilots_clients_alone() -> None:
 async def test_conf_069_home_can_be_read_without_a_mission() -> None:
     """dronekit reads it as item 0 and waits for ever without it; ArduCopter always has it."""
     async with world(flavour="ardupilot") as w:
-        await w.client.wait("HOME_POSITION")
+        w.client.send_command(dialect.MAV_CMD_REQUEST_MESSAGE, dialect.MAVLINK_MSG_ID_HOME_POSITION)
+        await w.client.wait("HOME_POSITION", since=0)
         mark = w.client.mark()
         w.client.send(dialect.MAVLink_mission_request_message(1, 1, 0, MISSION))
         home = await w.client.wait("MISSION_ITEM", since=mark)

@@ -145,7 +145,8 @@ async def test_position_is_not_sent_in_flight_while_gps_locations_have_stopped()
         await asyncio.sleep(POSITION_OLD + 0.5)
         assert w.client.since(mark, "GLOBAL_POSITION_INT")[-1][0] > w.client.received[-1][0] - 1.0
         w.drone.faults.quirks = frozenset()
-        await w.client.wait("GPS_RAW_INT")  # made of each GPS location
+        for _ in range(3):  # each of a GPS location: they come as often again as before
+            await w.client.wait("GPS_RAW_INT")
         await w.take_off(5.0)
         assert not [m for _, m in w.client.since(0, "STATUSTEXT") if m.text.startswith("Position unknown")]
         mark = w.client.mark()
@@ -156,6 +157,10 @@ async def test_position_is_not_sent_in_flight_while_gps_locations_have_stopped()
         await w.client.wait("SYS_STATUS")
         kinds = ("GLOBAL_POSITION_INT", "LOCAL_POSITION_NED", "ODOMETRY")
         assert [m for kind in kinds for m in w.client.since(mark, kind)] == []
+        # A change of height does not lead back to the old place.
+        ack = await w.client.command(ALTITUDE, 8.0, RELATIVE, timeout=20.0)
+        assert (ack.result, moves(w)) == (ACCEPTED, 0)
+        assert await goto(w, CHANGE_MODE) == REJECTED
         w.drone.faults.quirks = frozenset()
         await w.client.wait("GLOBAL_POSITION_INT")
         await said(w, mark, "Position known again")

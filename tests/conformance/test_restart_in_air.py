@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from pathlib import Path
 
@@ -14,6 +14,8 @@ from support.plans import Item
 from support.setpoints import POSITION_ONLY, engage, local, streaming
 from support.world import HOME, WEB_PORT, World, loopback, world
 
+from anafi_mav.arsdk.messages import rth
+from anafi_mav.arsdk.wire import Message
 from anafi_mav.config import Config, DroneConfig
 from anafi_mav.gateway import Gateway
 from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
@@ -28,7 +30,9 @@ METRE = 1.0 / 111_195.0
 
 
 @asynccontextmanager
-async def flying(tmp_path: Path, height: float, *quirks: Quirk, air: Impairment = CLEAR) -> AsyncIterator[World]:
+async def flying(
+    tmp_path: Path, height: float, *quirks: Quirk, air: Impairment = CLEAR, untold: Sequence[type[Message]] = ()
+) -> AsyncIterator[World]:
     """A world whose first gateway has taken the drone off and has ended; the second one has just found it."""
     drone, address = loopback(), loopback()
     names = tuple(quirk.value for quirk in quirks)
@@ -47,6 +51,7 @@ async def flying(tmp_path: Path, height: float, *quirks: Quirk, air: Impairment 
             await w.take_off(height)
             await w.client.close()
         simulator.drones[0].faults.up = simulator.drones[0].faults.down = air
+        simulator.drones[0].faults.untold = frozenset(event.NAME for event in untold)
         async with Gateway(config) as second:
             w = World(simulator, second, address)
             await w.connect()
@@ -89,7 +94,7 @@ async def test_restart_in_flight_without_flight_id_estimates_and_keeps_away_from
         assert abs(home.altitude - 35_000) < 1_500
         mark = w.client.mark()
         assert await goto(w, 10.0, HOME[2] + 12.0, GLOBAL) == REJECTED
-        refusal = "Refused: estimated AMSL height 12 m < 15 m"
+        refusal = "Refused: estimated AMSL: 12 m < 15 m"
         await w.client.wait("STATUSTEXT", lambda m: m.text == refusal, since=mark)
         assert w.commands("ardrone3.Piloting.moveTo") == []
         late = await w.connect(sysid=254)
@@ -142,3 +147,24 @@ async def test_goto_after_a_restart_over_a_bad_link_is_flown(tmp_path: Path) -> 
         assert (await w.client.wait("HOME_POSITION", since=0)).altitude == 35_000
         assert await goto(w, 10.0, HOME[2] + 8.0, GLOBAL) == ACCEPTED
         await at(w.drone, 10.0, 8.0)
+
+
+@pytest.mark.parametrize(
+    ("quirks", "untold"),
+    [((), (rth.TakeoffLocation,)), ((Quirk.NO_FLIGHT_ID,), (rth.TakeoffLocation,))],
+    ids=["kept with the flight id", "home of type take-off"],
+)
+async def test_restart_in_flight_without_takeoff_location_keeps_the_local_frame(
+    tmp_path: Path, quirks: tuple[Quirk, ...], untold: tuple[type[Message], ...]
+) -> None:
+    async with flying(tmp_path, 6.0, *quirks, untold=untold) as w:
+        assert await goto(w, 12.0, 6.0, RELATIVE) == ACCEPTED
+        await w.client.wait("LOCAL_POSITION_NED", lambda m: abs(m.x - 12.0) < 0.7 and abs(m.y) < 0.7, timeout=30.0)
+
+
+async def test_restart_in_flight_with_no_takeoff_place_refuses_the_local_frame(tmp_path: Path) -> None:
+    async with flying(tmp_path, 6.0, Quirk.NO_FLIGHT_ID, untold=(rth.TakeoffLocation, rth.HomeType)) as w:
+        async with streaming(w.client, local(POSITION_ONLY, at=(8.0, 0.0, -7.0))):
+            await w.client.wait("STATUSTEXT", lambda m: m.text == "Setpoint refused: take-off place unknown", since=0)
+        assert w.client.since(0, "LOCAL_POSITION_NED") == []
+        assert w.commands("ardrone3.Piloting.moveTo") == []

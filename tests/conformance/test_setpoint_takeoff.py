@@ -29,6 +29,7 @@ from support.world import ARMED, HOLD, HOME, OFFBOARD, World, world
 
 from anafi_mav import geo
 from anafi_mav.sim.faults import Impairment
+from anafi_mav.sim.quirks import Quirk
 
 ACCEPTED, FAILED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_FAILED
 CANCELLED = 6
@@ -98,6 +99,23 @@ async def test_offboard_setpoint_that_climbs_takes_off_and_is_flown(
             assert [e for e in early if not e.name.endswith("PCMD") or e.args["gaz"] or e.args["pitch"]] == []
             await w.client.heartbeat(lambda beat: beat.custom_mode == OFFBOARD and beat.base_mode & ARMED)
         await said(w.client, "Offboard setpoints stopped: hovering")
+
+
+async def test_trajectory_that_begins_at_the_ground_takes_off_and_is_flown() -> None:
+    """MAVSDK's offboard_from_csv: ten points a second, the first 10 cm above the ground."""
+    async with world(speed=1.0) as w:
+        mark, begun = w.client.mark(), asyncio.get_running_loop().time()
+
+        def point() -> Any:
+            height = min(max(asyncio.get_running_loop().time() - begun - 1.0, 0.0), 5.0)
+            mask = NO_ACCELERATION | NO_YAW | NO_YAW_RATE
+            return local(mask, at=(0.0, 0.0, -height), v=(0.0, 0.0, -1.0 if height else 0.0))
+
+        async with streaming(w.client, point, every=0.1):
+            await ready(w.client, "px4")
+            await lifted(w)
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["up"] > 4.5, 15.0)
+        assert "is below 1" not in " ".join(texts(w.client, mark))
 
 
 async def test_guided_attitude_with_thrust_takes_off() -> None:
@@ -174,9 +192,11 @@ async def test_second_before_a_setpoint_takeoff_can_be_ended(flavour: str, how: 
         assert heard(w, "TakeOff") == []
 
 
-@pytest.mark.parametrize("moment", ["motor ramping", "taking off"])
+@pytest.mark.parametrize("moment", ["motor ramping", "motor ramping, landing ignored", "taking off"])
 async def test_silence_in_a_setpoint_takeoff_disarms_on_the_ground_and_hovers_in_the_air(moment: str) -> None:
     async with world(speed=1.0) as w:
+        if "ignored" in moment:
+            w.drone.faults.quirks = frozenset({Quirk.RAMPING_IGNORES_LANDING})
         program, mark = Program(IDLE), w.client.mark()
         async with streaming(w.client, program):
             await ready(w.client, "px4")
@@ -184,7 +204,7 @@ async def test_silence_in_a_setpoint_takeoff_disarms_on_the_ground_and_hovers_in
             await lifted(w)
             if moment == "taking off":
                 await w.drone.wait_log(lambda e: e.name.endswith("FlyingStateChanged") and e.args["state"] == 1, 5.0)
-        if moment == "motor ramping":
+        if moment != "taking off":
             await said(w.client, "Setpoints stopped on the ground: disarming", mark)
             await w.client.heartbeat(lambda beat: not beat.base_mode & ARMED, since=mark, timeout=15.0)
             assert w.drone.flying_state.name == "LANDED"

@@ -159,6 +159,7 @@ async def test_pilots_stick_in_bad_air_takes_the_drone(generation: int, way: str
         moved = asyncio.get_running_loop().time()
         pilot.stick(PITCH_STICK, 60)
         await w.drone.wait_log(lambda e: pilot.source is Source.SKY_CONTROLLER and pilot.grabbed_axes == 0, 10.0)
+        await w.client.wait("STATUSTEXT", lambda m: m.text == "Skycontroller pilot has control: stick moved", since=0)
         stopped = {"goto": "CancelMoveTo", "mission": "Pause"}[way]
         await w.drone.wait_log(lambda e: e.name.endswith(stopped) and e.t >= moved, 10.0)
         # His stick flies the drone, and nothing of ours follows.

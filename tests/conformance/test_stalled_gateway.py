@@ -71,6 +71,10 @@ async def set_out(w: World, way: str) -> asyncio.Task[Any] | None:
         assert await goto(w, 200.0, 10.0) == ACCEPTED
         return None
 
+    if way == "orbit":
+        assert (await w.client.command(dialect.MAV_CMD_DO_ORBIT, 8.0, 2.0)).result == ACCEPTED
+        return None
+
     async def stream() -> None:
         while True:
             rotation = list(quaternion_from_euler(0.0, -0.05, 0.0))
@@ -96,7 +100,7 @@ async def sees(w: World, true: Any, timeout: float = 20.0) -> None:
 
 
 @pytest.mark.parametrize("generation", [3, 4])
-@pytest.mark.parametrize("way", ["goto", "mission", "offboard"])
+@pytest.mark.parametrize("way", ["goto", "mission", "offboard", "orbit"])
 async def test_pilot_has_sticks_while_gateway_is_stopped(tmp_path: Path, way: str, generation: int) -> None:
     async with apart(tmp_path, generation) as (w, gateway):
         pilot = w.drone.skycontroller

@@ -133,7 +133,7 @@ def test_check_without_a_model_is_for_all(flight: Path, capsys: pytest.CaptureFi
     ]
     assert main(["plan", "check", str(flight), "--max-altitude", "22"]) == 1
     # What all have is said once.
-    error = "flight.plan: error: item 8: 25 m is higher than the limit of 22 m"
+    error = "flight.plan: error: item 8: 25 m above take-off is higher than the limit of 22 m"
     assert capsys.readouterr().out.splitlines().count(error) == 1
 
 
@@ -172,9 +172,9 @@ def test_check_and_show_as_json(flight: Path, capsys: pytest.CaptureFixture[str]
     assert found["file"] == "flight.plan"
     assert set(found["models"]) == {"ANAFI 4K", "ANAFI Thermal", "ANAFI USA", "ANAFI Ai"}
     assert found["models"]["ANAFI 4K"]["flies"] is False
-    assert {"severity": "error", "item": 8, "what": "25 m is higher than the limit of 22 m"} in found["models"][
-        "ANAFI 4K"
-    ]["problems"]
+    assert {"severity": "error", "item": 8, "what": "25 m above take-off is higher than the limit of 22 m"} in found[
+        "models"
+    ]["ANAFI 4K"]["problems"]
     assert main(["plan", "show", str(flight), "--json"]) == 0
     shown = json.loads(capsys.readouterr().out)
     assert [(item["item"], item["command"]) for item in shown["items"]] == [

@@ -184,7 +184,7 @@ async def test_a_stop_of_what_has_not_begun_is_no_stop_of_nothing(
 
 
 @pytest.mark.parametrize(("verb", "start", "stop"), BEGINNINGS)
-@pytest.mark.parametrize("newer", ["move_to", "move_by", "return_home", "land", "emergency"])
+@pytest.mark.parametrize("newer", ["move_to", "move_by", "return_home", "land"])
 async def test_a_newer_intention_calls_off_what_has_not_begun(
     drone: Drone, device: ScriptedDevice, verb: Verb, start: type[Message], stop: type[Message], newer: str
 ) -> None:
@@ -197,7 +197,6 @@ async def test_a_newer_intention_calls_off_what_has_not_begun(
         "move_by": lambda: piloting.move_by(1.0, 0.0, 0.0, 0.0),
         "return_home": piloting.return_home,
         "land": piloting.land,
-        "emergency": piloting.emergency,
     }
     task = asyncio.ensure_future(calls[newer]())
     with pytest.raises(CommandRejected):
@@ -205,6 +204,22 @@ async def test_a_newer_intention_calls_off_what_has_not_begun(
     await device.until(stop)
     task.cancel()
     await asyncio.wait([task])
+
+
+@pytest.mark.parametrize(("verb", "start", "stop"), BEGINNINGS)
+async def test_emergency_ends_what_has_not_begun_and_sends_nothing_else(
+    drone: Drone, device: ScriptedDevice, verb: Verb, start: type[Message], stop: type[Message]
+) -> None:
+    """No stop delays it, and no start follows it: the motors are cut."""
+    await flies(drone, device)
+    starting = asyncio.ensure_future(verb(drone))
+    await device.until(start)
+    device.script[ardrone3.Emergency] = lambda _: [ardrone3.FlyingStateChanged(FlyingState.EMERGENCY)]
+    await drone.piloting.emergency()
+    with pytest.raises(CommandRejected):
+        await starting
+    assert device.got(stop) == []
+    assert len(device.got(start)) == 1
 
 
 async def test_a_start_that_is_given_up_does_not_end_the_newer_one(drone: Drone, device: ScriptedDevice) -> None:

@@ -354,7 +354,7 @@ CHECK = TakeoffChecklistType
             AlertsState(alert=AlertState.TOO_MUCH_ANGLE, checklist={CHECK.DRONE_INCLINATION_TOO_HIGH: False}),
             BatteryState(alerts={BatteryAlert.POWER_LEVEL: AlertLevel.CRITICAL}),
             CalibrationState(),
-            ["battery power level"],
+            ["battery critical"],
         ),
     ],
 )
