@@ -17,7 +17,7 @@ from anafi_mav.drone.expectation import Commander, loop_time
 from anafi_mav.drone.home import Home
 from anafi_mav.drone.piloting_state import PilotingState, in_state
 from anafi_mav.drone.sticks import CENTRED, Percent, Sticks, is_deflected
-from anafi_mav.errors import LinkLost
+from anafi_mav.errors import CommandRejected, LinkLost
 
 log = logging.getLogger("anafi_mav")
 
@@ -140,9 +140,16 @@ class StickStream:
         self.silence()
 
     def _send(self, message: PCMD) -> None:
-        """For what is worth sending only while there is a link; its loss is reported elsewhere."""
+        """For what is worth sending only while there is a link; its loss is reported elsewhere.
+
+        So is a newer command, which lets the task that it has replaced centre nothing more.
+        """
         try:
             self._commander.send(message, stops=not is_deflected(message))
         except LinkLost as error:
             log.debug("%s not sent: %s", message.NAME, error)
             self._sticks.stop()
+        except CommandRejected as error:
+            if is_deflected(message):
+                raise
+            log.debug("%s not sent: %s", message.NAME, error)

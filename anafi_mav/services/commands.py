@@ -122,6 +122,13 @@ class Command:
         return self.id in _STOPPING
 
     @property
+    def lands(self) -> bool:
+        """It asks for a landing. That stops something too, but a Hold of another client may have ended it since."""
+        if self.id in _MODE_COMMANDS:
+            return self.mode is FlightMode.LAND
+        return self.id == dialect.MAV_CMD_NAV_LAND
+
+    @property
     def returns(self) -> bool:
         """It asks for the way home: when that is flown already, asking again changes nothing."""
         if self.id in _MODE_COMMANDS:
@@ -226,16 +233,16 @@ class CommandDesk:
     ) -> int | None:
         """The MAV_RESULT to answer a command with that this client sends once more; None: it is to be executed.
 
-        What may be carried out twice is: orders to stop always, a return while nobody else has taken over, and modes
-        that have ended by themselves (`mode` is the vehicle's). What another client has replaced is neither carried out
-        over its head nor confirmed: it is answered with CANCELLED.
+        What may be carried out twice is: orders to stop always, a landing or a return while no other client has taken
+        over, and modes that have ended by themselves (`mode` is the vehicle's). What another client has replaced is
+        neither carried out over its head nor confirmed: it is answered with CANCELLED.
         """
         newest = self._newest.get(client)
         if newest is None or not newest.command.same_as(command):
             return None
         if newest.result == dialect.MAV_RESULT_IN_PROGRESS:
             return newest.result
-        if command.stops:
+        if command.stops and not (command.lands and newest.superseded):
             return None
         succeeded = newest.result in (dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_CANCELLED)
         if now - newest.ended >= (RESEND_WINDOW if succeeded else REFUSAL_WINDOW):

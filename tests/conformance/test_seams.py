@@ -11,12 +11,16 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.mav import NAN
-from support.setpoints import POSITION_ONLY, VELOCITY_ONLY, attitude, engage, heard, local, said, streaming
-from support.trouble import ACCEPTED, CANCELLED, IN_PROGRESS, goto, somebody_else, watched
+from support.params import write
+from support.plans import ACCEPTED as TAKEN
+from support.plans import FENCE, circle, upload
+from support.setpoints import POSITION_ONLY, VELOCITY_ONLY, attitude, engage, heard, local, said, streaming, texts
+from support.trouble import ACCEPTED, CANCELLED, FAILED, IN_PROGRESS, goto, results, somebody_else, watched
 from support.world import HOLD, HOME, OFFBOARD, World, world
 
 from anafi_mav import geo
 from anafi_mav.arsdk.messages import ardrone3, rth
+from anafi_mav.services.commands import RESEND_WINDOW
 from anafi_mav.sim.faults import Impairment
 
 ARM, TAKEOFF, LAND = dialect.MAV_CMD_COMPONENT_ARM_DISARM, dialect.MAV_CMD_NAV_TAKEOFF, dialect.MAV_CMD_NAV_LAND
@@ -179,3 +183,91 @@ async def test_silence_before_the_takeoff_waits_half_a_second_for_what_it_replac
         died = loop.time()
         await w.drone.wait_log(lambda e: e.kind == "command" and e.name.endswith(".Landing"), 10.0)
         assert loop.time() - died < 1.3
+
+
+@pytest.mark.parametrize("action", [3, 5], ids=["return", "land"])
+async def test_hold_while_the_fence_acts_replaces_what_the_fence_commanded(action: int) -> None:
+    """The fence's Landing is not confirmed when a person presses Hold: accepted, the drone hovers, nothing follows."""
+    async with world(speed=1.0) as w:
+        assert (await upload(w.client, [circle((HOME[0], HOME[1]), 20.0)], FENCE)).type == TAKEN
+        await write(w.client, "GF_ACTION", action, 6)
+        await w.take_off(10.0)
+        w.drone.faults.down = w.drone.faults.up = Impairment(delay=0.3)
+        mark = w.client.mark()
+        somebody_else(w, ardrone3.MoveBy(24.0, 0.0, 0.0, 0.0))
+        await said(w.client, "Fence ahead", mark)
+        assert (await w.client.command(SET_MODE, 1, 4, 3, timeout=8.0)).result == ACCEPTED
+        w.drone.faults.down = w.drone.faults.up = Impairment()
+        await watched(1.0)
+        assert w.drone.flying_state.name == "HOVERING"
+        assert w.drone.pose.up > 8.0
+
+
+async def test_landing_that_another_client_has_ended_does_not_begin_again_by_a_repetition() -> None:
+    """The acknowledgement of Land was lost, and its client's program repeats it after another client's Hold."""
+    async with world(speed=1.0, clients=2) as w:
+        await w.take_off(10.0)
+        assert (await w.client.command(LAND)).result == ACCEPTED
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landing", 5.0)
+        assert (await w.clients[1].command(SET_MODE, 1, 4, 3)).result == ACCEPTED
+        assert (await w.client.command(LAND)).result == CANCELLED
+        await watched(1.0)
+        assert len(heard(w, "Landing")) == 1
+        await asyncio.sleep(RESEND_WINDOW)  # later it is another one
+        assert (await w.client.command(LAND)).result == ACCEPTED
+        await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.land)
+
+
+async def test_emergency_while_gaz_ends_a_landing_cancels_that() -> None:
+    """No gaz follows the cut, and the client of the Hold receives CANCELLED."""
+    async with world(speed=1.0, allow_kill=True, clients=2) as w:
+        await w.take_off(10.0)
+        assert (await w.client.command(LAND)).result == ACCEPTED
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landing", 5.0)
+        await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.land)
+        w.drone.faults.down = Impairment(delay=0.5)
+        mark = w.client.mark()
+        w.client.send_command(SET_MODE, 1, 4, 3)
+        await w.drone.wait_log(lambda e: e.name.endswith("PCMD") and e.args["gaz"] > 0, 5.0)
+        assert (await w.clients[1].command(ARM, 0, 21196)).result == ACCEPTED
+        assert (SET_MODE, CANCELLED) in results(w.client, mark)
+        emergency = next(e for e in w.drone.log if e.name.endswith("Emergency"))
+        await watched(1.0)
+        assert [e for e in heard(w, "PCMD", since=emergency.t + 0.05) if e.args["gaz"]] == []
+
+
+async def silence(w: World) -> None:
+    """The drone is not heard for longer than its heartbeats last, and speaks again."""
+    w.drone.faults.mute = True
+    await watched(3.0)
+    mark, w.drone.faults.mute = w.client.mark(), False
+    await w.client.heartbeat(lambda beat: True, since=mark, timeout=15.0)
+
+
+async def test_link_silence_above_home_leaves_the_drone_hovering() -> None:
+    async with world(speed=8.0) as w:
+        await w.take_off(12.0)
+        assert await goto(w, 15.0, 12.0) == ACCEPTED
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 14.0, 20.0)
+        mark = w.client.mark()
+        assert (await w.client.command(RTL)).result == ACCEPTED
+        while not any("Landing in 5 s" in line for line in texts(w.client, mark)):
+            await w.client.wait("STATUSTEXT", timeout=30.0)
+        await silence(w)
+        await watched(5.0)
+        assert heard(w, "Landing") == []
+        assert w.drone.flying_state.name == "HOVERING"
+
+
+async def test_link_silence_ends_a_goto_that_waits_for_a_takeoff() -> None:
+    async with world(speed=1.0) as w:
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        assert (await w.client.command(TAKEOFF, x=0.0, y=0.0, z=20.0)).result == ACCEPTED
+        mark = w.client.mark()
+        place = geo.destination(*HOME[:2], 30.0, 0.0)
+        w.client.send_command(GOTO, -1, 1, 0, NAN, frame=6, x=place[0], y=place[1], z=8.0)
+        await w.client.wait("COMMAND_ACK", lambda m: m.command == GOTO, since=mark)
+        await silence(w)
+        assert (GOTO, FAILED) in results(w.client, mark)
+        await watched(2.0)
+        assert heard(w, "moveTo") == []
