@@ -88,7 +88,9 @@ async def reposition(vehicle: Vehicle, command: Command) -> None:
         if attitude is None:
             raise Refused("Refused: the present heading is not known")
         heading += attitude.yaw
-    await vehicle.takeoff.over("Goto")
+    if vehicle.takeoff.rises:
+        vehicle.guided.check(where, ato)  # one that is refused replaces none that waits
+        await vehicle.takeoff.over("Goto")
     await vehicle.guided.reposition(where, ato, heading, speed if speed > 0.0 else None, mode)
 
 

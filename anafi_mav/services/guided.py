@@ -73,7 +73,9 @@ async def _fly_item(host: Host, inbound: Inbound) -> None:
                 raise Refused("Goto refused: the item is no way point", lasting=True)
             where = Place(item.x / scale, item.y / scale)
             check_on_earth(where, "Goto")
-            await vehicle.takeoff.over("Goto")
+            if vehicle.takeoff.rises:
+                vehicle.guided.check(where, ato)
+                await vehicle.takeoff.over("Goto")
             await vehicle.guided.reposition(where, ato, None, mode=guided_mode(flavour))
         else:
             await change_altitude(vehicle, ato, flavour)

@@ -71,6 +71,13 @@ class GuidedFlight:
         target = move.target
         return Goto(Place(target.latitude, target.longitude), target.altitude, None, None, FlightMode.GUIDED)
 
+    def check(self, place: Place | None, ato: float | None) -> None:
+        """Raise `Refused` for a place or height (m above take-off) that cannot be flown to at present; None: any."""
+        if ato is not None:
+            check_height(self._vehicle, ato)
+        if place is not None:
+            check_place(self._vehicle, place, start=self._vehicle.place)
+
     async def reposition(
         self,
         place: Place | None,

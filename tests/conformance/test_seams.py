@@ -15,7 +15,18 @@ from support.params import write
 from support.plans import ACCEPTED as TAKEN
 from support.plans import FENCE, circle, upload
 from support.setpoints import POSITION_ONLY, VELOCITY_ONLY, attitude, engage, heard, local, said, streaming, texts
-from support.trouble import ACCEPTED, CANCELLED, FAILED, IN_PROGRESS, goto, results, somebody_else, watched
+from support.trouble import (
+    ACCEPTED,
+    CANCELLED,
+    DENIED,
+    FAILED,
+    IN_PROGRESS,
+    REJECTED,
+    goto,
+    results,
+    somebody_else,
+    watched,
+)
 from support.world import HOLD, HOME, OFFBOARD, World, world
 
 from anafi_mav import geo
@@ -132,6 +143,22 @@ async def test_offboard_in_a_climb_replaces_a_goto_that_waits_for_it() -> None:
             await w.client.heartbeat(lambda beat: beat.custom_mode == OFFBOARD, timeout=15.0)
             await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["east"] > 2.0, 15.0)
         assert heard(w, "moveTo") == []
+
+
+async def test_goto_that_is_refused_leaves_the_one_that_waits_for_a_takeoff() -> None:
+    async with world(clients=2) as w:
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        assert (await w.client.command(TAKEOFF, x=0.0, y=0.0, z=6.0)).result == ACCEPTED
+        mark = w.client.mark()
+        near, far = (geo.destination(*HOME[:2], metres, 0.0) for metres in (10.0, 50_000.0))
+        w.client.send_command(GOTO, -1, 1, 0, NAN, frame=6, x=near[0], y=near[1], z=8.0)
+        await w.client.wait("COMMAND_ACK", lambda m: m.command == GOTO, since=mark)
+        assert w.drone.flying_state.name == "TAKINGOFF"
+        ack = await w.clients[1].command(GOTO, -1, 1, 0, NAN, frame=6, x=far[0], y=far[1], z=8.0, timeout=20.0)
+        assert ack.result in (REJECTED, DENIED)
+        assert heard(w, "moveTo") == []
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 9.0, 20.0)
+        assert (GOTO, ACCEPTED) in results(w.client, mark)
 
 
 @pytest.mark.parametrize("kind", ["position", "attitude"])
