@@ -73,7 +73,7 @@ class CompassService(Service):
         """The drone has stored the result; there is nothing left to do."""
         _check_mask(command)
         if not self._succeeded:
-            raise Refused("Compass calibration not accepted: none has succeeded")
+            raise Refused("Compass calibration not accepted: none done")
 
     async def _cancel(self, command: Command) -> None:
         """ACCEPTED without one under way, too, as in ArduPilot."""

@@ -189,7 +189,7 @@ class FollowFlight:
                 self._kept_height = state.altitude
             if self._kept_height is None:
                 raise Refused("Refused: the drone's height is not known")
-            self.complain(f"Follow height kept: {height:.0f} m above take-off is too low")
+            self.complain(f"Follow height kept: target asks for {height:.0f} m")
             return self._kept_height
         self._kept_height = None
         if settings.altitude_mode is AltitudeMode.TARGET:

@@ -49,7 +49,7 @@ def unpack_plan(content: bytes, mission_type: int) -> list[PlanItem] | Fault:
     if magic != MAGIC or kind != mission_type:
         return _invalid("the file is of another kind")
     if options != 0 or first != 0:
-        return _invalid("the file replaces a part of the list")
+        return _invalid("the file is a part of a list")
     if len(content) != size_of(count):
         return _invalid(f"the file has not its {count} items")
     items: list[PlanItem] = []

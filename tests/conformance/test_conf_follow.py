@@ -105,7 +105,7 @@ async def test_follow_target_that_asks_for_less_than_1_m_is_followed_at_the_pres
             await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["vn"] > 1.0, 10.0)
             await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 15.0, 20.0)
             await w.client.wait(
-                "STATUSTEXT", lambda m: "Follow height kept: -27 m above take-off" in m.text, since=mark
+                "STATUSTEXT", lambda m: "Follow height kept: target asks for -27 m" in m.text, since=mark
             )
         assert w.drone.pose.up == pytest.approx(6.0, abs=0.5)
 

@@ -48,8 +48,8 @@ def test_file_that_is_read_back_holds_the_same_list(kind: int) -> None:
         (pack_plan(ITEMS, FENCE), "of another kind"),
         (pack_plan(ITEMS, MISSION)[:-1], "has not its 3 items"),
         (pack_plan(ITEMS, MISSION) + b"\0", "has not its 3 items"),
-        (struct.pack("<HHHHH", MAGIC, 0, 1, 0, 0), "replaces a part"),
-        (struct.pack("<HHHHH", MAGIC, 0, 0, 1, 0), "replaces a part"),
+        (struct.pack("<HHHHH", MAGIC, 0, 1, 0, 0), "is a part of a list"),
+        (struct.pack("<HHHHH", MAGIC, 0, 0, 1, 0), "is a part of a list"),
         (struct.pack("<HHHHH", MAGIC, 0, 0, 0, 1) + pack_plan(ITEMS, MISSION)[-38:], "item 0 has the number 2"),
     ],
 )
