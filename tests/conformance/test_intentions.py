@@ -11,6 +11,7 @@ from support.trouble import (
     CANCELLED,
     GOTO,
     LAND_CMD,
+    PX4_HOLD,
     REJECTED,
     RTL,
     goto,
@@ -149,6 +150,7 @@ async def test_who_comes_back_while_its_loss_is_being_acted_upon_has_the_say() -
         muted = now_mute(w, "rth.return_to_home", 0.5)
         w.client.send(dialect.MAVLink_heartbeat_message(dialect.MAV_TYPE_GCS, 8, 0, 0, 4, 3))
         await muted
+        assert (await other.command(dialect.MAV_CMD_DO_SET_MODE, *PX4_HOLD)).result == ACCEPTED
         place = geo.destination(*HOME[:2], 40.0, 0.0)
         assert (await other.command(GOTO, -1, 1, 0, NAN, frame=6, x=place[0], y=place[1], z=8.0)).result == ACCEPTED
         await leaves(w, 10.0)
