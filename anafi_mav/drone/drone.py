@@ -263,16 +263,12 @@ class Drone:
             either: set[asyncio.Future[Any]] = {attempt} if fading is None else {attempt, self._heard}
             await asyncio.wait(either, return_when=asyncio.FIRST_COMPLETED)
             if not attempt.done() and fading is not None and self._resume(fading):
+                await _abandon(attempt)
                 return None
             session = await attempt
         except BaseException:
-            # Nobody takes what it may have opened.
-            if attempt.done() and not attempt.cancelled() and attempt.exception() is None:
-                await attempt.result().close()
+            await _abandon(attempt)
             raise
-        finally:
-            attempt.cancel()
-            await asyncio.wait([attempt])
         self._drop_fading("replaced by a new session")
         self.handshake_at, self._dismissed, self.may_be_displaced = loop_time(), None, False
         session.on_message = self._receive
@@ -735,3 +731,11 @@ def _starts_motors(message: Message) -> bool:
 
 def _model(id: int) -> Model:
     return MODELS.get(id) or Model(id, f"0x{id:04x}", "unknown model", protobuf=True)
+
+
+async def _abandon(attempt: asyncio.Future[ControllerSession]) -> None:
+    """Cancel an attempt to connect and wait for it; close the session that it may have opened all the same."""
+    attempt.cancel()
+    await asyncio.wait([attempt])
+    if not attempt.cancelled() and attempt.exception() is None:
+        await attempt.result().close()
