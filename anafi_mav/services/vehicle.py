@@ -297,6 +297,8 @@ class Vehicle(Aircraft):
         commanded = None if by is None else replace(by, extent=Extent.COMMANDED)
         if lands := self.landing:
             self._require_endable("Return", commanded)
+            if self.drone.home.state.rth == RthState.UNAVAILABLE:  # the landing would be ended for nothing
+                raise Refused("Return refused: not available, landing goes on")
         await self.take_over()
         if lands or self.landing:
             with self._selected_no_more(FlightMode.HOLD):

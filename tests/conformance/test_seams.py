@@ -298,3 +298,17 @@ async def test_link_silence_ends_a_goto_that_waits_for_a_takeoff() -> None:
         assert (GOTO, FAILED) in results(w.client, mark)
         await watched(2.0)
         assert heard(w, "moveTo") == []
+
+
+async def test_return_that_is_not_available_leaves_the_landing_alone() -> None:
+    """The drone has no GPS fix: nobody wants it to hover and drift instead of landing."""
+    async with world(speed=1.0) as w:
+        await w.take_off(10.0)
+        assert (await w.client.command(LAND)).result == ACCEPTED
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landing", 5.0)
+        mark, w.drone.faults.gps = w.client.mark(), False
+        await w.client.wait("GPS_RAW_INT", lambda m: m.fix_type < 2, since=mark)
+        assert (await w.client.command(RTL)).result == REJECTED
+        await watched(0.5)
+        assert w.drone.flying_state.name == "LANDING"
+        assert [e for e in heard(w, "PCMD") if e.args["gaz"]] == []
