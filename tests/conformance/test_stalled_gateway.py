@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import math
 import signal
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -18,6 +19,7 @@ from support.process import gateway_process
 from support.trouble import ACCEPTED, GOTO, PX4_OFFBOARD, goto, heard
 from support.world import HOLD, HOME, WEB_PORT, World, loopback
 
+from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.messages.skyctrl import Source
 from anafi_mav.gateway import Gateway
 from anafi_mav.sim import DroneSpec, Simulator
@@ -173,3 +175,26 @@ async def test_what_clients_sent_to_a_stopped_gateway_is_not_carried_out(tmp_pat
         await w.drone.wait_log(lambda e: e.kind == "pose" and e.t > back + 2.0, 10.0)
         assert deflected(w, back) == []
         assert heard(w, "moveTo") == []
+
+
+@pytest.mark.parametrize("way", ["goto", "mission", "offboard", "orbit"])
+async def test_ended_gateway_leaves_a_hovering_drone(tmp_path: Path, way: str) -> None:
+    """SIGTERM, with a program that goes on sending: the drone stands, and nothing of before moves it."""
+    async with apart(tmp_path, None) as (w, gateway):
+        task = await set_out(w, way)
+        try:
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["vn"] ** 2 + e.args["ve"] ** 2 > 1.0, 20.0)
+            gateway.send_signal(signal.SIGTERM)
+            assert await asyncio.wait_for(gateway.wait(), 20.0) == 0
+            ended = w.drone.log[len(w.drone.log) - 1].t
+            await w.drone.wait_log(
+                lambda e: e.kind == "pose" and e.t > ended and e.args["vn"] ** 2 + e.args["ve"] ** 2 < 0.04, 10.0
+            )
+            assert w.drone.flying_state in (FlyingState.HOVERING, FlyingState.FLYING)
+            stood = w.drone.pose
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.t > ended + 3.0, 10.0)
+            assert math.hypot(w.drone.pose.north - stood.north, w.drone.pose.east - stood.east) < 1.0
+            assert abs(w.drone.pose.up - stood.up) < 0.5
+        finally:
+            if task is not None:
+                task.cancel()
