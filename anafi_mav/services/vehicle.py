@@ -134,6 +134,8 @@ class Vehicle(Aircraft):
         self._initiators = Initiators()
         self._landing_sent = 0
         """Landings that were sent and have not been answered."""
+        self.landing_ended_at = -math.inf
+        """When a client last ended a landing."""
         self._returns_sent = 0
         """Returns that were sent and have not been answered."""
         self.holds = HoldRule()
@@ -514,6 +516,7 @@ class Vehicle(Aircraft):
             await self.drone.piloting.end_landing(take_off=take_off)
         except CommandRejected as error:
             raise Refused(f"Landing not aborted: {error.reason}") from None
+        self.landing_ended_at = self._clock.monotonic()
         if by is not None:
             self.text(Severity.NOTICE, f"Landing aborted by system {by.system}: hovering")
 
