@@ -149,7 +149,8 @@ class CommandService(Service):
         # Before it is known whether it is a retransmission: a program that repeats its Hold is to be noticed.
         counted = not command.holds or self.host.vehicle.holds.arrive(command.client, now)
         command = replace(command, at=now, counted=counted)
-        repeated = self._desk.retransmission(command.client, command, now, mode)
+        ended_at = self.host.vehicle.landing_ended_at
+        repeated = self._desk.retransmission(command.client, command, now, mode, ended_at)
         if repeated is not None:
             quiet = command.patient or command.is_answered_once  # IN_PROGRESS is sent later, or not at all
             if not (quiet and repeated == dialect.MAV_RESULT_IN_PROGRESS):

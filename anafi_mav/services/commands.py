@@ -229,20 +229,26 @@ class CommandDesk:
         self._newest: dict[Hashable, Execution] = {}
 
     def retransmission(
-        self, client: Hashable, command: Command, now: float, mode: FlightMode | None = None
+        self,
+        client: Hashable,
+        command: Command,
+        now: float,
+        mode: FlightMode | None = None,
+        landing_ended_at: float = -math.inf,
     ) -> int | None:
         """The MAV_RESULT to answer a command with that this client sends once more; None: it is to be executed.
 
-        What may be carried out twice is: orders to stop always, a landing or a return while no other client has taken
-        over, and modes that have ended by themselves (`mode` is the vehicle's). What another client has replaced is
-        neither carried out over its head nor confirmed: it is answered with CANCELLED.
+        What may be carried out twice is: orders to stop always, but for a landing that another client has ended
+        (`landing_ended_at` is when a client last ended one), a return while no other client has taken over, and modes
+        that have ended by themselves (`mode` is the vehicle's). What another client has replaced is neither carried out
+        over its head nor confirmed: it is answered with CANCELLED.
         """
         newest = self._newest.get(client)
         if newest is None or not newest.command.same_as(command):
             return None
         if newest.result == dialect.MAV_RESULT_IN_PROGRESS:
             return newest.result
-        if command.stops and not (command.lands and newest.superseded):
+        if command.stops and not (command.lands and newest.superseded and landing_ended_at >= newest.ended):
             return None
         succeeded = newest.result in (dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_CANCELLED)
         if now - newest.ended >= (RESEND_WINDOW if succeeded else REFUSAL_WINDOW):

@@ -134,6 +134,8 @@ class Vehicle(Aircraft):
         self._initiators = Initiators()
         self._landing_sent = 0
         """Landings that were sent and have not been answered."""
+        self.landing_ended_at = -math.inf
+        """When a client last ended a landing."""
         self._returns_sent = 0
         """Returns that were sent and have not been answered."""
         self.holds = HoldRule()
@@ -297,6 +299,8 @@ class Vehicle(Aircraft):
         commanded = None if by is None else replace(by, extent=Extent.COMMANDED)
         if lands := self.landing:
             self._require_endable("Return", commanded)
+            if self.drone.home.state.rth == RthState.UNAVAILABLE:  # the landing would be ended for nothing
+                raise Refused("Return refused: not available, landing goes on")
         await self.take_over()
         if lands or self.landing:
             with self._selected_no_more(FlightMode.HOLD):
@@ -512,6 +516,7 @@ class Vehicle(Aircraft):
             await self.drone.piloting.end_landing(take_off=take_off)
         except CommandRejected as error:
             raise Refused(f"Landing not aborted: {error.reason}") from None
+        self.landing_ended_at = self._clock.monotonic()
         if by is not None:
             self.text(Severity.NOTICE, f"Landing aborted by system {by.system}: hovering")
 

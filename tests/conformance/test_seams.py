@@ -114,7 +114,7 @@ async def test_take_off_that_waits_for_arming_replaces_a_session_on_the_ground()
 
 
 async def test_session_on_the_ground_does_not_fly_a_drone_that_somebody_else_takes_off() -> None:
-    """The pilot at a Skycontroller takes off while a program, not armed, is in Offboard: it is his flight."""
+    """The pilot at a Skycontroller takes off while a program, not armed, is in Offboard: the flight is the pilot's."""
     async with world(clients=1) as w:
         async with streaming(w.client, NORTH):
             await engage(w.client, "px4")
@@ -245,6 +245,16 @@ async def test_landing_that_another_client_has_ended_does_not_begin_again_by_a_r
         await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.land)
 
 
+async def test_land_is_carried_out_again_when_another_client_has_taken_off_since() -> None:
+    """It had nothing to do on the ground. Now it has, and a landing may not have to wait."""
+    async with world(speed=1.0, clients=2) as w:
+        assert (await w.client.command(LAND)).result == ACCEPTED
+        assert (await w.clients[1].command(ARM, 1)).result == ACCEPTED
+        assert (await w.clients[1].command(TAKEOFF, x=0.0, y=0.0, z=8.0)).result == ACCEPTED
+        assert (await w.client.command(LAND)).result == ACCEPTED
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landing", 5.0)
+
+
 async def test_emergency_while_gaz_ends_a_landing_cancels_that() -> None:
     """No gaz follows the cut, and the client of the Hold receives CANCELLED."""
     async with world(speed=1.0, allow_kill=True, clients=2) as w:
@@ -298,3 +308,17 @@ async def test_link_silence_ends_a_goto_that_waits_for_a_takeoff() -> None:
         assert (GOTO, FAILED) in results(w.client, mark)
         await watched(2.0)
         assert heard(w, "moveTo") == []
+
+
+async def test_return_that_is_not_available_leaves_the_landing_alone() -> None:
+    """The drone has no GPS fix: it is not to hover and drift instead of landing."""
+    async with world(speed=1.0) as w:
+        await w.take_off(10.0)
+        assert (await w.client.command(LAND)).result == ACCEPTED
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landing", 5.0)
+        mark, w.drone.faults.gps = w.client.mark(), False
+        await w.client.wait("GPS_RAW_INT", lambda m: m.fix_type < 2, since=mark)
+        assert (await w.client.command(RTL)).result == REJECTED
+        await watched(0.5)
+        assert w.drone.flying_state.name == "LANDING"
+        assert [e for e in heard(w, "PCMD") if e.args["gaz"]] == []
