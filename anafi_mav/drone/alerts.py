@@ -87,7 +87,7 @@ _FLIES_WITHOUT = (Sensor.GPS,)
 
 
 _HARMLESS = (None, AlertState.NONE, AlertState.USER, AlertState.LOW_BATTERY)
-"""Alerts with which a drone takes off. USER is a past emergency stop, which the flying state EMERGENCY tells better: a
+"""Alerts with which a drone takes off. USER is a past emergency stop; the flying state EMERGENCY reports it better. A
 firmware that kept it would stay on the ground until it is switched off."""
 
 

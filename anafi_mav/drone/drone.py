@@ -319,7 +319,7 @@ class Drone:
             fading.end(reason)
 
     def _note_loss(self, session: ControllerSession, *, silent: bool) -> None:
-        """Keep what tells a loss by another controller's handshake, which silences us, from others.
+        """Keep the facts that distinguish another controller's handshake, which silences us, from other losses.
 
         The one connection of a Skycontroller 4 is closed by it. What loses the drone behind it, and a drone that is
         switched off, is none.

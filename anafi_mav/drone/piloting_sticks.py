@@ -91,7 +91,7 @@ class StickStream:
         self.pump()
 
     def send_now(self, position: Percent) -> None:
-        """Send one PCMD in a landing, outside of the 20 Hz grid; whoever calls repeats it, and then centres."""
+        """Send one PCMD in a landing, outside of the 20 Hz grid; the caller repeats it, and then centres."""
         if self._flight.state.flying == FlyingState.LANDING and not self.landings_asked:
             self._send(self._sticks.single(position, loop_time()))
 
@@ -130,7 +130,7 @@ class StickStream:
             self._timer = None
 
     def release(self) -> None:
-        """Send centred PCMDs, then none: a return waits for flag 0 (rth.xml 146-0-11), whoever sent flag 1 last.
+        """Send centred PCMDs, then none: a return waits for flag 0 (rth.xml 146-0-11), from any controller.
 
         Not while the pilot at a Skycontroller has the piloting source: the sticks that count are his.
         """

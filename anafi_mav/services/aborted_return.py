@@ -1,6 +1,6 @@
 """What clients are notified of after one of them has ended a return that the drone began: at once, and again and again.
 
-The drone does not return a second time for the same reason, so that nobody may forget why it wanted to.
+The drone does not return a second time for the same reason, so its reason is repeated to the pilot.
 """
 
 from __future__ import annotations

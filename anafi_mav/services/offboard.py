@@ -167,7 +167,7 @@ class OffboardStream:
     def receive(self, sender: Hashable, setpoint: Setpoint, now: float, lasts: float = SILENCE) -> bool:
         """A usable setpoint arrived; it is over after `lasts` s of silence.
 
-        False: somebody else flies, or too many want to.
+        False: another client flies, or too many want to.
         """
         if sender not in self._heard and len(self._heard) >= MAX_PILOTS:
             self._prune(now)

@@ -463,7 +463,7 @@ GCS_LOSS = Parameter(
     polled=True,
     group=GATEWAY,
     long="Once a ground station has been heard. Behind a Skycontroller, while nothing of ours flies the drone, a text "
-    "is all, even if its pilot does not hold it. When the drone's link was lost and is back, the time begins anew.",
+    "is all, even if its pilot does not hold it. When the drone's link was lost and is back, the time restarts.",
     default=float(LossAction.NOTHING),
     source="gateway",
 )
