@@ -36,6 +36,7 @@ def test_failed_test_is_repeated_once_only_if_third_party_and_is_printed(tmp_pat
     file.write_text(FAILS_ONCE)
     words = ("-m", "pytest", "-p", "support.repeats", "-n", "2", "-q", "-c", os.devnull, str(file))
     environment = {**os.environ, "PYTHONPATH": str(TESTS)}
+    environment.pop("PYTEST_ADDOPTS", None)  # options of the suite's own run
     done = subprocess.run([sys.executable, *words], capture_output=True, text=True, timeout=120, env=environment)
     assert done.returncode == 1, done.stdout + done.stderr
     repeated = [line.rpartition("::")[2] for line in done.stdout.splitlines() if line.startswith("repeated: ")]
