@@ -26,7 +26,7 @@ from support import clock
 
 clock.install()
 
-from support.soak import known, rounds_flown, draw  # noqa: E402 (the clock comes first)
+from support.soak import draw, known, rounds_flown  # noqa: E402 (the clock comes first)
 
 from anafi_mav.arsdk import watchdog  # noqa: E402
 

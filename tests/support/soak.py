@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import gc
+import itertools
 import logging
 import math
 import random
@@ -24,12 +25,13 @@ from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.mavlink import dialect as newer
 from anafi_mav.sim.faults import CLEAR, Impairment
 from support.mav import NAN, Client
+from support.missions import ACTIVE, CORNERS, put, start, state, way
 from support.missions import RTL as ITEM_RTL
 from support.missions import takeoff as item_takeoff
-from support.missions import way
 from support.plans import MISSION, Item, upload
 from support.setpoints import EVERY, POSITION_ONLY, VELOCITY_ONLY, earth, local
-from support.world import HOME, World, world
+from support.trouble import watched
+from support.world import HOME, TAKE_OFF_SPEED, World, world
 
 MODELS = ("4k", "usa", "thermal", "ai")
 STEPS = 12
@@ -49,6 +51,9 @@ FINAL_WITHIN = 45.0
 
 GAZ_FOR = 1.0
 """s of full gaz at most that end a landing (arsdk: ardrone3.xml 1-0-3)."""
+
+LONGEST_CUT = 1.3
+"""s that the link is interrupted at most; below the time after which it counts as lost."""
 
 STANDS_WITHIN = 20.0
 """s after a Hold within which the drone stands still."""
@@ -109,6 +114,17 @@ DIFFERS_AT_MOST = 20.0
 """s that a mode may differ. A commanded return hovers at home for 5 s before it lands, and for 13 s more where the
 drone reports no end of it."""
 
+BEGINNINGS = ("ground", "hover", "hover", "mission")
+
+AFTER_CANCEL, BLAMED = ", after COMMAND_CANCEL", "continued by another controller, and there is none"
+
+DEFECTS = {
+    AFTER_CANCEL: "CONTROL 3: cancel while control is acquired leaves mode Mission",
+    BLAMED: "CONTROL 2: cancelled mission restart is reported as another controller's",
+}
+"""Defects that issue CONTROL ends, by what their failures end with. Its number 1, a single goto that becomes a stream,
+breaks no promise that a round can judge: the goto ends where any newer command may end it."""
+
 WEIGHTS = {
     "arm": 2,
     "takeoff": 3,
@@ -129,6 +145,7 @@ WEIGHTS = {
     "land": 2,
     "disarm": 1,
     "cancel": 3,
+    "withdraw": 2,
     "again": 3,
     "cut": 1,
 }
@@ -157,15 +174,15 @@ class Draw:
     flavours: tuple[str, ...]
     """Of each client."""
     skycontroller: int | None
-    flies: bool
-    """The round begins in the air."""
+    begins: str
+    """On the ground, in a hover or on a mission."""
     up: Impairment
     down: Impairment
     steps: tuple[Step, ...]
 
     def __str__(self) -> str:
         head = f"seed {self.seed}: {self.model}, clients {', '.join(self.flavours)}, Skycontroller {self.skycontroller}"
-        link = f"  {'in the air' if self.flies else 'on the ground'}, up {self.up}, down {self.down}"
+        link = f"  {self.begins}, up {self.up}, down {self.down}"
         return "\n".join([head, link, *(f"  {step}" for step in self.steps)])
 
 
@@ -190,9 +207,7 @@ def draw(seed: int, steps: int = STEPS) -> Draw:
         drawn.append(Step(gap, chance.randrange(len(flavours)), kind, args))
     model = chance.choice(MODELS)
     skycontroller = 3 if chance.random() < 0.25 and model != "ai" else None
-    return Draw(
-        seed, model, tuple(flavours), skycontroller, chance.random() < 0.7, up, down, tuple(drawn)
-    )
+    return Draw(seed, model, tuple(flavours), skycontroller, chance.choice(BEGINNINGS), up, down, tuple(drawn))
 
 
 @dataclass(frozen=True)
@@ -352,6 +367,10 @@ class Flight:
                 other = int(abs(first)) % len(self.drawn.flavours)
                 if other in self._last:
                     self.client(n).send(newer.MAVLink_command_cancel_message(1, 1, self._last[other][0]))
+            case "withdraw":
+                self.command(n, SET_CURRENT, 1.0 + copter)
+                cancel = newer.MAVLink_command_cancel_message(1, 1, SET_CURRENT)
+                asyncio.get_running_loop().call_later(third / 4.0, self.client(n).send, cancel)
             case "again":
                 if n in self._last:
                     id, params, where = self._last[n]
@@ -377,7 +396,7 @@ class Flight:
         found = []
         for client in self.w.clients:
             beats = [at for at, m in client.since(0, "HEARTBEAT") if m.get_srcComponent() == 1]
-            found += [(a, b) for a, b in zip(beats, beats[1:], strict=False) if b - a > 1.6]
+            found += [(a, b) for a, b in itertools.pairwise(beats) if b - a > 1.6]
         return found
 
     def unanswered(self) -> list[Sent]:
@@ -464,8 +483,7 @@ async def fly(drawn: Draw) -> list[str]:
         ) as w:
             for index, flavour in enumerate(drawn.flavours[1:], 1):
                 await w.connect(sysid=255 - index, port=5760 if flavour == first else 5761)
-            if drawn.flies:
-                await w.take_off()
+            await begin(w, drawn.begins)
             flight = Flight(w, drawn)
             w.drone.faults.up, w.drone.faults.down = drawn.up, drawn.down
             for step in drawn.steps:
@@ -482,6 +500,18 @@ async def fly(drawn: Draw) -> list[str]:
     return flight.wrong + [f"logged: {record}" for record in logged]
 
 
+async def begin(w: World, how: str) -> None:
+    """Bring the drone to where the steps begin."""
+    if how == "hover":
+        await w.take_off()
+    elif how == "mission":
+        w.simulator.speed = TAKE_OFF_SPEED
+        await put(w, CORNERS)
+        await start(w)
+        await state(w, ACTIVE, seq=1, since=0)
+        w.simulator.speed = SPEED
+
+
 async def settle(flight: Flight) -> None:
     """Wait until each command has its final acknowledgement and the last stream is over."""
     w = flight.w
@@ -489,7 +519,7 @@ async def settle(flight: Flight) -> None:
     await asyncio.sleep(GUIDED_TIMEOUT + flight.delay + SLACK)
     limit = now() + FINAL_WITHIN
     while flight.unanswered() and now() < limit and not (flight.gaps() and now() > limit - FINAL_WITHIN + 10.0):
-        await asyncio.sleep(0.2)  # acknowledgements of many commands, in any order
+        await watched(0.2)  # acknowledgements of many commands, in any order
     w.drone.faults.up = w.drone.faults.down = CLEAR
     await asyncio.sleep(1.0)
 
@@ -528,7 +558,7 @@ async def _differences(flight: Flight, seconds: float = 3.0) -> list[str]:
     seen, begun = set(), now()
     for _ in range(round(seconds / 0.2)):
         seen.add(doing(w))
-        await asyncio.sleep(0.2)  # samples of what the drone does
+        await watched(0.2)  # samples of what the drone does
     if len(seen) > 1 or any(end > begun for _, end in flight.gaps()):
         return []
     (truth,) = seen
@@ -537,7 +567,9 @@ async def _differences(flight: Flight, seconds: float = 3.0) -> list[str]:
         modes = {SHOWN[flight.flavour(index)].get(m.custom_mode, "other") for m in beats}
         armed = {bool(m.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED) for m in beats}
         if len(modes) == 1 and not modes <= MAY_SHOW[truth]:
-            found.append(f"mode of client {index} is {modes} while the drone's state is {truth}")
+            cancels = any(step.kind in ("cancel", "withdraw") for step in flight.drawn.steps)
+            after = AFTER_CANCEL if cancels and modes == {"mission"} else ""
+            found.append(f"mode of client {index} is {modes} while the drone's state is {truth}{after}")
         if truth != "ground" and armed != {True}:
             found.append(f"armed of client {index} is {armed} while the drone's state is {truth}")
     return found
@@ -546,6 +578,9 @@ async def _differences(flight: Flight, seconds: float = 3.0) -> list[str]:
 def judge(flight: Flight) -> None:
     """What the log and the acknowledgements of the steps say."""
     _judge_acks(flight)
+    texts = [m.text for client in flight.w.clients for _, m in client.since(0, "STATUSTEXT")]
+    if flight.drawn.skycontroller is None and any("somebody else has continued" in text for text in texts):
+        flight.wrong.append(f"mission is {BLAMED}")
     _judge_sticks(flight)
     _judge_motors(flight)
 
@@ -614,7 +649,7 @@ def _finals(flight: Flight, s: Sent) -> list[tuple[float, int]]:
 
 def _judge_motors(flight: Flight) -> None:
     began = flight.began
-    landed_at, flying = -math.inf, flight.drawn.flies
+    landed_at, flying = -math.inf, False
     for entry in flight.w.drone.log:
         if entry.kind == "state" and entry.name == "flying":
             flying = entry.args["to"] != "landed"
@@ -624,14 +659,14 @@ def _judge_motors(flight: Flight) -> None:
             continue
         name = entry.name.rpartition(".")[2]
         if not (
-            name == "TakeOff"
-            or (name == "UserTakeOff" and entry.args["state"])
-            or entry.name.endswith("Mavlink.Start")
+            name == "TakeOff" or (name == "UserTakeOff" and entry.args["state"]) or entry.name.endswith("Mavlink.Start")
         ):
             continue
-        arms = [s for s in flight.sent if s.command == ARM and s.values[:1] == (1.0,) and s.at <= entry.t]
-        if flight.drawn.flies and landed_at == -math.inf:
+        if name == "TakeOff" and _crossed(flight, entry.t):
+            if not _stopped(flight, entry.t):
+                flight.wrong.append("TakeOff against a landing is received after the touchdown, nothing stops it")
             continue
+        arms = [s for s in flight.sent if s.command == ARM and s.values[:1] == (1.0,) and s.at <= entry.t]
         usable = [
             s
             for s in arms
@@ -657,7 +692,25 @@ def _judge_motors(flight: Flight) -> None:
                 and s.values[:1] != (0.0,)
             ] + [s.begun for s in flight.streams if s.ended + s.lasts >= stops[-1][0]]
             if not newer:
-                flight.wrong.append(f"{name} is received after an accepted landing or disarming, without a newer command")
+                flight.wrong.append(f"{name} is received after an accepted landing, without a newer command")
+
+
+def _crossed(flight: Flight, at: float) -> bool:
+    """Whether a TakeOff was meant to end a landing: sent before the gateway could know of the touchdown."""
+    late = flight.drawn.down.delay + flight.delay + LONGEST_CUT + 1.0
+    return any(
+        begun <= s.at <= over + late and over <= at <= over + late + 1.0
+        for s in flight.sent
+        if s.command == TAKEOFF
+        for begun, over in _landings(flight.w)
+    )
+
+
+def _stopped(flight: Flight, at: float) -> bool:
+    """Whether the drone is commanded to stop what a TakeOff has started, as soon as the gateway can know of it."""
+    limit = at + flight.drawn.down.delay + flight.delay + LONGEST_CUT + 1.0
+    commands = [e for e in flight.w.drone.log if e.kind == "command" and at < e.t < limit]
+    return any(e.name.rpartition(".")[2] in ("Landing", "UserTakeOff", "Emergency") for e in commands)
 
 
 def _speed(entry: Any) -> float:
@@ -674,7 +727,7 @@ async def stands(w: World, within: float) -> bool:
             full = poses[-1].args["time"] - poses[0].args["time"] > 2.0
             if full and all(_speed(e) < 0.3 for e in span) and doing(w) in ("hover", "fly", "ground"):
                 return True
-        await asyncio.sleep(0.2)  # samples of where the drone is
+        await watched(0.2)  # samples of where the drone is
     return False
 
 
@@ -700,7 +753,7 @@ async def land(flight: Flight) -> None:
     ack = await client.command(LAND, timeout=20.0)
     limit = now() + LANDS_WITHIN
     while now() < limit and doing(w) != "ground":
-        await asyncio.sleep(0.2)  # samples of what the drone does
+        await watched(0.2)  # samples of what the drone does
     if doing(w) != "ground":
         flight.wrong.append(f"Land answered {ack.result} leads to no landing: the drone's state is {doing(w)}")
         return
@@ -716,7 +769,7 @@ async def land(flight: Flight) -> None:
 
 def known(text: str) -> str | None:
     """The name of the known defect that a failure shows; None for any other."""
-    return None
+    return next((name for end, name in DEFECTS.items() if end in text), None)
 
 
 async def rounds_flown(seed: int) -> list[str]:
