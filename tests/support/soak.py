@@ -662,16 +662,16 @@ def _judge_motors(flight: Flight) -> None:
             name == "TakeOff" or (name == "UserTakeOff" and entry.args["state"]) or entry.name.endswith("Mavlink.Start")
         ):
             continue
-        if name == "TakeOff" and _crossed(flight, entry.t):
-            if not _stopped(flight, entry.t):
-                flight.wrong.append("TakeOff against a landing is received after the touchdown, nothing stops it")
-            continue
         arms = [s for s in flight.sent if s.command == ARM and s.values[:1] == (1.0,) and s.at <= entry.t]
         usable = [
             s
             for s in arms
             if not (f := _finals(flight, s)) or f[0][0] >= entry.t or (f[0][1] == ACCEPTED and f[0][0] > landed_at)
         ]
+        if not usable and name == "TakeOff" and _crossed(flight, entry.t):
+            if not _stopped(flight, entry.t):
+                flight.wrong.append("TakeOff against a landing is received after the touchdown, nothing stops it")
+            continue
         if not usable:
             flight.wrong.append(f"{name} is received without an armed vehicle")
         stops = [
