@@ -515,12 +515,13 @@ async def begin(w: World, how: str) -> None:
 async def settle(flight: Flight) -> None:
     """Wait until each command has its final acknowledgement and the last stream is over."""
     w = flight.w
-    w.simulator.speed = SETTLING_SPEED
     await asyncio.sleep(GUIDED_TIMEOUT + flight.delay + SLACK)
+    w.simulator.speed = SETTLING_SPEED
     limit = now() + FINAL_WITHIN
     while flight.unanswered() and now() < limit and not (flight.gaps() and now() > limit - FINAL_WITHIN + 10.0):
         await watched(0.2)  # acknowledgements of many commands, in any order
     w.drone.faults.up = w.drone.faults.down = CLEAR
+    w.simulator.speed = SPEED
     await asyncio.sleep(1.0)
 
 
@@ -757,6 +758,7 @@ async def land(flight: Flight) -> None:
     if doing(w) != "ground":
         flight.wrong.append(f"Land answered {ack.result} leads to no landing: the drone's state is {doing(w)}")
         return
+    w.simulator.speed = 1.0  # it stands, only the gateway's time counts
     mark, disarmed = client.mark(), not dialect.MAV_MODE_FLAG_SAFETY_ARMED
     try:  # on the ground before, an armed vehicle disarms itself after 10 s
         await client.heartbeat(
@@ -764,7 +766,6 @@ async def land(flight: Flight) -> None:
         )
     except AssertionError:
         flight.wrong.append(f"Land answered {ack.result} leaves the vehicle armed on the ground")
-    w.simulator.speed = SPEED
 
 
 def known(text: str) -> str | None:
