@@ -67,13 +67,17 @@ class LandingEnd:
         try:
             if take_off and self._is_modern():
                 answer.token = self._commander.send(ardrone3.SmartTakeOffLand())
+                self._motors.take_off_against_landing()
                 # It toggles: were the landing ended by gaz before it arrives, it would begin another one.
                 await asyncio.wait({answer.future}, timeout=SMART_WAIT)
                 self._commander.cancel(answer.token)
             elif take_off:
                 answer.token = self._commander.send(ardrone3.TakeOff())
+                self._motors.take_off_against_landing()
             await self._hold_gaz(answer.future)
             await answer.wait()
+            if take_off:
+                self._motors.landing_over()
         except BaseException as error:
             if answer.token is not None:
                 self._motors.take_off_withdrawn()

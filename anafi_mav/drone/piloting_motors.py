@@ -105,6 +105,17 @@ class Motors:
         """The landing is about to be ended: until a state is reported, LANDING proves nothing."""
         self._doubtful_until = loop_time() + LAND_MEMORY
 
+    def take_off_against_landing(self) -> None:
+        """A TakeOff was sent against a landing: from LANDED on, what it starts is stopped.
+
+        LANDED and the motors that ramp up may arrive together, before the command that waits has noticed the first.
+        """
+        self._withdrawn_until = math.inf
+
+    def landing_over(self) -> None:
+        """The TakeOff against the landing has done its work in the air."""
+        self._withdrawn_until = -math.inf
+
     def take_off_withdrawn(self) -> None:
         """A TakeOff against a landing was withdrawn and may have arrived: a drone that has landed must stay down."""
         self._withdrawn_until = loop_time() + STAYS_DOWN

@@ -203,7 +203,7 @@ class FlightPlan:
             return False
         self._uid, self._name, self._type = uid, name or uid, type
         self._items, self._index, self._goes_on = items, item, goes_on
-        self._begun, self._progress, self._began = False, None, time
+        self._begun, self._progress, self._began, self._time = False, None, time, time
         self._speed, self._roi = CRUISE, None
         self._camera.start(type)
         self._rois = [self._point(found) for found in items if found.command is Command.SET_ROI and found.p1 == 3]

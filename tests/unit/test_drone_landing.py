@@ -133,6 +133,34 @@ async def test_motors_that_start_after_a_lost_race_are_stopped(drone: Drone, dev
     await device.until(ardrone3.Landing, 2)
 
 
+async def test_motors_that_start_are_stopped_when_reported_together_with_touchdown(
+    drone: Drone, device: ScriptedDevice
+) -> None:
+    """A link that was interrupted delivers both states in one event-loop iteration (soak, seed 2168)."""
+    await reported(drone, device, FlyingState.LANDING)
+    ending = await begun(drone.piloting.end_landing(take_off=True))
+    await device.until(ardrone3.TakeOff)
+    device.say(state(FlyingState.LANDED))
+    device.say(state(FlyingState.MOTOR_RAMPING))
+    with pytest.raises(CommandRejected, match="already landed"):
+        await ending
+    assert (await device.until(ardrone3.UserTakeOff)).state == 0
+    await device.until(ardrone3.Landing, 1)
+    await reported(drone, device, FlyingState.TAKINGOFF)
+    await device.until(ardrone3.Landing, 2)
+
+
+async def test_touchdown_after_an_ended_landing_does_not_stop_motors(drone: Drone, device: ScriptedDevice) -> None:
+    await reported(drone, device, FlyingState.LANDING)
+    ending = await begun(drone.piloting.end_landing(take_off=True))
+    await reported(drone, device, FlyingState.HOVERING)
+    await ending
+    await reported(drone, device, FlyingState.LANDED)
+    await reported(drone, device, FlyingState.MOTOR_RAMPING)  # by another controller
+    await device.quiet(ardrone3.Landing)
+    assert device.got(ardrone3.Landing) == []
+
+
 @pytest.mark.parametrize("modern", [False, True])
 async def test_take_off_command_against_a_landing_is_withdrawn_with_it(
     drone: Drone, device: ScriptedDevice, modern: bool

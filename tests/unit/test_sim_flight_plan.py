@@ -483,6 +483,17 @@ def test_start_at_an_item_under_another_name() -> None:
     assert bench.send(flight_plan.ClearRecoveryInfo()) == [flight_plan.RecoveryInfo("", "", 0, 0, "")]
 
 
+def test_plan_that_is_stopped_as_soon_as_it_starts_has_run_for_no_time() -> None:
+    """Start and Landing may arrive between two steps of the simulation; the running time is unsigned."""
+    flight = Flight(line(22), line(93, 50), model="ai", flying=True)
+    bench = flight.bench
+    bench.run(5.0)
+    bench.send(flight_plan.StartAtV2(flight.uid, "mine", flight_plan.MavlinkType.FLIGHT_PLAN_V2, 0, 1))
+    bench.send(ardrone3.Landing())
+    (recovery,) = bench.of(flight_plan.RecoveryInfo)
+    assert recovery.running_time == 0
+
+
 def test_what_an_ai_misses() -> None:
     bench = Bench("ai")
     bench.faults.gps = False
