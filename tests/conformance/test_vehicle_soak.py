@@ -12,6 +12,8 @@ from support.soak import AFTER_CANCEL, BLAMED, Draw, Step, draw, fly, known, rou
 
 from anafi_mav.sim.faults import CLEAR, Impairment
 
+pytestmark = pytest.mark.soak
+
 ROUNDS, GROUP = 100, 10
 
 KNOWN: dict[int, str] = {}
