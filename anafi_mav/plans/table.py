@@ -1,4 +1,4 @@
-"""A plan as lines of text: what is in it, then a line for each item with its parameters in words."""
+"""A plan in words: its summary, then a row for each item with its parameters."""
 
 from __future__ import annotations
 
@@ -71,8 +71,8 @@ class Row:
 
 HEAD = Row("item", "command", "latitude, longitude", "height", "leg", "")
 
-RIGHT = (0, 3, 4)
-"""Columns of numbers."""
+NUMBERS = (0, 3, 4)
+"""Columns of numbers, aligned to the right."""
 
 
 def name_of(command: int) -> str:
@@ -98,18 +98,6 @@ def summary(plan: Plan) -> str:
         parts.append(counted(len(plan.rally), "rally point"))
     parts += [f"items {block.first} to {block.first + block.count - 1} are a {block.kind}" for block in plan.blocks]
     return ", ".join(parts)
-
-
-def lines(plan: Plan) -> Iterator[str]:
-    """The items as a table."""
-    rows = [HEAD, *rows_of(plan)]
-    widths = [max(map(len, column)) for column in zip(*(row.columns() for row in rows), strict=True)]
-    for row in rows:
-        cells = [
-            cell.rjust(width) if place in RIGHT else cell.ljust(width)
-            for place, (cell, width) in enumerate(zip(row.columns(), widths, strict=True))
-        ]
-        yield "  ".join(cells).rstrip()
 
 
 def rows_of(plan: Plan) -> Iterator[Row]:
