@@ -98,7 +98,7 @@ def _sticks(*parts: tuple[float, float, tuple[int, int, int, int]]) -> Callable[
 
 
 def _orbit() -> Pilot:
-    """The gateway's orbit from 12 s on: clockwise around a place 20 m north, 4 m/s, with the aircraft's report rates."""
+    """The gateway's orbit from 12 s on: clockwise, 20 m around a place, 4 m/s, with the aircraft's report rates."""
     motion, limits = Motion(), Limits(tilt_deg=25.0, yaw_rate_dps=90.0, climb_mps=3.0)
     lap = Lap(Circle(Place(*_place(20.0, 0.0)), 20.0, 1, 4.0, 15.0))
     controller = Controller(motion)
