@@ -243,6 +243,14 @@ class SimulatedDrone:
         """Hand launch: counts after UserTakeOff."""
         self.firmware.throw()
 
+    def inject(self, event: Message) -> None:
+        """Send an event as the drone's firmware does, although nothing of it has happened.
+
+        The state of the simulated drone stays as it is, and what the drone reports next may contradict the event. Like
+        every event it is logged, unless its buffer is not acknowledged, and is subject to `faults.untold`.
+        """
+        self._emit(event)
+
     def note(self, name: str, args: dict[str, Any]) -> None:
         """Leave a line of kind "scenario" in the log."""
         self.log.add(self._clock(), "scenario", name, args)
