@@ -17,20 +17,17 @@ from __future__ import annotations
 import argparse
 import fcntl
 import gc
-import io
 import os
 import subprocess
 import sys
-import tarfile
 import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
+from common import tree_of  # noqa: E402 - after the path
 from support.recording import STEP, Texts, compare, read, shown  # noqa: E402 - after the path
 
 SHOWN = 3
@@ -95,18 +92,6 @@ def compared(old: Path, new: Path, step: float, texts: Texts, most: int) -> int:
         for difference in found[:most]:
             print(shown(difference, before, after))
     return int(different)
-
-
-@contextmanager
-def tree_of(commit: str) -> Iterator[Path]:
-    """The files of a commit in a temporary folder, with its generated modules."""
-    with tempfile.TemporaryDirectory() as root:
-        archive = subprocess.run(["git", "-C", str(ROOT), "archive", commit], check=True, stdout=subprocess.PIPE).stdout
-        with tarfile.open(fileobj=io.BytesIO(archive)) as files:
-            files.extractall(root, filter="data")
-        generate = [sys.executable, str(Path(root) / "dialect" / "generate.py")]
-        subprocess.run(generate, check=True, stdout=subprocess.DEVNULL)
-        yield Path(root)
 
 
 def record(folder: Path, only: list[str]) -> int:

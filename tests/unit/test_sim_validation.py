@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from anafi_mav.arsdk.video_metadata import FrameMetadata, Ned, Quaternion
-from anafi_mav.cli import sim_validate
+from anafi_mav.cli import main, sim_validate
 from anafi_mav.sim.model import MODELS
 from anafi_mav.sim.validation import (
     Result,
@@ -156,32 +156,20 @@ def test_nothing_heard_does_not_agree() -> None:
     assert not any(result.agrees for result in results)
 
 
-async def run_validate(*words: str, limit: float = 30.0) -> tuple[int | None, str, str]:
-    process = await asyncio.create_subprocess_exec(
-        *(sys.executable, "-m", "anafi_mav", "sim", "validate", *words),
-        stdout=asyncio.subprocess.PIPE,
-        stderr=asyncio.subprocess.PIPE,
-    )
-    try:
-        out, err = await asyncio.wait_for(process.communicate(), limit)
-    finally:
-        if process.returncode is None:
-            process.kill()
-            await process.wait()
-    return process.returncode, out.decode(), err.decode()
-
-
-async def test_bad_options(tmp_path: Path) -> None:
-    status, out, err = await run_validate("--model", "bebop")
+def refused(capsys: pytest.CaptureFixture[str], *words: str) -> str:
+    """What the command prints to stderr when it refuses its arguments."""
+    status = main(["sim", "validate", *words])
+    out, err = capsys.readouterr()
     assert (status, out) == (2, "")
-    assert "--model: expected one of 4k, thermal, usa, ai or all, got 'bebop'" in err
+    return err
+
+
+def test_bad_options(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    wrong = "--model: expected one of 4k, thermal, usa, ai or all, got 'bebop'"
+    assert wrong in refused(capsys, "--model", "bebop")
     (tmp_path / "file").write_text("")
-    status, _, err = await run_validate("--speed", "0")
-    assert status == 2
-    assert "--speed: expected a number from 0.1 to 20, got 0" in err
-    status, _, err = await run_validate("--model", "4k", "--plots", str(tmp_path / "file"))
-    assert status == 2
-    assert "--plots: expected " in err
+    assert "--speed: expected a number from 0.1 to 20, got 0" in refused(capsys, "--speed", "0")
+    assert "--plots: expected " in refused(capsys, "--model", "4k", "--plots", str(tmp_path / "file"))
 
 
 async def test_all_models_fly_as_the_paper_says_and_are_drawn(
