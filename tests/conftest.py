@@ -1,6 +1,6 @@
 """Notes which flavours of the gateway a test has spoken to, and makes the conformance table of a run's results.
 
-pytest tests/conformance tests/clients --conformance=docs/conformance.md
+pytest tests/conformance tests/clients -m "not soak" --conformance=docs/conformance.md
 """
 
 from __future__ import annotations
@@ -35,7 +35,8 @@ _NUMBER = re.compile(r"test_conf_(\d{3})")
 HEAD = """\
 # Conformance
 
-<!-- Made by `pytest tests/conformance tests/clients --conformance=docs/conformance.md` from its results. -->
+<!-- Made by `pytest tests/conformance tests/clients -m "not soak" --conformance=docs/conformance.md` from its results,
+with the combinations marked `full`. -->
 
 What a MAVLink client needs of a vehicle, item by item, shown over real sockets with a simulated drone behind the
 gateway and judged by the simulator's own log. The numbers are those of the tests' names, `test_conf_NNN`. A flavour is
