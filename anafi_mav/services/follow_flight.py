@@ -13,7 +13,6 @@ from collections.abc import Callable, Hashable
 from anafi_mav import geo
 from anafi_mav.clock import Clock
 from anafi_mav.drone import PilotingCommand, events
-from anafi_mav.drone.events import Message
 from anafi_mav.errors import LinkLost
 from anafi_mav.services.aircraft import Aircraft
 from anafi_mav.services.bounds import LOWEST, amsl_to_ato, check_estimate, check_height, check_on_earth, check_place
@@ -35,6 +34,7 @@ from anafi_mav.services.place import Place
 from anafi_mav.services.refusal import Refused
 from anafi_mav.services.roll_sign import ROLL_INVERTED
 from anafi_mav.services.statustext import Severity
+from anafi_mav.services.subscriptions import Subscriptions
 
 
 class FollowFlight:
@@ -134,9 +134,12 @@ class FollowFlight:
         self._cancel_timer()
         self.state = State.OFF
 
-    def on_event(self, message: Message, now: float) -> None:
-        """How the drone moves: the loop closes on it."""
-        if self.state is State.FOLLOWING and type(message) is events.SpeedChanged:
+    def subscriptions(self) -> Subscriptions:
+        """Return the handlers of what reports how the drone moves: the loop closes on it."""
+        return {events.SpeedChanged: self._on_speed}
+
+    def _on_speed(self, message: events.SpeedChanged, now: float) -> None:
+        if self.state is State.FOLLOWING:
             self._fly(now)
 
     def _fly(self, now: float) -> None:

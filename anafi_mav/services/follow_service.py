@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from anafi_mav.drone.events import Message
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.follow import sighting
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
+from anafi_mav.services.subscriptions import Subscriptions
 
 
 class FollowService(Service):
@@ -22,8 +22,8 @@ class FollowService(Service):
     def messages(self) -> Mapping[int, MessageHandler]:
         return {dialect.MAVLINK_MSG_ID_FOLLOW_TARGET: self._target}
 
-    def on_event(self, message: Message, now: float) -> None:
-        self._flight.on_event(message, now)
+    def subscriptions(self) -> Subscriptions:
+        return self._flight.subscriptions()
 
     def _target(self, inbound: Inbound) -> None:
         seen = sighting(inbound.message)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 from anafi_mav.drone.events import Message
 from anafi_mav.mavlink import dialect
@@ -21,6 +21,7 @@ from anafi_mav.services.flavours import ARDUPILOT, flavour_of
 from anafi_mav.services.news import News
 from anafi_mav.services.service import Answer, Host, MessageHandler, Query, Request, Service
 from anafi_mav.services.stream import Stream, Times
+from anafi_mav.services.subscriptions import Subscriptions
 
 logger = logging.getLogger(__name__)
 
@@ -101,10 +102,10 @@ class MessageService(Service):
     def link_down(self) -> None:
         self._news.reset(self.host.clock.monotonic())
 
-    def hears(self) -> Collection[type[Message]]:
-        return self._events
+    def subscriptions(self) -> Subscriptions:
+        return dict.fromkeys(self._events, self._on_update)
 
-    def on_event(self, message: Message, now: float) -> None:
+    def _on_update(self, message: Message, now: float) -> None:
         if self._news.note(type(message), now):
             asyncio.get_running_loop().call_soon(self._tell_news)
 

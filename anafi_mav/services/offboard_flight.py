@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 from anafi_mav import units
 from anafi_mav.clock import Clock
 from anafi_mav.drone import Limits, PilotingCommand, events
-from anafi_mav.drone.events import FlyingState, Message
+from anafi_mav.drone.events import FlyingState
 from anafi_mav.errors import AnafiMavError, LinkLost
 from anafi_mav.services.aircraft import Aircraft
 from anafi_mav.services.bounds import TooLow
@@ -41,6 +41,7 @@ from anafi_mav.services.refusal import Refused
 from anafi_mav.services.roll_sign import ROLL_INVERTED
 from anafi_mav.services.setpoint_takeoff import Launcher, Phase, SetpointTakeoff, Step, climbs
 from anafi_mav.services.statustext import Severity
+from anafi_mav.services.subscriptions import Subscriptions
 
 WARN_AGAIN = 1.0
 """m/s by which a velocity has to be higher than the last one whose tilt was worth a word."""
@@ -52,15 +53,6 @@ SINGLE_WAIT = 2.0
 
 PAUSED = "paused by a client"
 """Why setpoints in Guided are ignored after a pause."""
-
-HEARD = (
-    events.AttitudeChanged,
-    events.SpeedChanged,
-    events.AltitudeChanged,
-    events.GpsLocationChanged,
-    events.FlyingStateChanged,
-)
-"""What tells how the drone moves, and that it hovers after a take-off."""
 
 _BEFORE_TAKEOFF = (FlyingState.LANDED, FlyingState.MOTOR_RAMPING)
 """States in which silence disarms a drone that setpoints take off."""
@@ -389,35 +381,43 @@ class OffboardFlight:
         self.motion = Motion(self._vehicle.roll)
         self._controller = Controller(self.motion)
 
-    # What the drone tells.
+    # What the drone reports.
 
-    def on_event(self, message: Message, now: float) -> None:
-        """How the drone moves: the loops close on it."""
-        piloting, motion = self._vehicle.drone.piloting.state, self.motion
-        kind = type(message)
-        if kind is events.FlyingStateChanged:
-            self.after_takeoff()
-        elif kind is events.AttitudeChanged:
-            if (attitude := piloting.attitude) is None:
-                motion.forget_attitude()
-            else:
-                motion.on_attitude(attitude.roll, attitude.pitch, attitude.yaw, now)
-            if isinstance(self._stream.setpoint, AttitudeSetpoint):
-                self._fly()
-        elif kind is events.SpeedChanged:
-            if (velocity := piloting.velocity) is None:
-                motion.forget_velocity()
-            else:
-                motion.on_velocity(velocity.north, velocity.east, velocity.down, now)
-            if isinstance(self._stream.setpoint, MotionSetpoint):
-                self._fly()
-        elif kind is events.AltitudeChanged:
-            if piloting.altitude is None:
-                motion.forget_height()
-            else:
-                motion.on_height(piloting.altitude, now)
-        elif kind is events.GpsLocationChanged and (place := self._vehicle.place) is not None:
-            motion.on_place(place.latitude, place.longitude)
+    def subscriptions(self) -> Subscriptions:
+        """Return the handlers of what reports how the drone moves, and that it hovers after a take-off."""
+        return {
+            events.FlyingStateChanged: lambda message, now: self.after_takeoff(),
+            events.AttitudeChanged: self._on_attitude,
+            events.SpeedChanged: self._on_speed,
+            events.AltitudeChanged: self._on_altitude,
+            events.GpsLocationChanged: self._on_location,
+        }
+
+    def _on_attitude(self, message: events.AttitudeChanged, now: float) -> None:
+        if (attitude := self._vehicle.drone.piloting.state.attitude) is None:
+            self.motion.forget_attitude()
+        else:
+            self.motion.on_attitude(attitude.roll, attitude.pitch, attitude.yaw, now)
+        if isinstance(self._stream.setpoint, AttitudeSetpoint):
+            self._fly()
+
+    def _on_speed(self, message: events.SpeedChanged, now: float) -> None:
+        if (velocity := self._vehicle.drone.piloting.state.velocity) is None:
+            self.motion.forget_velocity()
+        else:
+            self.motion.on_velocity(velocity.north, velocity.east, velocity.down, now)
+        if isinstance(self._stream.setpoint, MotionSetpoint):
+            self._fly()
+
+    def _on_altitude(self, message: events.AltitudeChanged, now: float) -> None:
+        if (altitude := self._vehicle.drone.piloting.state.altitude) is None:
+            self.motion.forget_height()
+        else:
+            self.motion.on_height(altitude, now)
+
+    def _on_location(self, message: events.GpsLocationChanged, now: float) -> None:
+        if (place := self._vehicle.place) is not None:
+            self.motion.on_place(place.latitude, place.longitude)
 
     # Flying.
 

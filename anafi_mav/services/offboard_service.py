@@ -5,19 +5,18 @@ What the messages mean is in `offboard_setpoints`, how they are flown in `offboa
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
-from anafi_mav.drone.events import Message
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services import offboard_setpoints
 from anafi_mav.services.flavours import flavour_of
 from anafi_mav.services.offboard_echo import STREAMS
-from anafi_mav.services.offboard_flight import HEARD
 from anafi_mav.services.offboard_setpoints import Setpoint
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
 from anafi_mav.services.stream import Stream
+from anafi_mav.services.subscriptions import Subscriptions
 
 
 class OffboardService(Service):
@@ -46,11 +45,8 @@ class OffboardService(Service):
     def streams(self) -> Mapping[int, Stream]:
         return STREAMS
 
-    def hears(self) -> Collection[type[Message]]:
-        return HEARD
-
-    def on_event(self, message: Message, now: float) -> None:
-        self._flight.on_event(message, now)
+    def subscriptions(self) -> Subscriptions:
+        return self._flight.subscriptions()
 
     def _takes(self, read: Callable[[Any], Setpoint | str]) -> MessageHandler:
         def take(inbound: Inbound) -> None:

@@ -7,12 +7,11 @@ sorts what arrives into them, and nothing else connects the two.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable, Collection, Coroutine, Hashable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Coroutine, Hashable, Mapping, Sequence
 from typing import Any, Protocol
 
 from anafi_mav.clock import Clock
 from anafi_mav.drone import Drone
-from anafi_mav.drone.events import Message
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
@@ -22,6 +21,7 @@ from anafi_mav.services.flavours import Flavour
 from anafi_mav.services.memory import Memory
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.stream import Stream, Times
+from anafi_mav.services.subscriptions import Subscriptions
 from anafi_mav.services.vehicle import Vehicle
 
 MessageHandler = Callable[[Inbound], None]
@@ -97,7 +97,7 @@ def client_of(inbound: Inbound) -> Hashable:
 
 
 class Service:
-    """One MAVLink microservice of one system. All tables are read once, when the system is made."""
+    """One MAVLink microservice of one system. Tables are read when the system is made, `subscriptions` at link up."""
 
     def __init__(self, host: Host) -> None:
         self.host = host
@@ -136,15 +136,9 @@ class Service:
     def link_down(self) -> None:
         """The drone's link is gone: nothing that was asked for outlives it."""
 
-    def hears(self) -> Collection[type[Message]] | None:
-        """What `on_event` wants to be called with; None: everything. Read when the drone has connected.
-
-        A fleet's drones say thousands of things a second, and most services care for few of them.
-        """
-        return None
-
-    def on_event(self, message: Message, now: float) -> None:
-        """The drone said this; its states know it already."""
+    def subscriptions(self) -> Subscriptions:
+        """Return the handlers of the drone's events, by kind. Read once per connection, after `link_up`."""
+        return {}
 
     def received(self, inbound: Inbound) -> None:
         """A message that names this system as its target has arrived, before it is handled."""

@@ -9,12 +9,12 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
-from collections.abc import Callable, Coroutine, Hashable, Sequence
+from collections.abc import Callable, Coroutine, Hashable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 from anafi_mav.clock import Clock
-from anafi_mav.drone import Drone, events
+from anafi_mav.drone import Drone
 from anafi_mav.drone.events import Message
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
@@ -55,6 +55,7 @@ from anafi_mav.services.service import MessageHandler, Service
 from anafi_mav.services.shell import ShellService
 from anafi_mav.services.statustext import Severity, TextNumbers
 from anafi_mav.services.stream import Times
+from anafi_mav.services.subscriptions import EventHandler, Subscriptions, in_order
 from anafi_mav.services.takeoff_point_service import TakeoffPointService
 from anafi_mav.services.telemetry import CHANGES, TelemetryService
 from anafi_mav.services.time_service import TimeService
@@ -191,16 +192,8 @@ class System:
         self._handlers[dialect.MAVLINK_MSG_ID_HEARTBEAT] = self._heard
         self._receiving = [service for service in self.services if type(service).received is not Service.received]
         self._ticking = [service for service in self.services if type(service).tick is not Service.tick]
-        self._updates: dict[type[Message], Callable[[], None]] = {
-            events.FlyingStateChanged: self.vehicle.on_flying_state,
-            events.GpsLocationChanged: self.vehicle.on_location,
-            events.FlightId: self.vehicle.on_position,
-            events.TakeoffLocation: self.vehicle.on_takeoff_location,
-            events.ReturnStateChanged: self.vehicle.on_return,
-        }
-        """What the vehicle makes of an event, before the services hear of it."""
-        self._listeners: dict[type[Message], tuple[Callable[[Message, float], None], ...]] = {}
-        """Whom each kind of event goes to, as far as it has come up on this connection."""
+        self._subscribed: dict[type[Message], tuple[EventHandler, ...]] = {}
+        """The handlers of each kind of event, in the order in which they are called."""
 
     # Link up, link down.
 
@@ -215,7 +208,7 @@ class System:
         self.vehicle.link_up(TakeoffRecord.read(self.memory.settings.get(takeoff_point_service.KEY)))
         for service in self.services:
             service.link_up()
-        self._listeners.clear()
+        self._subscribed = in_order(self.subscriptions())
         self._changed()
         self._next_heartbeat = self.clock.monotonic() + HEARTBEAT_EVERY
         self._ticker = asyncio.get_running_loop().create_task(self._tick())
@@ -379,25 +372,19 @@ class System:
     # What the drone reports.
 
     def _on_event(self, message: Message, now: float) -> None:
-        listeners = self._listeners.get(type(message))
-        if listeners is None:
-            listeners = self._listeners[type(message)] = self._listeners_of(type(message))
-        for listener in listeners:
-            listener(message, now)
+        for handler in self._subscribed.get(type(message), ()):
+            handler(message, now)
 
-    def _listeners_of(self, kind: type[Message]) -> tuple[Callable[[Message, float], None], ...]:
-        """Who wants to know of such an event, in the order in which they are told."""
-        listeners: list[Callable[[Message, float], None]] = []
-        if (update := self._updates.get(kind)) is not None:
-            listeners.append(lambda message, now: update())
+    def subscriptions(self) -> Iterator[Subscriptions]:
+        """Return all tables of event handlers, in the order that decides which handler of an event is called first.
+
+        The vehicle comes first, because services read its state. Services follow in their order in `self.services`.
+        State messages that leave `on_change` are last, because they contain what the services make of the event.
+        """
+        yield self.vehicle.subscriptions()
         for service in self.services:
-            if type(service).on_event is not Service.on_event:
-                heard = service.hears()
-                if heard is None or kind in heard:
-                    listeners.append(service.on_event)
-        if kind in CHANGES:
-            listeners.append(lambda message, now: self._changed(force=True))
-        return tuple(listeners)
+            yield service.subscriptions()
+        yield dict.fromkeys(CHANGES, lambda message, now: self._changed(force=True))
 
     def _changed(self, *, force: bool = False) -> None:
         """Mode, armed state or health may have changed: clients wait for it, so tell them at once.
