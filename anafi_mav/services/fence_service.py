@@ -147,7 +147,7 @@ class FenceService(Service):
             self._watch.done(self.host.vehicle.orders)
         else:
             self.host.text(Severity.CRITICAL, f"{head}: {verdict.text}: {action.value}")
-            self.host.act(FenceService, self._carry_out(action))  # in its turn: what is newer replaces it
+            self.host.run_action(FenceService, self._carry_out(action))  # in its turn: what is newer replaces it
 
     async def _carry_out(self, action: Reaction) -> None:
         vehicle = self.host.vehicle

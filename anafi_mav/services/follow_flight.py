@@ -43,7 +43,7 @@ class FollowFlight:
     def __init__(self, vehicle: Aircraft, motion: Callable[[], Motion], clock: Clock) -> None:
         self.settings = FollowSettings()
         self.state = State.OFF
-        self.complain: Callable[[str], None] = lambda text: vehicle.text(Severity.WARNING, text)
+        self.warn_throttled: Callable[[str], None] = lambda text: vehicle.text(Severity.WARNING, text)
         self._vehicle = vehicle
         self._motion = motion
         self._clock = clock
@@ -96,7 +96,7 @@ class FollowFlight:
         if self.state is State.OFF or (self.state is State.FOLLOWING and sender != self._leader):
             return
         if reason := self._objection(seen):
-            self.complain(f"Target ignored: {reason}")
+            self.warn_throttled(f"Target ignored: {reason}")
             return
         reference = self._motion().reference
         if reference is None:
@@ -168,7 +168,7 @@ class FollowFlight:
                 check_place(vehicle, place)
                 sticks = self._controller.sticks(wanted, limits, now) or sticks
         except Refused as refusal:
-            self.complain(f"Target not followed: {refusal.reason.partition('efused: ')[2] or refusal.reason}")
+            self.warn_throttled(f"Target not followed: {refusal.reason.partition('efused: ')[2] or refusal.reason}")
         vehicle.drone.piloting.pilot(sticks)
 
     def _height(self) -> float:
@@ -192,7 +192,7 @@ class FollowFlight:
                 self._kept_height = state.altitude
             if self._kept_height is None:
                 raise Refused("Refused: the drone's height is not known")
-            self.complain(f"Follow height kept: target asks for {height:.0f} m")
+            self.warn_throttled(f"Follow height kept: target asks for {height:.0f} m")
             return self._kept_height
         self._kept_height = None
         if settings.altitude_mode is AltitudeMode.TARGET:

@@ -17,7 +17,7 @@ class FollowService(Service):
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self._flight = host.vehicle.follow
-        self._flight.complain = host.complain
+        self._flight.warn_throttled = host.warn_throttled
 
     def messages(self) -> Mapping[int, MessageHandler]:
         return {dialect.MAVLINK_MSG_ID_FOLLOW_TARGET: self._target}
@@ -30,4 +30,4 @@ class FollowService(Service):
         if not isinstance(seen, str):
             self._flight.receive(client_of(inbound), seen)
         elif self._flight.engaged:
-            self.host.complain(f"Target ignored: {seen}")
+            self.host.warn_throttled(f"Target ignored: {seen}")

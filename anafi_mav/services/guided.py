@@ -59,7 +59,7 @@ def fly_item(host: Host, inbound: Inbound) -> None:
 
     dronekit's simple_goto, MAVProxy's and Mission Planner's change of altitude (conformance D1-D3, item 141).
     """
-    host.act(client_of(inbound), _fly_item(host, inbound))
+    host.run_action(client_of(inbound), _fly_item(host, inbound))
 
 
 async def _fly_item(host: Host, inbound: Inbound) -> None:

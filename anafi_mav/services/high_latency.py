@@ -154,7 +154,7 @@ class HighLatencyService(Service):
         wanted = command.params[0]
         if wanted not in (0.0, 1.0):
             return dialect.MAV_RESULT_DENIED
-        self.host.hush(inbound.channel, quiet=wanted == 1.0)
+        self.host.set_muted(inbound.channel, muted=wanted == 1.0)
         if wanted == 0.0:
             self._next.pop(inbound.channel, None)
         else:

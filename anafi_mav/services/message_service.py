@@ -109,13 +109,13 @@ class MessageService(Service):
         if self._news.note(type(message), now):
             asyncio.get_running_loop().call_soon(self._tell_news)
 
-    def news(self, id: int, at: float) -> None:
-        """This message has something new; it leaves at the end of the loop's turn."""
+    def mark_updated(self, id: int, at: float) -> None:
+        """Send this message at the end of the event-loop iteration."""
         if self._news.note(id, at):
             asyncio.get_running_loop().call_soon(self._tell_news)
 
-    def wanted(self, id: int) -> bool:
-        """Does anybody have a stream of this message?"""
+    def is_streamed(self, id: int) -> bool:
+        """Return True when this message is streamed on some channel."""
         return any(self._intervals.interval(channel, id) is not None for channel in self.host.channels)
 
     def tick(self, now: float) -> None:

@@ -123,7 +123,7 @@ class MissionService(Service):
         """MISSION_SET_CURRENT: MISSION_CURRENT answers it, or a text."""
         client = client_of(inbound)
         self._sent = None
-        self.host.act(client, self._flight.choose(client, _ours(inbound.message.seq, client)))
+        self.host.run_action(client, self._flight.choose(client, _ours(inbound.message.seq, client)))
 
     # What is told.
 
@@ -186,7 +186,7 @@ class MissionService(Service):
 
     async def _save(self) -> None:
         if (problem := await self.host.memory.save()) is not None:
-            self.host.complain(problem)
+            self.host.warn_throttled(problem)
 
 
 def _first_number(client: Hashable) -> int:

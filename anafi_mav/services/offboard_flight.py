@@ -74,9 +74,9 @@ class OffboardFlight:
         """s that a velocity lasts in ArduPilot's Guided (a parameter)."""
         self.motion = Motion(vehicle.roll)
         """How the drone moves; whoever else flies it by sticks uses it too."""
-        self.complain: Callable[[str], None] = lambda text: vehicle.text(Severity.WARNING, text)
+        self.warn_throttled: Callable[[str], None] = lambda text: vehicle.text(Severity.WARNING, text)
         """Says what is wrong with something that arrives many times a second."""
-        self.act: Callable[[Hashable, Coroutine[Any, Any, None]], asyncio.Task[None]] = _at_once
+        self.run_action: Callable[[Hashable, Coroutine[Any, Any, None]], asyncio.Task[None]] = _at_once
         """Runs what takes the drone over, in its turn among the commands."""
         self.flown: PilotingCommand | None = None
         """The sticks that setpoints hold at present; None while they hold none."""
@@ -98,7 +98,7 @@ class OffboardFlight:
         """m/s of velocity up to which it has been said whether MaxTilt is enough."""
         self._goal: Goal | None = None
         self._course = _Course(False, None, None)
-        self._moves = OffboardMoves(vehicle, lambda text: self.complain(text))
+        self._moves = OffboardMoves(vehicle, lambda text: self.warn_throttled(text))
 
     @property
     def engaged(self) -> bool:
@@ -189,7 +189,7 @@ class OffboardFlight:
             vehicle.text(Severity.WARNING, f"Takeoff by setpoints of system {system_of(sender)} in 1 s")
         elif step is Step.TAKE_OFF:
             lift.begin(sender, Phase.LIFTING)
-            self.act(sender, self._take_off(sender))
+            self.run_action(sender, self._take_off(sender))
         return None
 
     @property
@@ -324,7 +324,7 @@ class OffboardFlight:
             return f"setpoints fly the drone in mode Guided, this is {mode.value}"
         self._alone = ends(setpoint) and not (follows or self._stream.straggles(sender, now))
         if self._engaging is None or self._engaging.done():
-            self._engaging = self.act(sender, self._engage_guided(sender, setpoint, now))
+            self._engaging = self.run_action(sender, self._engage_guided(sender, setpoint, now))
         return None
 
     async def _engage_guided(self, sender: Hashable, setpoint: Setpoint, said: float) -> None:
@@ -340,7 +340,7 @@ class OffboardFlight:
             if not self._vehicle.in_air or self._vehicle.returning:
                 raise Refused("Setpoint refused: the drone does something else now")
         except AnafiMavError as error:
-            self.complain(str(error))
+            self.warn_throttled(str(error))
             return
         now = self._clock.monotonic()
         self._afterwards = FlightMode.GUIDED
@@ -463,7 +463,7 @@ class OffboardFlight:
             else:
                 self._hold(self._motion_sticks(setpoint, limits, now), now)
         except Refused as refusal:  # what the drone told when the setpoint arrived is not known any more
-            self.complain(f"Setpoint not flown: {refusal.reason}")
+            self.warn_throttled(f"Setpoint not flown: {refusal.reason}")
             self._hold(PilotingCommand(), now)
 
     def _attitude(self, setpoint: AttitudeSetpoint, limits: Limits, now: float) -> PilotingCommand:
@@ -485,9 +485,9 @@ class OffboardFlight:
             needed = tilt_for(speed) * units.DEG_PER_RAD
             allowed = tilt_limit(limits, self.motion) * units.DEG_PER_RAD
             if allowed < min(needed, limits.tilt_deg):
-                self.complain(TILT_HELD)
+                self.warn_throttled(TILT_HELD)
             elif needed > limits.tilt_deg:
-                self.complain(
+                self.warn_throttled(
                     f"MaxTilt of {limits.tilt_deg:.0f} degrees does not hold {speed:.1f} m/s against {WIND:g} m/s of "
                     f"wind, {math.ceil(needed)} would"
                 )
@@ -497,7 +497,7 @@ class OffboardFlight:
         if sticks is None:
             raise Refused("the drone does not tell how it moves")
         if self._controller.short_of is not None and self.motion.trusts_tilt:
-            self.complain(f"MaxTilt of {limits.tilt_deg:.0f} degrees is too little for this setpoint")
+            self.warn_throttled(f"MaxTilt of {limits.tilt_deg:.0f} degrees is too little for this setpoint")
         return sticks
 
     def _resolved(self, setpoint: MotionSetpoint) -> Goal | None:
@@ -537,7 +537,7 @@ class OffboardFlight:
             self._lift.stop()
             self._vehicle.select(self._afterwards if expired else self._vehicle.selected)
             self._vehicle.text(Severity.WARNING, "Setpoints stopped on the ground: disarming")
-            self.act(lifted, self._takeoff.abort())
+            self.run_action(lifted, self._takeoff.abort())
         elif expired:
             self._stopped(joined=phase is Phase.JOINED)
         self._watch()

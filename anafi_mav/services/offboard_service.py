@@ -25,8 +25,8 @@ class OffboardService(Service):
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self._flight = host.vehicle.offboard
-        self._flight.complain = host.complain
-        self._flight.act = host.act
+        self._flight.warn_throttled = host.warn_throttled
+        self._flight.run_action = host.run_action
 
     def capabilities(self) -> int:
         return (
@@ -57,6 +57,6 @@ class OffboardService(Service):
                 guided = flavour_of(inbound.channel).guided_setpoints
                 objection = self._flight.receive(client_of(inbound), setpoint, guided=guided)
             if objection is not None:
-                self.host.complain(f"Setpoint refused: {objection}")
+                self.host.warn_throttled(f"Setpoint refused: {objection}")
 
         return take

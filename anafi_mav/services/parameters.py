@@ -231,7 +231,7 @@ class ParameterService(Service):
         if now != settings.get(KEY, {one.name: one.default for one in KEPT}):
             settings[KEY] = now
             if (problem := await self.host.memory.save()) is not None:
-                self.host.complain(problem)
+                self.host.warn_throttled(problem)
 
     # Files.
 

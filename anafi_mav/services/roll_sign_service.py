@@ -83,4 +83,4 @@ class RollSignService(Service):
 
     async def _save(self) -> None:
         if (problem := await self.host.memory.save()) is not None:
-            self.host.complain(problem)
+            self.host.warn_throttled(problem)

@@ -52,7 +52,7 @@ class Host(Protocol):
 
     @property
     def channels(self) -> Sequence[Channel]:
-        """The channels that are to be told what happens: those that are open, without the hushed ones."""
+        """The open channels without the muted ones."""
 
     def send(self, message: dialect.MAVLink_message, to: Channel | Sequence[Channel] | None = None) -> None:
         """Send as the autopilot to one channel, to some, or to all. Nothing is sent while the link is down."""
@@ -68,27 +68,27 @@ class Host(Protocol):
     def text(self, severity: Severity, text: str, to: Channel | None = None) -> None:
         """A STATUSTEXT to everybody, and a line in the log; or to one channel alone."""
 
-    def complain(self, text: str) -> None:
-        """A warning about something that arrives many times a second: said rarely."""
+    def warn_throttled(self, text: str) -> None:
+        """Send a warning about something that arrives many times a second, at most once per five seconds."""
 
     def spawn(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
         """Run in the background; cancelled when the drone's link goes down."""
 
-    def act(self, client: Hashable, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
-        """Run an action that came by a message without COMMAND_ACK, in its turn among the commands: it replaces what is
-        under way, and newer ones replace it. A refusal of it becomes a text."""
+    def run_action(self, client: Hashable, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
+        """Run an action that a message without COMMAND_ACK asks for, in its turn among the commands: it replaces the
+        action under way, and newer ones replace it. A refusal becomes a text."""
 
     def times(self, at: float | None = None) -> Times:
         """A moment of the monotonic clock (None: now) in the clock of this system's messages."""
 
-    def wanted(self, id: int) -> bool:
-        """Does anybody have a stream of this message?"""
+    def is_streamed(self, id: int) -> bool:
+        """Return True when this message is streamed on some channel."""
 
-    def news(self, id: int, at: float) -> None:
-        """A streamed message has something new, true at a moment of the monotonic clock, that no event told of."""
+    def mark_updated(self, id: int, at: float) -> None:
+        """Send a streamed message for a value that no event reports. `at`: when it was true (s, monotonic)."""
 
-    def hush(self, channel: Channel, *, quiet: bool) -> None:
-        """Say nothing of our own accord on this channel: only answers go there, until it is to be told all again."""
+    def set_muted(self, channel: Channel, *, muted: bool) -> None:
+        """Send only answers on this channel; with False everything again."""
 
 
 def client_of(inbound: Inbound) -> Hashable:

@@ -124,10 +124,10 @@ DESCENT_WAIT = 1.5
 """s that a landing or return may take to be confirmed when the gateway ends: it is not withdrawn."""
 
 STATUS_EVERY = 5.0
-"""s before the same complaint is repeated as text."""
+"""s before the same throttled warning is repeated."""
 
-MAX_COMPLAINTS = 100
-"""Different complaints whose age is remembered."""
+MAX_WARNINGS = 100
+"""Different throttled warnings whose age is remembered."""
 
 
 class System:
@@ -159,10 +159,10 @@ class System:
         self._next_heartbeat = 0.0
         self._mission_over: asyncio.TimerHandle | None = None
         """Runs while heartbeats still say Mission."""
-        self._complained: dict[str, float] = {}
-        self._hushed: set[Channel] = set()
+        self._warned_at: dict[str, float] = {}
+        self._muted: set[Channel] = set()
         self._told: tuple[Sequence[Channel], Sequence[Channel]] = ([], [])
-        """The open channels when it was last looked, and those of them that are not hushed."""
+        """The open channels when it was last looked, and those of them that are not muted."""
         self.vehicle = Vehicle(
             drone,
             clock,
@@ -254,29 +254,29 @@ class System:
 
     @property
     def channels(self) -> Sequence[Channel]:
-        """The channels that are to be told what happens: those that are open, without the hushed ones."""
-        if not self._hushed:
+        """The open channels without the muted ones."""
+        if not self._muted:
             return self._node.channels
         everybody, told = self._told
         if everybody is not self._node.channels:  # a new list whenever they change
-            told = [channel for channel in self._node.channels if channel not in self._hushed]
+            told = [channel for channel in self._node.channels if channel not in self._muted]
             self._told = (self._node.channels, told)
         return told
 
-    def wanted(self, id: int) -> bool:
-        """Does anybody have a stream of this message?"""
-        return self._messages.wanted(id)
+    def is_streamed(self, id: int) -> bool:
+        """Return True when this message is streamed on some channel."""
+        return self._messages.is_streamed(id)
 
-    def news(self, id: int, at: float) -> None:
-        """A streamed message has something new, true at a moment of the monotonic clock, that no event told of."""
-        self._messages.news(id, at)
+    def mark_updated(self, id: int, at: float) -> None:
+        """Send a streamed message for a value that no event reports. `at`: when it was true (s, monotonic)."""
+        self._messages.mark_updated(id, at)
 
-    def hush(self, channel: Channel, *, quiet: bool) -> None:
-        """Say nothing of our own accord on this channel: only answers go there, until it is to be told all again."""
-        if quiet:
-            self._hushed.add(channel)
+    def set_muted(self, channel: Channel, *, muted: bool) -> None:
+        """Send only answers on this channel; with False everything again."""
+        if muted:
+            self._muted.add(channel)
         else:
-            self._hushed.discard(channel)
+            self._muted.discard(channel)
         self._told = ([], [])
 
     def send(self, message: dialect.MAVLink_message, to: Channel | Sequence[Channel] | None = None) -> None:
@@ -312,14 +312,14 @@ class System:
         for message in self._texts.messages(severity, text):
             self._node.send(message, sysid=self.sysid, compid=AUTOPILOT, to=self.channels)
 
-    def complain(self, text: str) -> None:
-        """A warning about something that arrives many times a second: said every `STATUS_EVERY` seconds at most."""
+    def warn_throttled(self, text: str) -> None:
+        """Send a warning about something that arrives many times a second, every `STATUS_EVERY` seconds at most."""
         now = self.clock.monotonic()
-        if now - self._complained.get(text, -math.inf) < STATUS_EVERY:
+        if now - self._warned_at.get(text, -math.inf) < STATUS_EVERY:
             return
-        if len(self._complained) >= MAX_COMPLAINTS:
-            self._complained.clear()
-        self._complained[text] = now
+        if len(self._warned_at) >= MAX_WARNINGS:
+            self._warned_at.clear()
+        self._warned_at[text] = now
         self.text(Severity.WARNING, text)
 
     def spawn(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
@@ -329,8 +329,8 @@ class System:
         task.add_done_callback(self._tasks.discard)
         return task
 
-    def act(self, client: Hashable, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
-        """Run an action that came by a message without COMMAND_ACK."""
+    def run_action(self, client: Hashable, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
+        """Run an action that a message without COMMAND_ACK asks for."""
         return self._commands.run(client, work)
 
     def times(self, at: float | None = None) -> Times:
@@ -468,7 +468,7 @@ class System:
 
     def channel_closed(self, channel: Channel) -> None:
         """A client's channel is gone."""
-        self._hushed.discard(channel)
+        self._muted.discard(channel)
         for service in self.services:
             service.channel_closed(channel)
 

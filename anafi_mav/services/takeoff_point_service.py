@@ -32,4 +32,4 @@ class TakeoffPointService(Service):
 
     async def _save(self) -> None:
         if (problem := await self.host.memory.save()) is not None:
-            self.host.complain(problem)
+            self.host.warn_throttled(problem)
