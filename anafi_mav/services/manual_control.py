@@ -40,8 +40,6 @@ class ManualControlService(Service):
         self._channels.clear()
 
     def _manual_control(self, inbound: Inbound) -> None:
-        if inbound.message.target not in (0, self.host.sysid):  # it calls its target system otherwise than all others
-            return
         sticks = manual_sticks(inbound.message)
         if isinstance(sticks, str):
             self.host.warn_throttled(f"MANUAL_CONTROL ignored: {sticks}")

@@ -16,9 +16,11 @@ from typing import Any
 from anafi_mav.clock import Clock
 from anafi_mav.drone import Drone
 from anafi_mav.drone.events import Message
+from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound, Node
+from anafi_mav.mavlink.router import EVERY_COMPONENT
 from anafi_mav.services import takeoff_point_service
 from anafi_mav.services.aborted_return_service import AbortedReturnService
 from anafi_mav.services.banner import BannerService
@@ -201,7 +203,9 @@ class System:
         """The drone is connected and has sent all its states: the system appears."""
         self.active = True
         self._undo = self.drone.subscribe(self._on_event)
-        self._node.own(self.sysid)
+        self._node.add_host(self.sysid, AUTOPILOT, self._receive)
+        for component in ABSENT:
+            self._node.add_host(self.sysid, component, self._refuse)
         self._last_state = None
         if (problem := self.memory.load(self.drone.identity.serial)) is not None:
             self.text(Severity.WARNING, problem)
@@ -235,7 +239,7 @@ class System:
             task.cancel()
         self.vehicle.link_down()
         self.active = False
-        self._node.disown(self.sysid)
+        self._node.remove_hosts(self.sysid)
 
     async def let_go(self) -> None:
         """The gateway ends: a flying drone is left hovering, or returning or landing where it does that already.
@@ -430,37 +434,50 @@ class System:
 
     # What clients send.
 
-    def listen(self, on: bool) -> None:
-        """Have messages to this system delivered while it does not exist, or no longer."""
-        if on:
-            self._node.own(self.sysid)
-        elif not self.active:
-            self._node.disown(self.sysid)
+    def listen(self, on_command: Callable[[Inbound], None] | None) -> None:
+        """Call this with each command to the system that is no query while the system does not exist; None: no longer.
 
-    def commands(self, inbound: Inbound) -> bool:
-        """True for a command to this system by its id that is no query, also while the system does not exist."""
-        message = inbound.message
+        Commands to any of its components count, but not those to all systems.
+        """
+        assert not self.active
+
+        def receive(inbound: Inbound) -> None:
+            if on_command is not None and self._commands_us(inbound.message):
+                on_command(inbound)
+
+        self._node.remove_hosts(self.sysid)
+        if on_command is not None:
+            self._node.add_host(self.sysid, EVERY_COMPONENT, receive)
+
+    def _commands_us(self, message: Any) -> bool:
+        """Return True for a command to this system by its id that is no query."""
         if message.get_msgId() == dialect.MAVLINK_MSG_ID_SET_MODE:
             return bool(message.target_system == self.sysid)
         known = message.get_msgId() in COMMANDS and message.target_system == self.sysid
         return known and self._commands.acts_on(message.command)
 
-    def receive(self, inbound: Inbound) -> None:
-        """A message from a client. Not addressed to our autopilot: not for us, and never answered."""
-        if not self.active:
-            return
+    def _receive(self, inbound: Inbound) -> None:
+        """Handle a message to our autopilot, to its system, or to all."""
         message = inbound.message
         handler = self._handlers.get(message.get_msgId())
-        if handler is None or getattr(message, "target_system", 0) not in (0, self.sysid):
+        if handler is None:
             return
-        component = getattr(message, "target_component", 0)
-        if component in (0, AUTOPILOT):
+        try:
             if getattr(message, "target_system", 0) == self.sysid:
                 for service in self._receiving:
                     service.received(inbound)
             handler(inbound)
-        elif component in ABSENT and message.get_msgId() in COMMANDS and message.target_system == self.sysid:
-            self._node.send(_unsupported(inbound), sysid=self.sysid, compid=component, to=inbound.channel)
+        except AnafiMavError as error:  # the drone's link may just have died
+            logger.debug("%s: %s not handled: %s", self.drone.name, message.get_type(), error)
+        except Exception:
+            logger.exception("%s: %s not handled", self.drone.name, message.get_type())
+
+    def _refuse(self, inbound: Inbound) -> None:
+        """Answer a command to one of the components in `ABSENT`, when it is addressed to that component alone."""
+        message = inbound.message
+        if message.get_msgId() in COMMANDS and message.target_system == self.sysid and message.target_component:
+            answer = _unsupported(inbound)
+            self._node.send(answer, sysid=self.sysid, compid=message.target_component, to=inbound.channel)
 
     def _heard(self, inbound: Inbound) -> None:
         for service in self.services:
