@@ -66,6 +66,7 @@ class Node:
         self.endpoints: list[Endpoint] = []
         """In the order of the URLs."""
         self._clock = clock or SystemClock()
+        self._telemetry: set[int] = set()
         self._router: Router[Channel, Host] = Router()
         self._delivers = True
         self._closed_counters: Counter[str] = Counter()
@@ -112,6 +113,10 @@ class Node:
         """Deliver no more messages for this system, and route them to others of its name."""
         self._router.remove_hosts(sysid)
 
+    def add_telemetry(self, ids: Iterable[int]) -> None:
+        """Let messages with these ids give way when they are forwarded for other systems."""
+        self._telemetry.update(ids)
+
     def stop_delivering(self) -> None:
         """Drop what arrives for our hosts from now on. Sending and forwarding continue."""
         self._delivers = False
@@ -123,18 +128,20 @@ class Node:
         sysid: int,
         compid: int,
         to: Channel | Iterable[Channel] | None = None,
+        give_way: bool = False,
     ) -> None:
         """Send as this system and component to one channel, to some, or to all. A closed one only counts it.
 
-        Raises `LocalProtocolError` for a field that does not fit; nothing is then sent to anybody.
+        `give_way`: a full channel drops this before an answer, because the next one of its kind replaces it. Raises
+        `LocalProtocolError` for a field that does not fit; nothing is then sent to anybody.
         """
         self._router.spoke(sysid, compid)
         packed = pack(message)
         if isinstance(to, Channel):
-            to.send_packed(packed, sysid, compid)
+            to.send_packed(packed, sysid, compid, give_way=give_way)
             return
         for channel in self.channels if to is None else to:
-            channel.send_packed(packed, sysid, compid)
+            channel.send_packed(packed, sysid, compid, give_way=give_way)
 
     def counters(self) -> Counter[str]:
         """Everything counted since the start: by channels, endpoints and the router."""
@@ -167,7 +174,7 @@ class Node:
             if route.forward:
                 raw = received.version_2()
                 for other in route.forward:
-                    other.forward(raw, received.id)
+                    other.forward(raw, give_way=received.id in self._telemetry)
             if not route.hosts or not self._delivers:
                 continue
             if old:

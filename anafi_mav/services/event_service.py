@@ -68,7 +68,7 @@ class EventService(Service):
         return {dialect.MAV_CMD_RUN_PREARM_CHECKS: self._run_checks}
 
     def streams(self) -> Mapping[int, Stream]:
-        return {dialect.MAVLINK_MSG_ID_CURRENT_EVENT_SEQUENCE: Stream(self._current)}
+        return {dialect.MAVLINK_MSG_ID_CURRENT_EVENT_SEQUENCE: Stream(self._current, every=1.0)}
 
     def files(self) -> Mapping[str, ServedFile]:
         return {"/events.json": ServedFile(self._described, metadata=dialect.COMP_METADATA_TYPE_EVENTS)}

@@ -61,7 +61,7 @@ class FenceService(Service):
         return {dialect.MAV_CMD_DO_FENCE_ENABLE: self._enable}
 
     def streams(self) -> Mapping[int, Stream]:
-        return {dialect.MAVLINK_MSG_ID_FENCE_STATUS: Stream(self._status, on_change=True)}
+        return {dialect.MAVLINK_MSG_ID_FENCE_STATUS: Stream(self._status, every=1.0, on_change=True)}
 
     def link_up(self) -> None:
         self._located = -math.inf if self.host.vehicle.place is None else self.host.clock.monotonic()

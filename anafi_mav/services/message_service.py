@@ -51,7 +51,7 @@ class MessageService(Service):
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
-        self._intervals: Streams[Channel] = Streams(without=lambda channel: flavour_of(channel).unstreamed)
+        self._intervals: Streams[Channel] = Streams({})
         self._table: Mapping[int, Stream] = {}
         self._requests: Mapping[int, Request] = {}
         self._news = News()
@@ -68,9 +68,11 @@ class MessageService(Service):
     def take_tables(self, streams: Mapping[int, Stream], requests: Mapping[int, Request]) -> None:
         """What all services of the system send by themselves, and what they can be asked for."""
         self._table, self._requests = streams, requests
+        defaults = {id: stream.every for id, stream in streams.items() if stream.every is not None}
+        self._intervals = Streams(defaults, without=lambda channel: flavour_of(channel).unstreamed)
         for id, stream in streams.items():
             self._news.register(id, (id,))
-            for event in stream.news:
+            for event in stream.updates:
                 self._news.register(event, (id,))
                 self._events.add(event)
             if stream.on_change:

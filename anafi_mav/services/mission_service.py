@@ -69,7 +69,7 @@ class MissionService(Service):
         }
 
     def streams(self) -> Mapping[int, Stream]:
-        return {dialect.MAVLINK_MSG_ID_MISSION_CURRENT: Stream(self._current, flavoured=True)}
+        return {dialect.MAVLINK_MSG_ID_MISSION_CURRENT: Stream(self._current, every=1.0, flavoured=True)}
 
     def link_up(self) -> None:
         memory = self.host.memory

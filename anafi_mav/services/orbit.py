@@ -74,7 +74,7 @@ class OrbitService(Service):
         return {dialect.MAV_CMD_DO_ORBIT: self._orbit}
 
     def streams(self) -> Mapping[int, Stream]:
-        return {dialect.MAVLINK_MSG_ID_ORBIT_EXECUTION_STATUS: Stream(self._status)}
+        return {dialect.MAVLINK_MSG_ID_ORBIT_EXECUTION_STATUS: Stream(self._status, every=0.8)}
 
     # Helm.
 

@@ -185,10 +185,11 @@ class System:
             _joined(service.queries() for service in self.services),
             _joined(service.actions() for service in self.services),
         )
-        self._messages.take_tables(
-            _joined(service.streams() for service in self.services),
-            _joined(service.requests() for service in self.services),
-        )
+        streams = _joined(service.streams() for service in self.services)
+        self._messages.take_tables(streams, _joined(service.requests() for service in self.services))
+        self.telemetry: frozenset[int] = frozenset({*streams, dialect.MAVLINK_MSG_ID_HEARTBEAT})
+        """Messages that the next one of their kind replaces: a full channel drops them rather than answers."""
+        node.add_telemetry(self.telemetry)
         self._ftp.take_tables(_joined(service.files() for service in self.services))
         self._handlers: dict[int, MessageHandler] = _joined(service.messages() for service in self.services)
         self._handlers[dialect.MAVLINK_MSG_ID_HEARTBEAT] = self._heard
@@ -286,7 +287,9 @@ class System:
     def send(self, message: dialect.MAVLink_message, to: Channel | Sequence[Channel] | None = None) -> None:
         """Send as the autopilot to one channel, to some, or to all. Nothing is sent while the link is down."""
         if self.active:
-            self._node.send(message, sysid=self.sysid, compid=AUTOPILOT, to=self.channels if to is None else to)
+            channels = self.channels if to is None else to
+            give_way = message.get_msgId() in self.telemetry
+            self._node.send(message, sysid=self.sysid, compid=AUTOPILOT, to=channels, give_way=give_way)
 
     def send_by_flavour(
         self, build: Callable[[Flavour], dialect.MAVLink_message | None], to: Sequence[Channel] | None = None

@@ -20,7 +20,7 @@ from anafi_mav.errors import ConfigError
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.base import MAX_PEERS
 from anafi_mav.mavlink.channel import QUEUE_BYTES, Channel
-from anafi_mav.mavlink.frames import Parser, Received
+from anafi_mav.mavlink.frames import Parser, Received, frame, pack
 from anafi_mav.mavlink.node import Inbound, Node
 from anafi_mav.mavlink.router import EVERY_COMPONENT
 
@@ -188,7 +188,7 @@ async def test_a_reader_that_stands_still_holds_up_nobody() -> None:
             reading = asyncio.ensure_future(asyncio.wait_for(brisk.readexactly(COUNT * FRAME + ANSWER), 30.0))
             for number in range(COUNT):
                 ATTITUDE.time_boot_ms = number
-                d.node.send(ATTITUDE, sysid=1, compid=1)
+                d.node.send(ATTITUDE, sysid=1, compid=1, give_way=True)
                 if number % 100 == 0:
                     await asyncio.sleep(0)
             d.node.send(dialect.MAVLink_command_ack_message(400, 1), sysid=1, compid=1)
@@ -212,6 +212,21 @@ async def test_a_reader_that_stands_still_holds_up_nobody() -> None:
             # To its reader nothing is missing: numbers are given when frames leave.
             assert [received.raw[4] for received in frames] == [n % 256 for n in range(len(frames))]
         writer.close()
+
+
+def test_forwarded_telemetry_gives_way_to_forwarded_answers() -> None:
+    written: list[bytes] = []
+    source, target = Channel("source", lambda raw: None), Channel("target", written.append)
+    node = Node()
+    node.add_telemetry({dialect.MAVLINK_MSG_ID_ATTITUDE})
+    for channel in (source, target):
+        node.opened(channel)
+    target.pause()
+    ack = dialect.MAVLink_command_ack_message(400, 0)
+    frames = [frame(pack(message), number, 42, 1) for number, message in enumerate((ATTITUDE, ack, ATTITUDE))]
+    node.received(source, Parser().receive(b"".join(frames)))
+    target.resume()
+    assert [raw[4] for raw in written] == [1, 0, 2]
 
 
 async def test_tcpout_comes_back() -> None:
