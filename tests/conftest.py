@@ -5,8 +5,10 @@ pytest tests/conformance tests/clients --conformance=docs/conformance.md
 
 from __future__ import annotations
 
+import os
 import re
 import signal
+import sys
 from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
@@ -19,6 +21,11 @@ from support.conformance_items import ITEMS
 from anafi_mav.arsdk import watchdog
 
 clock.install()
+
+# Whatever the user's shell says, the programs that tests start share compiled modules: without them each start of
+# anafi-mav compiles all of it again, which takes longer than most tests.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 pytest_plugins = ["support.repeats"]
 
