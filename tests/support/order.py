@@ -9,8 +9,8 @@ from __future__ import annotations
 import pytest
 
 LONGEST = {
-    "test_flights_of_mavsdks_examples_end_by_themselves": 80,
     "test_conf_075_121_every_sample_once_by_mavsdk": 70,
+    "test_flights_of_mavsdks_examples_end_by_themselves": 50,
     "test_flights_of_dronekits_examples_end_by_themselves": 50,
     "test_the_same_file_flies_the_same_path": 50,
     "test_olympe_does_everything": 40,
