@@ -13,7 +13,7 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import Command
-from anafi_mav.services.flavours import FLAVOURS, Flavour, flavour_of
+from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.mission_kind import FIRST_LABEL, offset
 from anafi_mav.services.mission_progress import MAVLINK_STATES, State
 from anafi_mav.services.mission_record import Record
@@ -55,8 +55,8 @@ class MissionService(Service):
         self._flight.keeper.write = self._remember
         self._saved = -math.inf
         self._unsaved = False
-        self._sent: dict[str, tuple[int, ...]] = {}
-        """Fields of the last MISSION_CURRENT that announced a change, by flavour; empty: the next one leaves anyway."""
+        self._sent: Mapping[bool, tuple[int, ...]] = {}
+        """What `_fields` was when MISSION_CURRENT last announced a change; empty: the next one leaves anyway."""
         self._sent_item: int | None = None
 
     def messages(self) -> Mapping[int, MessageHandler]:
@@ -128,7 +128,7 @@ class MissionService(Service):
     # What is told.
 
     def _current(self, vehicle: Vehicle, times: Times) -> dialect.MAVLink_message:
-        return dialect.MAVLink_mission_current_message(*_fields(vehicle, times.flavour))
+        return dialect.MAVLink_mission_current_message(*_fields(vehicle)[times.flavour.zero_home])
 
     def _tell(self) -> None:
         """Send MISSION_CURRENT to the clients for whom a field has changed; then, for a new item, a HEARTBEAT.
@@ -137,16 +137,16 @@ class MissionService(Service):
         (MissionManager::_handleHeartbeat). Without one it offers to resume a mission that is complete.
         """
         vehicle = self.host.vehicle
-        fields = {name: _fields(vehicle, flavour) for name, flavour in FLAVOURS.items()}
-        changed = {name for name in fields if fields[name] != self._sent.get(name)}
-        if not changed:
+        fields, before = _fields(vehicle), self._sent
+        if fields == before:
             return
         self._sent = fields
-        self.host.send_by_flavour(
-            lambda flavour: (
-                dialect.MAVLink_mission_current_message(*fields[flavour.name]) if flavour.name in changed else None
-            )
-        )
+
+        def changed(flavour: Flavour) -> dialect.MAVLink_message | None:
+            its = fields[flavour.zero_home]
+            return None if its == before.get(flavour.zero_home) else dialect.MAVLink_mission_current_message(*its)
+
+        self.host.send_by_flavour(changed)
         current = vehicle.mission.progress.current
         if vehicle.mode is FlightMode.MISSION and current != self._sent_item:
             self.host.send_heartbeat()
@@ -178,15 +178,12 @@ class MissionService(Service):
             self.host.warn_throttled(problem)
 
 
-def _fields(vehicle: Vehicle, flavour: Flavour) -> tuple[int, ...]:
-    """Return the fields of MISSION_CURRENT for clients of a flavour."""
+def _fields(vehicle: Vehicle) -> Mapping[bool, tuple[int, ...]]:
+    """Return the fields of MISSION_CURRENT by `Flavour.zero_home` of its receivers."""
     progress, ids = vehicle.mission.progress, vehicle.plan_ids
     there = progress.state is not State.NONE
-    # ArduPilot is at home, its item 0, until the mission begins or a client sets another one.
-    at_home = flavour.zero_home and progress.is_untouched
     mode = IN_MISSION_MODE if vehicle.mode is FlightMode.MISSION else NOT_IN_MISSION_MODE
-    return (
-        progress.current + offset(flavour) if there and not at_home else 0,
+    same = (
         len(progress.items) if there else NO_TOTAL,
         MAVLINK_STATES[progress.state],
         mode if there else 0,
@@ -194,6 +191,9 @@ def _fields(vehicle: Vehicle, flavour: Flavour) -> tuple[int, ...]:
         ids.get(dialect.MAV_MISSION_TYPE_FENCE, 0),
         ids.get(dialect.MAV_MISSION_TYPE_RALLY, 0),
     )
+    # ArduPilot is at home, its item 0, until the mission begins or a client sets another one.
+    behind_home = progress.current + 1 if there and not progress.is_untouched else 0
+    return {False: (progress.current if there else 0, *same), True: (behind_home, *same)}
 
 
 def _first_number(client: Hashable) -> int:
