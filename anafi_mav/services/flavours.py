@@ -49,6 +49,9 @@ class Flavour:
     """FIRMWARE_VERSION_TYPE."""
     bytewise: bool
     """Parameters: an INT32 travels as the bits of the float field; otherwise as the float of equal value."""
+    relative_frames_are_amsl: bool
+    """The z of some commands (`commands.Altitude.AMSL`) is above mean sea level in the frames 3 and 6 too: MAVSDK sends
+    it so, as PX4 takes it (conformance B1)."""
     zero_home: bool = False
     """Item 0 of a mission is home."""
     float_plans: bool = False
@@ -66,6 +69,9 @@ class Flavour:
     """Setpoints fly the drone in mode Guided, without a mode of their own."""
     unstreamed: frozenset[int] = frozenset()
     """Message ids that a client of this family gets on change and on request only, not at an interval by default."""
+    first_answer_as_final: bool = False
+    """Clients of this family take the first acknowledgement of a calibration or a restart for the final one.
+    dronekit2's tests count exactly one, Mission Planner waits up to 25 s for it."""
     title: str = ""
     """How the autopilot calls itself in its banner; empty: it does not."""
 
@@ -125,6 +131,7 @@ PX4 = Flavour(
     # connect (FirmwarePlugin::checkIfIsLatestStable), in either family. It shows "1.16.0dev" for it.
     version_type=dialect.FIRMWARE_VERSION_TYPE_DEV,
     bytewise=True,
+    relative_frames_are_amsl=True,
 )
 
 # Numbers of ArduCopter/mode.h. Its Brake is our Hold: it stops, and nobody's setpoints or sticks move the drone.
@@ -162,6 +169,7 @@ ARDUPILOT = Flavour(
     version=(4, 5, 7),
     version_type=dialect.FIRMWARE_VERSION_TYPE_DEV,
     bytewise=False,
+    relative_frames_are_amsl=False,
     zero_home=True,
     float_plans=True,
     always_continues=True,
@@ -169,6 +177,7 @@ ARDUPILOT = Flavour(
     relative_takeoff=True,
     zero_is_unset=True,
     guided_setpoints=True,
+    first_answer_as_final=True,
     # ArduCopter sends home when it is set; programs take one that arrives later for news (dronekit2's own tests).
     unstreamed=frozenset({dialect.MAVLINK_MSG_ID_HOME_POSITION}),
     title="ArduCopter V4.5.7",
@@ -182,6 +191,7 @@ STANDARD = Flavour(
     version=PX4.version,
     version_type=PX4.version_type,
     bytewise=True,
+    relative_frames_are_amsl=True,
     relative_takeoff=True,  # MAVSDK's "pure" path sends the height above ground (conformance F 156)
 )
 

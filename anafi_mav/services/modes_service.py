@@ -12,10 +12,10 @@ from collections.abc import Mapping
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.actions import change_mode
-from anafi_mav.services.commands import Command
-from anafi_mav.services.flavours import ARDUPILOT, STANDARD_MODES, Flavour, flavour_of
+from anafi_mav.services.commands import Action, Altitude, Command, effect_of_mode
+from anafi_mav.services.flavours import ARDUPILOT, STANDARD_MODES, Flavour, flavour_of, mode_of_standard
 from anafi_mav.services.modes import FlightMode
-from anafi_mav.services.service import Action, Answer, Host, Request, Service
+from anafi_mav.services.service import Answer, Host, Request, Service
 from anafi_mav.services.stream import Stream, Times
 from anafi_mav.services.vehicle import Vehicle
 
@@ -119,7 +119,15 @@ class ModesService(Service):
         return {dialect.MAVLINK_MSG_ID_AVAILABLE_MODES: self._available}
 
     def actions(self) -> Mapping[int, Action]:
-        return {dialect.MAV_CMD_DO_SET_STANDARD_MODE: self._set_standard}
+        return {
+            dialect.MAV_CMD_DO_SET_STANDARD_MODE: Action(
+                self._set_standard,
+                location=False,
+                altitude=Altitude.UNUSED,
+                effect=effect_of_mode,
+                mode=lambda command: mode_of_standard(command.params[0]),
+            )
+        }
 
     def streams(self) -> Mapping[int, Stream]:
         return {
