@@ -55,7 +55,9 @@ class Node:
         on_message: Callable[[Inbound], None] | None = None,
         on_channel: Callable[[Channel, bool], None] | None = None,
         clock: Clock | None = None,
+        flavours: Sequence[str] = (),
     ) -> None:
+        """`flavours` are those that the URL of an endpoint may name."""
         self.on_message = on_message
         self.on_channel = on_channel
         """Called with True when a channel opened and with False when it closed."""
@@ -64,6 +66,7 @@ class Node:
         self.endpoints: list[Endpoint] = []
         """In the order of the URLs."""
         self._clock = clock or SystemClock()
+        self._flavours = flavours
         self._router: Router[Channel] = Router()
         self._closed_counters: Counter[str] = Counter()
         self._stalls: StallWatch | None = None
@@ -75,7 +78,7 @@ class Node:
         parsed = []
         for index, text in enumerate(urls):
             try:
-                parsed.append(parse_endpoint(text))
+                parsed.append(parse_endpoint(text, self._flavours))
             except ConfigError as error:
                 raise ConfigError(f"endpoints[{index}]", error.problem) from error
         for index, url in enumerate(parsed):
