@@ -315,6 +315,11 @@ class Gateway:
                 supervised.task.cancel()
                 await asyncio.wait([supervised.task], timeout=CANCEL_WAIT)
 
+    @property
+    def systems(self) -> tuple[System, ...]:
+        """The MAVLink system of each drone in the order of the configuration; empty before `start`."""
+        return tuple(supervised.system for supervised in self._supervised)
+
     def lines(self) -> list[str]:
         """One line per drone and per endpoint."""
         return [s.line() for s in self._supervised] + [

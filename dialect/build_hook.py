@@ -1,6 +1,6 @@
 """Hatchling calls this when it builds a wheel, editable or not: the dialect is generated and goes into it.
 
-The module is not committed; a source distribution carries the generator instead.
+The modules are not committed; a source distribution carries the generator instead.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 
 class DialectBuildHook(BuildHookInterface):
-    """Generates anafi_mav/mavlink/dialect.py before hatchling collects the wheel's files."""
+    """Generates anafi_mav/mav_enums.py and anafi_mav/mavlink/dialect.py before hatchling collects the wheel's files."""
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         if self.target_name != "wheel":
@@ -24,6 +24,5 @@ class DialectBuildHook(BuildHookInterface):
         assert spec.loader is not None
         generator = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(generator)
-        output = generator.generate()
-        # It is in .gitignore, which hatchling obeys unless told that the file is a product of the build.
-        build_data["artifacts"].append(output.relative_to(self.root).as_posix())
+        # They are in .gitignore, which hatchling obeys unless the files are declared as products of the build.
+        build_data["artifacts"] += [path.relative_to(self.root).as_posix() for path in generator.generate()]

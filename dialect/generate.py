@@ -1,14 +1,17 @@
-"""Makes anafi_mav/mavlink/dialect.py: pymavlink's message definitions, overlaid with what they lack.
+"""Generate anafi_mav/mav_enums.py and anafi_mav/mavlink/dialect.py from pymavlink's definitions and our overlay.
 
 pymavlink carries its definitions as XML inside the package and a generator, mavgen, that turns them into a Python
 module. mavgen refuses a second definition of a message, so the overlay is merged into copies of the XML files first.
-Run ``python dialect/generate.py`` to make the module in place; the build hook does the same for wheels. With
+The enums of that module become a module of their own, without mavgen's descriptions, which are most of their size:
+`plans` needs the numbers but not the messages, and neither module needs pymavlink at run time.
+Run ``python dialect/generate.py`` to make both modules in place; the build hook does the same for wheels. With
 ``--c FOLDER`` it writes a set of C headers instead; ``FOLDER/anafi/mavlink.h`` is the one to include.
 """
 
 from __future__ import annotations
 
 import argparse
+import ast
 import contextlib
 import copy
 import io
@@ -27,21 +30,103 @@ ROOT = "anafi.xml"
 OVERLAY = HERE / "overlay.xml"
 HOST = "common.xml"
 """The file of pymavlink's that new messages and enums are put into: everything else includes it."""
-OUTPUT = HERE.parent / "anafi_mav" / "mavlink" / "dialect.py"
+PACKAGE = HERE.parent / "anafi_mav"
+ENUMS = Path("mav_enums.py")
+DIALECT = Path("mavlink", "dialect.py")
+"""Both modules, in the package."""
+
+BEGIN, END = "\n# enums\n", "\n# message IDs\n"
+"""mavgen's comments before and after its enums."""
+
+ENUMS_HEAD = '''"""MAVLink's enums: numbers, names, and the commands that have a location. Generated, do not edit.
+
+A constant for each entry, and `enums`: {name of the enum: {number: entry}}, as in pymavlink.
+"""
+
+
+class EnumEntry:
+    """One entry of an enum."""
+
+    __slots__ = ("has_location", "name")
+
+    def __init__(self, name: str, has_location: bool = False) -> None:
+        self.name = name
+        self.has_location = has_location
+
+
+_E = EnumEntry
+'''
 
 
 class OverlayError(Exception):
     """The overlay contradicts pymavlink's definitions, or mavgen refuses the result."""
 
 
-def generate(output: Path = OUTPUT) -> Path:
-    """Write the module and return its path. Raises `OverlayError`; the old module is then untouched."""
+def generate(package: Path = PACKAGE) -> list[Path]:
+    """Write both modules into `package` and return their paths. Raises `OverlayError` and then writes neither."""
     with tempfile.TemporaryDirectory() as name:
         module = Path(name) / "dialect.py"
         _run_mavgen(module, "Python3")
         text = module.read_text(encoding="utf-8")
-    output.write_text(text, encoding="utf-8")
-    return output
+    enums, dialect = split(text)
+    outputs = {package / ENUMS: enums, package / DIALECT: dialect}
+    for output, content in outputs.items():
+        output.write_text(content, encoding="utf-8")
+    return list(outputs)
+
+
+def split(text: str) -> tuple[str, str]:
+    """Return the enums of mavgen's module as a module of their own, and the rest, which imports that one.
+
+    Raises `OverlayError` when mavgen's module is not as expected.
+    """
+    before, begin, rest = text.partition(BEGIN)
+    section, end, after = rest.partition(END)
+    if not begin or not end:
+        raise OverlayError("mavgen's module has no enums")
+    star = "\nfrom anafi_mav.mav_enums import *  # the numbers and names of all enums\n"
+    return _enums_module(ast.parse(section)), f"{before}{star}{end}{after}"
+
+
+def _enums_module(section: ast.Module) -> str:
+    """`section` assigns constants (NAME = 3), entries (enums["E"][3] = EnumEntry(...)) and their attributes."""
+    constants: list[str] = []
+    entries: dict[str, dict[int, str]] = {}
+    locations: set[tuple[str, int]] = set()
+    for node in section.body:
+        if not isinstance(node, ast.Assign):
+            continue  # the two classes and the empty table
+        match node.targets[0], node.value:
+            case ast.Name(id=name), ast.Constant(value=number):
+                constants.append(f"{name} = {number}\n")
+            case ast.Subscript(value=ast.Name(id="enums"), slice=ast.Constant(value=enum)), _:
+                entries[enum] = {}
+            case (
+                ast.Subscript(value=ast.Subscript(slice=ast.Constant(value=enum)), slice=ast.Constant(value=number)),
+                ast.Call(func=ast.Name(id="EnumEntry"), args=[ast.Constant(value=name), *_]),
+            ):
+                entries[enum][number] = name
+            case (
+                ast.Attribute(
+                    value=ast.Subscript(
+                        value=ast.Subscript(slice=ast.Constant(value=enum)), slice=ast.Constant(value=number)
+                    ),
+                    attr="has_location",
+                ),
+                ast.Constant(value=True),
+            ):
+                locations.add((enum, number))
+    if not constants or not locations:
+        raise OverlayError("mavgen writes its enums in another way")
+    lines = [ENUMS_HEAD, *constants, "\nenums: dict[str, dict[int, EnumEntry]] = {\n"]
+    for enum, names in entries.items():
+        lines.append(f'    "{enum}": {{\n')
+        for number, name in names.items():
+            location = ", True" if (enum, number) in locations else ""
+            lines.append(f'        {number}: _E("{name}"{location}),\n')
+        lines.append("    },\n")
+    lines.append("}\n")
+    return "".join(lines)
 
 
 def generate_c(folder: Path) -> Path:
@@ -169,7 +254,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Makes the MAVLink dialect of anafi-mav.")
     parser.add_argument("--c", type=Path, metavar="FOLDER", help="write C headers there, not the Python module")
     folder = parser.parse_args().c
-    sys.stdout.write(f"{generate() if folder is None else generate_c(folder)}\n")
+    for path in generate() if folder is None else [generate_c(folder)]:
+        sys.stdout.write(f"{path}\n")
 
 
 if __name__ == "__main__":

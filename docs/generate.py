@@ -20,7 +20,8 @@ CONFIGURATION = """\
 
 <!-- Made by docs/generate.py from anafi_mav/config/schema.py. -->
 
-`anafi-mav run -c fleet.yaml` reads one YAML file. Two drones or a hundred are a longer list, nothing else:
+For people who run more than one drone, or change a default. After reading you can write the YAML file of
+`anafi-mav run -c fleet.yaml`. Two drones or a hundred are a longer list, nothing else:
 
 ```yaml
 endpoints: ["udpout://127.0.0.1:14550", "udpout://127.0.0.1:14540", "tcpin://127.0.0.1:5760?flavour=ardupilot"]
@@ -29,23 +30,27 @@ drones:
   - {name: bravo, sysid: 2, sim: {model: 4k, home: [48.8789, 2.3677, 35.0]}}
 ```
 
-An error is one line with the file, the place of the key and what was expected there. The exit status is then 2, and
-nothing has been started:
+An error is one line with the file, the key and the expected value. The exit status is then 2, and nothing has been
+started:
 
 ```
 anafi-mav: fleet.yaml: drones[1].sysid: expected a sysid of its own, 1 is already at drones[0].sysid
 ```
 
-Two options of the command line stand in for a list of the file, or of the defaults: `--drone ADDRESS` (repeatable;
-the drones get the system ids 1, 2, …; `192.168.42.1%wlan1` names the interface too) and `--endpoint URL` (repeatable).
-`--allow-kill` is `allow_kill: true`.
+Options of the command line replace a list of the file, or of the defaults:
 
-One gateway uses one `state` folder: its file `gateway.lock` names the process and its drones, and a second gateway is
-refused there. Two gateways on one machine need a folder each. A folder that cannot be used stops no gateway: it warns
-at the start and at each upload, keeps nothing, and its exit status is 1.
+| option | replaces |
+|---|---|
+| `--drone ADDRESS` (repeatable) | `drones`, with system ids 1, 2, …; `192.168.42.1%wlan1` names the interface too |
+| `--endpoint URL` (repeatable) | `endpoints` |
+| `--allow-kill` | `allow_kill: true` |
 
-Every ANAFI has the same address in its own Wi-Fi, and so has every Skycontroller. With a Wi-Fi adapter for each and the
-adapter's name as `interface` they fly together, without address translation:
+One gateway uses one `state` folder. Its file `gateway.lock` names the process and its drones. A second gateway with the
+same folder is refused: two gateways on one computer need a folder each. A gateway with an unusable folder runs. It
+warns at the start and at each upload, stores nothing, and its exit status is 1.
+
+Every ANAFI has the same address in its own Wi-Fi, and so has every Skycontroller. With a Wi-Fi adapter for each, and
+the adapter's name as `interface`, they fly together, without address translation:
 
 ```yaml
 drones:
@@ -62,22 +67,22 @@ ENDPOINTS = """
 
 | URL | what happens |
 |---|---|
-| `udpout://HOST:PORT` | sends to HOST:PORT and takes the answers: for a client that waits at a known port |
+| `udpout://HOST:PORT` | sends to HOST:PORT and receives the answers: for a client that waits at a known port |
 | `udpin://HOST:PORT` | waits at HOST:PORT; each client that sends something is served |
 | `tcpin://HOST:PORT` | waits at HOST:PORT for TCP connections |
 | `tcpout://HOST:PORT` | connects to HOST:PORT by TCP |
 | `serial:///dev/ttyUSB0:57600` | a serial line, here with 57600 baud |
 
-Each may end in `?flavour=px4` (the default), `?flavour=ardupilot` or `?flavour=standard`: the autopilot that its
-clients are shown.
+Each may end in `?flavour=px4` (the default), `?flavour=ardupilot` or `?flavour=standard`: the autopilot that the
+endpoint shows its clients.
 
 A datagram of `udpout` and `udpin` carries one MAVLink frame: some programs (gomavlib since 3.3.2, and so mavp2p) read
 only the first frame of a datagram. `?frames=many` puts up to 512 bytes of frames into one. It is for a large fleet and
 for a client that reads them all, as QGroundControl, MAVSDK, pymavlink and mavlink-router do. Two options are joined by
 `&`, as in `udpout://127.0.0.1:14550?flavour=ardupilot&frames=many` (in a shell, put the URL in quotes).
 
-`udpin` and `tcpin` listen on loopback unless HOST says otherwise. MAVLink has no password: who reaches an endpoint
-flies the drones.
+`udpin` and `tcpin` listen on HOST alone: give a loopback address unless the network may connect. MAVLink has no
+password: a program that reaches an endpoint can fly the drones.
 """
 
 
@@ -120,13 +125,16 @@ SEED = """\
 
 <!-- Made by docs/generate.py from tests/unit/seed_rows.py. -->
 
+For users of anafi_ros, and of the Python API. After reading you know the name in `anafi_mav.drone.Drone` for each
+function of that paper.
+
 The appendix of the paper lists what a program can do with an ANAFI: 5 topics to command it, 29 topics to read, 24
-services and 25 parameters. Each row is here with what reads or drives it in `anafi_mav.drone.Drone`, and with what
-`tests/unit/test_drone_seed_rows.py` shows on each model of the simulator, over its real sockets:
+services and 25 parameters. Each row has its counterpart in `Drone`. The last columns have the results of
+`tests/unit/test_drone_seed_rows.py` on each model of the simulator, over its real sockets:
 
 * **yes**: the row is read or driven, and the drone confirms it;
 * **no**: this model does not have it, and the verb raises `NotSupported`;
-* **–**: not shown there, for the reason given.
+* **–**: not shown by that test, for the reason given.
 """
 
 
@@ -157,9 +165,9 @@ SEED_MAVLINK = """\
 
 <!-- Made by docs/generate.py from tests/unit/seed_mavlink.py. -->
 
-What the paper's programs can read and do with an ANAFI ([seed.md](seed.md)), and the MAVLink that reaches it. Messages
-that begin with `ANAFI_` are in [dialect.md](dialect.md), parameters that begin with `ANF_` in
-[parameters.md](parameters.md).
+For users of anafi_ros who change to MAVLink. After reading you know the MAVLink message, command or parameter for each
+function of that paper ([seed.md](seed.md)). Messages that begin with `ANAFI_` are in [dialect.md](dialect.md),
+parameters that begin with `ANF_` in [parameters.md](parameters.md).
 
 | row | MAVLink | shown by |
 |---|---|---|
@@ -183,15 +191,22 @@ DIALECT = """\
 
 <!-- Made by docs/generate.py from dialect/anafi.xml. -->
 
-The gateway speaks MAVLink's `ardupilotmega` and `development` dialects and the messages below, for what an ANAFI and
-its Skycontroller tell and MAVLink has no field for. Component 1 sends them, to a client that has asked for them:
-`MAV_CMD_REQUEST_MESSAGE` for one, `MAV_CMD_SET_MESSAGE_INTERVAL` for a stream, whose interval is an upper bound of its
-rate, for a message leaves when the drone has told something new.
+For programmers who read values that MAVLink has no field for. After reading you can request and decode them.
 
-A value that the drone has not told is the field's "unknown". Enums keep Parrot's numbers; a number that is not listed
-is one that a later firmware has added.
+The gateway speaks MAVLink's `ardupilotmega` and `development` dialects and the messages below. They carry what an ANAFI
+and its Skycontroller report and MAVLink has no field for. Component 1 sends them to a client that requests them:
 
-Python programs take the definitions from the package:
+| to receive | send |
+|---|---|
+| one message | `MAV_CMD_REQUEST_MESSAGE` |
+| a stream | `MAV_CMD_SET_MESSAGE_INTERVAL` |
+
+The interval of a stream is a lower bound: a message is sent when the drone has reported a new value.
+
+A value that the drone has not reported is the field's "unknown". Enums keep Parrot's numbers. A later firmware may add
+numbers that are not listed.
+
+Python programs use the definitions of the package:
 
 ```python
 from anafi_mav.mavlink import dialect
@@ -204,7 +219,7 @@ connection = mavutil.mavlink_connection("udpin:127.0.0.1:14550", dialect=None)
 C programs include the headers that `python dialect/generate.py --c FOLDER` writes: `FOLDER/anafi/mavlink.h`. Other
 languages are made by pymavlink's `mavgen` from `dialect/anafi.xml` beside pymavlink's own definitions.
 
-| id | message | what it tells |
+| id | message | contents |
 |---|---|---|
 """
 
@@ -252,32 +267,41 @@ PARAMETERS = """\
 
 <!-- Made by docs/generate.py from anafi_mav/services/parameter_table*.py. -->
 
-A value has one place and several names. The native ones, `ANF_*`, are seen by every client; beside them a client of
-the PX4 flavour sees PX4's names and one of the ArduPilot flavour ArduPilot's. A write by one name is told under all of
-them, to everybody. Ranges are the drone's own: it tells them with each setting, and a client reads them in
-`parameter.json`, which QGroundControl and MAVSDK load by themselves over MAVLink FTP.
+For people who set up a drone. After reading you know each parameter, its names for PX4's and ArduPilot's clients, and
+when a write counts.
 
-A write is answered when the drone has confirmed it, with what it confirmed. What is out of range, read only or of
-another type is refused with PARAM_ERROR. So is a read of a name that is not listed. A value that is not known reads
--1; no parameter is ever NaN. The drone keeps its own settings, and the gateway keeps its settings for each drone, but
-for `ANF_HAND_LAUNCH`, `ANF_CRUISE_SPEED`, `ANF_CLIMB_SPEED` and `ANF_FENCE_ON`, which begin with their default whenever
-it is started.
+A value is stored once and has several names. Every client sees the native ones, `ANF_*`. A client of the PX4 flavour
+also sees PX4's names, a client of the ArduPilot flavour ArduPilot's. A write by one name is reported under all of them,
+to every client.
+
+Ranges are the drone's own: it reports them with each setting. A client reads them in `parameter.json`, which
+QGroundControl and MAVSDK load by themselves over MAVLink FTP.
+
+| request | answer |
+|---|---|
+| a write | the confirmed value, when the drone has confirmed it |
+| a write out of range, to a read-only name, or of another type | PARAM_ERROR |
+| a read of a name that is not listed | PARAM_ERROR |
+| a read of an unknown value | -1; no parameter is ever NaN |
+
+The drone keeps its own settings, and the gateway keeps its settings for each drone. Four begin with their default at
+each start: `ANF_HAND_LAUNCH`, `ANF_CRUISE_SPEED`, `ANF_CLIMB_SPEED` and `ANF_FENCE_ON`.
 """
 
 PARAMETERS_NATIVE = """
 ## Native
 
-| name | what it is | unit | values | PX4 | ArduPilot | source of value and range | models |
+| name | meaning | unit | values | PX4 | ArduPilot | source of value and range | models |
 |---|---|---|---|---|---|---|---|
 """
 
 PARAMETERS_FACTS = """
-## Facts in {title}'s words
+## Facts by {title}'s names
 
-What its clients ask for and cannot be set. They can be read only. What QGroundControl's setup pages ask for and an
-ANAFI does not have is there with a neutral value: "not available on ANAFI".
+Parameters that its clients request and that can only be read. A parameter of QGroundControl's setup pages that an ANAFI
+does not have is listed with a neutral value: "not available on ANAFI".
 
-| name | what it is | value | unit | source |
+| name | meaning | value | unit | source |
 |---|---|---|---|---|
 """
 
@@ -321,13 +345,15 @@ def parameters() -> str:
 
 
 SILENCE = """\
-# What the simulator does not answer
+# Commands that the simulator does not answer
 
 <!-- Made by docs/generate.py from tests/unit/silent_commands.py. -->
 
-`tests/unit/test_sim_silence.py` sends every command that is declared, with several values and in every situation in
-which it could mean something, to each model and to each Skycontroller. All of them are answered by an event at once but
-these.
+For programmers who test an ARSDK controller on the simulator. After reading you know which commands have no event in
+answer, and why.
+
+`tests/unit/test_sim_silence.py` sends every declared command to each model and each Skycontroller, with several values
+and in every relevant state. The simulator answers all of them at once by an event, except these.
 """
 
 
@@ -349,8 +375,11 @@ STATES = """\
 
 <!-- Made by docs/generate.py from the tables of the code. -->
 
-What can happen in which state, and what comes of it. A test walks every pair of state and event. What has no arrow
-changes nothing, for it is ignored, refused or put off, or it cannot happen: the module says which.
+For people who change a protocol or the flight core. After reading you know the states, the events and the transitions
+of each machine.
+
+A test walks every pair of state and event. An event without an arrow changes nothing: it is ignored, refused or
+deferred, or it cannot happen. The module's text has the reason.
 """
 
 
@@ -392,33 +421,35 @@ PLAN_TRANSLATION = """\
 
 <!-- Made by docs/generate.py from the table of anafi_mav/plans/rules.py. -->
 
-A drone flies a file of Parrot's, of version 1 (ANAFI 4K, Thermal, USA) or 2 (Ai). The mission is kept as it was
-uploaded; a translation of it flies.
+For people who plan missions. After reading you know how an ANAFI flies each command, and which ones it refuses.
+
+A drone flies a file of Parrot's, of version 1 (ANAFI 4K, Thermal, USA) or 2 (Ai). The mission is stored as it was
+uploaded; the drone flies a translation.
 
 * **exact**: {exact}.
 * **approximated**: {approximated}.
 * **stepped**: {stepped}. The drone's own plan ends before
-  it and another one begins after it. Where the gateway or the link to the drone fails meanwhile, the drone hovers and
-  does not go on.
+  it and another one begins after it. If the gateway or the link to the drone fails meanwhile, the drone hovers and
+  does not continue.
 * **refused**: {refused}, with the item and the reason. So is each command that is
   not in the table.
 
-What holds for all of them:
+Rules for all of them:
 
-* Heights count from the take-off, or from mean sea level when the height of the take-off point is known; not from the
-  terrain. A place of 0, 0 or none is where the drone is then, a height that is not set the one that it has.
+* Heights count from take-off, or from mean sea level when the height of the take-off point is known; not from the
+  terrain. A missing place, or 0, 0, is where the drone is then. A missing height is the drone's height then.
 * A way point counts as reached within {acceptance:g} m unless it names a radius. A heading that is not set is towards
   the way point. Holding and loitering is a delay after it.
-* From the ground the drone takes off first, whatever the mission begins with; without an item that takes off it then
-  rises straight to the height of the first way point, which is said.
-* A mission that begins in its middle begins with the speed, region of interest, view and gimbal that the items
-  before have set, and with photos or a video that they have begun and not ended.
-* An Ai that flies begins a file by going to above its first way point. What a mission does before that one, such as a
-  photo, is kept where it belongs by a way point there in front.
+* From the ground the drone takes off first, whatever the mission begins with. Without a take-off item it then
+  climbs straight to the height of the first way point, which a text reports.
+* A mission that begins in its middle sets first what the earlier items had set: speed, region of interest, view and
+  gimbal. It also resumes photos or a video that they had begun and not ended.
+* An Ai that flies begins a file with a flight to above its first way point. For actions before that one, such as a
+  photo, an additional way point keeps them at their place.
 * A file has at most {lines} lines. A longer mission is flown in several files (stepped).
-* An item that does not continue by itself, and one after a landing, are refused. What comes after a return or an
-  endless loop is never reached, which is said.
-* Photos are rectilinear unless SET_STILL_CAPTURE_MODE says otherwise: MAVLink has no word for it.
+* An item that does not continue by itself, and one after a landing, are refused. Items after a return or an
+  endless loop are never reached, which a text reports.
+* Photos are rectilinear unless SET_STILL_CAPTURE_MODE changes it: MAVLink has no field for it.
 
 | command | | how |
 |---|---|---|

@@ -5,8 +5,10 @@ pytest tests/conformance tests/clients --conformance=docs/conformance.md
 
 from __future__ import annotations
 
+import os
 import re
 import signal
+import sys
 from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
@@ -20,7 +22,12 @@ from anafi_mav.arsdk import watchdog
 
 clock.install()
 
-pytest_plugins = ["support.repeats"]
+# Whatever the user's shell says, the programs that tests start share compiled modules: without them each start of
+# anafi-mav compiles all of it again, which takes longer than most tests.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
+
+pytest_plugins = ["support.repeats", "support.fuzz_seed"]
 
 # Gateway, simulator and client share one event loop here: when it stalls, so does the Skycontroller that would be given
 # its axes back. Tests of the watchdog run the gateway as a process of its own.

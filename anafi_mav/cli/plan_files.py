@@ -11,7 +11,7 @@ from typing import Any
 from anafi_mav import config
 from anafi_mav.cli.consent import confirmed
 from anafi_mav.cli.plan_options import PARROT, height_of, limits, load, target_format, version
-from anafi_mav.cli.terminal import say, say_json
+from anafi_mav.cli.terminal import say, say_json, say_table
 from anafi_mav.errors import ConfigError, PlanError
 from anafi_mav.models import Model, planned
 from anafi_mav.plans import files, table
@@ -30,8 +30,9 @@ def show(arguments: argparse.Namespace) -> int:
         say_json({"file": arguments.file.name, **_facts(plan)})
         return 0
     say(f"{arguments.file.name}: {table.summary(plan)}")
-    for line in table.lines(plan) if plan.items else ():
-        say(line)
+    if plan.items:
+        rows = [row.columns() for row in table.rows_of(plan)]
+        say_table(table.HEAD.columns(), rows, right=table.NUMBERS)
     return 0
 
 

@@ -102,8 +102,13 @@ def run(arguments: argparse.Namespace) -> int:
             arguments.plots.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise ConfigError("--plots", f"expected a folder, got {arguments.plots}: {error.strerror}") from error
+    return interrupts.run(validate(models, speed, arguments.plots))
+
+
+async def validate(models: list[str], speed: float, plots: Path | None) -> int:
+    """Fly and compare these models, print the results, and draw them into a folder that exists; the exit status."""
     try:
-        flights = interrupts.run(_fly_all(models, speed))
+        flights = await _fly_all(models, speed)
     except StoodStill as error:
         complain(f"the flights are invalid: {error}; try again when it is less busy, or one --model at a time")
         return 1
@@ -118,8 +123,8 @@ def run(arguments: argparse.Namespace) -> int:
             say(line, "" if result.agrees else "red")
     rate = sum(flight.rate for flight in flights) / len(flights)
     say(f"from the frame metadata of the video, {rate:.0f} times a simulated second, speed {speed:g}")
-    if arguments.plots is not None:
-        for path in _plot(flights, arguments.plots):
+    if plots is not None:
+        for path in _plot(flights, plots):
             say(f"drawn {path}")
     return 0 if agreed else 1
 

@@ -6,17 +6,27 @@ Every line is cleaned of control characters: names and texts of drones and vehic
 from __future__ import annotations
 
 import contextlib
+import io
 import json
 import math
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Container, Iterator, Sequence
 from typing import TextIO
 
-from rich.console import Console
+from rich.cells import cell_len
+from rich.console import Console, JustifyMethod
+from rich.measure import Measurement
 from rich.progress import Progress
+from rich.table import Table
 from rich.text import Text
 
 from anafi_mav.printable import printable
+
+_LAST_COLUMN = 24
+"""Characters that the last column of a table has at least, on a terminal that is too narrow for all."""
+
+_UNFOLDED = 100_000
+"""Characters that no row of a table has."""
 
 _bars: list[Progress] = []
 """Bars on the screen: what is said meanwhile is printed above them."""
@@ -46,6 +56,32 @@ def _plain(value: object) -> object:
             return [_plain(item) for item in value]
         case _:
             return value
+
+
+def say_table(head: Sequence[str], rows: Sequence[Sequence[str]], right: Container[int] = ()) -> None:
+    """Print rows in columns on stdout. `right` are the columns that are aligned to the right.
+
+    A terminal gets a head in bold and a last column that is folded inside itself. Elsewhere a row is one line.
+    """
+    table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False, header_style="bold")
+    for place, title in enumerate(head):
+        widest = max(cell_len(printable(row[place])) for row in [head, *rows])
+        least = min(widest, _LAST_COLUMN) if place == len(head) - 1 else widest
+        justify: JustifyMethod = "right" if place in right else "left"
+        table.add_column(Text(title), justify=justify, min_width=least, overflow="fold")
+    for row in rows:
+        table.add_row(*(Text(printable(cell)) for cell in row))
+    if sys.stdout.isatty():
+        console = Console(file=sys.stdout)
+        least = Measurement.get(console, console.options, table).minimum
+        with contextlib.suppress(OSError):
+            console.print(table, width=max(console.width, least), crop=False)
+        return
+    page = Console(file=io.StringIO(), width=_UNFOLDED)
+    with page.capture() as text:
+        page.print(table)
+    for line in text.get().splitlines():
+        say(line.rstrip())
 
 
 def complain(line: str, style: str = "red") -> None:

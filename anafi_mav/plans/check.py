@@ -11,9 +11,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from pymavlink.dialects.v20 import common
-
-from anafi_mav import geo
+from anafi_mav import geo, mav_enums
 from anafi_mav.errors import PlanError
 from anafi_mav.models import Model
 from anafi_mav.plans import zones
@@ -207,26 +205,26 @@ class _Follower:
     def _line(self, line: Item, origin: int) -> Iterator[Problem]:
         one, two, three = line.params[:3]
         match line.command:
-            case common.MAV_CMD_NAV_WAYPOINT:
+            case mav_enums.MAV_CMD_NAV_WAYPOINT:
                 to = _point(line)
                 if self._first and self._planned:
                     yield from self._first_way(to, origin)
                 self._first = False
                 yield from self._go(to, origin)
-            case common.MAV_CMD_NAV_TAKEOFF:
+            case mav_enums.MAV_CMD_NAV_TAKEOFF:
                 self.seconds += TAKE_OFF_TIME
-            case common.MAV_CMD_NAV_LAND:
+            case mav_enums.MAV_CMD_NAV_LAND:
                 self.seconds += max(self._here.height, 0.0) / SINK
                 self._landed = True
-            case common.MAV_CMD_NAV_RETURN_TO_LAUNCH:
+            case mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH:
                 back = Point(*self._home, max(self._limits.return_height, self._here.height))
                 self._move(replace(self._here, height=back.height))
                 self._move(back)
                 self.seconds += back.height / SINK
                 self._landed = True
-            case common.MAV_CMD_NAV_DELAY | common.MAV_CMD_CONDITION_DELAY:
+            case mav_enums.MAV_CMD_NAV_DELAY | mav_enums.MAV_CMD_CONDITION_DELAY:
                 self.seconds += one or 0.0
-            case common.MAV_CMD_DO_CHANGE_SPEED:
+            case mav_enums.MAV_CMD_DO_CHANGE_SPEED:
                 self._speed = two or self._speed
                 if self._speed > self._figures.max_speed:
                     most = self._figures.max_speed
@@ -234,9 +232,9 @@ class _Follower:
                         f"{self._speed:g} m/s is more than the {most:g} that an {self._model.title} flies", origin
                     )
                     self._speed = most
-            case common.MAV_CMD_PANORAMA_CREATE:
+            case mav_enums.MAV_CMD_PANORAMA_CREATE:
                 self.seconds += abs(one or 0.0) / (three or PANORAMA_SPEED)
-            case common.MAV_CMD_IMAGE_START_CAPTURE if (two if self._figures.version == 1 else three) == 1.0:
+            case mav_enums.MAV_CMD_IMAGE_START_CAPTURE if (two if self._figures.version == 1 else three) == 1.0:
                 self.seconds += PHOTO_TIME
 
     def _first_way(self, to: Point, origin: int) -> Iterator[Problem]:

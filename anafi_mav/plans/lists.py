@@ -4,21 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from pymavlink.dialects.v20 import common
-
+from anafi_mav import mav_enums
 from anafi_mav.errors import PlanError
 from anafi_mav.plans.plan import GLOBAL, RELATIVE, Circle, Item, Plan, Point, Polygon
 
-RETURN_POINT = common.MAV_CMD_NAV_FENCE_RETURN_POINT
+RETURN_POINT = mav_enums.MAV_CMD_NAV_FENCE_RETURN_POINT
 HOME_CIRCLE = 5005
 """MAV_CMD_NAV_FENCE_HOME_CIRCLE_INCLUSION of MAVLink's development.xml."""
 _POLYGONS = {
-    common.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION: True,
-    common.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION: False,
+    mav_enums.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION: True,
+    mav_enums.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION: False,
 }
 _CIRCLES = {
-    common.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION: True,
-    common.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION: False,
+    mav_enums.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION: True,
+    mav_enums.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION: False,
     HOME_CIRCLE: True,
 }
 
@@ -50,7 +49,7 @@ def rally_items(plan: Plan) -> list[Item]:
     """The rally points as a list of items."""
     return [
         Item(
-            common.MAV_CMD_NAV_RALLY_POINT,
+            mav_enums.MAV_CMD_NAV_RALLY_POINT,
             RELATIVE,
             (0.0, 0.0, 0.0, 0.0, point.latitude, point.longitude, point.height),
         )

@@ -11,8 +11,7 @@ import re
 from dataclasses import replace
 from typing import Literal
 
-from pymavlink.dialects.v20 import common
-
+from anafi_mav import mav_enums
 from anafi_mav.errors import PlanError
 from anafi_mav.plans.plan import GLOBAL, GLOBAL_INT, MISSION, RELATIVE, RELATIVE_INT, Item, Loss, Params, Plan, counted
 from anafi_mav.plans.waypoints import editor_losses, rows, text_of
@@ -25,43 +24,43 @@ _HEADER = re.compile(r"QGC WPL \d+")
 SET_VIEW_MODE, SET_STILL_MODE = 50000, 50001
 """Parrot's own commands."""
 
-_START_PHOTO = common.MAV_CMD_IMAGE_START_CAPTURE
+_START_PHOTO = mav_enums.MAV_CMD_IMAGE_START_CAPTURE
 
 _PLACE = frozenset({5, 6, 7})
 
 _BOTH: dict[int, frozenset[int]] = {
-    common.MAV_CMD_NAV_WAYPOINT: frozenset({1, 2, 4}) | _PLACE,
-    common.MAV_CMD_NAV_RETURN_TO_LAUNCH: frozenset(),
-    common.MAV_CMD_NAV_DELAY: frozenset({1}),
-    common.MAV_CMD_CONDITION_DELAY: frozenset({1}),
-    common.MAV_CMD_IMAGE_STOP_CAPTURE: frozenset(),
-    common.MAV_CMD_VIDEO_START_CAPTURE: frozenset(),
-    common.MAV_CMD_VIDEO_STOP_CAPTURE: frozenset(),
-    common.MAV_CMD_PANORAMA_CREATE: frozenset({1, 2, 3, 4}),
+    mav_enums.MAV_CMD_NAV_WAYPOINT: frozenset({1, 2, 4}) | _PLACE,
+    mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH: frozenset(),
+    mav_enums.MAV_CMD_NAV_DELAY: frozenset({1}),
+    mav_enums.MAV_CMD_CONDITION_DELAY: frozenset({1}),
+    mav_enums.MAV_CMD_IMAGE_STOP_CAPTURE: frozenset(),
+    mav_enums.MAV_CMD_VIDEO_START_CAPTURE: frozenset(),
+    mav_enums.MAV_CMD_VIDEO_STOP_CAPTURE: frozenset(),
+    mav_enums.MAV_CMD_PANORAMA_CREATE: frozenset({1, 2, 3, 4}),
 }
 COMMANDS: dict[Version, dict[int, frozenset[int]]] = {
     1: {
         **_BOTH,
-        common.MAV_CMD_NAV_LAND: frozenset(),
-        common.MAV_CMD_NAV_TAKEOFF: frozenset(),
-        common.MAV_CMD_DO_CHANGE_SPEED: frozenset({1, 2}),
-        common.MAV_CMD_DO_SET_ROI: frozenset({1}) | _PLACE,
-        common.MAV_CMD_DO_MOUNT_CONTROL: frozenset({1}),
+        mav_enums.MAV_CMD_NAV_LAND: frozenset(),
+        mav_enums.MAV_CMD_NAV_TAKEOFF: frozenset(),
+        mav_enums.MAV_CMD_DO_CHANGE_SPEED: frozenset({1, 2}),
+        mav_enums.MAV_CMD_DO_SET_ROI: frozenset({1}) | _PLACE,
+        mav_enums.MAV_CMD_DO_MOUNT_CONTROL: frozenset({1}),
         _START_PHOTO: frozenset({2, 3}),
         SET_VIEW_MODE: frozenset({1, 2}),
         SET_STILL_MODE: frozenset({1, 2, 3}),
     },
     2: {
         **_BOTH,
-        common.MAV_CMD_NAV_LAND: frozenset({4}) | _PLACE,
-        common.MAV_CMD_NAV_TAKEOFF: frozenset({4}) | _PLACE,
-        common.MAV_CMD_DO_CHANGE_SPEED: frozenset({1, 2, 3, 4}),
-        common.MAV_CMD_DO_SET_ROI: frozenset({1, 2, 3}) | _PLACE,
-        common.MAV_CMD_DO_SET_ROI_LOCATION: _PLACE,
-        common.MAV_CMD_DO_SET_ROI_NONE: frozenset(),
-        common.MAV_CMD_DO_MOUNT_CONTROL: frozenset({1, 2, 3, 7}),
-        common.MAV_CMD_DO_SET_CAM_TRIGG_DIST: frozenset({1, 2, 3}),
-        common.MAV_CMD_DO_SET_CAM_TRIGG_INTERVAL: frozenset({1, 2}),
+        mav_enums.MAV_CMD_NAV_LAND: frozenset({4}) | _PLACE,
+        mav_enums.MAV_CMD_NAV_TAKEOFF: frozenset({4}) | _PLACE,
+        mav_enums.MAV_CMD_DO_CHANGE_SPEED: frozenset({1, 2, 3, 4}),
+        mav_enums.MAV_CMD_DO_SET_ROI: frozenset({1, 2, 3}) | _PLACE,
+        mav_enums.MAV_CMD_DO_SET_ROI_LOCATION: _PLACE,
+        mav_enums.MAV_CMD_DO_SET_ROI_NONE: frozenset(),
+        mav_enums.MAV_CMD_DO_MOUNT_CONTROL: frozenset({1, 2, 3, 7}),
+        mav_enums.MAV_CMD_DO_SET_CAM_TRIGG_DIST: frozenset({1, 2, 3}),
+        mav_enums.MAV_CMD_DO_SET_CAM_TRIGG_INTERVAL: frozenset({1, 2}),
         _START_PHOTO: frozenset({2, 3, 4}),
         SET_VIEW_MODE: frozenset({1, 2, 3}),
         SET_STILL_MODE: frozenset({1, 2, 3}),
@@ -73,7 +72,7 @@ Two are written otherwise in version 1: IMAGE_START_CAPTURE has interval, count 
 format stands there instead of in param3 of SET_STILL_MODE.
 """
 
-_NOTHING_WITHOUT_A_PLACE = (common.MAV_CMD_NAV_WAYPOINT, common.MAV_CMD_DO_SET_ROI_LOCATION)
+_NOTHING_WITHOUT_A_PLACE = (mav_enums.MAV_CMD_NAV_WAYPOINT, mav_enums.MAV_CMD_DO_SET_ROI_LOCATION)
 
 _FLOAT_FRAMES = {RELATIVE_INT: RELATIVE, GLOBAL_INT: GLOBAL}
 
@@ -180,7 +179,7 @@ def _held(number: int, item: Item, version: Version, losses: list[Loss]) -> Item
         losses.append(Loss("that it waits to be continued", number))
     params = _kept(item.params, known)
     if version == 1:
-        if item.command == common.MAV_CMD_NAV_WAYPOINT and params[3] is None:
+        if item.command == mav_enums.MAV_CMD_NAV_WAYPOINT and params[3] is None:
             losses.append(Loss("its heading is not set: written as 0, which is north", number))
         one, two, three, four, five, six, seven = (0.0 if value is None else value for value in params)
         params = one, two, three, four, five, six, seven

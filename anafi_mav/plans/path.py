@@ -6,9 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
-from pymavlink.dialects.v20 import common
-
-from anafi_mav import geo
+from anafi_mav import geo, mav_enums
 from anafi_mav.plans.plan import GLOBAL, GLOBAL_INT, RELATIVE, RELATIVE_INT, WAYPOINT, Item, Plan
 
 AMSL, ABOVE_TAKEOFF = (GLOBAL, GLOBAL_INT), (RELATIVE, RELATIVE_INT)
@@ -16,17 +14,17 @@ AMSL, ABOVE_TAKEOFF = (GLOBAL, GLOBAL_INT), (RELATIVE, RELATIVE_INT)
 _WAYS = frozenset(
     {
         WAYPOINT,
-        common.MAV_CMD_NAV_LOITER_UNLIM,
-        common.MAV_CMD_NAV_LOITER_TURNS,
-        common.MAV_CMD_NAV_LOITER_TIME,
-        common.MAV_CMD_NAV_LAND,
-        common.MAV_CMD_NAV_TAKEOFF,
-        common.MAV_CMD_NAV_SPLINE_WAYPOINT,
+        mav_enums.MAV_CMD_NAV_LOITER_UNLIM,
+        mav_enums.MAV_CMD_NAV_LOITER_TURNS,
+        mav_enums.MAV_CMD_NAV_LOITER_TIME,
+        mav_enums.MAV_CMD_NAV_LAND,
+        mav_enums.MAV_CMD_NAV_TAKEOFF,
+        mav_enums.MAV_CMD_NAV_SPLINE_WAYPOINT,
     }
 )
 """Commands that lead to their place."""
 
-LOOKS = frozenset({common.MAV_CMD_DO_SET_ROI, common.MAV_CMD_DO_SET_ROI_LOCATION})
+LOOKS = frozenset({mav_enums.MAV_CMD_DO_SET_ROI, mav_enums.MAV_CMD_DO_SET_ROI_LOCATION})
 """Commands whose place is looked at."""
 
 
@@ -69,7 +67,7 @@ def way(plan: Plan) -> Iterator[Stop]:
         place = place_of(item) or before
         if place is None:
             continue
-        height = 0.0 if item.command == common.MAV_CMD_NAV_LAND else height_of(item, plan)
+        height = 0.0 if item.command == mav_enums.MAV_CMD_NAV_LAND else height_of(item, plan)
         yield Stop(number, *place, height)
         before = place
 

@@ -11,9 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NoReturn
 
-from pymavlink.dialects.v20 import common
-
-from anafi_mav import geo
+from anafi_mav import geo, mav_enums
 from anafi_mav.plans import parrot
 from anafi_mav.plans.legs import Fault, FaultKind, Leg, Refused, Settings, Start, Step, UnknownHeight
 from anafi_mav.plans.parrot import SET_STILL_MODE, SET_VIEW_MODE, Version
@@ -52,22 +50,22 @@ ABSOLUTE, LOOK_AT_ROI = 0.0, 2.0
 TIMELAPSE, GPSLAPSE = 0.0, 1.0
 """Of SET_STILL_MODE."""
 
-_SET_ROI, _ROI_PLACE = common.MAV_CMD_DO_SET_ROI, float(common.MAV_ROI_LOCATION)
-_DELAY = {1: common.MAV_CMD_CONDITION_DELAY, 2: common.MAV_CMD_NAV_DELAY}
-_TAKE_TIME = frozenset({*_DELAY.values(), common.MAV_CMD_PANORAMA_CREATE})
+_SET_ROI, _ROI_PLACE = mav_enums.MAV_CMD_DO_SET_ROI, float(mav_enums.MAV_ROI_LOCATION)
+_DELAY = {1: mav_enums.MAV_CMD_CONDITION_DELAY, 2: mav_enums.MAV_CMD_NAV_DELAY}
+_TAKE_TIME = frozenset({*_DELAY.values(), mav_enums.MAV_CMD_PANORAMA_CREATE})
 _SETS = frozenset(
     {
-        common.MAV_CMD_DO_CHANGE_SPEED,
-        common.MAV_CMD_DO_MOUNT_CONTROL,
-        common.MAV_CMD_DO_SET_ROI_LOCATION,
-        common.MAV_CMD_DO_SET_ROI_NONE,
+        mav_enums.MAV_CMD_DO_CHANGE_SPEED,
+        mav_enums.MAV_CMD_DO_MOUNT_CONTROL,
+        mav_enums.MAV_CMD_DO_SET_ROI_LOCATION,
+        mav_enums.MAV_CMD_DO_SET_ROI_NONE,
         SET_VIEW_MODE,
         SET_STILL_MODE,
     }
 )
 """Commands that are the same wherever they are done."""
 
-_TARGETING = float(common.MAV_MOUNT_MODE_MAVLINK_TARGETING)
+_TARGETING = float(mav_enums.MAV_MOUNT_MODE_MAVLINK_TARGETING)
 
 
 class Pen:
@@ -173,7 +171,7 @@ class Pen:
         one would be done there.
         """
         commands = [line.command for line in self._lines]
-        if self.version == 1 or commands[0] == common.MAV_CMD_NAV_TAKEOFF or WAYPOINT not in commands:
+        if self.version == 1 or commands[0] == mav_enums.MAV_CMD_NAV_TAKEOFF or WAYPOINT not in commands:
             return
         if not all(command in _SETS for command in commands[: commands.index(WAYPOINT)]):
             here = self._began
@@ -203,14 +201,14 @@ class Pen:
         self.waiting.clear()
         self.written += 1
         self.flown += command in _TAKE_TIME
-        self.photographed += command == common.MAV_CMD_IMAGE_START_CAPTURE
+        self.photographed += command == mav_enums.MAV_CMD_IMAGE_START_CAPTURE
 
     def _open(self) -> None:
         """Before the first line of a file: the way up, and what holds."""
         self._began, self._began_heading = self.place, self.heading
         if not self.flying:
             self.flying = True
-            self._put(common.MAV_CMD_NAV_TAKEOFF)
+            self._put(mav_enums.MAV_CMD_NAV_TAKEOFF)
         holds = self.settings
         if holds.speed is not None:
             self._put_speed(*holds.speed)
@@ -227,7 +225,7 @@ class Pen:
                 self.stop_photos()
                 self._many(mode, step, 0.0)
             elif holds.films:
-                self._put(common.MAV_CMD_VIDEO_START_CAPTURE)
+                self._put(mav_enums.MAV_CMD_VIDEO_START_CAPTURE)
 
     def take_off(self, climb: Point | None) -> None:
         """From the ground; `climb`: at once to there."""
@@ -329,7 +327,7 @@ class Pen:
         if self.version == 1:
             self.line(SET_VIEW_MODE, *((self.settings.view or (ABSOLUTE, 0.0))[:2]))
         else:
-            self.line(common.MAV_CMD_DO_SET_ROI_NONE)
+            self.line(mav_enums.MAV_CMD_DO_SET_ROI_NONE)
 
     def look_beside(self, angle: float) -> None:
         self.settings = replace(self.settings, beside=angle)
@@ -358,15 +356,15 @@ class Pen:
 
     def _put_speed(self, kind: float, speed: float) -> None:
         if self.version == 1:
-            self._put(common.MAV_CMD_DO_CHANGE_SPEED, kind, speed)
+            self._put(mav_enums.MAV_CMD_DO_CHANGE_SPEED, kind, speed)
         else:
-            self._put(common.MAV_CMD_DO_CHANGE_SPEED, kind, speed, -1.0, 0.0)
+            self._put(mav_enums.MAV_CMD_DO_CHANGE_SPEED, kind, speed, -1.0, 0.0)
 
     def _put_view(self, values: tuple[float | None, float | None, float | None]) -> None:
         self._put(SET_VIEW_MODE, *values[: 2 if self.version == 1 else 3])
 
     def _put_gimbal(self, pitch: float | None, roll: float | None, yaw: float | None) -> None:
-        command = common.MAV_CMD_DO_MOUNT_CONTROL
+        command = mav_enums.MAV_CMD_DO_MOUNT_CONTROL
         if self.version == 1 and pitch is None:  # that version has no word for "as it is"
             return
         values = (pitch,) if self.version == 1 else (pitch, roll, yaw, None, None, None, _TARGETING)
@@ -377,7 +375,7 @@ class Pen:
 
     def _put_roi(self, point: Point) -> None:
         if self.version == 2:
-            self._put(common.MAV_CMD_DO_SET_ROI_LOCATION, at=point)
+            self._put(mav_enums.MAV_CMD_DO_SET_ROI_LOCATION, at=point)
             return
         if point not in self._rois:
             self._rois.append(point)
@@ -422,23 +420,23 @@ class Pen:
         """No line when the mission has stopped them and begun none: ground stations stop twice, in two ways."""
         self.settings = replace(self.settings, photos=None)
         if not self._stopped:
-            self.line(common.MAV_CMD_IMAGE_STOP_CAPTURE)
+            self.line(mav_enums.MAV_CMD_IMAGE_STOP_CAPTURE)
             self._stopped = not self.muted
 
     def film(self) -> None:
         if self.settings.photos is not None:
             self.refuse("photos are being taken, and the camera does one of the two", kind=FaultKind.PLAN)
         self._mode_wanted = None
-        self.line(common.MAV_CMD_VIDEO_START_CAPTURE)
+        self.line(mav_enums.MAV_CMD_VIDEO_START_CAPTURE)
         self.settings = replace(self.settings, films=True)
 
     def stop_film(self) -> None:
         self.settings = replace(self.settings, films=False)
-        self.line(common.MAV_CMD_VIDEO_STOP_CAPTURE)
+        self.line(mav_enums.MAV_CMD_VIDEO_STOP_CAPTURE)
 
     def panorama(self, *params: float | None) -> None:
         self._idle("panorama")
-        self.line(common.MAV_CMD_PANORAMA_CREATE, *params)
+        self.line(mav_enums.MAV_CMD_PANORAMA_CREATE, *params)
 
     def _idle(self, what: str) -> None:
         """Refuse what the camera cannot begin now."""
@@ -467,4 +465,4 @@ class Pen:
     def _photos(self, interval: float, count: float) -> None:
         self._stopped = False
         sequence = 1.0 if self.version == 2 and count == 1.0 else None
-        self.line(common.MAV_CMD_IMAGE_START_CAPTURE, None, interval, count, sequence)
+        self.line(mav_enums.MAV_CMD_IMAGE_START_CAPTURE, None, interval, count, sequence)

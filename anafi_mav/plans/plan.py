@@ -8,19 +8,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from pymavlink.dialects.v20 import common
+from anafi_mav import mav_enums
 
-WAYPOINT = common.MAV_CMD_NAV_WAYPOINT
-DO_JUMP = common.MAV_CMD_DO_JUMP
+WAYPOINT = mav_enums.MAV_CMD_NAV_WAYPOINT
+DO_JUMP = mav_enums.MAV_CMD_DO_JUMP
 
 GLOBAL, MISSION, RELATIVE, GLOBAL_INT, RELATIVE_INT, TERRAIN, TERRAIN_INT = (
-    common.MAV_FRAME_GLOBAL,
-    common.MAV_FRAME_MISSION,
-    common.MAV_FRAME_GLOBAL_RELATIVE_ALT,
-    common.MAV_FRAME_GLOBAL_INT,
-    common.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT,
-    common.MAV_FRAME_GLOBAL_TERRAIN_ALT,
-    common.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT,
+    mav_enums.MAV_FRAME_GLOBAL,
+    mav_enums.MAV_FRAME_MISSION,
+    mav_enums.MAV_FRAME_GLOBAL_RELATIVE_ALT,
+    mav_enums.MAV_FRAME_GLOBAL_INT,
+    mav_enums.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT,
+    mav_enums.MAV_FRAME_GLOBAL_TERRAIN_ALT,
+    mav_enums.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT,
 )
 
 MAX_ITEMS = 5000

@@ -12,9 +12,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from pymavlink.dialects.v20 import common
-
-from anafi_mav import geo
+from anafi_mav import geo, mav_enums
 from anafi_mav.errors import PlanError
 from anafi_mav.plans import path
 from anafi_mav.plans.path import Stop
@@ -176,12 +174,12 @@ def round_length(metres: float) -> float:
 
 def starts_at_home(plan: Plan) -> bool:
     """True unless the plan begins without a take-off, in the air."""
-    return any(item.command == common.MAV_CMD_NAV_TAKEOFF for item in plan.items)
+    return any(item.command == mav_enums.MAV_CMD_NAV_TAKEOFF for item in plan.items)
 
 
 def returns(plan: Plan) -> bool:
     """True when the plan ends with a return."""
-    return any(item.command == common.MAV_CMD_NAV_RETURN_TO_LAUNCH for item in plan.items)
+    return any(item.command == mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH for item in plan.items)
 
 
 def _outline(zone: Any, origin: tuple[float, float], plane: Any) -> list[tuple[float, float]]:

@@ -6,8 +6,7 @@ import enum
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from pymavlink.dialects.v20 import common
-
+from anafi_mav import mav_enums
 from anafi_mav.plans.parrot import SET_STILL_MODE, SET_VIEW_MODE
 from anafi_mav.plans.pen import Pen
 from anafi_mav.plans.plan import Item
@@ -51,7 +50,7 @@ class Row:
 
     @property
     def name(self) -> str:
-        entry = common.enums["MAV_CMD"].get(self.command)
+        entry = mav_enums.enums["MAV_CMD"].get(self.command)
         known = {SET_VIEW_MODE: "SET_VIEW_MODE", SET_STILL_MODE: "SET_STILL_CAPTURE_MODE"}.get(self.command)
         return known or (f"command {self.command}" if entry is None else entry.name.removeprefix("MAV_CMD_"))
 

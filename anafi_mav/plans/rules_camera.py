@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from pymavlink.dialects.v20 import common
-
+from anafi_mav import mav_enums
 from anafi_mav.plans.parrot import SET_STILL_MODE, SET_VIEW_MODE
 from anafi_mav.plans.pen import SHORTEST_INTERVAL, SHORTEST_STEP, Pen
 from anafi_mav.plans.plan import Item, Point
@@ -68,7 +67,7 @@ def _look_ahead(pen: Pen) -> None:
 
 def _roi(pen: Pen, item: Item) -> None:
     mode = item.params[0]
-    if mode not in (None, 0.0, float(common.MAV_ROI_LOCATION)):
+    if mode not in (None, 0.0, float(mav_enums.MAV_ROI_LOCATION)):
         pen.refuse("only a place can be looked at, no way point and no target", 1)
     if pen.numbers_regions:
         if not pen.names_place(item):
@@ -108,12 +107,12 @@ def _tilt(pen: Pen, pitch: float | None, number: int, roll: float | None = None,
 def _mount(pen: Pen, item: Item) -> None:
     pitch, roll, yaw = item.params[:3]
     mode = item.params[6]
-    if mode == common.MAV_MOUNT_MODE_NEUTRAL:
+    if mode == mav_enums.MAV_MOUNT_MODE_NEUTRAL:
         _tilt(pen, 0.0, 1, 0.0, 0.0)
         return
-    if mode not in (None, float(common.MAV_MOUNT_MODE_RETRACT), float(common.MAV_MOUNT_MODE_MAVLINK_TARGETING)):
+    if mode not in (None, float(mav_enums.MAV_MOUNT_MODE_RETRACT), float(mav_enums.MAV_MOUNT_MODE_MAVLINK_TARGETING)):
         pen.refuse("the gimbal is aimed by angles only", 7)
-    if mode == common.MAV_MOUNT_MODE_RETRACT:
+    if mode == mav_enums.MAV_MOUNT_MODE_RETRACT:
         pen.say("the gimbal cannot be put away: it is aimed")
     if pen.version == 1:
         only(pen, item, 2, "the flight plan does not roll the camera")
@@ -123,9 +122,9 @@ def _mount(pen: Pen, item: Item) -> None:
 
 def _mount_mode(pen: Pen, item: Item) -> None:
     mode = item.params[0]
-    if mode not in (None, 0.0, 1.0, float(common.MAV_MOUNT_MODE_MAVLINK_TARGETING)):
+    if mode not in (None, 0.0, 1.0, float(mav_enums.MAV_MOUNT_MODE_MAVLINK_TARGETING)):
         pen.refuse("the gimbal is aimed by angles only", 1)
-    if mode == common.MAV_MOUNT_MODE_NEUTRAL:
+    if mode == mav_enums.MAV_MOUNT_MODE_NEUTRAL:
         _tilt(pen, 0.0, 1, 0.0, 0.0)
 
 
@@ -135,12 +134,12 @@ def _pitch_yaw(pen: Pen, item: Item) -> None:
     only(pen, item, 3, "a flight plan aims at an angle, it does not turn with a speed")
     only(pen, item, 4, "a flight plan aims at an angle, it does not turn with a speed")
     bits = int(flags or 0.0)
-    if bits & (common.GIMBAL_MANAGER_FLAGS_RETRACT | common.GIMBAL_MANAGER_FLAGS_NEUTRAL):
+    if bits & (mav_enums.GIMBAL_MANAGER_FLAGS_RETRACT | mav_enums.GIMBAL_MANAGER_FLAGS_NEUTRAL):
         _tilt(pen, 0.0, 1, 0.0, 0.0)
-        if bits & common.GIMBAL_MANAGER_FLAGS_RETRACT:
+        if bits & mav_enums.GIMBAL_MANAGER_FLAGS_RETRACT:
             pen.say("the gimbal cannot be put away: it looks ahead")
         return
-    earth = bits & (common.GIMBAL_MANAGER_FLAGS_YAW_LOCK | common.GIMBAL_MANAGER_FLAGS_YAW_IN_EARTH_FRAME)
+    earth = bits & (mav_enums.GIMBAL_MANAGER_FLAGS_YAW_LOCK | mav_enums.GIMBAL_MANAGER_FLAGS_YAW_IN_EARTH_FRAME)
     if yaw is not None and (earth or (yaw != 0.0 and pen.version == 1)):
         pen.refuse("the camera looks where the drone's nose does: turn the drone" if pen.version == 1
                    else "the camera is aimed from the drone's nose, not from north", 2)  # fmt: skip
@@ -261,7 +260,7 @@ def _panorama(pen: Pen, item: Item) -> None:
 def _zoom(pen: Pen, item: Item) -> None:
     kind, value = item.params[:2]
     _camera(pen, item, 3)
-    if kind != float(common.ZOOM_TYPE_RANGE):
+    if kind != float(mav_enums.ZOOM_TYPE_RANGE):
         pen.refuse("only a zoom range in percent can be flown", 1)
     if value is None or not 0.0 <= value <= 100.0:
         pen.refuse("a zoom range is from 0 to 100 %", 2)

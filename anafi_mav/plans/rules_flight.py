@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from pymavlink.dialects.v20 import common
-
+from anafi_mav import mav_enums
 from anafi_mav.plans.pen import Pen
 from anafi_mav.plans.plan import DO_JUMP, WAYPOINT, Item, Point
 from anafi_mav.plans.row import Row, Verdict
@@ -65,7 +64,7 @@ def _take_off(pen: Pen, item: Item) -> None:
 
 def _land(pen: Pen, item: Item) -> None:
     precision, heading = item.params[1], item.params[3]
-    if precision == common.PRECISION_LAND_MODE_REQUIRED:
+    if precision == mav_enums.PRECISION_LAND_MODE_REQUIRED:
         pen.refuse("the drone cannot land by a mark on the ground", 2)
     if precision:
         pen.say("it lands without looking for a mark on the ground")
@@ -78,11 +77,11 @@ def _land(pen: Pen, item: Item) -> None:
             pen.fly(over, heading, None)
     elif heading:
         pen.say(f"it lands with the heading that it has, not {heading:g} deg")
-    pen.line(common.MAV_CMD_NAV_LAND)
+    pen.line(mav_enums.MAV_CMD_NAV_LAND)
 
 
 def _return(pen: Pen, item: Item) -> None:
-    pen.line(common.MAV_CMD_NAV_RETURN_TO_LAUNCH)
+    pen.line(mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH)
 
 
 # What waits.
@@ -127,7 +126,7 @@ def _turn(pen: Pen, item: Item) -> None:
 
 # What sets.
 
-_AIRSPEED, _GROUNDSPEED = float(common.SPEED_TYPE_AIRSPEED), float(common.SPEED_TYPE_GROUNDSPEED)
+_AIRSPEED, _GROUNDSPEED = float(mav_enums.SPEED_TYPE_AIRSPEED), float(mav_enums.SPEED_TYPE_GROUNDSPEED)
 _SAME = -1.0
 
 

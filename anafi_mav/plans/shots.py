@@ -5,8 +5,7 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass
 
-from pymavlink.dialects.v20 import common
-
+from anafi_mav import mav_enums
 from anafi_mav.plans import path
 from anafi_mav.plans.path import Stop
 from anafi_mav.plans.plan import Item, Plan
@@ -33,8 +32,8 @@ class Shots:
     """From where, None: not known; and at what."""
 
 
-_STOPS = {common.MAV_CMD_IMAGE_STOP_CAPTURE: Kind.PHOTOS, common.MAV_CMD_VIDEO_STOP_CAPTURE: Kind.VIDEO}
-_TRIGGERS = (common.MAV_CMD_DO_SET_CAM_TRIGG_DIST, common.MAV_CMD_DO_SET_CAM_TRIGG_INTERVAL)
+_STOPS = {mav_enums.MAV_CMD_IMAGE_STOP_CAPTURE: Kind.PHOTOS, mav_enums.MAV_CMD_VIDEO_STOP_CAPTURE: Kind.VIDEO}
+_TRIGGERS = (mav_enums.MAV_CMD_DO_SET_CAM_TRIGG_DIST, mav_enums.MAV_CMD_DO_SET_CAM_TRIGG_INTERVAL)
 
 
 def shots(plan: Plan) -> Shots:
@@ -71,9 +70,9 @@ def _camera(item: Item, running: set[Kind]) -> None:
     """Begin or end photos on the way, or a video."""
     value = item.params[0] or 0.0
     match item.command:
-        case common.MAV_CMD_VIDEO_START_CAPTURE:
+        case mav_enums.MAV_CMD_VIDEO_START_CAPTURE:
             running.add(Kind.VIDEO)
-        case common.MAV_CMD_IMAGE_START_CAPTURE if not item.params[2]:
+        case mav_enums.MAV_CMD_IMAGE_START_CAPTURE if not item.params[2]:
             running.add(Kind.PHOTOS)
         case command if command in _TRIGGERS:
             (running.add if value > 0.0 else running.discard)(Kind.PHOTOS)
@@ -84,11 +83,11 @@ def _camera(item: Item, running: set[Kind]) -> None:
 def _is_photo(item: Item) -> bool:
     """True for what takes a counted number of photos where it stands."""
     match item.command:
-        case common.MAV_CMD_IMAGE_START_CAPTURE:
+        case mav_enums.MAV_CMD_IMAGE_START_CAPTURE:
             return bool(item.params[2])
-        case common.MAV_CMD_DO_DIGICAM_CONTROL:
+        case mav_enums.MAV_CMD_DO_DIGICAM_CONTROL:
             return item.params[4] == 1.0
-        case common.MAV_CMD_PANORAMA_CREATE:
+        case mav_enums.MAV_CMD_PANORAMA_CREATE:
             return True
         case command if command in _TRIGGERS:
             return item.params[2] == 1.0  # one at once

@@ -9,9 +9,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from pymavlink.dialects.v20 import common
-
-from anafi_mav import geo
+from anafi_mav import geo, mav_enums
 from anafi_mav.plans.plan import MISSION, RELATIVE, WAYPOINT, Item
 
 VERSION = 3
@@ -19,9 +17,9 @@ VERSION = 3
 MAX_LAYERS = 100
 
 TRIGGER, LOOK, LOOK_NO_MORE = (
-    common.MAV_CMD_DO_SET_CAM_TRIGG_DIST,
-    common.MAV_CMD_DO_SET_ROI_WPNEXT_OFFSET,
-    common.MAV_CMD_DO_SET_ROI_NONE,
+    mav_enums.MAV_CMD_DO_SET_CAM_TRIGG_DIST,
+    mav_enums.MAV_CMD_DO_SET_ROI_WPNEXT_OFFSET,
+    mav_enums.MAV_CMD_DO_SET_ROI_NONE,
 )
 
 

@@ -1,13 +1,11 @@
-"""A plan as lines of text: what is in it, then a line for each item with its parameters in words."""
+"""A plan in words: its summary, then a row for each item with its parameters."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from pymavlink.dialects.v20 import common
-
-from anafi_mav import geo
+from anafi_mav import geo, mav_enums
 from anafi_mav.plans import path
 from anafi_mav.plans.parrot import SET_STILL_MODE, SET_VIEW_MODE
 from anafi_mav.plans.plan import (
@@ -28,22 +26,22 @@ _FRAMES = {RELATIVE: "", RELATIVE_INT: "", GLOBAL: " AMSL", GLOBAL_INT: " AMSL"}
 )
 
 _WORDS: dict[int, dict[int, str]] = {
-    common.MAV_CMD_NAV_WAYPOINT: {1: "hold {:g} s", 2: "within {:g} m", 4: "heading {:g}°"},
-    common.MAV_CMD_NAV_LOITER_TIME: {1: "for {:g} s"},
-    common.MAV_CMD_NAV_LAND: {4: "heading {:g}°"},
-    common.MAV_CMD_NAV_TAKEOFF: {4: "heading {:g}°"},
-    common.MAV_CMD_NAV_DELAY: {1: "{:g} s"},
-    common.MAV_CMD_CONDITION_DELAY: {1: "{:g} s"},
-    common.MAV_CMD_CONDITION_YAW: {1: "{:g}°"},
+    mav_enums.MAV_CMD_NAV_WAYPOINT: {1: "hold {:g} s", 2: "within {:g} m", 4: "heading {:g}°"},
+    mav_enums.MAV_CMD_NAV_LOITER_TIME: {1: "for {:g} s"},
+    mav_enums.MAV_CMD_NAV_LAND: {4: "heading {:g}°"},
+    mav_enums.MAV_CMD_NAV_TAKEOFF: {4: "heading {:g}°"},
+    mav_enums.MAV_CMD_NAV_DELAY: {1: "{:g} s"},
+    mav_enums.MAV_CMD_CONDITION_DELAY: {1: "{:g} s"},
+    mav_enums.MAV_CMD_CONDITION_YAW: {1: "{:g}°"},
     DO_JUMP: {1: "to item {:g}", 2: "{:g} times"},
-    common.MAV_CMD_DO_CHANGE_SPEED: {2: "{:g} m/s"},
-    common.MAV_CMD_DO_MOUNT_CONTROL: {1: "pitch {:g}°", 2: "roll {:g}°", 3: "yaw {:g}°"},
-    common.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW: {1: "pitch {:g}°", 2: "yaw {:g}°"},
-    common.MAV_CMD_DO_SET_CAM_TRIGG_DIST: {1: "every {:g} m"},
-    common.MAV_CMD_DO_SET_CAM_TRIGG_INTERVAL: {1: "every {:g} ms"},
-    common.MAV_CMD_SET_CAMERA_ZOOM: {1: "type {:g}", 2: "to {:g}"},
-    common.MAV_CMD_IMAGE_START_CAPTURE: {2: "every {:g} s", 3: "{:g} photos"},
-    common.MAV_CMD_PANORAMA_CREATE: {1: "{:g}° wide", 2: "{:g}° high", 3: "{:g}°/s", 4: "{:g}°/s up and down"},
+    mav_enums.MAV_CMD_DO_CHANGE_SPEED: {2: "{:g} m/s"},
+    mav_enums.MAV_CMD_DO_MOUNT_CONTROL: {1: "pitch {:g}°", 2: "roll {:g}°", 3: "yaw {:g}°"},
+    mav_enums.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW: {1: "pitch {:g}°", 2: "yaw {:g}°"},
+    mav_enums.MAV_CMD_DO_SET_CAM_TRIGG_DIST: {1: "every {:g} m"},
+    mav_enums.MAV_CMD_DO_SET_CAM_TRIGG_INTERVAL: {1: "every {:g} ms"},
+    mav_enums.MAV_CMD_SET_CAMERA_ZOOM: {1: "type {:g}", 2: "to {:g}"},
+    mav_enums.MAV_CMD_IMAGE_START_CAPTURE: {2: "every {:g} s", 3: "{:g} photos"},
+    mav_enums.MAV_CMD_PANORAMA_CREATE: {1: "{:g}° wide", 2: "{:g}° high", 3: "{:g}°/s", 4: "{:g}°/s up and down"},
     SET_VIEW_MODE: {1: "mode {:g}", 2: "ROI {:g}"},
     SET_STILL_MODE: {1: "type {:g}", 2: "every {:g}", 3: "format {:g}"},
 }
@@ -73,13 +71,13 @@ class Row:
 
 HEAD = Row("item", "command", "latitude, longitude", "height", "leg", "")
 
-RIGHT = (0, 3, 4)
-"""Columns of numbers."""
+NUMBERS = (0, 3, 4)
+"""Columns of numbers, aligned to the right."""
 
 
 def name_of(command: int) -> str:
     """A command's name without its prefix; its number when it has none."""
-    entry = common.enums["MAV_CMD"].get(command)
+    entry = mav_enums.enums["MAV_CMD"].get(command)
     return _OWN_NAMES.get(command) or (str(command) if entry is None else entry.name.removeprefix("MAV_CMD_"))
 
 
@@ -100,18 +98,6 @@ def summary(plan: Plan) -> str:
         parts.append(counted(len(plan.rally), "rally point"))
     parts += [f"items {block.first} to {block.first + block.count - 1} are a {block.kind}" for block in plan.blocks]
     return ", ".join(parts)
-
-
-def lines(plan: Plan) -> Iterator[str]:
-    """The items as a table."""
-    rows = [HEAD, *rows_of(plan)]
-    widths = [max(map(len, column)) for column in zip(*(row.columns() for row in rows), strict=True)]
-    for row in rows:
-        cells = [
-            cell.rjust(width) if place in RIGHT else cell.ljust(width)
-            for place, (cell, width) in enumerate(zip(row.columns(), widths, strict=True))
-        ]
-        yield "  ".join(cells).rstrip()
 
 
 def rows_of(plan: Plan) -> Iterator[Row]:

@@ -11,8 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 
-from pymavlink.dialects.v20 import common
-
+from anafi_mav import mav_enums
 from anafi_mav.errors import PlanError
 from anafi_mav.plans.legs import Fault, FaultKind, Leg, Refused, Settings, Start, Step
 from anafi_mav.plans.parrot import Version
@@ -199,7 +198,7 @@ def _wrong_ways(items: Sequence[Item], version: Version) -> list[Fault]:
         last = max(number for number, item in enumerate(items) if item.command == DO_JUMP)
         faults.append(Fault(last, f"the mission jumps more than {MAX_JUMPS} times", FaultKind.PARAM, 2))
     for number, item in enumerate(items):
-        if item.command == common.MAV_CMD_NAV_LAND and number in ways:
+        if item.command == mav_enums.MAV_CMD_NAV_LAND and number in ways:
             after = next((other for other in range(number + 1, len(items)) if other not in ways), None)
             if after is not None:
                 faults.append(Fault(after, "a landing stands before it, which ends the plan", FaultKind.PLAN))
@@ -336,7 +335,7 @@ def _way_up(items: Sequence[Item], first: int) -> int | None:
     """The item that says how high to rise from the ground; None: there is nowhere to fly to."""
     for number in range(first, len(items)):
         row = TABLE[items[number].command]
-        if items[number].command == common.MAV_CMD_NAV_TAKEOFF or row.place:
+        if items[number].command == mav_enums.MAV_CMD_NAV_TAKEOFF or row.place:
             return number
         if row.ends:
             return None
@@ -349,7 +348,7 @@ def _rise(pen: Pen, items: Sequence[Item], first: int) -> None:
     number = _way_up(items, first)
     if number is None:
         raise PlanError("mission", "on the ground it has nowhere to fly to", first)
-    if items[number].command == common.MAV_CMD_NAV_TAKEOFF:
+    if items[number].command == mav_enums.MAV_CMD_NAV_TAKEOFF:
         if any(TABLE[item.command].moves for item in items[first:number]):
             pen.say("the drone takes off first")
         pen.take_off(None)

@@ -10,8 +10,7 @@ from __future__ import annotations
 import math
 from decimal import Decimal
 
-from pymavlink.dialects.v20 import common
-
+from anafi_mav import mav_enums
 from anafi_mav.errors import PlanError
 from anafi_mav.plans.lists import fence_items, points_of, rally_items, zones_of
 from anafi_mav.plans.plan import GLOBAL, MAX_ITEMS, WAYPOINT, Item, Loss, Params, Plan, Point, counted, shifted
@@ -20,8 +19,8 @@ HEADER = "QGC WPL 110"
 
 COLUMNS = 12
 
-_FENCE = range(common.MAV_CMD_NAV_FENCE_RETURN_POINT, common.MAV_CMD_NAV_FENCE_RETURN_POINT + 6)
-_RALLY = (common.MAV_CMD_NAV_RALLY_POINT,)
+_FENCE = range(mav_enums.MAV_CMD_NAV_FENCE_RETURN_POINT, mav_enums.MAV_CMD_NAV_FENCE_RETURN_POINT + 6)
+_RALLY = (mav_enums.MAV_CMD_NAV_RALLY_POINT,)
 
 
 def rows(text: str, source: str) -> list[Item]:

@@ -56,7 +56,7 @@ SHUTDOWN_TIME, REBOOT_TIME = 1.0, 10.0
 HIGHEST = 10_000.0
 """m above or below the sea that a drone may stand at; the ground of the earth does not reach as far."""
 MAX_RATE = 200.0
-"""Hz; the motion itself is not computed more often."""
+"""Hz. The motion is computed 60 times a second; what is sent more often is sent again."""
 
 
 @dataclass(frozen=True)
@@ -242,6 +242,14 @@ class SimulatedDrone:
     def throw(self) -> None:
         """Hand launch: counts after UserTakeOff."""
         self.firmware.throw()
+
+    def inject(self, event: Message) -> None:
+        """Send an event as the drone's firmware does, although nothing of it has happened.
+
+        The state of the simulated drone stays as it is, and what the drone reports next may contradict the event. Like
+        every event it is logged, unless its buffer is not acknowledged, and is subject to `faults.untold`.
+        """
+        self._emit(event)
 
     def note(self, name: str, args: dict[str, Any]) -> None:
         """Leave a line of kind "scenario" in the log."""

@@ -123,6 +123,11 @@ class FlightPlan:
         return self.state is PlayingState.PLAYING
 
     @property
+    def items(self) -> tuple[Item, ...]:
+        """The lines of the plan that plays, or played last; the index is that of MissionItemExecuted."""
+        return self._items
+
+    @property
     def available(self) -> bool:
         """A plan could be started."""
         return all(self._parts[part] for part in (Part.GPS, Part.CALIBRATION, Part.TAKE_OFF, Part.CAMERA_AVAILABLE))

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import io
 import os
 import platform
 import random
 import subprocess
 import sys
+import tarfile
+import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -14,6 +17,8 @@ from pathlib import Path
 from typing import Any
 
 from pymavlink import mavutil
+
+ROOT = Path(__file__).resolve().parents[2]
 
 TICKS = os.sysconf("SC_CLK_TCK")
 
@@ -52,6 +57,18 @@ def product(*arguments: str) -> Iterator[subprocess.Popen[str]]:
             yield process
         finally:
             process.terminate()
+
+
+@contextmanager
+def tree_of(commit: str) -> Iterator[Path]:
+    """The files of a commit in a temporary folder, with its generated modules."""
+    with tempfile.TemporaryDirectory() as root:
+        archive = subprocess.run(["git", "-C", str(ROOT), "archive", commit], check=True, stdout=subprocess.PIPE).stdout
+        with tarfile.open(fileobj=io.BytesIO(archive)) as files:
+            files.extractall(root, filter="data")
+        generate = [sys.executable, str(Path(root) / "dialect" / "generate.py")]
+        subprocess.run(generate, check=True, stdout=subprocess.DEVNULL)
+        yield Path(root)
 
 
 def quantile(values: Sequence[float], share: float) -> float:

@@ -56,7 +56,7 @@ async def test_flight_status() -> None:
             ardrone3.AlertStateChanged(ardrone3.AlertState.TOO_MUCH_ANGLE),
             ardrone3.ForcedLandingAutoTrigger(ardrone3.ForcedLandingReason.DEFECTIVE_SENSOR, 0),
         ):
-            w.drone._emit(event)
+            w.drone.inject(event)
         told = await w.client.wait("ANAFI_FLIGHT_STATUS", lambda m: m.forced_landing != 0)
         assert (told.wind, told.icing) == (1, 2)
         assert told.hover_warnings == dialect.ANAFI_HOVER_WARNING_TOO_HIGH
@@ -81,8 +81,8 @@ async def test_home() -> None:
         home = w.drone.log.find("event", "ardrone3.GPSSettingsState.HomeChanged")[-1].args
         assert (told.latitude, told.longitude) == (round(home["latitude"] * 1e7), round(home["longitude"] * 1e7))
         assert told.type in (dialect.ANAFI_HOME_TYPE_TAKEOFF, dialect.ANAFI_HOME_TYPE_PILOT)
-        w.drone._emit(rth.RthAutoTrigger(rth.AutoTriggerReason.BATTERY_CRITICAL_SOON, 17))
-        w.drone._emit(rth.HomeReachability(rth.RthHomeReachability.CRITICAL))
+        w.drone.inject(rth.RthAutoTrigger(rth.AutoTriggerReason.BATTERY_CRITICAL_SOON, 17))
+        w.drone.inject(rth.HomeReachability(rth.RthHomeReachability.CRITICAL))
         await stream(w.client, dialect.MAVLINK_MSG_ID_ANAFI_HOME)
         told = await w.client.wait("ANAFI_HOME", lambda m: m.reachability == dialect.ANAFI_REACHABILITY_CRITICAL)
         assert (told.trigger, told.trigger_in) == (dialect.ANAFI_RETURN_TRIGGER_BATTERY, 17)
@@ -99,8 +99,8 @@ async def test_checklist() -> None:
         assert told.checks_failed == dialect.ANAFI_CHECK_MAGNETO_CALIBRATION
         assert told.checks_told & told.checks_failed
         on, off = alarms.State.ON, alarms.State.OFF
-        w.drone._emit(alarms.Alarms(alarms.Type.HORIZONTAL_GEOFENCE_REACHED, on, FIRST))
-        w.drone._emit(alarms.Alarms(alarms.Type.MAGNETO_PERTURBATION, off, LAST))
+        w.drone.inject(alarms.Alarms(alarms.Type.HORIZONTAL_GEOFENCE_REACHED, on, FIRST))
+        w.drone.inject(alarms.Alarms(alarms.Type.MAGNETO_PERTURBATION, off, LAST))
         told = await w.client.wait("ANAFI_CHECKLIST", lambda m: m.alarms_raised)
         assert told.alarms_raised == dialect.ANAFI_ALARM_HORIZONTAL_GEOFENCE
         assert told.alarms_told == dialect.ANAFI_ALARM_HORIZONTAL_GEOFENCE | dialect.ANAFI_ALARM_MAGNETO_PERTURBATION
@@ -109,8 +109,8 @@ async def test_checklist() -> None:
 async def test_link() -> None:
     async with world() as w:
         await stream(w.client, dialect.MAVLINK_MSG_ID_ANAFI_LINK)
-        w.drone._emit(common.LinkSignalQuality(0x83))  # quality 3, perturbed
-        w.drone._emit(wifi.RssiChanged(-67))
+        w.drone.inject(common.LinkSignalQuality(0x83))  # quality 3, perturbed
+        w.drone.inject(wifi.RssiChanged(-67))
         told = await w.client.wait("ANAFI_LINK", lambda m: m.rssi == -67)
         assert told.quality == 3
         assert told.flags == dialect.ANAFI_LINK_FLAGS_TOLD | dialect.ANAFI_LINK_FLAGS_PERTURBED
@@ -127,7 +127,7 @@ async def test_camera_exposure_and_intrinsics(model: str) -> None:
         assert math.isnan(told.awb_r_gain)
         if model == "4k":
             await stream(w.client, dialect.MAVLINK_MSG_ID_ANAFI_CAMERA_EXPOSURE)
-            w.drone._emit(camera.ZoomLevel(0, 2.5))
+            w.drone.inject(camera.ZoomLevel(0, 2.5))
             told = await w.client.wait("ANAFI_CAMERA_EXPOSURE", lambda m: m.zoom == 2.5)
         lens = await ask(w.client, dialect.MAVLINK_MSG_ID_ANAFI_CAMERA_INTRINSICS)
         width, fx = {"4k": (1280, 953.87), "ai": (1920, 1505.94)}[model]
@@ -146,7 +146,7 @@ async def test_the_video_runs_while_somebody_wants_what_only_it_says(model: str)
         await stream(w.client, dialect.MAVLINK_MSG_ID_ANAFI_LINK)
         told = await w.client.wait("ANAFI_LINK")
         assert told.goodput == 0xFFFFFFFF
-        video = w.gateway._supervised[0].drone.video
+        video = w.gateway.systems[0].drone.video
         assert not video.state.playing
         await stream(w.client, dialect.MAVLINK_MSG_ID_ANAFI_CAMERA_EXPOSURE)
         frame = dialect.ANAFI_EXPOSURE_SOURCE_FRAME

@@ -53,7 +53,7 @@ def while_it_waits(w: World, do: Callable[[], Any]) -> asyncio.Future[Any]:
 
 def waited(w: World) -> None:
     """The drone says that it has executed the line before the last, and no more of its lines."""
-    w.drone._emit(common.MissionItemExecuted(len(w.drone.firmware.flight_plan._items) - 2))
+    w.drone.inject(common.MissionItemExecuted(len(w.drone.firmware.flight_plan.items) - 2))
     w.drone.faults.untold = frozenset({common.MissionItemExecuted.NAME})
 
 
@@ -92,7 +92,7 @@ async def test_conf_073_an_end_that_the_drone_does_not_tell(flavour: str, model:
             [] if last is LAND else ["ardrone3.Piloting.Landing"]
         )  # above home: ANF_RTL_END
         lines = [e.args["idx"] for e in w.drone.log if e.name == common.MissionItemExecuted.NAME]
-        assert lines == [*range(len(w.drone.firmware.flight_plan._items) - 1)]
+        assert lines == [*range(len(w.drone.firmware.flight_plan.items) - 1)]
         assert reached(w) == [0, 1, 2, 3]
 
 
@@ -102,10 +102,10 @@ async def test_conf_073_a_last_line_that_is_told_after_the_end_completes_it() ->
 
         def ends() -> None:
             plan = w.drone.firmware.flight_plan
-            last = len(plan._items) - 1
+            last = len(plan.items) - 1
             plan.stop(hover=True)
             w.drone.faults.untold = frozenset()
-            w.drone._emit(common.MissionItemExecuted(last))
+            w.drone.inject(common.MissionItemExecuted(last))
 
         mark, _ = await to_the_last_line(w, LAND, ends)
         await state(w, COMPLETE, since=mark)
@@ -165,7 +165,7 @@ async def test_mission_whose_last_line_is_not_reported_completes_at_the_last_way
         await state(w, COMPLETE, since=0)
         assert reached(w) == [0, 1, 2]
         await mode(w, w.modes.idle)
-        last = len(w.drone.firmware.flight_plan._items) - 1
+        last = len(w.drone.firmware.flight_plan.items) - 1
         assert lines_reported(w) == [*range(last)]
         await settled(w, (9.0, 9.0, 6.0))
         assert [m.text for _, m in w.client.since(0, "STATUSTEXT") if "paused" in m.text] == []
@@ -209,7 +209,7 @@ async def test_mission_stopped_by_an_alert_at_its_last_way_point_is_paused() -> 
     async with world(web=True) as w:
         w.drone.faults.quirks = frozenset({Quirk.LAST_ITEM_NOT_REPORTED})
         await put(w, PLAIN["wait"])
-        while_it_waits(w, lambda: w.drone._emit(ardrone3.AlertStateChanged(ardrone3.AlertState.CRITICAL_BATTERY)))
+        while_it_waits(w, lambda: w.drone.inject(ardrone3.AlertStateChanged(ardrone3.AlertState.CRITICAL_BATTERY)))
         await start(w)
         await state(w, PAUSED, seq=2, since=0)
         assert reached(w) == [0, 1]

@@ -625,10 +625,8 @@ async def test_a_setpoint_does_not_overtake_a_newer_order() -> None:
     async with world(flavour="ardupilot") as w:
         await w.take_off(8.0)
         client = w.client
-        data = local(POSITION_ONLY, at=(20.0, 0.0, -8.0)).pack(client._out)
-        client._out.seq = (client._out.seq + 1) % 256
-        data += dialect.MAVLink_command_long_message(1, 1, 21, 0, *[NAN] * 7).pack(client._out)
-        client._out.seq = (client._out.seq + 1) % 256
+        data = client.pack(local(POSITION_ONLY, at=(20.0, 0.0, -8.0)))
+        data += client.pack(dialect.MAVLink_command_long_message(1, 1, dialect.MAV_CMD_NAV_LAND, 0, *[NAN] * 7))
         mark = client.mark()
         client.send_raw(data)
         ack = await client.wait("COMMAND_ACK", lambda m: m.command == 21 and m.result != 5, since=mark)

@@ -158,7 +158,7 @@ async def test_toolbar_is_not_red_in_an_orbit() -> None:
         assert ack.result == dialect.MAV_RESULT_ACCEPTED
         await w.client.heartbeat(lambda beat: beat.custom_mode == orbit, since=mark)
         again = w.client.mark()
-        w.drone._emit(ardrone3.AlertStateChanged(ardrone3.AlertState.NONE))  # a report is made once more
+        w.drone.inject(ardrone3.AlertStateChanged(ardrone3.AlertState.NONE))  # a report is made once more
         await w.client.heartbeat(lambda beat: True, since=again)
         reports = [m for _, m in w.client.since(0, "EVENT") if m.id == toolbar.summary]
         assert reports

@@ -23,11 +23,11 @@ async def test_return_that_the_drone_ends_by_landing_shows_no_mode_between(flavo
     async with world(flavour=flavour) as w:
         await w.take_off(5.0)
         w.drone.firmware.settings.set("rth_ending", RthEndingBehavior.LANDING)
-        w.drone._emit(rth.EndingBehavior(RthEndingBehavior.LANDING))
+        w.drone.inject(rth.EndingBehavior(RthEndingBehavior.LANDING))
         mark = w.client.mark()
-        w.drone._emit(rth.State(RthState.IN_PROGRESS, StateReason.CONNECTION_LOST))  # the drone's own
+        w.drone.inject(rth.State(RthState.IN_PROGRESS, StateReason.CONNECTION_LOST))  # the drone's own
         await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.returning, since=mark)
-        w.drone._emit(rth.State(RthState.AVAILABLE, StateReason.FINISHED))
+        w.drone.inject(rth.State(RthState.AVAILABLE, StateReason.FINISHED))
         await w.client.wait("SYS_STATUS")
         assert (await w.client.command(dialect.MAV_CMD_REQUEST_MESSAGE, 148)).result == ACCEPTED
         beats = [m.custom_mode for _, m in w.client.since(mark, "HEARTBEAT")]
@@ -41,7 +41,7 @@ async def test_commanded_return_that_the_drone_ends_by_landing_shows_return_and_
     async with world(flavour=flavour) as w:
         await w.take_off(5.0)
         w.drone.firmware.settings.set("rth_ending", RthEndingBehavior.LANDING)
-        w.drone._emit(rth.EndingBehavior(RthEndingBehavior.LANDING))
+        w.drone.inject(rth.EndingBehavior(RthEndingBehavior.LANDING))
         mark = w.client.mark()
         assert (await w.client.command(RETURN)).result == ACCEPTED
         await w.client.heartbeat(lambda beat: not beat.base_mode & ARMED, since=mark, timeout=40.0)

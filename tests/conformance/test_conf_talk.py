@@ -137,11 +137,11 @@ async def test_conf_112_long_texts_and_severities(flavour: str) -> None:
             (ardrone3.AlertStateChanged(ardrone3.AlertState.CUT_OUT), "Alert: cut out", 2),
         ):
             mark = w.client.mark()
-            w.drone._emit(event)
+            w.drone.inject(event)
             assert await text(w.client, begins, mark) == severity
         mark = w.client.mark()  # said once, not with every event
-        w.drone._emit(ardrone3.WindStateChanged(ardrone3.WarningLevel.CRITICAL))
-        w.drone._emit(ardrone3.IcingLevelChanged(ardrone3.WarningLevel.CRITICAL))
+        w.drone.inject(ardrone3.WindStateChanged(ardrone3.WarningLevel.CRITICAL))
+        w.drone.inject(ardrone3.IcingLevelChanged(ardrone3.WarningLevel.CRITICAL))
         await text(w.client, "Icing: critical", mark)
         assert [said for _, said in heard(w.client, mark)] == ["Icing: critical"]
         assert not any(m.text.endswith("\t") for _, m in w.client.since(0, "STATUSTEXT"))

@@ -110,11 +110,11 @@ async def test_conf_037_battery(flavour: str) -> None:
 async def test_conf_037_the_cells_of_an_ai() -> None:
     """149-0-6 to 149-0-9: three cells, kelvin, and charge in mAh."""
     async with world(model="ai") as w:
-        w.drone._emit(battery.Description("BAT1", "", 6800, 3, 3000, 4400))
-        w.drone._emit(battery.Temperature(303))
-        w.drone._emit(battery.Capacity(6500, 4100))
+        w.drone.inject(battery.Description("BAT1", "", 6800, 3, 3000, 4400))
+        w.drone.inject(battery.Temperature(303))
+        w.drone.inject(battery.Capacity(6500, 4100))
         for index, millivolts in enumerate((4101, 4102, 4099)):
-            w.drone._emit(battery.CellVoltage(index, millivolts))
+            w.drone.inject(battery.CellVoltage(index, millivolts))
         status = await w.client.wait("BATTERY_STATUS", lambda m: m.voltages[1] != 65535)
         assert status.voltages == [4101, 4102, 4099] + [65535] * 7
         assert status.temperature == 2985  # 303 K are 29.85 degC
@@ -258,7 +258,7 @@ async def test_conf_133_what_is_below_and_nothing_invented(flavour: str) -> None
             assert (await w.client.command(511, id, 1e6)).result == UNSUPPORTED
             assert (await w.client.command(512, id)).result == UNSUPPORTED
         mark = w.client.mark()
-        w.drone._emit(ardrone3.WindStateChanged(ardrone3.WarningLevel.CRITICAL))
+        w.drone.inject(ardrone3.WindStateChanged(ardrone3.WarningLevel.CRITICAL))
         text = await w.client.wait("STATUSTEXT", lambda m: "Wind" in m.text, since=mark)
         assert (text.text, text.severity) == ("Wind: critical", dialect.MAV_SEVERITY_CRITICAL)
 
@@ -272,13 +272,13 @@ async def test_conf_134_rssi(flavour: str, scale: dict[int, int]) -> None:
         assert (await w.client.wait("RC_CHANNELS")).rssi == 255
     async with world(flavour=flavour, skycontroller=3) as w:
         for quality, rssi in scale.items():
-            w.drone._emit(common.LinkSignalQuality(quality | 0x40))  # with a bit that is none of the quality
+            w.drone.inject(common.LinkSignalQuality(quality | 0x40))  # with a bit that is none of the quality
             channels = await w.client.wait("RC_CHANNELS", lambda m, r=rssi: m.rssi == r)
             assert (channels.chancount, channels.chan1_raw, channels.chan18_raw) == (0, 65535, 65535)
-        w.drone._emit(common.LinkSignalQuality(4))
+        w.drone.inject(common.LinkSignalQuality(4))
         status = await w.client.wait("SYS_STATUS", lambda m: m.onboard_control_sensors_health & RECEIVER)
         assert status.onboard_control_sensors_enabled & RECEIVER
-        w.drone._emit(common.LinkSignalQuality(1))
+        w.drone.inject(common.LinkSignalQuality(1))
         await w.client.wait("SYS_STATUS", lambda m: not m.onboard_control_sensors_health & RECEIVER)
 
 
@@ -294,7 +294,7 @@ async def test_conf_135_radio_status(flavour: str, values: dict[int, int]) -> No
     async with world(flavour=flavour) as w:
         for dbm, rssi in values.items():
             mark = w.client.mark()
-            w.drone._emit(wifi.RssiChanged(dbm))
+            w.drone.inject(wifi.RssiChanged(dbm))
             radio = await w.client.wait("RADIO_STATUS", lambda m, r=rssi: m.rssi == r, since=mark)
             # 255, MAVLink's unknown, is -1 dBm in QGroundControl; 0 is what it shows before a radio has reported.
             assert (radio.remrssi, radio.noise, radio.remnoise) == ((0,) * 3 if flavour == "px4" else (255,) * 3)
@@ -314,7 +314,7 @@ async def test_conf_140_estimator(flavour: str) -> None:
         w.drone.faults.gps = False
         report = await w.client.wait("EKF_STATUS_REPORT", lambda m: not m.flags & absolute)
         assert report.flags & (predicted | constant) == 0  # it hovers by its vertical camera
-        w.drone._emit(ardrone3.HoveringWarning(1, 0))
+        w.drone.inject(ardrone3.HoveringWarning(1, 0))
         report = await w.client.wait("EKF_STATUS_REPORT", lambda m: m.flags & constant)
         assert not report.flags & (relative | 2)
 

@@ -241,6 +241,24 @@ async def throw(send: Callable[[bytes], None], pieces: Iterator[bytes]) -> None:
             await asyncio.sleep(0.001)
 
 
+async def own_socket(drone: SimulatedDrone, client: Client) -> Callable[[bytes], None]:
+    """Return what sends a datagram to the gateway from the socket of the drone's own session."""
+    session = drone.session
+    assert session is not None
+    air, seen = session.air, []
+    assert air is not None
+
+    def watch(datagram: bytes, inbound: bool, deliver: Callable[[bytes], None]) -> None:
+        if not inbound:
+            seen.append(deliver)
+        air(datagram, inbound, deliver)
+
+    session.air = watch
+    await client.wait("ATTITUDE")  # telemetry has left the drone
+    session.air = air
+    return seen[0]
+
+
 async def test_garbage_on_every_mavlink_port() -> None:
     host, stranger = loopback(), loopback()
     peer = await UdpClient(254).open(host)
@@ -315,9 +333,8 @@ async def test_garbage_on_the_drones_side() -> None:
         watch = Watch(g, drone, client)
         session = drone.session
         assert session is not None
-        socket_of_drone = session._endpoint  # nothing but the drone's own socket is heard
-        assert socket_of_drone is not None
-        await throw(lambda piece: socket_of_drone.sendto(piece, data[1:]), arsdk_garbage(7))
+        # Nothing but the drone's own socket is heard.
+        await throw(await own_socket(drone, client), arsdk_garbage(7))
         await watch.unchanged(
             *(f"alpha.garbage.{why}" for why in ("header", "type", "size", "version", "queue", "payload"))
         )

@@ -28,14 +28,17 @@ from anafi_mav.mavlink import dialect as newer
 from anafi_mav.sim.motion import Pose
 
 FLAVOURS = ("px4", "ardupilot")
-ON_THE_GROUND, IN_THE_AIR = 50_000, {"hold": 50_000, "brake": 25_000, "guided": 25_000}
-"""Frames, by the mode that the drone hovers in: 100 000 in each flavour."""
+ON_THE_GROUND, IN_THE_AIR = 10_000, {"hold": 10_000, "brake": 5_000, "guided": 5_000}
+"""Frames, by the mode that the drone hovers in: 20 000 in each flavour, other ones in each run."""
+
+TIMES = [1, pytest.param(25, marks=pytest.mark.full)]
+"""A million frames with `-m full`."""
 
 BATCH = 500
 """Frames at once."""
 
-BATCH_EVERY, COMMAND_EVERY = 0.05, 0.001
-"""s: a storm, and all the same time goes on."""
+BATCH_EVERY, FRAME_EVERY, COMMAND_EVERY = 0.25, 0.05, 0.001
+"""s: a storm, and all the same time goes on: several heartbeats are due in it."""
 
 LOST = 3.0
 """s without a heartbeat after which the most impatient client, MAVSDK, takes a vehicle for lost. The clock of tests
@@ -107,10 +110,11 @@ MUTATED = 0.01
 
 
 def frames_in_the_air(source: random.Random) -> Iterator[bytes]:
-    """Random frames and mutated ones."""
+    """What flies a drone as it is, then random frames and mutated ones."""
     packer = dialect.MAVLink(None, 255, 190)
     payloads = [(message.get_msgId(), message.pack(packer)[10:-2]) for message in FLYING]
     others = random_frames(source)
+    yield from (framed(id, payload, 0) for id, payload in payloads)
     for count in itertools.count():
         if source.random() >= MUTATED:
             yield next(others)
@@ -160,23 +164,24 @@ def steady(w: World) -> Iterator[None]:
     assert turns.longest < LONGEST_TURN, turns.longest
 
 
-async def throw(w: World, frames: list[bytes]) -> None:
-    """Send them, and return when the gateway has worked them off."""
+async def throw(w: World, frames: list[bytes], pause: float = BATCH_EVERY) -> None:
+    """Send them, and return when the gateway has worked them off and the pause is over."""
     # What was cut off at the end swallows what follows, up to the longest frame.
     w.client.send_raw(b"".join(frames) + bytes(LONGEST))
     # An unsupported command is answered behind all of it.
     assert (await w.client.command(211, timeout=20.0)).result == UNSUPPORTED
-    await asyncio.sleep(BATCH_EVERY)
+    await asyncio.sleep(pause)
 
 
 @pytest.mark.timeout(300)
+@pytest.mark.parametrize("times", TIMES)
 @pytest.mark.parametrize("flavour", FLAVOURS)
-async def test_random_frames_on_the_ground(flavour: str, mistakes: list[str]) -> None:
+async def test_random_frames_on_the_ground(flavour: str, times: int, fuzz_seed: int, mistakes: list[str]) -> None:
     async with world(flavour=flavour) as w:
-        frames = random_frames(random.Random(f"anafi {flavour}"))
+        frames = random_frames(random.Random(f"{fuzz_seed} {flavour}"))
         began = w.drone.log[-1].t
         with steady(w):
-            for _ in range(ON_THE_GROUND // BATCH):
+            for _ in range(times * ON_THE_GROUND // BATCH):
                 await throw(w, list(itertools.islice(frames, BATCH)))
         assert motions(w, began) == []
         assert w.drone.flying_state.name == "LANDED"
@@ -200,18 +205,21 @@ STIRRED = 0.5
 
 
 @pytest.mark.timeout(300)
+@pytest.mark.parametrize("times", TIMES)
 @pytest.mark.parametrize(("flavour", "mode"), [("px4", "hold"), ("ardupilot", "brake"), ("ardupilot", "guided")])
-async def test_random_frames_in_the_air(flavour: str, mode: str, mistakes: list[str]) -> None:
+async def test_random_frames_in_the_air(
+    flavour: str, mode: str, times: int, fuzz_seed: int, mistakes: list[str]
+) -> None:
     """Frames that may move the drone are thrown one by one, the others together: none of those moves it."""
     async with world(flavour=flavour) as w:
         await w.take_off(HEIGHT)
         custom_mode = COPTER_BRAKE if mode == "brake" else w.modes.hold
         if mode == "brake":
             assert (await w.client.command(dialect.MAV_CMD_DO_SET_MODE, 1, COPTER_BRAKE)).result == 0
-        frames = frames_in_the_air(random.Random(f"anafi {mode}"))
+        frames = frames_in_the_air(random.Random(f"{fuzz_seed} {mode}"))
         moved: set[int] = set()
         with steady(w):
-            for _ in range(IN_THE_AIR[mode] // BATCH):
+            for _ in range(times * IN_THE_AIR[mode] // BATCH):
                 flying, others = [], []
                 for frame in itertools.islice(frames, BATCH):
                     (flying if message_id(frame) in MAY_FLY[mode] else others).append(frame)
@@ -221,7 +229,7 @@ async def test_random_frames_in_the_air(flavour: str, mode: str, mistakes: list[
                 assert apart(place, w.drone.pose) < STIRRED
                 for frame in flying:
                     began = w.drone.log[-1].t
-                    await throw(w, [frame])
+                    await throw(w, [frame], FRAME_EVERY)
                     if motions(w, began):
                         moved.add(message_id(frame) or 0)
                         await stop(w)

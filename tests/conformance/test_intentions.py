@@ -145,7 +145,7 @@ async def test_who_comes_back_while_its_loss_is_being_acted_upon_has_the_say() -
     async with world(speed=1.0) as w:
         other = await w.connect(sysid=254)
         await w.take_off(8.0)
-        policy = w.gateway._supervised[0].system.vehicle.gcs_loss
+        policy = w.gateway.systems[0].vehicle.gcs_loss
         policy.action, policy.after = LossAction.RETURN, 1.0
         muted = now_mute(w, "rth.return_to_home", 0.5)
         w.client.send(dialect.MAVLink_heartbeat_message(dialect.MAV_TYPE_GCS, 8, 0, 0, 4, 3))

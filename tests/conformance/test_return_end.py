@@ -136,7 +136,7 @@ async def test_return_ended_by_another_clients_hold_does_not_land() -> None:
         assert (await other.command(SET_MODE, *PX4_HOLD)).result == ACCEPTED
         ack = await other.command(*goto, frame=6, x=place[0], y=place[1], z=6.0)
         assert ack.result == ACCEPTED
-        w.drone._emit(rth.State(rth.RthState.AVAILABLE, rth.StateReason.FINISHED))
+        w.drone.inject(rth.State(rth.RthState.AVAILABLE, rth.StateReason.FINISHED))
         await w.drone.wait_log(lambda e: e.name.endswith("moveToChanged") and e.args["status"] == 1, 20.0)
         await asyncio.sleep(5.5)
         assert landings(w) == []
@@ -150,7 +150,7 @@ async def test_finished_report_of_an_earlier_return_does_not_end_this_one() -> N
         w.drone.faults.up = Impairment(delay=1.0)
         w.client.send_command(RTL)
         await w.client.wait("COMMAND_ACK", lambda m: m.result == dialect.MAV_RESULT_IN_PROGRESS)
-        w.drone._emit(rth.State(rth.RthState.AVAILABLE, rth.StateReason.FINISHED))
+        w.drone.inject(rth.State(rth.RthState.AVAILABLE, rth.StateReason.FINISHED))
         await w.client.wait("COMMAND_ACK", lambda m: m.result == ACCEPTED)
         w.drone.faults.up = Impairment()
         assert "Return ended" not in " ".join(texts(w.client))
@@ -259,8 +259,10 @@ async def test_return_that_ends_far_from_home_hovers() -> None:
     async with world(speed=FAST) as w:
         await away(w, 20.0)
         mark = await go_home(w)
-        w.drone.firmware.homing._stop_body()
-        w.drone._emit(rth.State(rth.RthState.AVAILABLE, rth.StateReason.FINISHED))
+        w.drone.faults.untold = frozenset({rth.State.NAME, ardrone3.NavigateHomeStateChanged.NAME})
+        w.drone.firmware.homing.abort()
+        w.drone.faults.untold = frozenset()
+        w.drone.inject(rth.State(rth.RthState.AVAILABLE, rth.StateReason.FINISHED))
         await said(w.client, "m from home", mark)
         await asyncio.sleep(5.5)
         assert landings(w) == []

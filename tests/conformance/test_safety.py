@@ -56,8 +56,7 @@ def at_once(client: Client, *commands: tuple[int, tuple[float, ...]]) -> None:
     data = b""
     for id, params in commands:
         seven = [*params, *[NAN] * (7 - len(params))]
-        data += dialect.MAVLink_command_long_message(1, 1, id, 0, *seven).pack(client._out)
-        client._out.seq = (client._out.seq + 1) % 256
+        data += client.pack(dialect.MAVLink_command_long_message(1, 1, id, 0, *seven))
     client.send_raw(data)
 
 
@@ -501,9 +500,9 @@ def plan(state: common.PlayingState) -> common.MavlinkFilePlayingStateChanged:
 async def test_hold_pauses_a_flight_plan() -> None:
     async with world() as w:
         await w.take_off()
-        w.drone._emit(plan(common.PlayingState.PLAYING))
+        w.drone.inject(plan(common.PlayingState.PLAYING))
         await w.client.heartbeat(lambda beat: beat.custom_mode == 0x04040000)  # Mission
-        answered = on_command(w, "common.Mavlink.Pause", lambda: w.drone._emit(plan(common.PlayingState.PAUSED)))
+        answered = on_command(w, "common.Mavlink.Pause", lambda: w.drone.inject(plan(common.PlayingState.PAUSED)))
         assert (await w.client.command(SET_MODE, *PX4_HOLD)).result == ACCEPTED
         await answered
 
@@ -553,11 +552,11 @@ async def test_the_gateway_does_not_climb_while_it_ends() -> None:
 
 async def test_an_impossible_value_of_the_drone_silences_nothing() -> None:
     async with world() as w:
-        w.drone._emit(common.BatteryStateChanged(200))
+        w.drone.inject(common.BatteryStateChanged(200))
         await w.client.wait("BATTERY_STATUS", lambda m: m.battery_remaining == -1)
         for _ in range(2):
             await w.client.wait("HEARTBEAT", timeout=2.0)
-        w.drone._emit(ardrone3.AltitudeChanged(1e300))
+        w.drone.inject(ardrone3.AltitudeChanged(1e300))
         for _ in range(2):
             await w.client.wait("HEARTBEAT", timeout=2.0)
         await w.client.wait("ATTITUDE")

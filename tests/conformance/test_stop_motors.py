@@ -230,7 +230,7 @@ async def test_land_and_hold_wait_half_a_second_for_what_they_replace(stop: str)
         w.drone.faults.untold = frozenset({rth.CustomLocation.NAME, rth.PreferredHomeType.NAME})
         w.client.send_command(dialect.MAV_CMD_DO_SET_HOME, 0, frame=0, x=48.88, y=2.37, z=0.0)
         await w.drone.wait_log(lambda e: e.kind == "command" and e.name.startswith("rth.set"), 5.0)
-        vehicle: Any = w.gateway._supervised[0].system.vehicle
+        vehicle: Any = w.gateway.systems[0].vehicle
         loop = asyncio.get_running_loop()
         began = loop.time()
         with contextlib.suppress(Exception):

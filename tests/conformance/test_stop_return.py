@@ -14,7 +14,7 @@ from support.mav import NAN, Client
 from support.trouble import ACCEPTED, LAND_CMD, PX4_HOLD, REJECTED, RTL, SET_MODE, goto, heard, watched
 from support.world import HOLD, RETURN, World, world
 
-from anafi_mav.arsdk.messages import rth
+from anafi_mav.arsdk.messages import ardrone3, rth
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.messages.rth import RthHomeReachability, StateReason
 from anafi_mav.errors import AnafiMavError
@@ -34,6 +34,11 @@ def by_itself(w: World, reason: StateReason = StateReason.LOW_BATTERY) -> None:
     """The drone begins to return for a reason of its own."""
     firmware = w.drone.firmware
     assert firmware.homing.request(reason, firmware.pose, False)
+
+
+def flag_sticks(w: World) -> None:
+    """Centred sticks with flag 1: a firmware that remembers the flag does not hover any more."""
+    w.drone.firmware.guidance.pilot(ardrone3.PCMD(1, 0, 0, 0, 0, 0), asyncio.get_running_loop().time())
 
 
 async def hold(client: Client) -> int:
@@ -71,14 +76,14 @@ async def test_second_clients_hold_ends_a_return_in_each_phase(phase: Phase, own
         await away(w)
         if phase is Phase.PENDING:  # a firmware that never hovers keeps the return waiting
             w.drone.faults.quirks = frozenset({Quirk.FLAG_REMEMBERED})
-            w.drone.firmware.guidance._tilting = True
+            flag_sticks(w)
             await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "flying", 5.0)
         if own:
             by_itself(w, StateReason.ICING if phase is Phase.PENDING else StateReason.LOW_BATTERY)
         else:
             w.client.send_command(RTL)
             if phase is Phase.PENDING:
-                w.drone.firmware.guidance._tilting = True
+                flag_sticks(w)
         await in_phase(w, phase)
         await w.client.heartbeat(lambda beat: beat.custom_mode == RETURN)
         w.drone.faults.up = w.drone.faults.down = BAD_AIR
@@ -165,7 +170,7 @@ async def test_aborted_return_is_repeated_to_everybody_until_the_drone_lands() -
         other = await w.connect(sysid=250)
         await away(w)
         w.drone.faults.battery = 40
-        w.drone._emit(rth.HomeReachability(RthHomeReachability.CRITICAL))
+        w.drone.inject(rth.HomeReachability(RthHomeReachability.CRITICAL))
         by_itself(w)
         await w.client.heartbeat(lambda beat: beat.custom_mode == RETURN)
         mark = w.client.mark()

@@ -13,7 +13,7 @@ from support.world import World
 
 def system_of(w: World) -> Any:
     """The gateway's system of the one drone."""
-    return w.gateway._supervised[0].system
+    return w.gateway.systems[0]
 
 
 def _service(system: Any, name: str) -> Any:

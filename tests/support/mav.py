@@ -86,8 +86,13 @@ class Client:
 
     def send(self, message: Any) -> None:
         """One frame of MAVLink 2."""
-        self.send_raw(message.pack(self._out))
+        self.send_raw(self.pack(message))
+
+    def pack(self, message: Any) -> bytes:
+        """Return the next frame, for a segment with several of them."""
+        data: bytes = message.pack(self._out)
         self._out.seq = (self._out.seq + 1) % 256
+        return data
 
     def mark(self) -> int:
         """Now, as a place in what was received."""

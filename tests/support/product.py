@@ -47,12 +47,18 @@ class Process:
 
     @classmethod
     async def start(
-        cls, *words: str, stdin: int = asyncio.subprocess.DEVNULL, env: Mapping[str, str] | None = None
+        cls,
+        *words: str,
+        stdin: int = asyncio.subprocess.DEVNULL,
+        env: Mapping[str, str] | None = None,
+        cwd: Path | None = None,
     ) -> Self:
         """`env` is added to our own environment."""
         pipe = asyncio.subprocess.PIPE
         whole = {**os.environ, "PYTHONFAULTHANDLER": "1", **(env or {})}
-        return cls(await asyncio.create_subprocess_exec(*words, stdin=stdin, stdout=pipe, stderr=pipe, env=whole))
+        return cls(
+            await asyncio.create_subprocess_exec(*words, stdin=stdin, stdout=pipe, stderr=pipe, env=whole, cwd=cwd)
+        )
 
     async def _read(self, stream: asyncio.StreamReader | None, lines: list[str]) -> None:
         assert stream is not None
@@ -124,10 +130,13 @@ class Process:
 
 @asynccontextmanager
 async def program(
-    *words: str, stdin: int = asyncio.subprocess.DEVNULL, env: Mapping[str, str] | None = None
+    *words: str,
+    stdin: int = asyncio.subprocess.DEVNULL,
+    env: Mapping[str, str] | None = None,
+    cwd: Path | None = None,
 ) -> AsyncIterator[Process]:
     """Any program for the length of a block."""
-    held = await Process.start(*words, stdin=stdin, env=env)
+    held = await Process.start(*words, stdin=stdin, env=env, cwd=cwd)
     try:
         yield held
     finally:

@@ -35,7 +35,7 @@ class Outcome:
     """Pieces of memory that the whole process has more than then, whoever holds them."""
 
 
-def throw(role: Role, version: int, count: int, seed: int) -> Outcome:
+def throw(role: Role, version: int, count: int, seed: str) -> Outcome:
     """`count` random or mutated datagrams at a transport of this role, in virtual time, with sends in between.
 
     Raises what the transport raises, and AssertionError when it reports what cannot be.

@@ -332,6 +332,27 @@ SIM = "sim: {address: DRONE}"
             f"drones: [{{name: a, sysid: 251, {SIM}}}]",
             "drones[0].sysid: expected a whole number from 1 to 250, got 251",
         ),
+    ],
+)
+def test_configuration_with_a_mistake_is_refused_with_one_line(
+    tmp_path: Path, config: str, line: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """In this process: a configuration is read before anything is started."""
+    host, log = loopback(), tmp_path / "sim.jsonl"
+    config, line = (text.replace("HOST", host).replace("DRONE", loopback()) for text in (config, line))
+    (tmp_path / "fleet.yaml").write_text(config)
+    assert main(["run", "-c", str(tmp_path / "fleet.yaml"), "--sim-log", str(log)]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    (complaint,) = err.splitlines()
+    assert complaint.startswith("anafi-mav: ")
+    assert line in complaint
+    assert not log.exists()  # a simulator begins with its log
+
+
+@pytest.mark.parametrize(
+    ("config", "line"),
+    [
         (
             f"{{endpoints: ['udp://HOST:1'], drones: [{{name: a, sysid: 1, {SIM}}}]}}",
             "endpoints[0]: 'udp://HOST:1': expected a URL that begins with one of udpout://,",

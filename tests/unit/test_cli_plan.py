@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -12,6 +14,7 @@ import pytest
 from plan_samples import FLIGHT
 
 from anafi_mav.cli import main
+from anafi_mav.cli.terminal import say_table
 from anafi_mav.plans import files
 from anafi_mav.plans.files import Format
 
@@ -30,6 +33,38 @@ def test_show(flight: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert lines[0].startswith("flight.plan: 12 items, home ")
     assert lines[1].split() == ["item", "command", "latitude,", "longitude", "height", "leg"]
     assert len(lines) == 2 + 12
+
+
+def test_show_in_a_pipe_prints_one_aligned_line_per_item(flight: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plan", "show", str(flight)]) == 0
+    head, *rows = capsys.readouterr().out.splitlines()[1:]
+    place = head.index("latitude")
+    assert all(row[place - 2 : place].isspace() and row == row.rstrip() for row in rows if len(row) > place)
+    assert rows[1].startswith("   1  DO_")
+    assert any(len(row) > 80 for row in rows)  # the width of a terminal that is not there
+
+
+class _Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.mark.parametrize("columns", [30, 60, 200])
+def test_show_on_a_terminal_folds_the_last_column_only(monkeypatch: pytest.MonkeyPatch, columns: int) -> None:
+    """A terminal narrower than the other columns wraps lines by itself; no character is cut off."""
+    screen = _Terminal()
+    monkeypatch.setattr("sys.stdout", screen)
+    monkeypatch.setenv("COLUMNS", str(columns))
+    monkeypatch.setenv("TERM", "dumb")
+    say_table(
+        ("a", "number", "words"), [("48.8789000, 2.3677000", "12", "word " * 20), ("\x1b[2J", "7", "")], right=(1,)
+    )
+    text = re.sub(r"\x1b\[[0-9;]*m", "", screen.getvalue())
+    lines = text.splitlines()
+    assert lines[1].startswith("48.8789000, 2.3677000      12  word word")
+    assert text.count("word") - text.count("words") == 20
+    assert r"\x1b[2J" in lines[-1]
+    assert max(map(len, lines)) <= max(columns, 21 + 2 + 6 + 2 + 24 + 2)
 
 
 def test_convert_tells_what_is_lost(flight: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import importlib.util
 import re
 import struct
@@ -11,6 +12,7 @@ from types import ModuleType
 
 import pytest
 
+from anafi_mav import mav_enums
 from anafi_mav.mavlink import dialect
 
 # id, name, CRC extra, length without and with extension fields, fields in wire order.
@@ -118,13 +120,50 @@ def generator() -> ModuleType:
     return module
 
 
-def test_the_module_in_use_is_the_one_that_the_definitions_give(generator: ModuleType, tmp_path: Path) -> None:
-    fresh = generator.generate(tmp_path / "dialect.py")
-    assert fresh.read_bytes() == Path(dialect.__file__).read_bytes(), "run dialect/generate.py"
+def test_the_modules_in_use_are_those_that_the_definitions_give(generator: ModuleType, tmp_path: Path) -> None:
+    (tmp_path / "mavlink").mkdir()
+    fresh = {path.name: path.read_bytes() for path in generator.generate(tmp_path)}
+    used = [Path(str(module.__file__)) for module in (mav_enums, dialect)]
+    assert fresh == {path.name: path.read_bytes() for path in used}, "run dialect/generate.py"
+
+
+def test_enums_are_the_numbers_and_names_that_mavgen_writes(generator: ModuleType, tmp_path: Path) -> None:
+    """mavgen's own module, before its enums are taken out, is the referee."""
+    path = tmp_path / "whole.py"
+    generator._run_mavgen(path, "Python3")
+    spec = importlib.util.spec_from_file_location("whole", path)
+    assert spec is not None
+    assert spec.loader is not None
+    whole = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(whole)
+
+    def entries(module: ModuleType) -> dict[str, list[tuple[int, str, bool]]]:
+        found = module.enums.items()
+        return {enum: [(n, one.name, one.has_location) for n, one in table.items()] for enum, table in found}
+
+    def numbers(module: ModuleType) -> dict[str, int]:
+        return {name: value for name, value in vars(module).items() if isinstance(value, int)}
+
+    assert entries(whole) == entries(mav_enums)
+    assert numbers(whole) == numbers(dialect)
+    assert numbers(mav_enums).items() <= numbers(dialect).items()
+    assert set().union(*({one for _, one, _ in table} for table in entries(whole).values())) <= set(numbers(mav_enums))
+
+
+def test_enums_are_stored_once_and_import_nothing() -> None:
+    assert dialect.enums is mav_enums.enums
+    tree = ast.parse(Path(mav_enums.__file__).read_text(encoding="utf-8"))
+    assert not [node for node in ast.walk(tree) if isinstance(node, (ast.Import, ast.ImportFrom))]
 
 
 def overlay(text: str) -> ET.ElementTree:
     return ET.ElementTree(ET.fromstring(f"<mavlink>{text}</mavlink>"))
+
+
+@pytest.mark.parametrize("text", ["", "\n# enums\n", "\n# enums\nX = 1\n# message IDs\n"])
+def test_module_of_another_mavgen_is_refused(generator: ModuleType, text: str) -> None:
+    with pytest.raises(generator.OverlayError, match="mavgen"):
+        generator.split(text)
 
 
 def test_what_is_there_already_is_left_alone(generator: ModuleType) -> None:

@@ -34,11 +34,10 @@ GEOJSON: dict[str, Any] = {
 }
 
 
-def test_a_table_says_items_in_words() -> None:
-    rows = [line.split("  ") for line in table.lines(FLIGHT)]
-    words = {row[-1].strip() for row in rows}
-    assert {"10 s", "to item 2, 3 times", "1 photos", "within 2 m, heading 90°"} <= words
-    assert any("60 m AMSL" in line and "48.8789000, 2.3679000" in line for line in table.lines(FLIGHT))
+def test_table_rows_say_items_in_words() -> None:
+    rows = list(table.rows_of(FLIGHT))
+    assert {"10 s", "to item 2, 3 times", "1 photos", "within 2 m, heading 90°"} <= {row.words for row in rows}
+    assert any(row.height == "60 m AMSL" and row.place == "48.8789000, 2.3679000" for row in rows)
     said = table.summary(FLIGHT)
     assert said.startswith("12 items, home 48.8789000, 2.3677000 at 35 m AMSL, 37 m from the first place to the last")
     # The last waypoint is at 60 m above the sea, and home at 35.
@@ -58,10 +57,10 @@ def test_the_way_of_a_plan() -> None:
 
 def test_items_without_words_of_their_own() -> None:
     odd = Plan((Item(4999, 2, (1.5, None, 0.0, 0.0, 7.0, 0.0, 0.0), False), waypoint(0, 0, 5.0, frame=10)))
-    lines = list(table.lines(odd))
-    assert "4999" in lines[1]
-    assert lines[1].endswith("param1 1.5, param5 7, waits to be continued")
-    assert "5 m above ground" in lines[2]
+    first, second = table.rows_of(odd)
+    assert first.command == "4999"
+    assert first.words == "param1 1.5, param5 7, waits to be continued"
+    assert second.height == "5 m above ground"
 
 
 @pytest.mark.parametrize("suffix", plot.SUFFIXES)

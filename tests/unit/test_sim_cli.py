@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import io
 import json
 import signal
 import socket
@@ -16,6 +17,7 @@ import pytest
 from support.world import loopback
 
 from anafi_mav.arsdk import handshake
+from anafi_mav.cli import main
 from anafi_mav.errors import ConfigError
 from anafi_mav.sim import DroneSpec, Simulator
 
@@ -55,11 +57,20 @@ async def running(
         await process.communicate()
 
 
-async def refused(*words: str, stdin: bytes | None = None) -> str:
-    """The one line with which it ends at once."""
-    process = await sim(*words, stdin=asyncio.subprocess.DEVNULL if stdin is None else asyncio.subprocess.PIPE)
+def refused_here(capsys: pytest.CaptureFixture[str], *words: str) -> str:
+    """The one line with which it refuses its arguments, in this process: nothing has been started by then."""
+    status = main(["sim", *words])
+    out, err = capsys.readouterr()
+    assert (status, out) == (2, "")
+    (line,) = err.splitlines()
+    return line
+
+
+async def refused(*words: str) -> str:
+    """The one line with which it ends at once, as a process."""
+    process = await sim(*words)
     try:
-        out, err = await asyncio.wait_for(process.communicate(stdin), LIMIT)
+        out, err = await asyncio.wait_for(process.communicate(), LIMIT)
     finally:
         if process.returncode is None:
             process.kill()
@@ -185,8 +196,8 @@ async def test_its_log_is_lines_of_json(tmp_path: Path) -> None:
         (["--fleet", "/nowhere/fleet.json"], "--fleet: expected a JSON object with drones in /nowhere/fleet.json: "),
     ],
 )
-async def test_a_mistake_is_one_line(words: list[str], complaint: str) -> None:
-    assert (await refused(*words)).startswith(f"anafi-mav: {complaint}")
+def test_a_mistake_is_one_line(words: list[str], complaint: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert refused_here(capsys, *words).startswith(f"anafi-mav: {complaint}")
 
 
 @pytest.mark.parametrize(
@@ -208,8 +219,11 @@ async def test_a_mistake_is_one_line(words: list[str], complaint: str) -> None:
         ),
     ],
 )
-async def test_a_wrong_fleet_is_one_line(fleet: bytes, complaint: str) -> None:
-    assert (await refused("--fleet", "-", stdin=fleet)).startswith(f"anafi-mav: {complaint}")
+def test_a_wrong_fleet_is_one_line(
+    fleet: bytes, complaint: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(fleet)))
+    assert refused_here(capsys, "--fleet", "-").startswith(f"anafi-mav: {complaint}")
 
 
 async def test_a_port_in_use_is_one_line() -> None:
