@@ -27,7 +27,7 @@ from anafi_mav.drone.contention import Contention
 from anafi_mav.drone.rest import HTTP_PORT
 from anafi_mav.errors import AnafiMavError, ConfigError, HandshakeRefused
 from anafi_mav.mavlink.channel import Channel
-from anafi_mav.mavlink.node import Inbound, Node
+from anafi_mav.mavlink.node import Node
 from anafi_mav.services.flavours import FLAVOURS
 from anafi_mav.services.flying import ON_GROUND
 from anafi_mav.services.statustext import Severity
@@ -74,8 +74,6 @@ class _Supervised:
         self._contention = Contention()
         self._judged = drone.handshake_at
         """The handshake whose loss was judged last."""
-        self._asked: asyncio.Future[int] | None = None
-        """While another controller has the drone: done with the system id of a client that wants it back."""
         drone.subscribe(self._on_event)
 
     async def run(self) -> None:
@@ -139,25 +137,18 @@ class _Supervised:
         await drone.close()
         self._report(Severity.NOTICE, f"Reconnecting in {away:.0f} s, or on a command")
         self.problem = f"another controller has taken the drone, staying away for {away:.0f} s"
-        self._asked = asked = asyncio.get_running_loop().create_future()
-        self.system.listen(True)
+        asked: asyncio.Future[int] = asyncio.get_running_loop().create_future()
+        self.system.listen(lambda inbound: None if asked.done() else asked.set_result(inbound.sysid))
         try:
             await asyncio.wait({asked}, timeout=away)
         finally:
-            self._asked = None
-            self.system.listen(False)
+            self.system.listen(None)
         if asked.done():
             self._report(Severity.NOTICE, f"Reconnecting: command of system {asked.result()}")
 
     def _report(self, severity: Severity, text: str) -> None:
         logger.log(logging.WARNING, "%s: %s", self.config.name, text)
         self.system.announce(severity, text)
-
-    def receive(self, inbound: Inbound) -> None:
-        """Give the system a client's message; a command to it ends the time that another controller is left alone."""
-        if self._asked is not None and not self._asked.done() and self.system.commands(inbound):
-            self._asked.set_result(inbound.sysid)
-        self.system.receive(inbound)
 
     def _on_event(self, message: events.Message, now: float) -> None:
         if type(message) is events.FlyingStateChanged and message.state in ON_GROUND:
@@ -194,9 +185,7 @@ class Gateway:
                 raise ConfigError(f"drones[{index}].address", "the gateway connects to addresses; expected one")
         self.config = config
         self._clock: Clock = clock or SystemClock()
-        self._node = Node(
-            on_message=self._receive, on_channel=self._on_channel, clock=self._clock, flavours=tuple(FLAVOURS)
-        )
+        self._node = Node(on_channel=self._on_channel, clock=self._clock, flavours=tuple(FLAVOURS))
         self._supervised: list[_Supervised] = []
         self._state: Path | None = None
         self._lock: StateLock | None = None
@@ -296,7 +285,7 @@ class Gateway:
 
         Clients are not heard any more, or one of them would fly on what has just been stopped.
         """
-        self._node.on_message = None
+        self._node.stop_delivering()
         await asyncio.gather(*(self._leave(s) for s in self._supervised))
         self._supervised.clear()
         await self._node.close()
@@ -352,12 +341,3 @@ class Gateway:
         if not opened:
             for supervised in self._supervised:
                 supervised.system.channel_closed(channel)
-
-    def _receive(self, inbound: Inbound) -> None:
-        for supervised in self._supervised:
-            try:
-                supervised.receive(inbound)
-            except AnafiMavError as error:  # this drone's link may just have died; the others hear it all the same
-                logger.debug("%s: %s not handled: %s", supervised.config.name, inbound.message.get_type(), error)
-            except Exception:
-                logger.exception("%s: %s not handled", supervised.config.name, inbound.message.get_type())

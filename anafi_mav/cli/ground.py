@@ -15,6 +15,7 @@ from anafi_mav.errors import CommandRejected, ConfigError, LinkLost
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound, Node
 from anafi_mav.mavlink.plan_client import Download, Message, Upload
+from anafi_mav.mavlink.router import EVERY_COMPONENT
 from anafi_mav.services.flavours import FLAVOURS
 
 SYSID, COMPID = 252, dialect.MAV_COMP_ID_MISSIONPLANNER
@@ -51,7 +52,7 @@ class Ground:
         self._beats: dict[int, Inbound] = {}
         self._news = asyncio.Event()
         self._clock = SystemClock()
-        self._node = Node(on_message=self._receive, clock=self._clock, flavours=tuple(FLAVOURS))
+        self._node = Node(clock=self._clock, flavours=tuple(FLAVOURS))
         self._beating: asyncio.Task[None] | None = None
         self._transfer: Upload | Download | None = None
         self._acks: list[Any] = []
@@ -61,7 +62,7 @@ class Ground:
             await self._node.start([self.url])
         except ConfigError as error:
             raise ConfigError("--endpoint", error.problem) from error
-        self._node.own(SYSID)
+        self._node.add_host(SYSID, EVERY_COMPONENT, self._receive)
         self._beating = asyncio.create_task(self._beat())
         return self
 
@@ -94,8 +95,6 @@ class Ground:
             self._beats[inbound.sysid] = inbound
             if (inbound.sysid, inbound.compid) == self.target:
                 self.heartbeat = message
-        if getattr(message, "target_system", SYSID) not in (0, SYSID):
-            return
         if (inbound.sysid, inbound.compid) == self.target:
             if isinstance(message, dialect.MAVLink_command_ack_message):
                 self._acks.append(message)

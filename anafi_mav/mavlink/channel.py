@@ -12,13 +12,9 @@ from collections.abc import Callable, Iterable
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.frames import Packed, Parser, Received, frame, pack
-from anafi_mav.mavlink.streams import TELEMETRY
 
 QUEUE_BYTES = 64 * 1024
 """What waits for a slow peer: some seconds of a small fleet. A serial line, being slow by nature, gets less."""
-
-GIVE_WAY = TELEMETRY | {dialect.MAVLINK_MSG_ID_HEARTBEAT}
-"""Message ids that give way to answers when a queue is full."""
 
 FRAME_BYTES = 12
 """A version 2 frame has so much more than its payload (MAVLink serialization.md §mavlink2_packet_format)."""
@@ -28,7 +24,10 @@ _Waiting = tuple[Packed, int, int] | bytes
 
 
 class Channel:
-    """One remote peer. Sending never blocks and never raises for the peer's sake."""
+    """One remote peer. Sending never blocks and never raises for the peer's sake.
+
+    When the queue is full, frames sent with `give_way` are dropped first: the next one of their kind replaces them.
+    """
 
     def __init__(
         self,
@@ -80,30 +79,30 @@ class Channel:
         """The share of the outgoing queue that is free, 0..1."""
         return max(0.0, 1.0 - self._waiting_bytes / self._queue_bytes)
 
-    def send(self, message: dialect.MAVLink_message, sysid: int, compid: int) -> None:
+    def send(self, message: dialect.MAVLink_message, sysid: int, compid: int, *, give_way: bool = False) -> None:
         """Send as this system and component. Raises `LocalProtocolError` for a field that does not fit."""
-        self.send_packed(pack(message), sysid, compid)
+        self.send_packed(pack(message), sysid, compid, give_way=give_way)
 
-    def send_packed(self, packed: Packed, sysid: int, compid: int) -> None:
+    def send_packed(self, packed: Packed, sysid: int, compid: int, *, give_way: bool = False) -> None:
         """Send a message that was packed already, for several channels at once."""
         if self.is_open and not self._paused:
             self._leave(packed, sysid, compid)
         else:
-            self._wait((packed, sysid, compid), packed.id)
+            self._wait((packed, sysid, compid), give_way)
 
-    def forward(self, raw: bytes, id: int) -> None:
-        """Send another system's version 2 frame as it is; `id` is its message id."""
+    def forward(self, raw: bytes, *, give_way: bool = False) -> None:
+        """Send another system's version 2 frame as it is."""
         if self.is_open and not self._paused:
             self._give(raw)
         else:
-            self._wait(raw, id)
+            self._wait(raw, give_way)
 
     def pause(self) -> None:
-        """The peer takes no more for now: frames wait from here on, the oldest telemetry is dropped first."""
+        """The peer takes no more for now: frames wait from here on, the oldest that gives way is dropped first."""
         self._paused = True
 
     def resume(self) -> None:
-        """The peer takes frames again. Answers leave before telemetry."""
+        """The peer takes frames again. What gives way leaves last."""
         self._paused = False
         for queue in (self._answers, self._telemetry):
             while queue and not self._paused:  # a write may fill the socket again
@@ -134,11 +133,11 @@ class Channel:
         self.sent_bytes += len(raw)
         self._write(raw)
 
-    def _wait(self, waiting: _Waiting, id: int) -> None:
+    def _wait(self, waiting: _Waiting, give_way: bool) -> None:
         if not self.is_open:
             self._drop(waiting)
             return
-        (self._telemetry if id in GIVE_WAY else self._answers).append(waiting)
+        (self._telemetry if give_way else self._answers).append(waiting)
         self._waiting_bytes += _size(waiting)
         while self._waiting_bytes > self._queue_bytes:
             oldest = (self._telemetry or self._answers).popleft()

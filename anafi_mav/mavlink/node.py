@@ -1,8 +1,8 @@
-"""The node: all endpoints of the gateway, the router between them and the way to our own services.
+"""The node: all endpoints of the gateway, the router between them and the way to our own hosts.
 
-node = Node(on_message=services.receive)
+node = Node()
 await node.start(["udpout://127.0.0.1:14550", "tcpin://127.0.0.1:5760"])
-node.own(1)
+node.add_host(1, 1, autopilot.receive)
 node.send(heartbeat, sysid=1, compid=1)
 """
 
@@ -28,14 +28,14 @@ from anafi_mav.mavlink.stall import StallWatch
 
 logger = logging.getLogger(__name__)
 message_logger = logging.getLogger("anafi_mav.message")
-"""Every message that reaches our services, decoded."""
+"""Every message that reaches one of our hosts, decoded."""
 
 
 class Inbound(msgspec.Struct, frozen=True):
-    """A message for our services: addressed to one of our systems, or to everybody."""
+    """A message for one of our hosts: addressed to its component, its system, or to all."""
 
     message: Any
-    """A message of the dialect. Whether it is for a certain system or component is for the reader to look up."""
+    """A message of the dialect."""
     channel: Channel
     """Where it came from, and where an answer goes."""
     sysid: int
@@ -46,19 +46,21 @@ class Inbound(msgspec.Struct, frozen=True):
     """When it arrived, by the clock's monotonic time."""
 
 
+Host = Callable[[Inbound], None]
+"""Takes the messages for one of our components."""
+
+
 class Node:
     """Our place in the MAVLink network. `start` once, `close` once (twice does no harm)."""
 
     def __init__(
         self,
         *,
-        on_message: Callable[[Inbound], None] | None = None,
         on_channel: Callable[[Channel, bool], None] | None = None,
         clock: Clock | None = None,
         flavours: Sequence[str] = (),
     ) -> None:
         """`flavours` are those that the URL of an endpoint may name."""
-        self.on_message = on_message
         self.on_channel = on_channel
         """Called with True when a channel opened and with False when it closed."""
         self.channels: list[Channel] = []
@@ -66,8 +68,10 @@ class Node:
         self.endpoints: list[Endpoint] = []
         """In the order of the URLs."""
         self._clock = clock or SystemClock()
+        self._telemetry: set[int] = set()
+        self._router: Router[Channel, Host] = Router()
+        self._delivers = True
         self._flavours = flavours
-        self._router: Router[Channel] = Router()
         self._closed_counters: Counter[str] = Counter()
         self._stalls: StallWatch | None = None
 
@@ -101,13 +105,24 @@ class Node:
         while self.endpoints:
             await self.endpoints.pop().close()
 
-    def own(self, sysid: int) -> None:
-        """Messages to this system are for our services."""
-        self._router.own(sysid)
+    def add_host(self, sysid: int, compid: int, host: Host) -> None:
+        """Deliver messages for this component of this system to `host`.
 
-    def disown(self, sysid: int) -> None:
-        """Messages to this system are not for us any more."""
-        self._router.disown(sysid)
+        Component 0 stands for all components of the system that have no host of their own.
+        """
+        self._router.add_host(sysid, compid, host)
+
+    def remove_hosts(self, sysid: int) -> None:
+        """Deliver no more messages for this system, and route them to others of its name."""
+        self._router.remove_hosts(sysid)
+
+    def add_telemetry(self, ids: Iterable[int]) -> None:
+        """Let messages with these ids give way when they are forwarded for other systems."""
+        self._telemetry.update(ids)
+
+    def stop_delivering(self) -> None:
+        """Drop what arrives for our hosts from now on. Sending and forwarding continue."""
+        self._delivers = False
 
     def send(
         self,
@@ -116,18 +131,20 @@ class Node:
         sysid: int,
         compid: int,
         to: Channel | Iterable[Channel] | None = None,
+        give_way: bool = False,
     ) -> None:
         """Send as this system and component to one channel, to some, or to all. A closed one only counts it.
 
-        Raises `LocalProtocolError` for a field that does not fit; nothing is then sent to anybody.
+        `give_way`: a full channel drops this before an answer, because the next one of its kind replaces it. Raises
+        `LocalProtocolError` for a field that does not fit; nothing is then sent to anybody.
         """
         self._router.spoke(sysid, compid)
         packed = pack(message)
         if isinstance(to, Channel):
-            to.send_packed(packed, sysid, compid)
+            to.send_packed(packed, sysid, compid, give_way=give_way)
             return
         for channel in self.channels if to is None else to:
-            channel.send_packed(packed, sysid, compid)
+            channel.send_packed(packed, sysid, compid, give_way=give_way)
 
     def counters(self) -> Counter[str]:
         """Everything counted since the start: by channels, endpoints and the router."""
@@ -160,15 +177,16 @@ class Node:
             if route.forward:
                 raw = received.version_2()
                 for other in route.forward:
-                    other.forward(raw, received.id)
-            if not route.ours or self.on_message is None:
+                    other.forward(raw, give_way=received.id in self._telemetry)
+            if not route.hosts or not self._delivers:
                 continue
             if old:
                 self._closed_counters["stale"] += 1
-            else:
-                message_logger.debug("%s: %s", channel.name, received.message)
-                inbound = Inbound(received.message, channel, received.sysid, received.compid, now)
-                self._guarded(self.on_message, inbound)
+                continue
+            message_logger.debug("%s: %s", channel.name, received.message)
+            inbound = Inbound(received.message, channel, received.sysid, received.compid, now)
+            for host in route.hosts:
+                self._guarded(host, inbound)
 
     def _stalled(self, seconds: float) -> None:
         logger.warning("the host stalled for %.1f s: what clients sent meanwhile is dropped", seconds)

@@ -1,6 +1,7 @@
-"""Who gets a message: we ourselves, other channels, or nobody (MAVLink routing.md §rules). No I/O.
+"""Routes messages to our own hosts and to other channels (MAVLink routing.md §rules). No I/O.
 
-Our vehicles are on every channel; whatever else speaks MAVLink is learned from what it sends. Rules beyond
+A host is a component of ours, looked up by system and component. Our hosts are on every channel; other systems are
+learned from what they send. Rules beyond
 routing.md: a frame that comes back to us is not passed on again, for endpoints are easily wired into a ring, and
 SETUP_SIGNING, which carries a key, never is.
 """
@@ -17,6 +18,10 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.frames import MAX_SOURCES, Received
 
 KeyT = TypeVar("KeyT", bound=Hashable)
+HostT = TypeVar("HostT")
+
+EVERY_COMPONENT = 0
+"""As a target all components of a system (MAV_COMP_ID_ALL); in `add_host` those that have no host of their own."""
 
 RING_WINDOW = 0.5
 """s in which the same frame is not passed on twice. A sender's sequence number makes all its frames differ, and half
@@ -26,23 +31,24 @@ RING_FRAMES = 512
 """Frames remembered for that: what some busy systems send in half a second. With more traffic the window is shorter."""
 
 
-class Route(msgspec.Struct, Generic[KeyT], frozen=True):
+class Route(msgspec.Struct, Generic[KeyT, HostT], frozen=True):
     """Where a message goes."""
 
-    ours: bool
-    """Our own services get it."""
+    hosts: tuple[HostT, ...]
+    """Our hosts that it is for, in the order of their system and component."""
     forward: tuple[KeyT, ...]
     """The channels that it is passed on to."""
 
 
-class Router(Generic[KeyT]):
-    """Routes between channels, each known by a key. Several channels may lead to one system."""
+class Router(Generic[KeyT, HostT]):
+    """Routes between channels, each known by a key, and our hosts. Several channels may lead to one system."""
 
     def __init__(self) -> None:
         self.counters: Counter[str] = Counter()
         """forwarded (per channel), own_sources (a frame in one of our names came in), rings, sources_ignored."""
         self._channels: dict[KeyT, set[tuple[int, int]]] = {}
-        self._own: set[int] = set()
+        self._hosts: dict[int, dict[int, HostT]] = {}
+        """Our hosts by system and component, in that order."""
         self._spoken: set[tuple[int, int]] = set()
         self._recent: OrderedDict[bytes, float] = OrderedDict()
 
@@ -54,13 +60,22 @@ class Router(Generic[KeyT]):
         """This channel is gone, and with it whoever was behind it."""
         self._channels.pop(channel, None)
 
-    def own(self, sysid: int) -> None:
-        """This system is one of ours: what is addressed to it is for our services."""
-        self._own.add(sysid)
+    def add_host(self, sysid: int, compid: int, host: HostT) -> None:
+        """Route what is for this component to `host`; what is for this system no longer goes to other systems."""
+        self._hosts.setdefault(sysid, {})[compid] = host
+        self._hosts = {system: dict(sorted(self._hosts[system].items())) for system in sorted(self._hosts)}
 
-    def disown(self, sysid: int) -> None:
-        """This system is not ours at present, e.g. because its drone is away."""
-        self._own.discard(sysid)
+    def remove_hosts(self, sysid: int) -> None:
+        """This system is not ours at present, e.g. because its drone is disconnected."""
+        self._hosts.pop(sysid, None)
+
+    def hosts(self, system: int, component: int) -> tuple[HostT, ...]:
+        """Return our hosts that a target means: system 0 means all systems, component 0 all components."""
+        systems = self._hosts if system == 0 else {system: self._hosts.get(system, {})}
+        if component == EVERY_COMPONENT:
+            return tuple([host for hosts in systems.values() for host in hosts.values()])
+        found = [hosts.get(component, hosts.get(EVERY_COMPONENT)) for hosts in systems.values()]
+        return tuple([host for host in found if host is not None])
 
     def spoke(self, sysid: int, compid: int) -> None:
         """We send in this name: frames in it that come in are echoes, and not learned from."""
@@ -73,17 +88,17 @@ class Router(Generic[KeyT]):
             return [channel for channel, sources in channels if (sysid, compid) in sources]
         return [channel for channel, sources in channels if any(source[0] == sysid for source in sources)]
 
-    def route(self, channel: KeyT, received: Received, now: float) -> Route[KeyT]:
+    def route(self, channel: KeyT, received: Received, now: float) -> Route[KeyT, HostT]:
         """Where a frame from this channel goes; its source is learned."""
         source = (received.sysid, received.compid)
         if source in self._spoken:
             self.counters["own_sources"] += 1
-            return Route(False, ())
+            return Route((), ())
         # 0 is the address of all, nobody's name.
         if received.message is not None and received.sysid != 0:
             self._learn(channel, source)
         target, component = targets(received.message)
-        ours = received.message is not None and (target == 0 or target in self._own)
+        hosts = () if received.message is None else self.hosts(target, component)
         destinations = self._destinations(target, component, received.id)
         forward = tuple([other for other in destinations if other != channel])
         if forward:
@@ -91,14 +106,14 @@ class Router(Generic[KeyT]):
                 self.counters["rings"] += 1
                 forward = ()
             self.counters["forwarded"] += len(forward)
-        return Route(ours, forward)
+        return Route(hosts, forward)
 
     def _destinations(self, target: int, component: int, id: int) -> list[KeyT]:
         if id == dialect.MAVLINK_MSG_ID_SETUP_SIGNING:
             return []
         if target == 0:
             return list(self._channels)
-        if target in self._own:
+        if target in self._hosts:
             # A companion computer may share the system of one of our drones.
             return self.heard_on(target, component) if component else []
         return self.heard_on(target)

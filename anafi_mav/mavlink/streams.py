@@ -10,60 +10,8 @@ from typing import Generic, TypeVar
 from weakref import WeakKeyDictionary
 
 from anafi_mav.errors import LocalProtocolError
-from anafi_mav.mavlink import dialect as mav
 
 ChannelT = TypeVar("ChannelT")
-
-DEFAULT_INTERVALS: Mapping[int, float] = {
-    mav.MAVLINK_MSG_ID_ATTITUDE: 0.1,
-    mav.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: 0.1,
-    mav.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 0.2,
-    mav.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 0.2,
-    mav.MAVLINK_MSG_ID_ALTITUDE: 0.2,
-    mav.MAVLINK_MSG_ID_VFR_HUD: 0.2,
-    mav.MAVLINK_MSG_ID_GPS_RAW_INT: 0.5,
-    mav.MAVLINK_MSG_ID_SYS_STATUS: 1.0,
-    mav.MAVLINK_MSG_ID_BATTERY_STATUS: 1.0,
-    mav.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 0.5,
-    mav.MAVLINK_MSG_ID_HOME_POSITION: 2.0,
-    mav.MAVLINK_MSG_ID_MISSION_CURRENT: 1.0,
-    mav.MAVLINK_MSG_ID_FENCE_STATUS: 1.0,
-    mav.MAVLINK_MSG_ID_RC_CHANNELS: 1.0,
-    mav.MAVLINK_MSG_ID_RADIO_STATUS: 1.0,
-    mav.MAVLINK_MSG_ID_DISTANCE_SENSOR: 0.2,
-    mav.MAVLINK_MSG_ID_SYSTEM_TIME: 1.0,
-    mav.MAVLINK_MSG_ID_EKF_STATUS_REPORT: 1.0,
-    # These two leave at each change, and stations of before 2024 count each of them as lost: their dialect lacks them.
-    mav.MAVLINK_MSG_ID_CURRENT_MODE: 5.0,
-    mav.MAVLINK_MSG_ID_AVAILABLE_MODES_MONITOR: 10.0,
-    mav.MAVLINK_MSG_ID_ORBIT_EXECUTION_STATUS: 0.8,
-    mav.MAVLINK_MSG_ID_CURRENT_EVENT_SEQUENCE: 1.0,
-    # Only while setpoints or moves are flown.
-    mav.MAVLINK_MSG_ID_ATTITUDE_TARGET: 0.5,
-    mav.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: 0.5,
-    mav.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT: 0.5,
-}
-"""Seconds by message id: what ground stations need to look alive, and a 57600 baud radio can carry."""
-
-ON_REQUEST = frozenset(
-    {
-        mav.MAVLINK_MSG_ID_ESTIMATOR_STATUS,
-        mav.MAVLINK_MSG_ID_FLIGHT_INFORMATION,
-        mav.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN,
-        mav.MAVLINK_MSG_ID_BATTERY_INFO,
-        mav.MAVLINK_MSG_ID_ONBOARD_COMPUTER_STATUS,
-        mav.MAVLINK_MSG_ID_HIGH_LATENCY2,
-        mav.MAVLINK_MSG_ID_RANGEFINDER,
-        mav.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT,
-        mav.MAVLINK_MSG_ID_ODOMETRY,
-        *(id for id in mav.mavlink_map if 61400 <= id <= 61499),
-    }
-)
-"""Messages that are streamed only to a client that asks for them. The last ones are our own dialect's."""
-
-TELEMETRY = frozenset(DEFAULT_INTERVALS) | ON_REQUEST
-"""Message ids that the next one of their kind makes worthless."""
-
 
 _NEVER = float("inf")
 
@@ -110,10 +58,10 @@ class Streams(Generic[ChannelT]):
 
     def __init__(
         self,
-        defaults: Mapping[int, float] = DEFAULT_INTERVALS,
+        defaults: Mapping[int, float],
         without: Callable[[ChannelT], Collection[int]] = lambda channel: (),
     ) -> None:
-        """`without` names the message ids that a channel does not have by default."""
+        """`defaults` are s by message id; `without` names the message ids that a channel does not have by default."""
         self._defaults = dict(defaults)
         self._without = without
         self._channels: WeakKeyDictionary[ChannelT, dict[int, _Stream]] = WeakKeyDictionary()

@@ -73,7 +73,7 @@ class CompassService(Service):
         await vehicle.take_over()
         self._succeeded = False
         await self.host.drone.calibration.start_magnetometer()
-        self._turning = self.host.act(command.client, self._turn())
+        self._turning = self.host.run_action(command.client, self._turn())
 
     async def _accept(self, command: Command) -> None:
         """The drone has stored the result; there is nothing left to do."""

@@ -5,10 +5,9 @@ Texts for people go by STATUSTEXT as ever; what is said here is not said there, 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 
 from anafi_mav.drone import events as parrot
-from anafi_mav.drone.events import Message
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services import event_table as table
@@ -22,6 +21,7 @@ from anafi_mav.services.metadata import to_json
 from anafi_mav.services.service import Host, MessageHandler, Query, Service
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.stream import Stream, Times
+from anafi_mav.services.subscriptions import Subscriptions
 from anafi_mav.services.vehicle import Landed, Vehicle
 
 RESET_FOR = 3.0
@@ -34,7 +34,7 @@ LOOK_EVERY = 1.0
 PAUSE = 0.3
 """s between two reports: what changes together is told together."""
 
-_NEWS = (
+_RELEVANT = (
     parrot.AlertStateChanged,
     parrot.BatteryAlertChanged,
     parrot.FlyingStateChanged,
@@ -68,7 +68,7 @@ class EventService(Service):
         return {dialect.MAV_CMD_RUN_PREARM_CHECKS: self._run_checks}
 
     def streams(self) -> Mapping[int, Stream]:
-        return {dialect.MAVLINK_MSG_ID_CURRENT_EVENT_SEQUENCE: Stream(self._current)}
+        return {dialect.MAVLINK_MSG_ID_CURRENT_EVENT_SEQUENCE: Stream(self._current, every=1.0)}
 
     def files(self) -> Mapping[str, ServedFile]:
         return {"/events.json": ServedFile(self._described, metadata=dialect.COMP_METADATA_TYPE_EVENTS)}
@@ -80,10 +80,10 @@ class EventService(Service):
         self._armed, self._landed = self.host.vehicle.armed, self.host.vehicle.landed
         self._report, self._stale, self._next_report = None, True, 0.0
 
-    def hears(self) -> Collection[type[Message]]:
-        return _NEWS
+    def subscriptions(self) -> Subscriptions:
+        return dict.fromkeys(_RELEVANT, self._on_relevant)
 
-    def on_event(self, message: Message, now: float) -> None:
+    def _on_relevant(self, message: object, now: float) -> None:
         self._stale = True
 
     def state_changed(self) -> None:

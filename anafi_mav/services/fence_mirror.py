@@ -147,4 +147,4 @@ class FenceMirror:
         else:
             settings[KEY] = entry
         if (problem := await self._host.memory.save()) is not None:
-            self._host.complain(problem)
+            self._host.warn_throttled(problem)

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from anafi_mav.drone import events
-from anafi_mav.drone.events import Message, PlayingState
+from anafi_mav.drone.events import PlayingState
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.commands import Action, Altitude, Command, Effect
@@ -23,6 +23,7 @@ from anafi_mav.services.refusal import Refused
 from anafi_mav.services.service import Host, Service
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.stream import Stream, Times
+from anafi_mav.services.subscriptions import Subscriptions
 from anafi_mav.services.vehicle import Vehicle
 
 LOOK_EVERY = 0.5
@@ -64,7 +65,7 @@ class FenceService(Service):
         }
 
     def streams(self) -> Mapping[int, Stream]:
-        return {dialect.MAVLINK_MSG_ID_FENCE_STATUS: Stream(self._status, on_change=True)}
+        return {dialect.MAVLINK_MSG_ID_FENCE_STATUS: Stream(self._status, every=1.0, on_change=True)}
 
     def link_up(self) -> None:
         self._located = -math.inf if self.host.vehicle.place is None else self.host.clock.monotonic()
@@ -74,14 +75,19 @@ class FenceService(Service):
         self._mirror.link_down()
         self._located = self._looked = self._mirrored = -math.inf
 
-    def hears(self) -> Collection[type[Message]]:
-        return (events.GpsLocationChanged, events.SpeedChanged, events.FlyingStateChanged)
+    def subscriptions(self) -> Subscriptions:
+        return {
+            events.GpsLocationChanged: self._on_location,
+            events.SpeedChanged: self._on_speed,
+            events.FlyingStateChanged: lambda message, now: self._look(self.host.clock.monotonic()),
+        }
 
-    def on_event(self, message: Message, now: float) -> None:
-        kind = type(message)
-        if kind is events.GpsLocationChanged:
-            self._located = self.host.clock.monotonic()
-        if kind is not events.SpeedChanged or now - self._looked >= LOOK_SOONEST:
+    def _on_location(self, message: events.GpsLocationChanged, now: float) -> None:
+        self._located = self.host.clock.monotonic()
+        self._look(self._located)
+
+    def _on_speed(self, message: events.SpeedChanged, now: float) -> None:
+        if now - self._looked >= LOOK_SOONEST:
             self._look(self.host.clock.monotonic())
 
     def tick(self, now: float) -> None:
@@ -145,7 +151,7 @@ class FenceService(Service):
             self._watch.done(self.host.vehicle.orders)
         else:
             self.host.text(Severity.CRITICAL, f"{head}: {verdict.text}: {action.value}")
-            self.host.act(FenceService, self._carry_out(action))  # in its turn: what is newer replaces it
+            self.host.run_action(FenceService, self._carry_out(action))  # in its turn: what is newer replaces it
 
     async def _carry_out(self, action: Reaction) -> None:
         vehicle = self.host.vehicle

@@ -13,7 +13,6 @@ from collections.abc import Callable, Hashable
 from anafi_mav import geo
 from anafi_mav.clock import Clock
 from anafi_mav.drone import PilotingCommand, events
-from anafi_mav.drone.events import Message
 from anafi_mav.errors import LinkLost
 from anafi_mav.services.aircraft import Aircraft
 from anafi_mav.services.bounds import LOWEST, amsl_to_ato, check_estimate, check_height, check_on_earth, check_place
@@ -35,6 +34,7 @@ from anafi_mav.services.place import Place
 from anafi_mav.services.refusal import Refused
 from anafi_mav.services.roll_sign import ROLL_INVERTED
 from anafi_mav.services.statustext import Severity
+from anafi_mav.services.subscriptions import Subscriptions
 
 
 class FollowFlight:
@@ -43,7 +43,7 @@ class FollowFlight:
     def __init__(self, vehicle: Aircraft, motion: Callable[[], Motion], clock: Clock) -> None:
         self.settings = FollowSettings()
         self.state = State.OFF
-        self.complain: Callable[[str], None] = lambda text: vehicle.text(Severity.WARNING, text)
+        self.warn_throttled: Callable[[str], None] = lambda text: vehicle.text(Severity.WARNING, text)
         self._vehicle = vehicle
         self._motion = motion
         self._clock = clock
@@ -96,7 +96,7 @@ class FollowFlight:
         if self.state is State.OFF or (self.state is State.FOLLOWING and sender != self._leader):
             return
         if reason := self._objection(seen):
-            self.complain(f"Target ignored: {reason}")
+            self.warn_throttled(f"Target ignored: {reason}")
             return
         reference = self._motion().reference
         if reference is None:
@@ -134,9 +134,12 @@ class FollowFlight:
         self._cancel_timer()
         self.state = State.OFF
 
-    def on_event(self, message: Message, now: float) -> None:
-        """How the drone moves: the loop closes on it."""
-        if self.state is State.FOLLOWING and type(message) is events.SpeedChanged:
+    def subscriptions(self) -> Subscriptions:
+        """Return the handlers of what reports how the drone moves: the loop closes on it."""
+        return {events.SpeedChanged: self._on_speed}
+
+    def _on_speed(self, message: events.SpeedChanged, now: float) -> None:
+        if self.state is State.FOLLOWING:
             self._fly(now)
 
     def _fly(self, now: float) -> None:
@@ -165,7 +168,7 @@ class FollowFlight:
                 check_place(vehicle, place)
                 sticks = self._controller.sticks(wanted, limits, now) or sticks
         except Refused as refusal:
-            self.complain(f"Target not followed: {refusal.reason.partition('efused: ')[2] or refusal.reason}")
+            self.warn_throttled(f"Target not followed: {refusal.reason.partition('efused: ')[2] or refusal.reason}")
         vehicle.drone.piloting.pilot(sticks)
 
     def _height(self) -> float:
@@ -189,7 +192,7 @@ class FollowFlight:
                 self._kept_height = state.altitude
             if self._kept_height is None:
                 raise Refused("Refused: the drone's height is not known")
-            self.complain(f"Follow height kept: target asks for {height:.0f} m")
+            self.warn_throttled(f"Follow height kept: target asks for {height:.0f} m")
             return self._kept_height
         self._kept_height = None
         if settings.altitude_mode is AltitudeMode.TARGET:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from anafi_mav.drone.events import Message
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.follow import sighting
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
+from anafi_mav.services.subscriptions import Subscriptions
 
 
 class FollowService(Service):
@@ -17,17 +17,17 @@ class FollowService(Service):
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self._flight = host.vehicle.follow
-        self._flight.complain = host.complain
+        self._flight.warn_throttled = host.warn_throttled
 
     def messages(self) -> Mapping[int, MessageHandler]:
         return {dialect.MAVLINK_MSG_ID_FOLLOW_TARGET: self._target}
 
-    def on_event(self, message: Message, now: float) -> None:
-        self._flight.on_event(message, now)
+    def subscriptions(self) -> Subscriptions:
+        return self._flight.subscriptions()
 
     def _target(self, inbound: Inbound) -> None:
         seen = sighting(inbound.message)
         if not isinstance(seen, str):
             self._flight.receive(client_of(inbound), seen)
         elif self._flight.engaged:
-            self.host.complain(f"Target ignored: {seen}")
+            self.host.warn_throttled(f"Target ignored: {seen}")

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from anafi_mav import units
-from anafi_mav.drone.events import FlyingStateChanged, Message, PoiMode, RthHomeType
+from anafi_mav.drone.events import FlyingStateChanged, PoiMode, RthHomeType
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
@@ -25,6 +25,7 @@ from anafi_mav.services.place import Place
 from anafi_mav.services.refusal import Refused
 from anafi_mav.services.service import Host, Service, client_of
 from anafi_mav.services.statustext import Severity
+from anafi_mav.services.subscriptions import Subscriptions
 from anafi_mav.services.targets import UnsupportedFrame, height, height_in_frame, place
 from anafi_mav.services.turns import DEG_PER_TURN, heading_of
 from anafi_mav.services.vehicle import Vehicle
@@ -58,7 +59,7 @@ def fly_item(host: Host, inbound: Inbound) -> None:
 
     dronekit's simple_goto, MAVProxy's and Mission Planner's change of altitude (conformance D1-D3, item 141).
     """
-    host.act(client_of(inbound), _fly_item(host, inbound))
+    host.run_action(client_of(inbound), _fly_item(host, inbound))
 
 
 async def _fly_item(host: Host, inbound: Inbound) -> None:
@@ -152,10 +153,10 @@ class GuidedService(Service):
     def link_down(self) -> None:
         self._paused = self._mission_paused = None
 
-    def hears(self) -> Collection[type[Message]]:
-        return (FlyingStateChanged,)
+    def subscriptions(self) -> Subscriptions:
+        return {FlyingStateChanged: self._on_flying_state}
 
-    def on_event(self, message: Message, now: float) -> None:
+    def _on_flying_state(self, message: FlyingStateChanged, now: float) -> None:
         if not self.host.vehicle.in_air:
             self._paused = self._mission_paused = None  # the next flight's heights count from elsewhere
 

@@ -8,11 +8,10 @@ closes.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 
 from anafi_mav import units
 from anafi_mav.drone import events
-from anafi_mav.drone.events import Message
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
@@ -20,6 +19,7 @@ from anafi_mav.services.commands import Command
 from anafi_mav.services.flavours import Flavour
 from anafi_mav.services.service import Host, Query, Service
 from anafi_mav.services.stream import Stream, Times
+from anafi_mav.services.subscriptions import Subscriptions
 from anafi_mav.services.telemetry_flight import amsl, target
 from anafi_mav.services.telemetry_status import percent, sensor_bits
 from anafi_mav.services.vehicle import Vehicle
@@ -127,11 +127,11 @@ class HighLatencyService(Service):
     def streams(self) -> Mapping[int, Stream]:
         return {dialect.MAVLINK_MSG_ID_HIGH_LATENCY2: Stream(self._build, flavoured=True)}
 
-    def hears(self) -> Collection[type[Message]]:
-        return (events.SpeedChanged,)
+    def subscriptions(self) -> Subscriptions:
+        return {events.SpeedChanged: self._on_speed}
 
-    def on_event(self, message: Message, now: float) -> None:
-        if self._next and isinstance(message, events.SpeedChanged) and math.isfinite(message.speedZ):
+    def _on_speed(self, message: events.SpeedChanged, now: float) -> None:
+        if self._next and math.isfinite(message.speedZ):
             self._climb = max(self._climb, abs(message.speedZ))
 
     def tick(self, now: float) -> None:
@@ -154,7 +154,7 @@ class HighLatencyService(Service):
         wanted = command.params[0]
         if wanted not in (0.0, 1.0):
             return dialect.MAV_RESULT_DENIED
-        self.host.hush(inbound.channel, quiet=wanted == 1.0)
+        self.host.set_muted(inbound.channel, muted=wanted == 1.0)
         if wanted == 0.0:
             self._next.pop(inbound.channel, None)
         else:

@@ -25,8 +25,8 @@ class ManualControlService(Service):
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self._flight = host.vehicle.manual
-        self._flight.complain = host.complain
-        self._flight.act = host.act
+        self._flight.warn_throttled = host.warn_throttled
+        self._flight.run_action = host.run_action
         self._channels: dict[Hashable, tuple[Channels, float]] = {}
         """By client, and when they were last said."""
 
@@ -40,11 +40,9 @@ class ManualControlService(Service):
         self._channels.clear()
 
     def _manual_control(self, inbound: Inbound) -> None:
-        if inbound.message.target not in (0, self.host.sysid):  # it calls its target system otherwise than all others
-            return
         sticks = manual_sticks(inbound.message)
         if isinstance(sticks, str):
-            self.host.complain(f"MANUAL_CONTROL ignored: {sticks}")
+            self.host.warn_throttled(f"MANUAL_CONTROL ignored: {sticks}")
         elif sticks is not None:
             self._flight.receive(client_of(inbound), sticks, overrides=flavour_of(inbound.channel).joystick_overrides)
 
@@ -53,7 +51,7 @@ class ManualControlService(Service):
         before, at = self._channels.pop(client, (Channels(), -math.inf))
         channels = (before if now - at < SILENCE else Channels()).after(inbound.message)
         if isinstance(channels, str):
-            self.host.complain(f"RC_CHANNELS_OVERRIDE ignored: {channels}")
+            self.host.warn_throttled(f"RC_CHANNELS_OVERRIDE ignored: {channels}")
         elif channels.released:
             self._flight.silent(client)
         else:

@@ -155,12 +155,12 @@ class ManualFlight:
 
     def __init__(self, vehicle: Aircraft, clock: Clock, overridable: Callable[[], Override]) -> None:
         """`overridable` returns what flies the drone now, as far as a joystick may take over from it."""
-        self.act: Callable[[Hashable, Coroutine[Any, Any, None]], asyncio.Task[None]]
+        self.run_action: Callable[[Hashable, Coroutine[Any, Any, None]], asyncio.Task[None]]
         """Runs an action of a client, in its turn among the commands; set by the service."""
         self.override = JoystickOverride()
         self._overridable = overridable
         self._overriding = False
-        self.complain: Callable[[str], None] = lambda text: vehicle.text(Severity.WARNING, text)
+        self.warn_throttled: Callable[[str], None] = lambda text: vehicle.text(Severity.WARNING, text)
         self.state = State.IDLE
         self._vehicle = vehicle
         self._clock = clock
@@ -173,13 +173,13 @@ class ManualFlight:
         vehicle = self._vehicle
         if overrides and self._takes_over(sender, sticks):
             self._overriding = True
-            self.act(sender, self._override(sender, sticks)).add_done_callback(self._overridden)
+            self.run_action(sender, self._override(sender, sticks)).add_done_callback(self._overridden)
         if self._overriding:
             return
         sticks = replace(sticks, climb=self.override.climb(sender, sticks.climb))
         if self.state is State.HELD and sender != self._pilot:
             if not sticks.centred:
-                self.complain("Sticks ignored: somebody else's are in use")
+                self.warn_throttled("Sticks ignored: somebody else's are in use")
             return
         if sticks.centred:
             self._let_go(Event.CENTRED)
@@ -242,7 +242,7 @@ class ManualFlight:
         else:
             return True
         if reason is not None:
-            self.complain(f"Sticks ignored: {reason}")
+            self.warn_throttled(f"Sticks ignored: {reason}")
         return False
 
     def end(self) -> list[asyncio.Task[None]]:

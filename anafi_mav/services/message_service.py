@@ -8,7 +8,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 from anafi_mav.drone.events import Message
 from anafi_mav.mavlink import dialect
@@ -21,6 +21,7 @@ from anafi_mav.services.flavours import flavour_of
 from anafi_mav.services.news import News
 from anafi_mav.services.service import Answer, Host, MessageHandler, Query, Request, Service
 from anafi_mav.services.stream import Stream, Times
+from anafi_mav.services.subscriptions import Subscriptions
 
 logger = logging.getLogger(__name__)
 
@@ -50,7 +51,7 @@ class MessageService(Service):
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
-        self._intervals: Streams[Channel] = Streams(without=lambda channel: flavour_of(channel).unstreamed)
+        self._intervals: Streams[Channel] = Streams({})
         self._table: Mapping[int, Stream] = {}
         self._requests: Mapping[int, Request] = {}
         self._news = News()
@@ -67,9 +68,11 @@ class MessageService(Service):
     def take_tables(self, streams: Mapping[int, Stream], requests: Mapping[int, Request]) -> None:
         """What all services of the system send by themselves, and what they can be asked for."""
         self._table, self._requests = streams, requests
+        defaults = {id: stream.every for id, stream in streams.items() if stream.every is not None}
+        self._intervals = Streams(defaults, without=lambda channel: flavour_of(channel).unstreamed)
         for id, stream in streams.items():
             self._news.register(id, (id,))
-            for event in stream.news:
+            for event in stream.updates:
                 self._news.register(event, (id,))
                 self._events.add(event)
             if stream.on_change:
@@ -101,20 +104,20 @@ class MessageService(Service):
     def link_down(self) -> None:
         self._news.reset(self.host.clock.monotonic())
 
-    def hears(self) -> Collection[type[Message]]:
-        return self._events
+    def subscriptions(self) -> Subscriptions:
+        return dict.fromkeys(self._events, self._on_update)
 
-    def on_event(self, message: Message, now: float) -> None:
+    def _on_update(self, message: Message, now: float) -> None:
         if self._news.note(type(message), now):
             asyncio.get_running_loop().call_soon(self._tell_news)
 
-    def news(self, id: int, at: float) -> None:
-        """This message has something new; it leaves at the end of the loop's turn."""
+    def mark_updated(self, id: int, at: float) -> None:
+        """Send this message at the end of the event-loop iteration."""
         if self._news.note(id, at):
             asyncio.get_running_loop().call_soon(self._tell_news)
 
-    def wanted(self, id: int) -> bool:
-        """Does anybody have a stream of this message?"""
+    def is_streamed(self, id: int) -> bool:
+        """Return True when this message is streamed on some channel."""
         return any(self._intervals.interval(channel, id) is not None for channel in self.host.channels)
 
     def tick(self, now: float) -> None:

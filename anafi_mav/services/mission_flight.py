@@ -13,7 +13,7 @@ from collections.abc import Callable, Coroutine, Hashable, Sequence
 from typing import Any
 
 from anafi_mav.drone import events
-from anafi_mav.drone.events import FlyingState, Message, PlayingState
+from anafi_mav.drone.events import FlyingState, PlayingState
 from anafi_mav.errors import AnafiMavError, CommandRejected, LinkLost
 from anafi_mav.plans.plan import Item
 from anafi_mav.plans.translate import Leg
@@ -29,6 +29,7 @@ from anafi_mav.services.mission_words import beginning, refusal
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.refusal import Refused
 from anafi_mav.services.statustext import Severity
+from anafi_mav.services.subscriptions import Subscriptions
 
 _LANDING = (FlyingState.LANDING, FlyingState.EMERGENCY_LANDING)
 
@@ -385,21 +386,22 @@ class MissionFlight:
 
         task.add_done_callback(done)
 
-    # What the drone says.
+    # What the drone reports.
 
-    def on_event(self, message: Message) -> None:
-        """The drone told of its plan."""
-        match message:
-            case events.MavlinkFilePlayingStateChanged():
-                self._on_playing(message)
-            case events.MissionItemExecuted():
-                self._executed(message.idx)
-            case events.WaypointSkipped():
-                item = self.progress.skip(message.item)
-                if item is not None:
-                    self.say(Severity.WARNING, lambda first: f"Mission: item {item + first} was out of reach")
+    def subscriptions(self) -> Subscriptions:
+        """Return the handlers of what reports how far the drone's plan is."""
+        return {
+            events.MavlinkFilePlayingStateChanged: self._on_playing,
+            events.MissionItemExecuted: lambda message, now: self._executed(message.idx),
+            events.WaypointSkipped: self._on_skipped,
+        }
 
-    def _on_playing(self, message: events.MavlinkFilePlayingStateChanged) -> None:
+    def _on_skipped(self, message: events.WaypointSkipped, now: float) -> None:
+        item = self.progress.skip(message.item)
+        if item is not None:
+            self.say(Severity.WARNING, lambda first: f"Mission: item {item + first} was out of reach")
+
+    def _on_playing(self, message: events.MavlinkFilePlayingStateChanged, now: float) -> None:
         progress = self.progress
         if message.state == PlayingState.PLAYING:
             self._end_watch.end()

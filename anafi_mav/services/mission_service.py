@@ -7,10 +7,8 @@ The list itself is `plan_service`'s, how it is flown `mission_flight`'s. Conform
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 
-from anafi_mav.drone import events
-from anafi_mav.drone.events import Message
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
@@ -24,6 +22,7 @@ from anafi_mav.services.refusal import Refused
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.stream import Stream, Times
+from anafi_mav.services.subscriptions import Subscriptions
 from anafi_mav.services.vehicle import Vehicle
 
 NO_TOTAL = 0xFFFF
@@ -78,7 +77,7 @@ class MissionService(Service):
         }
 
     def streams(self) -> Mapping[int, Stream]:
-        return {dialect.MAVLINK_MSG_ID_MISSION_CURRENT: Stream(self._current, flavoured=True)}
+        return {dialect.MAVLINK_MSG_ID_MISSION_CURRENT: Stream(self._current, every=1.0, flavoured=True)}
 
     def link_up(self) -> None:
         memory = self.host.memory
@@ -92,11 +91,8 @@ class MissionService(Service):
     def link_down(self) -> None:
         self._flight.link_down()  # before anybody is told that something has ended: the drone may fly on
 
-    def hears(self) -> Collection[type[Message]]:
-        return (events.MavlinkFilePlayingStateChanged, events.MissionItemExecuted, events.WaypointSkipped)
-
-    def on_event(self, message: Message, now: float) -> None:
-        self._flight.on_event(message)
+    def subscriptions(self) -> Subscriptions:
+        return self._flight.subscriptions()
 
     def state_changed(self) -> None:
         self._flight.on_vehicle()
@@ -135,7 +131,7 @@ class MissionService(Service):
         """MISSION_SET_CURRENT: MISSION_CURRENT answers it, or a text."""
         client = client_of(inbound)
         self._sent = None
-        self.host.act(client, self._flight.choose(client, _ours(inbound.message.seq, client)))
+        self.host.run_action(client, self._flight.choose(client, _ours(inbound.message.seq, client)))
 
     # What is told.
 
@@ -198,7 +194,7 @@ class MissionService(Service):
 
     async def _save(self) -> None:
         if (problem := await self.host.memory.save()) is not None:
-            self.host.complain(problem)
+            self.host.warn_throttled(problem)
 
 
 def _first_number(client: Hashable) -> int:

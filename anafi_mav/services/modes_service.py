@@ -97,8 +97,9 @@ class ModesService(Service):
 
     def streams(self) -> Mapping[int, Stream]:
         return {
-            dialect.MAVLINK_MSG_ID_CURRENT_MODE: Stream(current_mode, flavoured=True),
-            dialect.MAVLINK_MSG_ID_AVAILABLE_MODES_MONITOR: Stream(self._monitor),
+            # Both leave at each change, and stations of before 2024, whose dialect lacks them, count them as lost.
+            dialect.MAVLINK_MSG_ID_CURRENT_MODE: Stream(current_mode, every=5.0, flavoured=True),
+            dialect.MAVLINK_MSG_ID_AVAILABLE_MODES_MONITOR: Stream(self._monitor, every=10.0),
         }
 
     def link_up(self) -> None:

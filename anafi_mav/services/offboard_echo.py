@@ -139,8 +139,9 @@ def attitude_target(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message |
     )
 
 
+# Each is sent only while setpoints or moves are flown.
 STREAMS: Mapping[int, Stream] = {
-    dialect.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: Stream(local_target),
-    dialect.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT: Stream(global_target),
-    dialect.MAVLINK_MSG_ID_ATTITUDE_TARGET: Stream(attitude_target),
+    dialect.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: Stream(local_target, every=0.5),
+    dialect.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT: Stream(global_target, every=0.5),
+    dialect.MAVLINK_MSG_ID_ATTITUDE_TARGET: Stream(attitude_target, every=0.5),
 }

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 from anafi_mav import units
 from anafi_mav.clock import Clock
 from anafi_mav.drone import Limits, PilotingCommand, events
-from anafi_mav.drone.events import FlyingState, Message
+from anafi_mav.drone.events import FlyingState
 from anafi_mav.errors import AnafiMavError, LinkLost
 from anafi_mav.services.aircraft import Aircraft
 from anafi_mav.services.bounds import TooLow
@@ -41,6 +41,7 @@ from anafi_mav.services.refusal import Refused
 from anafi_mav.services.roll_sign import ROLL_INVERTED
 from anafi_mav.services.setpoint_takeoff import Launcher, Phase, SetpointTakeoff, Step, climbs
 from anafi_mav.services.statustext import Severity
+from anafi_mav.services.subscriptions import Subscriptions
 
 WARN_AGAIN = 1.0
 """m/s by which a velocity has to be higher than the last one whose tilt was worth a word."""
@@ -52,15 +53,6 @@ SINGLE_WAIT = 2.0
 
 PAUSED = "paused by a client"
 """Why setpoints in Guided are ignored after a pause."""
-
-HEARD = (
-    events.AttitudeChanged,
-    events.SpeedChanged,
-    events.AltitudeChanged,
-    events.GpsLocationChanged,
-    events.FlyingStateChanged,
-)
-"""What tells how the drone moves, and that it hovers after a take-off."""
 
 _BEFORE_TAKEOFF = (FlyingState.LANDED, FlyingState.MOTOR_RAMPING)
 """States in which silence disarms a drone that setpoints take off."""
@@ -82,9 +74,9 @@ class OffboardFlight:
         """s that a velocity lasts in ArduPilot's Guided (a parameter)."""
         self.motion = Motion(vehicle.roll)
         """How the drone moves; whoever else flies it by sticks uses it too."""
-        self.complain: Callable[[str], None] = lambda text: vehicle.text(Severity.WARNING, text)
+        self.warn_throttled: Callable[[str], None] = lambda text: vehicle.text(Severity.WARNING, text)
         """Says what is wrong with something that arrives many times a second."""
-        self.act: Callable[[Hashable, Coroutine[Any, Any, None]], asyncio.Task[None]] = _at_once
+        self.run_action: Callable[[Hashable, Coroutine[Any, Any, None]], asyncio.Task[None]] = _at_once
         """Runs what takes the drone over, in its turn among the commands."""
         self.flown: PilotingCommand | None = None
         """The sticks that setpoints hold at present; None while they hold none."""
@@ -106,7 +98,7 @@ class OffboardFlight:
         """m/s of velocity up to which it has been said whether MaxTilt is enough."""
         self._goal: Goal | None = None
         self._course = _Course(False, None, None)
-        self._moves = OffboardMoves(vehicle, lambda text: self.complain(text))
+        self._moves = OffboardMoves(vehicle, lambda text: self.warn_throttled(text))
 
     @property
     def engaged(self) -> bool:
@@ -197,7 +189,7 @@ class OffboardFlight:
             vehicle.text(Severity.WARNING, f"Takeoff by setpoints of system {system_of(sender)} in 1 s")
         elif step is Step.TAKE_OFF:
             lift.begin(sender, Phase.LIFTING)
-            self.act(sender, self._take_off(sender))
+            self.run_action(sender, self._take_off(sender))
         return None
 
     @property
@@ -332,7 +324,7 @@ class OffboardFlight:
             return f"setpoints fly the drone in mode Guided, this is {mode.value}"
         self._alone = ends(setpoint) and not (follows or self._stream.straggles(sender, now))
         if self._engaging is None or self._engaging.done():
-            self._engaging = self.act(sender, self._engage_guided(sender, setpoint, now))
+            self._engaging = self.run_action(sender, self._engage_guided(sender, setpoint, now))
         return None
 
     async def _engage_guided(self, sender: Hashable, setpoint: Setpoint, said: float) -> None:
@@ -348,7 +340,7 @@ class OffboardFlight:
             if not self._vehicle.in_air or self._vehicle.returning:
                 raise Refused("Setpoint refused: the drone does something else now")
         except AnafiMavError as error:
-            self.complain(str(error))
+            self.warn_throttled(str(error))
             return
         now = self._clock.monotonic()
         self._afterwards = FlightMode.GUIDED
@@ -389,35 +381,43 @@ class OffboardFlight:
         self.motion = Motion(self._vehicle.roll)
         self._controller = Controller(self.motion)
 
-    # What the drone tells.
+    # What the drone reports.
 
-    def on_event(self, message: Message, now: float) -> None:
-        """How the drone moves: the loops close on it."""
-        piloting, motion = self._vehicle.drone.piloting.state, self.motion
-        kind = type(message)
-        if kind is events.FlyingStateChanged:
-            self.after_takeoff()
-        elif kind is events.AttitudeChanged:
-            if (attitude := piloting.attitude) is None:
-                motion.forget_attitude()
-            else:
-                motion.on_attitude(attitude.roll, attitude.pitch, attitude.yaw, now)
-            if isinstance(self._stream.setpoint, AttitudeSetpoint):
-                self._fly()
-        elif kind is events.SpeedChanged:
-            if (velocity := piloting.velocity) is None:
-                motion.forget_velocity()
-            else:
-                motion.on_velocity(velocity.north, velocity.east, velocity.down, now)
-            if isinstance(self._stream.setpoint, MotionSetpoint):
-                self._fly()
-        elif kind is events.AltitudeChanged:
-            if piloting.altitude is None:
-                motion.forget_height()
-            else:
-                motion.on_height(piloting.altitude, now)
-        elif kind is events.GpsLocationChanged and (place := self._vehicle.place) is not None:
-            motion.on_place(place.latitude, place.longitude)
+    def subscriptions(self) -> Subscriptions:
+        """Return the handlers of what reports how the drone moves, and that it hovers after a take-off."""
+        return {
+            events.FlyingStateChanged: lambda message, now: self.after_takeoff(),
+            events.AttitudeChanged: self._on_attitude,
+            events.SpeedChanged: self._on_speed,
+            events.AltitudeChanged: self._on_altitude,
+            events.GpsLocationChanged: self._on_location,
+        }
+
+    def _on_attitude(self, message: events.AttitudeChanged, now: float) -> None:
+        if (attitude := self._vehicle.drone.piloting.state.attitude) is None:
+            self.motion.forget_attitude()
+        else:
+            self.motion.on_attitude(attitude.roll, attitude.pitch, attitude.yaw, now)
+        if isinstance(self._stream.setpoint, AttitudeSetpoint):
+            self._fly()
+
+    def _on_speed(self, message: events.SpeedChanged, now: float) -> None:
+        if (velocity := self._vehicle.drone.piloting.state.velocity) is None:
+            self.motion.forget_velocity()
+        else:
+            self.motion.on_velocity(velocity.north, velocity.east, velocity.down, now)
+        if isinstance(self._stream.setpoint, MotionSetpoint):
+            self._fly()
+
+    def _on_altitude(self, message: events.AltitudeChanged, now: float) -> None:
+        if (altitude := self._vehicle.drone.piloting.state.altitude) is None:
+            self.motion.forget_height()
+        else:
+            self.motion.on_height(altitude, now)
+
+    def _on_location(self, message: events.GpsLocationChanged, now: float) -> None:
+        if (place := self._vehicle.place) is not None:
+            self.motion.on_place(place.latitude, place.longitude)
 
     # Flying.
 
@@ -463,7 +463,7 @@ class OffboardFlight:
             else:
                 self._hold(self._motion_sticks(setpoint, limits, now), now)
         except Refused as refusal:  # what the drone told when the setpoint arrived is not known any more
-            self.complain(f"Setpoint not flown: {refusal.reason}")
+            self.warn_throttled(f"Setpoint not flown: {refusal.reason}")
             self._hold(PilotingCommand(), now)
 
     def _attitude(self, setpoint: AttitudeSetpoint, limits: Limits, now: float) -> PilotingCommand:
@@ -485,9 +485,9 @@ class OffboardFlight:
             needed = tilt_for(speed) * units.DEG_PER_RAD
             allowed = tilt_limit(limits, self.motion) * units.DEG_PER_RAD
             if allowed < min(needed, limits.tilt_deg):
-                self.complain(TILT_HELD)
+                self.warn_throttled(TILT_HELD)
             elif needed > limits.tilt_deg:
-                self.complain(
+                self.warn_throttled(
                     f"MaxTilt of {limits.tilt_deg:.0f} degrees does not hold {speed:.1f} m/s against {WIND:g} m/s of "
                     f"wind, {math.ceil(needed)} would"
                 )
@@ -497,7 +497,7 @@ class OffboardFlight:
         if sticks is None:
             raise Refused("the drone does not tell how it moves")
         if self._controller.short_of is not None and self.motion.trusts_tilt:
-            self.complain(f"MaxTilt of {limits.tilt_deg:.0f} degrees is too little for this setpoint")
+            self.warn_throttled(f"MaxTilt of {limits.tilt_deg:.0f} degrees is too little for this setpoint")
         return sticks
 
     def _resolved(self, setpoint: MotionSetpoint) -> Goal | None:
@@ -537,7 +537,7 @@ class OffboardFlight:
             self._lift.stop()
             self._vehicle.select(self._afterwards if expired else self._vehicle.selected)
             self._vehicle.text(Severity.WARNING, "Setpoints stopped on the ground: disarming")
-            self.act(lifted, self._takeoff.abort())
+            self.run_action(lifted, self._takeoff.abort())
         elif expired:
             self._stopped(joined=phase is Phase.JOINED)
         self._watch()

@@ -34,9 +34,9 @@ _Wanted: TypeAlias = "tuple[Goal, float | None]"
 class OffboardMoves:
     """The moves of one session of setpoints."""
 
-    def __init__(self, vehicle: Aircraft, complain: Callable[[str], None]) -> None:
+    def __init__(self, vehicle: Aircraft, warn_throttled: Callable[[str], None]) -> None:
         self._vehicle = vehicle
-        self._complain = complain
+        self._warn_throttled = warn_throttled
         self._wanted: _Wanted | None = None
         """What is asked for and has not been begun."""
         self._begun: _Wanted | None = None
@@ -139,7 +139,7 @@ class OffboardMoves:
         if how is MoveEnd.ERROR:
             self._failed(wanted, "the drone gave the move up", again=True)
         elif how is MoveEnd.CANCELED and self._is_news_of(wanted):
-            self._complain("Setpoint not flown: somebody else ended the move")
+            self._warn_throttled("Setpoint not flown: somebody else ended the move")
 
     def _is_news_of(self, wanted: _Wanted) -> bool:
         """Of a move that was replaced or stopped there is nothing to say."""
@@ -151,7 +151,7 @@ class OffboardMoves:
             return
         if again:
             self._retry_at = asyncio.get_running_loop().time() + RETRY
-        self._complain(f"Setpoint not flown: {why}")
+        self._warn_throttled(f"Setpoint not flown: {why}")
         # One that was refused leaves an older one alone, which nobody asks for any more.
         if self._vehicle.drone.piloting.sticks_blocked is None:
             with contextlib.suppress(LinkLost):

@@ -5,19 +5,18 @@ What the messages mean is in `offboard_setpoints`, how they are flown in `offboa
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
-from anafi_mav.drone.events import Message
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services import offboard_setpoints
 from anafi_mav.services.flavours import flavour_of
 from anafi_mav.services.offboard_echo import STREAMS
-from anafi_mav.services.offboard_flight import HEARD
 from anafi_mav.services.offboard_setpoints import Setpoint
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
 from anafi_mav.services.stream import Stream
+from anafi_mav.services.subscriptions import Subscriptions
 
 
 class OffboardService(Service):
@@ -26,8 +25,8 @@ class OffboardService(Service):
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self._flight = host.vehicle.offboard
-        self._flight.complain = host.complain
-        self._flight.act = host.act
+        self._flight.warn_throttled = host.warn_throttled
+        self._flight.run_action = host.run_action
 
     def capabilities(self) -> int:
         return (
@@ -46,11 +45,8 @@ class OffboardService(Service):
     def streams(self) -> Mapping[int, Stream]:
         return STREAMS
 
-    def hears(self) -> Collection[type[Message]]:
-        return HEARD
-
-    def on_event(self, message: Message, now: float) -> None:
-        self._flight.on_event(message, now)
+    def subscriptions(self) -> Subscriptions:
+        return self._flight.subscriptions()
 
     def _takes(self, read: Callable[[Any], Setpoint | str]) -> MessageHandler:
         def take(inbound: Inbound) -> None:
@@ -61,6 +57,6 @@ class OffboardService(Service):
                 guided = flavour_of(inbound.channel).guided_setpoints
                 objection = self._flight.receive(client_of(inbound), setpoint, guided=guided)
             if objection is not None:
-                self.host.complain(f"Setpoint refused: {objection}")
+                self.host.warn_throttled(f"Setpoint refused: {objection}")
 
         return take

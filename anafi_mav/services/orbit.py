@@ -9,12 +9,11 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 
 from anafi_mav import geo, units
 from anafi_mav.drone import events
-from anafi_mav.drone.events import Message
 from anafi_mav.drone.moves import Move, MoveEnd
 from anafi_mav.errors import LinkLost
 from anafi_mav.mavlink import dialect
@@ -43,6 +42,7 @@ from anafi_mav.services.roll_sign import ROLL_INVERTED
 from anafi_mav.services.service import Host, Service
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.stream import Stream, Times
+from anafi_mav.services.subscriptions import Subscriptions
 from anafi_mav.services.targets import height, place
 from anafi_mav.services.vehicle import Vehicle
 
@@ -76,7 +76,7 @@ class OrbitService(Service):
         }
 
     def streams(self) -> Mapping[int, Stream]:
-        return {dialect.MAVLINK_MSG_ID_ORBIT_EXECUTION_STATUS: Stream(self._status)}
+        return {dialect.MAVLINK_MSG_ID_ORBIT_EXECUTION_STATUS: Stream(self._status, every=0.8)}
 
     # Helm.
 
@@ -217,12 +217,8 @@ class OrbitService(Service):
 
     # Flying.
 
-    def hears(self) -> Collection[type[Message]]:
-        return (events.SpeedChanged, events.AttitudeChanged)
-
-    def on_event(self, message: Message, now: float) -> None:
-        if self._controller is not None:
-            self._fly(now)
+    def subscriptions(self) -> Subscriptions:
+        return dict.fromkeys((events.SpeedChanged, events.AttitudeChanged), lambda message, now: self._fly(now))
 
     def _fly(self, now: float) -> None:
         vehicle, lap, controller = self.host.vehicle, self._lap, self._controller

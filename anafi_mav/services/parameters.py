@@ -11,7 +11,7 @@ import asyncio
 import math
 import struct
 from collections import deque
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from anafi_mav.drone.events import Message
@@ -40,6 +40,7 @@ from anafi_mav.services.parameter_table_follow import FOLLOW_NATIVE
 from anafi_mav.services.parameter_table_px4 import PX4_NAMES
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
 from anafi_mav.services.statustext import Severity
+from anafi_mav.services.subscriptions import Subscriptions
 from anafi_mav.services.trickle import Trickle
 
 MAX_WRITES = 8
@@ -196,10 +197,10 @@ class ParameterService(Service):
         self._trickle.closed(channel)
         self._refused_at.pop(channel, None)
 
-    def hears(self) -> Collection[type[Message]]:
-        return self._by_news.keys()
+    def subscriptions(self) -> Subscriptions:
+        return dict.fromkeys(self._by_news, self._on_value)
 
-    def on_event(self, message: Message, now: float) -> None:
+    def _on_value(self, message: Message, now: float) -> None:
         for name, indices in self._by_news.get(type(message), {}).items():
             self._tell(name, self._lists[name].changed(indices))
 
@@ -232,7 +233,7 @@ class ParameterService(Service):
         if now != settings.get(KEY, {one.name: one.default for one in KEPT}):
             settings[KEY] = now
             if (problem := await self.host.memory.save()) is not None:
-                self.host.complain(problem)
+                self.host.warn_throttled(problem)
 
     # Files.
 

@@ -88,7 +88,7 @@ class PlanService(Service):
         else:
             outcome = transfer.replace(items, self._peer(inbound), self.host.clock.monotonic())
         if isinstance(outcome, Fault):
-            self.host.complain(f"{transfer.kind.name.capitalize()} refused: {outcome.reason}")
+            self.host.warn_throttled(f"{transfer.kind.name.capitalize()} refused: {outcome.reason}")
             return False
         self._perform(outcome)
         return True
@@ -144,7 +144,7 @@ class PlanService(Service):
                     self._changed(effect.mission_type)
                 case Say():
                     if effect.severity <= Severity.WARNING:
-                        self.host.complain(effect.text)
+                        self.host.warn_throttled(effect.text)
                     else:
                         self.host.text(effect.severity, effect.text)
         self._set_timer()
@@ -165,7 +165,7 @@ class PlanService(Service):
             if fault is not None:
                 transfer = self._desk.transfers.get(commit.mission_type)
                 what = "Plans" if transfer is None else transfer.kind.name.capitalize()
-                self.host.complain(f"{what} refused: {fault.reason}")
+                self.host.warn_throttled(f"{what} refused: {fault.reason}")
             self._perform(self._desk.stored(commit, self.host.clock.monotonic(), fault))
 
     async def _put(self, commit: Commit) -> Fault | None:

@@ -96,7 +96,7 @@ class RallyService(Service):
         if state.preferred_type is None or state.types is None or RthHomeType.CUSTOM not in state.types:
             return False
         if state.preferred_type == RthHomeType.CUSTOM and self._before() is None:
-            self.host.complain("Rally points not used: the drone returns to the home that was set")
+            self.host.warn_throttled("Rally points not used: the drone returns to the home that was set")
             return False
         return True
 
@@ -149,7 +149,7 @@ class RallyService(Service):
             if home.state.preferred_type == RthHomeType.CUSTOM and not taken_over:
                 await home.set_preferred_type(before)
         except AnafiMavError as error:
-            self.host.complain(f"The drone's home type could not be put back: {error}")
+            self.host.warn_throttled(f"The drone's home type could not be put back: {error}")
             return
         await self._remember(None)
         if not (taken_over or self.host.vehicle.on_ground):
@@ -170,4 +170,4 @@ class RallyService(Service):
 
     async def _save(self) -> None:
         if (problem := await self.host.memory.save()) is not None:
-            self.host.complain(problem)
+            self.host.warn_throttled(problem)

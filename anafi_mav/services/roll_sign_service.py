@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from anafi_mav.drone import events
-from anafi_mav.drone.events import Message
+from anafi_mav.drone.piloting_state import Attitude, Velocity
 from anafi_mav.services.roll_sign import INVERTED, Sign
 from anafi_mav.services.service import Service
 from anafi_mav.services.statustext import Severity
+from anafi_mav.services.subscriptions import Subscriptions
 
 KEY = "roll_sign"
 """Name of the record in the drone's file."""
@@ -41,18 +42,34 @@ class RollSignService(Service):
         if check.inverted:
             self.host.text(Severity.WARNING, INVERTED)
 
-    def hears(self) -> Collection[type[Message]]:
-        return (events.AttitudeChanged, events.SpeedChanged, events.FlyingStateChanged)
+    def subscriptions(self) -> Subscriptions:
+        return {
+            events.AttitudeChanged: self._on_attitude,
+            events.SpeedChanged: self._on_speed,
+            events.FlyingStateChanged: self._on_flying_state,
+        }
 
-    def on_event(self, message: Message, now: float) -> None:
+    def _motion(self) -> tuple[Attitude, Velocity] | None:
+        """Return how the drone flies; None when that is unknown or it does not fly, and earlier motion is discarded."""
         vehicle, state = self.host.vehicle, self.host.drone.piloting.state
-        attitude, velocity = state.attitude, state.velocity
-        if not vehicle.in_air or attitude is None or velocity is None:
+        if not vehicle.in_air or state.attitude is None or state.velocity is None:
             vehicle.roll.forget_motion()
-        elif isinstance(message, events.AttitudeChanged):
-            vehicle.roll.on_attitude(attitude.roll, attitude.yaw)
-        elif isinstance(message, events.SpeedChanged) and vehicle.roll.on_velocity(velocity.north, velocity.east, now):
-            self._report()
+            return None
+        return state.attitude, state.velocity
+
+    def _on_flying_state(self, message: events.FlyingStateChanged, now: float) -> None:
+        self._motion()
+
+    def _on_attitude(self, message: events.AttitudeChanged, now: float) -> None:
+        if (motion := self._motion()) is not None:
+            attitude, _ = motion
+            self.host.vehicle.roll.on_attitude(attitude.roll, attitude.yaw)
+
+    def _on_speed(self, message: events.SpeedChanged, now: float) -> None:
+        if (motion := self._motion()) is not None:
+            _, velocity = motion
+            if self.host.vehicle.roll.on_velocity(velocity.north, velocity.east, now):
+                self._report()
 
     def _report(self) -> None:
         sign, firmware = self.host.vehicle.roll.sign, self.host.drone.identity.firmware
@@ -66,4 +83,4 @@ class RollSignService(Service):
 
     async def _save(self) -> None:
         if (problem := await self.host.memory.save()) is not None:
-            self.host.complain(problem)
+            self.host.warn_throttled(problem)

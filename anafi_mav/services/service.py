@@ -7,12 +7,11 @@ sorts what arrives into them, and nothing else connects the two.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Collection, Coroutine, Hashable, Mapping, Sequence
+from collections.abc import Callable, Coroutine, Hashable, Mapping, Sequence
 from typing import Any, Protocol
 
 from anafi_mav.clock import Clock
 from anafi_mav.drone import Drone
-from anafi_mav.drone.events import Message
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
@@ -22,6 +21,7 @@ from anafi_mav.services.flavours import Flavour
 from anafi_mav.services.memory import Memory
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.stream import Stream, Times
+from anafi_mav.services.subscriptions import Subscriptions
 from anafi_mav.services.vehicle import Vehicle
 
 MessageHandler = Callable[[Inbound], None]
@@ -48,7 +48,7 @@ class Host(Protocol):
 
     @property
     def channels(self) -> Sequence[Channel]:
-        """The channels that are to be told what happens: those that are open, without the hushed ones."""
+        """The open channels without the muted ones."""
 
     def send(self, message: dialect.MAVLink_message, to: Channel | Sequence[Channel] | None = None) -> None:
         """Send as the autopilot to one channel, to some, or to all. Nothing is sent while the link is down."""
@@ -64,27 +64,27 @@ class Host(Protocol):
     def text(self, severity: Severity, text: str, to: Channel | None = None) -> None:
         """A STATUSTEXT to everybody, and a line in the log; or to one channel alone."""
 
-    def complain(self, text: str) -> None:
-        """A warning about something that arrives many times a second: said rarely."""
+    def warn_throttled(self, text: str) -> None:
+        """Send a warning about something that arrives many times a second, at most once per five seconds."""
 
     def spawn(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
         """Run in the background; cancelled when the drone's link goes down."""
 
-    def act(self, client: Hashable, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
-        """Run an action that came by a message without COMMAND_ACK, in its turn among the commands: it replaces what is
-        under way, and newer ones replace it. A refusal of it becomes a text."""
+    def run_action(self, client: Hashable, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
+        """Run an action that a message without COMMAND_ACK asks for, in its turn among the commands: it replaces the
+        action under way, and newer ones replace it. A refusal becomes a text."""
 
     def times(self, at: float | None = None) -> Times:
         """A moment of the monotonic clock (None: now) in the clock of this system's messages."""
 
-    def wanted(self, id: int) -> bool:
-        """Does anybody have a stream of this message?"""
+    def is_streamed(self, id: int) -> bool:
+        """Return True when this message is streamed on some channel."""
 
-    def news(self, id: int, at: float) -> None:
-        """A streamed message has something new, true at a moment of the monotonic clock, that no event told of."""
+    def mark_updated(self, id: int, at: float) -> None:
+        """Send a streamed message for a value that no event reports. `at`: when it was true (s, monotonic)."""
 
-    def hush(self, channel: Channel, *, quiet: bool) -> None:
-        """Say nothing of our own accord on this channel: only answers go there, until it is to be told all again."""
+    def set_muted(self, channel: Channel, *, muted: bool) -> None:
+        """Send only answers on this channel; with False everything again."""
 
 
 def client_of(inbound: Inbound) -> Hashable:
@@ -93,7 +93,7 @@ def client_of(inbound: Inbound) -> Hashable:
 
 
 class Service:
-    """One MAVLink microservice of one system. All tables are read once, when the system is made."""
+    """One MAVLink microservice of one system. Tables are read when the system is made, `subscriptions` at link up."""
 
     def __init__(self, host: Host) -> None:
         self.host = host
@@ -132,15 +132,9 @@ class Service:
     def link_down(self) -> None:
         """The drone's link is gone: nothing that was asked for outlives it."""
 
-    def hears(self) -> Collection[type[Message]] | None:
-        """What `on_event` wants to be called with; None: everything. Read when the drone has connected.
-
-        A fleet's drones say thousands of things a second, and most services care for few of them.
-        """
-        return None
-
-    def on_event(self, message: Message, now: float) -> None:
-        """The drone said this; its states know it already."""
+    def subscriptions(self) -> Subscriptions:
+        """Return the handlers of the drone's events, by kind. Read once per connection, after `link_up`."""
+        return {}
 
     def received(self, inbound: Inbound) -> None:
         """A message that names this system as its target has arrived, before it is handled."""

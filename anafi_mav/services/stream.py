@@ -1,4 +1,4 @@
-"""A stream: a message that a vehicle sends by itself. Who may have it how often is `mavlink.streams`' business."""
+"""A stream: a message that a vehicle sends by itself, and how often. Intervals per channel are in `mavlink.streams`."""
 
 from __future__ import annotations
 
@@ -38,14 +38,17 @@ Builder = Callable[[Vehicle, Times], "dialect.MAVLink_message | None"]
 
 @dataclass(frozen=True)
 class Stream:
-    """One message a vehicle sends by itself."""
+    """One message that a vehicle sends by itself; when a channel is full it gives way to answers."""
 
     build: Builder
-    news: tuple[type[Message], ...] = ()
-    """The drone's events that make it new. It leaves when one of them comes, and carries that moment's time."""
+    updates: tuple[type[Message], ...] = ()
+    """The drone's events that update it. It leaves with each of them, and carries its time."""
+    every: float | None = None
+    """s, the shortest interval by default: what stations need to look alive, and a radio of 57600 baud can carry. None:
+    the message is streamed only to a client that asks for it."""
     repeated: bool = False
-    """A state message: it also leaves at its interval without news, and then carries the time of sending. What has no
-    news is one in any case."""
+    """A state message: it also leaves at its interval without an update, and then carries the time of sending. A
+    message without `updates` is one in any case."""
     on_change: bool = False
     """A state message that also leaves at once when the vehicle's mode, armed or landed state changes."""
     flavoured: bool = False
@@ -53,5 +56,5 @@ class Stream:
 
     @property
     def is_repeated(self) -> bool:
-        """It leaves without news, too."""
-        return self.repeated or not self.news
+        """It leaves without an update, too."""
+        return self.repeated or not self.updates

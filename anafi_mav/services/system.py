@@ -9,16 +9,18 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
-from collections.abc import Callable, Coroutine, Hashable, Sequence
+from collections.abc import Callable, Coroutine, Hashable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 from anafi_mav.clock import Clock
-from anafi_mav.drone import Drone, events
+from anafi_mav.drone import Drone
 from anafi_mav.drone.events import Message
+from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound, Node
+from anafi_mav.mavlink.router import EVERY_COMPONENT
 from anafi_mav.services import takeoff_point_service
 from anafi_mav.services.aborted_return_service import AbortedReturnService
 from anafi_mav.services.banner import BannerService
@@ -55,6 +57,7 @@ from anafi_mav.services.service import MessageHandler, Service
 from anafi_mav.services.shell import ShellService
 from anafi_mav.services.statustext import Severity, TextNumbers
 from anafi_mav.services.stream import Times
+from anafi_mav.services.subscriptions import EventHandler, Subscriptions, in_order
 from anafi_mav.services.takeoff_point_service import TakeoffPointService
 from anafi_mav.services.telemetry import CHANGES, TelemetryService
 from anafi_mav.services.time_service import TimeService
@@ -123,10 +126,10 @@ DESCENT_WAIT = 1.5
 """s that a landing or return may take to be confirmed when the gateway ends: it is not withdrawn."""
 
 STATUS_EVERY = 5.0
-"""s before the same complaint is repeated as text."""
+"""s before the same throttled warning is repeated."""
 
-MAX_COMPLAINTS = 100
-"""Different complaints whose age is remembered."""
+MAX_WARNINGS = 100
+"""Different throttled warnings whose age is remembered."""
 
 
 class System:
@@ -158,10 +161,10 @@ class System:
         self._next_heartbeat = 0.0
         self._mission_over: asyncio.TimerHandle | None = None
         """Runs while heartbeats still say Mission."""
-        self._complained: dict[str, float] = {}
-        self._hushed: set[Channel] = set()
+        self._warned_at: dict[str, float] = {}
+        self._muted: set[Channel] = set()
         self._told: tuple[Sequence[Channel], Sequence[Channel]] = ([], [])
-        """The open channels when it was last looked, and those of them that are not hushed."""
+        """The open channels when it was last looked, and those of them that are not muted."""
         self.vehicle = Vehicle(
             drone,
             clock,
@@ -182,25 +185,18 @@ class System:
             _joined(service.queries() for service in self.services),
             _joined(service.actions() for service in self.services),
         )
-        self._messages.take_tables(
-            _joined(service.streams() for service in self.services),
-            _joined(service.requests() for service in self.services),
-        )
+        streams = _joined(service.streams() for service in self.services)
+        self._messages.take_tables(streams, _joined(service.requests() for service in self.services))
+        self.telemetry: frozenset[int] = frozenset({*streams, dialect.MAVLINK_MSG_ID_HEARTBEAT})
+        """Messages that the next one of their kind replaces: a full channel drops them rather than answers."""
+        node.add_telemetry(self.telemetry)
         self._ftp.take_tables(_joined(service.files() for service in self.services))
         self._handlers: dict[int, MessageHandler] = _joined(service.messages() for service in self.services)
         self._handlers[dialect.MAVLINK_MSG_ID_HEARTBEAT] = self._heard
         self._receiving = [service for service in self.services if type(service).received is not Service.received]
         self._ticking = [service for service in self.services if type(service).tick is not Service.tick]
-        self._updates: dict[type[Message], Callable[[], None]] = {
-            events.FlyingStateChanged: self.vehicle.on_flying_state,
-            events.GpsLocationChanged: self.vehicle.on_location,
-            events.FlightId: self.vehicle.on_position,
-            events.TakeoffLocation: self.vehicle.on_takeoff_location,
-            events.ReturnStateChanged: self.vehicle.on_return,
-        }
-        """What the vehicle makes of an event, before the services hear of it."""
-        self._listeners: dict[type[Message], tuple[Callable[[Message, float], None], ...]] = {}
-        """Whom each kind of event goes to, as far as it has come up on this connection."""
+        self._subscribed: dict[type[Message], tuple[EventHandler, ...]] = {}
+        """The handlers of each kind of event, in the order in which they are called."""
 
     # Link up, link down.
 
@@ -208,14 +204,16 @@ class System:
         """The drone is connected and has sent all its states: the system appears."""
         self.active = True
         self._undo = self.drone.subscribe(self._on_event)
-        self._node.own(self.sysid)
+        self._node.add_host(self.sysid, AUTOPILOT, self._receive)
+        for component in ABSENT:
+            self._node.add_host(self.sysid, component, self._refuse)
         self._last_state = None
         if (problem := self.memory.load(self.drone.identity.serial)) is not None:
             self.text(Severity.WARNING, problem)
         self.vehicle.link_up(TakeoffRecord.read(self.memory.settings.get(takeoff_point_service.KEY)))
         for service in self.services:
             service.link_up()
-        self._listeners.clear()
+        self._subscribed = in_order(self.subscriptions())
         self._changed()
         self._next_heartbeat = self.clock.monotonic() + HEARTBEAT_EVERY
         self._ticker = asyncio.get_running_loop().create_task(self._tick())
@@ -242,7 +240,7 @@ class System:
             task.cancel()
         self.vehicle.link_down()
         self.active = False
-        self._node.disown(self.sysid)
+        self._node.remove_hosts(self.sysid)
 
     async def let_go(self) -> None:
         """The gateway ends: a flying drone is left hovering, or returning or landing where it does that already.
@@ -261,35 +259,37 @@ class System:
 
     @property
     def channels(self) -> Sequence[Channel]:
-        """The channels that are to be told what happens: those that are open, without the hushed ones."""
-        if not self._hushed:
+        """The open channels without the muted ones."""
+        if not self._muted:
             return self._node.channels
         everybody, told = self._told
         if everybody is not self._node.channels:  # a new list whenever they change
-            told = [channel for channel in self._node.channels if channel not in self._hushed]
+            told = [channel for channel in self._node.channels if channel not in self._muted]
             self._told = (self._node.channels, told)
         return told
 
-    def wanted(self, id: int) -> bool:
-        """Does anybody have a stream of this message?"""
-        return self._messages.wanted(id)
+    def is_streamed(self, id: int) -> bool:
+        """Return True when this message is streamed on some channel."""
+        return self._messages.is_streamed(id)
 
-    def news(self, id: int, at: float) -> None:
-        """A streamed message has something new, true at a moment of the monotonic clock, that no event told of."""
-        self._messages.news(id, at)
+    def mark_updated(self, id: int, at: float) -> None:
+        """Send a streamed message for a value that no event reports. `at`: when it was true (s, monotonic)."""
+        self._messages.mark_updated(id, at)
 
-    def hush(self, channel: Channel, *, quiet: bool) -> None:
-        """Say nothing of our own accord on this channel: only answers go there, until it is to be told all again."""
-        if quiet:
-            self._hushed.add(channel)
+    def set_muted(self, channel: Channel, *, muted: bool) -> None:
+        """Send only answers on this channel; with False everything again."""
+        if muted:
+            self._muted.add(channel)
         else:
-            self._hushed.discard(channel)
+            self._muted.discard(channel)
         self._told = ([], [])
 
     def send(self, message: dialect.MAVLink_message, to: Channel | Sequence[Channel] | None = None) -> None:
         """Send as the autopilot to one channel, to some, or to all. Nothing is sent while the link is down."""
         if self.active:
-            self._node.send(message, sysid=self.sysid, compid=AUTOPILOT, to=self.channels if to is None else to)
+            channels = self.channels if to is None else to
+            give_way = message.get_msgId() in self.telemetry
+            self._node.send(message, sysid=self.sysid, compid=AUTOPILOT, to=channels, give_way=give_way)
 
     def send_by_flavour(
         self, build: Callable[[Flavour], dialect.MAVLink_message | None], to: Sequence[Channel] | None = None
@@ -319,14 +319,14 @@ class System:
         for message in self._texts.messages(severity, text):
             self._node.send(message, sysid=self.sysid, compid=AUTOPILOT, to=self.channels)
 
-    def complain(self, text: str) -> None:
-        """A warning about something that arrives many times a second: said every `STATUS_EVERY` seconds at most."""
+    def warn_throttled(self, text: str) -> None:
+        """Send a warning about something that arrives many times a second, every `STATUS_EVERY` seconds at most."""
         now = self.clock.monotonic()
-        if now - self._complained.get(text, -math.inf) < STATUS_EVERY:
+        if now - self._warned_at.get(text, -math.inf) < STATUS_EVERY:
             return
-        if len(self._complained) >= MAX_COMPLAINTS:
-            self._complained.clear()
-        self._complained[text] = now
+        if len(self._warned_at) >= MAX_WARNINGS:
+            self._warned_at.clear()
+        self._warned_at[text] = now
         self.text(Severity.WARNING, text)
 
     def spawn(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
@@ -336,8 +336,8 @@ class System:
         task.add_done_callback(self._tasks.discard)
         return task
 
-    def act(self, client: Hashable, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
-        """Run an action that came by a message without COMMAND_ACK."""
+    def run_action(self, client: Hashable, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
+        """Run an action that a message without COMMAND_ACK asks for."""
         return self._commands.run(client, work)
 
     def times(self, at: float | None = None) -> Times:
@@ -379,25 +379,19 @@ class System:
     # What the drone reports.
 
     def _on_event(self, message: Message, now: float) -> None:
-        listeners = self._listeners.get(type(message))
-        if listeners is None:
-            listeners = self._listeners[type(message)] = self._listeners_of(type(message))
-        for listener in listeners:
-            listener(message, now)
+        for handler in self._subscribed.get(type(message), ()):
+            handler(message, now)
 
-    def _listeners_of(self, kind: type[Message]) -> tuple[Callable[[Message, float], None], ...]:
-        """Who wants to know of such an event, in the order in which they are told."""
-        listeners: list[Callable[[Message, float], None]] = []
-        if (update := self._updates.get(kind)) is not None:
-            listeners.append(lambda message, now: update())
+    def subscriptions(self) -> Iterator[Subscriptions]:
+        """Return all tables of event handlers, in the order that decides which handler of an event is called first.
+
+        The vehicle comes first, because services read its state. Services follow in their order in `self.services`.
+        State messages that leave `on_change` are last, because they contain what the services make of the event.
+        """
+        yield self.vehicle.subscriptions()
         for service in self.services:
-            if type(service).on_event is not Service.on_event:
-                heard = service.hears()
-                if heard is None or kind in heard:
-                    listeners.append(service.on_event)
-        if kind in CHANGES:
-            listeners.append(lambda message, now: self._changed(force=True))
-        return tuple(listeners)
+            yield service.subscriptions()
+        yield dict.fromkeys(CHANGES, lambda message, now: self._changed(force=True))
 
     def _changed(self, *, force: bool = False) -> None:
         """Mode, armed state or health may have changed: clients wait for it, so tell them at once.
@@ -443,37 +437,50 @@ class System:
 
     # What clients send.
 
-    def listen(self, on: bool) -> None:
-        """Have messages to this system delivered while it does not exist, or no longer."""
-        if on:
-            self._node.own(self.sysid)
-        elif not self.active:
-            self._node.disown(self.sysid)
+    def listen(self, on_command: Callable[[Inbound], None] | None) -> None:
+        """Call this with each command to the system that is no query while the system does not exist; None: no longer.
 
-    def commands(self, inbound: Inbound) -> bool:
-        """True for a command to this system by its id that is no query, also while the system does not exist."""
-        message = inbound.message
+        Commands to any of its components count, but not those to all systems.
+        """
+        assert not self.active
+
+        def receive(inbound: Inbound) -> None:
+            if on_command is not None and self._commands_us(inbound.message):
+                on_command(inbound)
+
+        self._node.remove_hosts(self.sysid)
+        if on_command is not None:
+            self._node.add_host(self.sysid, EVERY_COMPONENT, receive)
+
+    def _commands_us(self, message: Any) -> bool:
+        """Return True for a command to this system by its id that is no query."""
         if message.get_msgId() == dialect.MAVLINK_MSG_ID_SET_MODE:
             return bool(message.target_system == self.sysid)
         known = message.get_msgId() in COMMANDS and message.target_system == self.sysid
         return known and self._commands.acts_on(message.command)
 
-    def receive(self, inbound: Inbound) -> None:
-        """A message from a client. Not addressed to our autopilot: not for us, and never answered."""
-        if not self.active:
-            return
+    def _receive(self, inbound: Inbound) -> None:
+        """Handle a message to our autopilot, to its system, or to all."""
         message = inbound.message
         handler = self._handlers.get(message.get_msgId())
-        if handler is None or getattr(message, "target_system", 0) not in (0, self.sysid):
+        if handler is None:
             return
-        component = getattr(message, "target_component", 0)
-        if component in (0, AUTOPILOT):
+        try:
             if getattr(message, "target_system", 0) == self.sysid:
                 for service in self._receiving:
                     service.received(inbound)
             handler(inbound)
-        elif component in ABSENT and message.get_msgId() in COMMANDS and message.target_system == self.sysid:
-            self._node.send(_unsupported(inbound), sysid=self.sysid, compid=component, to=inbound.channel)
+        except AnafiMavError as error:  # the drone's link may just have died
+            logger.debug("%s: %s not handled: %s", self.drone.name, message.get_type(), error)
+        except Exception:
+            logger.exception("%s: %s not handled", self.drone.name, message.get_type())
+
+    def _refuse(self, inbound: Inbound) -> None:
+        """Answer a command to one of the components in `ABSENT`, when it is addressed to that component alone."""
+        message = inbound.message
+        if message.get_msgId() in COMMANDS and message.target_system == self.sysid and message.target_component:
+            answer = _unsupported(inbound)
+            self._node.send(answer, sysid=self.sysid, compid=message.target_component, to=inbound.channel)
 
     def _heard(self, inbound: Inbound) -> None:
         for service in self.services:
@@ -481,7 +488,7 @@ class System:
 
     def channel_closed(self, channel: Channel) -> None:
         """A client's channel is gone."""
-        self._hushed.discard(channel)
+        self._muted.discard(channel)
         for service in self.services:
             service.channel_closed(channel)
 

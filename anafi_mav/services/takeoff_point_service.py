@@ -5,11 +5,9 @@ The file of a drone is found by its serial number, and the record in it counts f
 
 from __future__ import annotations
 
-from collections.abc import Collection
-
 from anafi_mav.drone import events
-from anafi_mav.drone.events import Message
 from anafi_mav.services.service import Service
+from anafi_mav.services.subscriptions import Subscriptions
 
 KEY = "takeoff"
 """Name of the record in the drone's file."""
@@ -18,13 +16,11 @@ KEY = "takeoff"
 class TakeoffPointService(Service):
     """Writes the take-off point of each flight once, or when more of it becomes known."""
 
-    def hears(self) -> Collection[type[Message]]:
-        return (events.FlightId, events.GpsLocationChanged, events.TakeoffLocation, events.FlyingStateChanged)
+    def subscriptions(self) -> Subscriptions:
+        kinds = (events.FlightId, events.GpsLocationChanged, events.TakeoffLocation, events.FlyingStateChanged)
+        return dict.fromkeys(kinds, lambda message, now: self._keep())
 
     def link_up(self) -> None:
-        self._keep()
-
-    def on_event(self, message: Message, now: float) -> None:
         self._keep()
 
     def _keep(self) -> None:
@@ -36,4 +32,4 @@ class TakeoffPointService(Service):
 
     async def _save(self) -> None:
         if (problem := await self.host.memory.save()) is not None:
-            self.host.complain(problem)
+            self.host.warn_throttled(problem)

@@ -291,20 +291,22 @@ def gps_global_origin(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message
 _POSITION = (events.GpsLocationChanged, events.AltitudeChanged, events.SpeedChanged)
 
 STREAMS: Mapping[int, Stream] = {
-    dialect.MAVLINK_MSG_ID_ATTITUDE: Stream(attitude, (events.AttitudeChanged,)),
-    dialect.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: Stream(attitude_quaternion, (events.AttitudeChanged,)),
-    dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: Stream(global_position_int, _POSITION),
-    dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED: Stream(local_position_ned, _POSITION),
+    dialect.MAVLINK_MSG_ID_ATTITUDE: Stream(attitude, (events.AttitudeChanged,), every=0.1),
+    dialect.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: Stream(attitude_quaternion, (events.AttitudeChanged,), every=0.1),
+    dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: Stream(global_position_int, _POSITION, every=0.2),
+    dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED: Stream(local_position_ned, _POSITION, every=0.2),
     dialect.MAVLINK_MSG_ID_ODOMETRY: Stream(odometry, (events.AttitudeChanged, *_POSITION)),
-    dialect.MAVLINK_MSG_ID_ALTITUDE: Stream(altitude, (events.AltitudeChanged, events.AltitudeAboveGroundChanged)),
-    dialect.MAVLINK_MSG_ID_VFR_HUD: Stream(vfr_hud, (events.SpeedChanged, events.AltitudeChanged)),
-    dialect.MAVLINK_MSG_ID_GPS_RAW_INT: Stream(
-        gps_raw_int, (events.GpsLocationChanged, events.NumberOfSatelliteChanged, events.GPSFixStateChanged)
+    dialect.MAVLINK_MSG_ID_ALTITUDE: Stream(
+        altitude, (events.AltitudeChanged, events.AltitudeAboveGroundChanged), every=0.2
     ),
-    dialect.MAVLINK_MSG_ID_DISTANCE_SENSOR: Stream(distance_sensor, (events.AltitudeAboveGroundChanged,)),
+    dialect.MAVLINK_MSG_ID_VFR_HUD: Stream(vfr_hud, (events.SpeedChanged, events.AltitudeChanged), every=0.2),
+    dialect.MAVLINK_MSG_ID_GPS_RAW_INT: Stream(
+        gps_raw_int, (events.GpsLocationChanged, events.NumberOfSatelliteChanged, events.GPSFixStateChanged), every=0.5
+    ),
+    dialect.MAVLINK_MSG_ID_DISTANCE_SENSOR: Stream(distance_sensor, (events.AltitudeAboveGroundChanged,), every=0.2),
     dialect.MAVLINK_MSG_ID_RANGEFINDER: Stream(rangefinder, (events.AltitudeAboveGroundChanged,)),
     dialect.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT: Stream(nav_controller_output),
-    dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: Stream(extended_sys_state, on_change=True),
-    dialect.MAVLINK_MSG_ID_HOME_POSITION: Stream(home_position, on_change=True),
+    dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: Stream(extended_sys_state, every=0.5, on_change=True),
+    dialect.MAVLINK_MSG_ID_HOME_POSITION: Stream(home_position, every=2.0, on_change=True),
     dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: Stream(gps_global_origin),
 }

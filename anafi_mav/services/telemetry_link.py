@@ -83,10 +83,10 @@ def onboard_computer_status(vehicle: Vehicle, times: Times) -> dialect.MAVLink_m
     )
 
 
-_NEWS = tuple(Link.REDUCERS)
+_UPDATES = tuple(Link.REDUCERS)
 
 STREAMS: Mapping[int, Stream] = {
-    dialect.MAVLINK_MSG_ID_RC_CHANNELS: Stream(rc_channels, _NEWS, repeated=True, flavoured=True),
-    dialect.MAVLINK_MSG_ID_RADIO_STATUS: Stream(radio_status, _NEWS, repeated=True, flavoured=True),
+    dialect.MAVLINK_MSG_ID_RC_CHANNELS: Stream(rc_channels, _UPDATES, every=1.0, repeated=True, flavoured=True),
+    dialect.MAVLINK_MSG_ID_RADIO_STATUS: Stream(radio_status, _UPDATES, every=1.0, repeated=True, flavoured=True),
     dialect.MAVLINK_MSG_ID_ONBOARD_COMPUTER_STATUS: Stream(onboard_computer_status),
 }

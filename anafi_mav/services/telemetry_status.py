@@ -229,10 +229,10 @@ def estimator_status(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message 
 
 
 STREAMS: Mapping[int, Stream] = {
-    dialect.MAVLINK_MSG_ID_SYS_STATUS: Stream(sys_status, on_change=True),
-    dialect.MAVLINK_MSG_ID_BATTERY_STATUS: Stream(battery_status),
+    dialect.MAVLINK_MSG_ID_SYS_STATUS: Stream(sys_status, every=1.0, on_change=True),
+    dialect.MAVLINK_MSG_ID_BATTERY_STATUS: Stream(battery_status, every=1.0),
     dialect.MAVLINK_MSG_ID_BATTERY_INFO: Stream(battery_info),
-    dialect.MAVLINK_MSG_ID_EKF_STATUS_REPORT: Stream(ekf_status_report),
+    dialect.MAVLINK_MSG_ID_EKF_STATUS_REPORT: Stream(ekf_status_report, every=1.0),
     dialect.MAVLINK_MSG_ID_ESTIMATOR_STATUS: Stream(
         estimator_status, (events.GpsLocationChanged, events.HoveringWarning), repeated=True
     ),

@@ -18,7 +18,7 @@ class TimeService(Service):
         return {dialect.MAVLINK_MSG_ID_PING: self._ping, dialect.MAVLINK_MSG_ID_TIMESYNC: self._timesync}
 
     def streams(self) -> Mapping[int, Stream]:
-        return {dialect.MAVLINK_MSG_ID_SYSTEM_TIME: Stream(self._system_time)}
+        return {dialect.MAVLINK_MSG_ID_SYSTEM_TIME: Stream(self._system_time, every=1.0)}
 
     def _system_time(self, vehicle: Vehicle, times: Times) -> dialect.MAVLink_message:
         """SYSTEM_TIME: the machine's clock, which the drone's was set by when it connected, beside our own."""

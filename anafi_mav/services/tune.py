@@ -41,7 +41,7 @@ class TuneService(Service):
         sound = self.host.drone.sound
         try:
             if on and not self.host.vehicle.on_ground:
-                self.host.complain("Tune refused: the drone beeps on the ground only")
+                self.host.warn_throttled("Tune refused: the drone beeps on the ground only")
                 return
             if not on:
                 await sound.stop()
@@ -51,4 +51,4 @@ class TuneService(Service):
             await sound.stop()
         except AnafiMavError as error:
             with contextlib.suppress(AnafiMavError):
-                self.host.complain(f"Tune not played: {error}")
+                self.host.warn_throttled(f"Tune not played: {error}")

@@ -20,13 +20,18 @@ from anafi_mav.drone.element import Position
 from anafi_mav.drone.events import (
     AlertLevel,
     AutoTriggerReason,
+    FlightId,
     FlyingState,
+    FlyingStateChanged,
     ForcedLandingReason,
+    GpsLocationChanged,
     PlayingState,
     ReturnReason,
+    ReturnStateChanged,
     RthEndingBehavior,
     RthHomeType,
     RthState,
+    TakeoffLocation,
 )
 from anafi_mav.drone.piloting_landing import ALREADY_LANDED
 from anafi_mav.errors import CommandRejected
@@ -53,6 +58,7 @@ from anafi_mav.services.return_end import ReturnEnd
 from anafi_mav.services.right import Extent, Right
 from anafi_mav.services.roll_sign import INVERTED
 from anafi_mav.services.statustext import Severity
+from anafi_mav.services.subscriptions import Subscriptions
 from anafi_mav.services.takeoff import Takeoff
 
 FORCED = "forced landing"
@@ -521,6 +527,16 @@ class Vehicle(Aircraft):
             self.text(Severity.NOTICE, f"Landing aborted by system {by.system}: hovering")
 
     # What the drone reports.
+
+    def subscriptions(self) -> Subscriptions:
+        """Return the handlers of events that change the vehicle's own state. Services are called after them."""
+        return {
+            FlyingStateChanged: lambda message, now: self.on_flying_state(),
+            GpsLocationChanged: lambda message, now: self.on_location(),
+            FlightId: lambda message, now: self.on_position(),
+            TakeoffLocation: lambda message, now: self.on_takeoff_location(),
+            ReturnStateChanged: lambda message, now: self.on_return(),
+        }
 
     def on_flying_state(self) -> None:
         """The drone's flying state changed."""

@@ -116,7 +116,7 @@ class VideoTelemetryService(Service):
         self._retry_at = 0.0
 
     def tick(self, now: float) -> None:
-        wanted = self.host.wanted(dialect.MAVLINK_MSG_ID_ANAFI_CAMERA_EXPOSURE)
+        wanted = self.host.is_streamed(dialect.MAVLINK_MSG_ID_ANAFI_CAMERA_EXPOSURE)
         if self._watch is not None and (self._watch.done() or not wanted):
             self._watch.cancel()
             self._watch = None
@@ -129,8 +129,8 @@ class VideoTelemetryService(Service):
             async with self.host.drone.video.watching():
                 await asyncio.Event().wait()  # until it is cancelled
         except AnafiMavError as error:
-            self.host.complain(f"No video to read the exposure from: {error}")
+            self.host.warn_throttled(f"No video to read the exposure from: {error}")
 
     def _frame(self, frame: VideoFrame) -> None:
-        self.host.news(dialect.MAVLINK_MSG_ID_ANAFI_CAMERA_EXPOSURE, frame.arrived)
-        self.host.news(dialect.MAVLINK_MSG_ID_ANAFI_LINK, frame.arrived)
+        self.host.mark_updated(dialect.MAVLINK_MSG_ID_ANAFI_CAMERA_EXPOSURE, frame.arrived)
+        self.host.mark_updated(dialect.MAVLINK_MSG_ID_ANAFI_LINK, frame.arrived)

@@ -6,7 +6,7 @@ itself, and nobody can talk it out of, is an alert, motors that were cut in the 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Hashable, Iterator, Mapping
+from collections.abc import Hashable, Iterator, Mapping
 
 from anafi_mav.drone import Drone
 from anafi_mav.drone.alerts import Alerts, spoken
@@ -28,6 +28,7 @@ from anafi_mav.drone.events import (
 from anafi_mav.drone.home import Home
 from anafi_mav.services.service import Host, Service
 from anafi_mav.services.statustext import Severity
+from anafi_mav.services.subscriptions import Subscriptions
 
 _LEVELS: Mapping[int, Severity] = {1: Severity.WARNING, 2: Severity.CRITICAL}
 """WarningLevel and AlertLevel have the same numbers."""
@@ -102,11 +103,8 @@ class WarningService(Service):
         self._told = frozenset()
         self._tell()
 
-    def hears(self) -> Collection[type[Message]]:
-        return _RELEVANT
-
-    def on_event(self, message: Message, now: float) -> None:
-        self._tell()
+    def subscriptions(self) -> Subscriptions:
+        return dict.fromkeys(_RELEVANT, lambda message, now: self._tell())
 
     def _tell(self) -> None:
         holding = list(standing(self.host.drone))

@@ -10,7 +10,11 @@ from support.flavours import both
 from support.mav import NAN, Client
 from support.world import world
 
+from anafi_mav.drone.events import AttitudeChanged
 from anafi_mav.mavlink import dialect as newer
+from anafi_mav.services import telemetry_flight
+from anafi_mav.services.stream import Stream, Times
+from anafi_mav.services.vehicle import Vehicle
 
 ACCEPTED, DENIED, UNSUPPORTED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_DENIED, dialect.MAV_RESULT_UNSUPPORTED
 SET, GET = dialect.MAV_CMD_SET_MESSAGE_INTERVAL, dialect.MAV_CMD_GET_MESSAGE_INTERVAL
@@ -137,6 +141,26 @@ async def test_conf_108_off_default_and_refused_on_each_link_alone(flavour: str)
         for impossible in (-2, -0.5, math.inf, -math.inf):
             assert (await first.command(SET, 30, impossible)).result == DENIED
         assert await interval(first, "ATTITUDE") == pytest.approx(0.1, rel=0.05)
+
+
+async def test_message_added_by_one_row_leaves_at_its_default_interval(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An element's value in a message of its own: builder, events that update it, and default interval in one row."""
+
+    def heading(vehicle: Vehicle, times: Times) -> newer.MAVLink_message | None:
+        attitude = vehicle.drone.piloting.state.attitude
+        return (
+            None if attitude is None else newer.MAVLink_named_value_float_message(times.boot_ms, b"yaw", attitude.yaw)
+        )
+
+    row = Stream(heading, (AttitudeChanged,), every=0.5)
+    monkeypatch.setitem(telemetry_flight.STREAMS, newer.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT, row)
+    async with world(speed=1.0) as w:
+        assert await rates(w.client, ["NAMED_VALUE_FLOAT"], 6.0) == {"NAMED_VALUE_FLOAT": pytest.approx(2.0, rel=0.2)}
+        assert await interval(w.client, "NAMED_VALUE_FLOAT") == pytest.approx(0.5)
+        await set_all(w.client, ["NAMED_VALUE_FLOAT"], 50_000)
+        told = await rates(w.client, ["NAMED_VALUE_FLOAT"], 4.0)
+        assert told == {"NAMED_VALUE_FLOAT": pytest.approx(5.0, rel=0.2)}  # each attitude, and no more than those
+        assert (await w.client.command(dialect.MAV_CMD_REQUEST_MESSAGE, IDS["NAMED_VALUE_FLOAT"])).result == ACCEPTED
 
 
 @both

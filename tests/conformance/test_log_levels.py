@@ -60,7 +60,7 @@ async def test_link_of_an_endpoint_that_is_lost_and_back_is_logged_at_one_level(
     address, port = loopback(), 5760
     accepted: asyncio.Queue[asyncio.StreamWriter] = asyncio.Queue()
     server = await asyncio.start_server(lambda reader, writer: accepted.put_nowait(writer), address, port)
-    node = Node(on_message=lambda inbound: None, clock=SystemClock())
+    node = Node(clock=SystemClock())
     url = f"tcpout://{address}:{port}"
     with listening(url) as lines:
         await node.start([url])

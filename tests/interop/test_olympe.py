@@ -1,4 +1,7 @@
-"""Parrot's Olympe does everything at the simulated models, directly and through a Skycontroller, in one connection."""
+"""Parrot's Olympe does everything at the simulated models, directly and through a Skycontroller, in one connection.
+
+The default run takes a pairwise selection of model, controller and version (`olympe.SELECTED`), `full` every one.
+"""
 
 from __future__ import annotations
 
@@ -28,27 +31,13 @@ UNHEARD = {
 pytestmark = [pytest.mark.third_party, olympe.needed]
 
 
-# The controllers are those that Parrot sells with the models, and the fourth in front of an older one. Olympe's wire
-# format is the newest, or the one that the drone asks for.
-@pytest.mark.parametrize(
-    ("model", "kind", "version"),
-    [
-        ("4k", "Drone", 3),
-        ("thermal", "Drone", 2),
-        ("usa", "Drone", 1),
-        ("ai", "Drone", 3),
-        ("4k", "SkyController3", 3),
-        ("thermal", "SkyController3", 3),
-        ("usa", "SkyController3", 3),
-        ("usa", "SkyController4", 3),
-        ("ai", "SkyController4", 3),
-    ],
-)
+@pytest.mark.parametrize("on", olympe.combinations("visit"))
 @pytest.mark.timeout(240)
-async def test_olympe_does_everything(model: str, kind: str, version: int, tmp_path: Path) -> None:
+async def test_olympe_does_everything(on: olympe.Combination, tmp_path: Path) -> None:
+    _, model, kind, version = on
     # The telemetry is as frequent as the simulator logs where the drone is.
-    options = ("--protocol", str(version), "--speed", SPEED, "--telemetry-rate", "10")
-    report, err, log = await olympe.visit("olympe_visit.py", kind, model, tmp_path, timeout=200.0, options=options)
+    options = ("--speed", SPEED, "--telemetry-rate", "10")
+    report, err, log = await olympe.visit("olympe_visit.py", on, tmp_path, timeout=200.0, options=options)
 
     assert olympe.failed(report["connection"]["steps"]) == {}
     assert olympe.failed(report["end"]["steps"]) == {}

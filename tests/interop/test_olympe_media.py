@@ -14,15 +14,16 @@ from support.world import loopback
 pytestmark = [pytest.mark.third_party, olympe.needed]
 
 
-@pytest.mark.parametrize("via", ["drone", "skycontroller"])
+@pytest.mark.parametrize("on", olympe.combinations("media"))
 @pytest.mark.timeout(240)
-async def test_olympes_media_examples(via: str, tmp_path: Path) -> None:
+async def test_olympes_media_examples(on: olympe.Combination, tmp_path: Path) -> None:
+    via = "drone" if on.controller == "Drone" else "skycontroller"
     address, log, downloads = loopback(), tmp_path / "sim.jsonl", tmp_path / "downloads"
     downloads.mkdir()
     port = str(olympe.HTTP_PORT)
     controller = ("--skycontroller", "4") if via == "skycontroller" else ()
     # The examples give a burst and its media three seconds; it takes one and a half of simulated ones.
-    options = ("--model", "ai", "--http-port", port, "--seed", "1", "--speed", "3", *controller)
+    options = ("--model", on.model, "--http-port", port, "--seed", "1", "--speed", "3", *controller)
     async with simulator_process(address, log, *options):
         report, err = await olympe.run("olympe_media.py", address, port, via, str(downloads), timeout=200.0)
     assert report == {"failed": None}, err
@@ -36,7 +37,7 @@ async def test_olympes_media_examples(via: str, tmp_path: Path) -> None:
         assert hashlib.md5(file.read_bytes()).hexdigest() == told_md5
     assert sorted(file.name for file in downloads.glob("*/thumbnails/*.JPG")) == [file.name for file in files]
     entries = [json.loads(line) for line in log.read_text().splitlines()]
-    olympe.clock_set(entries, "Drone" if via == "drone" else "SkyController4")
+    olympe.clock_set(entries, on.controller)
     counted = [entry["args"]["photo_resource_count"] for entry in entries if entry["name"] == "mediastore.counters"]
     # Files are counted as they reach the card, and when the example has all of them it deletes them.
     assert max(counted) == 14

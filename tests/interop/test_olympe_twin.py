@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-import importlib.util
+import asyncio
 import json
 import math
 import sys
+from collections.abc import Coroutine
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import pytest
+from support import olympe
 from support.mav import Client
 from support.process import simulator_process
 from support.product import START_LIMIT, Process, product, program
@@ -24,13 +27,7 @@ PORT = 8080
 WITHIN = 1.0
 """m."""
 
-pytestmark = [
-    pytest.mark.third_party,
-    pytest.mark.skipif(
-        importlib.util.find_spec("olympe") is None,
-        reason="Olympe is not installed: package parrot-olympe exists for x86-64 Linux, Python < 3.12",
-    ),
-]
+pytestmark = [pytest.mark.third_party, olympe.needed]
 
 Point = tuple[float, float, float]
 
@@ -40,6 +37,17 @@ async def run(*words: str, timeout: float = START_LIMIT) -> Process:
     async with program(sys.executable, *words) as held:
         assert await held.end(timeout) == 0, str(held)
         return held
+
+
+async def together(*flights: Coroutine[Any, Any, None]) -> None:
+    """All of them at once; the first that fails ends the others."""
+    tasks = [asyncio.ensure_future(flight) for flight in flights]
+    try:
+        await asyncio.gather(*tasks)
+    finally:
+        for task in tasks:
+            task.cancel()
+        await asyncio.wait(tasks)
 
 
 def path(log: Path) -> list[Point]:
@@ -67,9 +75,11 @@ def apart(these: list[Point], those: list[Point]) -> float:
     return max(min(off(point, one, two) for one, two in pairwise(thinned)) for point in these[::3])
 
 
-@pytest.mark.parametrize("model", ["4k", "ai"])
+@pytest.mark.parametrize("on", olympe.combinations("twin"))
 @pytest.mark.timeout(300)
-async def test_the_same_file_flies_the_same_path(model: str, tmp_path: Path) -> None:
+async def test_the_same_file_flies_the_same_path(on: olympe.Combination, tmp_path: Path) -> None:
+    """Both at once, each at a drone of its own."""
+    model = on.model
     olympes, ours, gateway = loopback(), loopback(), loopback()
     logs = {name: tmp_path / f"{name}.jsonl" for name in ("olympe", "gateway")}
     options = ("--model", model, "--http-port", str(PORT), "--seed", "1", "--speed", "3")
@@ -80,15 +90,21 @@ async def test_the_same_file_flies_the_same_path(model: str, tmp_path: Path) -> 
     twin = tmp_path / "twin.mavlink"
     plan = ("-m", "anafi_mav", "plan")
     await run(*plan, "convert", str(SAMPLE), str(twin), "--model", model)
-    async with simulator_process(olympes, logs["olympe"], *options):
-        flown = await run(str(SCRIPT), olympes, str(PORT), model, str(twin), timeout=180.0)
-        steps = json.loads(flown.lines[-1])
-        assert steps == dict.fromkeys(("connect", "flown", "landed", "disconnect"), True), str(flown)
-    async with simulator_process(ours, logs["gateway"], *options), product(tmp_path, config):
-        watcher = await Client(sysid=254).connect(5760, gateway)
-        await run(*plan, "fly", str(SAMPLE), "--endpoint", f"tcpout://{gateway}:5760", timeout=120.0)
-        await watcher.heartbeat(lambda beat: not beat.base_mode & ARMED, timeout=60.0)
-        await watcher.close()
+
+    async def by_olympe() -> None:
+        async with simulator_process(olympes, logs["olympe"], *options):
+            flown = await run(str(SCRIPT), olympes, str(PORT), model, str(twin), timeout=180.0)
+            steps = json.loads(flown.lines[-1])
+            assert steps == dict.fromkeys(("connect", "flown", "landed", "disconnect"), True), str(flown)
+
+    async def by_gateway() -> None:
+        async with simulator_process(ours, logs["gateway"], *options), product(tmp_path, config):
+            watcher = await Client(sysid=254).connect(5760, gateway)
+            await run(*plan, "fly", str(SAMPLE), "--endpoint", f"tcpout://{gateway}:5760", timeout=120.0)
+            await watcher.heartbeat(lambda beat: not beat.base_mode & ARMED, timeout=60.0)
+            await watcher.close()
+
+    await together(by_olympe(), by_gateway())
     one, two = path(logs["olympe"]), path(logs["gateway"])
     assert max(north for north, _, _ in one) > 50.0
     assert apart(one, two) < WITHIN

@@ -1,4 +1,7 @@
-"""Parrot's Olympe watches the simulated models: pictures, and metadata that is the flight in the simulator's log."""
+"""Parrot's Olympe watches the simulated models: pictures, and metadata that is the flight in the simulator's log.
+
+The default run takes a pairwise selection of model, controller and version (`olympe.SELECTED`), `full` every one.
+"""
 
 from __future__ import annotations
 
@@ -143,15 +146,11 @@ def check_streams(streams: dict[str, Any], log: list[dict[str, Any]]) -> None:
 
 
 # Directly, and through the mux of a Skycontroller 4; through the third `test_olympe.py` looks.
-@pytest.mark.parametrize(
-    ("model", "kind"),
-    [("4k", "Drone"), ("thermal", "Drone"), ("usa", "Drone"), ("ai", "Drone"), ("ai", "SkyController4")],
-)
+@pytest.mark.parametrize("on", olympe.combinations("video"))
 @pytest.mark.timeout(240)
-async def test_olympe_watches_a_flight(model: str, kind: str, tmp_path: Path) -> None:
-    report, err, log = await olympe.visit(
-        "olympe_video.py", kind, model, tmp_path, timeout=200.0, options=("--speed", SPEED)
-    )
+async def test_olympe_watches_a_flight(on: olympe.Combination, tmp_path: Path) -> None:
+    _, model, kind, _ = on
+    report, err, log = await olympe.visit("olympe_video.py", on, tmp_path, timeout=200.0, options=("--speed", SPEED))
     for part in report.values():
         assert olympe.failed(part["steps"]) == {}
     streams = report["video"]["streams"]

@@ -54,11 +54,13 @@ SET_ANEW = ("set_view_mode", "set_roi_none", "mount_control")
 """Lines that a file may have besides, for a mode that holds or has to."""
 
 
-def executed(plan: Plan) -> Iterator[Item]:
-    """The items in the order in which they are flown: jumps followed.
+MAVSDKS_JUMPS = 1
+"""Items behind its target that a jump of a plan goes when MAVSDK imports it: it sends QGroundControl's jump ids, which
+count from 1, as they are."""
 
-    To one item further than QGroundControl means: MAVSDK sends its jump ids, which count from 1, as they are.
-    """
+
+def executed(plan: Plan, jump_beyond: int = 0) -> Iterator[Item]:
+    """The items in the order in which they are flown, jumps followed, so many items beyond their targets."""
     left: dict[int, int] = {}
     number = 0
     while number < len(plan.items):
@@ -67,7 +69,7 @@ def executed(plan: Plan) -> Iterator[Item]:
             target, times = int(item.params[0] or 0), int(item.params[1] or 0)
             if left.setdefault(number, times) > 0:
                 left[number] -= 1
-                number = target + 1
+                number = target + jump_beyond
                 continue
         else:
             yield item
@@ -132,13 +134,13 @@ class Log:
         return [order["target"] for order in orders]
 
 
-def check(log: Log, plan: Plan) -> list[tuple[float, Item]]:
+def check(log: Log, plan: Plan, jump_beyond: int = 0) -> list[tuple[float, Item]]:
     """Each way point was passed within 2 m, and what is between two of them was done between them, in order.
 
-    Returns the items and when they were begun.
+    Returns the items and when they were begun. `jump_beyond`: see `executed`.
     """
     track, lines = log.track(), log.lines()
-    wanted = [item for item in executed(plan) if item.command in LINES]
+    wanted = [item for item in executed(plan, jump_beyond) if item.command in LINES]
     begun: list[tuple[float, Item]] = []
     position = 0
 

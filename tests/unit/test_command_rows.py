@@ -58,7 +58,7 @@ ROWS: dict[str, tuple[bool, Altitude, object, Progress]] = {
 
 async def make_system() -> System:
     """A system of which no drone is connected and no endpoint open."""
-    node = Node(on_message=lambda inbound: None, on_channel=lambda channel: None, clock=SystemClock())
+    node = Node(clock=SystemClock())
     return System(node, Drone("127.0.0.1"), 1, SystemClock(), 0.0, allow_kill=False)
 
 

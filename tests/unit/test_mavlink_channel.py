@@ -8,7 +8,7 @@ import pytest
 
 from anafi_mav.errors import LocalProtocolError
 from anafi_mav.mavlink import dialect
-from anafi_mav.mavlink.channel import FRAME_BYTES, GIVE_WAY, Channel, total
+from anafi_mav.mavlink.channel import FRAME_BYTES, Channel, total
 from anafi_mav.mavlink.frames import Parser, Received, frame, pack
 
 ATTITUDE = dialect.MAVLink_attitude_message(1, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5)
@@ -59,15 +59,17 @@ def test_channels_count_for_themselves() -> None:
 def test_a_full_socket_makes_it_wait_and_answers_leave_first() -> None:
     wire = Wire()
     wire.channel.pause()
-    wire.channel.send(ATTITUDE, 1, 1)
+    wire.channel.forward(frame(pack(ATTITUDE), 98, 43, 1), give_way=True)
+    wire.channel.send(ATTITUDE, 1, 1, give_way=True)
     wire.channel.send(ACK, 1, 1)
-    wire.channel.forward(frame(pack(ACK), 99, 42, 1), ACK.get_msgId())
+    wire.channel.forward(frame(pack(ACK), 99, 42, 1))
     assert wire.written == []
     wire.channel.resume()
     frames = wire.read()
-    assert [(received.id, received.sysid) for received in frames] == [(77, 1), (77, 42), (30, 1)]
+    assert [(received.id, received.sysid) for received in frames] == [(77, 1), (77, 42), (30, 43), (30, 1)]
     assert sequence(frames, (1, 1)) == [0, 1]
     assert sequence(frames, (42, 1)) == [99]
+    assert sequence(frames, (43, 1)) == [98]
 
 
 def test_the_oldest_telemetry_is_dropped_first_and_counted() -> None:
@@ -76,7 +78,7 @@ def test_the_oldest_telemetry_is_dropped_first_and_counted() -> None:
     wire.channel.pause()
     wire.channel.send(ACK, 1, 1)
     for n in range(100):
-        wire.channel.send(dialect.MAVLink_attitude_message(n, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5), 1, 1)
+        wire.channel.send(dialect.MAVLink_attitude_message(n, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5), 1, 1, give_way=True)
     wire.channel.resume()
     frames = wire.read()
     assert frames[0].id == 77
@@ -89,7 +91,7 @@ def test_answers_are_dropped_only_when_nothing_else_is_left() -> None:
     size = len(pack(ACK).payload) + FRAME_BYTES
     wire = Wire(queue_bytes=3 * size)
     wire.channel.pause()
-    wire.channel.send(ATTITUDE, 1, 1)
+    wire.channel.send(ATTITUDE, 1, 1, give_way=True)
     for command in range(400, 405):
         wire.channel.send(dialect.MAVLink_command_ack_message(command, 0), 1, 1)
     wire.channel.resume()
@@ -116,10 +118,10 @@ def test_a_socket_that_fills_again_while_the_queue_leaves() -> None:
 def test_a_closed_channel_only_counts() -> None:
     wire = Wire()
     wire.channel.pause()
-    wire.channel.send(ATTITUDE, 1, 1)
+    wire.channel.send(ATTITUDE, 1, 1, give_way=True)
     wire.channel.close()
     wire.channel.send(ACK, 1, 1)
-    wire.channel.forward(b"whatever", 77)
+    wire.channel.forward(b"whatever")
     wire.channel.resume()
     assert wire.written == []
     assert not wire.channel.is_open
@@ -147,9 +149,3 @@ def test_counters_are_summed() -> None:
         wire.channel.send(ACK, 1, 1)
         wire.channel.receive(b"rubbish")
     assert total(wire.channel for wire in wires) == {"sent_frames": 2, "garbage_bytes": 14}
-
-
-def test_telemetry_is_what_the_next_message_replaces() -> None:
-    assert {0, 30, 33, 1} <= GIVE_WAY
-    # Answers, parameters, missions, texts.
-    assert GIVE_WAY.isdisjoint({77, 22, 44, 47, 253, 110})

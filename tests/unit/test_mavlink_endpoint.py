@@ -140,7 +140,7 @@ def test_endpoint_is_open_to_the_network_when_it_listens_beyond_loopback(url: st
     "url", ["tcpin://127.0.0.1:0?flavour=ardupilot", "udpin://127.0.0.1:0", "tcpin://127.0.0.1:00"]
 )
 async def test_endpoint_with_port_0_shows_its_real_port(url: str) -> None:
-    node = Node(on_message=lambda inbound: None, clock=SystemClock(), flavours=FLAVOURS)
+    node = Node(clock=SystemClock(), flavours=FLAVOURS)
     await node.start([url])
     (endpoint,) = node.endpoints
     port = endpoint.local_port

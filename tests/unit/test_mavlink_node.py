@@ -20,11 +20,16 @@ from anafi_mav.errors import ConfigError
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.base import MAX_PEERS
 from anafi_mav.mavlink.channel import QUEUE_BYTES, Channel
-from anafi_mav.mavlink.frames import Parser, Received
+from anafi_mav.mavlink.frames import Parser, Received, frame, pack
 from anafi_mav.mavlink.node import Inbound, Node
+from anafi_mav.mavlink.router import EVERY_COMPONENT
 
 ATTITUDE = dialect.MAVLink_attitude_message(1, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5)
 BEAT = stock.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
+
+
+LISTENER = 200
+"""A system that nothing is addressed to: its host gets broadcasts alone."""
 
 
 class Desk:
@@ -33,7 +38,8 @@ class Desk:
     def __init__(self) -> None:
         self.inbound: list[Inbound] = []
         self.changes: list[tuple[str, bool]] = []
-        self.node = Node(on_message=self.inbound.append, on_channel=self._channel)
+        self.node = Node(on_channel=self._channel)
+        self.node.add_host(LISTENER, EVERY_COMPONENT, self.inbound.append)
 
     def _channel(self, channel: Channel, opened: bool) -> None:
         self.changes.append((channel.name, opened))
@@ -120,7 +126,7 @@ async def test_a_message_with_a_target_goes_there_alone() -> None:
 
 async def test_what_is_for_our_systems_stays_with_us() -> None:
     async with three(loopback()) as (d, ten, twenty, thirty):
-        d.node.own(1)
+        d.node.add_host(1, 1, d.inbound.append)
         ten.send(ping(1, 1, 1))
         await d.until(lambda: len(d.got("PING", 10)) == 1)
         (inbound,) = (i for i in d.inbound if i.message.get_type() == "PING")
@@ -128,13 +134,33 @@ async def test_what_is_for_our_systems_stays_with_us() -> None:
         d.node.send(dialect.MAVLink_ping_message(9, 9, 10, 190), sysid=1, compid=1, to=inbound.channel)
         answer = await ten.wait("PING", since=0)
         assert (answer.seq, answer.get_srcSystem()) == (9, 1)
-        d.node.disown(1)
+        d.node.remove_hosts(1)
         ten.send(ping(1, 1, 2))  # its drone is away: nobody's now
         ten.send(ping(0, 0, 3))
         await twenty.wait("PING", since=0)
         await thirty.wait("PING", since=0)
         assert [message.seq for message in d.got("PING", 10)] == [1, 3]
         assert (numbers(twenty), numbers(thirty)) == ([3], [3])
+
+
+async def test_a_component_added_as_host_gets_what_is_for_it() -> None:
+    """A camera component beside the autopilot: one line at its owner's, and nothing else knows of it."""
+    async with three(loopback()) as (d, ten, twenty, _):
+        autopilot: list[Inbound] = []
+        camera: list[Inbound] = []
+        d.node.add_host(1, 1, autopilot.append)
+        d.node.add_host(1, dialect.MAV_COMP_ID_CAMERA, camera.append)
+        for component, number in ((1, 1), (dialect.MAV_COMP_ID_CAMERA, 2), (dialect.MAV_COMP_ID_GIMBAL, 3), (0, 4)):
+            ten.send(ping(1, component, number))
+        ten.send(ping(0, 0, 5))
+        await twenty.wait("PING", since=0)
+        assert [inbound.message.seq for inbound in autopilot] == [1, 4, 5]
+        assert [inbound.message.seq for inbound in camera] == [2, 4, 5]
+        d.node.stop_delivering()
+        ten.send(ping(1, 0, 6))
+        ten.send(ping(0, 0, 7))
+        await twenty.wait("PING", lambda message: message.seq == 7, since=0)
+        assert (len(autopilot), len(camera)) == (3, 3)
 
 
 COUNT, FRAME, ANSWER = 120_000, 40, 15
@@ -162,7 +188,7 @@ async def test_a_reader_that_stands_still_holds_up_nobody() -> None:
             reading = asyncio.ensure_future(asyncio.wait_for(brisk.readexactly(COUNT * FRAME + ANSWER), 30.0))
             for number in range(COUNT):
                 ATTITUDE.time_boot_ms = number
-                d.node.send(ATTITUDE, sysid=1, compid=1)
+                d.node.send(ATTITUDE, sysid=1, compid=1, give_way=True)
                 if number % 100 == 0:
                     await asyncio.sleep(0)
             d.node.send(dialect.MAVLink_command_ack_message(400, 1), sysid=1, compid=1)
@@ -186,6 +212,21 @@ async def test_a_reader_that_stands_still_holds_up_nobody() -> None:
             # To its reader nothing is missing: numbers are given when frames leave.
             assert [received.raw[4] for received in frames] == [n % 256 for n in range(len(frames))]
         writer.close()
+
+
+def test_forwarded_telemetry_gives_way_to_forwarded_answers() -> None:
+    written: list[bytes] = []
+    source, target = Channel("source", lambda raw: None), Channel("target", written.append)
+    node = Node()
+    node.add_telemetry({dialect.MAVLINK_MSG_ID_ATTITUDE})
+    for channel in (source, target):
+        node.opened(channel)
+    target.pause()
+    ack = dialect.MAVLink_command_ack_message(400, 0)
+    frames = [frame(pack(message), number, 42, 1) for number, message in enumerate((ATTITUDE, ack, ATTITUDE))]
+    node.received(source, Parser().receive(b"".join(frames)))
+    target.resume()
+    assert [raw[4] for raw in written] == [1, 0, 2]
 
 
 async def test_tcpout_comes_back() -> None:
@@ -299,14 +340,15 @@ async def test_a_failing_service_costs_no_connection() -> None:
         raise RuntimeError("a mistake of ours")
 
     async with desk(f"tcpin://{host}:5760") as d:
-        d.node.on_message = fail
+        d.node.add_host(1, 1, fail)
         client = await Client().connect(5760, host)
         await d.until(lambda: len(d.node.channels) == 1)
         client.send(BEAT)
         await d.until(lambda: bool(reported))
-        d.node.on_message = d.inbound.append
+        assert len(d.inbound) == 1  # the other hosts have got it
+        d.node.remove_hosts(1)
         client.send(BEAT)
-        await d.until(lambda: bool(d.inbound))
+        await d.until(lambda: len(d.inbound) == 2)
         await client.close()
     assert [str(context["exception"]) for context in reported] == ["a mistake of ours"]
 

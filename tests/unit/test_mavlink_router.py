@@ -8,7 +8,7 @@ import pytest
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.frames import MAX_SOURCES, Parser, Received, frame, pack
-from anafi_mav.mavlink.router import RING_FRAMES, RING_WINDOW, Router, targets
+from anafi_mav.mavlink.router import EVERY_COMPONENT, RING_FRAMES, RING_WINDOW, Router, targets
 
 GCS, OTHER_GCS, OURS, FOREIGN = (255, 190), (254, 190), 1, 42
 
@@ -27,59 +27,111 @@ def command(system: int, component: int, seq: int = 0, source: tuple[int, int] =
 
 
 @pytest.fixture
-def router() -> Router[str]:
-    router = Router[str]()
+def router() -> Router[str, str]:
+    router = Router[str, str]()
     for name in ("a", "b", "c"):
         router.add(name)
-    router.own(OURS)
+    router.add_host(OURS, 1, "autopilot")
     router.spoke(OURS, 1)
     return router
 
 
-def test_a_message_without_target_is_for_everybody_but_its_sender(router: Router[str]) -> None:
+def test_a_message_without_target_is_for_everybody_but_its_sender(router: Router[str, str]) -> None:
     route = router.route("a", heartbeat(), 0.0)
-    assert (route.ours, route.forward) == (True, ("b", "c"))
+    assert (route.hosts, route.forward) == (("autopilot",), ("b", "c"))
     assert router.counters["forwarded"] == 2
 
 
-def test_target_0_is_everybody(router: Router[str]) -> None:
+def test_target_0_is_everybody(router: Router[str, str]) -> None:
     route = router.route("a", command(0, 0), 0.0)
-    assert (route.ours, route.forward) == (True, ("b", "c"))
+    assert (route.hosts, route.forward) == (("autopilot",), ("b", "c"))
 
 
-@pytest.mark.parametrize("component", [0, 1, 77])
-def test_a_message_to_our_system_stays_with_us(router: Router[str], component: int) -> None:
+@pytest.mark.parametrize(("component", "hosts"), [(0, ("autopilot",)), (1, ("autopilot",)), (77, ())])
+def test_a_message_to_our_system_stays_with_us(
+    router: Router[str, str], component: int, hosts: tuple[str, ...]
+) -> None:
     router.route("b", heartbeat(source=OTHER_GCS), 0.0)
     route = router.route("a", command(OURS, component), 0.0)
-    assert (route.ours, route.forward) == (True, ())
+    assert (route.hosts, route.forward) == (hosts, ())
 
 
-def test_a_companion_in_our_system_gets_what_is_addressed_to_it(router: Router[str]) -> None:
+FLEET = {(3, EVERY_COMPONENT): "all of 3", (2, 1): "autopilot 2", (1, 100): "camera 1", (1, 1): "autopilot 1"}
+"""Hosts in the order in which they are added, which is not that of their addresses."""
+
+
+@pytest.mark.parametrize(
+    ("system", "component", "hosts"),
+    [
+        (0, 0, ["autopilot 1", "camera 1", "autopilot 2", "all of 3"]),
+        (0, 1, ["autopilot 1", "autopilot 2", "all of 3"]),
+        (0, 100, ["camera 1", "all of 3"]),
+        (1, 0, ["autopilot 1", "camera 1"]),
+        (1, 1, ["autopilot 1"]),
+        (1, 100, ["camera 1"]),
+        (1, 154, []),  # our system, another's component
+        (2, 0, ["autopilot 2"]),
+        (2, 100, []),
+        (3, 0, ["all of 3"]),
+        (3, 77, ["all of 3"]),
+        (42, 0, []),
+        (42, 1, []),
+    ],
+)
+def test_hosts_are_those_that_the_target_means(system: int, component: int, hosts: list[str]) -> None:
+    router = Router[str, str]()
+    router.add("a")
+    for address, host in FLEET.items():
+        router.add_host(*address, host)
+    assert [*router.route("a", command(system, component), 0.0).hosts] == hosts
+
+
+def test_hosts_of_a_message_without_target_are_all() -> None:
+    router = Router[str, str]()
+    router.add("a")
+    for address, host in FLEET.items():
+        router.add_host(*address, host)
+    assert router.route("a", heartbeat(), 0.0).hosts == ("autopilot 1", "camera 1", "autopilot 2", "all of 3")
+    manual_control = dialect.MAVLink_manual_control_message(1, 0, 0, 0, 0, 0)  # its only target is a system
+    assert router.route("a", received(manual_control), 0.0).hosts == ("autopilot 1", "camera 1")
+
+
+def test_hosts_removed_with_their_system_leave_the_others() -> None:
+    router = Router[str, str]()
+    for address, host in FLEET.items():
+        router.add_host(*address, host)
+    router.remove_hosts(1)
+    router.remove_hosts(9)
+    assert router.hosts(0, 0) == ("autopilot 2", "all of 3")
+    assert router.hosts(1, 1) == ()
+
+
+def test_a_companion_in_our_system_gets_what_is_addressed_to_it(router: Router[str, str]) -> None:
     router.route("c", heartbeat(source=(OURS, 191)), 0.0)
     assert router.route("a", command(OURS, 191), 0.0).forward == ("c",)
     assert router.route("a", command(OURS, 1), 0.0).forward == ()
     assert router.route("a", command(OURS, 0), 0.0).forward == ()
 
 
-def test_a_foreign_system_is_reached_where_it_was_heard_and_only_there(router: Router[str]) -> None:
+def test_a_foreign_system_is_reached_where_it_was_heard_and_only_there(router: Router[str, str]) -> None:
     assert router.route("a", command(FOREIGN, 1, seq=1), 0.0).forward == ()
     router.route("b", heartbeat(source=(FOREIGN, 1)), 0.0)
     route = router.route("a", command(FOREIGN, 1, seq=2), 0.0)
-    assert (route.ours, route.forward) == (False, ("b",))
+    assert (route.hosts, route.forward) == ((), ("b",))
     # By its system, whatever component is meant (MAVLink routing.md §rules).
     assert router.route("a", command(FOREIGN, 100, seq=3), 0.0).forward == ("b",)
     # Its own channel is where the message came from: no echo.
     assert router.route("b", command(FOREIGN, 1, seq=4), 0.0).forward == ()
 
 
-def test_an_answer_finds_the_way_back(router: Router[str]) -> None:
+def test_an_answer_finds_the_way_back(router: Router[str, str]) -> None:
     router.route("a", heartbeat(), 0.0)
     ack = dialect.MAVLink_command_ack_message(400, 0, 0, 0, GCS[0], GCS[1])
     route = router.route("b", received(ack, (FOREIGN, 1)), 0.0)
-    assert (route.ours, route.forward) == (False, ("a",))
+    assert (route.hosts, route.forward) == ((), ("a",))
 
 
-def test_a_closed_channel_takes_its_systems_along(router: Router[str]) -> None:
+def test_a_closed_channel_takes_its_systems_along(router: Router[str, str]) -> None:
     router.route("b", heartbeat(source=(FOREIGN, 1)), 0.0)
     router.remove("b")
     assert router.heard_on(FOREIGN) == []
@@ -88,28 +140,28 @@ def test_a_closed_channel_takes_its_systems_along(router: Router[str]) -> None:
     assert router.route("a", command(FOREIGN, 1), 0.0).forward == ()
 
 
-def test_a_disowned_system_is_nobodys(router: Router[str]) -> None:
-    router.disown(OURS)
+def test_a_disowned_system_is_nobodys(router: Router[str, str]) -> None:
+    router.remove_hosts(OURS)
     route = router.route("a", command(OURS, 1), 0.0)
-    assert (route.ours, route.forward) == (False, ())
+    assert (route.hosts, route.forward) == ((), ())
 
 
-def test_setup_signing_is_never_passed_on(router: Router[str]) -> None:
+def test_setup_signing_is_never_passed_on(router: Router[str, str]) -> None:
     router.route("b", heartbeat(source=(FOREIGN, 1)), 0.0)
-    for target, ours in ((FOREIGN, False), (0, True), (OURS, True)):
+    for target, hosts in ((FOREIGN, ()), (0, ("autopilot",)), (OURS, ("autopilot",))):
         message = dialect.MAVLink_setup_signing_message(target, 1, [7] * 32, 1)
         route = router.route("a", received(message), 0.0)
-        assert (route.ours, route.forward) == (ours, ())
+        assert (route.hosts, route.forward) == (hosts, ())
 
 
-def test_our_own_echo_is_dropped_and_teaches_nothing(router: Router[str]) -> None:
+def test_our_own_echo_is_dropped_and_teaches_nothing(router: Router[str, str]) -> None:
     route = router.route("a", heartbeat(source=(OURS, 1)), 0.0)
-    assert (route.ours, route.forward) == (False, ())
+    assert (route.hosts, route.forward) == ((), ())
     assert router.counters["own_sources"] == 1
     assert router.heard_on(OURS) == []
 
 
-def test_a_frame_that_went_round_is_passed_on_once(router: Router[str]) -> None:
+def test_a_frame_that_went_round_is_passed_on_once(router: Router[str, str]) -> None:
     frame = heartbeat(seq=9)
     assert router.route("a", frame, 10.0).forward == ("b", "c")
     assert router.route("b", frame, 10.1).forward == ()
@@ -120,7 +172,7 @@ def test_a_frame_that_went_round_is_passed_on_once(router: Router[str]) -> None:
     assert router.route("a", frame, 10.0 + RING_WINDOW).forward == ("b", "c")
 
 
-def test_what_a_peer_can_make_us_remember_is_bounded(router: Router[str]) -> None:
+def test_what_a_peer_can_make_us_remember_is_bounded(router: Router[str, str]) -> None:
     for sysid in range(2, 250):
         for compid in (1, 2, 3):
             router.route("a", heartbeat(seq=compid, source=(sysid, compid)), 0.0)
@@ -132,15 +184,15 @@ def test_what_a_peer_can_make_us_remember_is_bounded(router: Router[str]) -> Non
     assert "b" in router.heard_on(FOREIGN)
 
 
-def test_system_0_is_nobodys_name(router: Router[str]) -> None:
-    assert router.route("a", heartbeat(source=(0, 0)), 0.0).ours
+def test_system_0_is_nobodys_name(router: Router[str, str]) -> None:
+    assert router.route("a", heartbeat(source=(0, 0)), 0.0).hosts == ("autopilot",)
     assert router.heard_on(0) == []
 
 
-def test_an_unknown_message_is_passed_on_to_all_and_not_ours(router: Router[str]) -> None:
+def test_an_unknown_message_is_passed_on_to_all_and_not_ours(router: Router[str, str]) -> None:
     unknown = Received(None, 0xABCDE, *GCS, b"\xfd\x00\x00\x00\x00\xff\xbe\xde\xbc\x0a\x00\x00")
     route = router.route("a", unknown, 0.0)
-    assert (route.ours, route.forward) == (False, ("b", "c"))
+    assert (route.hosts, route.forward) == ((), ("b", "c"))
     assert router.heard_on(GCS[0]) == []
 
 

@@ -8,11 +8,13 @@ from typing import Any
 
 import pytest
 
+from anafi_mav.clock import SystemClock
+from anafi_mav.drone import Drone
 from anafi_mav.drone.battery import BatteryState
 from anafi_mav.drone.link import LinkState
 from anafi_mav.drone.piloting_state import Attitude, PilotingState, Velocity
 from anafi_mav.mavlink import dialect
-from anafi_mav.mavlink.streams import DEFAULT_INTERVALS, ON_REQUEST
+from anafi_mav.mavlink.node import Node
 from anafi_mav.services import (
     data_streams,
     telemetry_anafi,
@@ -26,6 +28,7 @@ from anafi_mav.services.news import News
 from anafi_mav.services.shell import PROMPT, answer
 from anafi_mav.services.statustext import Severity, TextNumbers
 from anafi_mav.services.stream import Times
+from anafi_mav.services.system import System
 from anafi_mav.services.vehicle import Landed
 
 NOW = Times(1_234_567_890)
@@ -99,16 +102,47 @@ def test_groups_of_ardupilot_have_what_we_stream() -> None:
     assert list(data_streams.members(dialect.MAV_DATA_STREAM_RAW_CONTROLLER)) == []
     assert list(data_streams.members(99)) == []
     # Home is in no group of ArduCopter's either; all else that flows by itself is.
-    ours = {id for module in (telemetry_flight, telemetry_status, telemetry_link) for id in module.STREAMS}
-    assert {id for id in ours & DEFAULT_INTERVALS.keys() if id not in everything} == {
+    rows = {**telemetry_flight.STREAMS, **telemetry_status.STREAMS, **telemetry_link.STREAMS}
+    assert {id for id, row in rows.items() if row.every is not None and id not in everything} == {
         dialect.MAVLINK_MSG_ID_HOME_POSITION
     }
 
 
-def test_every_stream_is_telemetry_that_gives_way() -> None:
-    for module in (telemetry_flight, telemetry_status, telemetry_link, telemetry_anafi):
-        for id in module.STREAMS:
-            assert id in DEFAULT_INTERVALS or id in ON_REQUEST, dialect.mavlink_map[id].msgname
+async def test_default_intervals_are_those_of_the_rows() -> None:
+    clock = SystemClock()
+    system = System(Node(clock=clock), Drone("127.0.42.1"), 1, clock, 0.0, allow_kill=False)
+    rows = {id: row for service in system.services for id, row in service.streams().items()}
+    assert all(id in dialect.mavlink_map for id in rows)
+    assert {dialect.mavlink_map[id].msgname: row.every for id, row in rows.items() if row.every is not None} == {
+        "ATTITUDE": 0.1,
+        "ATTITUDE_QUATERNION": 0.1,
+        "GLOBAL_POSITION_INT": 0.2,
+        "LOCAL_POSITION_NED": 0.2,
+        "ALTITUDE": 0.2,
+        "VFR_HUD": 0.2,
+        "DISTANCE_SENSOR": 0.2,
+        "GPS_RAW_INT": 0.5,
+        "EXTENDED_SYS_STATE": 0.5,
+        "ATTITUDE_TARGET": 0.5,
+        "POSITION_TARGET_LOCAL_NED": 0.5,
+        "POSITION_TARGET_GLOBAL_INT": 0.5,
+        "ORBIT_EXECUTION_STATUS": 0.8,
+        "SYS_STATUS": 1.0,
+        "BATTERY_STATUS": 1.0,
+        "MISSION_CURRENT": 1.0,
+        "FENCE_STATUS": 1.0,
+        "RC_CHANNELS": 1.0,
+        "RADIO_STATUS": 1.0,
+        "SYSTEM_TIME": 1.0,
+        "EKF_STATUS_REPORT": 1.0,
+        "CURRENT_EVENT_SEQUENCE": 1.0,
+        "HOME_POSITION": 2.0,
+        "CURRENT_MODE": 5.0,
+        "AVAILABLE_MODES_MONITOR": 10.0,
+    }
+    # On a full channel gives way what the next one of its kind replaces, and no answer, parameter, item or text.
+    assert system.telemetry == {*rows, dialect.MAVLINK_MSG_ID_HEARTBEAT}
+    assert system.telemetry.isdisjoint({77, 22, 44, 47, 253, 110})
 
 
 def test_a_flight_is_armed_takes_off_and_lands() -> None:
