@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 
 HERE = Path(__file__).parent
-TESTS = HERE.parent / "tests" / "unit"
+TESTS = HERE.parent / "tests"
 DIALECT_XML = HERE.parent / "dialect" / "anafi.xml"
 sys.path[:0] = [str(HERE.parent), str(TESTS), str(HERE)]
 
@@ -123,7 +123,7 @@ def configuration() -> str:
 SEED = """\
 # The rows of the anafi_ros paper
 
-<!-- Made by docs/generate.py from tests/unit/seed_rows.py. -->
+<!-- Made by docs/generate.py from tests/support/seed_rows.py. -->
 
 For users of anafi_ros, and of the Python API. After reading you know the name in `anafi_mav.drone.Drone` for each
 function of that paper.
@@ -140,7 +140,7 @@ services and 25 parameters. Each row has its counterpart in `Drone`. The last co
 
 def seed() -> str:
     """docs/seed.md."""
-    from seed_rows import MODELS, ROWS, Row
+    from support.seed_rows import MODELS, ROWS, Row
 
     def shown(row: Row, model: str) -> str:
         if row.drive is None:
@@ -163,7 +163,7 @@ def seed() -> str:
 SEED_MAVLINK = """\
 # The rows of the anafi_ros paper over MAVLink
 
-<!-- Made by docs/generate.py from tests/unit/seed_mavlink.py. -->
+<!-- Made by docs/generate.py from tests/support/seed_mavlink.py. -->
 
 For users of anafi_ros who change to MAVLink. After reading you know the MAVLink message, command or parameter for each
 function of that paper ([seed.md](seed.md)). Messages that begin with `ANAFI_` are in [dialect.md](dialect.md),
@@ -176,7 +176,7 @@ parameters that begin with `ANF_` in [parameters.md](parameters.md).
 
 def seed_mavlink() -> str:
     """docs/seed-mavlink.md."""
-    from seed_mavlink import REACHED
+    from support.seed_mavlink import REACHED
 
     rows = []
     for name, reach in REACHED.items():
@@ -349,7 +349,7 @@ def parameters() -> str:
 SILENCE = """\
 # Commands that the simulator does not answer
 
-<!-- Made by docs/generate.py from tests/unit/silent_commands.py. -->
+<!-- Made by docs/generate.py from tests/support/silent_commands.py. -->
 
 For programmers who test an ARSDK controller on the simulator. After reading you know which commands have no event in
 answer, and why.
@@ -361,7 +361,7 @@ and in every relevant state. The simulator answers all of them at once by an eve
 
 def silence() -> str:
     """docs/silence.md."""
-    from silent_commands import CONTROLLERS, DRONES
+    from support.silent_commands import CONTROLLERS, DRONES
 
     parts = [SILENCE]
     for title, column, table in (("Drones", "models", DRONES), ("Skycontrollers", "generations", CONTROLLERS)):

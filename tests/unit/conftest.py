@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import AsyncIterator
 
 import pytest
-from scripted_device import SETTINGS, STATES, ScriptedDevice
+from support.scripted_device import SETTINGS, STATES, ScriptedDevice
 
 from anafi_mav.arsdk.messages import common
 from anafi_mav.arsdk.wire import Message

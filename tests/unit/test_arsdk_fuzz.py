@@ -9,7 +9,7 @@ import contextlib
 import random
 
 import pytest
-from arsdk_fuzz import throw
+from support.arsdk_fuzz import throw
 
 from anafi_mav.arsdk import handshake, wire
 from anafi_mav.arsdk.frame import VERSIONS, decode_frames

@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 
 import pytest
-from faulty_wire import Faults, FaultyWire
+from support.faulty_wire import Faults, FaultyWire
 
 from anafi_mav.arsdk import wire
 from anafi_mav.arsdk.frame import Frame, FrameType, decode_frames, encode_frame

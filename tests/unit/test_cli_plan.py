@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from plan_samples import FLIGHT
+from support.plan_samples import FLIGHT
 
 from anafi_mav.cli import main
 from anafi_mav.cli.terminal import say_table

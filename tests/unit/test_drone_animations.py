@@ -6,8 +6,8 @@ import asyncio
 import math
 
 import pytest
-from scripted_device import STATES, ScriptedDevice
-from simulated import connected, take_off
+from support.scripted_device import STATES, ScriptedDevice
+from support.simulated import connected, take_off
 
 from anafi_mav.arsdk.messages import animation, ardrone3, common
 from anafi_mav.arsdk.messages.animation import AnimationState, Indicator, Mode, PlayMode, Type

@@ -6,8 +6,8 @@ import asyncio
 from collections.abc import AsyncIterator
 
 import pytest
-from scripted_device import STATES, ScriptedDevice
-from simulated import connected
+from support.scripted_device import STATES, ScriptedDevice
+from support.simulated import connected
 
 from anafi_mav.arsdk.messages import camera as old
 from anafi_mav.arsdk.messages.proto import antiflicker as mains

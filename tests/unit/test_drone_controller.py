@@ -9,7 +9,7 @@ from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass
 
 import pytest
-from scripted_device import STATES, ScriptedDevice
+from support.scripted_device import STATES, ScriptedDevice
 from support.world import loopback
 
 from anafi_mav.arsdk.messages import (

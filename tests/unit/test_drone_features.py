@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import pytest
-from scripted_device import ScriptedDevice
-from simulated import connected
+from support.scripted_device import ScriptedDevice
+from support.simulated import connected
 
 from anafi_mav.drone.features import Feature, Support
 

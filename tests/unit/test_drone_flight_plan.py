@@ -6,8 +6,8 @@ import asyncio
 from collections.abc import AsyncIterator
 
 import pytest
-from scripted_device import STATES, ScriptedDevice
-from simulated import Pair, connected, take_off
+from support.scripted_device import STATES, ScriptedDevice
+from support.simulated import Pair, connected, take_off
 
 from anafi_mav.arsdk.messages import common
 from anafi_mav.arsdk.messages import flight_plan as modern

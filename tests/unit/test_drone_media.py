@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 from aiohttp import web
-from scripted_device import STATES, ScriptedDevice
-from simulated import Pair, connected
+from support.scripted_device import STATES, ScriptedDevice
+from support.simulated import Pair, connected
 
 from anafi_mav.arsdk.messages import common, mediastore
 from anafi_mav.arsdk.messages.mediastore import MediastoreState

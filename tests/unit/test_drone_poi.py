@@ -6,8 +6,8 @@ import asyncio
 import math
 
 import pytest
-from scripted_device import STATES, ScriptedDevice
-from simulated import connected, take_off
+from support.scripted_device import STATES, ScriptedDevice
+from support.simulated import connected, take_off
 
 from anafi_mav.arsdk.messages import ardrone3, common, controller_info, follow_me
 from anafi_mav.arsdk.messages.ardrone3 import PoiMode, PoiStatus

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 
-from scripted_device import ScriptedDevice
+from support.scripted_device import ScriptedDevice
 
 from anafi_mav.arsdk.messages import ardrone3, rth
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState

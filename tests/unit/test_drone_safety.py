@@ -8,7 +8,7 @@ from collections.abc import Awaitable, Callable
 from typing import Any
 
 import pytest
-from scripted_device import STATES, ScriptedDevice
+from support.scripted_device import STATES, ScriptedDevice
 
 from anafi_mav.arsdk.messages import animation, ardrone3, common, follow_me, rth
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState, MoveByError, PoiMode, PoiStatus

@@ -8,8 +8,8 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
-from seed_rows import MODELS, ROWS, Row
-from simulated import connected
+from support.seed_rows import MODELS, ROWS, Row
+from support.simulated import connected
 
 from anafi_mav.errors import NotSupported
 

@@ -7,7 +7,7 @@ from collections.abc import Awaitable, Callable
 from typing import Any
 
 import pytest
-from scripted_device import SETTINGS, ScriptedDevice
+from support.scripted_device import SETTINGS, ScriptedDevice
 
 from anafi_mav.arsdk.messages import ardrone3, common, obstacle_avoidance, piloting_style, precise_home, rth
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState

@@ -12,7 +12,7 @@ from collections.abc import Awaitable, Callable
 from typing import Any
 
 import pytest
-from simulated import HOME, Pair, connected, take_off
+from support.simulated import HOME, Pair, connected, take_off
 from test_drone_flight_plan import V1
 
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState

@@ -5,8 +5,8 @@ from __future__ import annotations
 import asyncio
 
 import pytest
-from scripted_device import STATES, ScriptedDevice
-from simulated import connected
+from support.scripted_device import STATES, ScriptedDevice
+from support.simulated import connected
 
 from anafi_mav.arsdk.messages import common
 from anafi_mav.arsdk.messages import user_storage as v1

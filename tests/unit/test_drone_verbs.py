@@ -8,7 +8,7 @@ import math
 from datetime import datetime
 
 import pytest
-from scripted_device import SETTINGS, STATES, ScriptedDevice
+from support.scripted_device import SETTINGS, STATES, ScriptedDevice
 
 from anafi_mav.arsdk.messages import alarms, animation, ardrone3, common, follow_me, move, rth
 from anafi_mav.arsdk.messages.ardrone3 import (

@@ -12,9 +12,9 @@ from itertools import pairwise
 
 import pytest
 from msgspec.structs import replace
-from scripted_device import ScriptedDevice
+from support.scripted_device import ScriptedDevice
+from support.video_server import KEY, METADATA, PPS, SDP, SPS, Asked, VideoServer, ok, refused
 from support.world import loopback
-from video_server import KEY, METADATA, PPS, SDP, SPS, Asked, VideoServer, ok, refused
 
 from anafi_mav.arsdk.rtcp import ReceiverReport
 from anafi_mav.arsdk.rtp_h264 import Picture, PictureSender

@@ -7,7 +7,7 @@ import math
 from itertools import pairwise
 
 import pytest
-from simulated import connected, take_off
+from support.simulated import connected, take_off
 from support.world import loopback
 
 from anafi_mav.drone import Drone, PilotingCommand

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import AsyncIterator
 
 import pytest
-from simulated import connected
+from support.simulated import connected
 
 from anafi_mav.plans.plan import Item
 from anafi_mav.plans.translate import Leg, Start, translate

@@ -6,7 +6,7 @@ import math
 
 import pytest
 from hypothesis import given, settings
-from plan_samples import FLIGHT, LAT, LON, action, plans, waypoint
+from support.plan_samples import FLIGHT, LAT, LON, action, plans, waypoint
 
 from anafi_mav.plans.plan import MISSION, RELATIVE, Item, Plan
 from anafi_mav.services.mission_items import as_carried, from_wire, to_wire

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from plan_wire import FENCE, Wire, an_item, desk, items, peer
+from support.plan_wire import FENCE, Wire, an_item, desk, items, peer
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.plan_client import (

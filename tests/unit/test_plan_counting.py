@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from plan_counting import CountingClient
-from plan_wire import FENCE, Wire, desk, items, peer, replies
+from support.plan_counting import CountingClient
+from support.plan_wire import FENCE, Wire, desk, items, peer, replies
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.flavours import ARDUPILOT

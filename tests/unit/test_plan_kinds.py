@@ -6,7 +6,7 @@ from typing import Any
 
 import msgspec
 import pytest
-from plan_wire import FENCE, MISSION, peer, replies, texts
+from support.plan_wire import FENCE, MISSION, peer, replies, texts
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.fence import FenceKind

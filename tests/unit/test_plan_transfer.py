@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from plan_wire import FENCE, MISSION, RALLY, Client, Kind, Wire, an_item, desk, items, peer, replies, texts
+from support.plan_wire import FENCE, MISSION, RALLY, Client, Kind, Wire, an_item, desk, items, peer, replies, texts
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.flavours import ARDUPILOT, PX4, STANDARD, Flavour

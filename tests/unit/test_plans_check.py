@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from plan_samples import LAT, LON, action, waypoint
+from support.plan_samples import LAT, LON, action, waypoint
 
 from anafi_mav.models import planned
 from anafi_mav.plans import files

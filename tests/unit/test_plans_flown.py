@@ -7,7 +7,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from sim_bench import HOME, Bench
+from support.sim_bench import HOME, Bench
 
 from anafi_mav import geo
 from anafi_mav.arsdk.messages import camera, common

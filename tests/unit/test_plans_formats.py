@@ -11,7 +11,9 @@ from typing import Any
 
 import pytest
 from hypothesis import given, settings
-from plan_samples import (
+from pymavlink import mavutil, mavwp
+from pymavlink.dialects.v20 import common
+from support.plan_samples import (
     FLIGHT,
     LAT,
     LON,
@@ -25,8 +27,6 @@ from plan_samples import (
     survey,
     waypoint,
 )
-from pymavlink import mavutil, mavwp
-from pymavlink.dialects.v20 import common
 
 from anafi_mav import geo
 from anafi_mav.errors import PlanError

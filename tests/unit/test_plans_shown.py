@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from plan_samples import FLIGHT, document, encoded, structure_scan, waypoint
+from support.plan_samples import FLIGHT, document, encoded, structure_scan, waypoint
 
 from anafi_mav.errors import PlanError
 from anafi_mav.plans import files, path, plot, table

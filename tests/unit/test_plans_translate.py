@@ -10,7 +10,7 @@ from random import Random
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from plan_samples import LAT, LON, action, waypoint
+from support.plan_samples import LAT, LON, action, waypoint
 
 from anafi_mav.errors import PlanError
 from anafi_mav.plans.parrot import Version

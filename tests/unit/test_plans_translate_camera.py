@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from plan_samples import LAT, LON, PARROTS_EXAMPLE, action, waypoint
+from support.plan_samples import LAT, LON, PARROTS_EXAMPLE, action, waypoint
 
 from anafi_mav.errors import PlanError
 from anafi_mav.plans import files, parrot

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from python_api import classes, members
+from support.python_api import classes, members
 
 from anafi_mav import drone
 from anafi_mav.drone import events

@@ -7,8 +7,8 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-from seed_mavlink import PAYLOAD, REACHED
-from seed_rows import ROWS
+from support.seed_mavlink import PAYLOAD, REACHED
+from support.seed_rows import ROWS
 
 TESTS = Path(__file__).parents[1]
 

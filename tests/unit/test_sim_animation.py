@@ -6,7 +6,7 @@ import itertools
 import math
 
 import pytest
-from sim_bench import HOME, Bench
+from support.sim_bench import HOME, Bench
 
 from anafi_mav.arsdk.messages import animation, ardrone3, camera, follow_me, rth
 from anafi_mav.arsdk.messages.animation import AnimationState, Indicator, PlayMode, Type

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 
 import pytest
-from sim_bench import Bench
+from support.sim_bench import Bench
 
 from anafi_mav.arsdk.messages import ardrone3, camera, common, mediastore, thermal, user_storage
 from anafi_mav.arsdk.messages.camera import (

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 import pytest
-from sim_bench import Bench
+from support.sim_bench import Bench
 
 from anafi_mav.arsdk.messages import ardrone3, camera, user_storage_v2
 from anafi_mav.arsdk.messages.proto import camera2

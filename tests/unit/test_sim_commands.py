@@ -8,7 +8,7 @@ import struct
 from typing import Any
 
 import pytest
-from sim_bench import Bench
+from support.sim_bench import Bench
 
 import anafi_mav.arsdk.messages
 import anafi_mav.arsdk.messages.proto  # noqa: F401 # declares the protobuf ones too

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from sim_bench import Bench
+from support.sim_bench import Bench
 
 from anafi_mav.arsdk.messages import alarms, ardrone3, battery, common
 from anafi_mav.arsdk.messages.alarms import State, TakeoffChecklistType, Type

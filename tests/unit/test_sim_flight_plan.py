@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import pytest
-from plan_samples import PARROTS_EXAMPLE
-from sim_bench import HOME, Bench
+from support.plan_samples import PARROTS_EXAMPLE
+from support.sim_bench import HOME, Bench
 
 from anafi_mav import geo
 from anafi_mav.arsdk.messages import ardrone3, camera, common, flight_plan, rth

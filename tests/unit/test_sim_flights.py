@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
-from sim_flights import FLIGHTS, recorded
+from support.sim_flights import FLIGHTS, recorded
 
 RECORDED = recorded()
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
-from sim_bench import HOME, Bench
+from support.sim_bench import HOME, Bench
 
 from anafi_mav.arsdk.messages import ardrone3, common, controller_info, follow_me, rth
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState, PoiMode, PoiStatus

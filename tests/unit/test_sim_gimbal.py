@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
-from sim_bench import Bench
+from support.sim_bench import Bench
 
 from anafi_mav.arsdk.messages import gimbal
 from anafi_mav.arsdk.messages.gimbal import (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from sim_bench import HOME, Bench
+from support.sim_bench import HOME, Bench
 
 from anafi_mav import geo
 from anafi_mav.arsdk.messages import alarms, ardrone3, rth

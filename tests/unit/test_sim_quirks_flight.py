@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from sim_bench import Bench
+from support.sim_bench import Bench
 
 from anafi_mav.arsdk.messages import ardrone3, rth
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState

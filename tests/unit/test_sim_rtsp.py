@@ -10,8 +10,8 @@ from contextlib import asynccontextmanager
 from typing import Any
 
 import pytest
-from rtsp_client import LIMIT, Viewer, viewer
-from sim_bench import Bench
+from support.rtsp_client import LIMIT, Viewer, viewer
+from support.sim_bench import Bench
 
 from anafi_mav.arsdk import rtcp, rtsp
 from anafi_mav.arsdk.messages import ardrone3

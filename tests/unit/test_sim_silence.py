@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import pytest
-from reactions import COMMANDS, MODELS, OF_A_CONTROLLER, unanswered, unanswered_by_controller
-from silent_commands import CONTROLLERS, DRONES, reason
+from support.reactions import COMMANDS, MODELS, OF_A_CONTROLLER, unanswered, unanswered_by_controller
+from support.silent_commands import CONTROLLERS, DRONES, reason
 
 
 @pytest.mark.parametrize("model", MODELS)

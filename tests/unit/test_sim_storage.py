@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from sim_bench import Bench
+from support.sim_bench import Bench
 
 from anafi_mav.arsdk.messages import camera, mediastore, user_storage, user_storage_v2
 from anafi_mav.arsdk.messages.camera import Availability, CameraCameraMode, PhotoResult, RecordingResult, State

@@ -8,7 +8,7 @@ from typing import Any
 
 import cv2
 import pytest
-from sim_bench import HOME, Bench
+from support.sim_bench import HOME, Bench
 
 from anafi_mav.arsdk.messages import animation, ardrone3, camera, controller_info, follow_me, gimbal, rth
 from anafi_mav.arsdk.messages.camera import ExposureMode, IsoSensitivity, ShutterSpeed, WhiteBalanceMode

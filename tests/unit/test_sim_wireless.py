@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from sim_bench import Bench
+from support.sim_bench import Bench
 
 from anafi_mav.arsdk.messages import wifi
 from anafi_mav.arsdk.messages.proto import connectivity

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+
 from support.olympe import during, failed
 
 PRODUCTS = {"4k": 0x0914, "thermal": 0x0919, "usa": 0x091E, "ai": 0x091A}

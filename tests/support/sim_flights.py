@@ -3,7 +3,7 @@
 The record was made by the simulator with steps of 5 ms. Run this module to make it again, which is right only when the
 motion is meant to change:
 
-    .venv/bin/python tests/unit/sim_flights.py
+    PYTHONPATH=tests .venv/bin/python -m support.sim_flights
 
 Commands leave and poses are noted at multiples of 0.05 s, which is a whole number of steps at 200 Hz and at 60 Hz.
 """
@@ -18,8 +18,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeAlias
 
-from sim_bench import HOME, Bench
-
 from anafi_mav import geo
 from anafi_mav.arsdk.messages import ardrone3, move
 from anafi_mav.arsdk.messages.ardrone3 import PCMD, OrientationMode
@@ -30,6 +28,7 @@ from anafi_mav.services.circle import Circle, Lap
 from anafi_mav.services.offboard_control import Controller, Motion
 from anafi_mav.services.place import Place
 from anafi_mav.sim.motion import STEP
+from support.sim_bench import HOME, Bench
 
 RECORD = Path(__file__).with_suffix(".json")
 

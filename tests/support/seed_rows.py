@@ -12,8 +12,6 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from simulated import Pair, take_off
-
 from anafi_mav.arsdk.messages import common, gimbal
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.messages.piloting_style import PilotingStyleStyle
@@ -26,6 +24,7 @@ from anafi_mav.drone.camera_state import PhotoSettings
 from anafi_mav.drone.camera_words import CameraMode, PhotoMode, Streaming, Style
 from anafi_mav.drone.gimbal import Aim
 from anafi_mav.drone.video import VideoFrame
+from support.simulated import Pair, take_off
 
 MODELS = ("4k", "thermal", "usa", "ai")
 OLDER = ("4k", "thermal", "usa")

@@ -12,11 +12,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from plan_wire import FENCE
-
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.plan_items import PlanItem, item_int
 from anafi_mav.services.plan_transfer import Peer
+from support.plan_wire import FENCE
 
 LIMIT, TIMEOUT = 5, 0.5
 

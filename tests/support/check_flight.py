@@ -8,11 +8,11 @@ import re
 from typing import Any
 
 import pytest
-from support.olympe import failed
-from support.world import HOME
 
 from anafi_mav import geo
 from anafi_mav.arsdk.messages.ardrone3 import MoveToStatus
+from support.olympe import failed
+from support.world import HOME
 
 FAILS = {
     "beyond the range": "the drone takes MaxTilt(60) to 40, as the aircraft does, and Olympe waits for the 60 it sent",

@@ -9,8 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from sim_bench import HOME, Bench
-
 import anafi_mav.arsdk.messages
 import anafi_mav.arsdk.messages.proto  # noqa: F401 # declares the protobuf ones too
 from anafi_mav.arsdk.envelope import ProtobufMessage
@@ -31,6 +29,7 @@ from anafi_mav.arsdk.wire import (
 )
 from anafi_mav.sim.place import Origin
 from anafi_mav.sim.skycontroller import Skycontroller
+from support.sim_bench import HOME, Bench
 
 MODELS = ("4k", "thermal", "usa", "ai")
 COMMANDS = sorted((m for m in declared_messages() if m.DIRECTION is Direction.COMMAND), key=lambda m: m.NAME)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
 from support.olympe import failed
 from support.poses import pose_at
 

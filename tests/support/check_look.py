@@ -6,9 +6,9 @@ import math
 from typing import Any
 
 import pytest
-from support.olympe import during, failed
 
 from anafi_mav.geo import offset
+from support.olympe import during, failed
 
 SIZES = {
     "DefaultVideo": [1280, 720],
