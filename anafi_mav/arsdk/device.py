@@ -10,10 +10,10 @@ from collections.abc import Awaitable, Callable
 from typing import TypeAlias
 
 from anafi_mav.arsdk import handshake
+from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
 from anafi_mav.arsdk.handshake import ConnectReply, ConnectRequest, DeviceInfo
 from anafi_mav.arsdk.session import OnMessage, Session, reason_of
 from anafi_mav.arsdk.transport import Role, Transport
-from anafi_mav.arsdk.wire import Message, UnknownMessage
 from anafi_mav.errors import RemoteProtocolError
 
 log = logging.getLogger("anafi_mav.arsdk")

@@ -17,6 +17,7 @@ from typing import TypeAlias, cast
 
 from typing_extensions import assert_never
 
+from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
 from anafi_mav.arsdk.transport import (
     Delivered,
     Event,
@@ -28,7 +29,6 @@ from anafi_mav.arsdk.transport import (
     Transport,
     Undelivered,
 )
-from anafi_mav.arsdk.wire import Message, UnknownMessage
 
 log = logging.getLogger("anafi_mav.arsdk")
 raw_log = logging.getLogger("anafi_mav.raw")

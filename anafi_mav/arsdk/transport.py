@@ -26,10 +26,10 @@ from typing import TypeAlias
 
 import msgspec
 
-from anafi_mav.arsdk import wire
+from anafi_mav.arsdk.codec import wire
+from anafi_mav.arsdk.codec.wire import Buffer, Message, MessageId, UnknownMessage
 from anafi_mav.arsdk.frame import VERSIONS, FrameType, decode_frames, encode_frame
 from anafi_mav.arsdk.packing import PACK_LIMIT, Piece, Unpacker, Waiting, longest_command, pack, with_length
-from anafi_mav.arsdk.wire import Buffer, Message, MessageId, UnknownMessage
 from anafi_mav.errors import LocalProtocolError
 
 PING, PONG = 0, 1

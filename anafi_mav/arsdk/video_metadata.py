@@ -19,7 +19,7 @@ from typing import NamedTuple, TypeVar
 
 import msgspec
 
-from anafi_mav.arsdk.wire import OpenEnum
+from anafi_mav.arsdk.codec.wire import OpenEnum
 from anafi_mav.errors import LocalProtocolError
 
 V3_PROFILE = 0x5033

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, TypeVar
 
-from anafi_mav.arsdk.protobuf import (
+from anafi_mav.arsdk.codec.protobuf import (
     BOOL,
     DOUBLE,
     ENUM,

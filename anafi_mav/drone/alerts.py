@@ -9,12 +9,12 @@ from typing import ClassVar, NamedTuple
 import msgspec
 from msgspec.structs import replace
 
+from anafi_mav.arsdk.codec.wire import Message, OpenEnum
 from anafi_mav.arsdk.messages import alarms, ardrone3
 from anafi_mav.arsdk.messages.alarms import TakeoffChecklistType
 from anafi_mav.arsdk.messages.ardrone3 import AlertState, ForcedLandingReason, MotorError, WarningLevel
 from anafi_mav.arsdk.messages.battery import AlertLevel, BatteryAlert
 from anafi_mav.arsdk.messages.common import Sensor
-from anafi_mav.arsdk.wire import Message, OpenEnum
 from anafi_mav.drone.battery import BatteryState
 from anafi_mav.drone.calibration import CalibrationState
 from anafi_mav.drone.element import Element, Reducer, with_item

@@ -13,9 +13,9 @@ from typing import Any, ClassVar
 import msgspec
 from msgspec.structs import replace
 
+from anafi_mav.arsdk.codec.wire import Message, OpenEnum
 from anafi_mav.arsdk.messages import animation
 from anafi_mav.arsdk.messages.animation import AnimationState, Indicator, Mode, PlayMode, Type, VertigoFinishAction
-from anafi_mav.arsdk.wire import Message, OpenEnum
 from anafi_mav.drone.alerts import spoken
 from anafi_mav.drone.element import Reducer, members, with_item
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT

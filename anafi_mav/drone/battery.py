@@ -8,9 +8,9 @@ from typing import ClassVar
 import msgspec
 from msgspec.structs import replace
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import battery, common
 from anafi_mav.arsdk.messages.battery import AlertLevel, BatteryAlert
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone.element import Element, Reducer, with_item
 
 

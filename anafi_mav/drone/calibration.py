@@ -8,9 +8,9 @@ from typing import Any, ClassVar
 import msgspec
 from msgspec.structs import replace
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import common
 from anafi_mav.arsdk.messages.common import CalibrationAxis, Sensor
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone.element import Reducer, with_item
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT
 from anafi_mav.drone.settings import Commanding

@@ -11,9 +11,9 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, TypeAlias
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages.proto import antiflicker as mains
 from anafi_mav.arsdk.messages.proto import camera2
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone import camera_classic, camera_modern
 from anafi_mav.drone.camera_classic import Classic
 from anafi_mav.drone.camera_modern import Modern

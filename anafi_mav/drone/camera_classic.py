@@ -8,6 +8,7 @@ from typing import Any
 
 from msgspec.structs import replace
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import camera as wire
 from anafi_mav.arsdk.messages.camera import (
     AutoExposureMeteringMode,
@@ -34,7 +35,6 @@ from anafi_mav.arsdk.messages.camera import (
     WhiteBalanceTemperature,
     ZoomControlMode,
 )
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone.alerts import spoken
 from anafi_mav.drone.camera_state import (
     MAX_OPTIONS,

@@ -12,9 +12,9 @@ from typing import Any
 
 from msgspec.structs import replace
 
+from anafi_mav.arsdk.codec.wire import Message, OpenEnum
 from anafi_mav.arsdk.messages.proto import antiflicker as mains
 from anafi_mav.arsdk.messages.proto import camera2 as wire
-from anafi_mav.arsdk.wire import Message, OpenEnum
 from anafi_mav.drone.alerts import spoken
 from anafi_mav.drone.camera_state import (
     MAX_OPTIONS,

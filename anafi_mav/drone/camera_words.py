@@ -14,7 +14,7 @@ from fractions import Fraction
 from functools import lru_cache
 from typing import TypeVar
 
-from anafi_mav.arsdk.wire import OpenEnum
+from anafi_mav.arsdk.codec.wire import OpenEnum
 from anafi_mav.errors import LocalProtocolError, NotSupported
 
 

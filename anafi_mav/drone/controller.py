@@ -17,6 +17,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import (
     animation,
     ardrone3,
@@ -32,7 +33,6 @@ from anafi_mav.arsdk.messages.drone_manager import DroneManagerConnectionState a
 from anafi_mav.arsdk.messages.generic import ListFlags
 from anafi_mav.arsdk.messages.proto import controller_network, device_manager
 from anafi_mav.arsdk.messages.skyctrl import Source
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone.controller_state import REDUCERS, ControllerState, KnownDrone
 from anafi_mav.drone.element import Element, Reducer
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, loop_time

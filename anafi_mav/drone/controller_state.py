@@ -12,12 +12,12 @@ from collections.abc import Mapping
 import msgspec
 from msgspec.structs import replace
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import drone_manager, mapper, skyctrl
 from anafi_mav.arsdk.messages.drone_manager import DroneManagerConnectionState as Connection
 from anafi_mav.arsdk.messages.mapper import ButtonEvent
 from anafi_mav.arsdk.messages.proto import controller_network, device_manager, network
 from anafi_mav.arsdk.messages.skyctrl import BatteryStatus, CalibrationStatus, Source
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone.element import MAX_ITEMS, Position, Reducer, position, with_item
 
 MAX_AXIS = 5

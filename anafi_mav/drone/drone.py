@@ -17,6 +17,7 @@ from typing import Any, TypeAlias, TypeVar
 
 from anafi_mav import models
 from anafi_mav.arsdk import mux_link
+from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
 from anafi_mav.arsdk.controller import ControllerSession
 from anafi_mav.arsdk.handshake import DISCOVERY_PORT
 from anafi_mav.arsdk.messages import ardrone3, common, drone_manager, rth, skyctrl
@@ -28,7 +29,6 @@ from anafi_mav.arsdk.messages.drone_manager import DroneManagerConnectionState a
 from anafi_mav.arsdk.messages.follow_me import Mode as FollowMeMode
 from anafi_mav.arsdk.messages.proto import device_manager
 from anafi_mav.arsdk.rtsp import DEFAULT_PORT as RTSP_PORT
-from anafi_mav.arsdk.wire import Message, UnknownMessage
 from anafi_mav.clock import Clock, SystemClock
 from anafi_mav.drone import inquiry
 from anafi_mav.drone.alerts import Alerts, Blocker, spoken, takeoff_blockers

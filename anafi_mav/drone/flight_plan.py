@@ -13,11 +13,11 @@ from typing import Any, ClassVar
 import msgspec
 from msgspec.structs import replace
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import common
 from anafi_mav.arsdk.messages import flight_plan as modern
 from anafi_mav.arsdk.messages.common import FlightPlanComponent, MavlinkType, PlayError, PlayingState
 from anafi_mav.arsdk.messages.flight_plan import Indicator, SupportedCapabilities
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone.alerts import spoken
 from anafi_mav.drone.element import Reducer, members, with_item
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, loop_time

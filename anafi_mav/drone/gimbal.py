@@ -17,6 +17,7 @@ from typing import ClassVar
 import msgspec
 from msgspec.structs import replace
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import gimbal
 from anafi_mav.arsdk.messages.gimbal import (
     Axis,
@@ -27,7 +28,6 @@ from anafi_mav.arsdk.messages.gimbal import (
     GimbalCalibrationState,
     Model,
 )
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone.element import Range, Reducer, members, with_item
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT
 from anafi_mav.drone.settings import Commanding

@@ -12,6 +12,7 @@ from typing import ClassVar
 import msgspec
 from msgspec.structs import replace
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import ardrone3, common, precise_home, rth
 from anafi_mav.arsdk.messages.precise_home import PreciseHomeMode, PreciseHomeState
 from anafi_mav.arsdk.messages.rth import (
@@ -24,7 +25,6 @@ from anafi_mav.arsdk.messages.rth import (
     RthState,
     StateReason,
 )
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone.element import Position, Range, Reducer, members, position, setting
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT
 from anafi_mav.drone.settings import Commanding

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 
-from anafi_mav.arsdk.wire import Message
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.drone.expectation import Commander
 from anafi_mav.drone.settings import Question
 from anafi_mav.errors import CommandTimeout, LinkLost

@@ -8,8 +8,8 @@ from typing import ClassVar
 import msgspec
 from msgspec.structs import replace
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import common, wifi
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone.element import Element, Reducer
 
 _QUALITY = 0x0F

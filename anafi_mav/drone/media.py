@@ -18,9 +18,9 @@ import aiohttp
 import msgspec
 from msgspec.structs import replace
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import mediastore
 from anafi_mav.arsdk.messages.mediastore import MediastoreState
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone.element import Reducer
 from anafi_mav.drone.expectation import Commander
 from anafi_mav.drone.rest import Rest

@@ -21,10 +21,10 @@ from typing import Any
 import msgspec
 
 from anafi_mav import geo
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import ardrone3, rth
 from anafi_mav.arsdk.messages.ardrone3 import MoveByError, MoveToStatus
 from anafi_mav.arsdk.messages.rth import StateReason
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone.element import Position, position
 from anafi_mav.drone.expectation import Expectation
 from anafi_mav.drone.home import Home

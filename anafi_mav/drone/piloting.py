@@ -15,11 +15,11 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import animation, ardrone3, common, follow_me, rth
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState, MoveToStatus, PoiStatus
 from anafi_mav.arsdk.messages.common import PlayingState
 from anafi_mav.arsdk.messages.follow_me import Mode as FollowMeMode
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone.element import Reducer
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, QUIET, Commander, loop_time
 from anafi_mav.drone.home import Home

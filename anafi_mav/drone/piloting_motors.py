@@ -10,9 +10,9 @@ import asyncio
 import math
 from collections.abc import Callable
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import ardrone3, common
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone.element import Element
 from anafi_mav.drone.expectation import QUIET, Commander, Expectation, loop_time
 from anafi_mav.drone.piloting_state import MOTORS_OFF, PilotingState, in_state

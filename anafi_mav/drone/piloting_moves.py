@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import math
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.arsdk.messages import move as guided
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState, OrientationMode
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone.element import Element, Position
 from anafi_mav.drone.expectation import Commander, loop_time
 from anafi_mav.drone.home import Home

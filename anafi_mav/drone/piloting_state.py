@@ -8,12 +8,12 @@ from collections.abc import Mapping
 import msgspec
 from msgspec.structs import replace
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import animation, ardrone3, common, follow_me, move, obstacle_avoidance, piloting_style
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState, Motion, MoveToStatus, PoiStatus
 from anafi_mav.arsdk.messages.common import PlayingState
 from anafi_mav.arsdk.messages.follow_me import Mode as FollowMeMode
 from anafi_mav.arsdk.messages.piloting_style import PilotingStyleStyle
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone.alerts import spoken
 from anafi_mav.drone.element import Position, Range, Reducer, finite, members, position, setting
 from anafi_mav.drone.sticks import Limits

@@ -9,11 +9,11 @@ from typing import Any, ClassVar
 import msgspec
 from msgspec.structs import replace
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.arsdk.messages import poi as modern
 from anafi_mav.arsdk.messages.ardrone3 import PoiMode, PoiStatus
 from anafi_mav.arsdk.messages.poi import Indicator
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone.alerts import spoken
 from anafi_mav.drone.element import Position, Reducer, members, position
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT

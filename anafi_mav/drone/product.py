@@ -8,8 +8,8 @@ from typing import ClassVar
 import msgspec
 from msgspec.structs import replace
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import ardrone3, common
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone.element import Element, Reducer
 from anafi_mav.models import BY_ID, Model
 

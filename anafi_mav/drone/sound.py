@@ -7,9 +7,9 @@ from typing import ClassVar
 
 import msgspec
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.arsdk.messages.ardrone3 import AlertSoundState
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone.element import Reducer
 from anafi_mav.drone.settings import Commanding
 

@@ -13,6 +13,7 @@ from typing import Any, ClassVar
 import msgspec
 from msgspec.structs import replace
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import user_storage as v1
 from anafi_mav.arsdk.messages import user_storage_v2 as v2
 from anafi_mav.arsdk.messages.proto import storage as v3
@@ -25,7 +26,6 @@ from anafi_mav.arsdk.messages.user_storage import (
     FsState,
     PhyState,
 )
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone.alerts import spoken
 from anafi_mav.drone.element import EMPTY, REMOVE, Reducer, members, with_item
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT

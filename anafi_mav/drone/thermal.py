@@ -11,6 +11,7 @@ from typing import ClassVar
 import msgspec
 from msgspec.structs import replace
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import thermal
 from anafi_mav.arsdk.messages.thermal import (
     ColorizationMode,
@@ -22,7 +23,6 @@ from anafi_mav.arsdk.messages.thermal import (
     ThermalMode,
 )
 from anafi_mav.arsdk.messages.thermal import Range as Sensitivity
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone.element import EMPTY, FIRST, LAST, Reducer, finite, members
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT
 from anafi_mav.drone.settings import Commanding, number

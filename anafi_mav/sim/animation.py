@@ -12,10 +12,10 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import animation
 from anafi_mav.arsdk.messages.animation import AnimationState, Indicator, Mode, Type
 from anafi_mav.arsdk.messages.generic import ListFlags
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.sim.body import Body
 from anafi_mav.sim.figures import NEEDS_TARGET, Figure, Leg, Stage, Target, figure
 from anafi_mav.sim.model import Model

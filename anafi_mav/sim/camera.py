@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable, Iterable
 from typing import Any
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import camera
 from anafi_mav.arsdk.messages.camera import (
     AutoExposureMeteringMode,
@@ -36,7 +37,6 @@ from anafi_mav.arsdk.messages.camera import (
     WhiteBalanceTemperature,
     ZoomControlMode,
 )
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.sim.lenses import BITRATES, LOWEST_BITRATE, WIDTHS, Lens, Photos, Recording
 from anafi_mav.sim.model import Range
 from anafi_mav.sim.optics import Optics, seconds, sensitivity, white_balance, zoomed

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import Any
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import camera
 from anafi_mav.arsdk.messages.camera import CameraAntiflickerMode, CameraCameraMode, State, Supported
 from anafi_mav.arsdk.messages.generic import ListFlags
 from anafi_mav.arsdk.messages.thermal import ThermalMode
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.sim.camera import Camera, bits
 from anafi_mav.sim.capture import Capture, Studio
 from anafi_mav.sim.model import Model

@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import camera
 from anafi_mav.arsdk.messages.camera import (
     Availability,
@@ -25,7 +26,6 @@ from anafi_mav.arsdk.messages.camera import (
     RecordingResult,
     State,
 )
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.sim import picture
 from anafi_mav.sim.calendar import Calendar
 from anafi_mav.sim.camera import Camera

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import common
 from anafi_mav.arsdk.messages.common import CalibrationAxis
-from anafi_mav.arsdk.wire import Message
 
 AXIS_TIME = 2.0
 """s that each axis takes."""

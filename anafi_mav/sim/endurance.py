@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import math
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import ardrone3, rth
 from anafi_mav.arsdk.messages.ardrone3 import BatteryCapacityStatus, ForcedLandingReason
 from anafi_mav.arsdk.messages.rth import AutoTriggerReason, RthAutoTriggerMode, RthHomeReachability
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.sim import homing, power
 from anafi_mav.sim.model import Model
 from anafi_mav.sim.motion import Pose

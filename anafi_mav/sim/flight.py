@@ -12,11 +12,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import ardrone3, common
 from anafi_mav.arsdk.messages.alarms import TakeoffChecklistType, Type
 from anafi_mav.arsdk.messages.ardrone3 import AlertState, FlyingState
 from anafi_mav.arsdk.messages.rth import RthEndingBehavior, StateReason
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.sim import power
 from anafi_mav.sim.animation import Animations
 from anafi_mav.sim.body import Body

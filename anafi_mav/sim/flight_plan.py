@@ -11,10 +11,10 @@ import math
 from collections.abc import Callable
 from typing import Any, Protocol
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import common, flight_plan
 from anafi_mav.arsdk.messages.common import FlightPlanComponent as Part
 from anafi_mav.arsdk.messages.common import MavlinkType, PlayError, PlayingState
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.sim.body import Body
 from anafi_mav.sim.faults import Faults
 from anafi_mav.sim.model import Model

@@ -13,9 +13,9 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import controller_info, follow_me
 from anafi_mav.arsdk.messages.follow_me import Animation, Behavior, GeoRelConfigureParam, Input, Mode
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.sim.body import Body
 from anafi_mav.sim.motion import Pose
 from anafi_mav.sim.place import Origin

@@ -14,9 +14,9 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import gimbal
 from anafi_mav.arsdk.messages.gimbal import Axis, ControlMode, FrameOfReference, GimbalCalibrationState
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.sim.model import GimbalModel, Model, Range
 from anafi_mav.sim.motion import Pose
 from anafi_mav.units import DEG_PER_RAD, clip, wrap_pi

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import ardrone3, move
 from anafi_mav.arsdk.messages.ardrone3 import MoveByError, MoveToStatus
 from anafi_mav.arsdk.messages.rth import RthEndingBehavior
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.sim.body import Body
 from anafi_mav.sim.faults import Faults
 from anafi_mav.sim.homing import Homing

@@ -12,9 +12,9 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import ardrone3, rth
 from anafi_mav.arsdk.messages.rth import RthEndingBehavior, RthHomeType, RthState, StateReason
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.sim.body import Body
 from anafi_mav.sim.faults import Faults
 from anafi_mav.sim.motion import Pose, Turn

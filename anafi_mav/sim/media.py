@@ -12,9 +12,9 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import mediastore
 from anafi_mav.arsdk.messages.mediastore import MediastoreState
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.sim import picture, xmp
 from anafi_mav.sim.picture import Scene
 

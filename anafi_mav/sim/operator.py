@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import Any
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import camera, gimbal
 from anafi_mav.arsdk.messages.gimbal import ControlMode, FrameOfReference
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.sim.gimbal import Gimbals
 from anafi_mav.sim.motion import Pose
 from anafi_mav.sim.payload import Payload

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import camera
 from anafi_mav.arsdk.messages.thermal import ThermalMode
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.sim.calendar import Calendar
 from anafi_mav.sim.camera2 import Camera2
 from anafi_mav.sim.cameras import Cameras

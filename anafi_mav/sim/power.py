@@ -7,11 +7,11 @@ assumed: Parrot publishes none.
 
 from __future__ import annotations
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import battery, common
 from anafi_mav.arsdk.messages.ardrone3 import AlertState
 from anafi_mav.arsdk.messages.battery import AlertLevel, BatteryAlert
 from anafi_mav.arsdk.messages.generic import ListFlags
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.sim.model import Model
 
 LOW, CRITICAL, EMPTY = 20, 10, 4

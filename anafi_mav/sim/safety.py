@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Collection
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import alarms, ardrone3
 from anafi_mav.arsdk.messages.alarms import State, TakeoffChecklistType, Type
 from anafi_mav.arsdk.messages.ardrone3 import LastMotorError, Motion, MotorError, WarningLevel
 from anafi_mav.arsdk.messages.generic import ListFlags
-from anafi_mav.arsdk.wire import Message
 
 ALARMS = (
     Type.USER_EMERGENCY,

@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import Any
 
+from anafi_mav.arsdk.codec.protobuf import Empty
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import flight_plan, move, obstacle_avoidance
 from anafi_mav.arsdk.messages.proto import antiflicker, connectivity, developer, network, piloting, pointnfly, privacy
-from anafi_mav.arsdk.protobuf import Empty
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.sim.wireless import Radio
 from anafi_mav.units import clip
 

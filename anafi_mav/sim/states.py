@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import (
     ardrone3,
     common,
@@ -15,7 +16,6 @@ from anafi_mav.arsdk.messages import (
     precise_home,
     wifi,
 )
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.sim.firmware import Firmware
 from anafi_mav.sim.safety import checklist
 from anafi_mav.sim.wireless import COUNTRIES, RSSI

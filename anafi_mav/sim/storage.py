@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import user_storage as v1
 from anafi_mav.arsdk.messages import user_storage_v2 as v2
 from anafi_mav.arsdk.messages.generic import ListFlags
 from anafi_mav.arsdk.messages.user_storage import FormattingResult, FormattingStep, FormattingType, FsState, PhyState
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.sim.media import MediaStore
 from anafi_mav.sim.model import Card, Model
 

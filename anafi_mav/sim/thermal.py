@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterable
 from typing import Any
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import thermal
 from anafi_mav.arsdk.messages.generic import ListFlags
 from anafi_mav.arsdk.messages.thermal import (
@@ -18,7 +19,6 @@ from anafi_mav.arsdk.messages.thermal import (
     SpotType,
     ThermalMode,
 )
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.units import clip
 
 MAX_PALETTE = 256

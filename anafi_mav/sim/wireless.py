@@ -10,10 +10,10 @@ from typing import Any
 
 from msgspec.structs import replace
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import wifi
 from anafi_mav.arsdk.messages.generic import ListFlags
 from anafi_mav.arsdk.messages.proto import connectivity
-from anafi_mav.arsdk.wire import Message
 
 RADIO = 0
 """Id of the one radio."""

@@ -14,8 +14,8 @@ from support.plans import Item
 from support.setpoints import POSITION_ONLY, engage, local, streaming
 from support.world import HOME, WEB_PORT, World, loopback, world
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import rth
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.config import Config, DroneConfig
 from anafi_mav.gateway import Gateway
 from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator

@@ -11,11 +11,8 @@ from typing import Any
 
 import anafi_mav.arsdk.messages
 import anafi_mav.arsdk.messages.proto  # noqa: F401 # declares the protobuf ones too
-from anafi_mav.arsdk.envelope import ProtobufMessage
-from anafi_mav.arsdk.handshake import DeviceInfo
-from anafi_mav.arsdk.messages import animation, ardrone3, common, follow_me, rth
-from anafi_mav.arsdk.messages.ardrone3 import FlyingState, MoveToStatus, PoiMode
-from anafi_mav.arsdk.wire import (
+from anafi_mav.arsdk.codec.envelope import ProtobufMessage
+from anafi_mav.arsdk.codec.wire import (
     Bits,
     Blob,
     Direction,
@@ -27,6 +24,9 @@ from anafi_mav.arsdk.wire import (
     declared_messages,
     wire_fields,
 )
+from anafi_mav.arsdk.handshake import DeviceInfo
+from anafi_mav.arsdk.messages import animation, ardrone3, common, follow_me, rth
+from anafi_mav.arsdk.messages.ardrone3 import FlyingState, MoveToStatus, PoiMode
 from anafi_mav.sim.place import Origin
 from anafi_mav.sim.skycontroller import Skycontroller
 from support.sim_bench import HOME, Bench

@@ -6,9 +6,9 @@ import random
 from collections.abc import Callable
 from typing import Any, TypeVar
 
+from anafi_mav.arsdk.codec.wire import Message, encode
 from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
-from anafi_mav.arsdk.wire import Message, encode
 from anafi_mav.sim.body import Body
 from anafi_mav.sim.faults import Faults
 from anafi_mav.sim.firmware import Firmware, Identity

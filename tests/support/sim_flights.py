@@ -19,9 +19,9 @@ from pathlib import Path
 from typing import TypeAlias
 
 from anafi_mav import geo
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import ardrone3, move
 from anafi_mav.arsdk.messages.ardrone3 import PCMD, OrientationMode
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone import Limits
 from anafi_mav.drone.sticks import percent
 from anafi_mav.services.circle import Circle, Lap

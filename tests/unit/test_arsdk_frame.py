@@ -6,7 +6,7 @@ from collections import deque
 
 import pytest
 
-from anafi_mav.arsdk import wire
+from anafi_mav.arsdk.codec import wire
 from anafi_mav.arsdk.frame import Frame, FrameType, decode_frames, decode_varint, encode_frame, encode_varint
 from anafi_mav.arsdk.messages import ardrone3, common
 from anafi_mav.arsdk.packing import Unpacker, Waiting, pack, with_length

@@ -11,10 +11,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from anafi_mav.arsdk import protobuf, wire
-from anafi_mav.arsdk.envelope import ProtobufMessage, Service
+from anafi_mav.arsdk.codec import protobuf, wire
+from anafi_mav.arsdk.codec.envelope import ProtobufMessage, Service
+from anafi_mav.arsdk.codec.protobuf import ENUM, RECORD, UINT32, Field, Kind, Map, Record, Wrapped
 from anafi_mav.arsdk.messages.proto import camera2, connectivity, device_manager, logsync, network, piloting, pointnfly
-from anafi_mav.arsdk.protobuf import ENUM, RECORD, UINT32, Field, Kind, Map, Record, Wrapped
 from anafi_mav.errors import LocalProtocolError
 
 

@@ -15,9 +15,9 @@ from typing import Any
 import pytest
 
 import anafi_mav.arsdk.messages
-from anafi_mav.arsdk import protobuf, wire
-from anafi_mav.arsdk.envelope import ProtobufMessage, Service
-from anafi_mav.arsdk.protobuf import Empty, FieldPlan, Kind, Map, Record, Wrapped
+from anafi_mav.arsdk.codec import protobuf, wire
+from anafi_mav.arsdk.codec.envelope import ProtobufMessage, Service
+from anafi_mav.arsdk.codec.protobuf import Empty, FieldPlan, Kind, Map, Record, Wrapped
 
 FILES = [
     "antiflicker",

@@ -7,7 +7,7 @@ import random
 import pytest
 from support.faulty_wire import Faults, FaultyWire
 
-from anafi_mav.arsdk import wire
+from anafi_mav.arsdk.codec import wire
 from anafi_mav.arsdk.frame import Frame, FrameType, decode_frames, encode_frame
 from anafi_mav.arsdk.messages import ardrone3, common
 from anafi_mav.arsdk.packing import with_length

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import pytest
 
-from anafi_mav.arsdk import wire
+from anafi_mav.arsdk.codec import wire
 from anafi_mav.arsdk.messages import ardrone3, common, rth, user_storage
 from anafi_mav.errors import LocalProtocolError
 

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 import anafi_mav.arsdk.messages
-from anafi_mav.arsdk import wire
-from anafi_mav.arsdk.envelope import ProtobufMessage
+from anafi_mav.arsdk.codec import wire
+from anafi_mav.arsdk.codec.envelope import ProtobufMessage
 from anafi_mav.arsdk.transport import RETRIED_FOR_EVER
 
 

@@ -14,8 +14,8 @@ import fastcrc
 import pymavlink
 import pytest
 
+from anafi_mav.arsdk.codec.wire import OpenEnum
 from anafi_mav.arsdk.messages import alarms, ardrone3, common, rth, skyctrl
-from anafi_mav.arsdk.wire import OpenEnum
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.frames import frame, pack
 

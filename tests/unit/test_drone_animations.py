@@ -9,10 +9,10 @@ import pytest
 from support.scripted_device import STATES, ScriptedDevice
 from support.simulated import connected, take_off
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import animation, ardrone3, common
 from anafi_mav.arsdk.messages.animation import AnimationState, Indicator, Mode, PlayMode, Type
 from anafi_mav.arsdk.messages.ardrone3 import PoiMode
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone import Drone
 from anafi_mav.errors import CommandRejected, CommandTimeout, LocalProtocolError, NotSupported
 

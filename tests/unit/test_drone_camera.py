@@ -9,10 +9,10 @@ import pytest
 from support.scripted_device import STATES, ScriptedDevice
 from support.simulated import connected
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import camera as old
 from anafi_mav.arsdk.messages.proto import antiflicker as mains
 from anafi_mav.arsdk.messages.proto import camera2 as new
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone import Drone, Range
 from anafi_mav.drone.camera_state import ExposureSettings, PhotoSettings, RecordingSettings
 from anafi_mav.drone.camera_words import (

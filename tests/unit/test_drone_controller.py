@@ -12,6 +12,7 @@ import pytest
 from support.scripted_device import STATES, ScriptedDevice
 from support.world import loopback
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import (
     animation,
     ardrone3,
@@ -28,7 +29,6 @@ from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.messages.drone_manager import DroneManagerConnectionState as Connection
 from anafi_mav.arsdk.messages.proto import controller_network, device_manager, network
 from anafi_mav.arsdk.messages.skyctrl import Source
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone import Drone, PilotingCommand
 from anafi_mav.drone.controller import PILOT_KEEPS, STICKS, TILT, is_motion
 from anafi_mav.drone.moves import Move, MoveEnd

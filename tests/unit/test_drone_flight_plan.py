@@ -9,10 +9,10 @@ import pytest
 from support.scripted_device import STATES, ScriptedDevice
 from support.simulated import Pair, connected, take_off
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import common
 from anafi_mav.arsdk.messages import flight_plan as modern
 from anafi_mav.arsdk.messages.common import FlightPlanComponent, MavlinkType, PlayingState
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone import Drone
 from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, NotSupported, RemoteProtocolError
 

@@ -8,6 +8,7 @@ import pytest
 from support.scripted_device import STATES, ScriptedDevice
 from support.simulated import connected
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import gimbal
 from anafi_mav.arsdk.messages.gimbal import (
     Axis,
@@ -17,7 +18,6 @@ from anafi_mav.arsdk.messages.gimbal import (
     GimbalCalibrationState,
     Model,
 )
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone import Drone, Range
 from anafi_mav.drone.gimbal import Aim
 from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, LocalProtocolError, NotSupported

@@ -8,9 +8,9 @@ from collections.abc import Awaitable
 import pytest
 from support.scripted_device import ScriptedDevice
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone import Drone, PilotingCommand
 from anafi_mav.errors import AnafiMavError, CommandRejected
 

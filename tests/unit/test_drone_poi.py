@@ -9,10 +9,10 @@ import pytest
 from support.scripted_device import STATES, ScriptedDevice
 from support.simulated import connected, take_off
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import ardrone3, common, controller_info, follow_me
 from anafi_mav.arsdk.messages.ardrone3 import PoiMode, PoiStatus
 from anafi_mav.arsdk.messages.common import CalibrationAxis
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone import Drone, Position
 from anafi_mav.drone.camera_words import CameraMode
 from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, LocalProtocolError, NotSupported

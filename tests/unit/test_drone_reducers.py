@@ -9,13 +9,13 @@ from typing import Any
 
 import pytest
 
-from anafi_mav.arsdk import wire
-from anafi_mav.arsdk.envelope import ProtobufMessage
+from anafi_mav.arsdk.codec import wire
+from anafi_mav.arsdk.codec.envelope import ProtobufMessage
+from anafi_mav.arsdk.codec.protobuf import Kind, Map, Record, record_fields
+from anafi_mav.arsdk.codec.wire import Message, OpenEnum
 from anafi_mav.arsdk.messages import camera as old
 from anafi_mav.arsdk.messages import gimbal
 from anafi_mav.arsdk.messages.proto import camera2 as new
-from anafi_mav.arsdk.protobuf import Kind, Map, Record, record_fields
-from anafi_mav.arsdk.wire import Message, OpenEnum
 from anafi_mav.drone.animations import Animations
 from anafi_mav.drone.calibration import Calibration
 from anafi_mav.drone.camera import Camera

@@ -10,11 +10,11 @@ from typing import Any
 import pytest
 from support.scripted_device import STATES, ScriptedDevice
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import animation, ardrone3, common, follow_me, rth
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState, MoveByError, PoiMode, PoiStatus
 from anafi_mav.arsdk.messages.common import MavlinkType, PlayingState
 from anafi_mav.arsdk.messages.rth import RthState, StateReason
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone import Drone, PilotingCommand
 from anafi_mav.errors import CommandRejected, CommandTimeout
 

@@ -9,11 +9,11 @@ from typing import Any
 import pytest
 from support.scripted_device import SETTINGS, ScriptedDevice
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import ardrone3, common, obstacle_avoidance, piloting_style, precise_home, rth
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.messages.piloting_style import PilotingStyleStyle
 from anafi_mav.arsdk.messages.rth import RthAutoTriggerMode, RthEndingBehavior, RthHomeType
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone import Drone, Position
 from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, LocalProtocolError, NotSupported
 

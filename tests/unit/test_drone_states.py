@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from anafi_mav.arsdk import wire
+from anafi_mav.arsdk.codec import wire
 from anafi_mav.arsdk.messages import alarms, ardrone3, battery, common, move, rth, wifi
 from anafi_mav.arsdk.messages.alarms import TakeoffChecklistType
 from anafi_mav.arsdk.messages.ardrone3 import (

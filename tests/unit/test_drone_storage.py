@@ -8,12 +8,12 @@ import pytest
 from support.scripted_device import STATES, ScriptedDevice
 from support.simulated import connected
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import common
 from anafi_mav.arsdk.messages import user_storage as v1
 from anafi_mav.arsdk.messages import user_storage_v2 as v2
 from anafi_mav.arsdk.messages.proto import storage as v3
 from anafi_mav.arsdk.messages.user_storage import Feature, FormattingType, FsState, PhyState
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone import Drone
 from anafi_mav.drone.storage import StorageState
 from anafi_mav.errors import CommandRejected, CommandTimeout, LocalProtocolError, NotSupported

@@ -10,6 +10,7 @@ from datetime import datetime
 import pytest
 from support.scripted_device import SETTINGS, STATES, ScriptedDevice
 
+from anafi_mav.arsdk.codec.wire import Message, MessageId, UnknownMessage
 from anafi_mav.arsdk.messages import alarms, animation, ardrone3, common, follow_me, move, rth
 from anafi_mav.arsdk.messages.ardrone3 import (
     FlyingState,
@@ -20,7 +21,6 @@ from anafi_mav.arsdk.messages.ardrone3 import (
     PoiStatus,
 )
 from anafi_mav.arsdk.messages.rth import RthState, StateReason
-from anafi_mav.arsdk.wire import Message, MessageId, UnknownMessage
 from anafi_mav.drone import Displacement, Drone, MoveEnd, PilotingCommand, Range
 from anafi_mav.errors import (
     CommandRejected,

@@ -22,7 +22,7 @@ KIT = {"errors", "units", "geo", "clock", "documents", "models", "printable", "s
 GUARDED = {"lxml", "pymavlink"}
 """Libraries of the build and the tests: no room may import them."""
 
-CORES = ["arsdk/wire.py", "arsdk/messages", "arsdk/frame.py", "arsdk/packing.py", "arsdk/transport.py"]
+CORES = ["arsdk/codec/wire.py", "arsdk/messages", "arsdk/frame.py", "arsdk/packing.py", "arsdk/transport.py"]
 CORES += ["arsdk/video_metadata.py", "arsdk/video_metadata_proto.py", "arsdk/rtp.py", "arsdk/rtp_h264.py"]
 CORES += ["arsdk/rtcp.py", "arsdk/rtp_reception.py", "arsdk/rtsp.py", "arsdk/sdp.py"]
 CORES += ["arsdk/handshake.py", "mavlink/frames.py", "mavlink/router.py", "mavlink/streams.py", "plans"]

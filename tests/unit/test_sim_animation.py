@@ -8,10 +8,10 @@ import math
 import pytest
 from support.sim_bench import HOME, Bench
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import animation, ardrone3, camera, follow_me, rth
 from anafi_mav.arsdk.messages.animation import AnimationState, Indicator, PlayMode, Type
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState, PoiMode
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.sim.figures import STARTS
 from anafi_mav.sim.place import Origin
 

@@ -8,6 +8,7 @@ from collections.abc import Callable
 import pytest
 from support.sim_bench import Bench
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import ardrone3, camera, common, mediastore, thermal, user_storage
 from anafi_mav.arsdk.messages.camera import (
     AutoExposureMeteringMode,
@@ -37,7 +38,6 @@ from anafi_mav.arsdk.messages.camera import (
     ZoomControlMode,
 )
 from anafi_mav.arsdk.messages.generic import ListFlags
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.sim.cameras import Cameras
 
 PHOTO, RECORDING = CameraCameraMode.PHOTO, CameraCameraMode.RECORDING

@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 from support.sim_bench import Bench
 
+from anafi_mav.arsdk.codec.wire import Message, decode, encode
 from anafi_mav.arsdk.messages import ardrone3, camera, user_storage_v2
 from anafi_mav.arsdk.messages.proto import camera2
-from anafi_mav.arsdk.wire import Message, decode, encode
 
 PHOTO, RECORDING = camera2.CameraMode.PHOTO, camera2.CameraMode.RECORDING
 

@@ -12,8 +12,8 @@ from support.sim_bench import Bench
 
 import anafi_mav.arsdk.messages
 import anafi_mav.arsdk.messages.proto  # noqa: F401 # declares the protobuf ones too
-from anafi_mav.arsdk.envelope import ProtobufMessage
-from anafi_mav.arsdk.wire import (
+from anafi_mav.arsdk.codec.envelope import ProtobufMessage
+from anafi_mav.arsdk.codec.wire import (
     Bits,
     Blob,
     Direction,

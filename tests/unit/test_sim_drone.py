@@ -7,10 +7,10 @@ from collections.abc import AsyncIterator, Callable
 
 import pytest
 
+from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
 from anafi_mav.arsdk.controller import ControllerSession, connect
 from anafi_mav.arsdk.messages import ardrone3, battery, common
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
-from anafi_mav.arsdk.wire import Message, UnknownMessage
 from anafi_mav.errors import LinkLost
 from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import pytest
 from support.sim_bench import Bench
 
+from anafi_mav.arsdk.codec.wire import MessageId, UnknownMessage
 from anafi_mav.arsdk.messages import alarms, ardrone3, battery, common
 from anafi_mav.arsdk.messages.alarms import State, TakeoffChecklistType, Type
 from anafi_mav.arsdk.messages.ardrone3 import AlertState, FlyingState, ForcedLandingReason
 from anafi_mav.arsdk.messages.battery import AlertLevel
-from anafi_mav.arsdk.wire import MessageId, UnknownMessage
 from anafi_mav.sim.states import all_settings, all_states
 
 S = FlyingState

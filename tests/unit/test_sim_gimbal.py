@@ -7,6 +7,7 @@ import math
 import pytest
 from support.sim_bench import Bench
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import gimbal
 from anafi_mav.arsdk.messages.gimbal import (
     Axis,
@@ -16,7 +17,6 @@ from anafi_mav.arsdk.messages.gimbal import (
     GimbalCalibrationState,
     State,
 )
-from anafi_mav.arsdk.wire import Message
 
 NONE, RELATIVE, ABSOLUTE = FrameOfReference.NONE, FrameOfReference.RELATIVE, FrameOfReference.ABSOLUTE
 POSITION, VELOCITY = ControlMode.POSITION, ControlMode.VELOCITY

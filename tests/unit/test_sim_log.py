@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from anafi_mav.arsdk.codec.wire import MessageId, UnknownMessage
 from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
-from anafi_mav.arsdk.wire import MessageId, UnknownMessage
 from anafi_mav.errors import CommandTimeout
 from anafi_mav.sim.log import Log, LogFile
 

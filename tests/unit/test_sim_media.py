@@ -11,9 +11,9 @@ import cv2
 import pytest
 from PIL import Image
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import mediastore
 from anafi_mav.arsdk.messages.mediastore import MediastoreState
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.sim import picture
 from anafi_mav.sim.calendar import Calendar
 from anafi_mav.sim.media import Kind, Media, MediaStore

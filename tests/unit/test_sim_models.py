@@ -7,11 +7,11 @@ import math
 import pytest
 from support.sim_bench import Bench
 
+from anafi_mav.arsdk.codec.protobuf import Empty
+from anafi_mav.arsdk.codec.wire import Message, decode, encode
 from anafi_mav.arsdk.controller import connect
 from anafi_mav.arsdk.messages import flight_plan, move, obstacle_avoidance
 from anafi_mav.arsdk.messages.proto import antiflicker, connectivity, developer, network, piloting, pointnfly, privacy
-from anafi_mav.arsdk.protobuf import Empty
-from anafi_mav.arsdk.wire import Message, decode, encode
 from anafi_mav.errors import ConfigError
 from anafi_mav.sim import DroneSpec, Simulator
 from anafi_mav.sim.model import MODELS

@@ -8,8 +8,8 @@ from collections.abc import Callable
 import pytest
 from support.sim_bench import Bench
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import ardrone3, common, piloting_style, precise_home, rth
-from anafi_mav.arsdk.wire import Message
 
 # Command, event, and the lowest, the highest and the factory's value (arsdk.md 2.5).
 RANGES: list[tuple[Callable[[float], Message], type[Message], float, float, float]] = [

@@ -12,13 +12,13 @@ import aiohttp
 import pytest
 from support.world import loopback
 
+from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
 from anafi_mav.arsdk.controller import ControllerSession, connect
 from anafi_mav.arsdk.messages import ardrone3, common, drone_manager, mapper, skyctrl
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.messages.drone_manager import DroneManagerConnectionState as Connection
 from anafi_mav.arsdk.messages.mapper import ButtonEvent
 from anafi_mav.arsdk.messages.skyctrl import Source
-from anafi_mav.arsdk.wire import Message, UnknownMessage
 from anafi_mav.errors import ConfigError
 from anafi_mav.sim import DroneSpec, LogEntry, SimulatedDrone, Simulator
 from anafi_mav.sim.skycontroller import PITCH, RETURN_HOME, ROLL, TAKEOFF_LAND, YAW, Skycontroller

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from support.sim_bench import Bench
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import camera, mediastore, user_storage, user_storage_v2
 from anafi_mav.arsdk.messages.camera import Availability, CameraCameraMode, PhotoResult, RecordingResult, State
 from anafi_mav.arsdk.messages.generic import ListFlags
@@ -16,7 +17,6 @@ from anafi_mav.arsdk.messages.user_storage import (
     FsState,
     PhyState,
 )
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.sim.storage import Place
 
 

@@ -20,9 +20,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar, TypeVar
 
-from anafi_mav.arsdk import wire
-from anafi_mav.arsdk.protobuf import Malformed, Record, chunk, parse, serialize, walk
-from anafi_mav.arsdk.wire import HEADER, Buffer, Direction, Message, MessageId, UnknownMessage
+from anafi_mav.arsdk.codec import wire
+from anafi_mav.arsdk.codec.protobuf import Malformed, Record, chunk, parse, serialize, walk
+from anafi_mav.arsdk.codec.wire import HEADER, Buffer, Direction, Message, MessageId, UnknownMessage
 from anafi_mav.errors import LocalProtocolError
 
 FIRST_ACKNOWLEDGED = 16
