@@ -13,7 +13,7 @@ import struct
 from collections.abc import Sequence
 from typing import NamedTuple, TypeAlias
 
-from anafi_mav.arsdk.frame import decode_varint, encode_varint
+from anafi_mav.arsdk.link.frame import decode_varint, encode_varint
 from anafi_mav.errors import LocalProtocolError
 
 PORT = 4321

@@ -14,8 +14,8 @@ from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
-from anafi_mav.arsdk.handshake import DeviceInfo
-from anafi_mav.arsdk.interface import networks
+from anafi_mav.arsdk.link.handshake import DeviceInfo
+from anafi_mav.arsdk.link.interface import networks
 from anafi_mav.arsdk.mux_link import look_either
 from anafi_mav.cli import interrupts, log
 from anafi_mav.cli.addresses import spot

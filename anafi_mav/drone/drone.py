@@ -18,8 +18,8 @@ from typing import Any, TypeAlias, TypeVar
 from anafi_mav import models
 from anafi_mav.arsdk import mux_link
 from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
-from anafi_mav.arsdk.controller import ControllerSession
-from anafi_mav.arsdk.handshake import DISCOVERY_PORT
+from anafi_mav.arsdk.link.controller import ControllerSession
+from anafi_mav.arsdk.link.handshake import DISCOVERY_PORT
 from anafi_mav.arsdk.messages import ardrone3, common, drone_manager, rth, skyctrl
 from anafi_mav.arsdk.messages import flight_plan as modern_plan
 from anafi_mav.arsdk.messages.animation import Type as AnimationType

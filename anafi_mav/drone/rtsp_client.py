@@ -12,9 +12,9 @@ from collections import Counter
 from collections.abc import Iterable
 
 from anafi_mav.arsdk import rtsp
-from anafi_mav.arsdk.interface import open_connection
+from anafi_mav.arsdk.link.interface import open_connection
+from anafi_mav.arsdk.link.session import reason_of
 from anafi_mav.arsdk.rtsp import Malformed, Request, Response, Status
-from anafi_mav.arsdk.session import reason_of
 from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, RemoteProtocolError
 
 log = logging.getLogger("anafi_mav")

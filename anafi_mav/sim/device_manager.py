@@ -7,7 +7,7 @@ once: the pause that a client may ask for (`supports_fast_connection`) is not ma
 from __future__ import annotations
 
 from anafi_mav.arsdk.codec.wire import Message
-from anafi_mav.arsdk.handshake import DeviceInfo
+from anafi_mav.arsdk.link.handshake import DeviceInfo
 from anafi_mav.arsdk.messages.proto import controller_network, network
 from anafi_mav.arsdk.messages.proto import device_manager as words
 from anafi_mav.sim.wireless import RSSI

@@ -11,15 +11,15 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from anafi_mav.arsdk import handshake
 from anafi_mav.arsdk.codec.wire import Buffer, Message, UnknownMessage
-from anafi_mav.arsdk.device import DeviceServer, DeviceSession
-from anafi_mav.arsdk.handshake import DeviceInfo
+from anafi_mav.arsdk.link import handshake
+from anafi_mav.arsdk.link.device import DeviceServer, DeviceSession
+from anafi_mav.arsdk.link.handshake import DeviceInfo
+from anafi_mav.arsdk.link.session import OnMessage
 from anafi_mav.arsdk.messages import common
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.mux_link import MuxServer
 from anafi_mav.arsdk.rtsp import DEFAULT_PORT as RTSP_PORT
-from anafi_mav.arsdk.session import OnMessage
 from anafi_mav.errors import ConfigError
 from anafi_mav.sim import quirks
 from anafi_mav.sim.air import Air

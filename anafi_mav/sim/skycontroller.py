@@ -14,7 +14,7 @@ from typing import Any
 
 from anafi_mav.arsdk.codec.envelope import ProtobufMessage
 from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
-from anafi_mav.arsdk.handshake import DeviceInfo
+from anafi_mav.arsdk.link.handshake import DeviceInfo
 from anafi_mav.arsdk.messages import ardrone3, camera, drone_manager, gimbal, mapper, rth, skyctrl
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.messages.drone_manager import DroneManagerConnectionState as Connection

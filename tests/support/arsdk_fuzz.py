@@ -12,9 +12,9 @@ from types import FunctionType, ModuleType
 import anafi_mav.arsdk.messages as tables
 from anafi_mav.arsdk.codec import wire
 from anafi_mav.arsdk.codec.wire import Bits, Blob, Buffer, Message, MessageId, Scalar, Text, UnknownMessage
-from anafi_mav.arsdk.frame import FrameType, encode_frame
+from anafi_mav.arsdk.link.frame import FrameType, encode_frame
+from anafi_mav.arsdk.link.transport import MAX_QUEUED, Delivered, Event, Garbage, Received, Role, Transport, Undelivered
 from anafi_mav.arsdk.messages import ardrone3
-from anafi_mav.arsdk.transport import MAX_QUEUED, Delivered, Event, Garbage, Received, Role, Transport, Undelivered
 
 WARM_UP = 20_000
 """Frames until everything that may be kept is: a long split command begun on each queue, every counter once."""

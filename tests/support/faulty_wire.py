@@ -6,7 +6,7 @@ import heapq
 import random
 from dataclasses import dataclass
 
-from anafi_mav.arsdk.transport import Event, Transport
+from anafi_mav.arsdk.link.transport import Event, Transport
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from anafi_mav.arsdk.codec.wire import (
     declared_messages,
     wire_fields,
 )
-from anafi_mav.arsdk.handshake import DeviceInfo
+from anafi_mav.arsdk.link.handshake import DeviceInfo
 from anafi_mav.arsdk.messages import animation, ardrone3, common, follow_me, rth
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState, MoveToStatus, PoiMode
 from anafi_mav.sim.place import Origin

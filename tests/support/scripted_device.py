@@ -8,11 +8,11 @@ from contextlib import asynccontextmanager
 from typing import Any, TypeVar
 
 from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
-from anafi_mav.arsdk.device import DeviceServer, DeviceSession
-from anafi_mav.arsdk.handshake import DeviceInfo
+from anafi_mav.arsdk.link.device import DeviceServer, DeviceSession
+from anafi_mav.arsdk.link.handshake import DeviceInfo
+from anafi_mav.arsdk.link.session import OnMessage
 from anafi_mav.arsdk.messages import ardrone3, common, rth
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
-from anafi_mav.arsdk.session import OnMessage
 from anafi_mav.clock import Clock
 from anafi_mav.drone import Drone
 

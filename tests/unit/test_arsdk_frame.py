@@ -7,9 +7,9 @@ from collections import deque
 import pytest
 
 from anafi_mav.arsdk.codec import wire
-from anafi_mav.arsdk.frame import Frame, FrameType, decode_frames, decode_varint, encode_frame, encode_varint
+from anafi_mav.arsdk.link.frame import Frame, FrameType, decode_frames, decode_varint, encode_frame, encode_varint
+from anafi_mav.arsdk.link.packing import Unpacker, Waiting, pack, with_length
 from anafi_mav.arsdk.messages import ardrone3, common
-from anafi_mav.arsdk.packing import Unpacker, Waiting, pack, with_length
 from anafi_mav.errors import LocalProtocolError
 
 ALL_STATES = wire.encode(common.AllStates())

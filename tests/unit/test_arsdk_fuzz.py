@@ -11,12 +11,12 @@ import random
 import pytest
 from support.arsdk_fuzz import throw
 
-from anafi_mav.arsdk import handshake
 from anafi_mav.arsdk.codec import wire
 from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
-from anafi_mav.arsdk.frame import VERSIONS, decode_frames
-from anafi_mav.arsdk.packing import MAX_COMMAND
-from anafi_mav.arsdk.transport import Role
+from anafi_mav.arsdk.link import handshake
+from anafi_mav.arsdk.link.frame import VERSIONS, decode_frames
+from anafi_mav.arsdk.link.packing import MAX_COMMAND
+from anafi_mav.arsdk.link.transport import Role
 from anafi_mav.errors import RemoteProtocolError
 
 FRAMES = [60_000, pytest.param(1_000_000 // 6, marks=pytest.mark.full)]

@@ -8,8 +8,8 @@ import random
 
 import pytest
 
-from anafi_mav.arsdk import handshake
-from anafi_mav.arsdk.handshake import ConnectReply, ConnectRequest, DeviceInfo
+from anafi_mav.arsdk.link import handshake
+from anafi_mav.arsdk.link.handshake import ConnectReply, ConnectRequest, DeviceInfo
 from anafi_mav.errors import LocalProtocolError, RemoteProtocolError
 
 # What arsdk-ng's printf and json-c make of it, spaces included.

@@ -17,12 +17,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import anafi_mav.arsdk.messages as tables
-from anafi_mav.arsdk import handshake
 from anafi_mav.arsdk.codec import wire
 from anafi_mav.arsdk.codec.wire import Bits, Blob, Message, MessageId, OpenEnum, Scalar, Text, UnknownMessage
-from anafi_mav.arsdk.frame import decode_frames, encode_frame
+from anafi_mav.arsdk.link import handshake
+from anafi_mav.arsdk.link.frame import decode_frames, encode_frame
+from anafi_mav.arsdk.link.transport import ACK_TIMEOUT, Delivered, Received, Role, Transport, Undelivered
 from anafi_mav.arsdk.messages import ardrone3
-from anafi_mav.arsdk.transport import ACK_TIMEOUT, Delivered, Received, Role, Transport, Undelivered
 
 VERSIONS = [1, 2, 3]
 

@@ -11,13 +11,13 @@ from typing import Any
 
 import pytest
 
-from anafi_mav.arsdk import handshake
 from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
-from anafi_mav.arsdk.controller import ControllerSession, connect
-from anafi_mav.arsdk.device import MAX_CONNECTIONS, DeviceServer, DeviceSession
-from anafi_mav.arsdk.handshake import DeviceInfo
+from anafi_mav.arsdk.link import handshake
+from anafi_mav.arsdk.link.controller import ControllerSession, connect
+from anafi_mav.arsdk.link.device import MAX_CONNECTIONS, DeviceServer, DeviceSession
+from anafi_mav.arsdk.link.handshake import DeviceInfo
+from anafi_mav.arsdk.link.session import OnMessage
 from anafi_mav.arsdk.messages import ardrone3, common
-from anafi_mav.arsdk.session import OnMessage
 from anafi_mav.errors import LinkLost, LocalProtocolError, RemoteProtocolError
 
 HOST = "127.0.0.1"

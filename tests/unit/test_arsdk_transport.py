@@ -8,10 +8,9 @@ import pytest
 from support.faulty_wire import Faults, FaultyWire
 
 from anafi_mav.arsdk.codec import wire
-from anafi_mav.arsdk.frame import Frame, FrameType, decode_frames, encode_frame
-from anafi_mav.arsdk.messages import ardrone3, common
-from anafi_mav.arsdk.packing import with_length
-from anafi_mav.arsdk.transport import (
+from anafi_mav.arsdk.link.frame import Frame, FrameType, decode_frames, encode_frame
+from anafi_mav.arsdk.link.packing import with_length
+from anafi_mav.arsdk.link.transport import (
     MAX_QUEUED,
     MAX_QUEUED_NOACK,
     MAX_REPLIES,
@@ -26,6 +25,7 @@ from anafi_mav.arsdk.transport import (
     Transport,
     Undelivered,
 )
+from anafi_mav.arsdk.messages import ardrone3, common
 from anafi_mav.errors import LocalProtocolError
 
 VERSIONS = [1, 2, 3]

@@ -13,7 +13,7 @@ import pytest
 import anafi_mav.arsdk.messages
 from anafi_mav.arsdk.codec import wire
 from anafi_mav.arsdk.codec.envelope import ProtobufMessage
-from anafi_mav.arsdk.transport import RETRIED_FOR_EVER
+from anafi_mav.arsdk.link.transport import RETRIED_FOR_EVER
 
 
 def find_xml() -> Path | None:

@@ -16,9 +16,9 @@ import pytest
 from support.product import Process
 from support.world import loopback
 
-from anafi_mav.arsdk import interface
-from anafi_mav.arsdk.controller import look
-from anafi_mav.arsdk.handshake import DeviceInfo
+from anafi_mav.arsdk.link import interface
+from anafi_mav.arsdk.link.controller import look
+from anafi_mav.arsdk.link.handshake import DeviceInfo
 from anafi_mav.cli.discover import Find, Place, configuration, places
 from anafi_mav.config import from_text
 from anafi_mav.errors import LinkLost

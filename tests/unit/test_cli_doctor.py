@@ -14,8 +14,8 @@ import pytest
 from support.product import Process
 from support.world import loopback
 
-from anafi_mav.arsdk import interface
-from anafi_mav.arsdk.handshake import ConnectReply, DeviceInfo, format_discovery, format_reply
+from anafi_mav.arsdk.link import interface
+from anafi_mav.arsdk.link.handshake import ConnectReply, DeviceInfo, format_discovery, format_reply
 from anafi_mav.cli import doctor
 from anafi_mav.cli.doctor import Finding, Place, before_handshake, with_handshake
 from anafi_mav.drone import Drone

@@ -22,10 +22,16 @@ KIT = {"errors", "units", "geo", "clock", "documents", "models", "printable", "s
 GUARDED = {"lxml", "pymavlink"}
 """Libraries of the build and the tests: no room may import them."""
 
-CORES = ["arsdk/codec/wire.py", "arsdk/messages", "arsdk/frame.py", "arsdk/packing.py", "arsdk/transport.py"]
+CORES = [
+    "arsdk/codec/wire.py",
+    "arsdk/messages",
+    "arsdk/link/frame.py",
+    "arsdk/link/packing.py",
+    "arsdk/link/transport.py",
+]
 CORES += ["arsdk/video_metadata.py", "arsdk/video_metadata_proto.py", "arsdk/rtp.py", "arsdk/rtp_h264.py"]
 CORES += ["arsdk/rtcp.py", "arsdk/rtp_reception.py", "arsdk/rtsp.py", "arsdk/sdp.py"]
-CORES += ["arsdk/handshake.py", "mavlink/frames.py", "mavlink/router.py", "mavlink/streams.py", "plans"]
+CORES += ["arsdk/link/handshake.py", "mavlink/frames.py", "mavlink/router.py", "mavlink/streams.py", "plans"]
 CORES += ["services/mission_course.py", "services/mission_progress.py"]
 CORES += ["services/modes.py", "services/offboard.py", "services/height.py", "units.py", "geo.py", "config/schema.py"]
 CORES += ["mav_enums.py"]

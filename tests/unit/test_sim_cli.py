@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 from support.world import loopback
 
-from anafi_mav.arsdk import handshake
+from anafi_mav.arsdk.link import handshake
 from anafi_mav.cli import main
 from anafi_mav.errors import ConfigError
 from anafi_mav.sim import DroneSpec, Simulator

@@ -8,7 +8,7 @@ from collections.abc import AsyncIterator, Callable
 import pytest
 
 from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
-from anafi_mav.arsdk.controller import ControllerSession, connect
+from anafi_mav.arsdk.link.controller import ControllerSession, connect
 from anafi_mav.arsdk.messages import ardrone3, battery, common
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.errors import LinkLost

@@ -10,7 +10,7 @@ import pytest
 from support.ear import Ear
 from support.sim_bench import Bench
 
-from anafi_mav.arsdk.controller import ControllerSession, connect
+from anafi_mav.arsdk.link.controller import ControllerSession, connect
 from anafi_mav.arsdk.messages import ardrone3, common, rth
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.messages.proto import camera2

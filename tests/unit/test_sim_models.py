@@ -9,7 +9,7 @@ from support.sim_bench import Bench
 
 from anafi_mav.arsdk.codec.protobuf import Empty
 from anafi_mav.arsdk.codec.wire import Message, decode, encode
-from anafi_mav.arsdk.controller import connect
+from anafi_mav.arsdk.link.controller import connect
 from anafi_mav.arsdk.messages import flight_plan, move, obstacle_avoidance
 from anafi_mav.arsdk.messages.proto import antiflicker, connectivity, developer, network, piloting, pointnfly, privacy
 from anafi_mav.errors import ConfigError

@@ -13,7 +13,7 @@ import pytest
 from support.world import loopback
 
 from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
-from anafi_mav.arsdk.controller import ControllerSession, connect
+from anafi_mav.arsdk.link.controller import ControllerSession, connect
 from anafi_mav.arsdk.messages import ardrone3, common, drone_manager, mapper, skyctrl
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.messages.drone_manager import DroneManagerConnectionState as Connection

@@ -28,8 +28,8 @@ import msgspec
 
 from anafi_mav.arsdk.codec import wire
 from anafi_mav.arsdk.codec.wire import Buffer, Message, MessageId, UnknownMessage
-from anafi_mav.arsdk.frame import VERSIONS, FrameType, decode_frames, encode_frame
-from anafi_mav.arsdk.packing import PACK_LIMIT, Piece, Unpacker, Waiting, longest_command, pack, with_length
+from anafi_mav.arsdk.link.frame import VERSIONS, FrameType, decode_frames, encode_frame
+from anafi_mav.arsdk.link.packing import PACK_LIMIT, Piece, Unpacker, Waiting, longest_command, pack, with_length
 from anafi_mav.errors import LocalProtocolError
 
 PING, PONG = 0, 1

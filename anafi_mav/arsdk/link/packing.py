@@ -11,7 +11,7 @@ import struct
 from collections import deque
 from typing import NamedTuple
 
-from anafi_mav.arsdk.frame import decode_varint, encode_varint
+from anafi_mav.arsdk.link.frame import decode_varint, encode_varint
 
 PACK_LIMIT = {1: 65_000, 2: 1400, 3: 1000}
 """Most payload bytes of a frame. v2, v3: ARSDK_PACK_MAX_SIZE of cmd_itf2 and 3; v1: what a UDP datagram can carry."""

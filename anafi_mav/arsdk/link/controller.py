@@ -10,13 +10,13 @@ import socket
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 
-from anafi_mav.arsdk import handshake, watchdog
 from anafi_mav.arsdk.codec.wire import Message
-from anafi_mav.arsdk.handshake import ConnectReply, ConnectRequest, DeviceInfo
-from anafi_mav.arsdk.interface import bind_to_interface, open_connection
-from anafi_mav.arsdk.session import OnMessage, Session, reason_of
-from anafi_mav.arsdk.transport import Role, Transport
-from anafi_mav.arsdk.watchdog import Watchdog
+from anafi_mav.arsdk.link import handshake, watchdog
+from anafi_mav.arsdk.link.handshake import ConnectReply, ConnectRequest, DeviceInfo
+from anafi_mav.arsdk.link.interface import bind_to_interface, open_connection
+from anafi_mav.arsdk.link.session import OnMessage, Session, reason_of
+from anafi_mav.arsdk.link.transport import Role, Transport
+from anafi_mav.arsdk.link.watchdog import Watchdog
 from anafi_mav.errors import HandshakeRefused, LinkLost, RemoteProtocolError
 
 log = logging.getLogger("anafi_mav.arsdk")

@@ -14,7 +14,7 @@ import json
 from dataclasses import dataclass
 from typing import Any
 
-from anafi_mav.arsdk.frame import VERSIONS
+from anafi_mav.arsdk.link.frame import VERSIONS
 from anafi_mav.errors import LocalProtocolError, RemoteProtocolError
 
 DISCOVERY_PORT = 44445

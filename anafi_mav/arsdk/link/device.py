@@ -9,11 +9,11 @@ import socket
 from collections.abc import Awaitable, Callable
 from typing import TypeAlias
 
-from anafi_mav.arsdk import handshake
 from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
-from anafi_mav.arsdk.handshake import ConnectReply, ConnectRequest, DeviceInfo
-from anafi_mav.arsdk.session import OnMessage, Session, reason_of
-from anafi_mav.arsdk.transport import Role, Transport
+from anafi_mav.arsdk.link import handshake
+from anafi_mav.arsdk.link.handshake import ConnectReply, ConnectRequest, DeviceInfo
+from anafi_mav.arsdk.link.session import OnMessage, Session, reason_of
+from anafi_mav.arsdk.link.transport import Role, Transport
 from anafi_mav.errors import RemoteProtocolError
 
 log = logging.getLogger("anafi_mav.arsdk")

@@ -18,8 +18,8 @@ import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from anafi_mav.arsdk import watchdog_child
-from anafi_mav.arsdk.watchdog_child import FRAME, RECORD
+from anafi_mav.arsdk.link import watchdog_child
+from anafi_mav.arsdk.link.watchdog_child import FRAME, RECORD
 
 log = logging.getLogger("anafi_mav.arsdk")
 
@@ -76,7 +76,7 @@ class Watchdog:
             process = await asyncio.create_subprocess_exec(
                 *(sys.executable, "-m", watchdog_child.__name__, *map(str, given), str(version)),
                 *(str(self._limit), str(int(stream))),
-                cwd=Path(__file__).parents[2],  # -m looks here first: it has to find this very package
+                cwd=Path(__file__).parents[3],  # -m looks here first: it has to find this very package
                 stdin=asyncio.subprocess.DEVNULL,
                 pass_fds=given,
                 start_new_session=True,  # what stops or ends the gateway's group must not reach it

@@ -18,7 +18,7 @@ from typing import TypeAlias, cast
 from typing_extensions import assert_never
 
 from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
-from anafi_mav.arsdk.transport import (
+from anafi_mav.arsdk.link.transport import (
     Delivered,
     Event,
     Garbage,

@@ -19,7 +19,7 @@ import struct
 import sys
 import time
 
-from anafi_mav.arsdk.frame import FrameType, decode_frames
+from anafi_mav.arsdk.link.frame import FrameType, decode_frames
 
 REPEAT = 0.15
 """s between two sendings of a frame, as `transport.ACK_TIMEOUT`."""
