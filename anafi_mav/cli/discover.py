@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 from anafi_mav.arsdk.link.handshake import DeviceInfo
 from anafi_mav.arsdk.link.interface import networks
-from anafi_mav.arsdk.mux_link import look_either
+from anafi_mav.arsdk.mux.mux_link import look_either
 from anafi_mav.cli import interrupts, log
 from anafi_mav.cli.addresses import spot
 from anafi_mav.cli.terminal import complain, say, say_json

@@ -13,10 +13,10 @@ import socket
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from anafi_mav.arsdk import mux
 from anafi_mav.arsdk.link.handshake import DISCOVERY_PORT, HANDSHAKE_PORT, DeviceInfo
 from anafi_mav.arsdk.link.interface import bind_to_interface, networks, open_connection
-from anafi_mav.arsdk.mux_link import look_either
+from anafi_mav.arsdk.mux import mux
+from anafi_mav.arsdk.mux.mux_link import look_either
 from anafi_mav.arsdk.rtsp import DEFAULT_PORT as RTSP_PORT
 from anafi_mav.cli import consent, interrupts, log, options
 from anafi_mav.cli.addresses import spot

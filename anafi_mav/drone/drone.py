@@ -16,7 +16,6 @@ from functools import partial
 from typing import Any, TypeAlias, TypeVar
 
 from anafi_mav import models
-from anafi_mav.arsdk import mux_link
 from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
 from anafi_mav.arsdk.link.controller import ControllerSession
 from anafi_mav.arsdk.link.handshake import DISCOVERY_PORT
@@ -28,6 +27,7 @@ from anafi_mav.arsdk.messages.common import PlayingState
 from anafi_mav.arsdk.messages.drone_manager import DroneManagerConnectionState as Connection
 from anafi_mav.arsdk.messages.follow_me import Mode as FollowMeMode
 from anafi_mav.arsdk.messages.proto import device_manager
+from anafi_mav.arsdk.mux import mux_link
 from anafi_mav.arsdk.rtsp import DEFAULT_PORT as RTSP_PORT
 from anafi_mav.clock import Clock, SystemClock
 from anafi_mav.drone import inquiry

@@ -10,8 +10,8 @@ from typing import Any, Protocol
 
 from anafi_mav.arsdk.link.interface import bind_to_interface
 from anafi_mav.arsdk.link.session import reason_of
-from anafi_mav.arsdk.mux_link import MuxControllerSession
-from anafi_mav.arsdk.mux_udp import UdpTunnel
+from anafi_mav.arsdk.mux.mux_link import MuxControllerSession
+from anafi_mav.arsdk.mux.mux_udp import UdpTunnel
 from anafi_mav.drone.rtsp_client import RtspClient
 from anafi_mav.errors import LinkLost
 

@@ -11,12 +11,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.ear import Ear, Listener
 
-from anafi_mav.arsdk import mux, mux_link
 from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
 from anafi_mav.arsdk.link.handshake import DeviceInfo
 from anafi_mav.arsdk.link.session import OnMessage
 from anafi_mav.arsdk.messages import ardrone3, common
-from anafi_mav.arsdk.mux import Control, Decoder, Frame, decode_control, decode_pomp, encode_frame, encode_pomp
+from anafi_mav.arsdk.mux import mux, mux_link
+from anafi_mav.arsdk.mux.mux import Control, Decoder, Frame, decode_control, decode_pomp, encode_frame, encode_pomp
 from anafi_mav.errors import LinkLost, LocalProtocolError
 
 INFO = DeviceInfo(0x091D, "PI040443AA9K754503", 0, "SC4")

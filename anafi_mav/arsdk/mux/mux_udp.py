@@ -11,7 +11,7 @@ import asyncio
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from anafi_mav.arsdk.mux import encode_control, encode_frame
+from anafi_mav.arsdk.mux.mux import encode_control, encode_frame
 from anafi_mav.errors import LinkLost, LocalProtocolError
 
 REMOTE_UPDATE_REQ, REMOTE_UPDATE_ACK = 11, 12

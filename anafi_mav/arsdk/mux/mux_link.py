@@ -9,7 +9,6 @@ import logging
 from collections.abc import Callable
 from typing import Any, cast
 
-from anafi_mav.arsdk import mux, mux_proxy
 from anafi_mav.arsdk.link import controller, handshake
 from anafi_mav.arsdk.link.controller import CONTROLLER_NAME, CONTROLLER_TYPE, ControllerSession
 from anafi_mav.arsdk.link.device import MAX_CONNECTIONS, DeviceSession, Mutable, OnSession
@@ -18,7 +17,8 @@ from anafi_mav.arsdk.link.interface import open_connection
 from anafi_mav.arsdk.link.session import OnMessage, reason_of
 from anafi_mav.arsdk.link.transport import Role, Transport
 from anafi_mav.arsdk.link.watchdog import Watchdog
-from anafi_mav.arsdk.mux_udp import UdpTunnel
+from anafi_mav.arsdk.mux import mux, mux_proxy
+from anafi_mav.arsdk.mux.mux_udp import UdpTunnel
 from anafi_mav.errors import HandshakeRefused, LinkLost, RemoteProtocolError
 
 log = logging.getLogger("anafi_mav.arsdk")

@@ -15,8 +15,8 @@ import logging
 from collections.abc import Callable
 from typing import Protocol
 
-from anafi_mav.arsdk.mux import Control, encode_control, encode_frame
-from anafi_mav.arsdk.mux_udp import REMOTE_UPDATE_ACK, UdpSocket, UdpTunnel
+from anafi_mav.arsdk.mux.mux import Control, encode_control, encode_frame
+from anafi_mav.arsdk.mux.mux_udp import REMOTE_UPDATE_ACK, UdpSocket, UdpTunnel
 from anafi_mav.errors import LinkLost
 
 log = logging.getLogger("anafi_mav.arsdk")
