@@ -19,7 +19,7 @@ from types import TracebackType
 
 from typing_extensions import Self
 
-from anafi_mav.arsdk.rtsp import DEFAULT_PORT as RTSP_PORT
+from anafi_mav.arsdk.video.rtsp import DEFAULT_PORT as RTSP_PORT
 from anafi_mav.clock import Clock, SystemClock
 from anafi_mav.config import Config, DroneConfig
 from anafi_mav.drone import Drone, events

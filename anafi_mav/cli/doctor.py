@@ -17,7 +17,7 @@ from anafi_mav.arsdk.link.handshake import DISCOVERY_PORT, HANDSHAKE_PORT, Devic
 from anafi_mav.arsdk.link.interface import bind_to_interface, networks, open_connection
 from anafi_mav.arsdk.mux import mux
 from anafi_mav.arsdk.mux.mux_link import look_either
-from anafi_mav.arsdk.rtsp import DEFAULT_PORT as RTSP_PORT
+from anafi_mav.arsdk.video.rtsp import DEFAULT_PORT as RTSP_PORT
 from anafi_mav.cli import consent, interrupts, log, options
 from anafi_mav.cli.addresses import spot
 from anafi_mav.cli.terminal import say, say_json

@@ -10,8 +10,8 @@ The names in `__all__` are stable, and so are those of `anafi_mav.drone.events`,
 docs/python-api.md is the guide, docs/python-api-reference.md the reference.
 """
 
-from anafi_mav.arsdk.rtp_h264 import Picture
-from anafi_mav.arsdk.video_metadata import FrameMetadata, Location, Ned, Quaternion, WifiLink
+from anafi_mav.arsdk.video.rtp_h264 import Picture
+from anafi_mav.arsdk.video.video_metadata import FrameMetadata, Location, Ned, Quaternion, WifiLink
 from anafi_mav.drone import events
 from anafi_mav.drone.alerts import Alerts, AlertsState, Blocker, BlockerKind
 from anafi_mav.drone.animations import Animations, AnimationsState

@@ -28,7 +28,7 @@ from anafi_mav.arsdk.messages.drone_manager import DroneManagerConnectionState a
 from anafi_mav.arsdk.messages.follow_me import Mode as FollowMeMode
 from anafi_mav.arsdk.messages.proto import device_manager
 from anafi_mav.arsdk.mux import mux_link
-from anafi_mav.arsdk.rtsp import DEFAULT_PORT as RTSP_PORT
+from anafi_mav.arsdk.video.rtsp import DEFAULT_PORT as RTSP_PORT
 from anafi_mav.clock import Clock, SystemClock
 from anafi_mav.drone import inquiry
 from anafi_mav.drone.alerts import Alerts, Blocker, spoken, takeoff_blockers

@@ -11,10 +11,10 @@ import logging
 from collections import Counter
 from collections.abc import Iterable
 
-from anafi_mav.arsdk import rtsp
 from anafi_mav.arsdk.link.interface import open_connection
 from anafi_mav.arsdk.link.session import reason_of
-from anafi_mav.arsdk.rtsp import Malformed, Request, Response, Status
+from anafi_mav.arsdk.video import rtsp
+from anafi_mav.arsdk.video.rtsp import Malformed, Request, Response, Status
 from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, RemoteProtocolError
 
 log = logging.getLogger("anafi_mav")

@@ -18,8 +18,8 @@ import msgspec
 from msgspec.structs import replace
 
 from anafi_mav.arsdk.codec.wire import Message
-from anafi_mav.arsdk.rtp_h264 import CLOCK_RATE, Picture
-from anafi_mav.arsdk.video_metadata import FrameMetadata
+from anafi_mav.arsdk.video.rtp_h264 import CLOCK_RATE, Picture
+from anafi_mav.arsdk.video.video_metadata import FrameMetadata
 from anafi_mav.drone.element import Element, Reducer
 from anafi_mav.drone.piloting_state import Attitude
 from anafi_mav.drone.video_route import Route

@@ -15,12 +15,12 @@ from contextlib import suppress
 
 import msgspec
 
-from anafi_mav.arsdk import rtsp, sdp
-from anafi_mav.arsdk.rtcp import ReceiverReport, SenderReport, decode_reports, encode_receiver_report
-from anafi_mav.arsdk.rtp_h264 import CLOCK_RATE, Picture, PictureReceiver
-from anafi_mav.arsdk.rtp_reception import Reception
-from anafi_mav.arsdk.rtsp import Response, Transport
-from anafi_mav.arsdk.sdp import MediaDescription, SessionDescription
+from anafi_mav.arsdk.video import rtsp, sdp
+from anafi_mav.arsdk.video.rtcp import ReceiverReport, SenderReport, decode_reports, encode_receiver_report
+from anafi_mav.arsdk.video.rtp_h264 import CLOCK_RATE, Picture, PictureReceiver
+from anafi_mav.arsdk.video.rtp_reception import Reception
+from anafi_mav.arsdk.video.rtsp import Response, Transport
+from anafi_mav.arsdk.video.sdp import MediaDescription, SessionDescription
 from anafi_mav.drone.rtsp_client import RtspClient
 from anafi_mav.drone.video_route import Channels, Route
 from anafi_mav.errors import AnafiMavError, CommandTimeout, LinkLost, NotSupported, RemoteProtocolError

@@ -19,7 +19,7 @@ from anafi_mav.arsdk.link.session import OnMessage
 from anafi_mav.arsdk.messages import common
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.mux.mux_link import MuxServer
-from anafi_mav.arsdk.rtsp import DEFAULT_PORT as RTSP_PORT
+from anafi_mav.arsdk.video.rtsp import DEFAULT_PORT as RTSP_PORT
 from anafi_mav.errors import ConfigError
 from anafi_mav.sim import quirks
 from anafi_mav.sim.air import Air

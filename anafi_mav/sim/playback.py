@@ -7,10 +7,10 @@ import random
 from collections.abc import Callable
 from typing import Any, cast
 
-from anafi_mav.arsdk import rtcp
-from anafi_mav.arsdk.rtcp import ReceiverReport, SenderReport
-from anafi_mav.arsdk.rtp_h264 import CLOCK_RATE, PictureSender
-from anafi_mav.arsdk.video_metadata import FrameMetadata
+from anafi_mav.arsdk.video import rtcp
+from anafi_mav.arsdk.video.rtcp import ReceiverReport, SenderReport
+from anafi_mav.arsdk.video.rtp_h264 import CLOCK_RATE, PictureSender
+from anafi_mav.arsdk.video.video_metadata import FrameMetadata
 from anafi_mav.sim.h264 import pictures
 from anafi_mav.sim.video import Stream
 

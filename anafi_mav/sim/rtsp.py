@@ -17,10 +17,10 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from anafi_mav.arsdk import rtsp
-from anafi_mav.arsdk.rtsp import Malformed, MessageReader, Request, Response, RtpInfo, Status, Transport
-from anafi_mav.arsdk.sdp import format_description
-from anafi_mav.arsdk.video_metadata import FrameMetadata
+from anafi_mav.arsdk.video import rtsp
+from anafi_mav.arsdk.video.rtsp import Malformed, MessageReader, Request, Response, RtpInfo, Status, Transport
+from anafi_mav.arsdk.video.sdp import format_description
+from anafi_mav.arsdk.video.video_metadata import FrameMetadata
 from anafi_mav.sim import video
 from anafi_mav.sim.firmware import Firmware
 from anafi_mav.sim.h264 import FRAME_RATE

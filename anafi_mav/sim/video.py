@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from anafi_mav.arsdk import sdp
-from anafi_mav.arsdk.sdp import MediaDescription, SessionDescription
-from anafi_mav.arsdk.video_metadata import (
+from anafi_mav.arsdk.video import sdp
+from anafi_mav.arsdk.video.sdp import MediaDescription, SessionDescription
+from anafi_mav.arsdk.video.video_metadata import (
     PROTO_PROFILE,
     V3_PROFILE,
     FlyingState,

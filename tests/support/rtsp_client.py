@@ -6,10 +6,10 @@ import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
-from anafi_mav.arsdk import rtcp, rtsp
-from anafi_mav.arsdk.rtp_h264 import Picture, PictureReceiver
-from anafi_mav.arsdk.rtsp import MessageReader, Request, Response
-from anafi_mav.arsdk.sdp import SessionDescription, parse_description
+from anafi_mav.arsdk.video import rtcp, rtsp
+from anafi_mav.arsdk.video.rtp_h264 import Picture, PictureReceiver
+from anafi_mav.arsdk.video.rtsp import MessageReader, Request, Response
+from anafi_mav.arsdk.video.sdp import SessionDescription, parse_description
 
 LIMIT = 10.0
 """s for anything that is awaited."""

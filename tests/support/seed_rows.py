@@ -18,7 +18,7 @@ from anafi_mav.arsdk.messages.piloting_style import PilotingStyleStyle
 from anafi_mav.arsdk.messages.rth import RthEndingBehavior, RthHomeType
 from anafi_mav.arsdk.messages.thermal import RenderingMode
 from anafi_mav.arsdk.messages.user_storage import FormattingType
-from anafi_mav.arsdk.rtp_h264 import Picture
+from anafi_mav.arsdk.video.rtp_h264 import Picture
 from anafi_mav.drone import Drone, PilotingCommand
 from anafi_mav.drone.camera_state import PhotoSettings
 from anafi_mav.drone.camera_words import CameraMode, PhotoMode, Streaming, Style

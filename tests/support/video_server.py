@@ -8,9 +8,9 @@ import random
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from anafi_mav.arsdk.rtcp import Report, decode_reports
-from anafi_mav.arsdk.rtp_h264 import PictureSender
-from anafi_mav.arsdk.video_metadata import (
+from anafi_mav.arsdk.video.rtcp import Report, decode_reports
+from anafi_mav.arsdk.video.rtp_h264 import PictureSender
+from anafi_mav.arsdk.video.video_metadata import (
     PROTO_PROFILE,
     V3_PROFILE,
     FlyingState,

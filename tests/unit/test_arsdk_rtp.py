@@ -6,8 +6,8 @@ import random
 
 import pytest
 
-from anafi_mav.arsdk import rtcp
-from anafi_mav.arsdk.rtp import (
+from anafi_mav.arsdk.video import rtcp
+from anafi_mav.arsdk.video.rtp import (
     MAX_WAIT,
     Extension,
     Packet,
@@ -16,15 +16,8 @@ from anafi_mav.arsdk.rtp import (
     encode_packet,
     sequence_distance,
 )
-from anafi_mav.arsdk.rtp_h264 import (
-    MAX_PACKET,
-    Picture,
-    PictureReceiver,
-    PictureSender,
-    split_proto,
-    split_units,
-)
-from anafi_mav.arsdk.video_metadata import (
+from anafi_mav.arsdk.video.rtp_h264 import MAX_PACKET, Picture, PictureReceiver, PictureSender, split_proto, split_units
+from anafi_mav.arsdk.video.video_metadata import (
     PROTO_PROFILE,
     V3_PROFILE,
     FlyingState,
@@ -35,7 +28,7 @@ from anafi_mav.arsdk.video_metadata import (
     Ned,
     StarfishLink,
 )
-from anafi_mav.arsdk.video_metadata_proto import encode_proto
+from anafi_mav.arsdk.video.video_metadata_proto import encode_proto
 from anafi_mav.errors import LocalProtocolError
 
 METADATA = FrameMetadata(

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from anafi_mav.arsdk.rtcp import ReportBlock, SenderReport
-from anafi_mav.arsdk.rtp import Packet, encode_packet
-from anafi_mav.arsdk.rtp_reception import Reception
+from anafi_mav.arsdk.video.rtcp import ReportBlock, SenderReport
+from anafi_mav.arsdk.video.rtp import Packet, encode_packet
+from anafi_mav.arsdk.video.rtp_reception import Reception
 
 
 def packet(sequence: int, timestamp: int = 0, ssrc: int = 7) -> bytes:

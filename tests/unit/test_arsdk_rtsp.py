@@ -6,8 +6,8 @@ import random
 
 import pytest
 
-from anafi_mav.arsdk import rtsp, sdp
-from anafi_mav.arsdk.rtsp import (
+from anafi_mav.arsdk.video import rtsp, sdp
+from anafi_mav.arsdk.video.rtsp import (
     Malformed,
     MessageReader,
     Request,
@@ -27,7 +27,7 @@ from anafi_mav.arsdk.rtsp import (
     parse_transport,
     split_url,
 )
-from anafi_mav.arsdk.sdp import MediaDescription, SessionDescription, format_description, parse_description
+from anafi_mav.arsdk.video.sdp import MediaDescription, SessionDescription, format_description, parse_description
 from anafi_mav.errors import LocalProtocolError
 
 DESCRIBE = Request("DESCRIBE", "rtsp://192.168.42.1/live", (("CSeq", "2"), ("Accept", "application/sdp")))

@@ -9,7 +9,7 @@ import struct
 import msgspec
 import pytest
 
-from anafi_mav.arsdk.video_metadata import (
+from anafi_mav.arsdk.video.video_metadata import (
     FlyingState,
     FrameMetadata,
     LinkInfo,
@@ -25,7 +25,7 @@ from anafi_mav.arsdk.video_metadata import (
     decode_v3,
     encode_v3,
 )
-from anafi_mav.arsdk.video_metadata_proto import decode_proto, encode_proto
+from anafi_mav.arsdk.video.video_metadata_proto import decode_proto, encode_proto
 from anafi_mav.errors import LocalProtocolError
 
 FLOWN = FrameMetadata(

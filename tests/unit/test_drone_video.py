@@ -16,9 +16,9 @@ from support.scripted_device import ScriptedDevice
 from support.video_server import KEY, METADATA, PPS, SDP, SPS, Asked, VideoServer, ok, refused
 from support.world import loopback
 
-from anafi_mav.arsdk.rtcp import ReceiverReport
-from anafi_mav.arsdk.rtp_h264 import Picture, PictureSender
-from anafi_mav.arsdk.video_metadata import PROTO_PROFILE, V3_PROFILE, Quaternion
+from anafi_mav.arsdk.video.rtcp import ReceiverReport
+from anafi_mav.arsdk.video.rtp_h264 import Picture, PictureSender
+from anafi_mav.arsdk.video.video_metadata import PROTO_PROFILE, V3_PROFILE, Quaternion
 from anafi_mav.drone import Drone
 from anafi_mav.drone import video as video_module
 from anafi_mav.drone.video import VideoFrame, VideoState

@@ -29,8 +29,13 @@ CORES = [
     "arsdk/link/packing.py",
     "arsdk/link/transport.py",
 ]
-CORES += ["arsdk/video_metadata.py", "arsdk/video_metadata_proto.py", "arsdk/rtp.py", "arsdk/rtp_h264.py"]
-CORES += ["arsdk/rtcp.py", "arsdk/rtp_reception.py", "arsdk/rtsp.py", "arsdk/sdp.py"]
+CORES += [
+    "arsdk/video/video_metadata.py",
+    "arsdk/video/video_metadata_proto.py",
+    "arsdk/video/rtp.py",
+    "arsdk/video/rtp_h264.py",
+]
+CORES += ["arsdk/video/rtcp.py", "arsdk/video/rtp_reception.py", "arsdk/video/rtsp.py", "arsdk/video/sdp.py"]
 CORES += ["arsdk/link/handshake.py", "mavlink/frames.py", "mavlink/router.py", "mavlink/streams.py", "plans"]
 CORES += ["services/mission_course.py", "services/mission_progress.py"]
 CORES += ["services/modes.py", "services/offboard.py", "services/height.py", "units.py", "geo.py", "config/schema.py"]

@@ -13,9 +13,9 @@ import pytest
 from support.rtsp_client import LIMIT, Viewer, viewer
 from support.sim_bench import Bench
 
-from anafi_mav.arsdk import rtcp, rtsp
 from anafi_mav.arsdk.messages import ardrone3
-from anafi_mav.arsdk.video_metadata import FlyingState
+from anafi_mav.arsdk.video import rtcp, rtsp
+from anafi_mav.arsdk.video.video_metadata import FlyingState
 from anafi_mav.sim import DroneSpec, Simulator
 from anafi_mav.sim.faults import Impairment
 from anafi_mav.sim.h264 import KEY_INTERVAL

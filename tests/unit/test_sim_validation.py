@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from anafi_mav.arsdk.video_metadata import FrameMetadata, Ned, Quaternion
+from anafi_mav.arsdk.video.video_metadata import FrameMetadata, Ned, Quaternion
 from anafi_mav.cli import main, sim_validate
 from anafi_mav.sim.model import MODELS
 from anafi_mav.sim.validation import (

@@ -13,8 +13,15 @@ from support.sim_bench import HOME, Bench
 from anafi_mav.arsdk.messages import animation, ardrone3, camera, controller_info, follow_me, gimbal, rth
 from anafi_mav.arsdk.messages.camera import ExposureMode, IsoSensitivity, ShutterSpeed, WhiteBalanceMode
 from anafi_mav.arsdk.messages.proto import camera2
-from anafi_mav.arsdk.sdp import CAMERA_TYPE, DEFAULT_MEDIA, MODEL_ID, PICTURE_FOV, format_description, parse_description
-from anafi_mav.arsdk.video_metadata import (
+from anafi_mav.arsdk.video.sdp import (
+    CAMERA_TYPE,
+    DEFAULT_MEDIA,
+    MODEL_ID,
+    PICTURE_FOV,
+    format_description,
+    parse_description,
+)
+from anafi_mav.arsdk.video.video_metadata import (
     PROTO_PROFILE,
     V3_PROFILE,
     FlyingState,

@@ -20,7 +20,7 @@ from anafi_mav.arsdk.codec.protobuf import (
     parse,
     serialize,
 )
-from anafi_mav.arsdk.video_metadata import (
+from anafi_mav.arsdk.video.video_metadata import (
     UNKNOWN_SATELLITES,
     FlyingState,
     FrameMetadata,

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from anafi_mav.arsdk.rtcp import ReportBlock, SenderReport, middle_of
-from anafi_mav.arsdk.rtp import HEADER, sequence_distance
+from anafi_mav.arsdk.video.rtcp import ReportBlock, SenderReport, middle_of
+from anafi_mav.arsdk.video.rtp import HEADER, sequence_distance
 
 
 class Reception:

@@ -15,9 +15,9 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from anafi_mav.arsdk.rtp import HEADER, Extension, Packet, Received, ReorderWindow, decode_packet, encode_packet
-from anafi_mav.arsdk.video_metadata import PROTO_PROFILE, V3_PROFILE, FrameMetadata, decode_v3, encode_v3
-from anafi_mav.arsdk.video_metadata_proto import decode_proto, encode_proto
+from anafi_mav.arsdk.video.rtp import HEADER, Extension, Packet, Received, ReorderWindow, decode_packet, encode_packet
+from anafi_mav.arsdk.video.video_metadata import PROTO_PROFILE, V3_PROFILE, FrameMetadata, decode_v3, encode_v3
+from anafi_mav.arsdk.video.video_metadata_proto import decode_proto, encode_proto
 from anafi_mav.errors import LocalProtocolError
 
 PAYLOAD_TYPE = 96
