@@ -24,8 +24,8 @@ from anafi_mav.cli.terminal import say, say_json
 from anafi_mav.drone import Drone
 from anafi_mav.drone.controller import MODELS as CONTROLLERS
 from anafi_mav.drone.drone import CONTROLLER_PORTS
-from anafi_mav.drone.product import MODELS
 from anafi_mav.drone.rest import HTTP_PORT
+from anafi_mav.drone.status.product import MODELS
 from anafi_mav.errors import AnafiMavError, ConfigError, LinkLost
 
 ANSWER_LIMIT = 2.0

@@ -16,10 +16,10 @@ from msgspec.structs import replace
 from anafi_mav.arsdk.codec.wire import Message, OpenEnum
 from anafi_mav.arsdk.messages import animation
 from anafi_mav.arsdk.messages.animation import AnimationState, Indicator, Mode, PlayMode, Type, VertigoFinishAction
-from anafi_mav.drone.alerts import spoken
 from anafi_mav.drone.element import Reducer, members, with_item
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT
 from anafi_mav.drone.settings import Commanding, number
+from anafi_mav.drone.status.alerts import spoken
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, NotSupported
 
 FIGURE_TIMEOUT = 60.0

@@ -35,7 +35,6 @@ from anafi_mav.arsdk.messages.camera import (
     WhiteBalanceTemperature,
     ZoomControlMode,
 )
-from anafi_mav.drone.alerts import spoken
 from anafi_mav.drone.camera_state import (
     MAX_OPTIONS,
     CamerasState,
@@ -75,6 +74,7 @@ from anafi_mav.drone.camera_words import (
     words,
 )
 from anafi_mav.drone.element import FIRST, Range, Reducer, finite, members
+from anafi_mav.drone.status.alerts import spoken
 from anafi_mav.errors import NotSupported
 
 FEATURE = "camera"

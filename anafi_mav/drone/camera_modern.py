@@ -15,7 +15,6 @@ from msgspec.structs import replace
 from anafi_mav.arsdk.codec.wire import Message, OpenEnum
 from anafi_mav.arsdk.messages.proto import antiflicker as mains
 from anafi_mav.arsdk.messages.proto import camera2 as wire
-from anafi_mav.drone.alerts import spoken
 from anafi_mav.drone.camera_state import (
     MAX_OPTIONS,
     CamerasState,
@@ -56,6 +55,7 @@ from anafi_mav.drone.camera_words import (
     words,
 )
 from anafi_mav.drone.element import MAX_ITEMS, Range, Reducer, finite
+from anafi_mav.drone.status.alerts import spoken
 from anafi_mav.errors import NotSupported
 
 FEATURE = "camera2"

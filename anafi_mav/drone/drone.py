@@ -31,10 +31,7 @@ from anafi_mav.arsdk.mux import mux_link
 from anafi_mav.arsdk.video.rtsp import DEFAULT_PORT as RTSP_PORT
 from anafi_mav.clock import Clock, SystemClock
 from anafi_mav.drone import inquiry
-from anafi_mav.drone.alerts import Alerts, Blocker, spoken, takeoff_blockers
 from anafi_mav.drone.animations import Animations
-from anafi_mav.drone.battery import Battery
-from anafi_mav.drone.calibration import Calibration
 from anafi_mav.drone.camera import Camera
 from anafi_mav.drone.controller import MODELS as CONTROLLERS
 from anafi_mav.drone.controller import Controller, is_motion
@@ -44,16 +41,19 @@ from anafi_mav.drone.features import Feature, Support, features
 from anafi_mav.drone.flight_plan import FlightPlan
 from anafi_mav.drone.follow_me import FollowMe
 from anafi_mav.drone.gimbal import Gimbal
-from anafi_mav.drone.gps import Gps
-from anafi_mav.drone.home import Home, modern
-from anafi_mav.drone.link import Link
 from anafi_mav.drone.media import Media
 from anafi_mav.drone.moves import Move
 from anafi_mav.drone.piloting import Piloting
 from anafi_mav.drone.poi import Poi
-from anafi_mav.drone.product import MODELS, Identity, Product
 from anafi_mav.drone.rest import HTTP_PORT, Rest
-from anafi_mav.drone.sound import Sound
+from anafi_mav.drone.status.alerts import Alerts, Blocker, spoken, takeoff_blockers
+from anafi_mav.drone.status.battery import Battery
+from anafi_mav.drone.status.calibration import Calibration
+from anafi_mav.drone.status.gps import Gps
+from anafi_mav.drone.status.home import Home, modern
+from anafi_mav.drone.status.link import Link
+from anafi_mav.drone.status.product import MODELS, Identity, Product
+from anafi_mav.drone.status.sound import Sound
 from anafi_mav.drone.storage import Storage
 from anafi_mav.drone.thermal import Thermal
 from anafi_mav.drone.video import Video

@@ -107,8 +107,8 @@ from anafi_mav.arsdk.messages.thermal import ThermalMode as ThermalMode
 from anafi_mav.arsdk.messages.user_storage import FormattingType as FormattingType
 from anafi_mav.arsdk.messages.user_storage import FsState as FsState
 from anafi_mav.arsdk.messages.user_storage import PhyState as PhyState
-from anafi_mav.drone.alerts import Blocker as Blocker
-from anafi_mav.drone.alerts import BlockerKind as BlockerKind
+from anafi_mav.drone.status.alerts import Blocker as Blocker
+from anafi_mav.drone.status.alerts import BlockerKind as BlockerKind
 
 __all__ = [
     "AlertLevel",

@@ -18,11 +18,11 @@ from anafi_mav.arsdk.messages import common
 from anafi_mav.arsdk.messages import flight_plan as modern
 from anafi_mav.arsdk.messages.common import FlightPlanComponent, MavlinkType, PlayError, PlayingState
 from anafi_mav.arsdk.messages.flight_plan import Indicator, SupportedCapabilities
-from anafi_mav.drone.alerts import spoken
 from anafi_mav.drone.element import Reducer, members, with_item
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, loop_time
 from anafi_mav.drone.rest import Rest
 from anafi_mav.drone.settings import Commanding
+from anafi_mav.drone.status.alerts import spoken
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost, NotSupported, RemoteProtocolError
 from anafi_mav.models import NO_MODEL, Model
 

@@ -12,10 +12,10 @@ from msgspec.structs import replace
 from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import controller_info, follow_me
 from anafi_mav.arsdk.messages.follow_me import Behavior, Input, Mode
-from anafi_mav.drone.alerts import spoken
 from anafi_mav.drone.element import Position, Reducer, members, position, with_item
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, loop_time
 from anafi_mav.drone.settings import Commanding, number
+from anafi_mav.drone.status.alerts import spoken
 from anafi_mav.errors import (
     AnafiMavError,
     CommandRejected,

@@ -22,7 +22,6 @@ from anafi_mav.arsdk.messages.common import PlayingState
 from anafi_mav.arsdk.messages.follow_me import Mode as FollowMeMode
 from anafi_mav.drone.element import Reducer
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, QUIET, Commander, loop_time
-from anafi_mav.drone.home import Home
 from anafi_mav.drone.moves import Displacement, Move, MoveEnd, Moves
 from anafi_mav.drone.piloting_landing import LandingEnd
 from anafi_mav.drone.piloting_motors import Motors
@@ -31,6 +30,7 @@ from anafi_mav.drone.piloting_return import Returns
 from anafi_mav.drone.piloting_settings import PilotingSettings
 from anafi_mav.drone.piloting_state import REDUCERS, PilotingState
 from anafi_mav.drone.piloting_sticks import StickStream
+from anafi_mav.drone.status.home import Home
 from anafi_mav.drone.sticks import Limits, PilotingCommand, percent
 from anafi_mav.errors import CommandTimeout, NotSupported
 

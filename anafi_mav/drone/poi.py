@@ -14,10 +14,10 @@ from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.arsdk.messages import poi as modern
 from anafi_mav.arsdk.messages.ardrone3 import PoiMode, PoiStatus
 from anafi_mav.arsdk.messages.poi import Indicator
-from anafi_mav.drone.alerts import spoken
 from anafi_mav.drone.element import Position, Reducer, members, position
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT
 from anafi_mav.drone.settings import Commanding
+from anafi_mav.drone.status.alerts import spoken
 from anafi_mav.errors import AnafiMavError, CommandRejected, LocalProtocolError
 
 _SAME_PLACE_DEG = 1e-7

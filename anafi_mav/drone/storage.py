@@ -26,10 +26,10 @@ from anafi_mav.arsdk.messages.user_storage import (
     FsState,
     PhyState,
 )
-from anafi_mav.drone.alerts import spoken
 from anafi_mav.drone.element import EMPTY, REMOVE, Reducer, members, with_item
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT
 from anafi_mav.drone.settings import Commanding, Question
+from anafi_mav.drone.status.alerts import spoken
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LocalProtocolError, NotSupported
 
 FORMAT_TIMEOUT = 120.0

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import math
 
-from anafi_mav.drone.alerts import spoken
 from anafi_mav.drone.events import HomeReachability, ReturnReason, WarningLevel
+from anafi_mav.drone.status.alerts import spoken
 from anafi_mav.services.aircraft import Aircraft
 from anafi_mav.services.flying import LANDING
 from anafi_mav.services.statustext import Severity

@@ -10,12 +10,12 @@ from collections.abc import Callable, Iterable, Mapping
 
 from anafi_mav import units
 from anafi_mav.drone import events
-from anafi_mav.drone.alerts import Alerts
 from anafi_mav.drone.controller import Controller
 from anafi_mav.drone.controller_state import MAX_AXIS
 from anafi_mav.drone.element import Range
-from anafi_mav.drone.home import Home
 from anafi_mav.drone.piloting_state import REDUCERS as PILOTING
+from anafi_mav.drone.status.alerts import Alerts
+from anafi_mav.drone.status.home import Home
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.stream import Stream, Times
 from anafi_mav.services.vehicle import Vehicle

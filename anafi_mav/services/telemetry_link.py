@@ -10,7 +10,7 @@ import os
 from collections.abc import Mapping
 
 from anafi_mav import units
-from anafi_mav.drone.link import Link
+from anafi_mav.drone.status.link import Link
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.stream import Stream, Times
 from anafi_mav.services.vehicle import Vehicle

@@ -11,8 +11,8 @@ from collections.abc import Mapping
 
 from anafi_mav import units
 from anafi_mav.drone import events
-from anafi_mav.drone.battery import BatteryState
 from anafi_mav.drone.events import AlertLevel, BatteryAlert, MotorError, Sensor
+from anafi_mav.drone.status.battery import BatteryState
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.stream import Stream, Times
 from anafi_mav.services.vehicle import Vehicle

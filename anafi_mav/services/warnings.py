@@ -9,8 +9,6 @@ from __future__ import annotations
 from collections.abc import Hashable, Iterator, Mapping
 
 from anafi_mav.drone import Drone
-from anafi_mav.drone.alerts import Alerts, spoken
-from anafi_mav.drone.calibration import Calibration
 from anafi_mav.drone.events import (
     AlertLevel,
     AlertState,
@@ -25,7 +23,9 @@ from anafi_mav.drone.events import (
     MotorError,
     WarningLevel,
 )
-from anafi_mav.drone.home import Home
+from anafi_mav.drone.status.alerts import Alerts, spoken
+from anafi_mav.drone.status.calibration import Calibration
+from anafi_mav.drone.status.home import Home
 from anafi_mav.services.service import Host, Service
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.subscriptions import Subscriptions

@@ -26,16 +26,16 @@ from anafi_mav.arsdk.messages.battery import AlertLevel, BatteryAlert
 from anafi_mav.arsdk.messages.common import CalibrationAxis, Sensor
 from anafi_mav.arsdk.messages.rth import AutoTriggerReason, RthEndingBehavior, RthHomeType, RthState, StateReason
 from anafi_mav.drone import Position, Range
-from anafi_mav.drone.alerts import Alerts, AlertsState, takeoff_blockers
-from anafi_mav.drone.battery import Battery, BatteryState
-from anafi_mav.drone.calibration import Calibration, CalibrationState
 from anafi_mav.drone.element import MAX_ITEMS, Element
-from anafi_mav.drone.gps import Gps
-from anafi_mav.drone.home import Home, HomeState
-from anafi_mav.drone.link import Link
 from anafi_mav.drone.piloting import Piloting
 from anafi_mav.drone.piloting_state import Attitude, PilotingState, Velocity
-from anafi_mav.drone.product import MODELS, Product
+from anafi_mav.drone.status.alerts import Alerts, AlertsState, takeoff_blockers
+from anafi_mav.drone.status.battery import Battery, BatteryState
+from anafi_mav.drone.status.calibration import Calibration, CalibrationState
+from anafi_mav.drone.status.gps import Gps
+from anafi_mav.drone.status.home import Home, HomeState
+from anafi_mav.drone.status.link import Link
+from anafi_mav.drone.status.product import MODELS, Product
 
 ELEMENTS: list[type[Element[Any]]] = [Alerts, Battery, Calibration, Gps, Home, Link, Piloting, Product]
 

@@ -150,7 +150,7 @@ def test_a_wrong_edge_is_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setitem(globals(), "PACKAGE", tmp_path / "anafi_mav")
     for statement in (
         "import anafi_mav.drone",
-        "from anafi_mav.drone.home import Home",
+        "from anafi_mav.drone.status.home import Home",
         "from anafi_mav import drone",
         "from ..drone import Drone",
         "from .. import drone",

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from MAVProxy.modules.lib.param_ftp import ftp_param_decode
 
-from anafi_mav.drone.battery import BatteryState
+from anafi_mav.drone.status.battery import BatteryState
 from anafi_mav.mavlink.frames import pack
 from anafi_mav.models import MODELS, unknown
 from anafi_mav.services.flavours import ARDUPILOT, FLAVOURS, PX4

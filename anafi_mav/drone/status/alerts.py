@@ -15,9 +15,9 @@ from anafi_mav.arsdk.messages.alarms import TakeoffChecklistType
 from anafi_mav.arsdk.messages.ardrone3 import AlertState, ForcedLandingReason, MotorError, WarningLevel
 from anafi_mav.arsdk.messages.battery import AlertLevel, BatteryAlert
 from anafi_mav.arsdk.messages.common import Sensor
-from anafi_mav.drone.battery import BatteryState
-from anafi_mav.drone.calibration import CalibrationState
 from anafi_mav.drone.element import Element, Reducer, with_item
+from anafi_mav.drone.status.battery import BatteryState
+from anafi_mav.drone.status.calibration import CalibrationState
 
 
 class AlertsState(msgspec.Struct, frozen=True):
