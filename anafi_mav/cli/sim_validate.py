@@ -24,7 +24,7 @@ from anafi_mav.cli import interrupts, options
 from anafi_mav.cli.terminal import complain, say
 from anafi_mav.drone import Drone, PilotingCommand
 from anafi_mav.drone.gimbal import Aim
-from anafi_mav.drone.sticks import HOLD_LIMIT
+from anafi_mav.drone.piloting.sticks import HOLD_LIMIT
 from anafi_mav.drone.video import VideoFrame
 from anafi_mav.errors import CommandTimeout, ConfigError
 from anafi_mav.sim import DroneSpec, LogEntry, SimulatedDrone, Simulator

@@ -53,9 +53,10 @@ from anafi_mav.drone.flight_plan import FlightPlan, FlightPlanState, PlanOnDrone
 from anafi_mav.drone.follow_me import FollowMe, FollowMeState, Trajectory
 from anafi_mav.drone.gimbal import Aim, Angles, Gimbal, GimbalAttitude, GimbalState
 from anafi_mav.drone.media import Media, MediaItem, MediaState, Notification, Place, Resource
-from anafi_mav.drone.moves import Displacement, Move, MoveEnd
-from anafi_mav.drone.piloting import Piloting
-from anafi_mav.drone.piloting_state import Attitude, Avoidance, PilotingState, Velocity
+from anafi_mav.drone.piloting.moves import Displacement, Move, MoveEnd
+from anafi_mav.drone.piloting.piloting import Piloting
+from anafi_mav.drone.piloting.state import Attitude, Avoidance, PilotingState, Velocity
+from anafi_mav.drone.piloting.sticks import Limits, PilotingCommand
 from anafi_mav.drone.poi import Poi, PoiState
 from anafi_mav.drone.status.alerts import Alerts, AlertsState, Blocker, BlockerKind
 from anafi_mav.drone.status.battery import Battery, BatteryState
@@ -65,7 +66,6 @@ from anafi_mav.drone.status.home import Home, HomeState
 from anafi_mav.drone.status.link import Link, LinkState
 from anafi_mav.drone.status.product import MODELS, Identity, Product, ProductState
 from anafi_mav.drone.status.sound import Sound, SoundState
-from anafi_mav.drone.sticks import Limits, PilotingCommand
 from anafi_mav.drone.storage import Storage, StorageState
 from anafi_mav.drone.thermal import Colour, Palette, Thermal, ThermalState
 from anafi_mav.drone.video import Video, VideoFrame, VideoState

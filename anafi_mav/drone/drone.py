@@ -42,8 +42,8 @@ from anafi_mav.drone.flight_plan import FlightPlan
 from anafi_mav.drone.follow_me import FollowMe
 from anafi_mav.drone.gimbal import Gimbal
 from anafi_mav.drone.media import Media
-from anafi_mav.drone.moves import Move
-from anafi_mav.drone.piloting import Piloting
+from anafi_mav.drone.piloting.moves import Move
+from anafi_mav.drone.piloting.piloting import Piloting
 from anafi_mav.drone.poi import Poi
 from anafi_mav.drone.rest import HTTP_PORT, Rest
 from anafi_mav.drone.status.alerts import Alerts, Blocker, spoken, takeoff_blockers

@@ -21,7 +21,7 @@ from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.video.rtp_h264 import CLOCK_RATE, Picture
 from anafi_mav.arsdk.video.video_metadata import FrameMetadata
 from anafi_mav.drone.element import Element, Reducer
-from anafi_mav.drone.piloting_state import Attitude
+from anafi_mav.drone.piloting.state import Attitude
 from anafi_mav.drone.video_route import Route
 from anafi_mav.drone.video_stream import Shown, Stream
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost

@@ -14,7 +14,7 @@ from dataclasses import replace
 
 from anafi_mav import geo, units
 from anafi_mav.drone import events
-from anafi_mav.drone.moves import Move, MoveEnd
+from anafi_mav.drone.piloting.moves import Move, MoveEnd
 from anafi_mav.errors import LinkLost
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.bounds import SLOWEST, check_height, check_on_earth, check_place

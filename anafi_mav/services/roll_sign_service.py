@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from anafi_mav.drone import events
-from anafi_mav.drone.piloting_state import Attitude, Velocity
+from anafi_mav.drone.piloting.state import Attitude, Velocity
 from anafi_mav.services.roll_sign import INVERTED, Sign
 from anafi_mav.services.service import Service
 from anafi_mav.services.statustext import Severity

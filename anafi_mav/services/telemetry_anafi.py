@@ -13,7 +13,7 @@ from anafi_mav.drone import events
 from anafi_mav.drone.controller import Controller
 from anafi_mav.drone.controller_state import MAX_AXIS
 from anafi_mav.drone.element import Range
-from anafi_mav.drone.piloting_state import REDUCERS as PILOTING
+from anafi_mav.drone.piloting.state import REDUCERS as PILOTING
 from anafi_mav.drone.status.alerts import Alerts
 from anafi_mav.drone.status.home import Home
 from anafi_mav.mavlink import dialect

@@ -17,7 +17,7 @@ from msgspec.structs import replace
 from anafi_mav import geo, units
 from anafi_mav.drone import events
 from anafi_mav.drone.events import MoveToStatus
-from anafi_mav.drone.piloting_state import Attitude, Velocity
+from anafi_mav.drone.piloting.state import Attitude, Velocity
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.stream import Stream, Times
 from anafi_mav.services.vehicle import Vehicle

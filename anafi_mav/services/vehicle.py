@@ -33,7 +33,7 @@ from anafi_mav.drone.events import (
     RthState,
     TakeoffLocation,
 )
-from anafi_mav.drone.piloting_landing import ALREADY_LANDED
+from anafi_mav.drone.piloting.landing import ALREADY_LANDED
 from anafi_mav.errors import CommandRejected
 from anafi_mav.services.aborted_return import AbortedReturn
 from anafi_mav.services.aircraft import STOP_WAIT, Aircraft

@@ -23,7 +23,7 @@ from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import ardrone3, move
 from anafi_mav.arsdk.messages.ardrone3 import PCMD, OrientationMode
 from anafi_mav.drone import Limits
-from anafi_mav.drone.sticks import percent
+from anafi_mav.drone.piloting.sticks import percent
 from anafi_mav.services.circle import Circle, Lap
 from anafi_mav.services.offboard_control import Controller, Motion
 from anafi_mav.services.place import Place

@@ -25,7 +25,7 @@ from anafi_mav.drone.flight_plan import FlightPlan
 from anafi_mav.drone.follow_me import FollowMe
 from anafi_mav.drone.gimbal import Gimbal
 from anafi_mav.drone.media import Media
-from anafi_mav.drone.piloting import Piloting
+from anafi_mav.drone.piloting.piloting import Piloting
 from anafi_mav.drone.poi import Poi
 from anafi_mav.drone.status.calibration import Calibration
 from anafi_mav.drone.status.home import Home

@@ -560,7 +560,7 @@ async def test_emergency_overtakes_and_nothing_follows_it(drone: Drone, device: 
 async def test_a_cut_that_was_said_to_have_failed_is_not_made_later(
     drone: Drone, device: ScriptedDevice, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("anafi_mav.drone.piloting_motors.EMERGENCY_TIMEOUT", 0.4)
+    monkeypatch.setattr("anafi_mav.drone.piloting.motors.EMERGENCY_TIMEOUT", 0.4)
     await flies(drone, device)
     deaf(device)
     with pytest.raises(CommandTimeout):

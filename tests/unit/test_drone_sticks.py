@@ -7,7 +7,7 @@ import math
 import pytest
 
 from anafi_mav.arsdk.messages.ardrone3 import PCMD
-from anafi_mav.drone.sticks import CENTRED, Limits, Percent, PilotingCommand, Sticks, percent
+from anafi_mav.drone.piloting.sticks import CENTRED, Limits, Percent, PilotingCommand, Sticks, percent
 from anafi_mav.errors import LocalProtocolError
 
 LIMITS = Limits(tilt_deg=40.0, yaw_rate_dps=200.0, climb_mps=4.0)

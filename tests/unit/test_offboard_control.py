@@ -13,7 +13,7 @@ from support.sim_bench import Bench
 
 from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.drone import Limits, PilotingCommand
-from anafi_mav.drone.sticks import percent
+from anafi_mav.drone.piloting.sticks import percent
 from anafi_mav.services.offboard_control import (
     AIR_GAIN,
     PLACE_GAIN,

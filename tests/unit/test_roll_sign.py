@@ -9,7 +9,7 @@ from support.sim_bench import Bench
 
 from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.drone import Limits
-from anafi_mav.drone.sticks import percent
+from anafi_mav.drone.piloting.sticks import percent
 from anafi_mav.services.offboard_control import (
     CAUTIOUS_GAIN,
     CAUTIOUS_TILT,

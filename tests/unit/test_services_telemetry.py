@@ -10,7 +10,7 @@ import pytest
 
 from anafi_mav.clock import SystemClock
 from anafi_mav.drone import Drone
-from anafi_mav.drone.piloting_state import Attitude, PilotingState, Velocity
+from anafi_mav.drone.piloting.state import Attitude, PilotingState, Velocity
 from anafi_mav.drone.status.battery import BatteryState
 from anafi_mav.drone.status.link import LinkState
 from anafi_mav.mavlink import dialect

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from anafi_mav.drone import piloting_landing
 from anafi_mav.drone.events import HomeReachability, ReturnReason, WarningLevel
+from anafi_mav.drone.piloting import landing
 from anafi_mav.services.aborted_return import REPEAT_EVERY, AbortedReturn
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.statustext import CHUNK
@@ -35,13 +35,13 @@ def test_refusals_to_end_a_landing_or_return_fit_one_text(mode: FlightMode) -> N
 
 def test_texts_about_a_landing_that_goes_on_fit_one_text() -> None:
     reasons = (
-        piloting_landing.ALREADY_LANDED,
-        piloting_landing.STILL_LANDING,
-        piloting_landing.MOTORS_CUT,
-        piloting_landing.FORCED,
+        landing.ALREADY_LANDED,
+        landing.STILL_LANDING,
+        landing.MOTORS_CUT,
+        landing.FORCED,
     )
     assert max(len(f"Landing not aborted: {reason}") for reason in reasons) <= CHUNK
-    assert f"Landing not aborted: {piloting_landing.ALREADY_LANDED}" == "Landing not aborted: already landed"
+    assert f"Landing not aborted: {landing.ALREADY_LANDED}" == "Landing not aborted: already landed"
 
 
 @pytest.mark.parametrize("reason", [*ReturnReason, None])

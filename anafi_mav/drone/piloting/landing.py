@@ -13,10 +13,10 @@ from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.drone.element import Element
 from anafi_mav.drone.expectation import Commander, loop_time
-from anafi_mav.drone.piloting_motors import Motors
-from anafi_mav.drone.piloting_state import PilotingState
-from anafi_mav.drone.piloting_sticks import StickStream
-from anafi_mav.drone.sticks import PERIOD, Percent
+from anafi_mav.drone.piloting.motors import Motors
+from anafi_mav.drone.piloting.state import PilotingState
+from anafi_mav.drone.piloting.stick_stream import StickStream
+from anafi_mav.drone.piloting.sticks import PERIOD, Percent
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout
 
 GAZ_FOR = 1.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from anafi_mav.arsdk.messages import ardrone3, obstacle_avoidance, piloting_style
 from anafi_mav.arsdk.messages.obstacle_avoidance import Mode as AvoidanceMode
 from anafi_mav.arsdk.messages.piloting_style import PilotingStyleStyle
-from anafi_mav.drone.piloting_state import PilotingState
+from anafi_mav.drone.piloting.state import PilotingState
 from anafi_mav.drone.settings import Commanding
 
 

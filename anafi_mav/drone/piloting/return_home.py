@@ -12,9 +12,9 @@ from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.messages.rth import RthState
 from anafi_mav.drone.element import Element
 from anafi_mav.drone.expectation import QUIET, Commander, loop_time
-from anafi_mav.drone.moves import Move, MoveEnd, Moves
-from anafi_mav.drone.piloting_state import PilotingState, in_state
-from anafi_mav.drone.piloting_sticks import StickStream
+from anafi_mav.drone.piloting.moves import Move, MoveEnd, Moves
+from anafi_mav.drone.piloting.state import PilotingState, in_state
+from anafi_mav.drone.piloting.stick_stream import StickStream
 from anafi_mav.drone.status.alerts import spoken
 from anafi_mav.drone.status.home import Home
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost

@@ -27,7 +27,7 @@ from anafi_mav.arsdk.messages.ardrone3 import MoveByError, MoveToStatus
 from anafi_mav.arsdk.messages.rth import StateReason
 from anafi_mav.drone.element import Position, position
 from anafi_mav.drone.expectation import Expectation
-from anafi_mav.drone.piloting_state import MOTORS_OFF
+from anafi_mav.drone.piloting.state import MOTORS_OFF
 from anafi_mav.drone.status.home import Home
 from anafi_mav.errors import CommandRejected
 

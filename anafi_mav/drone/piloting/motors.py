@@ -15,8 +15,8 @@ from anafi_mav.arsdk.messages import ardrone3, common
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.drone.element import Element
 from anafi_mav.drone.expectation import QUIET, Commander, Expectation, loop_time
-from anafi_mav.drone.piloting_state import MOTORS_OFF, PilotingState, in_state
-from anafi_mav.drone.piloting_sticks import StickStream
+from anafi_mav.drone.piloting.state import MOTORS_OFF, PilotingState, in_state
+from anafi_mav.drone.piloting.stick_stream import StickStream
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost
 
 RAMPING_TIMEOUT = 10.0

@@ -22,16 +22,16 @@ from anafi_mav.arsdk.messages.common import PlayingState
 from anafi_mav.arsdk.messages.follow_me import Mode as FollowMeMode
 from anafi_mav.drone.element import Reducer
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, QUIET, Commander, loop_time
-from anafi_mav.drone.moves import Displacement, Move, MoveEnd, Moves
-from anafi_mav.drone.piloting_landing import LandingEnd
-from anafi_mav.drone.piloting_motors import Motors
-from anafi_mav.drone.piloting_moves import GuidedMoves
-from anafi_mav.drone.piloting_return import Returns
-from anafi_mav.drone.piloting_settings import PilotingSettings
-from anafi_mav.drone.piloting_state import REDUCERS, PilotingState
-from anafi_mav.drone.piloting_sticks import StickStream
+from anafi_mav.drone.piloting.guided_moves import GuidedMoves
+from anafi_mav.drone.piloting.landing import LandingEnd
+from anafi_mav.drone.piloting.motors import Motors
+from anafi_mav.drone.piloting.moves import Displacement, Move, MoveEnd, Moves
+from anafi_mav.drone.piloting.return_home import Returns
+from anafi_mav.drone.piloting.settings import PilotingSettings
+from anafi_mav.drone.piloting.state import REDUCERS, PilotingState
+from anafi_mav.drone.piloting.stick_stream import StickStream
+from anafi_mav.drone.piloting.sticks import Limits, PilotingCommand, percent
 from anafi_mav.drone.status.home import Home
-from anafi_mav.drone.sticks import Limits, PilotingCommand, percent
 from anafi_mav.errors import CommandTimeout, NotSupported
 
 _IN_FLIGHT = frozenset({FlyingState.HOVERING, FlyingState.FLYING})

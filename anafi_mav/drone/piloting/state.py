@@ -15,8 +15,8 @@ from anafi_mav.arsdk.messages.common import PlayingState
 from anafi_mav.arsdk.messages.follow_me import Mode as FollowMeMode
 from anafi_mav.arsdk.messages.piloting_style import PilotingStyleStyle
 from anafi_mav.drone.element import Position, Range, Reducer, finite, members, position, setting
+from anafi_mav.drone.piloting.sticks import Limits
 from anafi_mav.drone.status.alerts import spoken
-from anafi_mav.drone.sticks import Limits
 
 MOTORS_OFF = frozenset({FlyingState.LANDED, FlyingState.EMERGENCY})
 ON_THE_GROUND = MOTORS_OFF | {FlyingState.MOTOR_RAMPING, FlyingState.USERTAKEOFF}

@@ -13,10 +13,10 @@ from anafi_mav.arsdk.messages.ardrone3 import PCMD, FlyingState
 from anafi_mav.arsdk.messages.common import PlayingState
 from anafi_mav.drone.element import Element
 from anafi_mav.drone.expectation import Commander, loop_time
-from anafi_mav.drone.piloting_state import PilotingState, in_state
+from anafi_mav.drone.piloting.state import PilotingState, in_state
+from anafi_mav.drone.piloting.sticks import CENTRED, Percent, Sticks, is_deflected
 from anafi_mav.drone.status.alerts import spoken
 from anafi_mav.drone.status.home import Home
-from anafi_mav.drone.sticks import CENTRED, Percent, Sticks, is_deflected
 from anafi_mav.errors import CommandRejected, LinkLost
 
 log = logging.getLogger("anafi_mav")

@@ -13,9 +13,9 @@ from anafi_mav.arsdk.messages import move as guided
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState, OrientationMode
 from anafi_mav.drone.element import Element, Position
 from anafi_mav.drone.expectation import Commander, loop_time
-from anafi_mav.drone.moves import Displacement, Move, Moves
-from anafi_mav.drone.piloting_state import PilotingState, in_state
-from anafi_mav.drone.piloting_sticks import StickStream
+from anafi_mav.drone.piloting.moves import Displacement, Move, Moves
+from anafi_mav.drone.piloting.state import PilotingState, in_state
+from anafi_mav.drone.piloting.stick_stream import StickStream
 from anafi_mav.drone.status.home import Home
 from anafi_mav.errors import CommandRejected, LocalProtocolError, NotSupported
 from anafi_mav.units import RAD_PER_DEG, wrap_360
