@@ -23,7 +23,7 @@ from anafi_mav.arsdk.messages.gimbal import FrameOfReference
 from anafi_mav.cli import interrupts, options
 from anafi_mav.cli.terminal import complain, say
 from anafi_mav.drone import Drone, PilotingCommand
-from anafi_mav.drone.gimbal import Aim
+from anafi_mav.drone.payload.gimbal import Aim
 from anafi_mav.drone.piloting.sticks import HOLD_LIMIT
 from anafi_mav.drone.video import VideoFrame
 from anafi_mav.errors import CommandTimeout, ConfigError

@@ -32,7 +32,6 @@ from anafi_mav.arsdk.video.rtsp import DEFAULT_PORT as RTSP_PORT
 from anafi_mav.clock import Clock, SystemClock
 from anafi_mav.drone import inquiry
 from anafi_mav.drone.animations import Animations
-from anafi_mav.drone.camera import Camera
 from anafi_mav.drone.controller import MODELS as CONTROLLERS
 from anafi_mav.drone.controller import Controller, is_motion
 from anafi_mav.drone.element import Element, Reducer
@@ -40,8 +39,11 @@ from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, loop_time
 from anafi_mav.drone.features import Feature, Support, features
 from anafi_mav.drone.flight_plan import FlightPlan
 from anafi_mav.drone.follow_me import FollowMe
-from anafi_mav.drone.gimbal import Gimbal
-from anafi_mav.drone.media import Media
+from anafi_mav.drone.payload.camera import Camera
+from anafi_mav.drone.payload.gimbal import Gimbal
+from anafi_mav.drone.payload.media import Media
+from anafi_mav.drone.payload.storage import Storage
+from anafi_mav.drone.payload.thermal import Thermal
 from anafi_mav.drone.piloting.moves import Move
 from anafi_mav.drone.piloting.piloting import Piloting
 from anafi_mav.drone.poi import Poi
@@ -54,8 +56,6 @@ from anafi_mav.drone.status.home import Home, modern
 from anafi_mav.drone.status.link import Link
 from anafi_mav.drone.status.product import MODELS, Identity, Product
 from anafi_mav.drone.status.sound import Sound
-from anafi_mav.drone.storage import Storage
-from anafi_mav.drone.thermal import Thermal
 from anafi_mav.drone.video import Video
 from anafi_mav.drone.video_route import Direct, Mux, Route
 from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, LocalProtocolError

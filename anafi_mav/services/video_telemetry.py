@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Mapping
 
 from anafi_mav import units
-from anafi_mav.drone.camera import Camera
+from anafi_mav.drone.payload.camera import Camera
 from anafi_mav.drone.status.link import Link, LinkState
 from anafi_mav.drone.video import VideoFrame
 from anafi_mav.errors import AnafiMavError

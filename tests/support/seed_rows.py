@@ -20,9 +20,9 @@ from anafi_mav.arsdk.messages.thermal import RenderingMode
 from anafi_mav.arsdk.messages.user_storage import FormattingType
 from anafi_mav.arsdk.video.rtp_h264 import Picture
 from anafi_mav.drone import Drone, PilotingCommand
-from anafi_mav.drone.camera_state import PhotoSettings
-from anafi_mav.drone.camera_words import CameraMode, PhotoMode, Streaming, Style
-from anafi_mav.drone.gimbal import Aim
+from anafi_mav.drone.payload.camera_enums import CameraMode, PhotoMode, Streaming, Style
+from anafi_mav.drone.payload.camera_state import PhotoSettings
+from anafi_mav.drone.payload.gimbal import Aim
 from anafi_mav.drone.video import VideoFrame
 from support.simulated import Pair, take_off
 

@@ -14,8 +14,7 @@ from anafi_mav.arsdk.messages import camera as old
 from anafi_mav.arsdk.messages.proto import antiflicker as mains
 from anafi_mav.arsdk.messages.proto import camera2 as new
 from anafi_mav.drone import Drone, Range
-from anafi_mav.drone.camera_state import ExposureSettings, PhotoSettings, RecordingSettings
-from anafi_mav.drone.camera_words import (
+from anafi_mav.drone.payload.camera_enums import (
     Antiflicker,
     Burst,
     CameraKind,
@@ -36,6 +35,7 @@ from anafi_mav.drone.camera_words import (
     quantity,
     word,
 )
+from anafi_mav.drone.payload.camera_state import ExposureSettings, PhotoSettings, RecordingSettings
 from anafi_mav.errors import CommandRejected, CommandTimeout, LocalProtocolError, NotSupported
 
 NAN = float("nan")

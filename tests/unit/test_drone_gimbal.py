@@ -19,7 +19,7 @@ from anafi_mav.arsdk.messages.gimbal import (
     Model,
 )
 from anafi_mav.drone import Drone, Range
-from anafi_mav.drone.gimbal import Aim
+from anafi_mav.drone.payload.gimbal import Aim
 from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, LocalProtocolError, NotSupported
 
 NONE, RELATIVE, ABSOLUTE = FrameOfReference.NONE, FrameOfReference.RELATIVE, FrameOfReference.ABSOLUTE

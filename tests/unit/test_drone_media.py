@@ -17,9 +17,9 @@ from support.simulated import Pair, connected
 from anafi_mav.arsdk.messages import common, mediastore
 from anafi_mav.arsdk.messages.mediastore import MediastoreState
 from anafi_mav.drone import Drone
-from anafi_mav.drone.camera_state import PhotoSettings
-from anafi_mav.drone.camera_words import CameraMode, PhotoFile, PhotoMode
-from anafi_mav.drone.media import MediaItem, Notification, Resource
+from anafi_mav.drone.payload.camera_enums import CameraMode, PhotoFile, PhotoMode
+from anafi_mav.drone.payload.camera_state import PhotoSettings
+from anafi_mav.drone.payload.media import MediaItem, Notification, Resource
 from anafi_mav.drone.rest import Rest
 from anafi_mav.errors import CommandRejected, LinkLost, NotSupported, RemoteProtocolError
 

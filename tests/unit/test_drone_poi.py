@@ -14,7 +14,7 @@ from anafi_mav.arsdk.messages import ardrone3, common, controller_info, follow_m
 from anafi_mav.arsdk.messages.ardrone3 import PoiMode, PoiStatus
 from anafi_mav.arsdk.messages.common import CalibrationAxis
 from anafi_mav.drone import Drone, Position
-from anafi_mav.drone.camera_words import CameraMode
+from anafi_mav.drone.payload.camera_enums import CameraMode
 from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, LocalProtocolError, NotSupported
 
 PLACE = (48.8795, 2.3680, 3.0)

@@ -15,7 +15,7 @@ from anafi_mav.arsdk.messages import user_storage_v2 as v2
 from anafi_mav.arsdk.messages.proto import storage as v3
 from anafi_mav.arsdk.messages.user_storage import Feature, FormattingType, FsState, PhyState
 from anafi_mav.drone import Drone
-from anafi_mav.drone.storage import StorageState
+from anafi_mav.drone.payload.storage import StorageState
 from anafi_mav.errors import CommandRejected, CommandTimeout, LocalProtocolError, NotSupported
 
 TELLS = 1 << Feature.FORMAT_RESULT_EVT_SUPPORTED

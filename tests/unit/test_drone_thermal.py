@@ -17,7 +17,7 @@ from anafi_mav.arsdk.messages.thermal import (
     ThermalMode,
 )
 from anafi_mav.arsdk.messages.thermal import Range as Sensitivity
-from anafi_mav.drone.thermal import MAX_COLOURS, Colour, Palette
+from anafi_mav.drone.payload.thermal import MAX_COLOURS, Colour, Palette
 from anafi_mav.errors import LocalProtocolError, NotSupported
 
 FIRST, LAST, EMPTY = 1, 2, 4

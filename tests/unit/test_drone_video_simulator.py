@@ -11,8 +11,8 @@ from support.simulated import connected, take_off
 from support.world import loopback
 
 from anafi_mav.drone import Drone, PilotingCommand
-from anafi_mav.drone.camera_words import CameraMode
-from anafi_mav.drone.gimbal import Aim
+from anafi_mav.drone.payload.camera_enums import CameraMode
+from anafi_mav.drone.payload.gimbal import Aim
 from anafi_mav.drone.video import VideoFrame, VideoState
 from anafi_mav.errors import LinkLost, NotSupported
 from anafi_mav.sim import DroneSpec, Simulator

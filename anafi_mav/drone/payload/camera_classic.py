@@ -35,21 +35,8 @@ from anafi_mav.arsdk.messages.camera import (
     WhiteBalanceTemperature,
     ZoomControlMode,
 )
-from anafi_mav.drone.camera_state import (
-    MAX_OPTIONS,
-    CamerasState,
-    CameraState,
-    ExposureSettings,
-    News,
-    PhotoOption,
-    PhotoSettings,
-    Progress,
-    RecordingOption,
-    RecordingSettings,
-    StyleSettings,
-    changed,
-)
-from anafi_mav.drone.camera_words import (
+from anafi_mav.drone.element import FIRST, Range, Reducer, finite, members
+from anafi_mav.drone.payload.camera_enums import (
     Antiflicker,
     Bracketing,
     Burst,
@@ -73,7 +60,20 @@ from anafi_mav.drone.camera_words import (
     word,
     words,
 )
-from anafi_mav.drone.element import FIRST, Range, Reducer, finite, members
+from anafi_mav.drone.payload.camera_state import (
+    MAX_OPTIONS,
+    CamerasState,
+    CameraState,
+    ExposureSettings,
+    News,
+    PhotoOption,
+    PhotoSettings,
+    Progress,
+    RecordingOption,
+    RecordingSettings,
+    StyleSettings,
+    changed,
+)
 from anafi_mav.drone.status.alerts import spoken
 from anafi_mav.errors import NotSupported
 

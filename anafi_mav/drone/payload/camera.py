@@ -14,10 +14,13 @@ from typing import Any, ClassVar, TypeAlias
 from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages.proto import antiflicker as mains
 from anafi_mav.arsdk.messages.proto import camera2
-from anafi_mav.drone import camera_classic, camera_modern
-from anafi_mav.drone.camera_classic import Classic
-from anafi_mav.drone.camera_modern import Modern
-from anafi_mav.drone.camera_state import (
+from anafi_mav.drone.element import Reducer
+from anafi_mav.drone.expectation import ANSWER_TIMEOUT
+from anafi_mav.drone.payload import camera_classic, camera_modern
+from anafi_mav.drone.payload.camera_classic import Classic
+from anafi_mav.drone.payload.camera_enums import Antiflicker, CameraMode, PhotoMode, Streaming, Style, WhiteBalance
+from anafi_mav.drone.payload.camera_modern import Modern
+from anafi_mav.drone.payload.camera_state import (
     CamerasState,
     CameraState,
     ExposureSettings,
@@ -26,9 +29,6 @@ from anafi_mav.drone.camera_state import (
     Progress,
     RecordingSettings,
 )
-from anafi_mav.drone.camera_words import Antiflicker, CameraMode, PhotoMode, Streaming, Style, WhiteBalance
-from anafi_mav.drone.element import Reducer
-from anafi_mav.drone.expectation import ANSWER_TIMEOUT
 from anafi_mav.drone.settings import Commanding, Question, number
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LocalProtocolError, NotSupported
 from anafi_mav.units import clip

@@ -9,7 +9,8 @@ from typing import Any
 import msgspec
 from msgspec.structs import replace
 
-from anafi_mav.drone.camera_words import (
+from anafi_mav.drone.element import Range, with_item
+from anafi_mav.drone.payload.camera_enums import (
     Antiflicker,
     Bracketing,
     Burst,
@@ -26,7 +27,6 @@ from anafi_mav.drone.camera_words import (
     Style,
     WhiteBalance,
 )
-from anafi_mav.drone.element import Range, with_item
 
 MAX_OPTIONS = 64
 """Combinations of settings that are kept of a camera; Parrot's have a dozen, more is a confused peer."""

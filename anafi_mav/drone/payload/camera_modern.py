@@ -15,21 +15,8 @@ from msgspec.structs import replace
 from anafi_mav.arsdk.codec.wire import Message, OpenEnum
 from anafi_mav.arsdk.messages.proto import antiflicker as mains
 from anafi_mav.arsdk.messages.proto import camera2 as wire
-from anafi_mav.drone.camera_state import (
-    MAX_OPTIONS,
-    CamerasState,
-    CameraState,
-    ExposureSettings,
-    News,
-    PhotoOption,
-    PhotoSettings,
-    Progress,
-    RecordingOption,
-    RecordingSettings,
-    StyleSettings,
-    changed,
-)
-from anafi_mav.drone.camera_words import (
+from anafi_mav.drone.element import MAX_ITEMS, Range, Reducer, finite
+from anafi_mav.drone.payload.camera_enums import (
     Antiflicker,
     Bracketing,
     Burst,
@@ -54,7 +41,20 @@ from anafi_mav.drone.camera_words import (
     word,
     words,
 )
-from anafi_mav.drone.element import MAX_ITEMS, Range, Reducer, finite
+from anafi_mav.drone.payload.camera_state import (
+    MAX_OPTIONS,
+    CamerasState,
+    CameraState,
+    ExposureSettings,
+    News,
+    PhotoOption,
+    PhotoSettings,
+    Progress,
+    RecordingOption,
+    RecordingSettings,
+    StyleSettings,
+    changed,
+)
 from anafi_mav.drone.status.alerts import spoken
 from anafi_mav.errors import NotSupported
 
