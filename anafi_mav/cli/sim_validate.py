@@ -25,7 +25,7 @@ from anafi_mav.cli.terminal import complain, say
 from anafi_mav.drone import Drone, PilotingCommand
 from anafi_mav.drone.payload.gimbal import Aim
 from anafi_mav.drone.piloting.sticks import HOLD_LIMIT
-from anafi_mav.drone.video import VideoFrame
+from anafi_mav.drone.video.video import VideoFrame
 from anafi_mav.errors import CommandTimeout, ConfigError
 from anafi_mav.sim import DroneSpec, LogEntry, SimulatedDrone, Simulator
 from anafi_mav.sim.model import MODELS

@@ -68,8 +68,8 @@ from anafi_mav.drone.status.home import Home, HomeState
 from anafi_mav.drone.status.link import Link, LinkState
 from anafi_mav.drone.status.product import MODELS, Identity, Product, ProductState
 from anafi_mav.drone.status.sound import Sound, SoundState
-from anafi_mav.drone.video import Video, VideoFrame, VideoState
-from anafi_mav.drone.video_stream import Shown
+from anafi_mav.drone.video.stream import Shown
+from anafi_mav.drone.video.video import Video, VideoFrame, VideoState
 from anafi_mav.errors import (
     AnafiMavError,
     CommandRejected,

@@ -56,8 +56,8 @@ from anafi_mav.drone.status.home import Home, modern
 from anafi_mav.drone.status.link import Link
 from anafi_mav.drone.status.product import MODELS, Identity, Product
 from anafi_mav.drone.status.sound import Sound
-from anafi_mav.drone.video import Video
-from anafi_mav.drone.video_route import Direct, Mux, Route
+from anafi_mav.drone.video.route import Direct, Mux, Route
+from anafi_mav.drone.video.video import Video
 from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, LocalProtocolError
 
 log = logging.getLogger("anafi_mav")

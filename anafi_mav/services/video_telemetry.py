@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 from anafi_mav import units
 from anafi_mav.drone.payload.camera import Camera
 from anafi_mav.drone.status.link import Link, LinkState
-from anafi_mav.drone.video import VideoFrame
+from anafi_mav.drone.video.video import VideoFrame
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.service import Host, Service

@@ -23,7 +23,7 @@ from anafi_mav.drone import Drone, PilotingCommand
 from anafi_mav.drone.payload.camera_enums import CameraMode, PhotoMode, Streaming, Style
 from anafi_mav.drone.payload.camera_state import PhotoSettings
 from anafi_mav.drone.payload.gimbal import Aim
-from anafi_mav.drone.video import VideoFrame
+from anafi_mav.drone.video.video import VideoFrame
 from support.simulated import Pair, take_off
 
 MODELS = ("4k", "thermal", "usa", "ai")

@@ -20,8 +20,8 @@ from anafi_mav.arsdk.video.rtcp import ReceiverReport
 from anafi_mav.arsdk.video.rtp_h264 import Picture, PictureSender
 from anafi_mav.arsdk.video.video_metadata import PROTO_PROFILE, V3_PROFILE, Quaternion
 from anafi_mav.drone import Drone
-from anafi_mav.drone import video as video_module
-from anafi_mav.drone.video import VideoFrame, VideoState
+from anafi_mav.drone.video import video as video_module
+from anafi_mav.drone.video.video import VideoFrame, VideoState
 from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, NotSupported, RemoteProtocolError
 from anafi_mav.sim import DroneSpec, Simulator
 

@@ -13,7 +13,7 @@ from support.world import loopback
 from anafi_mav.drone import Drone, PilotingCommand
 from anafi_mav.drone.payload.camera_enums import CameraMode
 from anafi_mav.drone.payload.gimbal import Aim
-from anafi_mav.drone.video import VideoFrame, VideoState
+from anafi_mav.drone.video.video import VideoFrame, VideoState
 from anafi_mav.errors import LinkLost, NotSupported
 from anafi_mav.sim import DroneSpec, Simulator
 from anafi_mav.sim.faults import Impairment

@@ -22,8 +22,8 @@ from anafi_mav.arsdk.video.rtp_h264 import CLOCK_RATE, Picture
 from anafi_mav.arsdk.video.video_metadata import FrameMetadata
 from anafi_mav.drone.element import Element, Reducer
 from anafi_mav.drone.piloting.state import Attitude
-from anafi_mav.drone.video_route import Route
-from anafi_mav.drone.video_stream import Shown, Stream
+from anafi_mav.drone.video.route import Route
+from anafi_mav.drone.video.stream import Shown, Stream
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost
 from anafi_mav.units import euler_from_quaternion
 

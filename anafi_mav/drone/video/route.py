@@ -12,7 +12,7 @@ from anafi_mav.arsdk.link.interface import bind_to_interface
 from anafi_mav.arsdk.link.session import reason_of
 from anafi_mav.arsdk.mux.mux_link import MuxControllerSession
 from anafi_mav.arsdk.mux.mux_udp import UdpTunnel
-from anafi_mav.drone.rtsp_client import RtspClient
+from anafi_mav.drone.video.rtsp_client import RtspClient
 from anafi_mav.errors import LinkLost
 
 log = logging.getLogger("anafi_mav")

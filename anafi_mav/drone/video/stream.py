@@ -21,8 +21,8 @@ from anafi_mav.arsdk.video.rtp_h264 import CLOCK_RATE, Picture, PictureReceiver
 from anafi_mav.arsdk.video.rtp_reception import Reception
 from anafi_mav.arsdk.video.rtsp import Response, Transport
 from anafi_mav.arsdk.video.sdp import MediaDescription, SessionDescription
-from anafi_mav.drone.rtsp_client import RtspClient
-from anafi_mav.drone.video_route import Channels, Route
+from anafi_mav.drone.video.route import Channels, Route
+from anafi_mav.drone.video.rtsp_client import RtspClient
 from anafi_mav.errors import AnafiMavError, CommandTimeout, LinkLost, NotSupported, RemoteProtocolError
 
 SILENCE = 4.0
