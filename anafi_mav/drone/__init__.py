@@ -13,7 +13,10 @@ docs/python-api.md is the guide, docs/python-api-reference.md the reference.
 from anafi_mav.arsdk.video.rtp_h264 import Picture
 from anafi_mav.arsdk.video.video_metadata import FrameMetadata, Location, Ned, Quaternion, WifiLink
 from anafi_mav.drone import events
-from anafi_mav.drone.animations import Animations, AnimationsState
+from anafi_mav.drone.automatic.animations import Animations, AnimationsState
+from anafi_mav.drone.automatic.flight_plan import FlightPlan, FlightPlanState, PlanOnDrone, Recovery
+from anafi_mav.drone.automatic.follow_me import FollowMe, FollowMeState, Trajectory
+from anafi_mav.drone.automatic.poi import Poi, PoiState
 from anafi_mav.drone.connection import connect
 from anafi_mav.drone.controller import Controller
 from anafi_mav.drone.controller_state import ControllerState, KnownDrone
@@ -21,8 +24,6 @@ from anafi_mav.drone.drone import Drone
 from anafi_mav.drone.element import Position, Range
 from anafi_mav.drone.events import FlyingState, PlayingState
 from anafi_mav.drone.features import Feature, Support
-from anafi_mav.drone.flight_plan import FlightPlan, FlightPlanState, PlanOnDrone, Recovery
-from anafi_mav.drone.follow_me import FollowMe, FollowMeState, Trajectory
 from anafi_mav.drone.payload.camera import Camera
 from anafi_mav.drone.payload.camera_enums import (
     Antiflicker,
@@ -59,7 +60,6 @@ from anafi_mav.drone.piloting.moves import Displacement, Move, MoveEnd
 from anafi_mav.drone.piloting.piloting import Piloting
 from anafi_mav.drone.piloting.state import Attitude, Avoidance, PilotingState, Velocity
 from anafi_mav.drone.piloting.sticks import Limits, PilotingCommand
-from anafi_mav.drone.poi import Poi, PoiState
 from anafi_mav.drone.status.alerts import Alerts, AlertsState, Blocker, BlockerKind
 from anafi_mav.drone.status.battery import Battery, BatteryState
 from anafi_mav.drone.status.calibration import Calibration, CalibrationState

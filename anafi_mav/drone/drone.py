@@ -31,14 +31,15 @@ from anafi_mav.arsdk.mux import mux_link
 from anafi_mav.arsdk.video.rtsp import DEFAULT_PORT as RTSP_PORT
 from anafi_mav.clock import Clock, SystemClock
 from anafi_mav.drone import inquiry
-from anafi_mav.drone.animations import Animations
+from anafi_mav.drone.automatic.animations import Animations
+from anafi_mav.drone.automatic.flight_plan import FlightPlan
+from anafi_mav.drone.automatic.follow_me import FollowMe
+from anafi_mav.drone.automatic.poi import Poi
 from anafi_mav.drone.controller import MODELS as CONTROLLERS
 from anafi_mav.drone.controller import Controller, is_motion
 from anafi_mav.drone.element import Element, Reducer
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, loop_time
 from anafi_mav.drone.features import Feature, Support, features
-from anafi_mav.drone.flight_plan import FlightPlan
-from anafi_mav.drone.follow_me import FollowMe
 from anafi_mav.drone.payload.camera import Camera
 from anafi_mav.drone.payload.gimbal import Gimbal
 from anafi_mav.drone.payload.media import Media
@@ -46,7 +47,6 @@ from anafi_mav.drone.payload.storage import Storage
 from anafi_mav.drone.payload.thermal import Thermal
 from anafi_mav.drone.piloting.moves import Move
 from anafi_mav.drone.piloting.piloting import Piloting
-from anafi_mav.drone.poi import Poi
 from anafi_mav.drone.rest import HTTP_PORT, Rest
 from anafi_mav.drone.status.alerts import Alerts, Blocker, spoken, takeoff_blockers
 from anafi_mav.drone.status.battery import Battery

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 
-from anafi_mav.drone.flight_plan import FlightPlan
+from anafi_mav.drone.automatic.flight_plan import FlightPlan
 from anafi_mav.errors import CommandRejected
 from anafi_mav.plans.plan import Item
 from anafi_mav.plans.translate import Leg

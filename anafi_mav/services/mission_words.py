@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from anafi_mav.drone.automatic.flight_plan import FlightPlanState
 from anafi_mav.drone.events import FlightPlanComponent as Part
 from anafi_mav.drone.events import FlightPlanIndicator as Input
-from anafi_mav.drone.flight_plan import FlightPlanState
 from anafi_mav.errors import CommandRejected
 
 _REASONS = {

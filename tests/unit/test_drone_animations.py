@@ -133,7 +133,7 @@ async def test_only_values_that_are_given_count(drone: Drone, device: ScriptedDe
 async def test_a_start_without_an_answer_is_taken_back(
     drone: Drone, device: ScriptedDevice, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("anafi_mav.drone.animations.ANSWER_TIMEOUT", 0.2)
+    monkeypatch.setattr("anafi_mav.drone.automatic.animations.ANSWER_TIMEOUT", 0.2)
     with pytest.raises(CommandTimeout):
         await drone.animations.dronie()
     await device.until(animation.Cancel)

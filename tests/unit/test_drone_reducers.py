@@ -16,11 +16,12 @@ from anafi_mav.arsdk.codec.wire import Message, OpenEnum
 from anafi_mav.arsdk.messages import camera as old
 from anafi_mav.arsdk.messages import gimbal
 from anafi_mav.arsdk.messages.proto import camera2 as new
-from anafi_mav.drone.animations import Animations
+from anafi_mav.drone.automatic.animations import Animations
+from anafi_mav.drone.automatic.flight_plan import FlightPlan
+from anafi_mav.drone.automatic.follow_me import FollowMe
+from anafi_mav.drone.automatic.poi import Poi
 from anafi_mav.drone.controller import Controller
 from anafi_mav.drone.element import MAX_ITEMS, Element
-from anafi_mav.drone.flight_plan import FlightPlan
-from anafi_mav.drone.follow_me import FollowMe
 from anafi_mav.drone.payload.camera import Camera
 from anafi_mav.drone.payload.camera_state import MAX_OPTIONS, CamerasState
 from anafi_mav.drone.payload.gimbal import Gimbal
@@ -28,7 +29,6 @@ from anafi_mav.drone.payload.media import Media
 from anafi_mav.drone.payload.storage import Storage
 from anafi_mav.drone.payload.thermal import Thermal
 from anafi_mav.drone.piloting.piloting import Piloting
-from anafi_mav.drone.poi import Poi
 from anafi_mav.drone.status.calibration import Calibration
 from anafi_mav.drone.status.home import Home
 from anafi_mav.drone.status.sound import Sound
