@@ -20,7 +20,7 @@ from anafi_mav.arsdk.mux.mux_link import look_either
 from anafi_mav.cli import interrupts, log
 from anafi_mav.cli.addresses import spot
 from anafi_mav.cli.terminal import complain, say, say_json
-from anafi_mav.drone.controller import MODELS as CONTROLLERS
+from anafi_mav.drone.controller.controller import MODELS as CONTROLLERS
 from anafi_mav.drone.status.product import MODELS
 from anafi_mav.errors import AnafiMavError, ConfigError
 from anafi_mav.printable import printable

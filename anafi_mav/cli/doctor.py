@@ -22,7 +22,7 @@ from anafi_mav.cli import consent, interrupts, log, options
 from anafi_mav.cli.addresses import spot
 from anafi_mav.cli.terminal import say, say_json
 from anafi_mav.drone import Drone
-from anafi_mav.drone.controller import MODELS as CONTROLLERS
+from anafi_mav.drone.controller.controller import MODELS as CONTROLLERS
 from anafi_mav.drone.drone import CONTROLLER_PORTS
 from anafi_mav.drone.rest import HTTP_PORT
 from anafi_mav.drone.status.product import MODELS

@@ -18,8 +18,8 @@ from anafi_mav.drone.automatic.flight_plan import FlightPlan, FlightPlanState, P
 from anafi_mav.drone.automatic.follow_me import FollowMe, FollowMeState, Trajectory
 from anafi_mav.drone.automatic.poi import Poi, PoiState
 from anafi_mav.drone.connection import connect
-from anafi_mav.drone.controller import Controller
-from anafi_mav.drone.controller_state import ControllerState, KnownDrone
+from anafi_mav.drone.controller.controller import Controller
+from anafi_mav.drone.controller.state import ControllerState, KnownDrone
 from anafi_mav.drone.drone import Drone
 from anafi_mav.drone.element import Position, Range
 from anafi_mav.drone.events import FlyingState, PlayingState

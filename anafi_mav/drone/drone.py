@@ -35,8 +35,8 @@ from anafi_mav.drone.automatic.animations import Animations
 from anafi_mav.drone.automatic.flight_plan import FlightPlan
 from anafi_mav.drone.automatic.follow_me import FollowMe
 from anafi_mav.drone.automatic.poi import Poi
-from anafi_mav.drone.controller import MODELS as CONTROLLERS
-from anafi_mav.drone.controller import Controller, is_motion
+from anafi_mav.drone.controller.controller import MODELS as CONTROLLERS
+from anafi_mav.drone.controller.controller import Controller, is_motion
 from anafi_mav.drone.element import Element, Reducer
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, loop_time
 from anafi_mav.drone.features import Feature, Support, features

@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterable, Mapping
 
 from anafi_mav import units
 from anafi_mav.drone import events
-from anafi_mav.drone.controller import Controller
-from anafi_mav.drone.controller_state import MAX_AXIS
+from anafi_mav.drone.controller.controller import Controller
+from anafi_mav.drone.controller.state import MAX_AXIS
 from anafi_mav.drone.element import Range
 from anafi_mav.drone.piloting.state import REDUCERS as PILOTING
 from anafi_mav.drone.status.alerts import Alerts

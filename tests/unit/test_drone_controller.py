@@ -30,7 +30,7 @@ from anafi_mav.arsdk.messages.drone_manager import DroneManagerConnectionState a
 from anafi_mav.arsdk.messages.proto import controller_network, device_manager, network
 from anafi_mav.arsdk.messages.skyctrl import Source
 from anafi_mav.drone import Drone, PilotingCommand
-from anafi_mav.drone.controller import PILOT_KEEPS, STICKS, TILT, is_motion
+from anafi_mav.drone.controller.controller import PILOT_KEEPS, STICKS, TILT, is_motion
 from anafi_mav.drone.piloting.moves import Move, MoveEnd
 from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, LocalProtocolError, NotSupported
 from anafi_mav.sim import DroneSpec, LogEntry, SimulatedDrone, Simulator

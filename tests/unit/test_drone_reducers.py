@@ -20,7 +20,7 @@ from anafi_mav.drone.automatic.animations import Animations
 from anafi_mav.drone.automatic.flight_plan import FlightPlan
 from anafi_mav.drone.automatic.follow_me import FollowMe
 from anafi_mav.drone.automatic.poi import Poi
-from anafi_mav.drone.controller import Controller
+from anafi_mav.drone.controller.controller import Controller
 from anafi_mav.drone.element import MAX_ITEMS, Element
 from anafi_mav.drone.payload.camera import Camera
 from anafi_mav.drone.payload.camera_state import MAX_OPTIONS, CamerasState

@@ -33,7 +33,7 @@ from anafi_mav.arsdk.messages.drone_manager import DroneManagerConnectionState a
 from anafi_mav.arsdk.messages.generic import ListFlags
 from anafi_mav.arsdk.messages.proto import controller_network, device_manager
 from anafi_mav.arsdk.messages.skyctrl import Source
-from anafi_mav.drone.controller_state import REDUCERS, ControllerState, KnownDrone
+from anafi_mav.drone.controller.state import REDUCERS, ControllerState, KnownDrone
 from anafi_mav.drone.element import Element, Reducer
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, loop_time
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost, LocalProtocolError, NotSupported
