@@ -30,7 +30,7 @@ from anafi_mav.arsdk.messages.proto import device_manager
 from anafi_mav.arsdk.mux import mux_link
 from anafi_mav.arsdk.video.rtsp import DEFAULT_PORT as RTSP_PORT
 from anafi_mav.clock import Clock, SystemClock
-from anafi_mav.drone import inquiry
+from anafi_mav.drone import startup_queries
 from anafi_mav.drone.automatic.animations import Animations
 from anafi_mav.drone.automatic.flight_plan import FlightPlan
 from anafi_mav.drone.automatic.follow_me import FollowMe
@@ -225,8 +225,12 @@ class Drone:
                 await self._find_web_server(session)
                 await self._read_states()
                 if self._model.protobuf:
-                    await inquiry.ask(self._commander, self.name, [*self.camera.questions(), *self.storage.questions()])
-                    await inquiry.ask(self._commander, self.name, [*self.camera.details(), *self.storage.details()])
+                    await startup_queries.ask(
+                        self._commander, self.name, [*self.camera.questions(), *self.storage.questions()]
+                    )
+                    await startup_queries.ask(
+                        self._commander, self.name, [*self.camera.details(), *self.storage.details()]
+                    )
             except BaseException:
                 await self.close()
                 raise
@@ -401,7 +405,7 @@ class Drone:
         the Skycontroller first, if there is one, then of the drone behind it."""
         date = datetime.fromtimestamp(self._clock.time()).astimezone().strftime("%Y%m%dT%H%M%S%z")
         if self.controller.present:
-            await inquiry.read(
+            await startup_queries.read(
                 self._commander,
                 "Skycontroller",
                 (skyctrl.CurrentDateTime(date), skyctrl.AllStates(), skyctrl.AllSettings()),
@@ -410,7 +414,7 @@ class Drone:
             for question in self.controller.questions():
                 self._commander.send(question)
             await self._find_drone()
-        await inquiry.read(
+        await startup_queries.read(
             self._commander,
             "drone",
             (common.CurrentDateTime(date), common.AllStates(), common.AllSettings()),

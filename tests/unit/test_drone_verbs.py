@@ -118,7 +118,7 @@ async def test_the_date_is_local_time_with_its_offset(device: ScriptedDevice) ->
 async def test_a_drone_that_does_not_send_all_its_states_is_no_connection(
     device: ScriptedDevice, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("anafi_mav.drone.inquiry.STATES_TIMEOUT", SHORT)
+    monkeypatch.setattr("anafi_mav.drone.startup_queries.STATES_TIMEOUT", SHORT)
     del device.script[common.AllSettings]
     drone = device.drone()
     with pytest.raises(LinkLost, match="all its settings"):
