@@ -28,7 +28,6 @@ from anafi_mav.drone.piloting.sticks import HOLD_LIMIT
 from anafi_mav.drone.video.video import VideoFrame
 from anafi_mav.errors import CommandTimeout, ConfigError
 from anafi_mav.sim import DroneSpec, LogEntry, SimulatedDrone, Simulator
-from anafi_mav.sim.model import MODELS
 from anafi_mav.sim.validation import (
     AFTER,
     CLIMB,
@@ -43,6 +42,7 @@ from anafi_mav.sim.validation import (
     tilt_results,
     yaw_results,
 )
+from anafi_mav.sim.world.model import MODELS
 
 HEIGHT = 30.0
 """m above take-off that everything is flown at."""

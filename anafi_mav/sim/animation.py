@@ -16,11 +16,11 @@ from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import animation
 from anafi_mav.arsdk.messages.animation import AnimationState, Indicator, Mode, Type
 from anafi_mav.arsdk.messages.generic import ListFlags
-from anafi_mav.sim.body import Body
 from anafi_mav.sim.figures import NEEDS_TARGET, Figure, Leg, Stage, Target, figure
-from anafi_mav.sim.model import Model
-from anafi_mav.sim.motion import Pose
 from anafi_mav.sim.operator import Operator
+from anafi_mav.sim.world.airframe import Body
+from anafi_mav.sim.world.model import Model
+from anafi_mav.sim.world.motion import Pose
 from anafi_mav.units import clip, wrap_pi
 
 STALL = 4.0

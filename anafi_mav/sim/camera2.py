@@ -19,8 +19,6 @@ from anafi_mav.arsdk.messages.proto import camera2
 from anafi_mav.sim.camera import Camera
 from anafi_mav.sim.camera2_settings import CHOICES, COMMON, DEFAULTS, PHOTO, RANGES, RECORDING
 from anafi_mav.sim.capture import Capture, Studio
-from anafi_mav.sim.lenses import AI
-from anafi_mav.sim.model import Model
 from anafi_mav.sim.optics import (
     AUTOMATIC_EXPOSURE,
     AUTOMATIC_ISO,
@@ -30,6 +28,8 @@ from anafi_mav.sim.optics import (
     white_balance,
     zoomed,
 )
+from anafi_mav.sim.world.lenses import AI
+from anafi_mav.sim.world.model import Model
 from anafi_mav.units import RAD_PER_DEG, clip
 
 CAMERA = 0

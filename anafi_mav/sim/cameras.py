@@ -12,8 +12,8 @@ from anafi_mav.arsdk.messages.generic import ListFlags
 from anafi_mav.arsdk.messages.thermal import ThermalMode
 from anafi_mav.sim.camera import Camera, bits
 from anafi_mav.sim.capture import Capture, Studio
-from anafi_mav.sim.model import Model
 from anafi_mav.sim.optics import Optics
+from anafi_mav.sim.world.model import Model
 
 ACTIVE = {ThermalMode.DISABLED: 0, ThermalMode.STANDARD: 1, ThermalMode.BLENDED: 2}
 """Id of the camera that a thermal mode makes the active one."""

@@ -27,11 +27,11 @@ from anafi_mav.arsdk.messages.camera import (
     State,
 )
 from anafi_mav.sim import picture
-from anafi_mav.sim.calendar import Calendar
 from anafi_mav.sim.camera import Camera
 from anafi_mav.sim.media import MAX_RESOURCES, Kind, Media, MediaStore, Resource
 from anafi_mav.sim.picture import Scene
 from anafi_mav.sim.storage import Place
+from anafi_mav.sim.world.calendar import Calendar
 
 SHOT_TIME = 0.1
 """s from the button to the shot, and between the shots of a bracketing. Assumed."""

@@ -14,9 +14,9 @@ from anafi_mav.arsdk.messages import ardrone3, rth
 from anafi_mav.arsdk.messages.ardrone3 import BatteryCapacityStatus, ForcedLandingReason
 from anafi_mav.arsdk.messages.rth import AutoTriggerReason, RthAutoTriggerMode, RthHomeReachability
 from anafi_mav.sim import homing, power
-from anafi_mav.sim.model import Model
-from anafi_mav.sim.motion import Pose
 from anafi_mav.sim.settings import Settings
+from anafi_mav.sim.world.model import Model
+from anafi_mav.sim.world.motion import Pose
 
 PERIOD = 1.0
 """s between two looks, and between two announcements (ardrone3.xml: "then every seconds")."""

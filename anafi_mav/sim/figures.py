@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import animation
 from anafi_mav.arsdk.messages.animation import PlayMode, Type
-from anafi_mav.sim.motion import Pose
+from anafi_mav.sim.world.motion import Pose
 from anafi_mav.units import DEG_PER_RAD, RAD_PER_DEG, clip, wrap_pi
 
 CLIMB = 2.0

@@ -19,7 +19,7 @@ from anafi_mav.sim.flight import Flight
 from anafi_mav.sim.flight import Identity as Identity
 from anafi_mav.sim.follow_me import COMMANDS as FOLLOW_ME
 from anafi_mav.sim.machine import AIRBORNE, GUIDED, LANDED, Event
-from anafi_mav.sim.quirks import Quirk
+from anafi_mav.sim.world.quirks import Quirk
 
 LATE_TAKE_OFF = 1.0
 """s by which a firmware with the quirk `takeoff-from-ground-late` executes a TakeOff late."""

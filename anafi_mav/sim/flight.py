@@ -19,10 +19,8 @@ from anafi_mav.arsdk.messages.ardrone3 import AlertState, FlyingState
 from anafi_mav.arsdk.messages.rth import RthEndingBehavior, StateReason
 from anafi_mav.sim import power
 from anafi_mav.sim.animation import Animations
-from anafi_mav.sim.body import Body
 from anafi_mav.sim.compass import Compass
 from anafi_mav.sim.endurance import Endurance
-from anafi_mav.sim.faults import Faults
 from anafi_mav.sim.figures import Target
 from anafi_mav.sim.flight_plan import FlightPlan
 from anafi_mav.sim.follow_me import FollowMe
@@ -30,19 +28,21 @@ from anafi_mav.sim.gimbal import Gimbals
 from anafi_mav.sim.guidance import Guidance
 from anafi_mav.sim.homing import UNKNOWN, Homing
 from anafi_mav.sim.machine import AIRBORNE, GUIDED, LANDED, Event, next_state
-from anafi_mav.sim.model import Model
-from anafi_mav.sim.motion import Pose
 from anafi_mav.sim.operator import Operator
 from anafi_mav.sim.payload import Payload
 from anafi_mav.sim.picture import Scene
-from anafi_mav.sim.place import Origin
 from anafi_mav.sim.plan_store import FlightPlanStore
 from anafi_mav.sim.poi import Poi
 from anafi_mav.sim.power import Battery
-from anafi_mav.sim.quirks import Quirk
 from anafi_mav.sim.safety import Alarms, Warnings, check_changed, checklist
 from anafi_mav.sim.settings import Settings
-from anafi_mav.sim.wind import WindWatch
+from anafi_mav.sim.world.airframe import Body
+from anafi_mav.sim.world.faults import Faults
+from anafi_mav.sim.world.model import Model
+from anafi_mav.sim.world.motion import Pose
+from anafi_mav.sim.world.place import Origin
+from anafi_mav.sim.world.quirks import Quirk
+from anafi_mav.sim.world.wind import WindWatch
 
 RAMP_TIME = 1.0
 """s that the motors need; one or two on the aircraft."""

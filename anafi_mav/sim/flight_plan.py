@@ -15,18 +15,18 @@ from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import common, flight_plan
 from anafi_mav.arsdk.messages.common import FlightPlanComponent as Part
 from anafi_mav.arsdk.messages.common import MavlinkType, PlayError, PlayingState
-from anafi_mav.sim.body import Body
-from anafi_mav.sim.faults import Faults
-from anafi_mav.sim.model import Model
-from anafi_mav.sim.motion import Pose, Turn
 from anafi_mav.sim.operator import Operator
 from anafi_mav.sim.panorama import Panorama
-from anafi_mav.sim.place import Origin
 from anafi_mav.sim.plan_camera import COMMANDS, PlanCamera
 from anafi_mav.sim.plan_file import Command, Item, PlanFileError, read
 from anafi_mav.sim.poi import look
-from anafi_mav.sim.quirks import Quirk
 from anafi_mav.sim.settings import Settings
+from anafi_mav.sim.world.airframe import Body
+from anafi_mav.sim.world.faults import Faults
+from anafi_mav.sim.world.model import Model
+from anafi_mav.sim.world.motion import Pose, Turn
+from anafi_mav.sim.world.place import Origin
+from anafi_mav.sim.world.quirks import Quirk
 from anafi_mav.units import DEG_PER_RAD, RAD_PER_DEG
 
 CRUISE = 5.0

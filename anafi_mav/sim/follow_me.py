@@ -16,11 +16,11 @@ from typing import Any, NamedTuple
 from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import controller_info, follow_me
 from anafi_mav.arsdk.messages.follow_me import Animation, Behavior, GeoRelConfigureParam, Input, Mode
-from anafi_mav.sim.body import Body
-from anafi_mav.sim.motion import Pose
-from anafi_mav.sim.place import Origin
 from anafi_mav.sim.poi import look
 from anafi_mav.sim.settings import Settings
+from anafi_mav.sim.world.airframe import Body
+from anafi_mav.sim.world.motion import Pose
+from anafi_mav.sim.world.place import Origin
 from anafi_mav.units import DEG_PER_RAD, RAD_PER_DEG, clip, wrap_pi
 
 MODES = (Mode.LOOK_AT, Mode.GEOGRAPHIC, Mode.RELATIVE)

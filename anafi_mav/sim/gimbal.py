@@ -17,8 +17,8 @@ from typing import Any
 from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import gimbal
 from anafi_mav.arsdk.messages.gimbal import Axis, ControlMode, FrameOfReference, GimbalCalibrationState
-from anafi_mav.sim.model import GimbalModel, Model, Range
-from anafi_mav.sim.motion import Pose
+from anafi_mav.sim.world.model import GimbalModel, Model, Range
+from anafi_mav.sim.world.motion import Pose
 from anafi_mav.units import DEG_PER_RAD, clip, wrap_pi
 
 OFFSET_RANGE = (-10.0, 10.0)

@@ -13,15 +13,15 @@ from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import ardrone3, move
 from anafi_mav.arsdk.messages.ardrone3 import MoveByError, MoveToStatus
 from anafi_mav.arsdk.messages.rth import RthEndingBehavior
-from anafi_mav.sim.body import Body
-from anafi_mav.sim.faults import Faults
 from anafi_mav.sim.homing import Homing
-from anafi_mav.sim.model import Model
-from anafi_mav.sim.motion import Pose
 from anafi_mav.sim.moves import MoveBy, MoveTo, asked_speeds, own_speeds
-from anafi_mav.sim.place import Origin
-from anafi_mav.sim.quirks import Quirk
 from anafi_mav.sim.settings import Settings
+from anafi_mav.sim.world.airframe import Body
+from anafi_mav.sim.world.faults import Faults
+from anafi_mav.sim.world.model import Model
+from anafi_mav.sim.world.motion import Pose
+from anafi_mav.sim.world.place import Origin
+from anafi_mav.sim.world.quirks import Quirk
 from anafi_mav.units import RAD_PER_DEG, clip
 
 STICK_TIMEOUT = 0.5

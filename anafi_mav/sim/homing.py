@@ -15,12 +15,12 @@ from typing import NamedTuple
 from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import ardrone3, rth
 from anafi_mav.arsdk.messages.rth import RthEndingBehavior, RthHomeType, RthState, StateReason
-from anafi_mav.sim.body import Body
-from anafi_mav.sim.faults import Faults
-from anafi_mav.sim.motion import Pose, Turn
-from anafi_mav.sim.place import Origin
-from anafi_mav.sim.quirks import Quirk
 from anafi_mav.sim.settings import HOME_TYPES, Settings
+from anafi_mav.sim.world.airframe import Body
+from anafi_mav.sim.world.faults import Faults
+from anafi_mav.sim.world.motion import Pose, Turn
+from anafi_mav.sim.world.place import Origin
+from anafi_mav.sim.world.quirks import Quirk
 from anafi_mav.units import RAD_PER_DEG
 
 UNKNOWN = 500.0

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 from anafi_mav.arsdk.messages import ardrone3, move
 from anafi_mav.arsdk.messages.ardrone3 import MoveByError, MoveToStatus, OrientationMode
-from anafi_mav.sim.body import Body
-from anafi_mav.sim.model import Airframe
-from anafi_mav.sim.motion import FLOOR, Pose, Turn
 from anafi_mav.sim.settings import Settings
+from anafi_mav.sim.world.airframe import Body
+from anafi_mav.sim.world.model import Airframe
+from anafi_mav.sim.world.motion import FLOOR, Pose, Turn
 from anafi_mav.units import RAD_PER_DEG
 
 CRUISE = 5.0

@@ -9,8 +9,8 @@ from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import camera, gimbal
 from anafi_mav.arsdk.messages.gimbal import ControlMode, FrameOfReference
 from anafi_mav.sim.gimbal import Gimbals
-from anafi_mav.sim.motion import Pose
 from anafi_mav.sim.payload import Payload
+from anafi_mav.sim.world.motion import Pose
 
 
 class Operator:

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import math
 
-from anafi_mav.sim.body import Body
-from anafi_mav.sim.motion import Pose
 from anafi_mav.sim.operator import Operator
 from anafi_mav.sim.plan_file import Item
+from anafi_mav.sim.world.airframe import Body
+from anafi_mav.sim.world.motion import Pose
 from anafi_mav.units import RAD_PER_DEG, clip
 
 SPEED = 30.0

@@ -12,7 +12,7 @@ from anafi_mav.arsdk.messages import battery, common
 from anafi_mav.arsdk.messages.ardrone3 import AlertState
 from anafi_mav.arsdk.messages.battery import AlertLevel, BatteryAlert
 from anafi_mav.arsdk.messages.generic import ListFlags
-from anafi_mav.sim.model import Model
+from anafi_mav.sim.world.model import Model
 
 LOW, CRITICAL, EMPTY = 20, 10, 4
 """Percent: warning, no take-off any more, forced landing."""

@@ -13,7 +13,7 @@ from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import ardrone3, common, piloting_style, precise_home, rth, wifi
 from anafi_mav.arsdk.messages.ardrone3 import HomeTypeSetting
 from anafi_mav.arsdk.messages.rth import RthHomeType
-from anafi_mav.sim.model import Model, Range
+from anafi_mav.sim.world.model import Model, Range
 from anafi_mav.units import RAD_PER_DEG
 
 MAX_NAME = 64

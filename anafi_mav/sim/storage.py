@@ -15,7 +15,7 @@ from anafi_mav.arsdk.messages import user_storage_v2 as v2
 from anafi_mav.arsdk.messages.generic import ListFlags
 from anafi_mav.arsdk.messages.user_storage import FormattingResult, FormattingStep, FormattingType, FsState, PhyState
 from anafi_mav.sim.media import MediaStore
-from anafi_mav.sim.model import Card, Model
+from anafi_mav.sim.world.model import Card, Model
 
 DEFAULT_PERIOD = 1
 """s between two reports of the free space for who asks for 0 (Parrot's user_storage.xml)."""

@@ -27,8 +27,8 @@ from anafi_mav.arsdk.codec.wire import (
 from anafi_mav.arsdk.link.handshake import DeviceInfo
 from anafi_mav.arsdk.messages import animation, ardrone3, common, follow_me, rth
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState, MoveToStatus, PoiMode
-from anafi_mav.sim.place import Origin
 from anafi_mav.sim.skycontroller import Skycontroller
+from anafi_mav.sim.world.place import Origin
 from support.sim_bench import HOME, Bench
 
 MODELS = ("4k", "thermal", "usa", "ai")

@@ -9,12 +9,12 @@ from typing import Any, TypeVar
 from anafi_mav.arsdk.codec.wire import Message, encode
 from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
-from anafi_mav.sim.body import Body
-from anafi_mav.sim.faults import Faults
 from anafi_mav.sim.firmware import Firmware, Identity
-from anafi_mav.sim.model import MODELS
-from anafi_mav.sim.motion import STEP, Motion, Pose
-from anafi_mav.sim.place import Origin
+from anafi_mav.sim.world.airframe import Body
+from anafi_mav.sim.world.faults import Faults
+from anafi_mav.sim.world.model import MODELS
+from anafi_mav.sim.world.motion import STEP, Motion, Pose
+from anafi_mav.sim.world.place import Origin
 
 HOME = (48.8789, 2.3677, 35.0)
 

@@ -23,7 +23,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from anafi_mav import geo
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.mavlink import dialect as newer
-from anafi_mav.sim.faults import CLEAR, Impairment
+from anafi_mav.sim.world.faults import CLEAR, Impairment
 from support.mav import NAN, Client
 from support.missions import ACTIVE, CORNERS, put, start, state, way
 from support.missions import RTL as ITEM_RTL

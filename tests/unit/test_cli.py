@@ -26,7 +26,7 @@ from anafi_mav.cli.addresses import Reservations
 from anafi_mav.cli.run import configuration, place
 from anafi_mav.cli.sim import Fleet
 from anafi_mav.config import Config, load
-from anafi_mav.sim.wind import WindSpec
+from anafi_mav.sim.world.wind import WindSpec
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="it waits for processes by pidfd")
 

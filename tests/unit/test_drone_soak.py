@@ -17,7 +17,7 @@ from test_drone_flight_plan import V1
 
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.errors import AnafiMavError, CommandRejected, LinkLost
-from anafi_mav.sim.faults import Impairment
+from anafi_mav.sim.world.faults import Impairment
 
 ROUNDS = 8
 

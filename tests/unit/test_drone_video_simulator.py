@@ -16,7 +16,7 @@ from anafi_mav.drone.payload.gimbal import Aim
 from anafi_mav.drone.video.video import VideoFrame, VideoState
 from anafi_mav.errors import LinkLost, NotSupported
 from anafi_mav.sim import DroneSpec, Simulator
-from anafi_mav.sim.faults import Impairment
+from anafi_mav.sim.world.faults import Impairment
 
 MODELS = ("4k", "thermal", "usa", "ai")
 

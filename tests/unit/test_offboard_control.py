@@ -28,7 +28,7 @@ from anafi_mav.services.offboard_control import (
     tilt_for,
     turn_towards,
 )
-from anafi_mav.sim.model import MODELS
+from anafi_mav.sim.world.model import MODELS
 
 LIMITS = Limits(tilt_deg=35.0, yaw_rate_dps=90.0, climb_mps=3.0)
 

@@ -11,7 +11,7 @@ from anafi_mav.models import planned
 from anafi_mav.plans import files
 from anafi_mav.plans.check import Findings, Limits, Severity, check
 from anafi_mav.plans.plan import GLOBAL, RELATIVE, Circle, Item, Plan, Point, Polygon
-from anafi_mav.sim.model import MODELS as SIMULATED
+from anafi_mav.sim.world.model import MODELS as SIMULATED
 
 MISSIONS = Path(__file__).parents[2] / "missions"
 HOME = Point(LAT, LON, 35.0)

@@ -13,7 +13,7 @@ from anafi_mav.arsdk.messages import animation, ardrone3, camera, follow_me, rth
 from anafi_mav.arsdk.messages.animation import AnimationState, Indicator, PlayMode, Type
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState, PoiMode
 from anafi_mav.sim.figures import STARTS
-from anafi_mav.sim.place import Origin
+from anafi_mav.sim.world.place import Origin
 
 RAD = math.pi / 180.0
 ALL = 0xFF

@@ -15,8 +15,8 @@ from anafi_mav.arsdk.messages import ardrone3, common, rth
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.messages.proto import camera2
 from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
-from anafi_mav.sim.air import HELD, MAX_UNDER_WAY, Air
-from anafi_mav.sim.faults import CLEAR, Faults, Impairment
+from anafi_mav.sim.world.faults import CLEAR, Faults, Impairment
+from anafi_mav.sim.world.link_emulation import HELD, MAX_UNDER_WAY, Air
 
 
 class Sky:

@@ -11,7 +11,7 @@ from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import ardrone3, common, controller_info, follow_me, rth
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState, PoiMode, PoiStatus
 from anafi_mav.arsdk.messages.follow_me import Behavior, Input, Mode
-from anafi_mav.sim.place import Origin
+from anafi_mav.sim.world.place import Origin
 
 RAD = math.pi / 180.0
 

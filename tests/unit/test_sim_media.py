@@ -15,10 +15,10 @@ from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import mediastore
 from anafi_mav.arsdk.messages.mediastore import MediastoreState
 from anafi_mav.sim import picture
-from anafi_mav.sim.calendar import Calendar
 from anafi_mav.sim.media import Kind, Media, MediaStore
 from anafi_mav.sim.picture import Scene
 from anafi_mav.sim.plan_store import MAX_PLANS, FlightPlanStore
+from anafi_mav.sim.world.calendar import Calendar
 
 PARIS = Scene(48.8789, 2.3677, 85.5, pitch=0.0, roll=0.0)
 DATE = "20261121T101112+0100"

@@ -14,8 +14,8 @@ from anafi_mav.arsdk.messages import flight_plan, move, obstacle_avoidance
 from anafi_mav.arsdk.messages.proto import antiflicker, connectivity, developer, network, piloting, pointnfly, privacy
 from anafi_mav.errors import ConfigError
 from anafi_mav.sim import DroneSpec, Simulator
-from anafi_mav.sim.model import MODELS
 from anafi_mav.sim.states import all_settings, all_states
+from anafi_mav.sim.world.model import MODELS
 
 ALL = ["4k", "thermal", "usa", "ai"]
 

@@ -6,9 +6,9 @@ import math
 
 import pytest
 
-from anafi_mav.sim.body import Body
-from anafi_mav.sim.model import MODELS
-from anafi_mav.sim.motion import STEP, Motion, Pose, Turn
+from anafi_mav.sim.world.airframe import Body
+from anafi_mav.sim.world.model import MODELS
+from anafi_mav.sim.world.motion import STEP, Motion, Pose, Turn
 
 RAD = math.pi / 180.0
 AIRFRAME = MODELS["4k"].airframe

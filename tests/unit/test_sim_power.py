@@ -26,10 +26,10 @@ from anafi_mav.arsdk.messages.rth import (
     StateReason,
 )
 from anafi_mav.sim.endurance import Endurance
-from anafi_mav.sim.model import MODELS
-from anafi_mav.sim.motion import Pose
 from anafi_mav.sim.settings import Settings
 from anafi_mav.sim.states import all_settings, all_states
+from anafi_mav.sim.world.model import MODELS
+from anafi_mav.sim.world.motion import Pose
 
 S = FlyingState
 MODEL = MODELS["4k"]

@@ -11,8 +11,9 @@ from anafi_mav.cli.addresses import Reservations
 from anafi_mav.cli.run import place
 from anafi_mav.config import from_text
 from anafi_mav.errors import ConfigError
-from anafi_mav.sim import DroneSpec, quirks, scenario
-from anafi_mav.sim.quirks import QUIRKS, Quirk
+from anafi_mav.sim import DroneSpec, scenario
+from anafi_mav.sim.world import quirks
+from anafi_mav.sim.world.quirks import QUIRKS, Quirk
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "simulator.md"
 

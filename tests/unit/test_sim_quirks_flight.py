@@ -8,7 +8,7 @@ from support.sim_bench import Bench
 from anafi_mav.arsdk.messages import ardrone3, rth
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.messages.rth import RthState
-from anafi_mav.sim.quirks import Quirk
+from anafi_mav.sim.world.quirks import Quirk
 
 GAZ = ardrone3.PCMD(0, 0, 0, 0, 100, 0)
 

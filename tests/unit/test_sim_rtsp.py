@@ -17,11 +17,11 @@ from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.arsdk.video import rtcp, rtsp
 from anafi_mav.arsdk.video.video_metadata import FlyingState
 from anafi_mav.sim import DroneSpec, Simulator
-from anafi_mav.sim.faults import Impairment
 from anafi_mav.sim.h264 import KEY_INTERVAL
 from anafi_mav.sim.media import Kind
 from anafi_mav.sim.picture import Scene
 from anafi_mav.sim.rtsp import MAX_CONNECTIONS, MAX_SESSIONS, VideoServer
+from anafi_mav.sim.world.faults import Impairment
 
 TICK = 90000 / 30
 """Between the timestamps of two pictures."""

@@ -13,9 +13,9 @@ from anafi_mav.arsdk.messages.ardrone3 import FlyingState, MotorError, TakeOff, 
 from anafi_mav.arsdk.messages.common import FlightPlanComponent
 from anafi_mav.errors import ConfigError
 from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
-from anafi_mav.sim.faults import CLEAR, Impairment
 from anafi_mav.sim.scenario import from_text, load
-from anafi_mav.sim.wind import CALM, WindSpec
+from anafi_mav.sim.world.faults import CLEAR, Impairment
+from anafi_mav.sim.world.wind import CALM, WindSpec
 
 
 class World:

@@ -16,7 +16,6 @@ import pytest
 
 from anafi_mav.arsdk.video.video_metadata import FrameMetadata, Ned, Quaternion
 from anafi_mav.cli import main, sim_validate
-from anafi_mav.sim.model import MODELS
 from anafi_mav.sim.validation import (
     Result,
     Track,
@@ -28,6 +27,7 @@ from anafi_mav.sim.validation import (
     tilt_results,
     yaw_results,
 )
+from anafi_mav.sim.world.model import MODELS
 
 ROOT = Path(__file__).parents[2]
 

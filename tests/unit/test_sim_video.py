@@ -35,8 +35,8 @@ from anafi_mav.arsdk.video.video_metadata import (
 from anafi_mav.errors import LocalProtocolError
 from anafi_mav.sim import optics, video
 from anafi_mav.sim.h264 import KEY_INTERVAL, Pictures, pictures
-from anafi_mav.sim.model import MODELS
 from anafi_mav.sim.video import streams_of
+from anafi_mav.sim.world.model import MODELS
 
 
 def say(bench: Bench, stream: int = 0) -> FrameMetadata:

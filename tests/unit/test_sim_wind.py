@@ -10,10 +10,10 @@ import pytest
 
 from anafi_mav.arsdk.messages.ardrone3 import WarningLevel
 from anafi_mav.errors import ConfigError
-from anafi_mav.sim.body import Body
-from anafi_mav.sim.model import MODELS
-from anafi_mav.sim.motion import STEP, Motion, Pose
-from anafi_mav.sim.wind import CALM, Wind, WindSpec, WindWatch
+from anafi_mav.sim.world.airframe import Body
+from anafi_mav.sim.world.model import MODELS
+from anafi_mav.sim.world.motion import STEP, Motion, Pose
+from anafi_mav.sim.world.wind import CALM, Wind, WindSpec, WindWatch
 
 RAD = math.pi / 180.0
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from anafi_mav.sim.motion import NO_FENCE, G, Mode, Motion, Turn
+from anafi_mav.sim.world.motion import NO_FENCE, G, Mode, Motion, Turn
 from anafi_mav.units import wrap_pi
 
 

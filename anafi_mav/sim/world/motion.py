@@ -30,8 +30,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from anafi_mav.sim.columns import Array, DelayLine, bounded, limit
-from anafi_mav.sim.model import Airframe
+from anafi_mav.sim.world.model import Airframe
+from anafi_mav.sim.world.vector_math import Array, DelayLine, bounded, limit
 from anafi_mav.units import RAD_PER_DEG, wrap_pi
 
 STEP = 1.0 / 60.0

@@ -6,7 +6,7 @@ import random
 from collections.abc import Callable
 from typing import Any
 
-from anafi_mav.sim.faults import Faults, Impairment
+from anafi_mav.sim.world.faults import Faults, Impairment
 
 HELD = 0.1
 """s at most that a datagram waits for the next one to overtake it."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from anafi_mav.arsdk.messages.alarms import TakeoffChecklistType
 from anafi_mav.arsdk.messages.ardrone3 import MotorError, WarningLevel
 from anafi_mav.arsdk.messages.common import FlightPlanComponent
-from anafi_mav.sim.quirks import Quirk
+from anafi_mav.sim.world.quirks import Quirk
 
 
 @dataclass(frozen=True)

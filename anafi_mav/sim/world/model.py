@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 from anafi_mav import models
 from anafi_mav.errors import ConfigError
 from anafi_mav.models import Intrinsics, Payload
-from anafi_mav.sim import lenses
-from anafi_mav.sim.lenses import Lens
+from anafi_mav.sim.world import lenses
+from anafi_mav.sim.world.lenses import Lens
 
 
 @dataclass(frozen=True)
@@ -248,5 +248,7 @@ def model_of(name: str) -> Model:
     if name in MODELS:
         return MODELS[name]
     if name in models.simulated():
-        raise ConfigError("model", f"the simulator has no figures of {name!r}: anafi_mav/sim/model.py lacks its entry")
+        raise ConfigError(
+            "model", f"the simulator has no figures of {name!r}: anafi_mav/sim/world/model.py lacks its entry"
+        )
     raise ConfigError("model", f"expected one of {', '.join(MODELS)}, got {name!r}")
