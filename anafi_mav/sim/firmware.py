@@ -13,7 +13,7 @@ from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
 from anafi_mav.arsdk.messages import animation, ardrone3, common, flight_plan, follow_me, gimbal, move, rth
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.messages.rth import StateReason
-from anafi_mav.sim import wireless
+from anafi_mav.sim.features import wireless
 from anafi_mav.sim.figures import STARTS as ANIMATIONS
 from anafi_mav.sim.flight import Flight
 from anafi_mav.sim.flight import Identity as Identity

@@ -21,6 +21,7 @@ from anafi_mav.sim import power
 from anafi_mav.sim.animation import Animations
 from anafi_mav.sim.compass import Compass
 from anafi_mav.sim.endurance import Endurance
+from anafi_mav.sim.features.settings import Settings
 from anafi_mav.sim.figures import Target
 from anafi_mav.sim.flight_plan import FlightPlan
 from anafi_mav.sim.follow_me import FollowMe
@@ -35,7 +36,6 @@ from anafi_mav.sim.plan_store import FlightPlanStore
 from anafi_mav.sim.poi import Poi
 from anafi_mav.sim.power import Battery
 from anafi_mav.sim.safety import Alarms, Warnings, check_changed, checklist
-from anafi_mav.sim.settings import Settings
 from anafi_mav.sim.world.airframe import Body
 from anafi_mav.sim.world.faults import Faults
 from anafi_mav.sim.world.model import Model

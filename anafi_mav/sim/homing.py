@@ -15,7 +15,7 @@ from typing import NamedTuple
 from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import ardrone3, rth
 from anafi_mav.arsdk.messages.rth import RthEndingBehavior, RthHomeType, RthState, StateReason
-from anafi_mav.sim.settings import HOME_TYPES, Settings
+from anafi_mav.sim.features.settings import HOME_TYPES, Settings
 from anafi_mav.sim.world.airframe import Body
 from anafi_mav.sim.world.faults import Faults
 from anafi_mav.sim.world.motion import Pose, Turn

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from anafi_mav.arsdk.messages import ardrone3, move
 from anafi_mav.arsdk.messages.ardrone3 import MoveByError, MoveToStatus, OrientationMode
-from anafi_mav.sim.settings import Settings
+from anafi_mav.sim.features.settings import Settings
 from anafi_mav.sim.world.airframe import Body
 from anafi_mav.sim.world.model import Airframe
 from anafi_mav.sim.world.motion import FLOOR, Pose, Turn

@@ -10,9 +10,9 @@ from anafi_mav.arsdk.messages.thermal import ThermalMode
 from anafi_mav.sim.camera2 import Camera2
 from anafi_mav.sim.cameras import Cameras
 from anafi_mav.sim.capture import Studio
+from anafi_mav.sim.features.services import Services
 from anafi_mav.sim.media import MediaStore
 from anafi_mav.sim.picture import Scene
-from anafi_mav.sim.services import Services
 from anafi_mav.sim.storage import Storage
 from anafi_mav.sim.thermal import Thermal
 from anafi_mav.sim.world.calendar import Calendar

@@ -22,7 +22,7 @@ from anafi_mav.arsdk.messages.generic import ListFlags
 from anafi_mav.arsdk.messages.mapper import AxisAction, ButtonAction, ButtonEvent
 from anafi_mav.arsdk.messages.proto import device_manager
 from anafi_mav.arsdk.messages.skyctrl import Source
-from anafi_mav.sim.device_manager import DeviceManager
+from anafi_mav.sim.features.device_manager import DeviceManager
 
 MODELS = {3: 0x0918, 4: 0x091D}
 """Generation -> product number."""

@@ -26,7 +26,7 @@ from anafi_mav.arsdk.messages.rth import (
     StateReason,
 )
 from anafi_mav.sim.endurance import Endurance
-from anafi_mav.sim.settings import Settings
+from anafi_mav.sim.features.settings import Settings
 from anafi_mav.sim.states import all_settings, all_states
 from anafi_mav.sim.world.model import MODELS
 from anafi_mav.sim.world.motion import Pose

@@ -13,7 +13,7 @@ from anafi_mav.arsdk.codec.protobuf import Empty
 from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import flight_plan, move, obstacle_avoidance
 from anafi_mav.arsdk.messages.proto import antiflicker, connectivity, developer, network, piloting, pointnfly, privacy
-from anafi_mav.sim.wireless import Radio
+from anafi_mav.sim.features.wireless import Radio
 from anafi_mav.units import clip
 
 HOVERING_ALTITUDES = (1.0, 10.0)

@@ -10,7 +10,7 @@ from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.link.handshake import DeviceInfo
 from anafi_mav.arsdk.messages.proto import controller_network, network
 from anafi_mav.arsdk.messages.proto import device_manager as words
-from anafi_mav.sim.wireless import RSSI
+from anafi_mav.sim.features.wireless import RSSI
 
 QUALITY = 5
 """Of the link between controller and drone: 0 to 5."""
