@@ -17,7 +17,7 @@ from anafi_mav.arsdk.messages import animation
 from anafi_mav.arsdk.messages.animation import AnimationState, Indicator, Mode, Type
 from anafi_mav.arsdk.messages.generic import ListFlags
 from anafi_mav.sim.figures import NEEDS_TARGET, Figure, Leg, Stage, Target, figure
-from anafi_mav.sim.operator import Operator
+from anafi_mav.sim.payload.camera_operator import Operator
 from anafi_mav.sim.world.airframe import Body
 from anafi_mav.sim.world.model import Model
 from anafi_mav.sim.world.motion import Pose

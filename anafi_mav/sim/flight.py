@@ -25,13 +25,13 @@ from anafi_mav.sim.features.settings import Settings
 from anafi_mav.sim.figures import Target
 from anafi_mav.sim.flight_plan import FlightPlan
 from anafi_mav.sim.follow_me import FollowMe
-from anafi_mav.sim.gimbal import Gimbals
 from anafi_mav.sim.guidance import Guidance
 from anafi_mav.sim.homing import UNKNOWN, Homing
 from anafi_mav.sim.machine import AIRBORNE, GUIDED, LANDED, Event, next_state
-from anafi_mav.sim.operator import Operator
-from anafi_mav.sim.payload import Payload
-from anafi_mav.sim.picture import Scene
+from anafi_mav.sim.payload.camera_operator import Operator
+from anafi_mav.sim.payload.gimbal import Gimbals
+from anafi_mav.sim.payload.jpeg_scene import Scene
+from anafi_mav.sim.payload.payload import Payload
 from anafi_mav.sim.plan_store import FlightPlanStore
 from anafi_mav.sim.poi import Poi
 from anafi_mav.sim.power import Battery

@@ -15,7 +15,7 @@ from typing import Any
 from aiohttp import WSCloseCode, web
 from aiohttp.typedefs import Handler
 
-from anafi_mav.sim.media import Kind, MediaStore
+from anafi_mav.sim.payload.media import Kind, MediaStore
 from anafi_mav.sim.plan_store import FlightPlanStore
 
 MAX_BODY = 1 << 20

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from anafi_mav.sim.operator import Operator
+from anafi_mav.sim.payload.camera_operator import Operator
 from anafi_mav.sim.plan_file import Item
 from anafi_mav.sim.world.airframe import Body
 from anafi_mav.sim.world.motion import Pose

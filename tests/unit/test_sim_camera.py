@@ -38,7 +38,7 @@ from anafi_mav.arsdk.messages.camera import (
     ZoomControlMode,
 )
 from anafi_mav.arsdk.messages.generic import ListFlags
-from anafi_mav.sim.cameras import Cameras
+from anafi_mav.sim.payload.cameras import Cameras
 
 PHOTO, RECORDING = CameraCameraMode.PHOTO, CameraCameraMode.RECORDING
 

@@ -14,9 +14,9 @@ from PIL import Image
 from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import mediastore
 from anafi_mav.arsdk.messages.mediastore import MediastoreState
-from anafi_mav.sim import picture
-from anafi_mav.sim.media import Kind, Media, MediaStore
-from anafi_mav.sim.picture import Scene
+from anafi_mav.sim.payload import jpeg_scene
+from anafi_mav.sim.payload.jpeg_scene import Scene
+from anafi_mav.sim.payload.media import Kind, Media, MediaStore
 from anafi_mav.sim.plan_store import MAX_PLANS, FlightPlanStore
 from anafi_mav.sim.world.calendar import Calendar
 
@@ -29,7 +29,7 @@ DATE = "20261121T101112+0100"
 
 def test_a_photo_is_a_jpeg_of_what_was_seen() -> None:
     def pixel(scene: Scene, x: int, y: int) -> str:
-        opened = Image.open(io.BytesIO(picture.jpeg(scene)))
+        opened = Image.open(io.BytesIO(jpeg_scene.jpeg(scene)))
         opened.load()
         assert (opened.size, opened.mode) == ((160, 120), "RGB")
         red, _, blue = opened.getpixel((x, y))
@@ -64,7 +64,7 @@ def test_a_photo_knows_where_and_when() -> None:
 
 
 def test_a_raw_photo_is_a_tiff_with_a_version() -> None:
-    data = picture.dng(PARIS, 1, "ANAFI", "2026:11:21 10:11:12", b"<x/>")
+    data = jpeg_scene.dng(PARIS, 1, "ANAFI", "2026:11:21 10:11:12", b"<x/>")
     assert struct.unpack_from("<2sHI", data) == (b"II", 42, 8)
     (count,) = struct.unpack_from("<H", data, 8)
     tags = {}
@@ -74,7 +74,7 @@ def test_a_raw_photo_is_a_tiff_with_a_version() -> None:
     assert list(tags) == sorted(tags)
     assert tags[0xC612] == (1, 4, bytes((1, 4, 0, 0)))  # DNGVersion
     offset, size = (struct.unpack("<I", tags[tag][2])[0] for tag in (0x0111, 0x0117))
-    assert size == picture.RAW_WIDTH * picture.RAW_HEIGHT * 3
+    assert size == jpeg_scene.RAW_WIDTH * jpeg_scene.RAW_HEIGHT * 3
     assert offset + size == len(data)
     # The first sample is the sky: more blue than red.
     assert data[offset + 2] > data[offset]
@@ -82,15 +82,15 @@ def test_a_raw_photo_is_a_tiff_with_a_version() -> None:
 
 @pytest.mark.parametrize(("seconds", "frames"), [(0.0, 1), (0.4, 1), (1.0, 1), (2.5, 3), (60.0, 60)])
 def test_a_video_has_a_frame_a_second(seconds: float, frames: int) -> None:
-    data = picture.mp4(PARIS, seconds)
-    assert len(data) == picture.mp4_size(PARIS, seconds)
+    data = jpeg_scene.mp4(PARIS, seconds)
+    assert len(data) == jpeg_scene.mp4_size(PARIS, seconds)
     boxes = []
     place = 0
     while place < len(data):
         size, kind = struct.unpack_from(">I4s", data, place)
         boxes.append(kind)
         if kind == b"mdat":
-            assert data.count(picture.jpeg(PARIS), place + 8) == frames
+            assert data.count(jpeg_scene.jpeg(PARIS), place + 8) == frames
         place += size
     assert boxes == [b"ftyp", b"moov", b"mdat"]
     assert place == len(data)
@@ -98,7 +98,7 @@ def test_a_video_has_a_frame_a_second(seconds: float, frames: int) -> None:
 
 def test_a_video_plays(tmp_path: Any) -> None:
     file = tmp_path / "video.mp4"
-    file.write_bytes(picture.mp4(PARIS, 3.5))
+    file.write_bytes(jpeg_scene.mp4(PARIS, 3.5))
     video = cv2.VideoCapture(str(file))
     frames = []
     while (read := video.read())[0]:

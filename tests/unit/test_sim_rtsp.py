@@ -18,8 +18,8 @@ from anafi_mav.arsdk.video import rtcp, rtsp
 from anafi_mav.arsdk.video.video_metadata import FlyingState
 from anafi_mav.sim import DroneSpec, Simulator
 from anafi_mav.sim.h264 import KEY_INTERVAL
-from anafi_mav.sim.media import Kind
-from anafi_mav.sim.picture import Scene
+from anafi_mav.sim.payload.jpeg_scene import Scene
+from anafi_mav.sim.payload.media import Kind
 from anafi_mav.sim.rtsp import MAX_CONNECTIONS, MAX_SESSIONS, VideoServer
 from anafi_mav.sim.world.faults import Impairment
 

@@ -17,7 +17,7 @@ from anafi_mav.arsdk.messages.user_storage import (
     FsState,
     PhyState,
 )
-from anafi_mav.sim.storage import Place
+from anafi_mav.sim.payload.storage import Place
 
 
 @pytest.fixture

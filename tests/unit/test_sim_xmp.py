@@ -9,9 +9,9 @@ from xml.etree import ElementTree
 import pytest
 from PIL import Image
 
-from anafi_mav.sim import picture
-from anafi_mav.sim.media import Kind, MediaStore
-from anafi_mav.sim.picture import Scene
+from anafi_mav.sim.payload import jpeg_scene
+from anafi_mav.sim.payload.jpeg_scene import Scene
+from anafi_mav.sim.payload.media import Kind, MediaStore
 
 DATE = "20261121T101112+0100"
 PARIS = Scene(48.8789, 2.3677, 85.5, pitch=-30.0, roll=1.25, heading=200.0)
@@ -61,7 +61,7 @@ def test_photo_with_xmp_is_a_jpeg_with_exif_that_opens() -> None:
     data = photo(PARIS)
     opened = Image.open(io.BytesIO(data))
     opened.load()
-    assert opened.size == (picture.WIDTH, picture.HEIGHT)
+    assert opened.size == (jpeg_scene.WIDTH, jpeg_scene.HEIGHT)
     assert opened.getexif()[0x010F] == "Parrot"
     assert b"x:xmpmeta" in opened.info["xmp"]
     markers, place = [], 2

@@ -14,7 +14,7 @@ from anafi_mav.arsdk.messages import user_storage as v1
 from anafi_mav.arsdk.messages import user_storage_v2 as v2
 from anafi_mav.arsdk.messages.generic import ListFlags
 from anafi_mav.arsdk.messages.user_storage import FormattingResult, FormattingStep, FormattingType, FsState, PhyState
-from anafi_mav.sim.media import MediaStore
+from anafi_mav.sim.payload.media import MediaStore
 from anafi_mav.sim.world.model import Card, Model
 
 DEFAULT_PERIOD = 1

@@ -7,14 +7,14 @@ from collections.abc import Callable
 from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import camera
 from anafi_mav.arsdk.messages.thermal import ThermalMode
-from anafi_mav.sim.camera2 import Camera2
-from anafi_mav.sim.cameras import Cameras
-from anafi_mav.sim.capture import Studio
 from anafi_mav.sim.features.services import Services
-from anafi_mav.sim.media import MediaStore
-from anafi_mav.sim.picture import Scene
-from anafi_mav.sim.storage import Storage
-from anafi_mav.sim.thermal import Thermal
+from anafi_mav.sim.payload.camera2 import Camera2
+from anafi_mav.sim.payload.cameras import Cameras
+from anafi_mav.sim.payload.capture import Studio
+from anafi_mav.sim.payload.jpeg_scene import Scene
+from anafi_mav.sim.payload.media import MediaStore
+from anafi_mav.sim.payload.storage import Storage
+from anafi_mav.sim.payload.thermal import Thermal
 from anafi_mav.sim.world.calendar import Calendar
 from anafi_mav.sim.world.model import Model
 

@@ -37,7 +37,7 @@ from anafi_mav.arsdk.messages.camera import (
     WhiteBalanceTemperature,
     ZoomControlMode,
 )
-from anafi_mav.sim.optics import Optics, seconds, sensitivity, white_balance, zoomed
+from anafi_mav.sim.payload.optics import Optics, seconds, sensitivity, white_balance, zoomed
 from anafi_mav.sim.world.lenses import BITRATES, LOWEST_BITRATE, WIDTHS, Lens, Photos, Recording
 from anafi_mav.sim.world.model import Range
 from anafi_mav.units import RAD_PER_DEG, clip

@@ -26,11 +26,11 @@ from anafi_mav.arsdk.messages.camera import (
     RecordingResult,
     State,
 )
-from anafi_mav.sim import picture
-from anafi_mav.sim.camera import Camera
-from anafi_mav.sim.media import MAX_RESOURCES, Kind, Media, MediaStore, Resource
-from anafi_mav.sim.picture import Scene
-from anafi_mav.sim.storage import Place
+from anafi_mav.sim.payload import jpeg_scene
+from anafi_mav.sim.payload.camera import Camera
+from anafi_mav.sim.payload.jpeg_scene import Scene
+from anafi_mav.sim.payload.media import MAX_RESOURCES, Kind, Media, MediaStore, Resource
+from anafi_mav.sim.payload.storage import Place
 from anafi_mav.sim.world.calendar import Calendar
 
 SHOT_TIME = 0.1
@@ -384,7 +384,7 @@ class Capture:
         studio = self._studio
         room = self._release()
         seconds = (time - take.began) * take.scale
-        if picture.mp4_size(take.scene, seconds) > room:
+        if jpeg_scene.mp4_size(take.scene, seconds) > room:
             seconds, result = _fitting(take, room), RecordingResult.STOPPED_NO_STORAGE_SPACE
         name = ""
         if seconds >= 0.0:
@@ -398,7 +398,7 @@ class Capture:
         place = self._studio.place
         written = place.reserved
         room = self._release()
-        size = picture.mp4_size(take.scene, (time - take.began) * take.scale)
+        size = jpeg_scene.mp4_size(take.scene, (time - take.began) * take.scale)
         place.reserved = size if size <= room else written
         if size > room:
             yield from self.stop_recording(time, RecordingResult.STOPPED_NO_STORAGE_SPACE)
@@ -464,6 +464,6 @@ class Capture:
 
 def _fitting(take: _Take, room: int) -> float:
     """Seconds of video for which there is room (bytes); less than 0 if there is none at all."""
-    one = picture.mp4_size(take.scene, picture.FRAME_TIME)
-    frame = picture.mp4_size(take.scene, 2 * picture.FRAME_TIME) - one
-    return picture.FRAME_TIME * (1 + (room - one) // frame)
+    one = jpeg_scene.mp4_size(take.scene, jpeg_scene.FRAME_TIME)
+    frame = jpeg_scene.mp4_size(take.scene, 2 * jpeg_scene.FRAME_TIME) - one
+    return jpeg_scene.FRAME_TIME * (1 + (room - one) // frame)

@@ -10,9 +10,9 @@ from anafi_mav.arsdk.messages import camera
 from anafi_mav.arsdk.messages.camera import CameraAntiflickerMode, CameraCameraMode, State, Supported
 from anafi_mav.arsdk.messages.generic import ListFlags
 from anafi_mav.arsdk.messages.thermal import ThermalMode
-from anafi_mav.sim.camera import Camera, bits
-from anafi_mav.sim.capture import Capture, Studio
-from anafi_mav.sim.optics import Optics
+from anafi_mav.sim.payload.camera import Camera, bits
+from anafi_mav.sim.payload.capture import Capture, Studio
+from anafi_mav.sim.payload.optics import Optics
 from anafi_mav.sim.world.model import Model
 
 ACTIVE = {ThermalMode.DISABLED: 0, ThermalMode.STANDARD: 1, ThermalMode.BLENDED: 2}

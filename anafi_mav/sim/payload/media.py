@@ -15,8 +15,8 @@ from typing import Any
 from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import mediastore
 from anafi_mav.arsdk.messages.mediastore import MediastoreState
-from anafi_mav.sim import picture, xmp
-from anafi_mav.sim.picture import Scene
+from anafi_mav.sim.payload import jpeg_scene, xmp
+from anafi_mav.sim.payload.jpeg_scene import Scene
 
 FIRST_ID = 10_000_001
 INDEXING_TIME = 0.5
@@ -57,7 +57,7 @@ class Resource:
 
     def __post_init__(self) -> None:
         video = self.kind is Kind.MP4
-        size = picture.mp4_size(self.scene, self.seconds) if video else len(self.content())
+        size = jpeg_scene.mp4_size(self.scene, self.seconds) if video else len(self.content())
         object.__setattr__(self, "size", size)
 
     @property
@@ -67,16 +67,16 @@ class Resource:
     def content(self) -> bytes:
         """The file."""
         if self.kind is Kind.MP4:
-            return picture.mp4(self.scene, self.seconds)
+            return jpeg_scene.mp4(self.scene, self.seconds)
         packet = xmp.packet(self.scene, self.camera, self.captured)
         if self.kind is Kind.DNG:
-            return picture.dng(self.scene, self.number, self.camera, _exif_date(self.date), packet)
-        note = picture.exif(self.scene, self.camera, _exif_date(self.date))
-        return picture.jpeg(self.scene, self.number, exif=note, xmp=xmp.HEADER + packet)
+            return jpeg_scene.dng(self.scene, self.number, self.camera, _exif_date(self.date), packet)
+        note = jpeg_scene.exif(self.scene, self.camera, _exif_date(self.date))
+        return jpeg_scene.jpeg(self.scene, self.number, exif=note, xmp=xmp.HEADER + packet)
 
     def thumbnail(self) -> bytes:
         """A smaller JPEG of it."""
-        return picture.thumbnail(self.scene, self.number)
+        return jpeg_scene.thumbnail(self.scene, self.number)
 
     def md5(self) -> str:
         return hashlib.md5(self.content(), usedforsecurity=False).hexdigest()
@@ -88,9 +88,9 @@ class Resource:
     def describe(self) -> dict[str, Any]:
         """As in the answers of the web server."""
         video = self.kind is Kind.MP4
-        width, height = picture.WIDTH, picture.HEIGHT
+        width, height = jpeg_scene.WIDTH, jpeg_scene.HEIGHT
         if self.kind is Kind.DNG:
-            width, height = picture.RAW_WIDTH, picture.RAW_HEIGHT
+            width, height = jpeg_scene.RAW_WIDTH, jpeg_scene.RAW_HEIGHT
         told: dict[str, Any] = {
             "media_id": self.media_id,
             "resource_id": self.id,

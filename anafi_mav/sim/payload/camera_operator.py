@@ -8,8 +8,8 @@ from typing import Any
 from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import camera, gimbal
 from anafi_mav.arsdk.messages.gimbal import ControlMode, FrameOfReference
-from anafi_mav.sim.gimbal import Gimbals
-from anafi_mav.sim.payload import Payload
+from anafi_mav.sim.payload.gimbal import Gimbals
+from anafi_mav.sim.payload.payload import Payload
 from anafi_mav.sim.world.motion import Pose
 
 

@@ -16,10 +16,10 @@ from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import camera
 from anafi_mav.arsdk.messages.camera import CameraCameraMode, CameraPhotoMode, PhotoResult, RecordingResult
 from anafi_mav.arsdk.messages.proto import camera2
-from anafi_mav.sim.camera import Camera
-from anafi_mav.sim.camera2_settings import CHOICES, COMMON, DEFAULTS, PHOTO, RANGES, RECORDING
-from anafi_mav.sim.capture import Capture, Studio
-from anafi_mav.sim.optics import (
+from anafi_mav.sim.payload.camera import Camera
+from anafi_mav.sim.payload.camera2_settings import CHOICES, COMMON, DEFAULTS, PHOTO, RANGES, RECORDING
+from anafi_mav.sim.payload.capture import Capture, Studio
+from anafi_mav.sim.payload.optics import (
     AUTOMATIC_EXPOSURE,
     AUTOMATIC_ISO,
     Optics,

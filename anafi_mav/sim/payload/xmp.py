@@ -5,7 +5,7 @@ Values stand in elements, not in attributes: Olympe's photo example reads the ch
 
 from __future__ import annotations
 
-from anafi_mav.sim.picture import UNKNOWN, Scene
+from anafi_mav.sim.payload.jpeg_scene import UNKNOWN, Scene
 from anafi_mav.units import wrap_360
 
 HEADER = b"http://ns.adobe.com/xap/1.0/\0"
