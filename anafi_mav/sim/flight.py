@@ -32,7 +32,7 @@ from anafi_mav.sim.payload.camera_operator import Operator
 from anafi_mav.sim.payload.gimbal import Gimbals
 from anafi_mav.sim.payload.jpeg_scene import Scene
 from anafi_mav.sim.payload.payload import Payload
-from anafi_mav.sim.plan_store import FlightPlanStore
+from anafi_mav.sim.plan.plan_store import FlightPlanStore
 from anafi_mav.sim.poi import Poi
 from anafi_mav.sim.power import Battery
 from anafi_mav.sim.safety import Alarms, Warnings, check_changed, checklist

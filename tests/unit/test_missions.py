@@ -16,7 +16,7 @@ from anafi_mav.plans.files import Format
 from anafi_mav.plans.path import place_of
 from anafi_mav.plans.plan import WAYPOINT, Item, Loss, Plan
 from anafi_mav.plans.twin import twin
-from anafi_mav.sim import plan_file
+from anafi_mav.sim.plan import plan_file
 
 MISSIONS = Path(__file__).parents[2] / "missions"
 SAMPLES = sorted(MISSIONS.glob("*.plan"))

@@ -18,7 +18,7 @@ from anafi_mav.plans.plan import DO_JUMP, GLOBAL, RELATIVE, TERRAIN, Item, Loss
 from anafi_mav.plans.row import Verdict
 from anafi_mav.plans.rules import TABLE
 from anafi_mav.plans.translate import MAX_LINES, Fault, FaultKind, Flight, Leg, Start, Step, examine, translate
-from anafi_mav.sim import plan_file
+from anafi_mav.sim.plan import plan_file
 
 GROUND = Start(LAT, LON, 0.0, flying=False, takeoff_amsl=35.0, heading=30.0)
 AIR = Start(LAT, LON, 10.0, flying=True, takeoff_amsl=35.0, heading=30.0)

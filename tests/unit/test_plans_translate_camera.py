@@ -10,8 +10,8 @@ from anafi_mav.plans import files, parrot
 from anafi_mav.plans.parrot import Version
 from anafi_mav.plans.plan import GLOBAL, RELATIVE, Item, Loss
 from anafi_mav.plans.translate import Fault, FaultKind, Leg, Start, Step, examine, translate
-from anafi_mav.sim import plan_file
-from anafi_mav.sim.plan_file import Command
+from anafi_mav.sim.plan import plan_file
+from anafi_mav.sim.plan.plan_file import Command
 
 AIR = Start(LAT, LON, 10.0, flying=True, takeoff_amsl=35.0, heading=30.0)
 

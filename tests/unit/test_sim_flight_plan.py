@@ -14,7 +14,7 @@ from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.messages.common import FlightPlanComponent as Part
 from anafi_mav.arsdk.messages.common import MavlinkType, PlayError, PlayingState
 from anafi_mav.arsdk.messages.rth import RthState, StateReason
-from anafi_mav.sim.plan_file import MAX_ITEMS, Command, Frame, PlanFileError, read
+from anafi_mav.sim.plan.plan_file import MAX_ITEMS, Command, Frame, PlanFileError, read
 from anafi_mav.sim.states import all_states
 
 S = FlyingState

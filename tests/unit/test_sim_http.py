@@ -14,7 +14,7 @@ import pytest
 from anafi_mav.sim.http import MAX_BODY, MAX_UNREAD, WebServer
 from anafi_mav.sim.payload.jpeg_scene import Scene
 from anafi_mav.sim.payload.media import Kind, Media, MediaStore
-from anafi_mav.sim.plan_store import FlightPlanStore
+from anafi_mav.sim.plan.plan_store import FlightPlanStore
 
 DATE = "20261121T101112+0100"
 API = "/api/v1"

@@ -17,7 +17,7 @@ from anafi_mav.arsdk.messages.mediastore import MediastoreState
 from anafi_mav.sim.payload import jpeg_scene
 from anafi_mav.sim.payload.jpeg_scene import Scene
 from anafi_mav.sim.payload.media import Kind, Media, MediaStore
-from anafi_mav.sim.plan_store import MAX_PLANS, FlightPlanStore
+from anafi_mav.sim.plan.plan_store import MAX_PLANS, FlightPlanStore
 from anafi_mav.sim.world.calendar import Calendar
 
 PARIS = Scene(48.8789, 2.3677, 85.5, pitch=0.0, roll=0.0)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from anafi_mav.arsdk.messages import camera
 from anafi_mav.arsdk.messages.common import MavlinkType
 from anafi_mav.sim.payload.camera_operator import Operator
-from anafi_mav.sim.plan_file import Command, Item
+from anafi_mav.sim.plan.plan_file import Command, Item
 
 
 class PlanCamera:

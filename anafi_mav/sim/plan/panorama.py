@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from anafi_mav.sim.payload.camera_operator import Operator
-from anafi_mav.sim.plan_file import Item
+from anafi_mav.sim.plan.plan_file import Item
 from anafi_mav.sim.world.airframe import Body
 from anafi_mav.sim.world.motion import Pose
 from anafi_mav.units import RAD_PER_DEG, clip
