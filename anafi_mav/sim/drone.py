@@ -21,10 +21,10 @@ from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.mux.mux_link import MuxServer
 from anafi_mav.arsdk.video.rtsp import DEFAULT_PORT as RTSP_PORT
 from anafi_mav.errors import ConfigError
-from anafi_mav.sim.firmware import Firmware, Identity
+from anafi_mav.sim.autopilot.firmware import Firmware, Identity
+from anafi_mav.sim.autopilot.power import Battery
 from anafi_mav.sim.http import WebServer
 from anafi_mav.sim.log import Log, LogEntry
-from anafi_mav.sim.power import Battery
 from anafi_mav.sim.rtsp import VideoServer
 from anafi_mav.sim.skycontroller import MODELS as SKYCONTROLLERS
 from anafi_mav.sim.skycontroller import Skycontroller

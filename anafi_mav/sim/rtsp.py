@@ -22,7 +22,7 @@ from anafi_mav.arsdk.video.rtsp import Malformed, MessageReader, Request, Respon
 from anafi_mav.arsdk.video.sdp import format_description
 from anafi_mav.arsdk.video.video_metadata import FrameMetadata
 from anafi_mav.sim import video
-from anafi_mav.sim.firmware import Firmware
+from anafi_mav.sim.autopilot.firmware import Firmware
 from anafi_mav.sim.h264 import FRAME_RATE
 from anafi_mav.sim.payload.media import Kind
 from anafi_mav.sim.playback import Send, Track

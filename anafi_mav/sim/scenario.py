@@ -29,7 +29,7 @@ from anafi_mav.arsdk.messages.alarms import TakeoffChecklistType
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState, MotorError, WarningLevel
 from anafi_mav.arsdk.messages.common import FlightPlanComponent
 from anafi_mav.errors import ConfigError
-from anafi_mav.sim.power import Battery
+from anafi_mav.sim.autopilot.power import Battery
 from anafi_mav.sim.world.faults import Faults, Impairment
 from anafi_mav.sim.world.motion import Pose
 from anafi_mav.sim.world.quirks import QUIRKS

@@ -16,9 +16,9 @@ from anafi_mav.arsdk.messages import (
     precise_home,
     wifi,
 )
+from anafi_mav.sim.autopilot.firmware import Firmware
+from anafi_mav.sim.autopilot.safety import checklist
 from anafi_mav.sim.features.wireless import COUNTRIES, RSSI
-from anafi_mav.sim.firmware import Firmware
-from anafi_mav.sim.safety import checklist
 
 
 def _bits(values: Iterable[int]) -> int:

@@ -23,9 +23,9 @@ from anafi_mav.arsdk.video.video_metadata import (
     WifiLink,
 )
 from anafi_mav.models import Payload
+from anafi_mav.sim.autopilot.firmware import Firmware
 from anafi_mav.sim.features.services import QUALITY
 from anafi_mav.sim.features.wireless import RSSI
-from anafi_mav.sim.firmware import Firmware
 from anafi_mav.sim.h264 import pictures
 from anafi_mav.sim.payload.optics import Optics, zoomed
 from anafi_mav.sim.world.model import Model

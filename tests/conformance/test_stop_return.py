@@ -19,8 +19,8 @@ from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.messages.rth import RthHomeReachability, StateReason
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.services.hold_rule import APART
-from anafi_mav.sim import power
-from anafi_mav.sim.homing import Phase
+from anafi_mav.sim.autopilot import power
+from anafi_mav.sim.autopilot.homing import Phase
 from anafi_mav.sim.world.faults import Impairment
 from anafi_mav.sim.world.quirks import Quirk
 

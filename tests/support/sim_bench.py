@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 from anafi_mav.arsdk.codec.wire import Message, encode
 from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
-from anafi_mav.sim.firmware import Firmware, Identity
+from anafi_mav.sim.autopilot.firmware import Firmware, Identity
 from anafi_mav.sim.world.airframe import Body
 from anafi_mav.sim.world.faults import Faults
 from anafi_mav.sim.world.model import MODELS

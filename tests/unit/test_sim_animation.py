@@ -12,7 +12,7 @@ from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import animation, ardrone3, camera, follow_me, rth
 from anafi_mav.arsdk.messages.animation import AnimationState, Indicator, PlayMode, Type
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState, PoiMode
-from anafi_mav.sim.figures import STARTS
+from anafi_mav.sim.autopilot.animation_paths import STARTS
 from anafi_mav.sim.world.place import Origin
 
 RAD = math.pi / 180.0

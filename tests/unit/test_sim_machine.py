@@ -7,7 +7,7 @@ import itertools
 import pytest
 
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
-from anafi_mav.sim.machine import AIRBORNE, GUIDED, TRANSITIONS, Event, next_state
+from anafi_mav.sim.autopilot.machine import AIRBORNE, GUIDED, TRANSITIONS, Event, next_state
 
 S = FlyingState
 

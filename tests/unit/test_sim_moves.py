@@ -10,7 +10,7 @@ from support.sim_bench import HOME, Bench
 from anafi_mav import geo
 from anafi_mav.arsdk.messages import ardrone3, move
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState, MoveByError, MoveToStatus, OrientationMode
-from anafi_mav.sim.guidance import STICK_TIMEOUT
+from anafi_mav.sim.autopilot.guidance import STICK_TIMEOUT
 
 NAN, INF = math.nan, math.inf
 

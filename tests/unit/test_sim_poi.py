@@ -11,7 +11,7 @@ from anafi_mav import geo
 from anafi_mav.arsdk.messages import ardrone3, gimbal, rth
 from anafi_mav.arsdk.messages.ardrone3 import PoiMode, PoiStatus
 from anafi_mav.arsdk.messages.gimbal import ControlMode, FrameOfReference
-from anafi_mav.sim.poi import look
+from anafi_mav.sim.autopilot.poi import look
 from anafi_mav.sim.states import all_states
 from anafi_mav.sim.world.motion import Pose
 

@@ -25,7 +25,7 @@ from anafi_mav.arsdk.messages.rth import (
     RthState,
     StateReason,
 )
-from anafi_mav.sim.endurance import Endurance
+from anafi_mav.sim.autopilot.endurance import Endurance
 from anafi_mav.sim.features.settings import Settings
 from anafi_mav.sim.states import all_settings, all_states
 from anafi_mav.sim.world.model import MODELS

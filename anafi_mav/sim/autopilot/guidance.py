@@ -13,9 +13,9 @@ from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import ardrone3, move
 from anafi_mav.arsdk.messages.ardrone3 import MoveByError, MoveToStatus
 from anafi_mav.arsdk.messages.rth import RthEndingBehavior
+from anafi_mav.sim.autopilot.homing import Homing
+from anafi_mav.sim.autopilot.moves import MoveBy, MoveTo, asked_speeds, own_speeds
 from anafi_mav.sim.features.settings import Settings
-from anafi_mav.sim.homing import Homing
-from anafi_mav.sim.moves import MoveBy, MoveTo, asked_speeds, own_speeds
 from anafi_mav.sim.world.airframe import Body
 from anafi_mav.sim.world.faults import Faults
 from anafi_mav.sim.world.model import Model

@@ -13,12 +13,12 @@ from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
 from anafi_mav.arsdk.messages import animation, ardrone3, common, flight_plan, follow_me, gimbal, move, rth
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.messages.rth import StateReason
+from anafi_mav.sim.autopilot.animation_paths import STARTS as ANIMATIONS
+from anafi_mav.sim.autopilot.flight import Flight
+from anafi_mav.sim.autopilot.flight import Identity as Identity
+from anafi_mav.sim.autopilot.follow_me import COMMANDS as FOLLOW_ME
+from anafi_mav.sim.autopilot.machine import AIRBORNE, GUIDED, LANDED, Event
 from anafi_mav.sim.features import wireless
-from anafi_mav.sim.figures import STARTS as ANIMATIONS
-from anafi_mav.sim.flight import Flight
-from anafi_mav.sim.flight import Identity as Identity
-from anafi_mav.sim.follow_me import COMMANDS as FOLLOW_ME
-from anafi_mav.sim.machine import AIRBORNE, GUIDED, LANDED, Event
 from anafi_mav.sim.world.quirks import Quirk
 
 LATE_TAKE_OFF = 1.0

@@ -17,25 +17,25 @@ from anafi_mav.arsdk.messages import ardrone3, common
 from anafi_mav.arsdk.messages.alarms import TakeoffChecklistType, Type
 from anafi_mav.arsdk.messages.ardrone3 import AlertState, FlyingState
 from anafi_mav.arsdk.messages.rth import RthEndingBehavior, StateReason
-from anafi_mav.sim import power
-from anafi_mav.sim.animation import Animations
-from anafi_mav.sim.compass import Compass
-from anafi_mav.sim.endurance import Endurance
+from anafi_mav.sim.autopilot import power
+from anafi_mav.sim.autopilot.animation import Animations
+from anafi_mav.sim.autopilot.animation_paths import Target
+from anafi_mav.sim.autopilot.compass import Compass
+from anafi_mav.sim.autopilot.endurance import Endurance
+from anafi_mav.sim.autopilot.flight_plan import FlightPlan
+from anafi_mav.sim.autopilot.follow_me import FollowMe
+from anafi_mav.sim.autopilot.guidance import Guidance
+from anafi_mav.sim.autopilot.homing import UNKNOWN, Homing
+from anafi_mav.sim.autopilot.machine import AIRBORNE, GUIDED, LANDED, Event, next_state
+from anafi_mav.sim.autopilot.poi import Poi
+from anafi_mav.sim.autopilot.power import Battery
+from anafi_mav.sim.autopilot.safety import Alarms, Warnings, check_changed, checklist
 from anafi_mav.sim.features.settings import Settings
-from anafi_mav.sim.figures import Target
-from anafi_mav.sim.flight_plan import FlightPlan
-from anafi_mav.sim.follow_me import FollowMe
-from anafi_mav.sim.guidance import Guidance
-from anafi_mav.sim.homing import UNKNOWN, Homing
-from anafi_mav.sim.machine import AIRBORNE, GUIDED, LANDED, Event, next_state
 from anafi_mav.sim.payload.camera_operator import Operator
 from anafi_mav.sim.payload.gimbal import Gimbals
 from anafi_mav.sim.payload.jpeg_scene import Scene
 from anafi_mav.sim.payload.payload import Payload
 from anafi_mav.sim.plan.plan_store import FlightPlanStore
-from anafi_mav.sim.poi import Poi
-from anafi_mav.sim.power import Battery
-from anafi_mav.sim.safety import Alarms, Warnings, check_changed, checklist
 from anafi_mav.sim.world.airframe import Body
 from anafi_mav.sim.world.faults import Faults
 from anafi_mav.sim.world.model import Model

@@ -15,12 +15,12 @@ from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import common, flight_plan
 from anafi_mav.arsdk.messages.common import FlightPlanComponent as Part
 from anafi_mav.arsdk.messages.common import MavlinkType, PlayError, PlayingState
+from anafi_mav.sim.autopilot.poi import look
 from anafi_mav.sim.features.settings import Settings
 from anafi_mav.sim.payload.camera_operator import Operator
 from anafi_mav.sim.plan.panorama import Panorama
 from anafi_mav.sim.plan.plan_camera import COMMANDS, PlanCamera
 from anafi_mav.sim.plan.plan_file import Command, Item, PlanFileError, read
-from anafi_mav.sim.poi import look
 from anafi_mav.sim.world.airframe import Body
 from anafi_mav.sim.world.faults import Faults
 from anafi_mav.sim.world.model import Model

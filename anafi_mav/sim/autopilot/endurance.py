@@ -13,7 +13,7 @@ from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import ardrone3, rth
 from anafi_mav.arsdk.messages.ardrone3 import BatteryCapacityStatus, ForcedLandingReason
 from anafi_mav.arsdk.messages.rth import AutoTriggerReason, RthAutoTriggerMode, RthHomeReachability
-from anafi_mav.sim import homing, power
+from anafi_mav.sim.autopilot import homing, power
 from anafi_mav.sim.features.settings import Settings
 from anafi_mav.sim.world.model import Model
 from anafi_mav.sim.world.motion import Pose

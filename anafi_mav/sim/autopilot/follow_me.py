@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import controller_info, follow_me
 from anafi_mav.arsdk.messages.follow_me import Animation, Behavior, GeoRelConfigureParam, Input, Mode
+from anafi_mav.sim.autopilot.poi import look
 from anafi_mav.sim.features.settings import Settings
-from anafi_mav.sim.poi import look
 from anafi_mav.sim.world.airframe import Body
 from anafi_mav.sim.world.motion import Pose
 from anafi_mav.sim.world.place import Origin

@@ -16,7 +16,7 @@ from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import animation
 from anafi_mav.arsdk.messages.animation import AnimationState, Indicator, Mode, Type
 from anafi_mav.arsdk.messages.generic import ListFlags
-from anafi_mav.sim.figures import NEEDS_TARGET, Figure, Leg, Stage, Target, figure
+from anafi_mav.sim.autopilot.animation_paths import NEEDS_TARGET, Figure, Leg, Stage, Target, figure
 from anafi_mav.sim.payload.camera_operator import Operator
 from anafi_mav.sim.world.airframe import Body
 from anafi_mav.sim.world.model import Model
