@@ -25,11 +25,11 @@ from anafi_mav.sim.autopilot.firmware import Firmware, Identity
 from anafi_mav.sim.autopilot.power import Battery
 from anafi_mav.sim.http import WebServer
 from anafi_mav.sim.log import Log, LogEntry
-from anafi_mav.sim.rtsp import VideoServer
 from anafi_mav.sim.skycontroller import MODELS as SKYCONTROLLERS
 from anafi_mav.sim.skycontroller import Skycontroller
 from anafi_mav.sim.states import all_settings, all_states
 from anafi_mav.sim.telemetry import RATE, Telemetry
+from anafi_mav.sim.video.rtsp import VideoServer
 from anafi_mav.sim.world import quirks
 from anafi_mav.sim.world.airframe import Body
 from anafi_mav.sim.world.faults import Faults

@@ -17,10 +17,10 @@ from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.arsdk.video import rtcp, rtsp
 from anafi_mav.arsdk.video.video_metadata import FlyingState
 from anafi_mav.sim import DroneSpec, Simulator
-from anafi_mav.sim.h264 import KEY_INTERVAL
 from anafi_mav.sim.payload.jpeg_scene import Scene
 from anafi_mav.sim.payload.media import Kind
-from anafi_mav.sim.rtsp import MAX_CONNECTIONS, MAX_SESSIONS, VideoServer
+from anafi_mav.sim.video.h264 import KEY_INTERVAL
+from anafi_mav.sim.video.rtsp import MAX_CONNECTIONS, MAX_SESSIONS, VideoServer
 from anafi_mav.sim.world.faults import Impairment
 
 TICK = 90000 / 30

@@ -33,10 +33,10 @@ from anafi_mav.arsdk.video.video_metadata import (
     encode_v3,
 )
 from anafi_mav.errors import LocalProtocolError
-from anafi_mav.sim import video
-from anafi_mav.sim.h264 import KEY_INTERVAL, Pictures, pictures
 from anafi_mav.sim.payload import optics
-from anafi_mav.sim.video import streams_of
+from anafi_mav.sim.video import video
+from anafi_mav.sim.video.h264 import KEY_INTERVAL, Pictures, pictures
+from anafi_mav.sim.video.video import streams_of
 from anafi_mav.sim.world.model import MODELS
 
 

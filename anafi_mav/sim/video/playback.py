@@ -11,8 +11,8 @@ from anafi_mav.arsdk.video import rtcp
 from anafi_mav.arsdk.video.rtcp import ReceiverReport, SenderReport
 from anafi_mav.arsdk.video.rtp_h264 import CLOCK_RATE, PictureSender
 from anafi_mav.arsdk.video.video_metadata import FrameMetadata
-from anafi_mav.sim.h264 import pictures
-from anafi_mav.sim.video import Stream
+from anafi_mav.sim.video.h264 import pictures
+from anafi_mav.sim.video.video import Stream
 
 REPORT_PERIOD = 1.0
 """s between two sender reports."""

@@ -21,12 +21,12 @@ from anafi_mav.arsdk.video import rtsp
 from anafi_mav.arsdk.video.rtsp import Malformed, MessageReader, Request, Response, RtpInfo, Status, Transport
 from anafi_mav.arsdk.video.sdp import format_description
 from anafi_mav.arsdk.video.video_metadata import FrameMetadata
-from anafi_mav.sim import video
 from anafi_mav.sim.autopilot.firmware import Firmware
-from anafi_mav.sim.h264 import FRAME_RATE
 from anafi_mav.sim.payload.media import Kind
-from anafi_mav.sim.playback import Send, Track
-from anafi_mav.sim.video import Stream, streams_of
+from anafi_mav.sim.video import video
+from anafi_mav.sim.video.h264 import FRAME_RATE
+from anafi_mav.sim.video.playback import Send, Track
+from anafi_mav.sim.video.video import Stream, streams_of
 
 SERVER = "Parrot Streaming Server"
 SESSION_TIMEOUT = 60

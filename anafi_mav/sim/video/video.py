@@ -26,8 +26,8 @@ from anafi_mav.models import Payload
 from anafi_mav.sim.autopilot.firmware import Firmware
 from anafi_mav.sim.features.services import QUALITY
 from anafi_mav.sim.features.wireless import RSSI
-from anafi_mav.sim.h264 import pictures
 from anafi_mav.sim.payload.optics import Optics, zoomed
+from anafi_mav.sim.video.h264 import pictures
 from anafi_mav.sim.world.model import Model
 from anafi_mav.units import DEG_PER_RAD, RAD_PER_DEG, quaternion_from_euler
 
