@@ -15,10 +15,10 @@ from anafi_mav import geo, mav_enums
 from anafi_mav.errors import PlanError
 from anafi_mav.models import Model
 from anafi_mav.plans import zones
+from anafi_mav.plans.formats.waypoints import rows
 from anafi_mav.plans.legs import UnknownHeight
 from anafi_mav.plans.plan import WAYPOINT, Circle, Item, Plan, Point
 from anafi_mav.plans.translate import Fault, Flight, Leg, Start, Step, examine, translate
-from anafi_mav.plans.waypoints import rows
 
 CRUISE = 5.0
 """m/s without a speed of the mission's or the planner's. Assumed: Parrot publishes none."""

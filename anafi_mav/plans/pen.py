@@ -12,9 +12,9 @@ from dataclasses import replace
 from typing import NoReturn
 
 from anafi_mav import geo, mav_enums
-from anafi_mav.plans import parrot
+from anafi_mav.plans.formats import parrot
+from anafi_mav.plans.formats.parrot import SET_STILL_MODE, SET_VIEW_MODE, Version
 from anafi_mav.plans.legs import Fault, FaultKind, Leg, Refused, Settings, Start, Step, UnknownHeight
-from anafi_mav.plans.parrot import SET_STILL_MODE, SET_VIEW_MODE, Version
 from anafi_mav.plans.plan import (
     GLOBAL,
     GLOBAL_INT,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from anafi_mav import mav_enums
-from anafi_mav.plans.parrot import SET_STILL_MODE, SET_VIEW_MODE
+from anafi_mav.plans.formats.parrot import SET_STILL_MODE, SET_VIEW_MODE
 from anafi_mav.plans.pen import SHORTEST_INTERVAL, SHORTEST_STEP, Pen
 from anafi_mav.plans.plan import Item, Point
 from anafi_mav.plans.row import Row, Verdict, only

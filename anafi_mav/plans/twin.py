@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from anafi_mav.errors import PlanError
-from anafi_mav.plans import parrot
-from anafi_mav.plans.parrot import Version
+from anafi_mav.plans.formats import parrot
+from anafi_mav.plans.formats.parrot import Version
 from anafi_mav.plans.path import place_of
 from anafi_mav.plans.plan import Loss, Plan
 from anafi_mav.plans.translate import Leg, Start, Step, examine, translate

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import msgspec
 
 from anafi_mav.mavlink import dialect
-from anafi_mav.plans.parrot import Version
+from anafi_mav.plans.formats.parrot import Version
 from anafi_mav.plans.plan import Item, Loss
 from anafi_mav.plans.translate import FaultKind, Report, examine
 from anafi_mav.services.flavours import PX4, Flavour

@@ -16,7 +16,7 @@ from anafi_mav import units
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
-from anafi_mav.plans.parrot import Version
+from anafi_mav.plans.formats.parrot import Version
 from anafi_mav.services import plan_files
 from anafi_mav.services.fence import FenceKind, summary
 from anafi_mav.services.files import Query, ServedFile

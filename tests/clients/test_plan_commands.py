@@ -15,7 +15,7 @@ from support.plans import download
 from support.product import Process, product, program
 from support.world import loopback
 
-from anafi_mav.plans import files
+from anafi_mav.plans.formats import files
 from anafi_mav.plans.plan import Plan
 from anafi_mav.services.mission_items import as_carried, to_wire
 

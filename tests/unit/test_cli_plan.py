@@ -15,8 +15,8 @@ from support.plan_samples import FLIGHT
 
 from anafi_mav.cli import main
 from anafi_mav.cli.terminal import say_table
-from anafi_mav.plans import files
-from anafi_mav.plans.files import Format
+from anafi_mav.plans.formats import files
+from anafi_mav.plans.formats.files import Format
 
 MISSIONS = Path(__file__).parents[2] / "missions"
 

@@ -20,7 +20,7 @@ from support.product import Process, program
 from support.world import loopback
 
 import anafi_mav
-from anafi_mav.plans import files
+from anafi_mav.plans.formats import files
 
 if sys.version_info >= (3, 11):
     import tomllib

@@ -11,8 +11,8 @@ import pytest
 
 from anafi_mav.cli import main
 from anafi_mav.errors import PlanError
-from anafi_mav.plans import files, parrot
-from anafi_mav.plans.files import Format
+from anafi_mav.plans.formats import files, parrot
+from anafi_mav.plans.formats.files import Format
 from anafi_mav.plans.path import place_of
 from anafi_mav.plans.plan import WAYPOINT, Item, Loss, Plan
 from anafi_mav.plans.twin import twin

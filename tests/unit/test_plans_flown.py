@@ -13,7 +13,7 @@ from anafi_mav import geo
 from anafi_mav.arsdk.messages import camera, common
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.messages.common import MavlinkType, PlayingState
-from anafi_mav.plans import files
+from anafi_mav.plans.formats import files
 from anafi_mav.plans.plan import GLOBAL, RELATIVE, WAYPOINT, Item
 from anafi_mav.plans.translate import Flight, Leg, Start, Step, examine, translate
 from anafi_mav.units import DEG_PER_RAD

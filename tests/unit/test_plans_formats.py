@@ -30,8 +30,8 @@ from support.plan_samples import (
 
 from anafi_mav import geo
 from anafi_mav.errors import PlanError
-from anafi_mav.plans import files, parrot, qgc_plan, waypoints
-from anafi_mav.plans.files import Format
+from anafi_mav.plans.formats import files, parrot, qgc_plan, waypoints
+from anafi_mav.plans.formats.files import Format
 from anafi_mav.plans.plan import DO_JUMP, MAX_ITEMS, MISSION, RELATIVE, Circle, Item, Loss, Plan, Point, Polygon
 from anafi_mav.sim.plan import plan_file
 

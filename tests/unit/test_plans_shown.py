@@ -12,7 +12,8 @@ import pytest
 from support.plan_samples import FLIGHT, document, encoded, structure_scan, waypoint
 
 from anafi_mav.errors import PlanError
-from anafi_mav.plans import files, path, plot, table
+from anafi_mav.plans import path, plot, table
+from anafi_mav.plans.formats import files
 from anafi_mav.plans.plan import RELATIVE, Item, Plan, Point
 from anafi_mav.plans.shots import Kind, shots
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from support.plan_samples import LAT, LON, action, waypoint
 
 from anafi_mav.errors import PlanError
-from anafi_mav.plans.parrot import Version
+from anafi_mav.plans.formats.parrot import Version
 from anafi_mav.plans.plan import DO_JUMP, GLOBAL, RELATIVE, TERRAIN, Item, Loss
 from anafi_mav.plans.row import Verdict
 from anafi_mav.plans.rules import TABLE

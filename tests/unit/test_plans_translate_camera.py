@@ -6,8 +6,8 @@ import pytest
 from support.plan_samples import LAT, LON, PARROTS_EXAMPLE, action, waypoint
 
 from anafi_mav.errors import PlanError
-from anafi_mav.plans import files, parrot
-from anafi_mav.plans.parrot import Version
+from anafi_mav.plans.formats import files, parrot
+from anafi_mav.plans.formats.parrot import Version
 from anafi_mav.plans.plan import GLOBAL, RELATIVE, Item, Loss
 from anafi_mav.plans.translate import Fault, FaultKind, Leg, Start, Step, examine, translate
 from anafi_mav.sim.plan import plan_file

@@ -12,7 +12,7 @@ from decimal import Decimal
 
 from anafi_mav import mav_enums
 from anafi_mav.errors import PlanError
-from anafi_mav.plans.lists import fence_items, points_of, rally_items, zones_of
+from anafi_mav.plans.formats.lists import fence_items, points_of, rally_items, zones_of
 from anafi_mav.plans.plan import GLOBAL, MAX_ITEMS, WAYPOINT, Item, Loss, Params, Plan, Point, counted, shifted
 
 HEADER = "QGC WPL 110"

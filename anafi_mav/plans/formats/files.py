@@ -10,7 +10,7 @@ import tempfile
 from pathlib import Path
 
 from anafi_mav.errors import PlanError
-from anafi_mav.plans import lines, parrot, qgc_plan, waypoints
+from anafi_mav.plans.formats import lines, parrot, qgc_plan, waypoints
 from anafi_mav.plans.plan import MAX_BYTES, Loss, Plan
 
 

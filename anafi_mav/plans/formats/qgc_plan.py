@@ -15,7 +15,7 @@ from typing import Any
 import msgspec
 
 from anafi_mav.errors import PlanError
-from anafi_mav.plans import structure_scan
+from anafi_mav.plans.formats import structure_scan
 from anafi_mav.plans.plan import (
     DO_JUMP,
     GLOBAL,
