@@ -421,7 +421,7 @@ def states() -> str:
 PLAN_TRANSLATION = """\
 # What a mission becomes
 
-<!-- Made by docs/generate.py from the table of anafi_mav/plans/rules.py. -->
+<!-- Made by docs/generate.py from the table of anafi_mav/plans/rules/rules.py. -->
 
 For people who plan missions. After reading you know how an ANAFI flies each command, and which ones it refuses.
 
@@ -460,8 +460,9 @@ Rules for all of them:
 
 def plan_translation() -> str:
     """docs/plan-translation.md."""
-    from anafi_mav.plans import pen, rules, translate
+    from anafi_mav.plans import pen, translate
     from anafi_mav.plans.row import Verdict
+    from anafi_mav.plans.rules import rules
 
     meanings = {verdict.name.lower(): verdict.value for verdict in Verdict}
     parts = [PLAN_TRANSLATION.format(**meanings, acceptance=pen.ACCEPTANCE, lines=translate.MAX_LINES)]

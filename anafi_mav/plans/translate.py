@@ -18,7 +18,7 @@ from anafi_mav.plans.legs import Fault, FaultKind, Leg, Refused, Settings, Start
 from anafi_mav.plans.pen import Pen
 from anafi_mav.plans.plan import DO_JUMP, Item, Loss
 from anafi_mav.plans.row import Row, Verdict
-from anafi_mav.plans.rules import TABLE
+from anafi_mav.plans.rules.rules import TABLE
 
 __all__ = [
     "Cursor",
