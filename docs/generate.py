@@ -460,12 +460,12 @@ Rules for all of them:
 
 def plan_translation() -> str:
     """docs/plan-translation.md."""
-    from anafi_mav.plans import pen, translate
-    from anafi_mav.plans.row import Verdict
-    from anafi_mav.plans.rules import rules
+    from anafi_mav.plans import translate
+    from anafi_mav.plans.rules import flight_plan_writer, rules
+    from anafi_mav.plans.rules.row import Verdict
 
     meanings = {verdict.name.lower(): verdict.value for verdict in Verdict}
-    parts = [PLAN_TRANSLATION.format(**meanings, acceptance=pen.ACCEPTANCE, lines=translate.MAX_LINES)]
+    parts = [PLAN_TRANSLATION.format(**meanings, acceptance=flight_plan_writer.ACCEPTANCE, lines=translate.MAX_LINES)]
     for row in rules.TABLE.values():
         parts.append(f"| {row.command} {row.name} | {row.verdict.name.lower()} | {row.how} |\n")
     return "".join(parts)

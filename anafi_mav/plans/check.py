@@ -16,8 +16,8 @@ from anafi_mav.errors import PlanError
 from anafi_mav.models import Model
 from anafi_mav.plans import zones
 from anafi_mav.plans.formats.waypoints import rows
-from anafi_mav.plans.legs import UnknownHeight
 from anafi_mav.plans.plan import WAYPOINT, Circle, Item, Plan, Point
+from anafi_mav.plans.rules.legs import UnknownHeight
 from anafi_mav.plans.translate import Fault, Flight, Leg, Start, Step, examine, translate
 
 CRUISE = 5.0

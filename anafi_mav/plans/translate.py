@@ -14,10 +14,10 @@ from itertools import chain
 from anafi_mav import mav_enums
 from anafi_mav.errors import PlanError
 from anafi_mav.plans.formats.parrot import Version
-from anafi_mav.plans.legs import Fault, FaultKind, Leg, Refused, Settings, Start, Step
-from anafi_mav.plans.pen import Pen
 from anafi_mav.plans.plan import DO_JUMP, Item, Loss
-from anafi_mav.plans.row import Row, Verdict
+from anafi_mav.plans.rules.flight_plan_writer import Pen
+from anafi_mav.plans.rules.legs import Fault, FaultKind, Leg, Refused, Settings, Start, Step
+from anafi_mav.plans.rules.row import Row, Verdict
 from anafi_mav.plans.rules.rules import TABLE
 
 __all__ = [

@@ -8,7 +8,7 @@ from anafi_mav import units
 from anafi_mav.errors import CommandRejected
 from anafi_mav.mavlink import dialect
 from anafi_mav.plans.plan import Item
-from anafi_mav.plans.rules_flight import is_relative
+from anafi_mav.plans.rules.rules_flight import is_relative
 from anafi_mav.services.aircraft import Aircraft
 from anafi_mav.services.turns import heading_of
 

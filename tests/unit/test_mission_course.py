@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from anafi_mav.plans.legs import Leg, Settings, Step
+from anafi_mav.plans.rules.legs import Leg, Settings, Step
 from anafi_mav.plans.translate import Cursor
 from anafi_mav.services.mission_course import Course
 

@@ -15,7 +15,7 @@ from support.plan_samples import LAT, LON, action, waypoint
 from anafi_mav.errors import PlanError
 from anafi_mav.plans.formats.parrot import Version
 from anafi_mav.plans.plan import DO_JUMP, GLOBAL, RELATIVE, TERRAIN, Item, Loss
-from anafi_mav.plans.row import Verdict
+from anafi_mav.plans.rules.row import Verdict
 from anafi_mav.plans.rules.rules import TABLE
 from anafi_mav.plans.translate import MAX_LINES, Fault, FaultKind, Flight, Leg, Start, Step, examine, translate
 from anafi_mav.sim.plan import plan_file

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from anafi_mav.plans.plan import Item
-from anafi_mav.plans.rules_flight import is_relative
+from anafi_mav.plans.rules.rules_flight import is_relative
 from anafi_mav.plans.translate import examine
 
 TURN = 115

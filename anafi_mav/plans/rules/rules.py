@@ -6,9 +6,9 @@ flight plan page. A command that is not here is refused.
 
 from __future__ import annotations
 
-from anafi_mav.plans.row import Row, Verdict
-from anafi_mav.plans.rules_camera import CAMERA
-from anafi_mav.plans.rules_flight import FLIGHT
+from anafi_mav.plans.rules.row import Row, Verdict
+from anafi_mav.plans.rules.rules_camera import CAMERA
+from anafi_mav.plans.rules.rules_flight import FLIGHT
 
 _NO_ACTUATOR = "The drone has no actuator that a flight plan could move."
 

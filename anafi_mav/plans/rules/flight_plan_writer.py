@@ -14,7 +14,6 @@ from typing import NoReturn
 from anafi_mav import geo, mav_enums
 from anafi_mav.plans.formats import parrot
 from anafi_mav.plans.formats.parrot import SET_STILL_MODE, SET_VIEW_MODE, Version
-from anafi_mav.plans.legs import Fault, FaultKind, Leg, Refused, Settings, Start, Step, UnknownHeight
 from anafi_mav.plans.plan import (
     GLOBAL,
     GLOBAL_INT,
@@ -30,6 +29,7 @@ from anafi_mav.plans.plan import (
     Plan,
     Point,
 )
+from anafi_mav.plans.rules.legs import Fault, FaultKind, Leg, Refused, Settings, Start, Step, UnknownHeight
 from anafi_mav.units import DEG_PER_RAD, wrap_360
 
 ACCEPTANCE = 1.0

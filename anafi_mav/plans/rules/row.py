@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from anafi_mav import mav_enums
 from anafi_mav.plans.formats.parrot import SET_STILL_MODE, SET_VIEW_MODE
-from anafi_mav.plans.pen import Pen
 from anafi_mav.plans.plan import Item
+from anafi_mav.plans.rules.flight_plan_writer import Pen
 
 
 class Verdict(enum.Enum):
