@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from anafi_mav.plans.translate import Cursor, Leg, Step
+from anafi_mav.plans.translation.translate import Cursor, Leg, Step
 
 
 class Course:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from anafi_mav.drone.automatic.flight_plan import FlightPlan
 from anafi_mav.errors import CommandRejected
 from anafi_mav.plans.plan import Item
-from anafi_mav.plans.translate import Leg
+from anafi_mav.plans.translation.translate import Leg
 from anafi_mav.services.mission_path import lines_of
 
 MAX_FILES = 16

@@ -16,7 +16,7 @@ from anafi_mav.drone import events
 from anafi_mav.drone.events import FlyingState, PlayingState
 from anafi_mav.errors import AnafiMavError, CommandRejected, LinkLost
 from anafi_mav.plans.plan import Item
-from anafi_mav.plans.translate import Leg
+from anafi_mav.plans.translation.translate import Leg
 from anafi_mav.services.aircraft import Aircraft
 from anafi_mav.services.mission_course import Course
 from anafi_mav.services.mission_files import FilesOnDrone

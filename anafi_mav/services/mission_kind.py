@@ -15,7 +15,7 @@ import msgspec
 from anafi_mav.mavlink import dialect
 from anafi_mav.plans.formats.parrot import Version
 from anafi_mav.plans.plan import Item, Loss
-from anafi_mav.plans.translate import FaultKind, Report, examine
+from anafi_mav.plans.translation.translate import FaultKind, Report, examine
 from anafi_mav.services.flavours import PX4, Flavour
 from anafi_mav.services.mission_items import from_wire
 from anafi_mav.services.plan_items import Fault, PlanItem

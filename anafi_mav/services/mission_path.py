@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from anafi_mav.errors import PlanError
 from anafi_mav.mavlink import dialect
 from anafi_mav.plans.plan import Item
-from anafi_mav.plans.translate import Cursor, Leg, Start, Step, translate
+from anafi_mav.plans.translation.translate import Cursor, Leg, Start, Step, translate
 from anafi_mav.services.aircraft import Aircraft
 from anafi_mav.services.bounds import check_estimate, check_place
 from anafi_mav.services.fence_watch import OutsideFence

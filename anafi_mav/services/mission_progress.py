@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.plans.plan import DO_JUMP, Item
-from anafi_mav.plans.translate import Leg
+from anafi_mav.plans.translation.translate import Leg
 
 ENDINGS = (dialect.MAV_CMD_NAV_LAND, dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH)
 """Items that end in a landing or a return, which is the plan's own and no take-over of the drone's."""

@@ -11,7 +11,7 @@ import msgspec
 from typing_extensions import Self
 
 from anafi_mav.plans.plan import DO_JUMP, Item
-from anafi_mav.plans.translate import Leg
+from anafi_mav.plans.translation.translate import Leg
 from anafi_mav.services.mission_path import way_points
 from anafi_mav.services.mission_progress import Progress
 

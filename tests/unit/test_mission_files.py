@@ -8,7 +8,7 @@ import pytest
 from support.simulated import connected
 
 from anafi_mav.plans.plan import Item
-from anafi_mav.plans.translate import Leg, Start, translate
+from anafi_mav.plans.translation.translate import Leg, Start, translate
 from anafi_mav.services.mission_files import FilesOnDrone
 from anafi_mav.services.mission_progress import Progress
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from anafi_mav.plans.plan import Item
-from anafi_mav.plans.translate import Leg
+from anafi_mav.plans.translation.translate import Leg
 from anafi_mav.services.mission_progress import TRANSITIONS, Event, Progress, State
 from anafi_mav.services.mission_record import Record
 

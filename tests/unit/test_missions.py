@@ -15,7 +15,7 @@ from anafi_mav.plans.formats import files, parrot
 from anafi_mav.plans.formats.files import Format
 from anafi_mav.plans.path import place_of
 from anafi_mav.plans.plan import WAYPOINT, Item, Loss, Plan
-from anafi_mav.plans.twin import twin
+from anafi_mav.plans.translation.parrot_export import twin
 from anafi_mav.sim.plan import plan_file
 
 MISSIONS = Path(__file__).parents[2] / "missions"

@@ -14,8 +14,8 @@ from anafi_mav import models
 from anafi_mav.config import from_mapping
 from anafi_mav.drone import MODELS as ANNOUNCED
 from anafi_mav.errors import ConfigError
-from anafi_mav.plans.check import check
 from anafi_mav.plans.plan import WAYPOINT, Item, Plan
+from anafi_mav.plans.translation.check import check
 from anafi_mav.sim import DroneSpec
 from anafi_mav.sim.world.model import MODELS as SIMULATED
 from anafi_mav.sim.world.model import model_of

@@ -8,9 +8,9 @@ import pytest
 from support.plan_samples import LAT, LON, action, waypoint
 
 from anafi_mav.models import planned
-from anafi_mav.plans.check import Findings, Limits, Severity, check
 from anafi_mav.plans.formats import files
 from anafi_mav.plans.plan import GLOBAL, RELATIVE, Circle, Item, Plan, Point, Polygon
+from anafi_mav.plans.translation.check import Findings, Limits, Severity, check
 from anafi_mav.sim.world.model import MODELS as SIMULATED
 
 MISSIONS = Path(__file__).parents[2] / "missions"

@@ -15,7 +15,7 @@ from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.messages.common import MavlinkType, PlayingState
 from anafi_mav.plans.formats import files
 from anafi_mav.plans.plan import GLOBAL, RELATIVE, WAYPOINT, Item
-from anafi_mav.plans.translate import Flight, Leg, Start, Step, examine, translate
+from anafi_mav.plans.translation.translate import Flight, Leg, Start, Step, examine, translate
 from anafi_mav.units import DEG_PER_RAD
 
 MISSIONS = Path(__file__).parents[2] / "missions"

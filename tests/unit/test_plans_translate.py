@@ -17,7 +17,17 @@ from anafi_mav.plans.formats.parrot import Version
 from anafi_mav.plans.plan import DO_JUMP, GLOBAL, RELATIVE, TERRAIN, Item, Loss
 from anafi_mav.plans.rules.row import Verdict
 from anafi_mav.plans.rules.rules import TABLE
-from anafi_mav.plans.translate import MAX_LINES, Fault, FaultKind, Flight, Leg, Start, Step, examine, translate
+from anafi_mav.plans.translation.translate import (
+    MAX_LINES,
+    Fault,
+    FaultKind,
+    Flight,
+    Leg,
+    Start,
+    Step,
+    examine,
+    translate,
+)
 from anafi_mav.sim.plan import plan_file
 
 GROUND = Start(LAT, LON, 0.0, flying=False, takeoff_amsl=35.0, heading=30.0)

@@ -9,7 +9,7 @@ from anafi_mav.errors import PlanError
 from anafi_mav.plans.formats import files, parrot
 from anafi_mav.plans.formats.parrot import Version
 from anafi_mav.plans.plan import GLOBAL, RELATIVE, Item, Loss
-from anafi_mav.plans.translate import Fault, FaultKind, Leg, Start, Step, examine, translate
+from anafi_mav.plans.translation.translate import Fault, FaultKind, Leg, Start, Step, examine, translate
 from anafi_mav.sim.plan import plan_file
 from anafi_mav.sim.plan.plan_file import Command
 

@@ -6,7 +6,7 @@ import pytest
 
 from anafi_mav.plans.plan import Item
 from anafi_mav.plans.rules.rules_flight import is_relative
-from anafi_mav.plans.translate import examine
+from anafi_mav.plans.translation.translate import examine
 
 TURN = 115
 

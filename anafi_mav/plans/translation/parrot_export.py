@@ -9,7 +9,7 @@ from anafi_mav.plans.formats import parrot
 from anafi_mav.plans.formats.parrot import Version
 from anafi_mav.plans.path import place_of
 from anafi_mav.plans.plan import Loss, Plan
-from anafi_mav.plans.translate import Leg, Start, Step, examine, translate
+from anafi_mav.plans.translation.translate import Leg, Start, Step, examine, translate
 
 
 def start_of(plan: Plan) -> Start:
