@@ -112,7 +112,7 @@ def test_the_table_was_read() -> None:
     assert TABLE["plans"] == KIT | {"mav_enums"}
     assert TABLE["mav_enums"] == set()
     assert TABLE["gateway"] == set(TABLE) - {"gateway", "cli", "__main__", "sim"}
-    speakers = {"mavlink", "services", "plans", "gateway", "cli", "__main__"}
+    speakers = {"mavlink", "vehicle", "services", "plans", "gateway", "cli", "__main__"}
     assert {room for room, may in TABLE.items() if "mav_enums" in may} == speakers
     assert not GUARDED & set().union(*TABLE.values())
 
