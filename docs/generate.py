@@ -387,8 +387,9 @@ deferred, or it cannot happen. The module's text has the reason.
 
 def states() -> str:
     """docs/states.md."""
-    from anafi_mav.services import fence_watch, follow, ftp, manual_flight, mission_progress, offboard, plan_transfer
+    from anafi_mav.services import follow, ftp, manual_flight, mission_progress, offboard, plan_transfer
     from anafi_mav.sim.autopilot import machine
+    from anafi_mav.vehicle.fence import fence_watch
 
     tables: list[tuple[str, Any]] = [
         ("Transfer of a mission, a fence or rally points", plan_transfer),

@@ -12,7 +12,6 @@ from collections.abc import Callable, Hashable
 
 from anafi_mav.drone import Drone
 from anafi_mav.drone.events import FlyingState, PilotingStyleStyle
-from anafi_mav.services.fence_watch import FenceWatch, OutsideFence
 from anafi_mav.services.flying import AIRBORNE, ON_GROUND
 from anafi_mav.services.height import HeightReference
 from anafi_mav.services.helm import Helm
@@ -21,6 +20,7 @@ from anafi_mav.services.place import Place, point_of
 from anafi_mav.services.right import Right
 from anafi_mav.services.roll_sign import RollCheck
 from anafi_mav.services.statustext import Severity
+from anafi_mav.vehicle.fence.fence_watch import FenceWatch, OutsideFence
 
 STOP_WAIT = 0.5
 """s that a command that stops something waits for what it replaces. What has not ended by then can send nothing."""

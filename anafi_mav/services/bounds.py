@@ -9,10 +9,10 @@ import math
 
 from anafi_mav import geo
 from anafi_mav.services.aircraft import Aircraft
-from anafi_mav.services.fence_watch import OutsideFence
 from anafi_mav.services.height import ESTIMATE_FLOOR
 from anafi_mav.services.place import Place, point_of
 from anafi_mav.services.refusal import Refused
+from anafi_mav.vehicle.fence.fence_watch import OutsideFence
 
 SLOWEST, FASTEST = 0.1, 100.0
 """m/s. A speed beyond these is a number in the wrong place, or in another unit. Within them the drone limits itself."""

@@ -17,9 +17,9 @@ from anafi_mav import geo
 from anafi_mav.drone import Range
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.plans.zones import Circle
-from anafi_mav.services.fence_watch import Reaction
 from anafi_mav.services.service import Host
 from anafi_mav.services.statustext import Severity
+from anafi_mav.vehicle.fence.fence_watch import Reaction
 
 NEAR, FAR = 5.0, 10.0
 """m between the drone's centre and the middle of a circle that count as the same place. While the drone stands its

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from anafi_mav.plans.plan import Item
-from anafi_mav.services.plan_items import DEGREES, UNSET, PlanItem, has_place
+from anafi_mav.vehicle.fence.plan_items import DEGREES, UNSET, PlanItem, has_place
 
 LARGEST = float(np.finfo(np.float32).max)
 

@@ -15,11 +15,11 @@ from anafi_mav.plans.plan import Item
 from anafi_mav.plans.translation.translate import Cursor, Leg, Start, Step, translate
 from anafi_mav.services.aircraft import Aircraft
 from anafi_mav.services.bounds import check_estimate, check_place
-from anafi_mav.services.fence_watch import OutsideFence
 from anafi_mav.services.height import ESTIMATE_FLOOR
 from anafi_mav.services.place import Place
 from anafi_mav.services.refusal import Refused
 from anafi_mav.units import DEG_PER_RAD
+from anafi_mav.vehicle.fence.fence_watch import OutsideFence
 
 BREATH = 20
 """Way points after which others get their turn: a large polygon takes a while."""

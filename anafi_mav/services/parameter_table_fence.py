@@ -3,7 +3,13 @@
 from __future__ import annotations
 
 from anafi_mav.drone import events
-from anafi_mav.services.fence_watch import (
+from anafi_mav.services.parameter import Parameter, mapped, own, twin
+from anafi_mav.services.parameter_codec import Kind
+from anafi_mav.services.parameter_table import GEOFENCE, OFF_ON
+from anafi_mav.services.refusal import Refused
+from anafi_mav.services.service import Host
+from anafi_mav.services.statustext import Severity
+from anafi_mav.vehicle.fence.fence_watch import (
     ARDUPILOT_ACTIONS,
     CEILING,
     EVERYTHING,
@@ -14,13 +20,7 @@ from anafi_mav.services.fence_watch import (
     ZONES,
     Reaction,
 )
-from anafi_mav.services.parameter import Parameter, mapped, own, twin
-from anafi_mav.services.parameter_codec import Kind
-from anafi_mav.services.parameter_table import GEOFENCE, OFF_ON
-from anafi_mav.services.rally import DEFAULT_TYPE, RTL_TYPES
-from anafi_mav.services.refusal import Refused
-from anafi_mav.services.service import Host
-from anafi_mav.services.statustext import Severity
+from anafi_mav.vehicle.fence.rally import DEFAULT_TYPE, RTL_TYPES
 
 GROUP = "Fence and rally points"
 

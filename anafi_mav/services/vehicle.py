@@ -52,7 +52,6 @@ from anafi_mav.services.mission_flight import MissionFlight
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.offboard_flight import OffboardFlight
 from anafi_mav.services.place import Place
-from anafi_mav.services.rally import RallyPoints
 from anafi_mav.services.refusal import Refused
 from anafi_mav.services.return_end import ReturnEnd
 from anafi_mav.services.right import Extent, Right
@@ -60,6 +59,7 @@ from anafi_mav.services.roll_sign import INVERTED
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.subscriptions import Subscriptions
 from anafi_mav.services.takeoff import Takeoff
+from anafi_mav.vehicle.fence.rally import RallyPoints
 
 FORCED = "forced landing"
 LANDS, PILOT_LANDS = "drone is landing", "Skycontroller pilot is landing"

@@ -10,7 +10,7 @@ from support.plans import FENCE, MISSION, RALLY, Item, circle, content, download
 from support.world import HOME, World, world
 
 from anafi_mav.services.plan_files import PATHS, unpack_plan
-from anafi_mav.services.plan_items import PlanItem
+from anafi_mav.vehicle.fence.plan_items import PlanItem
 
 CREATE, WRITE = 6, 7
 PLACE = (HOME[0], HOME[1])

@@ -17,8 +17,8 @@ from msgspec.structs import replace
 from anafi_mav import geo
 from anafi_mav.mavlink import dialect
 from anafi_mav.plans.zones import Circle, Fence, Polygon
-from anafi_mav.services.fence import FenceKind, fence_of, summary
-from anafi_mav.services.fence_watch import (
+from anafi_mav.vehicle.fence.fence import FenceKind, fence_of, summary
+from anafi_mav.vehicle.fence.fence_watch import (
     ARDUPILOT_ACTIONS,
     BACK_INSIDE,
     CALM,
@@ -39,7 +39,7 @@ from anafi_mav.services.fence_watch import (
     Sight,
     State,
 )
-from anafi_mav.services.plan_items import PlanItem
+from anafi_mav.vehicle.fence.plan_items import PlanItem
 
 LAT, LON = 48.8789, 2.3677
 NORTH, EAST = 111.2074, 73.3490

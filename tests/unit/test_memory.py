@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from anafi_mav.services.memory import MAX_BYTES, Memory
-from anafi_mav.services.plan_items import PlanItem, opaque_id
 from anafi_mav.state_lock import state_folder
+from anafi_mav.vehicle.fence.plan_items import PlanItem, opaque_id
 
 SERIAL = "PI040443BA8K000123"
 ITEMS = (

@@ -10,7 +10,7 @@ from support.plan_samples import FLIGHT, LAT, LON, action, plans, waypoint
 
 from anafi_mav.plans.plan import MISSION, RELATIVE, Item, Plan
 from anafi_mav.services.mission_items import as_carried, from_wire, to_wire
-from anafi_mav.services.plan_items import UNSET, PlanItem, has_place, item_int, item_of
+from anafi_mav.vehicle.fence.plan_items import UNSET, PlanItem, has_place, item_int, item_of
 
 
 def test_a_place_is_degrees_times_1e7_and_nothing_is_not_zero() -> None:

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 from anafi_mav import geo
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.plan_items import Fault, PlanItem, height_ato, place_fault
 from anafi_mav.services.plan_transfer import PlanKind
+from anafi_mav.vehicle.fence.plan_items import Fault, PlanItem, height_ato, place_fault
 
 CLOSER = 10.0
 """m that another place must be closer by before it replaces the chosen one: half way between two the choice would

@@ -20,8 +20,8 @@ from anafi_mav import geo
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.plans.zones import Circle, Fence, LatLon, Margin
-from anafi_mav.services.fence import fence_of
-from anafi_mav.services.plan_items import PlanItem
+from anafi_mav.vehicle.fence.fence import fence_of
+from anafi_mav.vehicle.fence.plan_items import PlanItem
 
 REACTION = 0.6
 """s from a motion to the drone's answer to what we make of it: telemetry comes five times a second, a stick takes 0.1 s

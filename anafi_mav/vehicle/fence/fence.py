@@ -8,8 +8,8 @@ from collections.abc import Iterable, Sequence
 from anafi_mav.mavlink import dialect
 from anafi_mav.plans.zones import Circle, Fence, Polygon, Zone
 from anafi_mav.services.flavours import PX4, Flavour
-from anafi_mav.services.plan_items import Fault, PlanItem, place_fault
 from anafi_mav.services.plan_transfer import PlanKind
+from anafi_mav.vehicle.fence.plan_items import Fault, PlanItem, place_fault
 
 SMALLEST_AREA = 1.0
 """m². A polygon that encloses less is a line or a point: a slip, and nobody can be in it."""
