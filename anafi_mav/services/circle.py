@@ -14,8 +14,8 @@ import math
 from dataclasses import dataclass
 
 from anafi_mav import geo, units
-from anafi_mav.services.offboard_control import Axis, Demand, G, Motion
-from anafi_mav.services.place import Place
+from anafi_mav.vehicle.base.place import Place
+from anafi_mav.vehicle.base.velocity_loop import Axis, Demand, G, Motion
 
 SMALLEST = 2.0
 """m of radius. On a smaller circle GPS does not know which side of it the drone is on."""

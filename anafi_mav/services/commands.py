@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.flavours import PX4, Flavour
-from anafi_mav.services.modes import FlightMode
-from anafi_mav.services.right import Extent, Right
+from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.right import Extent, Right
 from anafi_mav.vehicle.fence.plan_items import DEGREES, PLACED
 
 RESEND_WINDOW = 3.5

@@ -14,7 +14,7 @@ from typing import Any
 
 from anafi_mav.drone.events import AlertState, BatteryAlert, MotorError, Sensor, TakeoffChecklistType
 from anafi_mav.services.flavours import Flavour
-from anafi_mav.services.modes import FlightMode
+from anafi_mav.vehicle.base.modes import FlightMode
 
 NAMESPACE = "anafi"
 COMPONENT = 1

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 from anafi_mav import units
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.offboard_control import Axis, Demand
+from anafi_mav.vehicle.base.velocity_loop import Axis, Demand
 
 SILENCE = 2.5
 """s without a word of the target until the drone hovers: MAVSDK sends one a second, and one may be lost."""

@@ -10,11 +10,11 @@ from dataclasses import dataclass, replace
 
 from anafi_mav import units
 from anafi_mav.drone import MoveEnd, Position
-from anafi_mav.services.aircraft import Aircraft
-from anafi_mav.services.bounds import check_height, check_place
-from anafi_mav.services.modes import FlightMode
-from anafi_mav.services.place import Place
-from anafi_mav.services.refusal import Refused
+from anafi_mav.vehicle.base.aircraft import Aircraft
+from anafi_mav.vehicle.base.bounds import check_height, check_place
+from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.place import Place
+from anafi_mav.vehicle.base.refusal import Refused
 
 SAME_HEIGHT = 0.1
 """m by which the height of a moveTo may differ from the one asked for: some millimetres tell two of them apart."""

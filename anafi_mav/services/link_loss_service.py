@@ -8,11 +8,11 @@ from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.mavlink.stall import STALL
-from anafi_mav.services.link_loss import GcsWatch, LossAction
-from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.service import Host, Service
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.vehicle import Landed
+from anafi_mav.vehicle.base.link_loss import GcsWatch, LossAction
+from anafi_mav.vehicle.base.modes import FlightMode
 
 
 class LinkLossService(Service):

@@ -13,12 +13,12 @@ from anafi_mav.errors import PlanError
 from anafi_mav.mavlink import dialect
 from anafi_mav.plans.plan import Item
 from anafi_mav.plans.translation.translate import Cursor, Leg, Start, Step, translate
-from anafi_mav.services.aircraft import Aircraft
-from anafi_mav.services.bounds import check_estimate, check_place
-from anafi_mav.services.height import ESTIMATE_FLOOR
-from anafi_mav.services.place import Place
-from anafi_mav.services.refusal import Refused
 from anafi_mav.units import DEG_PER_RAD
+from anafi_mav.vehicle.base.aircraft import Aircraft
+from anafi_mav.vehicle.base.bounds import check_estimate, check_place
+from anafi_mav.vehicle.base.height import ESTIMATE_FLOOR
+from anafi_mav.vehicle.base.place import Place
+from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.fence.fence_watch import OutsideFence
 
 BREATH = 20

@@ -9,8 +9,8 @@ from anafi_mav.errors import CommandRejected
 from anafi_mav.mavlink import dialect
 from anafi_mav.plans.plan import Item
 from anafi_mav.plans.rules.rules_flight import is_relative
-from anafi_mav.services.aircraft import Aircraft
-from anafi_mav.services.turns import heading_of
+from anafi_mav.vehicle.base.aircraft import Aircraft
+from anafi_mav.vehicle.base.yaw import heading_of
 
 FULL = 100.0
 """ZOOM_TYPE_RANGE: a share of what the camera can, %."""

@@ -14,10 +14,10 @@ from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.actions import change_mode
 from anafi_mav.services.commands import Action, Altitude, Command, effect_of_mode
 from anafi_mav.services.flavours import STANDARD_MODES, Flavour, flavour_of, mode_of_standard
-from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.service import Answer, Host, Request, Service
 from anafi_mav.services.stream import Stream, Times
 from anafi_mav.services.vehicle import Vehicle
+from anafi_mav.vehicle.base.modes import FlightMode
 
 _BY_ITSELF = (FlightMode.ORBIT, FlightMode.TERMINATED)
 """Shown, but entered by a command only."""

@@ -19,12 +19,20 @@ from anafi_mav.clock import Clock
 from anafi_mav.drone import Limits, PilotingCommand, events
 from anafi_mav.drone.events import FlyingState
 from anafi_mav.errors import AnafiMavError, LinkLost
-from anafi_mav.services.aircraft import Aircraft
-from anafi_mav.services.bounds import TooLow
-from anafi_mav.services.clients import system_of
-from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.offboard import GUIDED_TIMEOUT, SILENCE, OffboardStream, State, ends, lasts
-from anafi_mav.services.offboard_control import (
+from anafi_mav.services.offboard_goals import Goal, demand, resolve
+from anafi_mav.services.offboard_moves import OffboardMoves
+from anafi_mav.services.offboard_setpoints import NOTHING, AttitudeSetpoint, MotionSetpoint, Setpoint
+from anafi_mav.services.setpoint_takeoff import Launcher, Phase, SetpointTakeoff, Step, climbs
+from anafi_mav.services.statustext import Severity
+from anafi_mav.services.subscriptions import Subscriptions
+from anafi_mav.vehicle.base.aircraft import Aircraft
+from anafi_mav.vehicle.base.bounds import TooLow
+from anafi_mav.vehicle.base.clients import system_of
+from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.refusal import Refused
+from anafi_mav.vehicle.base.roll_sign import ROLL_INVERTED
+from anafi_mav.vehicle.base.velocity_loop import (
     CAUTIOUS_TILT,
     STILL,
     WIND,
@@ -34,14 +42,6 @@ from anafi_mav.services.offboard_control import (
     tilt_limit,
     turn_towards,
 )
-from anafi_mav.services.offboard_goals import Goal, demand, resolve
-from anafi_mav.services.offboard_moves import OffboardMoves
-from anafi_mav.services.offboard_setpoints import NOTHING, AttitudeSetpoint, MotionSetpoint, Setpoint
-from anafi_mav.services.refusal import Refused
-from anafi_mav.services.roll_sign import ROLL_INVERTED
-from anafi_mav.services.setpoint_takeoff import Launcher, Phase, SetpointTakeoff, Step, climbs
-from anafi_mav.services.statustext import Severity
-from anafi_mav.services.subscriptions import Subscriptions
 
 WARN_AGAIN = 1.0
 """m/s by which a velocity has to be higher than the last one whose tilt was worth a word."""

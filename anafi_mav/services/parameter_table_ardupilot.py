@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 
 from anafi_mav.drone import events
-from anafi_mav.services.link_loss import LossAction
 from anafi_mav.services.parameter import Limits, Parameter, current, fact, mapped, number, twin
 from anafi_mav.services.parameter_codec import Kind
 from anafi_mav.services.parameter_table import (
@@ -38,6 +37,7 @@ from anafi_mav.services.return_end import EndOfReturn
 from anafi_mav.services.service import Host
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.takeoff import AUTO_DISARM
+from anafi_mav.vehicle.base.link_loss import LossAction
 
 FACTS = "ArduPilot facts"
 

@@ -6,9 +6,9 @@ from anafi_mav.drone import events
 from anafi_mav.services.parameter import Parameter, mapped, own, twin
 from anafi_mav.services.parameter_codec import Kind
 from anafi_mav.services.parameter_table import GEOFENCE, OFF_ON
-from anafi_mav.services.refusal import Refused
 from anafi_mav.services.service import Host
 from anafi_mav.services.statustext import Severity
+from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.fence.fence_watch import (
     ARDUPILOT_ACTIONS,
     CEILING,

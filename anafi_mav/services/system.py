@@ -33,7 +33,6 @@ from anafi_mav.services.flight_record import FlightRecordService
 from anafi_mav.services.follow_service import FollowService
 from anafi_mav.services.ftp_service import FtpService
 from anafi_mav.services.guided import GuidedService
-from anafi_mav.services.height import TakeoffRecord
 from anafi_mav.services.high_latency import HighLatencyService
 from anafi_mav.services.identity import IdentityService
 from anafi_mav.services.link_loss_service import LinkLossService
@@ -43,7 +42,6 @@ from anafi_mav.services.manual_control import ManualControlService
 from anafi_mav.services.memory import Memory
 from anafi_mav.services.message_service import MessageService
 from anafi_mav.services.mission_service import MissionService
-from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.modes_service import ModesService
 from anafi_mav.services.node_status import NodeStatusService
 from anafi_mav.services.offboard_service import OffboardService
@@ -65,6 +63,8 @@ from anafi_mav.services.tune import TuneService
 from anafi_mav.services.vehicle import Health, Landed, Vehicle
 from anafi_mav.services.video_telemetry import VideoTelemetryService
 from anafi_mav.services.warnings import WarningService
+from anafi_mav.vehicle.base.height import TakeoffRecord
+from anafi_mav.vehicle.base.modes import FlightMode
 
 logger = logging.getLogger(__name__)
 

@@ -8,11 +8,11 @@ from __future__ import annotations
 import math
 
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.bounds import amsl_to_ato, check_estimate
 from anafi_mav.services.commands import Altitude, Command
-from anafi_mav.services.place import Place
-from anafi_mav.services.refusal import Refused
 from anafi_mav.services.vehicle import Vehicle
+from anafi_mav.vehicle.base.bounds import amsl_to_ato, check_estimate
+from anafi_mav.vehicle.base.place import Place
+from anafi_mav.vehicle.base.refusal import Refused
 
 _AMSL_FRAMES = (None, dialect.MAV_FRAME_GLOBAL, dialect.MAV_FRAME_GLOBAL_INT)
 _RELATIVE_FRAMES = (dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT, dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)

@@ -36,29 +36,29 @@ from anafi_mav.drone.events import (
 from anafi_mav.drone.piloting.landing import ALREADY_LANDED
 from anafi_mav.errors import CommandRejected
 from anafi_mav.services.aborted_return import AbortedReturn
-from anafi_mav.services.aircraft import STOP_WAIT, Aircraft
-from anafi_mav.services.clients import system_of
-from anafi_mav.services.flying import AIRBORNE, LANDING, ON_GROUND, TAKING_OFF
 from anafi_mav.services.follow_flight import FollowFlight
 from anafi_mav.services.guided_flight import GuidedFlight
-from anafi_mav.services.height import ESTIMATE_ERROR, TakeoffRecord
-from anafi_mav.services.helm import Helm
 from anafi_mav.services.hold_rule import APART, HoldRule
 from anafi_mav.services.initiator import Initiator, Initiators
 from anafi_mav.services.joystick_override import Override
-from anafi_mav.services.link_loss import LossPolicy
 from anafi_mav.services.manual_flight import ManualFlight
 from anafi_mav.services.mission_flight import MissionFlight
-from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.offboard_flight import OffboardFlight
-from anafi_mav.services.place import Place
-from anafi_mav.services.refusal import Refused
 from anafi_mav.services.return_end import ReturnEnd
-from anafi_mav.services.right import Extent, Right
-from anafi_mav.services.roll_sign import INVERTED
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.subscriptions import Subscriptions
 from anafi_mav.services.takeoff import Takeoff
+from anafi_mav.vehicle.base.aircraft import STOP_WAIT, Aircraft
+from anafi_mav.vehicle.base.clients import system_of
+from anafi_mav.vehicle.base.flying import AIRBORNE, LANDING, ON_GROUND, TAKING_OFF
+from anafi_mav.vehicle.base.height import ESTIMATE_ERROR, TakeoffRecord
+from anafi_mav.vehicle.base.helm import Helm
+from anafi_mav.vehicle.base.link_loss import LossPolicy
+from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.place import Place
+from anafi_mav.vehicle.base.refusal import Refused
+from anafi_mav.vehicle.base.right import Extent, Right
+from anafi_mav.vehicle.base.roll_sign import INVERTED
 from anafi_mav.vehicle.fence.rally import RallyPoints
 
 FORCED = "forced landing"

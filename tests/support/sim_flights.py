@@ -25,9 +25,9 @@ from anafi_mav.arsdk.messages.ardrone3 import PCMD, OrientationMode
 from anafi_mav.drone import Limits
 from anafi_mav.drone.piloting.sticks import percent
 from anafi_mav.services.circle import Circle, Lap
-from anafi_mav.services.offboard_control import Controller, Motion
-from anafi_mav.services.place import Place
 from anafi_mav.sim.world.motion import STEP
+from anafi_mav.vehicle.base.place import Place
+from anafi_mav.vehicle.base.velocity_loop import Controller, Motion
 from support.sim_bench import HOME, Bench
 
 RECORD = Path(__file__).with_suffix(".json")

@@ -19,7 +19,6 @@ from anafi_mav.services.offboard import (
     State,
     lasts,
 )
-from anafi_mav.services.offboard_control import turn_towards
 from anafi_mav.services.offboard_setpoints import (
     AttitudeSetpoint,
     MotionSetpoint,
@@ -29,6 +28,7 @@ from anafi_mav.services.offboard_setpoints import (
     global_setpoint,
     local_setpoint,
 )
+from anafi_mav.vehicle.base.velocity_loop import turn_towards
 
 NAN = math.nan
 

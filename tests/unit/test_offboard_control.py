@@ -14,7 +14,8 @@ from support.sim_bench import Bench
 from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.drone import Limits, PilotingCommand
 from anafi_mav.drone.piloting.sticks import percent
-from anafi_mav.services.offboard_control import (
+from anafi_mav.sim.world.model import MODELS
+from anafi_mav.vehicle.base.velocity_loop import (
     AIR_GAIN,
     PLACE_GAIN,
     STALE,
@@ -28,7 +29,6 @@ from anafi_mav.services.offboard_control import (
     tilt_for,
     turn_towards,
 )
-from anafi_mav.sim.world.model import MODELS
 
 LIMITS = Limits(tilt_deg=35.0, yaw_rate_dps=90.0, climb_mps=3.0)
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from anafi_mav.services.roll_sign import INVERTED
 from anafi_mav.services.roll_sign_service import VERIFIED
 from anafi_mav.sim.world.quirks import QUIRKS
+from anafi_mav.vehicle.base.roll_sign import INVERTED
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "real-aircraft.md").read_text(encoding="utf-8")

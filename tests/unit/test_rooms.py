@@ -38,7 +38,14 @@ CORES += [
 CORES += ["arsdk/video/rtcp.py", "arsdk/video/rtp_reception.py", "arsdk/video/rtsp.py", "arsdk/video/sdp.py"]
 CORES += ["arsdk/link/handshake.py", "mavlink/frames.py", "mavlink/router.py", "mavlink/streams.py", "plans"]
 CORES += ["services/mission_course.py", "services/mission_progress.py"]
-CORES += ["services/modes.py", "services/offboard.py", "services/height.py", "units.py", "geo.py", "config/schema.py"]
+CORES += [
+    "vehicle/base/modes.py",
+    "services/offboard.py",
+    "vehicle/base/height.py",
+    "units.py",
+    "geo.py",
+    "config/schema.py",
+]
 CORES += ["mav_enums.py"]
 IO = {"asyncio", "socket", "time", "threading", "selectors", "subprocess"}
 

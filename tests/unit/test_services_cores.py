@@ -12,11 +12,11 @@ from anafi_mav.services import commands
 from anafi_mav.services.actions import flight_actions
 from anafi_mav.services.flavours import ARDUPILOT, PX4
 from anafi_mav.services.guided import GuidedService
-from anafi_mav.services.height import HeightReference, TakeoffRecord
-from anafi_mav.services.link_loss import GcsWatch
-from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.modes_service import ModesService
 from anafi_mav.services.statustext import Severity, TextNumbers
+from anafi_mav.vehicle.base.height import HeightReference, TakeoffRecord
+from anafi_mav.vehicle.base.link_loss import GcsWatch
+from anafi_mav.vehicle.base.modes import FlightMode
 
 NAN = math.nan
 

@@ -25,7 +25,7 @@ from dataclasses import dataclass
 
 from anafi_mav import geo, units
 from anafi_mav.drone import Limits, PilotingCommand
-from anafi_mav.services.roll_sign import RollCheck, Sign
+from anafi_mav.vehicle.base.roll_sign import RollCheck, Sign
 
 G = 9.81
 

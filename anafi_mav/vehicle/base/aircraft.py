@@ -12,14 +12,14 @@ from collections.abc import Callable, Hashable
 
 from anafi_mav.drone import Drone
 from anafi_mav.drone.events import FlyingState, PilotingStyleStyle
-from anafi_mav.services.flying import AIRBORNE, ON_GROUND
-from anafi_mav.services.height import HeightReference
-from anafi_mav.services.helm import Helm
-from anafi_mav.services.modes import FlightMode
-from anafi_mav.services.place import Place, point_of
-from anafi_mav.services.right import Right
-from anafi_mav.services.roll_sign import RollCheck
 from anafi_mav.services.statustext import Severity
+from anafi_mav.vehicle.base.flying import AIRBORNE, ON_GROUND
+from anafi_mav.vehicle.base.height import HeightReference
+from anafi_mav.vehicle.base.helm import Helm
+from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.place import Place, point_of
+from anafi_mav.vehicle.base.right import Right
+from anafi_mav.vehicle.base.roll_sign import RollCheck
 from anafi_mav.vehicle.fence.fence_watch import FenceWatch, OutsideFence
 
 STOP_WAIT = 0.5

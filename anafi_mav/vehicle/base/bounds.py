@@ -8,10 +8,10 @@ from __future__ import annotations
 import math
 
 from anafi_mav import geo
-from anafi_mav.services.aircraft import Aircraft
-from anafi_mav.services.height import ESTIMATE_FLOOR
-from anafi_mav.services.place import Place, point_of
-from anafi_mav.services.refusal import Refused
+from anafi_mav.vehicle.base.aircraft import Aircraft
+from anafi_mav.vehicle.base.height import ESTIMATE_FLOOR
+from anafi_mav.vehicle.base.place import Place, point_of
+from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.fence.fence_watch import OutsideFence
 
 SLOWEST, FASTEST = 0.1, 100.0
