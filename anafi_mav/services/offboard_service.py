@@ -10,13 +10,13 @@ from typing import Any
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
-from anafi_mav.services import offboard_setpoints
 from anafi_mav.services.flavours import flavour_of
 from anafi_mav.services.offboard_echo import STREAMS
-from anafi_mav.services.offboard_setpoints import Setpoint
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
 from anafi_mav.services.stream import Stream
 from anafi_mav.services.subscriptions import Subscriptions
+from anafi_mav.vehicle.offboard import setpoints
+from anafi_mav.vehicle.offboard.setpoints import Setpoint
 
 
 class OffboardService(Service):
@@ -37,9 +37,9 @@ class OffboardService(Service):
 
     def messages(self) -> Mapping[int, MessageHandler]:
         return {
-            dialect.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET: self._takes(offboard_setpoints.attitude_setpoint),
-            dialect.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED: self._takes(offboard_setpoints.local_setpoint),
-            dialect.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT: self._takes(offboard_setpoints.global_setpoint),
+            dialect.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET: self._takes(setpoints.attitude_setpoint),
+            dialect.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED: self._takes(setpoints.local_setpoint),
+            dialect.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT: self._takes(setpoints.global_setpoint),
         }
 
     def streams(self) -> Mapping[int, Stream]:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 
 from anafi_mav.drone import events
-from anafi_mav.services.offboard import SILENCE
 from anafi_mav.services.parameter import Limits, Parameter, current, fact, mapped, number, twin
 from anafi_mav.services.parameter_codec import Kind
 from anafi_mav.services.parameter_table import (
@@ -45,6 +44,7 @@ from anafi_mav.services.return_end import LONGEST_WAIT, EndOfReturn
 from anafi_mav.services.service import Host
 from anafi_mav.services.takeoff import AUTO_DISARM
 from anafi_mav.vehicle.base.refusal import Refused
+from anafi_mav.vehicle.offboard.stream import SILENCE
 
 FACTS = "PX4 facts"
 

@@ -8,7 +8,17 @@ from typing import Any
 import pytest
 
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.offboard import (
+from anafi_mav.vehicle.base.velocity_loop import turn_towards
+from anafi_mav.vehicle.offboard.setpoints import (
+    AttitudeSetpoint,
+    MotionSetpoint,
+    Origin,
+    Setpoint,
+    attitude_setpoint,
+    global_setpoint,
+    local_setpoint,
+)
+from anafi_mav.vehicle.offboard.stream import (
     MAX_PILOTS,
     SILENCE,
     STRAGGLING,
@@ -19,16 +29,6 @@ from anafi_mav.services.offboard import (
     State,
     lasts,
 )
-from anafi_mav.services.offboard_setpoints import (
-    AttitudeSetpoint,
-    MotionSetpoint,
-    Origin,
-    Setpoint,
-    attitude_setpoint,
-    global_setpoint,
-    local_setpoint,
-)
-from anafi_mav.vehicle.base.velocity_loop import turn_towards
 
 NAN = math.nan
 

@@ -40,7 +40,7 @@ CORES += ["arsdk/link/handshake.py", "mavlink/frames.py", "mavlink/router.py", "
 CORES += ["services/mission_course.py", "services/mission_progress.py"]
 CORES += [
     "vehicle/base/modes.py",
-    "services/offboard.py",
+    "vehicle/offboard/stream.py",
     "vehicle/base/height.py",
     "units.py",
     "geo.py",

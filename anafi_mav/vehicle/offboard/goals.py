@@ -10,12 +10,12 @@ import math
 from dataclasses import dataclass
 
 from anafi_mav import geo
-from anafi_mav.services.offboard_setpoints import MotionSetpoint, Origin, Vector
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.bounds import amsl_to_ato, check_estimate, check_height, check_place
 from anafi_mav.vehicle.base.place import Place
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.velocity_loop import Axis, Demand, Motion
+from anafi_mav.vehicle.offboard.setpoints import MotionSetpoint, Origin, Vector
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,8 @@ from typing import TypeAlias
 from anafi_mav import units
 from anafi_mav.drone import MoveEnd
 from anafi_mav.errors import AnafiMavError, CommandRejected, LinkLost
-from anafi_mav.services.offboard_goals import Goal
 from anafi_mav.vehicle.base.aircraft import Aircraft
+from anafi_mav.vehicle.offboard.goals import Goal
 
 MOVE_EVERY = 0.2
 """s between two moves: a program may change its target with every setpoint, but each move has to be acknowledged by

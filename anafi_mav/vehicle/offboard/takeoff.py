@@ -12,7 +12,7 @@ import enum
 from collections.abc import Callable, Hashable
 from typing import Protocol
 
-from anafi_mav.services.offboard_setpoints import AttitudeSetpoint, Origin, Setpoint
+from anafi_mav.vehicle.offboard.setpoints import AttitudeSetpoint, Origin, Setpoint
 
 CLIMB_FOR = 1.0
 """s for which a client asks to climb before the drone takes off."""

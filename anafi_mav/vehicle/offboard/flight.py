@@ -19,11 +19,6 @@ from anafi_mav.clock import Clock
 from anafi_mav.drone import Limits, PilotingCommand, events
 from anafi_mav.drone.events import FlyingState
 from anafi_mav.errors import AnafiMavError, LinkLost
-from anafi_mav.services.offboard import GUIDED_TIMEOUT, SILENCE, OffboardStream, State, ends, lasts
-from anafi_mav.services.offboard_goals import Goal, demand, resolve
-from anafi_mav.services.offboard_moves import OffboardMoves
-from anafi_mav.services.offboard_setpoints import NOTHING, AttitudeSetpoint, MotionSetpoint, Setpoint
-from anafi_mav.services.setpoint_takeoff import Launcher, Phase, SetpointTakeoff, Step, climbs
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.subscriptions import Subscriptions
 from anafi_mav.vehicle.base.aircraft import Aircraft
@@ -42,6 +37,11 @@ from anafi_mav.vehicle.base.velocity_loop import (
     tilt_limit,
     turn_towards,
 )
+from anafi_mav.vehicle.offboard.goals import Goal, demand, resolve
+from anafi_mav.vehicle.offboard.moves import OffboardMoves
+from anafi_mav.vehicle.offboard.setpoints import NOTHING, AttitudeSetpoint, MotionSetpoint, Setpoint
+from anafi_mav.vehicle.offboard.stream import GUIDED_TIMEOUT, SILENCE, OffboardStream, State, ends, lasts
+from anafi_mav.vehicle.offboard.takeoff import Launcher, Phase, SetpointTakeoff, Step, climbs
 
 WARN_AGAIN = 1.0
 """m/s by which a velocity has to be higher than the last one whose tilt was worth a word."""

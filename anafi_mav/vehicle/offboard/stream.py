@@ -16,7 +16,7 @@ import enum
 from collections.abc import Hashable
 from typing import NamedTuple
 
-from anafi_mav.services.offboard_setpoints import NOTHING, MotionSetpoint, Setpoint
+from anafi_mav.vehicle.offboard.setpoints import NOTHING, MotionSetpoint, Setpoint
 
 SILENCE = 0.45
 """s without a setpoint until the drone is told to hover, so that it has been told within half a second."""
