@@ -387,14 +387,15 @@ deferred, or it cannot happen. The module's text has the reason.
 
 def states() -> str:
     """docs/states.md."""
-    from anafi_mav.services import follow, ftp, manual_flight, mission_progress, plan_transfer
+    from anafi_mav.services import follow, ftp, manual_flight, plan_transfer
     from anafi_mav.sim.autopilot import machine
     from anafi_mav.vehicle.fence import fence_watch
+    from anafi_mav.vehicle.mission import progress
     from anafi_mav.vehicle.offboard import stream
 
     tables: list[tuple[str, Any]] = [
         ("Transfer of a mission, a fence or rally points", plan_transfer),
-        ("A mission", mission_progress),
+        ("A mission", progress),
         ("The fence: zones, floor and ceiling each", fence_watch),
         ("Setpoints of a program", stream),
         ("Sticks of a ground station", manual_flight),

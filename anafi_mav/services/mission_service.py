@@ -15,8 +15,6 @@ from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import Action, Altitude, Command, Effect, effect_of_mode
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.mission_kind import FIRST_LABEL, offset
-from anafi_mav.services.mission_progress import MAVLINK_STATES, State
-from anafi_mav.services.mission_record import Record
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.stream import Stream, Times
@@ -24,6 +22,8 @@ from anafi_mav.services.subscriptions import Subscriptions
 from anafi_mav.services.vehicle import Vehicle
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
+from anafi_mav.vehicle.mission.progress import MAVLINK_STATES, State
+from anafi_mav.vehicle.mission.record import Record
 
 NO_TOTAL = 0xFFFF
 """`total` of a MISSION_CURRENT where there is no mission (common.xml)."""

@@ -42,7 +42,6 @@ from anafi_mav.services.hold_rule import APART, HoldRule
 from anafi_mav.services.initiator import Initiator, Initiators
 from anafi_mav.services.joystick_override import Override
 from anafi_mav.services.manual_flight import ManualFlight
-from anafi_mav.services.mission_flight import MissionFlight
 from anafi_mav.services.return_end import ReturnEnd
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.subscriptions import Subscriptions
@@ -59,6 +58,7 @@ from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.right import Extent, Right
 from anafi_mav.vehicle.base.roll_sign import INVERTED
 from anafi_mav.vehicle.fence.rally import RallyPoints
+from anafi_mav.vehicle.mission.flight import MissionFlight
 from anafi_mav.vehicle.offboard.flight import OffboardFlight
 
 FORCED = "forced landing"

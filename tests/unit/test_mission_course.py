@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from anafi_mav.plans.rules.legs import Leg, Settings, Step
 from anafi_mav.plans.translation.translate import Cursor
-from anafi_mav.services.mission_course import Course
+from anafi_mav.vehicle.mission.course import Course
 
 FILE = Leg(b"QGC WPL 120\n", (0, 1), ((0,), (1,)))
 ZOOM = Step(2, (2,))

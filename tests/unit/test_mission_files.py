@@ -9,8 +9,8 @@ from support.simulated import connected
 
 from anafi_mav.plans.plan import Item
 from anafi_mav.plans.translation.translate import Leg, Start, translate
-from anafi_mav.services.mission_files import FilesOnDrone
-from anafi_mav.services.mission_progress import Progress
+from anafi_mav.vehicle.mission.files import FilesOnDrone
+from anafi_mav.vehicle.mission.progress import Progress
 
 
 def way(latitude: float, command: int = 16) -> Item:

@@ -6,8 +6,8 @@ import pytest
 
 from anafi_mav.plans.plan import Item
 from anafi_mav.plans.translation.translate import Leg
-from anafi_mav.services.mission_progress import TRANSITIONS, Event, Progress, State
-from anafi_mav.services.mission_record import Record
+from anafi_mav.vehicle.mission.progress import TRANSITIONS, Event, Progress, State
+from anafi_mav.vehicle.mission.record import Record
 
 IMPOSSIBLE = {
     (State.NONE, Event.CHOOSE),

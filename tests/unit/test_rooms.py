@@ -37,7 +37,7 @@ CORES += [
 ]
 CORES += ["arsdk/video/rtcp.py", "arsdk/video/rtp_reception.py", "arsdk/video/rtsp.py", "arsdk/video/sdp.py"]
 CORES += ["arsdk/link/handshake.py", "mavlink/frames.py", "mavlink/router.py", "mavlink/streams.py", "plans"]
-CORES += ["services/mission_course.py", "services/mission_progress.py"]
+CORES += ["vehicle/mission/course.py", "vehicle/mission/progress.py"]
 CORES += [
     "vehicle/base/modes.py",
     "vehicle/offboard/stream.py",

@@ -11,10 +11,10 @@ from contextlib import contextmanager
 
 from anafi_mav import geo
 from anafi_mav.drone.events import AlertState, FlyingState, ForcedLandingReason, PlayError
-from anafi_mav.services.mission_path import WayPoint
-from anafi_mav.services.mission_progress import Progress
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.refusal import Refused
+from anafi_mav.vehicle.mission.path import WayPoint
+from anafi_mav.vehicle.mission.progress import Progress
 
 ARM_WAIT = 10.0
 """s that a mission waits for somebody to arm: QGroundControl chooses the mode first and arms when it is shown."""

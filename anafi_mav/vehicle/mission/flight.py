@@ -17,19 +17,19 @@ from anafi_mav.drone.events import FlyingState, PlayingState
 from anafi_mav.errors import AnafiMavError, CommandRejected, LinkLost
 from anafi_mav.plans.plan import Item
 from anafi_mav.plans.translation.translate import Leg
-from anafi_mav.services.mission_course import Course
-from anafi_mav.services.mission_files import FilesOnDrone
-from anafi_mav.services.mission_path import WayPoint, check_path, lay_out, way_points
-from anafi_mav.services.mission_progress import ENDINGS, Progress, State
-from anafi_mav.services.mission_record import Keeper, Record
-from anafi_mav.services.mission_steps import fly_step
-from anafi_mav.services.mission_waits import ArmWait, EndWatch, StoreWait
-from anafi_mav.services.mission_words import beginning, refusal
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.subscriptions import Subscriptions
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
+from anafi_mav.vehicle.mission.course import Course
+from anafi_mav.vehicle.mission.files import FilesOnDrone
+from anafi_mav.vehicle.mission.path import WayPoint, check_path, lay_out, way_points
+from anafi_mav.vehicle.mission.progress import ENDINGS, Progress, State
+from anafi_mav.vehicle.mission.record import Keeper, Record
+from anafi_mav.vehicle.mission.steps import fly_step
+from anafi_mav.vehicle.mission.texts import beginning, refusal
+from anafi_mav.vehicle.mission.waits import ArmWait, EndWatch, StoreWait
 
 _LANDING = (FlyingState.LANDING, FlyingState.EMERGENCY_LANDING)
 

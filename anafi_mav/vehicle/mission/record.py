@@ -12,8 +12,8 @@ from typing_extensions import Self
 
 from anafi_mav.plans.plan import DO_JUMP, Item
 from anafi_mav.plans.translation.translate import Leg
-from anafi_mav.services.mission_path import way_points
-from anafi_mav.services.mission_progress import Progress
+from anafi_mav.vehicle.mission.path import way_points
+from anafi_mav.vehicle.mission.progress import Progress
 
 
 class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -9,7 +9,7 @@ from anafi_mav.drone.automatic.flight_plan import FlightPlan
 from anafi_mav.errors import CommandRejected
 from anafi_mav.plans.plan import Item
 from anafi_mav.plans.translation.translate import Leg
-from anafi_mav.services.mission_path import lines_of
+from anafi_mav.vehicle.mission.path import lines_of
 
 MAX_FILES = 16
 """Files that are remembered; the drone keeps more, and one that is forgotten is uploaded again."""
