@@ -387,8 +387,9 @@ deferred, or it cannot happen. The module's text has the reason.
 
 def states() -> str:
     """docs/states.md."""
-    from anafi_mav.services import follow, ftp, manual_flight, plan_transfer
+    from anafi_mav.services import ftp, plan_transfer
     from anafi_mav.sim.autopilot import machine
+    from anafi_mav.vehicle import follow, manual_flight
     from anafi_mav.vehicle.fence import fence_watch
     from anafi_mav.vehicle.mission import progress
     from anafi_mav.vehicle.offboard import stream

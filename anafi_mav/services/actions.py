@@ -9,11 +9,11 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.services.commands import Action, Altitude, Command, Effect, Progress, effect_of_mode
 from anafi_mav.services.guided import guided_mode
 from anafi_mav.services.targets import height, place
-from anafi_mav.services.vehicle import Vehicle
 from anafi_mav.vehicle.base.bounds import FASTEST, SLOWEST
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused, Unsupported
 from anafi_mav.vehicle.base.right import Right
+from anafi_mav.vehicle.vehicle import Vehicle
 
 FORCE = 21196
 """param2 of an arm or disarm that overrides checks (MAVLink common.xml MAV_CMD_COMPONENT_ARM_DISARM)."""

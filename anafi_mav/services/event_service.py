@@ -22,7 +22,7 @@ from anafi_mav.services.service import Host, MessageHandler, Query, Service
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.stream import Stream, Times
 from anafi_mav.services.subscriptions import Subscriptions
-from anafi_mav.services.vehicle import Landed, Vehicle
+from anafi_mav.vehicle.vehicle import Landed, Vehicle
 
 RESET_FOR = 3.0
 """s after the start for which CURRENT_EVENT_SEQUENCE says that the sequence began anew: three of them, one may be

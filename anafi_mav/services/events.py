@@ -13,8 +13,8 @@ from anafi_mav.drone.events import BlockerKind, FlyingState, TakeoffChecklistTyp
 from anafi_mav.mavlink import dialect
 from anafi_mav.services import event_table as table
 from anafi_mav.services.event_table import ALL_MODES, Event, Health, Level, mode_bits
-from anafi_mav.services.vehicle import Vehicle
 from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.vehicle import Vehicle
 
 KEPT = 128
 """Events that can be had again: a dozen reports of the health checks."""

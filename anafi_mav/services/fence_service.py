@@ -21,10 +21,10 @@ from anafi_mav.services.service import Host, Service
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.stream import Stream, Times
 from anafi_mav.services.subscriptions import Subscriptions
-from anafi_mav.services.vehicle import Vehicle
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.fence.fence_watch import CEILING, EVERYTHING, FLOOR, FenceWatch, Reaction, Sight, State
+from anafi_mav.vehicle.vehicle import Vehicle
 
 LOOK_EVERY = 0.5
 """s between looks while the drone tells nothing new."""

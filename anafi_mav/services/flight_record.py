@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.service import Host, Service
 from anafi_mav.services.stream import Stream, Times
-from anafi_mav.services.vehicle import Landed, Vehicle
+from anafi_mav.vehicle.vehicle import Landed, Vehicle
 
 
 @dataclass

@@ -22,7 +22,7 @@ from anafi_mav.services.stream import Stream, Times
 from anafi_mav.services.subscriptions import Subscriptions
 from anafi_mav.services.telemetry_flight import amsl, target
 from anafi_mav.services.telemetry_status import percent, sensor_bits
-from anafi_mav.services.vehicle import Vehicle
+from anafi_mav.vehicle.vehicle import Vehicle
 
 EVERY = 5.0
 """s between two HIGH_LATENCY2 (high_latency.md)."""

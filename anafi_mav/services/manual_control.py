@@ -11,8 +11,8 @@ from collections.abc import Hashable, Mapping
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.flavours import flavour_of
-from anafi_mav.services.manual_flight import Channels, manual_sticks
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
+from anafi_mav.vehicle.manual_flight import Channels, manual_sticks
 from anafi_mav.vehicle.offboard.stream import SILENCE
 
 MAX_CLIENTS = 8

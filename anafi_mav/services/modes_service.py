@@ -16,8 +16,8 @@ from anafi_mav.services.commands import Action, Altitude, Command, effect_of_mod
 from anafi_mav.services.flavours import STANDARD_MODES, Flavour, flavour_of, mode_of_standard
 from anafi_mav.services.service import Answer, Host, Request, Service
 from anafi_mav.services.stream import Stream, Times
-from anafi_mav.services.vehicle import Vehicle
 from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.vehicle import Vehicle
 
 _BY_ITSELF = (FlightMode.ORBIT, FlightMode.TERMINATED)
 """Shown, but entered by a command only."""

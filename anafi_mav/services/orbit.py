@@ -17,7 +17,19 @@ from anafi_mav.drone import events
 from anafi_mav.drone.piloting.moves import Move, MoveEnd
 from anafi_mav.errors import LinkLost
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.circle import (
+from anafi_mav.services.commands import Action, Altitude, Command, Effect
+from anafi_mav.services.service import Host, Service
+from anafi_mav.services.statustext import Severity
+from anafi_mav.services.stream import Stream, Times
+from anafi_mav.services.subscriptions import Subscriptions
+from anafi_mav.services.targets import height, place
+from anafi_mav.vehicle.base.bounds import SLOWEST, check_height, check_on_earth, check_place
+from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.place import Place
+from anafi_mav.vehicle.base.refusal import Refused
+from anafi_mav.vehicle.base.roll_sign import ROLL_INVERTED
+from anafi_mav.vehicle.base.velocity_loop import Controller, tilt_limit
+from anafi_mav.vehicle.circle import (
     DEFAULT_RADIUS,
     DEFAULT_SPEED,
     LARGEST,
@@ -31,20 +43,8 @@ from anafi_mav.services.circle import (
     heading_at,
     outline,
 )
-from anafi_mav.services.commands import Action, Altitude, Command, Effect
-from anafi_mav.services.guided_flight import Goto
-from anafi_mav.services.service import Host, Service
-from anafi_mav.services.statustext import Severity
-from anafi_mav.services.stream import Stream, Times
-from anafi_mav.services.subscriptions import Subscriptions
-from anafi_mav.services.targets import height, place
-from anafi_mav.services.vehicle import Vehicle
-from anafi_mav.vehicle.base.bounds import SLOWEST, check_height, check_on_earth, check_place
-from anafi_mav.vehicle.base.modes import FlightMode
-from anafi_mav.vehicle.base.place import Place
-from anafi_mav.vehicle.base.refusal import Refused
-from anafi_mav.vehicle.base.roll_sign import ROLL_INVERTED
-from anafi_mav.vehicle.base.velocity_loop import Controller, tilt_limit
+from anafi_mav.vehicle.guided_flight import Goto
+from anafi_mav.vehicle.vehicle import Vehicle
 
 AS_IT_IS = 5.0
 """ORBIT_YAW_BEHAVIOUR_UNCHANGED; QGroundControl always sends it."""

@@ -14,14 +14,14 @@ from typing import Any
 from anafi_mav.drone import MODELS, Drone, Range, events
 from anafi_mav.drone.events import Axis, PreciseHomeMode, RthEndingBehavior, RthHomeType
 from anafi_mav.drone.events import ObstacleAvoidanceMode as AvoidanceMode
-from anafi_mav.services.joystick_override import Override
 from anafi_mav.services.parameter import Limits, Parameter, bounds, current, number, own
 from anafi_mav.services.parameter_codec import Kind
-from anafi_mav.services.return_end import LONGEST_WAIT, SHORTEST_WAIT, EndOfReturn
 from anafi_mav.services.service import Host
 from anafi_mav.vehicle.base.bounds import LOWEST
 from anafi_mav.vehicle.base.link_loss import LossAction
+from anafi_mav.vehicle.joystick_override import Override
 from anafi_mav.vehicle.offboard.stream import GUIDED_TIMEOUT, LONGEST_TIMEOUT, SHORTEST_TIMEOUT
+from anafi_mav.vehicle.return_end import LONGEST_WAIT, SHORTEST_WAIT, EndOfReturn
 
 OFF_ON = {0: "Off", 1: "On"}
 

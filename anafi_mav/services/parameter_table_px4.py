@@ -40,11 +40,11 @@ from anafi_mav.services.parameter_table import (
 from anafi_mav.services.parameter_table_fence import FENCE_PX4
 from anafi_mav.services.parameter_table_follow import FOLLOW_PX4
 from anafi_mav.services.parameter_table_setup import SETUP_PX4
-from anafi_mav.services.return_end import LONGEST_WAIT, EndOfReturn
 from anafi_mav.services.service import Host
-from anafi_mav.services.takeoff import AUTO_DISARM
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.offboard.stream import SILENCE
+from anafi_mav.vehicle.return_end import LONGEST_WAIT, EndOfReturn
+from anafi_mav.vehicle.takeoff import AUTO_DISARM
 
 FACTS = "PX4 facts"
 

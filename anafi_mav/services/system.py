@@ -60,11 +60,11 @@ from anafi_mav.services.takeoff_point_service import TakeoffPointService
 from anafi_mav.services.telemetry import CHANGES, TelemetryService
 from anafi_mav.services.time_service import TimeService
 from anafi_mav.services.tune import TuneService
-from anafi_mav.services.vehicle import Health, Landed, Vehicle
 from anafi_mav.services.video_telemetry import VideoTelemetryService
 from anafi_mav.services.warnings import WarningService
 from anafi_mav.vehicle.base.height import TakeoffRecord
 from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.vehicle import Health, Landed, Vehicle
 
 logger = logging.getLogger(__name__)
 

@@ -9,10 +9,10 @@ import math
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.commands import Altitude, Command
-from anafi_mav.services.vehicle import Vehicle
 from anafi_mav.vehicle.base.bounds import amsl_to_ato, check_estimate
 from anafi_mav.vehicle.base.place import Place
 from anafi_mav.vehicle.base.refusal import Refused
+from anafi_mav.vehicle.vehicle import Vehicle
 
 _AMSL_FRAMES = (None, dialect.MAV_FRAME_GLOBAL, dialect.MAV_FRAME_GLOBAL_INT)
 _RELATIVE_FRAMES = (dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT, dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)

@@ -16,7 +16,7 @@ from anafi_mav.services import telemetry_anafi, telemetry_flight, telemetry_link
 from anafi_mav.services.service import Host, Service
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.stream import Stream
-from anafi_mav.services.vehicle import POSITION_OLD
+from anafi_mav.vehicle.vehicle import POSITION_OLD
 
 CHANGES: frozenset[type[Message]] = frozenset(
     {

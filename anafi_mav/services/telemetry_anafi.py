@@ -18,7 +18,7 @@ from anafi_mav.drone.status.alerts import Alerts
 from anafi_mav.drone.status.home import Home
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.stream import Stream, Times
-from anafi_mav.services.vehicle import Vehicle
+from anafi_mav.vehicle.vehicle import Vehicle
 
 NAN = math.nan
 UNKNOWN_U8, UNKNOWN_U16, UNKNOWN_I32 = 0xFF, 0xFFFF, 0x7FFFFFFF

@@ -20,7 +20,7 @@ from anafi_mav.drone.events import MoveToStatus
 from anafi_mav.drone.piloting.state import Attitude, Velocity
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.stream import Stream, Times
-from anafi_mav.services.vehicle import Vehicle
+from anafi_mav.vehicle.vehicle import Vehicle
 
 NAN = math.nan
 UNKNOWN_U16 = 0xFFFF

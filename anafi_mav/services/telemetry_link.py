@@ -13,7 +13,7 @@ from anafi_mav import units
 from anafi_mav.drone.status.link import Link
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.stream import Stream, Times
-from anafi_mav.services.vehicle import Vehicle
+from anafi_mav.vehicle.vehicle import Vehicle
 
 UNKNOWN_U8 = 255
 UNUSED_CHANNEL = 0xFFFF

@@ -15,7 +15,7 @@ from anafi_mav.drone.events import AlertLevel, BatteryAlert, MotorError, Sensor
 from anafi_mav.drone.status.battery import BatteryState
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.stream import Stream, Times
-from anafi_mav.services.vehicle import Vehicle
+from anafi_mav.vehicle.vehicle import Vehicle
 
 NAN = math.nan
 UNKNOWN_U16 = 0xFFFF

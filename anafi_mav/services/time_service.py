@@ -8,7 +8,7 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.service import MessageHandler, Service
 from anafi_mav.services.stream import Stream, Times
-from anafi_mav.services.vehicle import Vehicle
+from anafi_mav.vehicle.vehicle import Vehicle
 
 
 class TimeService(Service):

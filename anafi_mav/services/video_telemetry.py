@@ -18,7 +18,7 @@ from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.service import Host, Service
 from anafi_mav.services.stream import Stream, Times
-from anafi_mav.services.vehicle import Vehicle
+from anafi_mav.vehicle.vehicle import Vehicle
 
 NAN = math.nan
 UNKNOWN_U8, UNKNOWN_I16, UNKNOWN_U32 = 0xFF, 0x7FFF, 0xFFFFFFFF

@@ -24,10 +24,10 @@ from anafi_mav.arsdk.messages import ardrone3, move
 from anafi_mav.arsdk.messages.ardrone3 import PCMD, OrientationMode
 from anafi_mav.drone import Limits
 from anafi_mav.drone.piloting.sticks import percent
-from anafi_mav.services.circle import Circle, Lap
 from anafi_mav.sim.world.motion import STEP
 from anafi_mav.vehicle.base.place import Place
 from anafi_mav.vehicle.base.velocity_loop import Controller, Motion
+from anafi_mav.vehicle.circle import Circle, Lap
 from support.sim_bench import HOME, Bench
 
 RECORD = Path(__file__).with_suffix(".json")

@@ -7,9 +7,9 @@ import math
 import pytest
 
 from anafi_mav import geo
-from anafi_mav.services.circle import Circle, Facing, Lap, entry, fastest, heading_at, outline
 from anafi_mav.vehicle.base.place import Place
 from anafi_mav.vehicle.base.velocity_loop import Motion
+from anafi_mav.vehicle.circle import Circle, Facing, Lap, entry, fastest, heading_at, outline
 
 CENTRE = Place(48.8789, 2.3677)
 

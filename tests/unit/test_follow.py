@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.follow import FORESIGHT, TRANSITIONS, Event, Follower, FollowSettings, Sighting, State, sighting
+from anafi_mav.vehicle.follow import FORESIGHT, TRANSITIONS, Event, Follower, FollowSettings, Sighting, State, sighting
 
 NAN = math.nan
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from anafi_mav.services.hold_rule import ANSWER, APART, MAX_CLIENTS, HoldRule
+from anafi_mav.vehicle.hold_rule import ANSWER, APART, MAX_CLIENTS, HoldRule
 
 
 def test_hold_counts_after_five_seconds_without_one_of_its_client() -> None:

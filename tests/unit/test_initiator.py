@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from anafi_mav.services.initiator import Initiator, Initiators
+from anafi_mav.vehicle.initiator import Initiator, Initiators
 
 CLIENT, DRONE, PILOT = Initiator.CLIENT, Initiator.DRONE, Initiator.PILOT
 

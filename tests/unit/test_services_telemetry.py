@@ -29,7 +29,7 @@ from anafi_mav.services.shell import PROMPT, answer
 from anafi_mav.services.statustext import Severity, TextNumbers
 from anafi_mav.services.stream import Times
 from anafi_mav.services.system import System
-from anafi_mav.services.vehicle import Landed
+from anafi_mav.vehicle.vehicle import Landed
 
 NOW = Times(1_234_567_890)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from anafi_mav.services.joystick_override import JoystickOverride
+from anafi_mav.vehicle.joystick_override import JoystickOverride
 
 CLIENT = ("channel", 255, 190)
 

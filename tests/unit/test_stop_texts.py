@@ -9,10 +9,10 @@ import pytest
 
 from anafi_mav.drone.events import HomeReachability, ReturnReason, WarningLevel
 from anafi_mav.drone.piloting import landing
-from anafi_mav.services.aborted_return import REPEAT_EVERY, AbortedReturn
 from anafi_mav.services.statustext import CHUNK
-from anafi_mav.services.vehicle import UNENDABLE
+from anafi_mav.vehicle.aborted_return import REPEAT_EVERY, AbortedReturn
 from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.vehicle import UNENDABLE
 
 
 def aircraft(**state: Any) -> Any:

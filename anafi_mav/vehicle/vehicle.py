@@ -35,17 +35,9 @@ from anafi_mav.drone.events import (
 )
 from anafi_mav.drone.piloting.landing import ALREADY_LANDED
 from anafi_mav.errors import CommandRejected
-from anafi_mav.services.aborted_return import AbortedReturn
-from anafi_mav.services.follow_flight import FollowFlight
-from anafi_mav.services.guided_flight import GuidedFlight
-from anafi_mav.services.hold_rule import APART, HoldRule
-from anafi_mav.services.initiator import Initiator, Initiators
-from anafi_mav.services.joystick_override import Override
-from anafi_mav.services.manual_flight import ManualFlight
-from anafi_mav.services.return_end import ReturnEnd
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.subscriptions import Subscriptions
-from anafi_mav.services.takeoff import Takeoff
+from anafi_mav.vehicle.aborted_return import AbortedReturn
 from anafi_mav.vehicle.base.aircraft import STOP_WAIT, Aircraft
 from anafi_mav.vehicle.base.clients import system_of
 from anafi_mav.vehicle.base.flying import AIRBORNE, LANDING, ON_GROUND, TAKING_OFF
@@ -58,8 +50,16 @@ from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.right import Extent, Right
 from anafi_mav.vehicle.base.roll_sign import INVERTED
 from anafi_mav.vehicle.fence.rally import RallyPoints
+from anafi_mav.vehicle.follow_flight import FollowFlight
+from anafi_mav.vehicle.guided_flight import GuidedFlight
+from anafi_mav.vehicle.hold_rule import APART, HoldRule
+from anafi_mav.vehicle.initiator import Initiator, Initiators
+from anafi_mav.vehicle.joystick_override import Override
+from anafi_mav.vehicle.manual_flight import ManualFlight
 from anafi_mav.vehicle.mission.flight import MissionFlight
 from anafi_mav.vehicle.offboard.flight import OffboardFlight
+from anafi_mav.vehicle.return_end import ReturnEnd
+from anafi_mav.vehicle.takeoff import Takeoff
 
 FORCED = "forced landing"
 LANDS, PILOT_LANDS = "drone is landing", "Skycontroller pilot is landing"
