@@ -18,9 +18,9 @@ from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.plans.formats.parrot import Version
 from anafi_mav.services import plan_files
+from anafi_mav.services.command.guided_service import fly_item, is_guided_item
 from anafi_mav.services.files import Query, ServedFile
 from anafi_mav.services.flavours import PX4, Flavour, flavour_of
-from anafi_mav.services.guided import fly_item, is_guided_item
 from anafi_mav.services.memory import NOT_KEPT
 from anafi_mav.services.mission_kind import MissionKind
 from anafi_mav.services.plan_desk import MESSAGES, PlanDesk

@@ -9,10 +9,10 @@ import pytest
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.services import commands
-from anafi_mav.services.actions import flight_actions
+from anafi_mav.services.command.actions import flight_actions
+from anafi_mav.services.command.guided_service import GuidedService
+from anafi_mav.services.command.modes_service import ModesService
 from anafi_mav.services.flavours import ARDUPILOT, PX4
-from anafi_mav.services.guided import GuidedService
-from anafi_mav.services.modes_service import ModesService
 from anafi_mav.services.statustext import Severity, TextNumbers
 from anafi_mav.vehicle.base.height import HeightReference, TakeoffRecord
 from anafi_mav.vehicle.base.link_loss import GcsWatch

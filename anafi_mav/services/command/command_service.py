@@ -16,7 +16,7 @@ from typing import Any
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, NotSupported
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
-from anafi_mav.services.actions import change_mode, flight_actions
+from anafi_mav.services.command.actions import change_mode, flight_actions
 from anafi_mav.services.commands import (
     EFFECT_OF_MODE,
     MODE_PROGRESS_AFTER,

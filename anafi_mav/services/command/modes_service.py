@@ -11,7 +11,7 @@ from collections.abc import Mapping
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
-from anafi_mav.services.actions import change_mode
+from anafi_mav.services.command.actions import change_mode
 from anafi_mav.services.commands import Action, Altitude, Command, effect_of_mode
 from anafi_mav.services.flavours import STANDARD_MODES, Flavour, flavour_of, mode_of_standard
 from anafi_mav.services.service import Answer, Host, Request, Service
