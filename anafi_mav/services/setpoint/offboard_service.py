@@ -11,8 +11,8 @@ from typing import Any
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.flavours import flavour_of
-from anafi_mav.services.offboard_echo import STREAMS
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
+from anafi_mav.services.setpoint.offboard_echo import STREAMS
 from anafi_mav.services.stream import Stream
 from anafi_mav.services.subscriptions import Subscriptions
 from anafi_mav.vehicle.offboard import setpoints
