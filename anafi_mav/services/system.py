@@ -31,7 +31,6 @@ from anafi_mav.services.command.guided_service import GuidedService
 from anafi_mav.services.command.modes_service import ModesService
 from anafi_mav.services.command.orbit_service import OrbitService
 from anafi_mav.services.event_service import EventService
-from anafi_mav.services.fence_service import FenceService
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.flight_record import FlightRecordService
 from anafi_mav.services.ftp_service import FtpService
@@ -41,12 +40,13 @@ from anafi_mav.services.link_loss_service import LinkLossService
 from anafi_mav.services.logs import LogService
 from anafi_mav.services.memory import Memory
 from anafi_mav.services.message_service import MessageService
-from anafi_mav.services.mission_service import MissionService
 from anafi_mav.services.node_status import NodeStatusService
 from anafi_mav.services.parameters import ParameterService
 from anafi_mav.services.pilot_service import PilotService
-from anafi_mav.services.plan_service import PlanService
-from anafi_mav.services.rally_service import RallyService
+from anafi_mav.services.plan.fence_service import FenceService
+from anafi_mav.services.plan.mission_service import MissionService
+from anafi_mav.services.plan.plan_service import PlanService
+from anafi_mav.services.plan.rally_service import RallyService
 from anafi_mav.services.roll_sign_service import RollSignService
 from anafi_mav.services.service import MessageHandler, Service
 from anafi_mav.services.setpoint.follow_service import FollowService

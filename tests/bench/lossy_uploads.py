@@ -18,7 +18,7 @@ import sys
 from collections import defaultdict
 from collections.abc import Callable, Sequence
 
-from anafi_mav.services.plan_requests import REQUEST_EVERY, asked_for
+from anafi_mav.services.plan.plan_requests import REQUEST_EVERY, asked_for
 
 LIMIT, HALF_SECOND = 5, 0.5
 ROUNDS = 40

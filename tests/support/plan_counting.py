@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.plan_transfer import Peer
+from anafi_mav.services.plan.plan_transfer import Peer
 from anafi_mav.vehicle.fence.plan_items import PlanItem, item_int
 from support.plan_wire import FENCE
 

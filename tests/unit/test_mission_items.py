@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from support.plan_samples import FLIGHT, LAT, LON, action, plans, waypoint
 
 from anafi_mav.plans.plan import MISSION, RELATIVE, Item, Plan
-from anafi_mav.services.mission_items import as_carried, from_wire, to_wire
+from anafi_mav.services.plan.mission_items import as_carried, from_wire, to_wire
 from anafi_mav.vehicle.fence.plan_items import UNSET, PlanItem, has_place, item_int, item_of
 
 

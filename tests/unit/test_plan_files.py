@@ -8,7 +8,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as stock
 
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.plan_files import MAGIC, PATHS, pack_plan, size_of, unpack_plan
+from anafi_mav.services.plan.plan_files import MAGIC, PATHS, pack_plan, size_of, unpack_plan
 from anafi_mav.vehicle.fence.plan_items import Fault, PlanItem
 
 MISSION, FENCE = dialect.MAV_MISSION_TYPE_MISSION, dialect.MAV_MISSION_TYPE_FENCE

@@ -12,9 +12,9 @@ from support.plan_wire import FENCE, MISSION, RALLY, Client, Kind, Wire, an_item
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.flavours import ARDUPILOT, PX4, STANDARD, Flavour
-from anafi_mav.services.plan_desk import ALL, MAX_WAITING, PlanDesk
-from anafi_mav.services.plan_requests import MAX_TRIES, REQUEST_EVERY
-from anafi_mav.services.plan_transfer import (
+from anafi_mav.services.plan.plan_protocol import ALL, MAX_WAITING, PlanDesk
+from anafi_mav.services.plan.plan_requests import MAX_TRIES, REQUEST_EVERY
+from anafi_mav.services.plan.plan_transfer import (
     ECHOES,
     MAX_ITEMS,
     PATIENCE,

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from anafi_mav.mavlink import dialect
 from anafi_mav.plans.zones import Circle, Fence, Polygon, Zone
 from anafi_mav.services.flavours import PX4, Flavour
-from anafi_mav.services.plan_transfer import PlanKind
+from anafi_mav.services.plan.plan_transfer import PlanKind
 from anafi_mav.vehicle.fence.plan_items import Fault, PlanItem, place_fault
 
 SMALLEST_AREA = 1.0

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from anafi_mav import geo
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.plan_transfer import PlanKind
+from anafi_mav.services.plan.plan_transfer import PlanKind
 from anafi_mav.vehicle.fence.plan_items import Fault, PlanItem, height_ato, place_fault
 
 CLOSER = 10.0

@@ -17,14 +17,14 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.plans.formats.parrot import Version
-from anafi_mav.services import plan_files
 from anafi_mav.services.command.guided_service import fly_item, is_guided_item
 from anafi_mav.services.files import Query, ServedFile
 from anafi_mav.services.flavours import PX4, Flavour, flavour_of
 from anafi_mav.services.memory import NOT_KEPT
-from anafi_mav.services.mission_kind import MissionKind
-from anafi_mav.services.plan_desk import MESSAGES, PlanDesk
-from anafi_mav.services.plan_transfer import MAX_ITEMS, Changed, Commit, Effect, Peer, PlanKind, Reply, Say
+from anafi_mav.services.plan import plan_files
+from anafi_mav.services.plan.mission_kind import MissionKind
+from anafi_mav.services.plan.plan_protocol import MESSAGES, PlanDesk
+from anafi_mav.services.plan.plan_transfer import MAX_ITEMS, Changed, Commit, Effect, Peer, PlanKind, Reply, Say
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
 from anafi_mav.services.statustext import Severity
 from anafi_mav.vehicle.fence.fence import FenceKind, summary

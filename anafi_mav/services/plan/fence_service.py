@@ -16,7 +16,7 @@ from anafi_mav.drone.events import PlayingState
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.commands import Action, Altitude, Command, Effect
-from anafi_mav.services.fence_mirror import FenceMirror
+from anafi_mav.services.plan.fence_mirror import FenceMirror
 from anafi_mav.services.service import Host, Service
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.stream import Stream, Times

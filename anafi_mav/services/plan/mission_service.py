@@ -14,7 +14,7 @@ from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import Action, Altitude, Command, Effect, effect_of_mode
 from anafi_mav.services.flavours import Flavour, flavour_of
-from anafi_mav.services.mission_kind import FIRST_LABEL, offset
+from anafi_mav.services.plan.mission_kind import FIRST_LABEL, offset
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.stream import Stream, Times

@@ -14,7 +14,7 @@ from collections.abc import Callable, Hashable, Iterable
 from typing import Any
 
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.plan_transfer import Commit, Effect, Peer, PlanKind, PlanTransfer, Reply, Say, State
+from anafi_mav.services.plan.plan_transfer import Commit, Effect, Peer, PlanKind, PlanTransfer, Reply, Say, State
 from anafi_mav.services.statustext import Severity
 from anafi_mav.vehicle.fence.plan_items import Fault
 

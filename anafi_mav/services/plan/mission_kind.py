@@ -17,8 +17,8 @@ from anafi_mav.plans.formats.parrot import Version
 from anafi_mav.plans.plan import Item, Loss
 from anafi_mav.plans.translation.translate import FaultKind, Report, examine
 from anafi_mav.services.flavours import PX4, Flavour
-from anafi_mav.services.mission_items import from_wire
-from anafi_mav.services.plan_transfer import PlanKind
+from anafi_mav.services.plan.mission_items import from_wire
+from anafi_mav.services.plan.plan_transfer import PlanKind
 from anafi_mav.vehicle.fence.plan_items import Fault, PlanItem
 
 _HEADED = frozenset(
