@@ -32,14 +32,11 @@ from anafi_mav.services.command.modes_service import ModesService
 from anafi_mav.services.command.orbit_service import OrbitService
 from anafi_mav.services.event_service import EventService
 from anafi_mav.services.flavours import Flavour, flavour_of
-from anafi_mav.services.flight_record import FlightRecordService
 from anafi_mav.services.ftp_service import FtpService
-from anafi_mav.services.high_latency import HighLatencyService
 from anafi_mav.services.identity import IdentityService
 from anafi_mav.services.link_loss_service import LinkLossService
 from anafi_mav.services.logs import LogService
 from anafi_mav.services.memory import Memory
-from anafi_mav.services.message_service import MessageService
 from anafi_mav.services.node_status import NodeStatusService
 from anafi_mav.services.parameters import ParameterService
 from anafi_mav.services.pilot_service import PilotService
@@ -57,10 +54,13 @@ from anafi_mav.services.statustext import Severity, TextNumbers
 from anafi_mav.services.stream import Times
 from anafi_mav.services.subscriptions import EventHandler, Subscriptions, in_order
 from anafi_mav.services.takeoff_point_service import TakeoffPointService
-from anafi_mav.services.telemetry import CHANGES, TelemetryService
+from anafi_mav.services.telemetry.flight_record_service import FlightRecordService
+from anafi_mav.services.telemetry.high_latency_service import HighLatencyService
+from anafi_mav.services.telemetry.message_service import MessageService
+from anafi_mav.services.telemetry.telemetry_service import CHANGES, TelemetryService
+from anafi_mav.services.telemetry.video_service import VideoTelemetryService
 from anafi_mav.services.time_service import TimeService
 from anafi_mav.services.tune import TuneService
-from anafi_mav.services.video_telemetry import VideoTelemetryService
 from anafi_mav.services.warnings import WarningService
 from anafi_mav.vehicle.base.height import TakeoffRecord
 from anafi_mav.vehicle.base.modes import FlightMode

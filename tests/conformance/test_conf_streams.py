@@ -12,8 +12,8 @@ from support.world import world
 
 from anafi_mav.drone.events import AttitudeChanged
 from anafi_mav.mavlink import dialect as newer
-from anafi_mav.services import telemetry_flight
 from anafi_mav.services.stream import Stream, Times
+from anafi_mav.services.telemetry import telemetry_flight
 from anafi_mav.vehicle.vehicle import Vehicle
 
 ACCEPTED, DENIED, UNSUPPORTED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_DENIED, dialect.MAV_RESULT_UNSUPPORTED

@@ -15,20 +15,20 @@ from anafi_mav.drone.status.battery import BatteryState
 from anafi_mav.drone.status.link import LinkState
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Node
-from anafi_mav.services import (
+from anafi_mav.services.flavours import ARDUPILOT, PX4, STANDARD
+from anafi_mav.services.shell import PROMPT, answer
+from anafi_mav.services.statustext import Severity, TextNumbers
+from anafi_mav.services.stream import Times
+from anafi_mav.services.system import System
+from anafi_mav.services.telemetry import (
     data_streams,
     telemetry_anafi,
     telemetry_flight,
     telemetry_link,
     telemetry_status,
 )
-from anafi_mav.services.flavours import ARDUPILOT, PX4, STANDARD
-from anafi_mav.services.flight_record import FlightRecord
-from anafi_mav.services.news import News
-from anafi_mav.services.shell import PROMPT, answer
-from anafi_mav.services.statustext import Severity, TextNumbers
-from anafi_mav.services.stream import Times
-from anafi_mav.services.system import System
+from anafi_mav.services.telemetry.flight_record_service import FlightRecord
+from anafi_mav.services.telemetry.update_tracker import News
 from anafi_mav.vehicle.vehicle import Landed
 
 NOW = Times(1_234_567_890)

@@ -20,8 +20,8 @@ from anafi_mav.services.flavours import Flavour
 from anafi_mav.services.service import Host, Query, Service
 from anafi_mav.services.stream import Stream, Times
 from anafi_mav.services.subscriptions import Subscriptions
-from anafi_mav.services.telemetry_flight import amsl, target
-from anafi_mav.services.telemetry_status import percent, sensor_bits
+from anafi_mav.services.telemetry.telemetry_flight import amsl, target
+from anafi_mav.services.telemetry.telemetry_status import percent, sensor_bits
 from anafi_mav.vehicle.vehicle import Vehicle
 
 EVERY = 5.0

@@ -15,13 +15,13 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.mavlink.streams import Streams
-from anafi_mav.services import data_streams
 from anafi_mav.services.commands import Command
 from anafi_mav.services.flavours import flavour_of
-from anafi_mav.services.news import News
 from anafi_mav.services.service import Answer, Host, MessageHandler, Query, Request, Service
 from anafi_mav.services.stream import Stream, Times
 from anafi_mav.services.subscriptions import Subscriptions
+from anafi_mav.services.telemetry import data_streams
+from anafi_mav.services.telemetry.update_tracker import News
 
 logger = logging.getLogger(__name__)
 
