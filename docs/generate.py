@@ -310,10 +310,10 @@ does not have is listed with a neutral value: "not available on ANAFI".
 
 def parameters() -> str:
     """docs/parameters.md."""
-    from anafi_mav.services.parameter_table_ardupilot import ARDUPILOT_NAMES
-    from anafi_mav.services.parameter_table_px4 import PX4_NAMES
-    from anafi_mav.services.parameter_table_setup import NOT_AVAILABLE
-    from anafi_mav.services.parameters import NATIVE_NAMES
+    from anafi_mav.services.parameter.parameter_service import NATIVE_NAMES
+    from anafi_mav.services.parameter.parameter_table_ardupilot import ARDUPILOT_NAMES
+    from anafi_mav.services.parameter.parameter_table_px4 import PX4_NAMES
+    from anafi_mav.services.parameter.parameter_table_setup import NOT_AVAILABLE
 
     def twins(name: str, names: Any) -> str:
         found = [f"`{one.name}`" + (f" ({one.unit})" if one.unit else "") for one in names if one.native == name]

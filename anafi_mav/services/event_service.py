@@ -17,7 +17,7 @@ from anafi_mav.services.events import EventLog, Report, report
 from anafi_mav.services.files import Query as FileQuery
 from anafi_mav.services.files import ServedFile
 from anafi_mav.services.flavours import Flavour
-from anafi_mav.services.metadata import to_json
+from anafi_mav.services.parameter.parameter_metadata import to_json
 from anafi_mav.services.service import Host, MessageHandler, Query, Service
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.stream import Stream, Times

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.parameter_codec import crc32
+from anafi_mav.services.parameter.parameter_codec import crc32
 
 PAYLOAD = 251
 """Bytes of the message's payload field."""

@@ -38,7 +38,7 @@ from anafi_mav.services.link_loss_service import LinkLossService
 from anafi_mav.services.logs import LogService
 from anafi_mav.services.memory import Memory
 from anafi_mav.services.node_status import NodeStatusService
-from anafi_mav.services.parameters import ParameterService
+from anafi_mav.services.parameter.parameter_service import ParameterService
 from anafi_mav.services.pilot_service import PilotService
 from anafi_mav.services.plan.fence_service import FenceService
 from anafi_mav.services.plan.mission_service import MissionService

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import anafi_mav
 from anafi_mav.services.flavours import FLAVOURS
-from anafi_mav.services.parameters import NAME_TABLES, parameters_of
+from anafi_mav.services.parameter.parameter_service import NAME_TABLES, parameters_of
 from anafi_mav.vehicle.base.modes import FlightMode
 
 PACKAGE = Path(anafi_mav.__file__).parent

@@ -25,7 +25,7 @@ from anafi_mav.services.ftp import (
     Opcode,
     State,
 )
-from anafi_mav.services.parameter_codec import crc32
+from anafi_mav.services.parameter.parameter_codec import crc32
 
 CONTENT = bytes(range(256)) * 4
 OTHER = b"other"

@@ -14,7 +14,7 @@ from anafi_mav.drone.status.battery import BatteryState
 from anafi_mav.mavlink.frames import pack
 from anafi_mav.models import MODELS, unknown
 from anafi_mav.services.flavours import ARDUPILOT, FLAVOURS, PX4
-from anafi_mav.services.parameter_codec import (
+from anafi_mav.services.parameter.parameter_codec import (
     HASH_NAME,
     NO_INDEX,
     Kind,
@@ -26,8 +26,8 @@ from anafi_mav.services.parameter_codec import (
     packed_file,
     param_value,
 )
-from anafi_mav.services.parameter_table_setup import SETUP_PX4
-from anafi_mav.services.parameters import parameters_of
+from anafi_mav.services.parameter.parameter_service import parameters_of
+from anafi_mav.services.parameter.parameter_table_setup import SETUP_PX4
 
 
 @pytest.mark.parametrize(

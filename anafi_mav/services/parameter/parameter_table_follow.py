@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from anafi_mav.services.parameter import Parameter, mapped, own, twin
-from anafi_mav.services.parameter_codec import Kind
+from anafi_mav.services.parameter.parameter import Parameter, mapped, own, twin
+from anafi_mav.services.parameter.parameter_codec import Kind
 from anafi_mav.services.service import Host
 from anafi_mav.vehicle.follow import AltitudeMode
 

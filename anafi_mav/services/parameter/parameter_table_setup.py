@@ -9,9 +9,9 @@ has such a thing, otherwise neutral: nothing is mapped, nothing is offset, nothi
 from __future__ import annotations
 
 from anafi_mav.drone import events
-from anafi_mav.services.parameter import Parameter, fact, number
-from anafi_mav.services.parameter_codec import Kind
-from anafi_mav.services.parameter_table import AVOIDANCE
+from anafi_mav.services.parameter.parameter import Parameter, fact, number
+from anafi_mav.services.parameter.parameter_codec import Kind
+from anafi_mav.services.parameter.parameter_table import AVOIDANCE
 from anafi_mav.services.service import Host
 
 PX4_SETUP, ARDUPILOT_SETUP = "PX4 setup", "ArduPilot setup"

@@ -14,8 +14,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from anafi_mav.drone import Identity
-from anafi_mav.services.parameter import Parameter, limits_of
-from anafi_mav.services.parameter_codec import Kind, crc32
+from anafi_mav.services.parameter.parameter import Parameter, limits_of
+from anafi_mav.services.parameter.parameter_codec import Kind, crc32
 from anafi_mav.services.service import Host
 
 GENERAL = "/general.json"

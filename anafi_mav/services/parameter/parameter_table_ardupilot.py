@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 
 from anafi_mav.drone import events
-from anafi_mav.services.parameter import Limits, Parameter, current, fact, mapped, number, twin
-from anafi_mav.services.parameter_codec import Kind
-from anafi_mav.services.parameter_table import (
+from anafi_mav.services.parameter.parameter import Limits, Parameter, current, fact, mapped, number, twin
+from anafi_mav.services.parameter.parameter_codec import Kind
+from anafi_mav.services.parameter.parameter_table import (
     CLIMB_SPEED,
     CRUISE_SPEED,
     GCS_LOSS,
@@ -31,8 +31,8 @@ from anafi_mav.services.parameter_table import (
     YAW_RATE,
     put_end_of_return,
 )
-from anafi_mav.services.parameter_table_fence import FENCE_ARDUPILOT
-from anafi_mav.services.parameter_table_setup import SETUP_ARDUPILOT
+from anafi_mav.services.parameter.parameter_table_fence import FENCE_ARDUPILOT
+from anafi_mav.services.parameter.parameter_table_setup import SETUP_ARDUPILOT
 from anafi_mav.services.service import Host
 from anafi_mav.services.statustext import Severity
 from anafi_mav.vehicle.base.link_loss import LossAction

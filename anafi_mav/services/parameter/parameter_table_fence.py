@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from anafi_mav.drone import events
-from anafi_mav.services.parameter import Parameter, mapped, own, twin
-from anafi_mav.services.parameter_codec import Kind
-from anafi_mav.services.parameter_table import GEOFENCE, OFF_ON
+from anafi_mav.services.parameter.parameter import Parameter, mapped, own, twin
+from anafi_mav.services.parameter.parameter_codec import Kind
+from anafi_mav.services.parameter.parameter_table import GEOFENCE, OFF_ON
 from anafi_mav.services.service import Host
 from anafi_mav.services.statustext import Severity
 from anafi_mav.vehicle.base.refusal import Refused

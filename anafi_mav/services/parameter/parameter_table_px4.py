@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 
 from anafi_mav.drone import events
-from anafi_mav.services.parameter import Limits, Parameter, current, fact, mapped, number, twin
-from anafi_mav.services.parameter_codec import Kind
-from anafi_mav.services.parameter_table import (
+from anafi_mav.services.parameter.parameter import Limits, Parameter, current, fact, mapped, number, twin
+from anafi_mav.services.parameter.parameter_codec import Kind
+from anafi_mav.services.parameter.parameter_table import (
     AVOIDANCE,
     CLIMB_SPEED,
     CRUISE_SPEED,
@@ -37,9 +37,9 @@ from anafi_mav.services.parameter_table import (
     put_end_of_return,
     put_return_wait,
 )
-from anafi_mav.services.parameter_table_fence import FENCE_PX4
-from anafi_mav.services.parameter_table_follow import FOLLOW_PX4
-from anafi_mav.services.parameter_table_setup import SETUP_PX4
+from anafi_mav.services.parameter.parameter_table_fence import FENCE_PX4
+from anafi_mav.services.parameter.parameter_table_follow import FOLLOW_PX4
+from anafi_mav.services.parameter.parameter_table_setup import SETUP_PX4
 from anafi_mav.services.service import Host
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.offboard.stream import SILENCE

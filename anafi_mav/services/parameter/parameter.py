@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 
 from anafi_mav.drone import Drone, Range
 from anafi_mav.drone.events import Message
-from anafi_mav.services.parameter_codec import NAME_LENGTH, Kind
+from anafi_mav.services.parameter.parameter_codec import NAME_LENGTH, Kind
 from anafi_mav.services.service import Host
 
 Limits = tuple[float, float]

@@ -14,8 +14,8 @@ from typing import Any
 from anafi_mav.drone import MODELS, Drone, Range, events
 from anafi_mav.drone.events import Axis, PreciseHomeMode, RthEndingBehavior, RthHomeType
 from anafi_mav.drone.events import ObstacleAvoidanceMode as AvoidanceMode
-from anafi_mav.services.parameter import Limits, Parameter, bounds, current, number, own
-from anafi_mav.services.parameter_codec import Kind
+from anafi_mav.services.parameter.parameter import Limits, Parameter, bounds, current, number, own
+from anafi_mav.services.parameter.parameter_codec import Kind
 from anafi_mav.services.service import Host
 from anafi_mav.vehicle.base.bounds import LOWEST
 from anafi_mav.vehicle.base.link_loss import LossAction
