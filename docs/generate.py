@@ -387,7 +387,7 @@ deferred, or it cannot happen. The module's text has the reason.
 
 def states() -> str:
     """docs/states.md."""
-    from anafi_mav.services import ftp
+    from anafi_mav.services.ftp import ftp
     from anafi_mav.services.plan import plan_transfer
     from anafi_mav.sim.autopilot import machine
     from anafi_mav.vehicle import follow, manual_flight

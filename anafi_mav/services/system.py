@@ -32,10 +32,10 @@ from anafi_mav.services.command.modes_service import ModesService
 from anafi_mav.services.command.orbit_service import OrbitService
 from anafi_mav.services.event_service import EventService
 from anafi_mav.services.flavours import Flavour, flavour_of
-from anafi_mav.services.ftp_service import FtpService
+from anafi_mav.services.ftp.ftp_service import FtpService
+from anafi_mav.services.ftp.log_service import LogService
 from anafi_mav.services.identity import IdentityService
 from anafi_mav.services.link_loss_service import LinkLossService
-from anafi_mav.services.logs import LogService
 from anafi_mav.services.memory import Memory
 from anafi_mav.services.node_status import NodeStatusService
 from anafi_mav.services.parameter.parameter_service import ParameterService

@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 
 from anafi_mav.services.files import FileTree
-from anafi_mav.services.ftp import ACK, NAK, PAYLOAD, SESSION_TIMEOUT, Error, FtpServer, Opcode
+from anafi_mav.services.ftp.ftp import ACK, NAK, PAYLOAD, SESSION_TIMEOUT, Error, FtpServer, Opcode
 
 PATH = b"@MISSION/mission.dat"
 ROOM = 1000

@@ -8,7 +8,7 @@ import struct
 import pytest
 
 from anafi_mav.services.files import FileTree, Query
-from anafi_mav.services.ftp import (
+from anafi_mav.services.ftp.ftp import (
     ACK,
     BURST_PARTS,
     DATA,

@@ -14,7 +14,7 @@ from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import Command
 from anafi_mav.services.files import FileTree, Query, ServedFile, absolute
 from anafi_mav.services.flavours import FLAVOURS, Flavour, flavour_of
-from anafi_mav.services.ftp import FtpServer
+from anafi_mav.services.ftp.ftp import FtpServer
 from anafi_mav.services.identity import capability_bits
 from anafi_mav.services.parameter import parameter_metadata
 from anafi_mav.services.parameter.parameter_codec import crc32
