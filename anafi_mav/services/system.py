@@ -30,7 +30,7 @@ from anafi_mav.services.command.compass_service import CompassService
 from anafi_mav.services.command.guided_service import GuidedService
 from anafi_mav.services.command.modes_service import ModesService
 from anafi_mav.services.command.orbit_service import OrbitService
-from anafi_mav.services.event_service import EventService
+from anafi_mav.services.event.event_service import EventService
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.ftp.ftp_service import FtpService
 from anafi_mav.services.ftp.log_service import LogService

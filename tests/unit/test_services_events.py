@@ -8,9 +8,9 @@ import pytest
 
 from anafi_mav.drone.events import TakeoffChecklistType
 from anafi_mav.mavlink import dialect
-from anafi_mav.services import event_table as table
-from anafi_mav.services.event_table import EVENTS, Health, events_file, mode_groups
-from anafi_mav.services.events import KEPT, MAX_REQUEST, EventLog, part_of
+from anafi_mav.services.event import event_table as table
+from anafi_mav.services.event.event_table import EVENTS, Health, events_file, mode_groups
+from anafi_mav.services.event.events import KEPT, MAX_REQUEST, EventLog, part_of
 from anafi_mav.services.flavours import ARDUPILOT, FLAVOURS, PX4, Flavour
 
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 from anafi_mav.drone.events import BlockerKind, FlyingState, TakeoffChecklistType
 from anafi_mav.mavlink import dialect
-from anafi_mav.services import event_table as table
-from anafi_mav.services.event_table import ALL_MODES, Event, Health, Level, mode_bits
+from anafi_mav.services.event import event_table as table
+from anafi_mav.services.event.event_table import ALL_MODES, Event, Health, Level, mode_bits
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.vehicle import Vehicle
 

@@ -10,10 +10,10 @@ from collections.abc import Mapping
 from anafi_mav.drone import events as parrot
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
-from anafi_mav.services import event_table as table
 from anafi_mav.services.commands import Command
-from anafi_mav.services.event_table import Event, events_file
-from anafi_mav.services.events import EventLog, Report, report
+from anafi_mav.services.event import event_table as table
+from anafi_mav.services.event.event_table import Event, events_file
+from anafi_mav.services.event.events import EventLog, Report, report
 from anafi_mav.services.files import Query as FileQuery
 from anafi_mav.services.files import ServedFile
 from anafi_mav.services.flavours import Flavour
