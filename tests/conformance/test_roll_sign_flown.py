@@ -14,7 +14,7 @@ from support.world import HOLD, HOME, World, loopback, world
 
 from anafi_mav.config import Config, DroneConfig
 from anafi_mav.gateway import Gateway
-from anafi_mav.services.roll_sign_service import VERIFIED
+from anafi_mav.services.monitor.roll_sign_service import VERIFIED
 from anafi_mav.sim import DroneSpec, Simulator
 from anafi_mav.sim.world.faults import Impairment
 from anafi_mav.sim.world.quirks import Quirk

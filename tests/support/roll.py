@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from anafi_mav.services.roll_sign_service import KEY, written
+from anafi_mav.services.monitor.roll_sign_service import KEY, written
 from anafi_mav.sim import SimulatedDrone
 from anafi_mav.vehicle.base.roll_sign import Sign
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from anafi_mav.services.roll_sign_service import VERIFIED
+from anafi_mav.services.monitor.roll_sign_service import VERIFIED
 from anafi_mav.sim.world.quirks import QUIRKS
 from anafi_mav.vehicle.base.roll_sign import INVERTED
 

@@ -10,7 +10,7 @@ from support.sim_bench import Bench
 from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.drone import Limits
 from anafi_mav.drone.piloting.sticks import percent
-from anafi_mav.services.roll_sign_service import read, written
+from anafi_mav.services.monitor.roll_sign_service import read, written
 from anafi_mav.vehicle.base.roll_sign import OVERTURN, SAMPLES, RollCheck, Sign
 from anafi_mav.vehicle.base.velocity_loop import CAUTIOUS_GAIN, CAUTIOUS_TILT, Axis, Controller, Demand, G, Motion
 
