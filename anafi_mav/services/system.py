@@ -21,7 +21,6 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound, Node
 from anafi_mav.mavlink.router import EVERY_COMPONENT
-from anafi_mav.services.banner import BannerService
 from anafi_mav.services.command.calibration_service import MaintenanceService
 from anafi_mav.services.command.command_service import CommandService
 from anafi_mav.services.command.compass_service import CompassService
@@ -32,7 +31,12 @@ from anafi_mav.services.event.event_service import EventService
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.ftp.ftp_service import FtpService
 from anafi_mav.services.ftp.log_service import LogService
-from anafi_mav.services.identity import IdentityService
+from anafi_mav.services.ground_station.banner_service import BannerService
+from anafi_mav.services.ground_station.identity_service import IdentityService
+from anafi_mav.services.ground_station.node_status_service import NodeStatusService
+from anafi_mav.services.ground_station.shell_service import ShellService
+from anafi_mav.services.ground_station.time_service import TimeService
+from anafi_mav.services.ground_station.tune_service import TuneService
 from anafi_mav.services.memory import Memory
 from anafi_mav.services.monitor import takeoff_point_service
 from anafi_mav.services.monitor.aborted_return_service import AbortedReturnService
@@ -41,7 +45,6 @@ from anafi_mav.services.monitor.pilot_service import PilotService
 from anafi_mav.services.monitor.roll_sign_service import RollSignService
 from anafi_mav.services.monitor.takeoff_point_service import TakeoffPointService
 from anafi_mav.services.monitor.warning_service import WarningService
-from anafi_mav.services.node_status import NodeStatusService
 from anafi_mav.services.parameter.parameter_service import ParameterService
 from anafi_mav.services.plan.fence_service import FenceService
 from anafi_mav.services.plan.mission_service import MissionService
@@ -51,7 +54,6 @@ from anafi_mav.services.service import MessageHandler, Service
 from anafi_mav.services.setpoint.follow_service import FollowService
 from anafi_mav.services.setpoint.manual_control_service import ManualControlService
 from anafi_mav.services.setpoint.offboard_service import OffboardService
-from anafi_mav.services.shell import ShellService
 from anafi_mav.services.statustext import Severity, TextNumbers
 from anafi_mav.services.stream import Times
 from anafi_mav.services.subscriptions import EventHandler, Subscriptions, in_order
@@ -60,8 +62,6 @@ from anafi_mav.services.telemetry.high_latency_service import HighLatencyService
 from anafi_mav.services.telemetry.message_service import MessageService
 from anafi_mav.services.telemetry.telemetry_service import CHANGES, TelemetryService
 from anafi_mav.services.telemetry.video_service import VideoTelemetryService
-from anafi_mav.services.time_service import TimeService
-from anafi_mav.services.tune import TuneService
 from anafi_mav.vehicle.base.height import TakeoffRecord
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.vehicle import Health, Landed, Vehicle

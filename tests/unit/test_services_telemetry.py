@@ -16,7 +16,7 @@ from anafi_mav.drone.status.link import LinkState
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Node
 from anafi_mav.services.flavours import ARDUPILOT, PX4, STANDARD
-from anafi_mav.services.shell import PROMPT, answer
+from anafi_mav.services.ground_station.shell_service import PROMPT, answer
 from anafi_mav.services.statustext import Severity, TextNumbers
 from anafi_mav.services.stream import Times
 from anafi_mav.services.system import System

@@ -15,7 +15,7 @@ from anafi_mav.services.commands import Command
 from anafi_mav.services.files import FileTree, Query, ServedFile, absolute
 from anafi_mav.services.flavours import FLAVOURS, Flavour, flavour_of
 from anafi_mav.services.ftp.ftp import FtpServer
-from anafi_mav.services.identity import capability_bits
+from anafi_mav.services.ground_station.identity_service import capability_bits
 from anafi_mav.services.parameter import parameter_metadata
 from anafi_mav.services.parameter.parameter_codec import crc32
 from anafi_mav.services.parameter.parameter_metadata import COMPRESSED, GENERAL
