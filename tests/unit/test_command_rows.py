@@ -14,11 +14,11 @@ from anafi_mav.drone import Drone
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Node
 from anafi_mav.services import commands, system
+from anafi_mav.services.command_targets import height
 from anafi_mav.services.commands import Action, Altitude, Command, Definition, Effect, Progress, effect_of_mode
 from anafi_mav.services.flavours import ARDUPILOT, PX4, STANDARD, Flavour
 from anafi_mav.services.service import Service
 from anafi_mav.services.system import System
-from anafi_mav.services.targets import height
 from anafi_mav.vehicle.base.modes import FlightMode
 
 NAN = math.nan

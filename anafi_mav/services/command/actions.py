@@ -7,8 +7,8 @@ from functools import partial
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.command.guided_service import guided_mode
+from anafi_mav.services.command_targets import height, place
 from anafi_mav.services.commands import Action, Altitude, Command, Effect, Progress, effect_of_mode
-from anafi_mav.services.targets import height, place
 from anafi_mav.vehicle.base.bounds import FASTEST, SLOWEST
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused, Unsupported

@@ -17,6 +17,7 @@ from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, Not
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.command.actions import change_mode, flight_actions
+from anafi_mav.services.command_targets import UnsupportedFrame
 from anafi_mav.services.commands import (
     EFFECT_OF_MODE,
     MODE_PROGRESS_AFTER,
@@ -36,7 +37,6 @@ from anafi_mav.services.commands import (
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.service import Host, MessageHandler, Query, Service, client_of
 from anafi_mav.services.statustext import Severity
-from anafi_mav.services.targets import UnsupportedFrame
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused, Unsupported
 from anafi_mav.vehicle.base.right import Extent, Right

@@ -16,12 +16,12 @@ from anafi_mav.drone.events import FlyingStateChanged, PoiMode, RthHomeType
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
+from anafi_mav.services.command_targets import UnsupportedFrame, height, height_in_frame, place
 from anafi_mav.services.commands import Action, Altitude, Command, Effect
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.service import Host, Service, client_of
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.subscriptions import Subscriptions
-from anafi_mav.services.targets import UnsupportedFrame, height, height_in_frame, place
 from anafi_mav.vehicle.base.bounds import FASTEST, SLOWEST, check_height, check_on_earth
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.place import Place

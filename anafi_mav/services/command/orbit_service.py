@@ -17,12 +17,12 @@ from anafi_mav.drone import events
 from anafi_mav.drone.piloting.moves import Move, MoveEnd
 from anafi_mav.errors import LinkLost
 from anafi_mav.mavlink import dialect
+from anafi_mav.services.command_targets import height, place
 from anafi_mav.services.commands import Action, Altitude, Command, Effect
 from anafi_mav.services.service import Host, Service
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.stream import Stream, Times
 from anafi_mav.services.subscriptions import Subscriptions
-from anafi_mav.services.targets import height, place
 from anafi_mav.vehicle.base.bounds import SLOWEST, check_height, check_on_earth, check_place
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.place import Place

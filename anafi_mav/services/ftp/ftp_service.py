@@ -16,11 +16,11 @@ from anafi_mav.services.files import FileTree, Query, ServedFile, absolute
 from anafi_mav.services.flavours import FLAVOURS, Flavour, flavour_of
 from anafi_mav.services.ftp.ftp import FtpServer
 from anafi_mav.services.ground_station.identity_service import capability_bits
+from anafi_mav.services.paced_sender import Trickle
 from anafi_mav.services.parameter import parameter_metadata
 from anafi_mav.services.parameter.parameter_codec import crc32
 from anafi_mav.services.parameter.parameter_metadata import COMPRESSED, GENERAL
 from anafi_mav.services.service import Host, MessageHandler, Request, Service, client_of
-from anafi_mav.services.trickle import Trickle
 
 EXPIRE_EVERY = 1.0
 """s between looks for sessions that nobody uses."""

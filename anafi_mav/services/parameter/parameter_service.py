@@ -21,6 +21,7 @@ from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.files import Query, ServedFile
 from anafi_mav.services.flavours import FLAVOURS, Flavour, flavour_of
+from anafi_mav.services.paced_sender import Trickle
 from anafi_mav.services.parameter.parameter import Parameter
 from anafi_mav.services.parameter.parameter_codec import (
     HASH_NAME,
@@ -41,7 +42,6 @@ from anafi_mav.services.parameter.parameter_table_px4 import PX4_NAMES
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.subscriptions import Subscriptions
-from anafi_mav.services.trickle import Trickle
 
 MAX_WRITES = 8
 """Writes under way at once. A drone answers one within tens of milliseconds; several clients load their files."""
