@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import AsyncIterator
 
 import pytest
+from support.flight_plans import V1
 from support.scripted_device import STATES, ScriptedDevice
 from support.simulated import Pair, connected, take_off
 
@@ -16,12 +17,6 @@ from anafi_mav.arsdk.messages.common import FlightPlanComponent, MavlinkType, Pl
 from anafi_mav.drone import Drone
 from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, NotSupported, RemoteProtocolError
 
-V1 = b"""QGC WPL 120
-0\t0\t3\t22\t0.0\t0.0\t0.0\t0.0\t48.878900\t2.367700\t5.0\t1
-1\t0\t3\t93\t2.0\t0.0\t0.0\t0.0\t0.0\t0.0\t0.0\t1
-2\t0\t3\t16\t0.0\t5.0\t0.0\t0.0\t48.879000\t2.367700\t8.0\t1
-3\t0\t3\t93\t60.0\t0.0\t0.0\t0.0\t0.0\t0.0\t0.0\t1
-"""
 V2 = V1.replace(b"\t3\t93\t2.0\t0.0\t0.0\t0.0\t0.0\t0.0\t0.0", b"\t2\t93\t2.0\t-1\t-1\t-1\tnan\tnan\tnan").replace(
     b"\t3\t93\t60.0\t0.0\t0.0\t0.0\t0.0\t0.0\t0.0", b"\t2\t93\t60.0\t-1\t-1\t-1\tnan\tnan\tnan"
 )

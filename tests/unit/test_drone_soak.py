@@ -12,8 +12,8 @@ from collections.abc import Awaitable, Callable
 from typing import Any
 
 import pytest
+from support.flight_plans import V1
 from support.simulated import HOME, Pair, connected, take_off
-from test_drone_flight_plan import V1
 
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.errors import AnafiMavError, CommandRejected, LinkLost
