@@ -15,7 +15,7 @@ import pytest
 from support.product import Process, program
 from support.world import loopback
 
-MISSIONS = Path(__file__).parents[2] / "missions"
+MISSIONS = Path(__file__).parents[3] / "missions"
 
 DRIVER = r"""
 import os, runpy, signal, sys, tempfile

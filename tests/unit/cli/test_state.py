@@ -16,7 +16,7 @@ from support.world import loopback
 
 from anafi_mav.state_lock import read_holder, state_folder
 
-MISSIONS = Path(__file__).parents[2] / "missions"
+MISSIONS = Path(__file__).parents[3] / "missions"
 
 
 def fleet(address: str, drone: str, state: str = "") -> str:

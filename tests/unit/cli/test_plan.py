@@ -18,7 +18,7 @@ from anafi_mav.cli.terminal import say_table
 from anafi_mav.plans.formats import files
 from anafi_mav.plans.formats.files import Format
 
-MISSIONS = Path(__file__).parents[2] / "missions"
+MISSIONS = Path(__file__).parents[3] / "missions"
 
 
 @pytest.fixture
