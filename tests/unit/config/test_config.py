@@ -15,7 +15,7 @@ from anafi_mav.config import Config, DroneConfig, SimConfig, from_text, load, re
 from anafi_mav.config.schema import WindConfig
 from anafi_mav.errors import ConfigError
 
-REPOSITORY = Path(__file__).parents[2]
+REPOSITORY = Path(__file__).parents[3]
 
 HOST = "expected an IPv4 address or a host name, like 192.168.42.1, got"
 NAME = "expected 1 to 32 letters, digits, '-', '_' or '.', beginning with a letter or digit, got"
