@@ -130,7 +130,7 @@ function of that paper.
 
 The appendix of the paper lists what a program can do with an ANAFI: 5 topics to command it, 29 topics to read, 24
 services and 25 parameters. Each row has its counterpart in `Drone`. The last columns have the results of
-`tests/unit/test_drone_seed_rows.py` on each model of the simulator, over its real sockets:
+`tests/unit/drone/test_seed_rows.py` on each model of the simulator, over its real sockets:
 
 * **yes**: the row is read or driven, and the drone confirms it;
 * **no**: this model does not have it, and the verb raises `NotSupported`;

@@ -30,7 +30,7 @@ MODELS = ("4k", "thermal", "usa", "ai")
 OLDER = ("4k", "thermal", "usa")
 THERMAL = ("thermal", "usa")
 
-CONTROLLER = "through a Skycontroller only: tests/unit/test_drone_controller.py"
+CONTROLLER = "through a Skycontroller only: tests/unit/drone/controller/test_controller.py"
 LOCAL = "a setting of the computer, not of the drone: the directory is an argument of `media.download`"
 
 Drive = Callable[[Pair], Awaitable[object]]

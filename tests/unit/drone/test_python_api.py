@@ -13,7 +13,7 @@ from support.python_api import classes, members
 from anafi_mav import drone
 from anafi_mav.drone import events
 
-EXAMPLES = sorted((Path(__file__).parents[2] / "examples" / "python_api").glob("*.py"))
+EXAMPLES = sorted((Path(__file__).parents[3] / "examples" / "python_api").glob("*.py"))
 
 STABLE = """
 Aim Alerts AlertsState AnafiMavError Angles Animations AnimationsState Antiflicker Attitude Avoidance Battery

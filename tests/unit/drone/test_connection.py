@@ -104,7 +104,7 @@ async def test_cancelled_block_stops_the_move(real: SimulatedDrone) -> None:
 
 
 async def test_flight_plan_is_paused_when_the_block_ends() -> None:
-    address, plan = loopback(), Path(__file__).parents[2] / "missions" / "delivery.v1.mavlink"
+    address, plan = loopback(), Path(__file__).parents[3] / "missions" / "delivery.v1.mavlink"
     spec = DroneSpec(address=address, home=HOME, http_port=8080, rtsp_port=None)
     async with Simulator([spec], speed=4.0, seed=1) as simulator:
         async with connect(address, http_port=8080) as drone:
