@@ -19,9 +19,9 @@ from anafi_mav.arsdk.messages import alarms, ardrone3, common, rth, skyctrl
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.frames import frame, pack
 
-DEFINITIONS = ET.parse(Path(__file__).parents[2] / "dialect" / "anafi.xml").getroot()
+DEFINITIONS = ET.parse(Path(__file__).parents[3] / "dialect" / "anafi.xml").getroot()
 OURS = {int(message.get("id") or 0): message for message in DEFINITIONS.iterfind("messages/message")}
-GENERATOR = Path(__file__).parents[2] / "dialect" / "generate.py"
+GENERATOR = Path(__file__).parents[3] / "dialect" / "generate.py"
 
 # Ranges of message ids given away by mavlink/mavlink de1e078a (2026-07-22) message_definitions/v1.0/all.xml, with what
 # it says that will be given next. Below 300 are the messages of MAVLink 1 and minimal.xml.

@@ -111,7 +111,7 @@ def test_it_speaks_version_2_and_knows_both_ground_station_families() -> None:
 
 @pytest.fixture(scope="module")
 def generator() -> ModuleType:
-    path = Path(__file__).parents[2] / "dialect" / "generate.py"
+    path = Path(__file__).parents[3] / "dialect" / "generate.py"
     spec = importlib.util.spec_from_file_location("generate", path)
     assert spec is not None
     assert spec.loader is not None
