@@ -18,7 +18,7 @@ from anafi_mav.plans.plan import WAYPOINT, Item, Loss, Plan
 from anafi_mav.plans.translation.parrot_export import twin
 from anafi_mav.sim.plan import plan_file
 
-MISSIONS = Path(__file__).parents[2] / "missions"
+MISSIONS = Path(__file__).parents[3] / "missions"
 SAMPLES = sorted(MISSIONS.glob("*.plan"))
 WRONG = MISSIONS / "wrong"
 

@@ -13,7 +13,7 @@ from anafi_mav.plans.plan import GLOBAL, RELATIVE, Circle, Item, Plan, Point, Po
 from anafi_mav.plans.translation.check import Findings, Limits, Severity, check
 from anafi_mav.sim.world.model import MODELS as SIMULATED
 
-MISSIONS = Path(__file__).parents[2] / "missions"
+MISSIONS = Path(__file__).parents[4] / "missions"
 HOME = Point(LAT, LON, 35.0)
 MODELS = planned()
 

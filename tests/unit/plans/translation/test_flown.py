@@ -18,7 +18,7 @@ from anafi_mav.plans.plan import GLOBAL, RELATIVE, WAYPOINT, Item
 from anafi_mav.plans.translation.translate import Flight, Leg, Start, Step, examine, translate
 from anafi_mav.units import DEG_PER_RAD
 
-MISSIONS = Path(__file__).parents[2] / "missions"
+MISSIONS = Path(__file__).parents[4] / "missions"
 
 ZOOM, TURN = 531, 115
 

@@ -77,7 +77,7 @@ def test_a_picture(tmp_path: Path, suffix: str) -> None:
         assert "<!-- height above take-off -->" in text
 
 
-MISSIONS = Path(__file__).parents[2] / "missions"
+MISSIONS = Path(__file__).parents[3] / "missions"
 
 
 def test_shots_of_a_survey_are_on_its_lanes() -> None:
