@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from support.conformance_items import ITEMS
 
-TESTS = Path(__file__).parents[1]
+TESTS = Path(__file__).parents[2]
 TABLE = TESTS.parent / "docs" / "conformance.md"
 
 ROW = re.compile(r"\| (\d+) \| .* \| ([^|]+) \| ([^|]+) \| ([^|]*) \|")

@@ -15,7 +15,7 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-REPOSITORY = Path(__file__).parents[2]
+REPOSITORY = Path(__file__).parents[3]
 PACKAGE = REPOSITORY / "anafi_mav"
 
 KIT = {"errors", "units", "geo", "clock", "documents", "models", "printable", "state_lock", "subject"}

@@ -27,7 +27,7 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-REPOSITORY = Path(__file__).parents[2]
+REPOSITORY = Path(__file__).parents[3]
 MISSIONS = REPOSITORY / "missions"
 BUILD_ONLY = ("pymavlink", "lxml")
 with (REPOSITORY / "pyproject.toml").open("rb") as file:

@@ -10,7 +10,7 @@ import pytest
 from support.seed_mavlink import PAYLOAD, REACHED
 from support.seed_rows import ROWS
 
-TESTS = Path(__file__).parents[1]
+TESTS = Path(__file__).parents[2]
 
 
 @cache

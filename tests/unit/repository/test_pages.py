@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from support.words import forbidden_in
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 ALL = [
     ROOT / "README.md",
     ROOT / "CONTRIBUTING.md",

@@ -9,7 +9,7 @@ from anafi_mav.services.monitor.roll_sign_service import VERIFIED
 from anafi_mav.sim.world.quirks import QUIRKS
 from anafi_mav.vehicle.base.roll_sign import INVERTED
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 PAGE = (ROOT / "docs" / "real-aircraft.md").read_text(encoding="utf-8")
 ROWS = [line.split(" | ") for line in PAGE.splitlines() if re.match(r"\| \d+ \|", line)]
 SOURCE = "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "anafi_mav").rglob("*.py"))
