@@ -354,7 +354,7 @@ SILENCE = """\
 For programmers who test an ARSDK controller on the simulator. After reading you know which commands have no event in
 answer, and why.
 
-`tests/unit/test_sim_silence.py` sends every declared command to each model and each Skycontroller, with several values
+`tests/unit/sim/test_silence.py` sends every declared command to each model and each Skycontroller, with several values
 and in every relevant state. The simulator answers all of them at once by an event, except these.
 """
 

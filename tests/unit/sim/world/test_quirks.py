@@ -15,7 +15,7 @@ from anafi_mav.sim import DroneSpec, scenario
 from anafi_mav.sim.world import quirks
 from anafi_mav.sim.world.quirks import QUIRKS, Quirk
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "simulator.md"
+PAGE = Path(__file__).resolve().parents[4] / "docs" / "simulator.md"
 
 
 def test_quirk_page_lists_each_quirk_with_its_description() -> None:

@@ -29,7 +29,7 @@ from anafi_mav.sim.validation import (
 )
 from anafi_mav.sim.world.model import MODELS
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 RAMP = [(n / 10, n * 2.0) for n in range(-5, 91)]  # 20 a second
 
