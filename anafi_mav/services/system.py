@@ -56,7 +56,6 @@ from anafi_mav.services.setpoint.manual_control_service import ManualControlServ
 from anafi_mav.services.setpoint.offboard_service import OffboardService
 from anafi_mav.services.statustext import Severity, TextNumbers
 from anafi_mav.services.stream import Times
-from anafi_mav.services.subscriptions import EventHandler, Subscriptions, in_order
 from anafi_mav.services.telemetry.flight_record_service import FlightRecordService
 from anafi_mav.services.telemetry.high_latency_service import HighLatencyService
 from anafi_mav.services.telemetry.message_service import MessageService
@@ -64,6 +63,7 @@ from anafi_mav.services.telemetry.telemetry_service import CHANGES, TelemetrySer
 from anafi_mav.services.telemetry.video_service import VideoTelemetryService
 from anafi_mav.vehicle.base.height import TakeoffRecord
 from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.subscriptions import EventHandler, Subscriptions, in_order
 from anafi_mav.vehicle.vehicle import Health, Landed, Vehicle
 
 logger = logging.getLogger(__name__)

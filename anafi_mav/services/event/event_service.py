@@ -21,7 +21,7 @@ from anafi_mav.services.parameter.parameter_metadata import to_json
 from anafi_mav.services.service import Host, MessageHandler, Query, Service
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.stream import Stream, Times
-from anafi_mav.services.subscriptions import Subscriptions
+from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.vehicle import Landed, Vehicle
 
 RESET_FOR = 3.0

@@ -9,8 +9,8 @@ from anafi_mav.drone import events
 from anafi_mav.drone.piloting.state import Attitude, Velocity
 from anafi_mav.services.service import Service
 from anafi_mav.services.statustext import Severity
-from anafi_mav.services.subscriptions import Subscriptions
 from anafi_mav.vehicle.base.roll_sign import INVERTED, Sign
+from anafi_mav.vehicle.base.subscriptions import Subscriptions
 
 KEY = "roll_sign"
 """Name of the record in the drone's file."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from anafi_mav.drone import events
 from anafi_mav.services.service import Service
-from anafi_mav.services.subscriptions import Subscriptions
+from anafi_mav.vehicle.base.subscriptions import Subscriptions
 
 KEY = "takeoff"
 """Name of the record in the drone's file."""

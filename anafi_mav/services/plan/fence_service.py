@@ -20,9 +20,9 @@ from anafi_mav.services.plan.fence_mirror import FenceMirror
 from anafi_mav.services.service import Host, Service
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.stream import Stream, Times
-from anafi_mav.services.subscriptions import Subscriptions
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
+from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.fence.fence_watch import CEILING, EVERYTHING, FLOOR, FenceWatch, Reaction, Sight, State
 from anafi_mav.vehicle.vehicle import Vehicle
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
-from anafi_mav.services.subscriptions import Subscriptions
+from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.follow import sighting
 
 

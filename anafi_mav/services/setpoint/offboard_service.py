@@ -14,7 +14,7 @@ from anafi_mav.services.flavours import flavour_of
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
 from anafi_mav.services.setpoint.offboard_echo import STREAMS
 from anafi_mav.services.stream import Stream
-from anafi_mav.services.subscriptions import Subscriptions
+from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.offboard import setpoints
 from anafi_mav.vehicle.offboard.setpoints import Setpoint
 

@@ -19,9 +19,9 @@ from anafi_mav.services.commands import Command
 from anafi_mav.services.flavours import Flavour
 from anafi_mav.services.service import Host, Query, Service
 from anafi_mav.services.stream import Stream, Times
-from anafi_mav.services.subscriptions import Subscriptions
 from anafi_mav.services.telemetry.telemetry_flight import amsl, target
 from anafi_mav.services.telemetry.telemetry_status import percent, sensor_bits
+from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.vehicle import Vehicle
 
 EVERY = 5.0

@@ -19,9 +19,9 @@ from anafi_mav.services.commands import Command
 from anafi_mav.services.flavours import flavour_of
 from anafi_mav.services.service import Answer, Host, MessageHandler, Query, Request, Service
 from anafi_mav.services.stream import Stream, Times
-from anafi_mav.services.subscriptions import Subscriptions
 from anafi_mav.services.telemetry import data_streams
 from anafi_mav.services.telemetry.update_tracker import News
+from anafi_mav.vehicle.base.subscriptions import Subscriptions
 
 logger = logging.getLogger(__name__)
 

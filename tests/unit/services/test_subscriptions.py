@@ -10,8 +10,8 @@ from anafi_mav.clock import SystemClock
 from anafi_mav.drone import Drone, events
 from anafi_mav.drone.events import Message
 from anafi_mav.mavlink.node import Node
-from anafi_mav.services.subscriptions import in_order
 from anafi_mav.services.system import System
+from anafi_mav.vehicle.base.subscriptions import in_order
 
 
 def test_handlers_of_several_tables_are_called_in_the_order_of_the_tables() -> None:
