@@ -1,6 +1,6 @@
 """Arithmetic on one column per drone, for a fleet of one as for a fleet of a hundred.
 
-With few drones a call of numpy costs more than its work, so what is called 200 times a second makes few of them.
+With few drones a call of numpy costs more than its work, so what is called in every step makes few of them.
 """
 
 from __future__ import annotations

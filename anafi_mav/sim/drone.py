@@ -56,7 +56,7 @@ SHUTDOWN_TIME, REBOOT_TIME = 1.0, 10.0
 HIGHEST = 10_000.0
 """m above or below the sea that a drone may stand at; the ground of the earth does not reach as far."""
 MAX_RATE = 200.0
-"""Hz; the motion itself is not computed more often."""
+"""Hz. The motion is computed 60 times a second; what is sent more often is sent again."""
 
 
 @dataclass(frozen=True)

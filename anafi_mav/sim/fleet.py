@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import math
 import random
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -17,8 +16,9 @@ from anafi_mav.sim.model import MODELS
 from anafi_mav.sim.motion import STEP, Motion
 from anafi_mav.sim.scenario import Scenario
 
-TURN, FAST_TURN = 0.01, STEP
-"""s of the machine's clock between two turns of the world; the second when telemetry is wanted that fast."""
+TURN, FAST_TURN = STEP, 0.005
+"""s of the machine's clock between two turns of the world; the second when telemetry is wanted that fast. At `speed` 1
+a turn is one step of the motion, or none of the fast ones."""
 
 MAX_CATCH_UP = 0.25
 """s of the machine's clock that one turn makes up for; what is beyond (a stopped process, a machine too slow for
@@ -89,7 +89,7 @@ class Simulator:
         if not 0.0 < speed <= 100.0:
             raise ConfigError("speed", f"expected more than 0 and at most 100, got {speed:g}")
         self._speed = speed
-        self._most_steps = math.ceil(MAX_TURN * self._period * speed / STEP)
+        self._most_steps = max(1, round(MAX_TURN * self._period * speed / STEP))
 
     async def __aenter__(self) -> Simulator:
         await self.start()
@@ -132,26 +132,31 @@ class Simulator:
             await asyncio.shield(self._task)
 
     async def _run(self) -> None:
-        last = _clock()
+        last = due = _clock()
         debt = 0.0
         while True:
-            await asyncio.sleep(0.0 if debt >= STEP else max(0.0, last + self._period - _clock()))
+            if debt < STEP:
+                # From turn to turn on the clock, not from a late one on: else some would make two steps, others none.
+                due += self._period
+                if due < last:
+                    due = last + self._period
+            await asyncio.sleep(max(0.0, due - _clock()))
             now = _clock()
             debt += (now - last) * self._speed
             last = now
             if debt > MAX_CATCH_UP * self._speed:
                 self.lost_time += debt - MAX_CATCH_UP * self._speed
                 debt = MAX_CATCH_UP * self._speed
-            steps = min(int(debt / STEP), self._most_steps)
-            debt -= steps * STEP
+            steps = min(round(debt / STEP), self._most_steps)
+            debt -= steps * STEP  # negative when the last step began early, by half of it at most
             self._turn(now, steps)
 
     def advance(self, seconds: float) -> None:
         """Let the world turn by hand, as long as it has not been started; needs a running loop for its clock."""
         now = _clock()
-        for _ in range(round(seconds / (2 * STEP))):
-            now += 2 * STEP
-            self._turn(now, 2)
+        for _ in range(round(seconds / STEP)):
+            now += STEP
+            self._turn(now, 1)
 
     def _turn(self, now: float, steps: int) -> None:
         motion = self._motion

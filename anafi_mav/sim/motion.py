@@ -1,4 +1,4 @@
-"""How the drones move: one array per quantity, one column per drone, fixed steps of 5 ms.
+"""How the drones move: one array per quantity, one column per drone, 60 steps a second.
 
 The model is small on purpose and fitted to the measurements in section IV of the anafi_ros paper:
 
@@ -9,6 +9,11 @@ The model is small on purpose and fitted to the measurements in section IV of th
   place against the wind as far as `FULL_TILT` allows;
 - yaw rate and climb rate follow first-order after a pure delay (0.1 s each for yaw, 0.15 s and 0.12 s for climb),
   which gives 360 degrees in 2.0 s and 6.9 m in the first 2 s at 4 m/s.
+
+Tilt, yaw and climb are linear as long as no limit is reached: a step solves them in closed form for a command that is
+constant meanwhile. The drag is that of the mean speed. The push is that of the tilt at the end of the step: the half
+step that this is early makes up for the half step that a command waits, and for the lead that the semi-implicit steps
+of 5 ms had with which the flights in tests/unit/sim_flights.json were recorded. The delays are whole steps.
 
 Frames: position and velocity are north, east, down in metres from the place the simulator was given as home; attitude
 is roll (right wing down), pitch (nose up), yaw (clockwise from north) in rad. The ground is a plane at down = 0.
@@ -29,8 +34,8 @@ from anafi_mav.sim.columns import Array, DelayLine, bounded, limit
 from anafi_mav.sim.model import Airframe
 from anafi_mav.units import RAD_PER_DEG, wrap_pi
 
-STEP = 0.005
-"""s; 200 steps a second."""
+STEP = 1.0 / 60.0
+"""s. 0.1, 0.15 and 0.2 s are whole numbers of steps, and so is the time between two pictures at 30 Hz."""
 
 G = 9.81
 FULL_TILT = 40.0 * RAD_PER_DEG
@@ -38,6 +43,28 @@ FULL_TILT = 40.0 * RAD_PER_DEG
 
 _TILT_OMEGA, _TILT_DAMPING = 10.0, 0.9
 _YAW_TAU, _CLIMB_TAU = 0.1, 0.12
+
+
+def _second_order(omega: float, damping: float, step: float) -> tuple[float, float, float, float]:
+    """Solve x'' = -omega^2 x - 2 damping omega x' over a step, for a damping below 1.
+
+    Returns the matrix ((a, b), (c, d)) of x, x' at its end over x, x' at its beginning.
+    """
+    decay, turn = damping * omega, omega * math.sqrt(1.0 - damping**2)
+    fade = math.exp(-decay * step)
+    cos, sin = fade * math.cos(turn * step), fade * math.sin(turn * step) / turn
+    return cos + decay * sin, sin, -(omega**2) * sin, cos - decay * sin
+
+
+def _first_order(tau: float, step: float) -> tuple[float, float]:
+    """Solve x' = -x / tau over a step: (x at its end, integral of x) for an x of 1 at its beginning."""
+    kept = math.exp(-step / tau)
+    return kept, tau * (1.0 - kept)
+
+
+_TILT_KEPT, _TILT_GAINED, _RATE_GAINED, _RATE_KEPT = _second_order(_TILT_OMEGA, _TILT_DAMPING, STEP)
+_YAW_KEPT, _YAW_PASSED = _first_order(_YAW_TAU, STEP)
+_CLIMB_KEPT, _CLIMB_PASSED = _first_order(_CLIMB_TAU, STEP)
 _BRAKING = 3.0
 """m/s2 at most when stopping; the measured range is 2 to 4."""
 _APPROACH = 1.8
@@ -128,7 +155,7 @@ class Pose:
 
 
 _STICK, _FIRST, _DURING = int(Turn.STICK), int(Turn.FIRST), int(Turn.DURING)
-"""As numpy compares them: looking up a member of an enum costs more than the comparison, 200 times a second."""
+"""As numpy compares them: looking up a member of an enum costs more than the comparison, in every step."""
 
 
 class _Orders:
@@ -244,12 +271,22 @@ class Motion:
         lowest = np.minimum(_CLIMB_GAIN * (FLOOR - up), 0.0)
         climb = np.maximum(climb, lowest if orders.all_floored else np.where(orders.floored, lowest, climb))
 
-        self._tilt_and_push(orders, wanted, horizontal)
-        self.yaw_rate += (self.yaw_line.push(turn) - self.yaw_rate) * (STEP / _YAW_TAU)
-        self.yaw += self.yaw_rate * STEP
-        driven = (self.climb_line.push(climb) + velocity[2]) * (-STEP / _CLIMB_TAU)
-        velocity[2] += np.where(orders.fall, G * STEP, driven) if orders.any_fall else driven
-        self.position += velocity * STEP
+        turn = self.yaw_line.push(turn)
+        lag = self.yaw_rate - turn
+        turned = turn * STEP + lag * _YAW_PASSED
+        self.yaw_rate = turn + lag * _YAW_KEPT
+        self._tilt_and_push(orders, wanted, horizontal, self.yaw + 0.5 * turned)
+        self.yaw += turned
+
+        sinking = -self.climb_line.push(climb)
+        lag = velocity[2] - sinking
+        sunk = sinking * STEP + lag * _CLIMB_PASSED
+        sinking += lag * _CLIMB_KEPT
+        if orders.any_fall:
+            sunk = np.where(orders.fall, (velocity[2] + 0.5 * G * STEP) * STEP, sunk)
+            sinking = np.where(orders.fall, velocity[2] + G * STEP, sinking)
+        velocity[2] = sinking
+        self.position[2] += sunk
         self._touch_ground(orders)
 
     def _follow(self, orders: _Orders, up: Array) -> tuple[Array, Array, Array]:
@@ -282,15 +319,16 @@ class Motion:
         back = limit(_PLACE_GAIN * (self.hold - self.position[:2]), _HOLD_SPEED)
         return np.where(self.holding, back, 0.0 if wanted is None else wanted)
 
-    def _tilt_and_push(self, orders: _Orders, wanted: Array | None, horizontal: Array) -> None:
-        """Turn wishes into a tilt command, let the tilt follow it, and accelerate by the tilt reached.
+    def _tilt_and_push(self, orders: _Orders, wanted: Array | None, horizontal: Array, yaw: Array) -> None:
+        """Turn wishes into a tilt command, let the tilt follow it, and accelerate by it.
 
-        `wanted` None: everybody wants to stop.
+        `wanted` None: everybody wants to stop. `yaw` is that of the middle of the step.
         """
         through_air = horizontal
         if self.windy:
             through_air = horizontal - np.where(self.position[2] < 0.0, self.wind, 0.0)
-        resistance = self.drag * np.hypot(through_air[0], through_air[1]) * through_air
+        drag = self.drag * np.hypot(through_air[0], through_air[1])
+        resistance = drag * through_air
         wish = horizontal * -_SPEED_GAIN if wanted is None else _SPEED_GAIN * (wanted - horizontal)
         push = limit(wish, _BRAKING) + resistance
         # Braking never needs to push onwards: at high speed the drag alone stops faster than `_BRAKING`.
@@ -301,7 +339,7 @@ class Motion:
             onwards &= (horizontal**2).sum(axis=0) > _RUSH**2
         if np.count_nonzero(onwards):
             push = np.where(onwards, 0.0, push)
-        cos, sin = np.cos(self.yaw), np.sin(self.yaw)
+        cos, sin = np.cos(yaw), np.sin(yaw)
         body = self._body_push
         body[0] = push[0] * cos + push[1] * sin
         body[1] = push[1] * cos - push[0] * sin
@@ -314,16 +352,24 @@ class Motion:
         command = bounded(command, -FULL_TILT, FULL_TILT)
         if not orders.all_airborne:
             command = command * orders.thrust
-        spin = _TILT_OMEGA**2 * (command - self.tilt) - 2.0 * _TILT_DAMPING * _TILT_OMEGA * self.tilt_rate
-        self.tilt_rate = bounded(self.tilt_rate + spin * STEP, -self.tilt_rate_limit, self.tilt_rate_limit)
-        self.tilt += self.tilt_rate * STEP
+        off, rate = self.tilt - command, self.tilt_rate
+        fastest = self.tilt_rate_limit
+        tilted = command + _TILT_KEPT * off + _TILT_GAINED * rate - self.tilt
+        tilted = bounded(tilted, -STEP * fastest, STEP * fastest)
+        self.tilt_rate = bounded(_RATE_GAINED * off + _RATE_KEPT * rate, -fastest, fastest)
+        self.tilt += tilted
 
         right, forward = np.tan(self.tilt) * _PUSH_SIGNS
         if not orders.all_airborne:
             right, forward = right * orders.thrust, forward * orders.thrust
-        horizontal -= resistance * STEP
-        horizontal[0] += (forward * cos - right * sin) * STEP
-        horizontal[1] += (forward * sin + right * cos) * STEP
+        gained = body
+        gained[0] = forward * cos - right * sin
+        gained[1] = forward * sin + right * cos
+        gained -= resistance
+        # The drag is that of the mean of both speeds through the air, to first order in the step.
+        gained *= STEP / (1.0 + 0.5 * STEP * drag)
+        self.position[:2] += (horizontal + 0.5 * gained) * STEP
+        horizontal += gained
 
     def _fenced(self, push: Array, cos: Array, sin: Array, horizontal: Array, resistance: Array) -> None:
         """Take from the push (forward, right) what would carry a drone over its fence."""

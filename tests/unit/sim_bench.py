@@ -57,15 +57,14 @@ class Bench:
         return self.firmware.state
 
     def turn(self) -> None:
-        """Ten milliseconds."""
-        for _ in range(2):
-            self.motion.step()
-        self.now += 2 * STEP
+        """One step of the motion."""
+        self.motion.step()
+        self.now += STEP
         arrived, still = self.motion.arrived()[0], self.motion.still()[0]
-        self.firmware.tick(self.now, 2 * STEP, self.motion.poses()[0], arrived, still)
+        self.firmware.tick(self.now, STEP, self.motion.poses()[0], arrived, still)
 
     def run(self, seconds: float) -> None:
-        for _ in range(round(seconds / (2 * STEP))):
+        for _ in range(round(seconds / STEP)):
             self.turn()
 
     def run_until(self, happened: Callable[[], bool], limit: float = 60.0) -> float:

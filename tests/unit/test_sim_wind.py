@@ -30,9 +30,8 @@ class Hover:
         self.body.hover()
 
     def run(self, seconds: float) -> Pose:
-        for _ in range(round(seconds / (2 * STEP))):
-            self.body.blow(*self.wind.advance(2 * STEP))
-            self.motion.step()
+        for _ in range(round(seconds / STEP)):
+            self.body.blow(*self.wind.advance(STEP))
             self.motion.step()
         return self.motion.poses()[0]
 
