@@ -11,8 +11,12 @@ from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.drone import Limits
 from anafi_mav.drone.piloting.sticks import percent
 from anafi_mav.services.monitor.roll_sign_service import read, written
+from anafi_mav.sim.world.motion import STEP
 from anafi_mav.vehicle.base.roll_sign import OVERTURN, SAMPLES, RollCheck, Sign
 from anafi_mav.vehicle.base.velocity_loop import CAUTIOUS_GAIN, CAUTIOUS_TILT, Axis, Controller, Demand, G, Motion
+
+STEPS = round(1.0 / STEP)
+"""Steps of the simulated motion in a second."""
 
 
 class Flight:
@@ -172,10 +176,10 @@ def test_step_in_virtual_time_with_unverified_roll_settles(model: str, inverted:
     controller = Controller(motion)
     reports: list[tuple[float, tuple[float, ...]]] = []
     speeds, command, wanted = [], None, 3.0
-    for tick in range(4800):
+    for step in range(24 * STEPS):
         bench.turn()
         now, pose = bench.now, bench.pose
-        if tick % 20 == 0:
+        if step % (STEPS // 10) == 0:
             roll = -pose.roll if inverted else pose.roll
             reports.append((now + late, (roll, pose.pitch, pose.yaw, pose.vn, pose.ve, pose.vd)))
         if reports and reports[0][0] <= now:
@@ -184,12 +188,12 @@ def test_step_in_virtual_time_with_unverified_roll_settles(model: str, inverted:
             motion.on_velocity(vn, ve, vd, now)
             roll_check.on_attitude(roll, yaw)
             roll_check.on_velocity(vn, ve, now)
-            wanted = 3.0 if tick % 1600 < 800 else -3.0
+            wanted = 3.0 if step % (8 * STEPS) < 4 * STEPS else -3.0
             command = controller.sticks(Demand(Axis(0.0), Axis(wanted), yaw=0.0), limits, now)
-        if command is not None and tick % 5 == 0:
+        if command is not None and step % (STEPS // 20) == 0:
             bench.send(ardrone3.PCMD(1, *percent(command, limits), 0))
         assert abs(pose.ve) < 4.5
-        if tick % 800 > 650:
+        if step % (4 * STEPS) > 3.25 * STEPS:
             speeds.append(abs(pose.ve - wanted))
     assert max(speeds) < 0.8
     assert roll_check.sign is (Sign.LEFT if inverted else Sign.RIGHT)
