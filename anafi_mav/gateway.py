@@ -28,6 +28,7 @@ from anafi_mav.drone.rest import HTTP_PORT
 from anafi_mav.errors import AnafiMavError, ConfigError, HandshakeRefused
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Node
+from anafi_mav.services.flavours import FLAVOURS
 from anafi_mav.services.flying import ON_GROUND
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.system import System
@@ -184,7 +185,7 @@ class Gateway:
                 raise ConfigError(f"drones[{index}].address", "the gateway connects to addresses; expected one")
         self.config = config
         self._clock: Clock = clock or SystemClock()
-        self._node = Node(on_channel=self._on_channel, clock=self._clock)
+        self._node = Node(on_channel=self._on_channel, clock=self._clock, flavours=tuple(FLAVOURS))
         self._supervised: list[_Supervised] = []
         self._state: Path | None = None
         self._lock: StateLock | None = None

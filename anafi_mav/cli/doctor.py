@@ -34,9 +34,6 @@ ANSWER_LIMIT = 2.0
 LISTEN = 5.0
 """s to stay connected: another controller tries again within two, and what it takes is noticed by a silence of 2.5."""
 
-FIRMWARE = {"4k": (1, 8), "thermal": (1, 8), "usa": (1, 8), "ua": (1, 8), "ai": (7,)}
-"""The first parts of the versions that this program is written for, by model; later ones are taken to be like them."""
-
 LOWEST_CEILING, SMALLEST_FENCE = 10.0, 30.0
 """m: an aircraft with less than that refuses nearly every flight."""
 
@@ -292,11 +289,11 @@ def _no_connection(problem: str) -> Finding:
 
 def firmware(drone: Drone) -> Finding:
     """Is it a version that this program is written for?"""
-    version, wanted = drone.identity.firmware, FIRMWARE.get(drone.identity.model.key)
+    version, wanted = drone.identity.firmware, drone.identity.model.firmware
     if not version:
         return wrong("firmware", "not reported", _RESTART)
     numbers = tuple(int(part) if part.isdigit() else 0 for part in version.split("-")[0].split("."))
-    if wanted is None or numbers >= wanted:
+    if numbers >= wanted:
         return ok("firmware", version)
     need = ".".join(map(str, wanted))
     return wrong("firmware", f"{version}, older than {need}", "update it by Parrot's FreeFlight")

@@ -16,6 +16,7 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound, Node
 from anafi_mav.mavlink.plan_client import Download, Message, Upload
 from anafi_mav.mavlink.router import EVERY_COMPONENT
+from anafi_mav.services.flavours import FLAVOURS
 
 SYSID, COMPID = 252, dialect.MAV_COMP_ID_MISSIONPLANNER
 """Ours: beyond the drones of a fleet, and neither QGroundControl's 255 nor MAVSDK's 245."""
@@ -51,7 +52,7 @@ class Ground:
         self._beats: dict[int, Inbound] = {}
         self._news = asyncio.Event()
         self._clock = SystemClock()
-        self._node = Node(clock=self._clock)
+        self._node = Node(clock=self._clock, flavours=tuple(FLAVOURS))
         self._beating: asyncio.Task[None] | None = None
         self._transfer: Upload | Download | None = None
         self._acks: list[Any] = []

@@ -13,12 +13,12 @@ from anafi_mav.cli.consent import confirmed
 from anafi_mav.cli.plan_options import PARROT, height_of, limits, load, target_format, version
 from anafi_mav.cli.terminal import say, say_json, say_table
 from anafi_mav.errors import ConfigError, PlanError
+from anafi_mav.models import Model, planned
 from anafi_mav.plans import files, table
 from anafi_mav.plans import plot as drawing
 from anafi_mav.plans.check import Findings, Severity
 from anafi_mav.plans.check import check as lint
 from anafi_mav.plans.files import Format
-from anafi_mav.plans.models import MODELS, Model
 from anafi_mav.plans.plan import Circle, Plan
 from anafi_mav.plans.twin import twin
 
@@ -66,7 +66,7 @@ def check(arguments: argparse.Namespace) -> int:
     name, plans, settings = arguments.file.name, _plans(arguments), limits(arguments)
     findings = {model: lint(plan, model, settings) for model, plan in plans.items()}
     if arguments.json:
-        say_json({"file": name, "models": {model.name: _result(found) for model, found in findings.items()}})
+        say_json({"file": name, "models": {model.title: _result(found) for model, found in findings.items()}})
     else:
         _tell(name, findings)
     wrong = [found.errors for found in findings.values()]
@@ -78,12 +78,12 @@ def _plans(arguments: argparse.Namespace) -> dict[Model, Plan]:
     data, source = files.read(arguments.file), arguments.file.name
     height, models = height_of(arguments), _models(arguments)
     if arguments.file.suffix.lower() != PARROT:
-        plan = files.parse(data, source, models[0].version, height)
+        plan = files.parse(data, source, models[0].plans().version, height)
         return dict.fromkeys(models, plan)
     plans, problems = {}, []
     for model in models:
         try:
-            plans[model] = files.parse(data, source, model.version, height)
+            plans[model] = files.parse(data, source, model.plans().version, height)
         except PlanError as error:
             problems.append(error)
     if not plans:
@@ -94,14 +94,14 @@ def _plans(arguments: argparse.Namespace) -> dict[Model, Plan]:
 def _models(arguments: argparse.Namespace) -> list[Model]:
     """The models that a plan is checked for. Raises `ConfigError`."""
     if version(arguments.model) is not None:
-        return [MODELS[arguments.model]]
+        return [planned()[arguments.model]]
     if arguments.config is None:
-        return list(MODELS.values())
+        return list(planned().values())
     fleet = config.load(arguments.config)
     keys = {drone.sim.model for drone in fleet.drones if drone.sim is not None}
     if any(drone.sim is None for drone in fleet.drones):  # of a real one only its address is known
-        return list(MODELS.values())
-    return [model for key, model in MODELS.items() if key in keys]
+        return list(planned().values())
+    return [model for key, model in planned().items() if key in keys]
 
 
 def _result(found: Findings) -> dict[str, Any]:
@@ -120,7 +120,7 @@ def _tell(name: str, findings: dict[Model, Findings]) -> None:
     """Each problem once, with the models that have it unless all have."""
     problems = dict.fromkeys(problem for found in findings.values() for problem in found.problems)
     for problem in sorted(problems, key=lambda one: (one.item is None, one.item or 0)):
-        having = [model.name for model, found in findings.items() if problem in found.problems]
+        having = [model.title for model, found in findings.items() if problem in found.problems]
         which = "" if len(having) == len(findings) else f"{', '.join(having)}: "
         style = "red" if problem.severity is Severity.ERROR else "yellow"
         say(f"{name}: {which}{problem.severity.value}: {problem}", style)
@@ -128,7 +128,7 @@ def _tell(name: str, findings: dict[Model, Findings]) -> None:
         if not found.errors:
             way = "" if found.distance is None else f", {found.distance:.0f} m"
             time = "" if found.seconds is None else f" in about {_time(found.seconds)}"
-            say(f"{name}: an {model.name} flies it{way}{time}", "green")
+            say(f"{name}: an {model.title} flies it{way}{time}", "green")
 
 
 def _time(seconds: float) -> str:

@@ -10,10 +10,10 @@ from pathlib import Path
 
 from anafi_mav.cli import options
 from anafi_mav.errors import ConfigError
+from anafi_mav.models import planned
 from anafi_mav.plans import files, plot
 from anafi_mav.plans.check import Limits
 from anafi_mav.plans.files import Format
-from anafi_mav.plans.models import MODELS
 from anafi_mav.plans.parrot import Version
 from anafi_mav.plans.plan import Plan
 
@@ -44,7 +44,7 @@ def model_argument(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--model",
         metavar="MODEL",
-        help=f"the ANAFI that a .mavlink file is for: {', '.join(MODELS)}; the file itself does not say",
+        help=f"the ANAFI that a .mavlink file is for: {', '.join(planned())}; the file itself does not say",
     )
 
 
@@ -53,7 +53,7 @@ def load(arguments: argparse.Namespace) -> Plan:
     data = files.read(arguments.file)
     model = version(arguments.model)
     if model is None and arguments.file.suffix.lower() == PARROT:
-        raise ConfigError("--model", f"expected one of {', '.join(MODELS)}: a {PARROT} file does not say its drone")
+        raise ConfigError("--model", f"expected one of {', '.join(planned())}: a {PARROT} file does not say its drone")
     return files.parse(data, arguments.file.name, model or 2, height_of(arguments))
 
 
@@ -72,9 +72,10 @@ def version(model: str | None) -> Version | None:
     """Of the files that a model flies. Raises `ConfigError`."""
     if model is None:
         return None
-    if model not in MODELS:
-        raise ConfigError("--model", f"expected one of {', '.join(MODELS)}, got {model!r}")
-    return MODELS[model].version
+    known = planned()
+    if model not in known:
+        raise ConfigError("--model", f"expected one of {', '.join(known)}, got {model!r}")
+    return known[model].plans().version
 
 
 def out_argument(parser: argparse.ArgumentParser) -> None:
@@ -88,7 +89,9 @@ def target_format(path: Path, model: str | None) -> Format:
     if suffix == PARROT:
         found = version(model)
         if found is None:
-            raise ConfigError("--model", f"expected one of {', '.join(MODELS)}, for a {PARROT} file is for one drone")
+            raise ConfigError(
+                "--model", f"expected one of {', '.join(planned())}, for a {PARROT} file is for one drone"
+            )
         return Format.PARROT_1 if found == 1 else Format.PARROT_2
     if suffix not in files.SUFFIXES:
         endings = ", ".join([*files.SUFFIXES, PARROT])

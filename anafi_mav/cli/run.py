@@ -22,6 +22,7 @@ from anafi_mav.config import Config, DroneConfig, SimConfig, from_mapping, load,
 from anafi_mav.errors import ConfigError
 from anafi_mav.gateway import Gateway, state_in_use
 from anafi_mav.mavlink.endpoint import is_open_to_network, parse_endpoint
+from anafi_mav.services.flavours import FLAVOURS
 from anafi_mav.sim import quirks
 from anafi_mav.state_lock import read_holder, state_folder
 
@@ -81,7 +82,7 @@ def _serve(arguments: argparse.Namespace) -> int:
         complain(f"warning: {remark}", "yellow")
     for index, text in enumerate(config.endpoints):
         with contextlib.suppress(ConfigError):  # the gateway says what is wrong with it
-            if is_open_to_network(parse_endpoint(text)):
+            if is_open_to_network(parse_endpoint(text, tuple(FLAVOURS))):
                 what = (
                     "is open to the network and MAVLink has no password: any program that reaches it can fly the drones"
                 )

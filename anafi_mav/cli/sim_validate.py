@@ -256,7 +256,7 @@ class Flight:
 
     async def _yaw(self) -> None:
         track = await self._test(PilotingCommand(yaw_rate_dps=SPIN))
-        self.results += yaw_results(track, self.model)
+        self.results += yaw_results(track, MODELS[self.model].airframe.yaw_delay)
         self.series["yaw rate, deg per s"] = (_steps(SPIN), track.yaw_rate())
 
     async def _gimbal(self) -> None:

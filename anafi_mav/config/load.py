@@ -16,8 +16,8 @@ from typing import Any
 
 import msgspec
 
-from anafi_mav import documents
-from anafi_mav.config.schema import MAVSDK_SYSID, Config, DroneConfig, SimConfig
+from anafi_mav import documents, models
+from anafi_mav.config.schema import MAVSDK_SYSID, Config, DroneConfig, SimConfig, alternatives
 from anafi_mav.errors import ConfigError
 
 _HOST_NAME = re.compile(r"(?!-)[A-Za-z0-9-]{1,63}(?<!-)(\.(?!-)[A-Za-z0-9-]{1,63}(?<!-))*\.?")
@@ -216,12 +216,24 @@ def _of_one_drone(key_path: str, drone: DroneConfig) -> Iterator[tuple[str, str]
             yield f"{key_path}.{key}", f"expected it in sim, got {getattr(drone, key)} here"
     if drone.address is not None and not _is_host(drone.address):
         yield f"{key_path}.address", _wrong(DroneConfig, "address", drone.address)
-    if drone.sim is not None and drone.sim.model == "ai" and drone.sim.skycontroller == 3:
-        yield f"{key_path}.sim.skycontroller", "expected 4: a Skycontroller 3 cannot fly an ai"
+    if drone.sim is not None:
+        yield from _of_model(f"{key_path}.sim", drone.sim)
     if drone.sim is not None and drone.interface is not None:
         yield f"{key_path}.interface", "expected none for a simulated drone, which lives on this machine"
     if drone.sim is not None and drone.sim.address is not None and not _is_ipv4(drone.sim.address):
         yield f"{key_path}.sim.address", _wrong(SimConfig, "address", drone.sim.address)
+
+
+def _of_model(key_path: str, sim: SimConfig) -> Iterator[tuple[str, str]]:
+    known = models.simulated()
+    if sim.model not in known:
+        yield f"{key_path}.model", f"expected {alternatives(known)}, got {_shown(sim.model)}"
+        return
+    controllers = models.MODELS[sim.model].skycontrollers
+    if sim.skycontroller is not None and sim.skycontroller not in controllers:
+        wanted = alternatives([str(one) for one in controllers])
+        problem = f"a Skycontroller {sim.skycontroller} cannot fly an {sim.model}"
+        yield f"{key_path}.skycontroller", f"expected {wanted}: {problem}"
 
 
 def _wrong(struct: type[msgspec.Struct], key: str, value: object) -> str:

@@ -6,10 +6,13 @@ first makes docs/configuration.md, the second makes that page and the error mess
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
 import msgspec
 from msgspec import Meta
+
+from anafi_mav import models
 
 MAX_ENDPOINTS = 32
 """Each endpoint is a socket and gets every message: more than this is a mistake, not a fleet."""
@@ -30,6 +33,12 @@ MAVSDK_SYSID = 245
 def expected(what: str) -> dict[str, Any]:
     """The `extra` of a key: what its value must be, as it reads after the word "expected"."""
     return {"expected": what}
+
+
+def alternatives(values: Sequence[str]) -> str:
+    """["a", "b", "c"] → "a, b or c"."""
+    *first, last = values
+    return f"{', '.join(first)} or {last}" if first else last
 
 
 Port = Annotated[int, Meta(ge=1, le=65535)]
@@ -65,8 +74,8 @@ class SimConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     """A simulated drone. `anafi-mav run` starts it: all of them together in one process of their own."""
 
     model: Annotated[
-        Literal["4k", "thermal", "usa", "ai"],
-        Meta(description="Which ANAFI is simulated.", extra=expected("4k, thermal, usa or ai")),
+        str,
+        Meta(description="Which ANAFI is simulated.", extra=expected(alternatives(models.simulated()))),
     ] = "4k"
     home: Annotated[
         tuple[

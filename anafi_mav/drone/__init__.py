@@ -63,7 +63,7 @@ from anafi_mav.drone.moves import Displacement, Move, MoveEnd
 from anafi_mav.drone.piloting import Piloting
 from anafi_mav.drone.piloting_state import Attitude, Avoidance, PilotingState, Velocity
 from anafi_mav.drone.poi import Poi, PoiState
-from anafi_mav.drone.product import MODELS, Identity, Model, Product, ProductState
+from anafi_mav.drone.product import MODELS, Identity, Product, ProductState
 from anafi_mav.drone.sound import Sound, SoundState
 from anafi_mav.drone.sticks import Limits, PilotingCommand
 from anafi_mav.drone.storage import Storage, StorageState
@@ -80,6 +80,7 @@ from anafi_mav.errors import (
     NotSupported,
     RemoteProtocolError,
 )
+from anafi_mav.models import Model
 
 __all__ = [
     "MODELS",

@@ -15,6 +15,7 @@ from datetime import datetime
 from functools import partial
 from typing import Any, TypeAlias, TypeVar
 
+from anafi_mav import models
 from anafi_mav.arsdk import mux_link
 from anafi_mav.arsdk.controller import ControllerSession
 from anafi_mav.arsdk.handshake import DISCOVERY_PORT
@@ -50,7 +51,7 @@ from anafi_mav.drone.media import Media
 from anafi_mav.drone.moves import Move
 from anafi_mav.drone.piloting import Piloting
 from anafi_mav.drone.poi import Poi
-from anafi_mav.drone.product import MODELS, Identity, Model, Product
+from anafi_mav.drone.product import MODELS, Identity, Product
 from anafi_mav.drone.rest import HTTP_PORT, Rest
 from anafi_mav.drone.sound import Sound
 from anafi_mav.drone.storage import Storage
@@ -193,7 +194,7 @@ class Drone:
         self._opening = False
         self._complete = False
         self._counters: Counter[str] = Counter()
-        self._model = Model(0, "", "")
+        self._model = models.NO_MODEL
         self._reports_rth_state = False
         """rth.state has been received on this connection, so that its legacy twin says nothing more."""
         self._announced_serial = ""
@@ -729,8 +730,8 @@ def _starts_motors(message: Message) -> bool:
     return isinstance(message, starts)
 
 
-def _model(id: int) -> Model:
-    return MODELS.get(id) or Model(id, f"0x{id:04x}", "unknown model", protobuf=True)
+def _model(id: int) -> models.Model:
+    return MODELS.get(id) or models.unknown(id)
 
 
 async def _abandon(attempt: asyncio.Future[ControllerSession]) -> None:

@@ -21,10 +21,10 @@ from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone.alerts import spoken
 from anafi_mav.drone.element import Reducer, members, with_item
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, loop_time
-from anafi_mav.drone.product import Model
 from anafi_mav.drone.rest import Rest
 from anafi_mav.drone.settings import Commanding
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost, NotSupported, RemoteProtocolError
+from anafi_mav.models import NO_MODEL, Model
 
 API = "/api/v1/upload"
 START_TIMEOUT = 20.0
@@ -126,7 +126,7 @@ class FlightPlan(Commanding[FlightPlanState]):
     def __init__(self, commander: Commander, rest: Rest) -> None:
         super().__init__(commander)
         self._rest = rest
-        self.model: Callable[[], Model] = lambda: Model(0, "", "")
+        self.model: Callable[[], Model] = lambda: NO_MODEL
         """Which drone it is; the drone sets it."""
         self._starts = 0
         self._asked: str | None = None

@@ -1,4 +1,4 @@
-"""Element product: which drone this is. The models of the family are data."""
+"""Element product: which drone this is. The models of the family are in `anafi_mav.models`."""
 
 from __future__ import annotations
 
@@ -11,31 +11,10 @@ from msgspec.structs import replace
 from anafi_mav.arsdk.messages import ardrone3, common
 from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone.element import Element, Reducer
+from anafi_mav.models import BY_ID, Model
 
-
-class Model(msgspec.Struct, frozen=True):
-    """A model of the ANAFI family, by the number in its announcement (discovery's model.id)."""
-
-    id: int
-    key: str
-    """Short name as used in configurations: "4k"."""
-    title: str
-    plan_version: int | None = None
-    """Version of Parrot's flight-plan format that it flies; None when it is not known by the model."""
-    protobuf: bool = False
-    """True for models that report some of their states in protobuf only, on request."""
-
-
-MODELS: Mapping[int, Model] = {
-    model.id: model
-    for model in (
-        Model(0x0914, "4k", "ANAFI 4K", 1),
-        Model(0x0919, "thermal", "ANAFI Thermal", 1),
-        Model(0x091A, "ai", "ANAFI Ai", 2, protobuf=True),
-        Model(0x091B, "ua", "ANAFI UA"),
-        Model(0x091E, "usa", "ANAFI USA", 1),
-    )
-}
+MODELS: Mapping[int, Model] = BY_ID
+"""The models by the number in their announcement."""
 
 
 class ProductState(msgspec.Struct, frozen=True):

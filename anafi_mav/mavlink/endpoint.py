@@ -1,7 +1,7 @@
 """Endpoint URLs: their grammar, and the table of schemes from which endpoints are made and help is printed.
 
     udpout://HOST:PORT      udpin://HOST:PORT      tcpin://HOST:PORT      tcpout://HOST:PORT
-    serial://DEVICE:BAUD    each with ?flavour=px4, ?flavour=ardupilot or ?flavour=standard
+    serial://DEVICE:BAUD    each with ?flavour=NAME, one of those that the caller knows
     The two of UDP also with frames=one or frames=many; two options are joined by &.
 
 The names are MAVSDK's. An endpoint listens on the address in its URL and no other: beyond loopback only if that says
@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import ipaddress
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from urllib.parse import parse_qsl
 
@@ -22,9 +22,6 @@ from anafi_mav.mavlink.base import Endpoint, EndpointUrl, Sink
 from anafi_mav.mavlink.serial_line import SerialLine
 from anafi_mav.mavlink.tcp import TcpIn, TcpOut
 from anafi_mav.mavlink.udp import UdpIn, UdpOut
-
-FLAVOURS = ("px4", "ardupilot", "standard")
-"""Autopilots that a client can be shown."""
 
 FRAMES = ("one", "many")
 """MAVLink frames per UDP datagram."""
@@ -47,10 +44,9 @@ class Scheme:
     datagrams: bool = False
     """It sends datagrams, so that `frames` makes sense."""
 
-    @property
-    def options(self) -> dict[str, tuple[str, ...]]:
+    def options(self, flavours: Sequence[str]) -> dict[str, Sequence[str]]:
         """Option name → its possible values."""
-        return {"flavour": FLAVOURS, "frames": FRAMES} if self.datagrams else {"flavour": FLAVOURS}
+        return {"flavour": flavours, "frames": FRAMES} if self.datagrams else {"flavour": flavours}
 
 
 SCHEMES: dict[str, Scheme] = {
@@ -73,27 +69,30 @@ _PLACE = re.compile(
 _LINE = re.compile(r"(?P<device>[^:]+):(?P<number>[0-9]{1,7})")
 
 
-def parse_endpoint(url: str) -> EndpointUrl:
-    """The parts of a URL. Raises `ConfigError`, without a key path, that says what was expected."""
+def parse_endpoint(url: str, flavours: Sequence[str] = ()) -> EndpointUrl:
+    """The parts of a URL. Raises `ConfigError`, without a key path, that says what was expected.
+
+    `flavours` are the names of the autopilots that a client can be shown: what they mean is the business of services.
+    """
     parts = _URL.fullmatch(url)
     scheme = SCHEMES.get(parts["scheme"]) if parts else None
     if parts is None or scheme is None:
         kinds = ", ".join(f"{name}://" for name in SCHEMES)
         raise ConfigError("", f"{url!r}: expected a URL that begins with one of {kinds}")
     name = parts["scheme"]
-    form = f"{name}://{scheme.arguments}"
+    form, known = f"{name}://{scheme.arguments}", scheme.options(flavours)
     if name == "serial":
         place = _LINE.fullmatch(parts["rest"])
         if place is None or not 0 < int(place["number"]) <= MAX_BAUD:
             raise ConfigError("", f"{url!r}: expected {form}, e.g. serial:///dev/ttyUSB0:57600")
-        return EndpointUrl(url, name, place["device"], int(place["number"]), **_options(url, scheme, parts["query"]))
+        return EndpointUrl(url, name, place["device"], int(place["number"]), **_options(url, known, parts["query"]))
     place = _PLACE.fullmatch(parts["rest"])
     if place is None:
         raise ConfigError("", f"{url!r}: expected {form}, e.g. {name}://127.0.0.1:14550")
     port, lowest = int(place["number"]), 0 if scheme.listens else 1
     if not lowest <= port <= MAX_PORT:
         raise ConfigError("", f"{url!r}: expected a port from {lowest} to {MAX_PORT}")
-    return EndpointUrl(url, name, place["v6"] or place["host"], port, **_options(url, scheme, parts["query"]))
+    return EndpointUrl(url, name, place["v6"] or place["host"], port, **_options(url, known, parts["query"]))
 
 
 def is_open_to_network(url: EndpointUrl) -> bool:
@@ -111,11 +110,10 @@ def make_endpoint(url: EndpointUrl, sink: Sink, clock: Clock) -> Endpoint:
     return SCHEMES[url.scheme].factory(url, sink, clock)
 
 
-def _options(url: str, scheme: Scheme, query: str | None) -> dict[str, str]:
+def _options(url: str, known: Mapping[str, Sequence[str]], query: str | None) -> dict[str, str]:
     """The options after "?". Raises `ConfigError` for an unknown, repeated or wrong one."""
     if query is None:
         return {}
-    known = scheme.options
     try:
         pairs = parse_qsl(query, strict_parsing=True, keep_blank_values=True)
     except ValueError:

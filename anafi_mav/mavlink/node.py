@@ -58,7 +58,9 @@ class Node:
         *,
         on_channel: Callable[[Channel, bool], None] | None = None,
         clock: Clock | None = None,
+        flavours: Sequence[str] = (),
     ) -> None:
+        """`flavours` are those that the URL of an endpoint may name."""
         self.on_channel = on_channel
         """Called with True when a channel opened and with False when it closed."""
         self.channels: list[Channel] = []
@@ -69,6 +71,7 @@ class Node:
         self._telemetry: set[int] = set()
         self._router: Router[Channel, Receiver] = Router()
         self._delivers = True
+        self._flavours = flavours
         self._closed_counters: Counter[str] = Counter()
         self._stalls: StallWatch | None = None
 
@@ -79,7 +82,7 @@ class Node:
         parsed = []
         for index, text in enumerate(urls):
             try:
-                parsed.append(parse_endpoint(text))
+                parsed.append(parse_endpoint(text, self._flavours))
             except ConfigError as error:
                 raise ConfigError(f"endpoints[{index}]", error.problem) from error
         for index, url in enumerate(parsed):

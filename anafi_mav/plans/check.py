@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 
 from anafi_mav import geo, mav_enums
 from anafi_mav.errors import PlanError
+from anafi_mav.models import Model
 from anafi_mav.plans import zones
 from anafi_mav.plans.legs import UnknownHeight
-from anafi_mav.plans.models import Model
 from anafi_mav.plans.plan import WAYPOINT, Circle, Item, Plan, Point
 from anafi_mav.plans.translate import Fault, Flight, Leg, Start, Step, examine, translate
 from anafi_mav.plans.waypoints import rows
@@ -90,10 +90,11 @@ class Findings:
 
 
 def check(plan: Plan, model: Model, limits: Limits | None = None) -> Findings:
-    """Look for all that is wrong with a plan."""
+    """Look for all that is wrong with a plan. Raises `ValueError` for a model of which no plans are known."""
+    figures = model.plans()
     if not plan.items:
         return Findings((_error("it has no mission"),))
-    report = examine(plan.items, model.version)
+    report = examine(plan.items, figures.version)
     if report.faults:
         return Findings(tuple(_fault(fault) for fault in report.faults))
     problems = [_warning(loss.what, loss.item) for loss in report.approximations]
@@ -108,7 +109,7 @@ def check(plan: Plan, model: Model, limits: Limits | None = None) -> Findings:
         takeoff_amsl=None if plan.home is None else plan.home.height,
     )
     try:
-        flight = translate(plan.items, model.version, start)
+        flight = translate(plan.items, figures.version, start)
     except UnknownHeight as error:  # here, not when it is flown
         problems.append(_warning(f"{error.problem}: its path cannot be checked", error.item))
         return Findings(_ordered(problems))
@@ -158,7 +159,7 @@ class _Follower:
     """Follows a flight."""
 
     def __init__(self, plan: Plan, model: Model, limits: Limits, start: Start) -> None:
-        self._model, self._limits = model, limits
+        self._model, self._figures, self._limits = model, model.plans(), limits
         self._planned = plan.home is not None
         self._home = (start.latitude, start.longitude)
         self._amsl = start.takeoff_amsl
@@ -178,7 +179,7 @@ class _Follower:
                 self.seconds += STEP_TIME
                 continue
             lines = rows(part.content.decode(), "translation")
-            if self._model.version == 2:
+            if self._figures.version == 2:
                 yield from self._way_in(lines, part)
             for line, origin in zip(lines, part.origins, strict=True):
                 yield from self._line(line, origin)
@@ -225,15 +226,15 @@ class _Follower:
                 self.seconds += one or 0.0
             case mav_enums.MAV_CMD_DO_CHANGE_SPEED:
                 self._speed = two or self._speed
-                if self._speed > self._model.max_speed:
-                    most = self._model.max_speed
+                if self._speed > self._figures.max_speed:
+                    most = self._figures.max_speed
                     yield _error(
-                        f"{self._speed:g} m/s is more than the {most:g} that an {self._model.name} flies", origin
+                        f"{self._speed:g} m/s is more than the {most:g} that an {self._model.title} flies", origin
                     )
                     self._speed = most
             case mav_enums.MAV_CMD_PANORAMA_CREATE:
                 self.seconds += abs(one or 0.0) / (three or PANORAMA_SPEED)
-            case mav_enums.MAV_CMD_IMAGE_START_CAPTURE if (two if self._model.version == 1 else three) == 1.0:
+            case mav_enums.MAV_CMD_IMAGE_START_CAPTURE if (two if self._figures.version == 1 else three) == 1.0:
                 self.seconds += PHOTO_TIME
 
     def _first_way(self, to: Point, origin: int) -> Iterator[Problem]:
@@ -247,9 +248,9 @@ class _Follower:
             yield _error(f"{to.height:g} m above take-off is higher than the limit of {limit:g} m", origin)
         if to.height < 0.0:
             yield _error(f"{to.height:g} m is below the take-off", origin)
-        if self._amsl is not None and self._amsl + to.height > self._model.ceiling:
+        if self._amsl is not None and self._amsl + to.height > self._figures.ceiling:
             sea = self._amsl + to.height
-            yield _error(f"{sea:.0f} m above the sea is higher than an {self._model.name} flies", origin)
+            yield _error(f"{sea:.0f} m above the sea is higher than an {self._model.title} flies", origin)
         far = geo.distance(*self._home, to.latitude, to.longitude)
         if far > TOO_FAR:
             yield _error(f"it is {far / 1000.0:.1f} km from home, where no setting lets the drone fly", origin)
@@ -270,8 +271,8 @@ class _Follower:
         self._here = to
 
     def battery(self) -> Iterator[Problem]:
-        most = self._model.flight_time
-        taken = f"it takes {self.seconds / 60.0:.0f} min of the {most / 60.0:.0f} that an {self._model.name} flies"
+        most = self._figures.flight_time
+        taken = f"it takes {self.seconds / 60.0:.0f} min of the {most / 60.0:.0f} that an {self._model.title} flies"
         if self.seconds > most:
             yield _error(taken)
         elif self.seconds > most * (1.0 - RESERVE):

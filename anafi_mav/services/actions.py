@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Awaitable, Callable
+from functools import partial
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.bounds import FASTEST, SLOWEST
-from anafi_mav.services.commands import Command
+from anafi_mav.services.commands import Action, Altitude, Command, Effect, Progress, effect_of_mode
 from anafi_mav.services.guided import guided_mode
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.refusal import Refused, Unsupported
 from anafi_mav.services.right import Right
 from anafi_mav.services.targets import height, place
 from anafi_mav.services.vehicle import Vehicle
-
-Handler = Callable[[Vehicle, Command], Awaitable[None]]
 
 FORCE = 21196
 """param2 of an arm or disarm that overrides checks (MAVLink common.xml MAV_CMD_COMPONENT_ARM_DISARM)."""
@@ -125,13 +123,49 @@ async def terminate(vehicle: Vehicle, command: Command) -> None:
     await vehicle.terminate()
 
 
-ACTIONS: dict[int, Handler] = {
-    dialect.MAV_CMD_COMPONENT_ARM_DISARM: arm_disarm,
-    dialect.MAV_CMD_NAV_TAKEOFF: takeoff,
-    dialect.MAV_CMD_NAV_LAND: land,
-    dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH: return_to_launch,
-    dialect.MAV_CMD_DO_REPOSITION: reposition,
-    dialect.MAV_CMD_DO_SET_MODE: set_mode,
-    dialect.MAV_CMD_DO_FLIGHTTERMINATION: terminate,
-}
-"""Commands that change what the vehicle does. The newest one wins; each is executed once however often it comes."""
+def _effect_of_arm(command: Command) -> Effect:
+    return Effect.STOP if command.params[0] == 0.0 else Effect.CHANGE
+
+
+def _effect_of_reposition(command: Command) -> Effect:
+    """A reposition with nothing set is a pause."""
+    heading = command.params[3]
+    no_heading = math.isnan(heading) or (heading == 0.0 and command.flavour.zero_is_unset)
+    unset = no_heading and all(math.isnan(value) for value in (command.x, command.y, command.z))
+    return Effect.HOLD if unset else Effect.CHANGE
+
+
+def flight_actions(vehicle: Vehicle) -> dict[int, Action]:
+    """The commands that begin and end flights. The newest one wins."""
+    return {
+        dialect.MAV_CMD_COMPONENT_ARM_DISARM: Action(
+            partial(arm_disarm, vehicle), location=False, altitude=Altitude.UNUSED, effect=_effect_of_arm
+        ),
+        dialect.MAV_CMD_NAV_TAKEOFF: Action(
+            partial(takeoff, vehicle), location=True, altitude=Altitude.BY_FRAME, effect=Effect.IRREVOCABLE
+        ),
+        dialect.MAV_CMD_NAV_LAND: Action(
+            partial(land, vehicle), location=True, altitude=Altitude.UNUSED, effect=Effect.LAND
+        ),
+        dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH: Action(
+            partial(return_to_launch, vehicle), location=False, altitude=Altitude.UNUSED, effect=Effect.RETURN
+        ),
+        dialect.MAV_CMD_DO_REPOSITION: Action(
+            partial(reposition, vehicle),
+            location=True,
+            altitude=Altitude.BY_FRAME,
+            effect=_effect_of_reposition,
+            progress=Progress.EARLY,
+        ),
+        dialect.MAV_CMD_DO_SET_MODE: Action(
+            partial(set_mode, vehicle),
+            location=False,
+            altitude=Altitude.UNUSED,
+            effect=effect_of_mode,
+            mode=lambda command: command.flavour.mode_of_parameters(command.params[1], command.params[2]),
+            progress=Progress.LATE,
+        ),
+        dialect.MAV_CMD_DO_FLIGHTTERMINATION: Action(
+            partial(terminate, vehicle), location=False, altitude=Altitude.UNUSED, effect=Effect.STOP
+        ),
+    }

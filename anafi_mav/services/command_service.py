@@ -16,22 +16,28 @@ from typing import Any
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, NotSupported
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
-from anafi_mav.services.actions import ACTIONS, change_mode
+from anafi_mav.services.actions import change_mode, flight_actions
 from anafi_mav.services.commands import (
+    EFFECT_OF_MODE,
     MODE_PROGRESS_AFTER,
     PROGRESS_AFTER,
     PROGRESS_EVERY,
+    QUERY,
+    Action,
     Command,
     CommandDesk,
+    Definition,
+    Effect,
     Execution,
+    Progress,
     from_int,
     from_long,
 )
-from anafi_mav.services.flavours import flavour_of
+from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.refusal import Refused, Unsupported
 from anafi_mav.services.right import Extent, Right
-from anafi_mav.services.service import Action, Host, MessageHandler, Query, Service, client_of
+from anafi_mav.services.service import Host, MessageHandler, Query, Service, client_of
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.targets import UnsupportedFrame
 
@@ -39,6 +45,8 @@ logger = logging.getLogger(__name__)
 
 SETTLE = 0.1
 """s that commands get to end by themselves when the link is lost; they wait for the drone, which says so at once."""
+
+_Decode = Callable[[Any, Definition, Hashable, Flavour], Command]
 
 _RESULT_BY_ERROR: tuple[tuple[type[AnafiMavError], int], ...] = (
     (UnsupportedFrame, dialect.MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME),
@@ -65,20 +73,26 @@ class CommandService(Service):
         super().__init__(host)
         self._desk = CommandDesk()
         self._queries: Mapping[int, Query] = {}
-        self._actions: dict[int, Action] = {}
+        self._actions: Mapping[int, Action] = {}
         self._running: dict[asyncio.Task[None], _Running] = {}
         """Oldest first."""
 
     def take_tables(self, queries: Mapping[int, Query], actions: Mapping[int, Action]) -> None:
-        """What all services of the system answer and do."""
-        vehicle = self.host.vehicle
-        self._queries = queries
-        self._actions = {id: _bound(handler, vehicle) for id, handler in ACTIONS.items()}
-        self._actions.update(actions)
+        """Register the commands of all services. Raises `ValueError` when a row contradicts MAVLink or another."""
+        if twice := queries.keys() & actions.keys():
+            raise ValueError(f"{sorted(twice)} are both queries and actions")
+        for id in queries:
+            QUERY.check(id)
+        for id, action in actions.items():
+            action.check(id)
+        self._queries, self._actions = queries, actions
 
     def acts_on(self, command: int) -> bool:
         """True for a command that changes what the vehicle does, and is no query."""
         return command in self._actions
+
+    def actions(self) -> Mapping[int, Action]:
+        return flight_actions(self.host.vehicle)
 
     def capabilities(self) -> int:
         cut = dialect.MAV_PROTOCOL_CAPABILITY_FLIGHT_TERMINATION if self.host.vehicle.allow_kill else 0
@@ -86,12 +100,8 @@ class CommandService(Service):
 
     def messages(self) -> Mapping[int, MessageHandler]:
         return {
-            dialect.MAVLINK_MSG_ID_COMMAND_LONG: lambda inbound: self._command(
-                inbound, from_long(inbound.message, client_of(inbound), flavour_of(inbound.channel))
-            ),
-            dialect.MAVLINK_MSG_ID_COMMAND_INT: lambda inbound: self._command(
-                inbound, from_int(inbound.message, client_of(inbound), flavour_of(inbound.channel))
-            ),
+            dialect.MAVLINK_MSG_ID_COMMAND_LONG: lambda inbound: self._receive(inbound, from_long),
+            dialect.MAVLINK_MSG_ID_COMMAND_INT: lambda inbound: self._receive(inbound, from_int),
             dialect.MAVLINK_MSG_ID_COMMAND_CANCEL: self._cancel,
             dialect.MAVLINK_MSG_ID_SET_MODE: self._set_mode,
         }
@@ -133,26 +143,31 @@ class CommandService(Service):
         self._desk.supersede(None if running is None else running.client)
         return others
 
-    def _command(self, inbound: Inbound, command: Command) -> None:
-        query = self._queries.get(command.id)
-        if query is not None:
+    def _receive(self, inbound: Inbound, decode: _Decode) -> None:
+        id = inbound.message.command
+        definition: Definition | None = QUERY if id in self._queries else self._actions.get(id)
+        if definition is None:
+            self._acknowledge(inbound, id, dialect.MAV_RESULT_UNSUPPORTED)
+            return
+        command = decode(inbound.message, definition, client_of(inbound), flavour_of(inbound.channel))
+        if definition is QUERY:
             result = dialect.MAV_RESULT_FAILED
             try:
-                result = query(inbound, command)
+                result = self._queries[id](inbound, command)
             finally:  # whatever went wrong, the client learns that it did
-                self._acknowledge(inbound, command.id, result)
+                self._acknowledge(inbound, id, result)
             return
-        if command.id not in self._actions:
-            self._acknowledge(inbound, command.id, dialect.MAV_RESULT_UNSUPPORTED)
-            return
+        self._act(inbound, command)
+
+    def _act(self, inbound: Inbound, command: Command) -> None:
         now, mode = self.host.clock.monotonic(), self.host.vehicle.mode
         # Before it is known whether it is a retransmission: a program that repeats its Hold is to be noticed.
-        counted = not command.holds or self.host.vehicle.holds.arrive(command.client, now)
+        counted = command.effect is not Effect.HOLD or self.host.vehicle.holds.arrive(command.client, now)
         command = replace(command, at=now, counted=counted)
         ended_at = self.host.vehicle.landing_ended_at
         repeated = self._desk.retransmission(command.client, command, now, mode, ended_at)
         if repeated is not None:
-            quiet = command.patient or command.is_answered_once  # IN_PROGRESS is sent later, or not at all
+            quiet = command.progress in (Progress.LATE, None)  # IN_PROGRESS is sent later, or not at all
             if not (quiet and repeated == dialect.MAV_RESULT_IN_PROGRESS):
                 self._acknowledge(inbound, command.id, repeated)
             return
@@ -161,12 +176,12 @@ class CommandService(Service):
 
     async def _execute(self, inbound: Inbound, execution: Execution) -> None:
         command = execution.command
-        if command.id == dialect.MAV_CMD_DO_REPOSITION and self.host.vehicle.takeoff.rises:
+        if command.progress is Progress.EARLY and self.host.vehicle.takeoff.rises:
             self._acknowledge(inbound, command.id, dialect.MAV_RESULT_IN_PROGRESS)  # it waits for the climb's end
         progress = self.host.spawn(self._report_progress(inbound, command))
         result = dialect.MAV_RESULT_FAILED
         try:
-            await self._actions[command.id](command)
+            await self._actions[command.id].handler(command)
             result = dialect.MAV_RESULT_ACCEPTED
         except AnafiMavError as error:
             result = self._explain(error)
@@ -207,7 +222,7 @@ class CommandService(Service):
             if running.answer is None:
                 continue
             command = running.answer[1].command
-            if command.id == inbound.message.command and command.revocable:
+            if command.id == inbound.message.command and command.effect.is_revocable:
                 task.cancel()
 
     def _explain(self, error: AnafiMavError) -> int:
@@ -230,9 +245,9 @@ class CommandService(Service):
             work.close()  # cancelled before it began, it would complain that nobody awaited it
 
     async def _report_progress(self, inbound: Inbound, command: Command) -> None:
-        if command.is_answered_once:
+        if command.progress is None:
             return
-        await asyncio.sleep(MODE_PROGRESS_AFTER if command.patient else PROGRESS_AFTER)
+        await asyncio.sleep(MODE_PROGRESS_AFTER if command.progress is Progress.LATE else PROGRESS_AFTER)
         while True:
             self._acknowledge(inbound, command.id, dialect.MAV_RESULT_IN_PROGRESS)
             await asyncio.sleep(PROGRESS_EVERY)
@@ -249,12 +264,6 @@ class CommandService(Service):
         """SET_MODE has no acknowledgement: the heartbeat shows the mode, a text the refusal."""
         mode: FlightMode | None = flavour_of(inbound.channel).mode_of_number(inbound.message.custom_mode)
         client, vehicle, now = client_of(inbound), self.host.vehicle, self.host.clock.monotonic()
-        counted = mode not in (FlightMode.HOLD, FlightMode.POSITION) or vehicle.holds.arrive(client, now)
+        is_hold = mode is not None and EFFECT_OF_MODE[mode] is Effect.HOLD
+        counted = not is_hold or vehicle.holds.arrive(client, now)
         self.run(client, change_mode(vehicle, mode, Right(client, Extent.ALL, now, counted)))
-
-
-def _bound(handler: Callable[[Any, Command], Any], vehicle: Any) -> Action:
-    def action(command: Command) -> Any:
-        return handler(vehicle, command)
-
-    return action

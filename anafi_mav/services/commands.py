@@ -6,13 +6,15 @@ Rules: conformance R5-R10, MAVLink command.md.
 
 from __future__ import annotations
 
+import enum
 import math
-from collections.abc import Hashable
+from collections.abc import Awaitable, Callable, Hashable
 from dataclasses import dataclass
 
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.flavours import ARDUPILOT, PX4, Flavour, mode_of_standard
-from anafi_mav.services.modes import HOVERING, FlightMode
+from anafi_mav.services.flavours import PX4, Flavour
+from anafi_mav.services.modes import FlightMode
+from anafi_mav.services.plan_items import DEGREES, PLACED
 from anafi_mav.services.right import Extent, Right
 
 RESEND_WINDOW = 3.5
@@ -34,18 +36,106 @@ one for the end of start_mission, pause_mission and arm, which fail then and cra
 (mission_raw_impl.cpp start_mission; action_impl.cpp waits for the end, but for the mode that it sets before arming). It
 gives up 2 s after it has sent it, the others later."""
 
-_MODE_COMMANDS = (dialect.MAV_CMD_DO_SET_MODE, dialect.MAV_CMD_DO_SET_STANDARD_MODE)
-_STOPPING_MODES = (*HOVERING, FlightMode.LAND)
-_LAPSING = (FlightMode.OFFBOARD, FlightMode.FOLLOW, FlightMode.MISSION)
-_STOPPING = (
-    dialect.MAV_CMD_NAV_LAND,
-    dialect.MAV_CMD_DO_FLIGHTTERMINATION,
-    dialect.MAV_CMD_DO_SET_ROI_NONE,
-)
-_IRREVOCABLE = (dialect.MAV_CMD_NAV_TAKEOFF, dialect.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN)
-
 _UNSET_INT = (2**31 - 1, -(2**31))
 """x and y of a COMMAND_INT that stand for "not set": the specified INT32_MAX, and what a cast NaN becomes (R8)."""
+
+
+class Effect(enum.Enum):
+    """The kind of change that a command asks for: decides whether it is repeated, and whether it can be cancelled."""
+
+    CHANGE = "any other change: the same command sent again is answered, and COMMAND_CANCEL ends it"
+    STOP = "ends something and begins nothing: carried out each time it arrives, and never cancelled"
+    HOLD = "a STOP that a person means against whatever the drone does: Hold, Pause, Brake, Loiter, Position"
+    LAND = "a STOP that another client's Hold may have ended since: it is then not repeated"
+    RETURN = "asks for the way home: when that is flown already, it is carried out again; never cancelled"
+    LAPSING = "a mode that ends without another command: asked for after its end, it begins again, or is refused"
+    IRREVOCABLE = "cannot be cancelled: the drone does it whatever is sent then, so CANCELLED would be a lie"
+
+    @property
+    def stops(self) -> bool:
+        """Ends something and begins nothing. It may be carried out twice."""
+        return self in (Effect.STOP, Effect.HOLD, Effect.LAND)
+
+    @property
+    def is_revocable(self) -> bool:
+        """COMMAND_CANCEL may end it. Not a stop, which another client must not withdraw."""
+        return self in (Effect.CHANGE, Effect.LAPSING)
+
+
+EFFECT_OF_MODE = {
+    FlightMode.HOLD: Effect.HOLD,
+    FlightMode.POSITION: Effect.HOLD,
+    FlightMode.GUIDED: Effect.STOP,
+    FlightMode.LAND: Effect.LAND,
+    FlightMode.RETURN: Effect.RETURN,
+    FlightMode.OFFBOARD: Effect.LAPSING,
+    FlightMode.FOLLOW: Effect.LAPSING,
+    FlightMode.MISSION: Effect.LAPSING,
+    FlightMode.TAKEOFF: Effect.IRREVOCABLE,
+    FlightMode.TERMINATED: Effect.IRREVOCABLE,
+    FlightMode.ORBIT: Effect.CHANGE,
+}
+"""The effect of a command that names a mode. Every mode has one: a test compares."""
+
+
+def effect_of_mode(command: Command) -> Effect:
+    """The effect of the mode that a command names; a mode that we do not have is refused, which changes nothing."""
+    mode = command.mode
+    return Effect.CHANGE if mode is None else EFFECT_OF_MODE[mode]
+
+
+class Altitude(enum.Enum):
+    """How z (param7) of a command is to be read."""
+
+    UNUSED = "z is no height, or the command's height is not used"
+    BY_FRAME = "as the frame says; above mean sea level in a COMMAND_LONG"
+    AMSL = "as BY_FRAME; in relative frames above mean sea level too, where the flavour's `relative_frames_are_amsl`"
+
+
+class Progress(enum.Enum):
+    """When IN_PROGRESS is sent."""
+
+    PROMPT = "after `PROGRESS_AFTER`"
+    EARLY = "after `PROGRESS_AFTER`, and at once where the command first waits for the end of a take-off's climb"
+    LATE = "after `MODE_PROGRESS_AFTER`: clients take one for the end of it"
+    FINAL_ONLY = "as `PROMPT`, but never to clients of flavours that take `first_answer_as_final`"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Definition:
+    """What has to be known of a MAV_CMD, apart from what it does."""
+
+    location: bool
+    """x and y are a place: degrees, times 1e7 in a COMMAND_INT. Wrong by mistake it would be 4.8e8 degrees, so it is
+    stated here and compared with MAVLink's own definition (hasLocation) when the command is registered."""
+    altitude: Altitude
+    effect: Effect | Callable[[Command], Effect]
+    """One for all, or by the command's parameters."""
+    mode: Callable[[Command], FlightMode | None] | None = None
+    """The mode that it names, None for one that we do not have. Only for commands that name modes."""
+    progress: Progress = Progress.PROMPT
+
+    def check(self, id: int) -> None:
+        """Raise `ValueError` when this contradicts MAVLink's definition of the MAV_CMD, or itself."""
+        if self.location != (id in PLACED):
+            raise ValueError(f"MAV_CMD {id}: MAVLink says {id in PLACED} of its location, the row {self.location}")
+        if self.altitude is not Altitude.UNUSED and not self.location:
+            raise ValueError(f"MAV_CMD {id}: its z cannot be a height, it has no location")
+        if (self.effect is effect_of_mode) != (self.mode is not None):
+            raise ValueError(f"MAV_CMD {id}: it must have both mode and `effect_of_mode`, or none of them")
+
+
+@dataclass(frozen=True)
+class Action(Definition):
+    """A MAV_CMD that changes what the vehicle does: the one row that says all about it."""
+
+    handler: Callable[[Command], Awaitable[None]]
+    """Executed once however often the command arrives; returns when the drone confirmed, or raises an
+    `AnafiMavError` that says why not."""
+
+
+QUERY = Definition(location=False, altitude=Altitude.UNUSED, effect=Effect.CHANGE)
+"""A command that is answered at once, and changes nothing."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +143,7 @@ class Command:
     """One command, whichever message brought it. Unset parameters are NaN."""
 
     id: int
+    definition: Definition
     params: tuple[float, float, float, float]
     """param1..param4."""
     x: float
@@ -70,7 +161,7 @@ class Command:
     at: float = 0.0
     """When it arrived, on the monotonic clock."""
     counted: bool = True
-    """It `holds`, and its client sent no other such command in the 5 s before."""
+    """Its effect is HOLD, and its client sent no other such command in the 5 s before."""
 
     @property
     def right(self) -> Right:
@@ -78,75 +169,21 @@ class Command:
         return Right(self.client, Extent.ALL, self.at, self.counted)
 
     @property
-    def holds(self) -> bool:
-        """Hold, Pause, Brake, Loiter or Position: a person means it against whatever the drone does."""
-        if self.id in _MODE_COMMANDS:
-            return self.mode in (FlightMode.HOLD, FlightMode.POSITION)
-        return self.id in (dialect.MAV_CMD_DO_REPOSITION, dialect.MAV_CMD_DO_PAUSE_CONTINUE) and self.stops
+    def effect(self) -> Effect:
+        """What it asks for."""
+        effect = self.definition.effect
+        return effect if isinstance(effect, Effect) else effect(self)
 
     @property
     def mode(self) -> FlightMode | None:
-        """The mode that DO_SET_MODE or DO_SET_STANDARD_MODE names or MISSION_START means; None: we have none such."""
-        if self.id == dialect.MAV_CMD_MISSION_START:
-            return FlightMode.MISSION
-        if self.id == dialect.MAV_CMD_DO_SET_STANDARD_MODE:
-            return mode_of_standard(self.params[0])
-        return self.flavour.mode_of_parameters(self.params[1], self.params[2])
+        """The mode that it names; None: it names none, or one that we do not have."""
+        return None if self.definition.mode is None else self.definition.mode(self)
 
     @property
-    def patient(self) -> bool:
-        """Who sent it takes IN_PROGRESS amiss, and waits without: it is not said before `MODE_PROGRESS_AFTER`."""
-        return self.id == dialect.MAV_CMD_DO_SET_MODE
-
-    @property
-    def is_answered_once(self) -> bool:
-        """True when IN_PROGRESS is never sent: ArduPilot's clients take the first acknowledgement for the final one.
-
-        dronekit2's tests count exactly one; Mission Planner waits up to 25 s for it.
-        """
-        return self.flavour is ARDUPILOT and self.id in (
-            dialect.MAV_CMD_PREFLIGHT_CALIBRATION,
-            dialect.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN,
-        )
-
-    @property
-    def stops(self) -> bool:
-        """It ends something and begins nothing: hold, land, disarm, cut the motors. It may be carried out twice."""
-        if self.id == dialect.MAV_CMD_DO_REPOSITION:
-            no_heading = math.isnan(self.params[3]) or (self.params[3] == 0.0 and self.flavour.zero_is_unset)
-            return no_heading and all(math.isnan(value) for value in (self.x, self.y, self.z))
-        if self.id in _MODE_COMMANDS:
-            return self.mode in _STOPPING_MODES
-        if self.id in (dialect.MAV_CMD_COMPONENT_ARM_DISARM, dialect.MAV_CMD_DO_PAUSE_CONTINUE):
-            return self.params[0] == 0.0
-        return self.id in _STOPPING
-
-    @property
-    def lands(self) -> bool:
-        """It asks for a landing. That stops something too, but a Hold of another client may have ended it since."""
-        if self.id in _MODE_COMMANDS:
-            return self.mode is FlightMode.LAND
-        return self.id == dialect.MAV_CMD_NAV_LAND
-
-    @property
-    def returns(self) -> bool:
-        """It asks for the way home: when that is flown already, asking again changes nothing."""
-        if self.id in _MODE_COMMANDS:
-            return self.mode is FlightMode.RETURN
-        return self.id == dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH
-
-    @property
-    def revocable(self) -> bool:
-        """COMMAND_CANCEL may end it. Not an order to stop, which somebody else must not call off; and not what a drone
-        that has heard it does whatever we say then, so that "cancelled" would be a lie: take off, return, restart."""
-        if self.id in _MODE_COMMANDS and self.mode in (FlightMode.TAKEOFF, FlightMode.TERMINATED):
-            return False
-        return not (self.stops or self.returns or self.id in _IRREVOCABLE)
-
-    @property
-    def lapses(self) -> bool:
-        """It asks for a mode that ends without another order: asked for again, it begins again, or is refused."""
-        return self.id in (*_MODE_COMMANDS, dialect.MAV_CMD_MISSION_START) and self.mode in _LAPSING
+    def progress(self) -> Progress | None:
+        """When IN_PROGRESS is sent to its client; None: never."""
+        progress = self.definition.progress
+        return None if progress is Progress.FINAL_ONLY and self.flavour.first_answer_as_final else progress
 
     def same_as(self, other: Command) -> bool:
         """Equal, with NaN equal to NaN."""
@@ -158,27 +195,16 @@ class Command:
         )
 
 
-LOCATION_COMMANDS = frozenset(
-    {
-        dialect.MAV_CMD_NAV_WAYPOINT,
-        dialect.MAV_CMD_NAV_LAND,
-        dialect.MAV_CMD_NAV_TAKEOFF,
-        dialect.MAV_CMD_DO_ORBIT,
-        dialect.MAV_CMD_DO_REPOSITION,
-        dialect.MAV_CMD_DO_SET_HOME,
-        dialect.MAV_CMD_DO_SET_ROI_LOCATION,
-        dialect.MAV_CMD_DO_SET_ROI,
-    }
-)
-"""Commands whose x and y of a COMMAND_INT are degrees times 1e7."""
-
-
 def from_long(
-    message: dialect.MAVLink_command_long_message, client: Hashable = None, flavour: Flavour = PX4
+    message: dialect.MAVLink_command_long_message,
+    definition: Definition,
+    client: Hashable = None,
+    flavour: Flavour = PX4,
 ) -> Command:
     """The command of a COMMAND_LONG."""
     return Command(
         message.command,
+        definition,
         (message.param1, message.param2, message.param3, message.param4),
         message.param5,
         message.param6,
@@ -189,12 +215,18 @@ def from_long(
     )
 
 
-def from_int(message: dialect.MAVLink_command_int_message, client: Hashable = None, flavour: Flavour = PX4) -> Command:
+def from_int(
+    message: dialect.MAVLink_command_int_message,
+    definition: Definition,
+    client: Hashable = None,
+    flavour: Flavour = PX4,
+) -> Command:
     """The command of a COMMAND_INT."""
-    scale = 1e7 if message.command in LOCATION_COMMANDS else 1.0
+    scale = DEGREES if definition.location else 1.0
     x, y = (math.nan if value in _UNSET_INT else value / scale for value in (message.x, message.y))
     return Command(
         message.command,
+        definition,
         (message.param1, message.param2, message.param3, message.param4),
         x,
         y,
@@ -248,15 +280,17 @@ class CommandDesk:
             return None
         if newest.result == dialect.MAV_RESULT_IN_PROGRESS:
             return newest.result
-        if command.stops and not (command.lands and newest.superseded and landing_ended_at >= newest.ended):
+        effect = command.effect
+        landing_ended = effect is Effect.LAND and newest.superseded and landing_ended_at >= newest.ended
+        if effect.stops and not landing_ended:
             return None
         succeeded = newest.result in (dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_CANCELLED)
         if now - newest.ended >= (RESEND_WINDOW if succeeded else REFUSAL_WINDOW):
             return None
         if newest.superseded:
             return dialect.MAV_RESULT_CANCELLED
-        ended = command.lapses and mode is not None and mode is not command.mode
-        return None if command.returns or ended else newest.result
+        ended = effect is Effect.LAPSING and mode is not None and mode is not command.mode
+        return None if effect is Effect.RETURN or ended else newest.result
 
     def begin(self, client: Hashable, command: Command) -> Execution:
         """Note that an action begins; this client's next one is compared with it."""

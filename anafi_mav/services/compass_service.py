@@ -15,9 +15,9 @@ from collections.abc import Mapping
 from anafi_mav.drone.events import CalibrationAxis
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.commands import Command
+from anafi_mav.services.commands import Action, Altitude, Command, Effect
 from anafi_mav.services.refusal import Refused
-from anafi_mav.services.service import Action, Host, Service
+from anafi_mav.services.service import Host, Service
 from anafi_mav.services.statustext import Severity
 
 COMPASS_MASK = 1
@@ -49,9 +49,15 @@ class CompassService(Service):
 
     def actions(self) -> Mapping[int, Action]:
         return {
-            dialect.MAV_CMD_DO_START_MAG_CAL: self._start,
-            dialect.MAV_CMD_DO_ACCEPT_MAG_CAL: self._accept,
-            dialect.MAV_CMD_DO_CANCEL_MAG_CAL: self._cancel,
+            dialect.MAV_CMD_DO_START_MAG_CAL: Action(
+                self._start, location=False, altitude=Altitude.UNUSED, effect=Effect.CHANGE
+            ),
+            dialect.MAV_CMD_DO_ACCEPT_MAG_CAL: Action(
+                self._accept, location=False, altitude=Altitude.UNUSED, effect=Effect.CHANGE
+            ),
+            dialect.MAV_CMD_DO_CANCEL_MAG_CAL: Action(
+                self._cancel, location=False, altitude=Altitude.UNUSED, effect=Effect.CHANGE
+            ),
         }
 
     def link_down(self) -> None:

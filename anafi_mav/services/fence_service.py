@@ -15,12 +15,12 @@ from anafi_mav.drone import events
 from anafi_mav.drone.events import PlayingState
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.commands import Command
+from anafi_mav.services.commands import Action, Altitude, Command, Effect
 from anafi_mav.services.fence_mirror import FenceMirror
 from anafi_mav.services.fence_watch import CEILING, EVERYTHING, FLOOR, FenceWatch, Reaction, Sight, State
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.refusal import Refused
-from anafi_mav.services.service import Action, Host, Service
+from anafi_mav.services.service import Host, Service
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.stream import Stream, Times
 from anafi_mav.services.subscriptions import Subscriptions
@@ -58,7 +58,11 @@ class FenceService(Service):
 
     def actions(self) -> Mapping[int, Action]:
         # Not a query: who was refused a place before may ask for it again at once.
-        return {dialect.MAV_CMD_DO_FENCE_ENABLE: self._enable}
+        return {
+            dialect.MAV_CMD_DO_FENCE_ENABLE: Action(
+                self._enable, location=False, altitude=Altitude.UNUSED, effect=Effect.CHANGE
+            )
+        }
 
     def streams(self) -> Mapping[int, Stream]:
         return {dialect.MAVLINK_MSG_ID_FENCE_STATUS: Stream(self._status, every=1.0, on_change=True)}

@@ -23,8 +23,8 @@ class ServedFile:
 
     make: Callable[[Flavour, Query], bytes | None]
     """The content as clients of a flavour see it; None: not with such a query."""
-    flavour: Flavour | None = None
-    """The only one that is shown it; None: all are."""
+    packed: bool = False
+    """Shown to clients of flavours with `packed_files` alone."""
     metadata: int | None = None
     """COMP_METADATA_TYPE. Such a file is made once for each connection, and served compressed as well."""
     write: Callable[[Inbound, bytes], bool] | None = None

@@ -47,8 +47,20 @@ class Flavour:
     """The release whose behaviour is followed: major, minor, patch."""
     version_type: int
     """FIRMWARE_VERSION_TYPE."""
+    mode_names: Mapping[FlightMode, str]
+    """The modes that clients are shown by AVAILABLE_MODES, by their names and in their order."""
+    packed_modes: bool
+    """custom_mode is a main mode in bits 16..23 and a sub mode in bits 24..31. DO_SET_MODE may name the two as param2
+    and param3, HIGH_LATENCY2 has room for the upper half alone. Otherwise it is one number below 65536."""
+    parameter_names: str
+    """The table of names by which clients know parameters, in `parameters.NAME_TABLES`."""
+    rssi_full: int
+    """RC_CHANNELS.rssi of a perfect link (conformance A6, F 134)."""
     bytewise: bool
     """Parameters: an INT32 travels as the bits of the float field; otherwise as the float of equal value."""
+    relative_frames_are_amsl: bool
+    """The z of some commands (`commands.Altitude.AMSL`) is above mean sea level in the frames 3 and 6 too: MAVSDK sends
+    it so, as PX4 takes it (conformance B1)."""
     zero_home: bool = False
     """Item 0 of a mission is home."""
     float_plans: bool = False
@@ -66,6 +78,23 @@ class Flavour:
     """Setpoints fly the drone in mode Guided, without a mode of their own."""
     unstreamed: frozenset[int] = frozenset()
     """Message ids that a client of this family gets on change and on request only, not at an interval by default."""
+    first_answer_as_final: bool = False
+    """Clients of this family take the first acknowledgement of a calibration or a restart for the final one.
+    dronekit2's tests count exactly one, Mission Planner waits up to 25 s for it."""
+    joystick_overrides: bool = False
+    """A stick that leaves the middle takes the drone over from what flies it (PX4's COM_RC_OVERRIDE)."""
+    data_streams: bool = False
+    """REQUEST_DATA_STREAM sets rates. PX4 ignores it, and MAVProxy would slow a PX4 down by it."""
+    packed_files: bool = False
+    """Parameters and plans are also files (`@PARAM/param.pck` and others). PX4's clients do not look for them."""
+    text_version: bool = False
+    """flight_custom_version of AUTOPILOT_VERSION is 8 characters; otherwise bytes 2, 1, 0 are major, minor, patch, and
+    behind them is a hash of the release (QGroundControl InitialConnectStateMachine.cc)."""
+    sik_radio: bool = False
+    """RADIO_STATUS is read as a SiK radio's register, 1.9 a dB above -127 dBm (Mission Planner CurrentState.cs), and
+    255 is unknown; otherwise as a signed number of dBm (QGroundControl RadioStatusFactGroup.cc), and 0 is unknown."""
+    base_mode_in_custom0: bool = False
+    """HIGH_LATENCY2.custom0 is HEARTBEAT.base_mode, as a signed byte."""
     title: str = ""
     """How the autopilot calls itself in its banner; empty: it does not."""
 
@@ -82,13 +111,13 @@ class Flavour:
     def mode_of_parameters(self, main: float, sub: float) -> FlightMode | None:
         """The mode that MAV_CMD_DO_SET_MODE names with param2 and param3; None when we do not have it.
 
-        PX4: below 256 param2 is the main mode and param3 the sub mode (NaN = 0). All flavours: from 65536 on param2
-        is a packed number of PX4's. ArduPilot: param2 is the mode's number (conformance E5).
+        `packed_modes`: below 256 param2 is the main mode and param3 the sub mode (NaN = 0). All flavours: from 65536 on
+        param2 is a packed number of PX4's. Otherwise param2 is the mode's number (conformance E5).
         """
         number = _whole(main)
         if number is None:
             return None
-        if self is not ARDUPILOT and number < PX4_BITS:
+        if self.packed_modes and number < PX4_BITS:
             part = 0 if math.isnan(sub) else _whole(sub)
             if part is None or number > 0xFF or part > 0xFF:
                 return None
@@ -115,16 +144,38 @@ _PX4_MODES = {
     if mode not in (FlightMode.GUIDED, FlightMode.ORBIT)  # shown as another, and entered by a command only
 }
 
+_PX4_NAMES = {
+    mode: mode.value
+    for mode in (
+        FlightMode.POSITION,
+        FlightMode.HOLD,
+        FlightMode.MISSION,
+        FlightMode.RETURN,
+        FlightMode.LAND,
+        FlightMode.TAKEOFF,
+        FlightMode.OFFBOARD,
+        FlightMode.FOLLOW,
+        FlightMode.ORBIT,
+        FlightMode.TERMINATED,
+    )
+}
+
 PX4 = Flavour(
     name="px4",
     autopilot=dialect.MAV_AUTOPILOT_PX4,
     numbers=_PX4_NUMBERS,
     modes=_PX4_MODES,
+    mode_names=_PX4_NAMES,
+    packed_modes=True,
+    parameter_names="px4",
+    rssi_full=100,
     version=(1, 16, 0),
     # A development build: of an official one that is older than the newest QGroundControl says so in a dialog at each
     # connect (FirmwarePlugin::checkIfIsLatestStable), in either family. It shows "1.16.0dev" for it.
     version_type=dialect.FIRMWARE_VERSION_TYPE_DEV,
     bytewise=True,
+    relative_frames_are_amsl=True,
+    joystick_overrides=True,
 )
 
 # Numbers of ArduCopter/mode.h. Its Brake is our Hold: it stops, and nobody's setpoints or sticks move the drone.
@@ -143,6 +194,18 @@ _COPTER_NUMBERS = {
     FlightMode.TERMINATED: _BRAKE,
 }
 
+_COPTER_NAMES = {
+    FlightMode.POSITION: "Loiter",
+    FlightMode.HOLD: "Brake",
+    FlightMode.GUIDED: "Guided",
+    FlightMode.MISSION: "Auto",
+    FlightMode.RETURN: "RTL",
+    FlightMode.LAND: "Land",
+    FlightMode.FOLLOW: "Follow",
+    FlightMode.ORBIT: "Circle",
+}
+"""ArduCopter's names."""
+
 ARDUPILOT = Flavour(
     name="ardupilot",
     autopilot=dialect.MAV_AUTOPILOT_ARDUPILOTMEGA,
@@ -159,9 +222,14 @@ ARDUPILOT = Flavour(
         21: FlightMode.RETURN,  # SMART_RTL: an ANAFI has one way home
         23: FlightMode.FOLLOW,
     },
+    mode_names=_COPTER_NAMES,
+    packed_modes=False,
+    parameter_names="ardupilot",
+    rssi_full=254,
     version=(4, 5, 7),
     version_type=dialect.FIRMWARE_VERSION_TYPE_DEV,
     bytewise=False,
+    relative_frames_are_amsl=False,
     zero_home=True,
     float_plans=True,
     always_continues=True,
@@ -169,6 +237,12 @@ ARDUPILOT = Flavour(
     relative_takeoff=True,
     zero_is_unset=True,
     guided_setpoints=True,
+    first_answer_as_final=True,
+    data_streams=True,
+    packed_files=True,
+    text_version=True,
+    sik_radio=True,
+    base_mode_in_custom0=True,
     # ArduCopter sends home when it is set; programs take one that arrives later for news (dronekit2's own tests).
     unstreamed=frozenset({dialect.MAVLINK_MSG_ID_HOME_POSITION}),
     title="ArduCopter V4.5.7",
@@ -179,13 +253,19 @@ STANDARD = Flavour(
     autopilot=dialect.MAV_AUTOPILOT_GENERIC,
     numbers=_PX4_NUMBERS,
     modes=_PX4_MODES,
+    mode_names=_PX4_NAMES,
+    packed_modes=True,
+    parameter_names="px4",
+    rssi_full=100,
     version=PX4.version,
     version_type=PX4.version_type,
     bytewise=True,
+    relative_frames_are_amsl=True,
     relative_takeoff=True,  # MAVSDK's "pure" path sends the height above ground (conformance F 156)
 )
 
 FLAVOURS = {flavour.name: flavour for flavour in (PX4, ARDUPILOT, STANDARD)}
+"""By the name in the URL of an endpoint. Another one is another record here; nothing asks which flavour it is."""
 
 
 STANDARD_MODES: dict[FlightMode, int] = {

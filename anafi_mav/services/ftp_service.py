@@ -47,7 +47,7 @@ class FtpService(Service):
             makers = {
                 path: partial(self._content, path, flavour)
                 for path, file in files.items()
-                if file.flavour in (None, flavour)
+                if flavour.packed_files or not file.packed
             }
             lasting = [path for path, file in files.items() if file.metadata is not None]
             makers |= {path + COMPRESSED: partial(self._content, path + COMPRESSED, flavour) for path in lasting}

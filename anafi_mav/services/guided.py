@@ -17,13 +17,13 @@ from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.bounds import FASTEST, SLOWEST, check_height, check_on_earth
-from anafi_mav.services.commands import Command
+from anafi_mav.services.commands import Action, Altitude, Command, Effect
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.guided_flight import Goto
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.place import Place
 from anafi_mav.services.refusal import Refused
-from anafi_mav.services.service import Action, Host, Service, client_of
+from anafi_mav.services.service import Host, Service, client_of
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.subscriptions import Subscriptions
 from anafi_mav.services.targets import UnsupportedFrame, height, height_in_frame, place
@@ -108,6 +108,10 @@ async def change_altitude(vehicle: Vehicle, ato: float, flavour: Flavour) -> Non
             await vehicle.guided.go(goto.at_height(ato))
 
 
+def _effect_of_pause(command: Command) -> Effect:
+    return Effect.HOLD if command.params[0] == 0.0 else Effect.CHANGE
+
+
 class GuidedService(Service):
     """Changes what is being flown, and what the drone looks at."""
 
@@ -120,14 +124,30 @@ class GuidedService(Service):
 
     def actions(self) -> Mapping[int, Action]:
         return {
-            dialect.MAV_CMD_DO_CHANGE_SPEED: self._change_speed,
-            dialect.MAV_CMD_DO_CHANGE_ALTITUDE: self._change_altitude,
-            dialect.MAV_CMD_CONDITION_YAW: self._turn,
-            dialect.MAV_CMD_DO_PAUSE_CONTINUE: self._pause_or_continue,
-            dialect.MAV_CMD_DO_SET_ROI_LOCATION: self._look_at,
-            dialect.MAV_CMD_DO_SET_ROI_NONE: self._look_anywhere,
-            dialect.MAV_CMD_DO_SET_ROI: self._legacy_roi,
-            dialect.MAV_CMD_DO_SET_HOME: self._set_home,
+            dialect.MAV_CMD_DO_CHANGE_SPEED: Action(
+                self._change_speed, location=False, altitude=Altitude.UNUSED, effect=Effect.CHANGE
+            ),
+            dialect.MAV_CMD_DO_CHANGE_ALTITUDE: Action(
+                self._change_altitude, location=False, altitude=Altitude.UNUSED, effect=Effect.CHANGE
+            ),
+            dialect.MAV_CMD_CONDITION_YAW: Action(
+                self._turn, location=False, altitude=Altitude.UNUSED, effect=Effect.CHANGE
+            ),
+            dialect.MAV_CMD_DO_PAUSE_CONTINUE: Action(
+                self._pause_or_continue, location=False, altitude=Altitude.UNUSED, effect=_effect_of_pause
+            ),
+            dialect.MAV_CMD_DO_SET_ROI_LOCATION: Action(
+                self._look_at, location=True, altitude=Altitude.AMSL, effect=Effect.CHANGE
+            ),
+            dialect.MAV_CMD_DO_SET_ROI_NONE: Action(
+                self._look_anywhere, location=False, altitude=Altitude.UNUSED, effect=Effect.STOP
+            ),
+            dialect.MAV_CMD_DO_SET_ROI: Action(
+                self._legacy_roi, location=True, altitude=Altitude.BY_FRAME, effect=Effect.CHANGE
+            ),
+            dialect.MAV_CMD_DO_SET_HOME: Action(
+                self._set_home, location=True, altitude=Altitude.AMSL, effect=Effect.CHANGE
+            ),
         }
 
     def link_down(self) -> None:

@@ -16,7 +16,7 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import Command
-from anafi_mav.services.flavours import ARDUPILOT, Flavour
+from anafi_mav.services.flavours import Flavour
 from anafi_mav.services.service import Host, Query, Service
 from anafi_mav.services.stream import Stream, Times
 from anafi_mav.services.subscriptions import Subscriptions
@@ -53,13 +53,13 @@ def _half_degrees(radians: float) -> int:
 
 
 def _mode(vehicle: Vehicle, flavour: Flavour) -> int:
-    """The 16 bits that there are for custom_mode: of PX4's packed number the upper half (px4_custom_mode.h)."""
+    """The 16 bits that there are for custom_mode: of a packed number the upper half (px4_custom_mode.h)."""
     number = flavour.custom_mode(vehicle.mode)
-    return number if flavour is ARDUPILOT else number >> 16
+    return number >> 16 if flavour.packed_modes else number
 
 
 def _base_mode(vehicle: Vehicle) -> int:
-    """ArduPilot's clients find HEARTBEAT.base_mode in custom0, a signed byte."""
+    """HEARTBEAT.base_mode as a signed byte."""
     base = dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
     if vehicle.armed:
         base |= dialect.MAV_MODE_FLAG_SAFETY_ARMED
@@ -105,7 +105,7 @@ def high_latency(vehicle: Vehicle, times: Times, climb: float) -> dialect.MAVLin
         battery=percent(vehicle.drone.battery.state.percent),
         wp_num=UNKNOWN_U16,
         failure_flags=failures(vehicle),
-        custom0=_base_mode(vehicle) if times.flavour is ARDUPILOT else 0,
+        custom0=_base_mode(vehicle) if times.flavour.base_mode_in_custom0 else 0,
         custom1=0,
         custom2=0,
     )

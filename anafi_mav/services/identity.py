@@ -11,7 +11,7 @@ from anafi_mav.drone import Drone
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import Command
-from anafi_mav.services.flavours import ARDUPILOT, Flavour, flavour_of
+from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.service import MessageHandler, Request, Service
 
 
@@ -33,12 +33,8 @@ def _version(text: str) -> int:
 
 
 def _custom_version(firmware: str, flavour: Flavour) -> bytes:
-    """The ANAFI's firmware as each family's stations read flight_custom_version.
-
-    Those of ArduPilot take it as 8 characters. Those of PX4 show bytes 2, 1, 0 as major, minor, patch; behind them is
-    a hash of the release of anafi-mav (QGroundControl InitialConnectStateMachine.cc).
-    """
-    if flavour is ARDUPILOT:
+    """The ANAFI's firmware as the stations of a flavour read flight_custom_version."""
+    if flavour.text_version:
         return firmware.encode(errors="replace")[:8].ljust(8, b"\0")
     return _version(firmware).to_bytes(4, "little")[1:] + hashlib.sha256(__version__.encode()).digest()[:5]
 

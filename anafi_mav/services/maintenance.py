@@ -13,9 +13,9 @@ from collections.abc import Awaitable, Callable, Mapping
 from anafi_mav.drone.events import CalibrationAxis, MagnetoCalibrationStateChanged, Message
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.commands import Command
+from anafi_mav.services.commands import Action, Altitude, Command, Effect, Progress
 from anafi_mav.services.refusal import Refused
-from anafi_mav.services.service import Action, Service
+from anafi_mav.services.service import Service
 from anafi_mav.services.statustext import Severity
 
 _MAGNETOMETER, _HORIZON = 1.0, 2.0
@@ -49,9 +49,26 @@ class MaintenanceService(Service):
 
     def actions(self) -> Mapping[int, Action]:
         return {
-            dialect.MAV_CMD_PREFLIGHT_CALIBRATION: self._calibrate,
-            dialect.MAV_CMD_GIMBAL_REQUEST_AXIS_CALIBRATION: lambda command: self._on_ground(self._gimbal),
-            dialect.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: self._reboot,
+            dialect.MAV_CMD_PREFLIGHT_CALIBRATION: Action(
+                self._calibrate,
+                location=False,
+                altitude=Altitude.UNUSED,
+                effect=Effect.CHANGE,
+                progress=Progress.FINAL_ONLY,
+            ),
+            dialect.MAV_CMD_GIMBAL_REQUEST_AXIS_CALIBRATION: Action(
+                lambda command: self._on_ground(self._gimbal),
+                location=False,
+                altitude=Altitude.UNUSED,
+                effect=Effect.CHANGE,
+            ),
+            dialect.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: Action(
+                self._reboot,
+                location=False,
+                altitude=Altitude.UNUSED,
+                effect=Effect.IRREVOCABLE,
+                progress=Progress.FINAL_ONLY,
+            ),
         }
 
     async def _calibrate(self, command: Command) -> None:

@@ -10,7 +10,7 @@ from collections.abc import Hashable, Mapping
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
-from anafi_mav.services.flavours import PX4, flavour_of
+from anafi_mav.services.flavours import flavour_of
 from anafi_mav.services.manual_flight import Channels, manual_sticks
 from anafi_mav.services.offboard import SILENCE
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
@@ -44,7 +44,7 @@ class ManualControlService(Service):
         if isinstance(sticks, str):
             self.host.warn_throttled(f"MANUAL_CONTROL ignored: {sticks}")
         elif sticks is not None:
-            self._flight.receive(client_of(inbound), sticks, overrides=flavour_of(inbound.channel) is PX4)
+            self._flight.receive(client_of(inbound), sticks, overrides=flavour_of(inbound.channel).joystick_overrides)
 
     def _override(self, inbound: Inbound) -> None:
         client, now = client_of(inbound), self.host.clock.monotonic()
@@ -58,4 +58,4 @@ class ManualControlService(Service):
             self._channels[client] = (channels, now)
             if len(self._channels) > MAX_CLIENTS:
                 del self._channels[next(iter(self._channels))]
-            self._flight.receive(client, channels.sticks, overrides=flavour_of(inbound.channel) is PX4)
+            self._flight.receive(client, channels.sticks, overrides=flavour_of(inbound.channel).joystick_overrides)

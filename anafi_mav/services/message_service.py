@@ -17,7 +17,7 @@ from anafi_mav.mavlink.node import Inbound
 from anafi_mav.mavlink.streams import Streams
 from anafi_mav.services import data_streams
 from anafi_mav.services.commands import Command
-from anafi_mav.services.flavours import ARDUPILOT, flavour_of
+from anafi_mav.services.flavours import flavour_of
 from anafi_mav.services.news import News
 from anafi_mav.services.service import Answer, Host, MessageHandler, Query, Request, Service
 from anafi_mav.services.stream import Stream, Times
@@ -165,8 +165,8 @@ class MessageService(Service):
                 logger.error("%s: message %d cannot be made: %r", self.host.drone.name, id, error)
 
     def _data_stream(self, inbound: Inbound) -> None:
-        """REQUEST_DATA_STREAM. PX4 ignores it, and MAVProxy would slow a PX4 down by it: only ArduPilot obeys."""
-        if flavour_of(inbound.channel) is not ARDUPILOT:
+        """REQUEST_DATA_STREAM, from clients of flavours with `data_streams`."""
+        if not flavour_of(inbound.channel).data_streams:
             return
         request = inbound.message
         rate = request.req_message_rate if request.start_stop else 0

@@ -12,14 +12,14 @@ from collections.abc import Callable, Hashable, Mapping
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
-from anafi_mav.services.commands import Command
+from anafi_mav.services.commands import Action, Altitude, Command, Effect, effect_of_mode
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.mission_kind import FIRST_LABEL, offset
 from anafi_mav.services.mission_progress import MAVLINK_STATES, State
 from anafi_mav.services.mission_record import Record
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.refusal import Refused
-from anafi_mav.services.service import Action, Host, MessageHandler, Service, client_of
+from anafi_mav.services.service import Host, MessageHandler, Service, client_of
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.stream import Stream, Times
 from anafi_mav.services.subscriptions import Subscriptions
@@ -64,8 +64,16 @@ class MissionService(Service):
 
     def actions(self) -> Mapping[int, Action]:
         return {
-            dialect.MAV_CMD_MISSION_START: self._start,
-            dialect.MAV_CMD_DO_SET_MISSION_CURRENT: self._choose,
+            dialect.MAV_CMD_MISSION_START: Action(
+                self._start,
+                location=False,
+                altitude=Altitude.UNUSED,
+                effect=effect_of_mode,
+                mode=lambda command: FlightMode.MISSION,
+            ),
+            dialect.MAV_CMD_DO_SET_MISSION_CURRENT: Action(
+                self._choose, location=False, altitude=Altitude.UNUSED, effect=Effect.CHANGE
+            ),
         }
 
     def streams(self) -> Mapping[int, Stream]:

@@ -12,41 +12,12 @@ from collections.abc import Mapping
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.actions import change_mode
-from anafi_mav.services.commands import Command
-from anafi_mav.services.flavours import ARDUPILOT, STANDARD_MODES, Flavour, flavour_of
+from anafi_mav.services.commands import Action, Altitude, Command, effect_of_mode
+from anafi_mav.services.flavours import STANDARD_MODES, Flavour, flavour_of, mode_of_standard
 from anafi_mav.services.modes import FlightMode
-from anafi_mav.services.service import Action, Answer, Host, Request, Service
+from anafi_mav.services.service import Answer, Host, Request, Service
 from anafi_mav.services.stream import Stream, Times
 from anafi_mav.services.vehicle import Vehicle
-
-COPTER_NAMES = {
-    FlightMode.POSITION: "Loiter",
-    FlightMode.HOLD: "Brake",
-    FlightMode.GUIDED: "Guided",
-    FlightMode.MISSION: "Auto",
-    FlightMode.RETURN: "RTL",
-    FlightMode.LAND: "Land",
-    FlightMode.FOLLOW: "Follow",
-    FlightMode.ORBIT: "Circle",
-}
-"""The modes of the ArduPilot flavour, in the order they are listed, by ArduCopter's names."""
-
-PX4_NAMES = {
-    mode: mode.value
-    for mode in (
-        FlightMode.POSITION,
-        FlightMode.HOLD,
-        FlightMode.MISSION,
-        FlightMode.RETURN,
-        FlightMode.LAND,
-        FlightMode.TAKEOFF,
-        FlightMode.OFFBOARD,
-        FlightMode.FOLLOW,
-        FlightMode.ORBIT,
-        FlightMode.TERMINATED,
-    )
-}
-"""The modes of the other flavours, in the order they are listed."""
 
 _BY_ITSELF = (FlightMode.ORBIT, FlightMode.TERMINATED)
 """Shown, but entered by a command only."""
@@ -60,11 +31,6 @@ _AUTOMATIC = (
     FlightMode.FOLLOW,
     FlightMode.ORBIT,
 )
-
-
-def names(flavour: Flavour) -> Mapping[FlightMode, str]:
-    """The modes that clients of a flavour are shown, in their order."""
-    return COPTER_NAMES if flavour is ARDUPILOT else PX4_NAMES
 
 
 def properties(mode: FlightMode, vehicle: Vehicle) -> int:
@@ -81,7 +47,7 @@ def properties(mode: FlightMode, vehicle: Vehicle) -> int:
 
 def available(vehicle: Vehicle, flavour: Flavour) -> list[dialect.MAVLink_message]:
     """AVAILABLE_MODES of every mode."""
-    listed = names(flavour)
+    listed = flavour.mode_names
     return [
         dialect.MAVLink_available_modes_message(
             len(listed),
@@ -119,7 +85,15 @@ class ModesService(Service):
         return {dialect.MAVLINK_MSG_ID_AVAILABLE_MODES: self._available}
 
     def actions(self) -> Mapping[int, Action]:
-        return {dialect.MAV_CMD_DO_SET_STANDARD_MODE: self._set_standard}
+        return {
+            dialect.MAV_CMD_DO_SET_STANDARD_MODE: Action(
+                self._set_standard,
+                location=False,
+                altitude=Altitude.UNUSED,
+                effect=effect_of_mode,
+                mode=lambda command: mode_of_standard(command.params[0]),
+            )
+        }
 
     def streams(self) -> Mapping[int, Stream]:
         return {

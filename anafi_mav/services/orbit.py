@@ -32,14 +32,14 @@ from anafi_mav.services.circle import (
     heading_at,
     outline,
 )
-from anafi_mav.services.commands import Command
+from anafi_mav.services.commands import Action, Altitude, Command, Effect
 from anafi_mav.services.guided_flight import Goto
 from anafi_mav.services.modes import FlightMode
 from anafi_mav.services.offboard_control import Controller, tilt_limit
 from anafi_mav.services.place import Place
 from anafi_mav.services.refusal import Refused
 from anafi_mav.services.roll_sign import ROLL_INVERTED
-from anafi_mav.services.service import Action, Host, Service
+from anafi_mav.services.service import Host, Service
 from anafi_mav.services.statustext import Severity
 from anafi_mav.services.stream import Stream, Times
 from anafi_mav.services.subscriptions import Subscriptions
@@ -71,7 +71,9 @@ class OrbitService(Service):
         return None if self._lap is None else self._lap.circle
 
     def actions(self) -> Mapping[int, Action]:
-        return {dialect.MAV_CMD_DO_ORBIT: self._orbit}
+        return {
+            dialect.MAV_CMD_DO_ORBIT: Action(self._orbit, location=True, altitude=Altitude.AMSL, effect=Effect.CHANGE)
+        }
 
     def streams(self) -> Mapping[int, Stream]:
         return {dialect.MAVLINK_MSG_ID_ORBIT_EXECUTION_STATUS: Stream(self._status, every=0.8)}

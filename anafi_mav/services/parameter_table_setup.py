@@ -8,8 +8,6 @@ has such a thing, otherwise neutral: nothing is mapped, nothing is offset, nothi
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from anafi_mav.drone import events
 from anafi_mav.services.parameter import Parameter, fact, number
 from anafi_mav.services.parameter_codec import Kind
@@ -19,9 +17,6 @@ from anafi_mav.services.service import Host
 PX4_SETUP, ARDUPILOT_SETUP = "PX4 setup", "ArduPilot setup"
 
 NOT_AVAILABLE = "Not available on ANAFI."
-
-CELLS: Mapping[str, int] = {"4k": 2, "thermal": 2, "usa": 3, "ua": 3, "ai": 3}
-"""Cells in series of each model's battery, by `Model.key` (Parrot's data sheets); the Ai reports its own."""
 
 COMPASS_SIDES = 38
 """Bits of CAL_MAG_SIDES: 2 nose down, 4 left side down, 32 upright. QGroundControl shows one picture for each.
@@ -41,7 +36,7 @@ def _ardupilot(name: str, value: float, short: str, kind: Kind = Kind.INT8, **mo
 
 def _cells(host: Host) -> float:
     reported = host.drone.battery.state.cell_count
-    return number(reported if reported is not None else CELLS.get(host.drone.identity.model.key))
+    return number(reported if reported is not None else host.drone.identity.model.battery_cells)
 
 
 def _volts(millivolts: int | None) -> float:

@@ -20,7 +20,7 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.files import Query, ServedFile
-from anafi_mav.services.flavours import ARDUPILOT, FLAVOURS, Flavour, flavour_of
+from anafi_mav.services.flavours import FLAVOURS, Flavour, flavour_of
 from anafi_mav.services.metadata import parameter_file, to_json
 from anafi_mav.services.parameter import Parameter
 from anafi_mav.services.parameter_codec import (
@@ -63,13 +63,15 @@ MAX_WAITING = 512
 NATIVE_NAMES: tuple[Parameter, ...] = (*NATIVE, *FENCE_NATIVE, *FOLLOW_NATIVE)
 """What every client sees, whatever its flavour."""
 
+NAME_TABLES: dict[str, tuple[Parameter, ...]] = {"px4": PX4_NAMES, "ardupilot": ARDUPILOT_NAMES}
+"""By `Flavour.parameter_names`."""
+
 KEPT = tuple(parameter for parameter in NATIVE_NAMES if parameter.put is not None)
 
 
 def parameters_of(flavour: Flavour) -> tuple[Parameter, ...]:
     """All that clients of a flavour can be shown, sorted by name; which of them a drone has is another matter."""
-    names = ARDUPILOT_NAMES if flavour is ARDUPILOT else PX4_NAMES
-    return tuple(sorted((*NATIVE_NAMES, *names), key=lambda parameter: parameter.name))
+    return tuple(sorted((*NATIVE_NAMES, *NAME_TABLES[flavour.parameter_names]), key=lambda parameter: parameter.name))
 
 
 class ParameterList:
@@ -166,7 +168,7 @@ class ParameterService(Service):
     def files(self) -> Mapping[str, ServedFile]:
         return {
             "/parameter.json": ServedFile(self._described, metadata=dialect.COMP_METADATA_TYPE_PARAMETER),
-            "/@PARAM/param.pck": ServedFile(self._packed, flavour=ARDUPILOT),
+            "/@PARAM/param.pck": ServedFile(self._packed, packed=True),
         }
 
     def list_of(self, flavour: Flavour) -> ParameterList:

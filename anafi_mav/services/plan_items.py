@@ -26,9 +26,10 @@ UNSET = 2**31 - 1
 AMSL_FRAMES = (dialect.MAV_FRAME_GLOBAL, dialect.MAV_FRAME_GLOBAL_INT)
 RELATIVE_FRAMES = (dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT, dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
 
-_PLACED = frozenset(
+PLACED = frozenset(
     command for command, entry in dialect.enums["MAV_CMD"].items() if getattr(entry, "has_location", False)
 )
+"""Commands with a place, in items and in COMMAND_INT: MAVLink's hasLocation."""
 
 _CONTENT = struct.Struct("<HBB4fiif")
 
@@ -74,7 +75,7 @@ class PlanItem(msgspec.Struct, frozen=True):
 
 def has_place(command: int, frame: int) -> bool:
     """x and y of an item are degrees times 1e7, not plain numbers."""
-    return frame != dialect.MAV_FRAME_MISSION and command in _PLACED
+    return frame != dialect.MAV_FRAME_MISSION and command in PLACED
 
 
 def _integer(value: float, scale: float) -> int | None:

@@ -20,7 +20,7 @@ from anafi_mav.plans.parrot import Version
 from anafi_mav.services import plan_files
 from anafi_mav.services.fence import FenceKind, summary
 from anafi_mav.services.files import Query, ServedFile
-from anafi_mav.services.flavours import ARDUPILOT, PX4, Flavour, flavour_of
+from anafi_mav.services.flavours import PX4, Flavour, flavour_of
 from anafi_mav.services.guided import fly_item, is_guided_item
 from anafi_mav.services.memory import NOT_KEPT
 from anafi_mav.services.mission_kind import MissionKind
@@ -68,7 +68,7 @@ class PlanService(Service):
         return {
             path: ServedFile(
                 partial(self._packed, kind),
-                flavour=ARDUPILOT,
+                packed=True,
                 write=partial(self._written, kind),
                 room=plan_files.size_of(MAX_ITEMS),
             )

@@ -7,7 +7,7 @@ sorts what arrives into them, and nothing else connects the two.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable, Coroutine, Hashable, Mapping, Sequence
+from collections.abc import Callable, Coroutine, Hashable, Mapping, Sequence
 from typing import Any, Protocol
 
 from anafi_mav.clock import Clock
@@ -15,7 +15,7 @@ from anafi_mav.drone import Drone
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
-from anafi_mav.services.commands import Command
+from anafi_mav.services.commands import Action, Command
 from anafi_mav.services.files import ServedFile
 from anafi_mav.services.flavours import Flavour
 from anafi_mav.services.memory import Memory
@@ -29,10 +29,6 @@ MessageHandler = Callable[[Inbound], None]
 
 Query = Callable[[Inbound, Command], int]
 """Answers a command at once, every time it comes; returns the MAV_RESULT."""
-
-Action = Callable[[Command], Awaitable[None]]
-"""Changes what the vehicle does. Executed once however often the command comes; returns when the drone confirmed, or
-raises an `AnafiMavError` that says why not."""
 
 Answer = dialect.MAVLink_message | Sequence[dialect.MAVLink_message] | int
 Request = Callable[[Inbound, Command], Answer]
@@ -115,7 +111,7 @@ class Service:
         return {}
 
     def actions(self) -> Mapping[int, Action]:
-        """By MAV_CMD."""
+        """The rows of the commands that change what the vehicle does, by MAV_CMD."""
         return {}
 
     def requests(self) -> Mapping[int, Request]:

@@ -9,22 +9,13 @@ import math
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.bounds import amsl_to_ato, check_estimate
-from anafi_mav.services.commands import Command
-from anafi_mav.services.flavours import ARDUPILOT
+from anafi_mav.services.commands import Altitude, Command
 from anafi_mav.services.place import Place
 from anafi_mav.services.refusal import Refused
 from anafi_mav.services.vehicle import Vehicle
 
 _AMSL_FRAMES = (None, dialect.MAV_FRAME_GLOBAL, dialect.MAV_FRAME_GLOBAL_INT)
 _RELATIVE_FRAMES = (dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT, dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
-
-ALWAYS_AMSL = (
-    dialect.MAV_CMD_DO_ORBIT,
-    dialect.MAV_CMD_DO_SET_HOME,
-    dialect.MAV_CMD_DO_SET_ROI_LOCATION,
-)
-"""Commands whose z is AMSL in the frames 3 and 6 too, in all flavours but ArduPilot's: MAVSDK sends AMSL there, as PX4
-takes it (conformance B1)."""
 
 
 class UnsupportedFrame(Refused):
@@ -41,16 +32,18 @@ def height(vehicle: Vehicle, command: Command, *, flown: bool = True) -> float |
     """
     if math.isnan(command.z):
         return None
-    return height_in_frame(vehicle, command.z, command.frame, amsl=is_amsl(command), flown=flown)
-
-
-def is_amsl(command: Command) -> bool:
-    """z is AMSL even where the frame says that it is relative."""
-    return command.id in ALWAYS_AMSL and command.flavour is not ARDUPILOT
+    altitude = command.definition.altitude
+    if altitude is Altitude.UNUSED:
+        raise ValueError(f"MAV_CMD {command.id}: its row says that it has no height")
+    amsl = altitude is Altitude.AMSL and command.flavour.relative_frames_are_amsl
+    return height_in_frame(vehicle, command.z, command.frame, amsl=amsl, flown=flown)
 
 
 def height_in_frame(vehicle: Vehicle, z: float, frame: int | None, *, amsl: bool = False, flown: bool = True) -> float:
-    """Height above take-off (m) of `z` in a MAV_FRAME (None: AMSL). Raises `Refused`, `UnsupportedFrame`."""
+    """Height above take-off (m) of `z` in a MAV_FRAME (None: AMSL). Raises `Refused`, `UnsupportedFrame`.
+
+    `amsl`: z is AMSL even where the frame says that it is relative.
+    """
     if not math.isfinite(z):
         raise Refused("Refused: the height is not a number", lasting=True)
     if frame in _AMSL_FRAMES or (amsl and frame in _RELATIVE_FRAMES):

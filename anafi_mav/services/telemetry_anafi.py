@@ -15,7 +15,6 @@ from anafi_mav.drone.controller import Controller
 from anafi_mav.drone.controller_state import MAX_AXIS
 from anafi_mav.drone.element import Range
 from anafi_mav.drone.home import Home
-from anafi_mav.drone.lens import INTRINSICS
 from anafi_mav.drone.piloting_state import REDUCERS as PILOTING
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.stream import Stream, Times
@@ -154,7 +153,7 @@ def controller_status(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message
 
 def camera_intrinsics(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
     """ANAFI_CAMERA_INTRINSICS; none for a model that nobody has measured."""
-    lens = INTRINSICS.get(vehicle.drone.identity.model.key)
+    lens = vehicle.drone.identity.model.lens
     if lens is None:
         return None
     return dialect.MAVLink_anafi_camera_intrinsics_message(

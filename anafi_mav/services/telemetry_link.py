@@ -12,7 +12,6 @@ from collections.abc import Mapping
 from anafi_mav import units
 from anafi_mav.drone.link import Link
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.flavours import ARDUPILOT
 from anafi_mav.services.stream import Stream, Times
 from anafi_mav.services.vehicle import Vehicle
 
@@ -20,27 +19,20 @@ UNKNOWN_U8 = 255
 UNUSED_CHANNEL = 0xFFFF
 
 BEST_QUALITY = 5
-PX4_FULL, ARDUPILOT_FULL = 100, 254
-"""RC_CHANNELS.rssi of a perfect link (conformance A6, F 134)."""
 
 
 def rc_channels(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
     """RC_CHANNELS for its rssi: the quality of the drone's radio, behind a Skycontroller. An ANAFI has no channels to
     show, and without sticks there is no radio of theirs: unknown."""
     quality = vehicle.drone.link.state.quality if vehicle.drone.controller.present else None
-    full = ARDUPILOT_FULL if times.flavour is ARDUPILOT else PX4_FULL
-    rssi = UNKNOWN_U8 if quality is None else round(full * quality / BEST_QUALITY)
+    rssi = UNKNOWN_U8 if quality is None else round(times.flavour.rssi_full * quality / BEST_QUALITY)
     channels = {f"chan{number}_raw": UNUSED_CHANNEL for number in range(1, 19)}
     return dialect.MAVLink_rc_channels_message(time_boot_ms=times.boot_ms, chancount=0, rssi=rssi, **channels)
 
 
 def _signal(dbm: int, times: Times) -> int:
-    """RADIO_STATUS.rssi of a signal strength, in the scale that the client reads.
-
-    QGroundControl takes the byte as a signed number of dBm (RadioStatusFactGroup.cc), ArduPilot's clients as a SiK
-    radio's register, 1.9 a dB above -127 dBm (Mission Planner CurrentState.cs).
-    """
-    if times.flavour is ARDUPILOT:
+    """RADIO_STATUS.rssi of a signal strength, in the scale that the client reads."""
+    if times.flavour.sik_radio:
         return units.saturate(units.clip(1.9 * (dbm + 127.0), 0.0, 254.0), 8, signed=False)
     return int(units.clip(dbm, -128, -2)) & 0xFF  # -1 would be MAVLink's "unknown"
 
@@ -55,7 +47,7 @@ def radio_status(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | No
     dbm = vehicle.drone.link.state.rssi_dbm
     if dbm is None or dbm >= 0:
         return None
-    unknown = UNKNOWN_U8 if times.flavour is ARDUPILOT else 0
+    unknown = UNKNOWN_U8 if times.flavour.sik_radio else 0
     return dialect.MAVLink_radio_status_message(_signal(dbm, times), unknown, 100, unknown, unknown, 0, 0)
 
 

@@ -28,7 +28,7 @@ from anafi_mav.sim.faults import Faults
 from anafi_mav.sim.firmware import Firmware, Identity
 from anafi_mav.sim.http import WebServer
 from anafi_mav.sim.log import Log, LogEntry
-from anafi_mav.sim.model import MODELS
+from anafi_mav.sim.model import model_of
 from anafi_mav.sim.motion import Pose
 from anafi_mav.sim.place import Origin
 from anafi_mav.sim.power import Battery
@@ -92,8 +92,7 @@ class DroneSpec:
     """Names of the `Quirk`s that its firmware has from the start."""
 
     def __post_init__(self) -> None:
-        if self.model not in MODELS:
-            raise ConfigError("model", f"expected one of {', '.join(MODELS)}, got {self.model!r}")
+        model = model_of(self.model)
         try:
             ipaddress.IPv4Address(self.address)
         except ValueError:
@@ -117,8 +116,9 @@ class DroneSpec:
             if self.skycontroller not in SKYCONTROLLERS:
                 expected = " or ".join(map(str, SKYCONTROLLERS))
                 raise ConfigError("skycontroller", f"expected {expected}, got {self.skycontroller}")
-            if self.model == "ai" and self.skycontroller == 3:
-                raise ConfigError("skycontroller", "expected another model than ai, which a Skycontroller 3 cannot fly")
+            if self.skycontroller not in model.record.skycontrollers:
+                problem = f"which a Skycontroller {self.skycontroller} cannot fly"
+                raise ConfigError("skycontroller", f"expected another model than {self.model}, {problem}")
         quirks.named(self.firmware_quirks, "firmware_quirk")
         if self.serial is not None and not 5 <= len(self.serial) <= 32:
             raise ConfigError("serial", f"expected 5 to 32 characters, got {self.serial!r}")
@@ -130,7 +130,7 @@ class SimulatedDrone:
     def __init__(
         self, spec: DroneSpec, body: Body, log: Log, clock: Callable[[], float], chance: random.Random, phase: float
     ) -> None:
-        model = MODELS[spec.model]
+        model = model_of(spec.model)
         serial = spec.serial or _serial(model.serial_prefix, spec.address)
         identity = Identity(
             serial=serial,

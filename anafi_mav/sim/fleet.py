@@ -12,7 +12,7 @@ from anafi_mav.errors import ConfigError
 from anafi_mav.sim.body import Body
 from anafi_mav.sim.drone import DroneSpec, SimulatedDrone
 from anafi_mav.sim.log import Log, LogFile
-from anafi_mav.sim.model import MODELS
+from anafi_mav.sim.model import model_of
 from anafi_mav.sim.motion import STEP, Motion
 from anafi_mav.sim.scenario import Scenario
 
@@ -57,7 +57,7 @@ class Simulator:
             raise ConfigError("drones", "expected at least one")
         self._period = TURN if all(spec.telemetry_rate <= 0.5 / TURN for spec in specs) else FAST_TURN
         self.speed = speed
-        self._motion = Motion([MODELS[spec.model].airframe for spec in specs])
+        self._motion = Motion([model_of(spec.model).airframe for spec in specs])
         self._file = None if log is None else LogFile(log)
         self._task: asyncio.Task[None] | None = None
         self.lost_time = 0.0

@@ -210,10 +210,6 @@ def _bare(blended: Lens) -> Lens:
     return replace(blended, id=1, model=Model.THERMAL, recordings=())
 
 
-LENSES: dict[str, tuple[Lens, ...]] = {
-    "4k": (_4K,),
-    "thermal": (_THERMAL, _bare(_THERMAL_BLENDED), _THERMAL_BLENDED),
-    "usa": (_USA, _bare(_USA_BLENDED), _USA_BLENDED),
-    "ai": (),
-}
-"""By model. The Ai's cameras speak another language (protobuf) and are not among them."""
+ANAFI_4K: tuple[Lens, ...] = (_4K,)
+THERMAL: tuple[Lens, ...] = (_THERMAL, _bare(_THERMAL_BLENDED), _THERMAL_BLENDED)
+USA: tuple[Lens, ...] = (_USA, _bare(_USA_BLENDED), _USA_BLENDED)

@@ -1,5 +1,6 @@
-"""What is known of an aircraft model, as data. A new model is a new entry of `MODELS`, never a subclass.
+"""How each model of the family flies and what it reports, as data. A new one is a new entry of `MODELS`, no subclass.
 
+What both sides of the wire know of it, by its data sheet, is the record of the same key in `anafi_mav.models`.
 Numbers of the airframe come from the table of the anafi_ros paper (size, speeds, battery, flight time); ranges of
 settings from Parrot's own events as anafi_ros and GroundSDK record them. Values that no public source gives are
 marked "assumed" where they stand.
@@ -9,7 +10,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from anafi_mav.sim.lenses import LENSES, Lens
+from anafi_mav import models
+from anafi_mav.errors import ConfigError
+from anafi_mav.models import Intrinsics, Payload
+from anafi_mav.sim import lenses
+from anafi_mav.sim.lenses import Lens
 
 
 @dataclass(frozen=True)
@@ -90,9 +95,7 @@ class Model:
     """One aircraft of the family."""
 
     name: str
-    """As on the command line: "4k"."""
-    product_id: int
-    """Parrot's id, as in the discovery answer."""
+    """As on the command line, the key of its record: "4k"."""
     title: str
     """First part of the name it gives itself."""
     serial_prefix: str
@@ -108,15 +111,48 @@ class Model:
     zoom_max: float
     lenses: tuple[Lens, ...] = ()
     """Cameras of feature camera (143); none: they are protobuf ones."""
-    thermal: bool = False
-    plan_version: int = 1
-    """1 or 2: which form of flight plan file it flies."""
     settings: dict[str, Range] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.name not in models.simulated():
+            raise ValueError(f"{self.name}: anafi_mav/models.py has no record that says `simulated=True`")
+        record = self.record
+        missing = [key for key in ("plan_figures", "lens") if getattr(record, key) is None]
+        if not record.protobuf and not self.lenses:
+            missing.append("lenses")
+        if missing:
+            raise ValueError(f"{self.name}: a simulated drone needs {' and '.join(missing)}")
+
+    @property
+    def record(self) -> models.Model:
+        """What is known of it apart from the simulation."""
+        return models.MODELS[self.name]
+
+    @property
+    def product_id(self) -> int:
+        """Parrot's id, as in the discovery answer."""
+        return self.record.id
+
+    @property
+    def plan_version(self) -> int:
+        """1 or 2: which form of flight plan file it flies."""
+        return self.record.plans().version
+
+    @property
+    def lens(self) -> Intrinsics:
+        """The lens of its main camera."""
+        assert self.record.lens is not None
+        return self.record.lens
+
+    @property
+    def thermal(self) -> bool:
+        """True for a drone with a thermal camera."""
+        return Payload.THERMAL in self.record.payloads
 
     @property
     def modern(self) -> bool:
-        """Whether it is of the generation that speaks protobuf."""
-        return not self.lenses
+        """True for the generation that speaks protobuf."""
+        return self.record.protobuf
 
 
 _SETTINGS = {
@@ -142,7 +178,6 @@ _ROLL = (-38.0, 38.0)
 MODELS: dict[str, Model] = {
     "4k": Model(
         name="4k",
-        product_id=0x0914,
         title="ANAFI",
         serial_prefix="PI040416DA9H",
         software="1.8.2",
@@ -153,12 +188,11 @@ MODELS: dict[str, Model] = {
         gimbals=(GimbalModel(pitch=(-90.0, 90.0), roll=_ROLL),),
         cards=(_CARD,),
         zoom_max=3.0,
-        lenses=LENSES["4k"],
+        lenses=lenses.ANAFI_4K,
         settings=_SETTINGS,
     ),
     "thermal": Model(
         name="thermal",
-        product_id=0x0919,
         title="ANAFI-Thermal",
         serial_prefix="PI040443AA9K",  # assumed, as those below
         software="1.8.2",
@@ -169,13 +203,11 @@ MODELS: dict[str, Model] = {
         gimbals=(GimbalModel(pitch=(-90.0, 90.0), roll=_ROLL),),
         cards=(_CARD,),
         zoom_max=3.0,
-        lenses=LENSES["thermal"],
-        thermal=True,
+        lenses=lenses.THERMAL,
         settings=_SETTINGS,
     ),
     "usa": Model(
         name="usa",
-        product_id=0x091E,
         title="ANAFI-USA",
         serial_prefix="PI040456AA0L",
         software="1.8.2",  # assumed
@@ -186,13 +218,11 @@ MODELS: dict[str, Model] = {
         gimbals=(GimbalModel(pitch=(-90.0, 90.0), roll=_ROLL),),
         cards=(_CARD,),
         zoom_max=32.0,
-        lenses=LENSES["usa"],
-        thermal=True,
+        lenses=lenses.USA,
         settings=_SETTINGS,
     ),
     "ai": Model(
         name="ai",
-        product_id=0x091A,
         title="ANAFI-Ai",
         serial_prefix="PI040455BA1B",
         software="7.7.0",
@@ -207,8 +237,16 @@ MODELS: dict[str, Model] = {
         ),
         cards=(Card("Internal", 8_000_000_000, removable=False), _CARD),
         zoom_max=6.0,
-        plan_version=2,
         settings=_SETTINGS,
     ),
 }
 """By name on the command line."""
+
+
+def model_of(name: str) -> Model:
+    """The figures of a model. Raises `ConfigError` for one that is not simulated."""
+    if name in MODELS:
+        return MODELS[name]
+    if name in models.simulated():
+        raise ConfigError("model", f"the simulator has no figures of {name!r}: anafi_mav/sim/model.py lacks its entry")
+    raise ConfigError("model", f"expected one of {', '.join(MODELS)}, got {name!r}")

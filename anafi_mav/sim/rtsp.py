@@ -26,7 +26,7 @@ from anafi_mav.sim.firmware import Firmware
 from anafi_mav.sim.h264 import FRAME_RATE
 from anafi_mav.sim.media import Kind
 from anafi_mav.sim.playback import Send, Track
-from anafi_mav.sim.video import STREAMS, Stream
+from anafi_mav.sim.video import Stream, streams_of
 
 SERVER = "Parrot Streaming Server"
 SESSION_TIMEOUT = 60
@@ -286,14 +286,14 @@ class VideoServer:
         url = rtsp.split_url(uri)
         path = "" if url is None else url[2].rstrip("/")
         if path == _LIVE or path.startswith(_LIVE + "/"):
-            return _Resource(_LIVE, STREAMS[self._firmware.model.name]), path[len(_LIVE) + 1 :]
+            return _Resource(_LIVE, streams_of(self._firmware.model)), path[len(_LIVE) + 1 :]
         id, _, control = path.removeprefix(_REPLAY).partition("/")
         store = self._firmware.payload.media
         recorded = store.resource(id) if path.startswith(_REPLAY) and store.indexed else None
         if recorded is None or recorded.kind is not Kind.MP4:
             raise _Refused(Status.NOT_FOUND)
         media = store.media(recorded.media_id)
-        streams = STREAMS[self._firmware.model.name]
+        streams = streams_of(self._firmware.model)
         thermal = media is not None and media.thermal
         return _Resource(_REPLAY + id, streams[-1:] if thermal else streams[:1], recorded.seconds), control
 

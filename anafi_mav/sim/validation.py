@@ -182,9 +182,8 @@ def climb_results(track: Track) -> Iterable[Result]:
     yield Result("climb in the end", _rest(climb), "m/s", "around 0", 0.0, 0.1)
 
 
-def yaw_results(track: Track, model: str) -> Iterable[Result]:
+def yaw_results(track: Track, delay: float) -> Iterable[Result]:
     rate, turned = track.yaw_rate(), track.turned()
-    delay = 0.2 if model == "ai" else 0.1
     yield Result("yaw: delay", passes(turned, 1.0), "s", f"about {delay:g}", delay - 0.05, delay + 0.07)
     fast = (at(turned, HOLD) - at(turned, HOLD - 1.0)) / 1.0
     yield Result("yaw: rate", fast, "deg/s", f"{SPIN:g}", SPIN - 5.0, SPIN + 5.0)

@@ -22,6 +22,7 @@ from anafi_mav.arsdk.video_metadata import (
     Vector3,
     WifiLink,
 )
+from anafi_mav.models import Payload
 from anafi_mav.sim.firmware import Firmware
 from anafi_mav.sim.h264 import pictures
 from anafi_mav.sim.model import Model
@@ -65,39 +66,26 @@ class Stream:
     intrinsics: Intrinsics | None = None
 
 
-def _classic(intrinsics: Intrinsics) -> Stream:
-    return Stream("DefaultVideo", "video", 1280, 720, default=True, intrinsics=intrinsics)
+def streams_of(model: Model) -> tuple[Stream, ...]:
+    """The streams of a model's cameras; the first is what who does not choose gets."""
+    lens = model.lens
+    intrinsics = Intrinsics((lens.cx, lens.cy), (lens.k1, lens.k2, lens.k3), (lens.p1, lens.p2))
+    title, control = ("Front camera", "front") if model.modern else ("DefaultVideo", "video")
+    return (
+        Stream(title, control, lens.width, lens.height, default=True, intrinsics=intrinsics),
+        *(_THERMAL if Payload.THERMAL in model.record.payloads else ()),
+        *(_STEREO if Payload.STEREO in model.record.payloads else ()),
+    )
 
 
 _THERMAL = (
     Stream("ParrotThermalVideo", "thermal", 960, 720, lens=1, spectrum="thermal"),
     Stream("ParrotThermalBlendedVideo", "thermal-blended", 960, 720, lens=2, spectrum="blended"),
 )
-
-STREAMS: dict[str, tuple[Stream, ...]] = {
-    "4k": (_classic(Intrinsics((642.81, 345.59), (0.028871, -0.024042, 0.0), (0.004109, 0.001563))),),
-    "thermal": (
-        _classic(Intrinsics((649.16, 365.35), (0.003086, 0.018344, 0.0), (0.000088, 0.004435))),
-        *_THERMAL,
-    ),
-    "usa": (
-        _classic(Intrinsics((646.77, 362.74), (0.006502, -0.012889, -0.01654), (-0.001738, 0.002491))),
-        *_THERMAL,
-    ),
-    "ai": (
-        Stream(
-            "Front camera",
-            "front",
-            1920,
-            1080,
-            default=True,
-            intrinsics=Intrinsics((997.28, 504.10), (0.05074, -0.046698, 0.0), (0.001345, 0.007041)),
-        ),
-        # The width of the stereo pictures' view is assumed.
-        Stream("Disparity map", "disparity", 176, 90, lens=None, gimbal=1, kind="disparity", hfov=110.0),
-    ),
-}
-"""By model; the first is what who does not choose gets."""
+_STEREO = (
+    # The width of the stereo pictures' view is assumed.
+    Stream("Disparity map", "disparity", 176, 90, lens=None, gimbal=1, kind="disparity", hfov=110.0),
+)
 
 
 def profile(model: Model) -> int:

@@ -10,6 +10,8 @@ from anafi_mav.mavlink.base import EndpointUrl
 from anafi_mav.mavlink.endpoint import SCHEMES, is_open_to_network, make_endpoint, parse_endpoint
 from anafi_mav.mavlink.node import Node
 
+FLAVOURS = ("px4", "ardupilot", "standard")
+
 
 @pytest.mark.parametrize(
     ("url", "scheme", "place", "number", "flavour"),
@@ -28,7 +30,7 @@ from anafi_mav.mavlink.node import Node
     ],
 )
 def test_good_urls(url: str, scheme: str, place: str, number: int, flavour: str | None) -> None:
-    assert parse_endpoint(url) == EndpointUrl(url, scheme, place, number, flavour)
+    assert parse_endpoint(url, FLAVOURS) == EndpointUrl(url, scheme, place, number, flavour)
 
 
 @pytest.mark.parametrize(
@@ -75,7 +77,7 @@ def test_good_urls(url: str, scheme: str, place: str, number: int, flavour: str 
 )
 def test_bad_urls(url: str, expected: str) -> None:
     with pytest.raises(ConfigError) as caught:
-        parse_endpoint(url)
+        parse_endpoint(url, FLAVOURS)
     assert caught.value.key_path == ""
     assert expected in caught.value.problem
     assert repr(url) in caught.value.problem
@@ -93,7 +95,7 @@ def test_bad_urls(url: str, expected: str) -> None:
 )
 @pytest.mark.parametrize("scheme", ["udpin", "udpout"])
 def test_udp_url_with_options_keeps_each(scheme: str, query: str, flavour: str | None, frames: str) -> None:
-    url = parse_endpoint(f"{scheme}://127.0.0.1:14550{query}")
+    url = parse_endpoint(f"{scheme}://127.0.0.1:14550{query}", FLAVOURS)
     assert (url.flavour, url.frames) == (flavour, frames)
 
 
@@ -131,14 +133,14 @@ async def test_closing_what_was_never_opened_does_no_harm() -> None:
     ],
 )
 def test_endpoint_is_open_to_the_network_when_it_listens_beyond_loopback(url: str, is_open: bool) -> None:
-    assert is_open_to_network(parse_endpoint(url)) is is_open
+    assert is_open_to_network(parse_endpoint(url, FLAVOURS)) is is_open
 
 
 @pytest.mark.parametrize(
     "url", ["tcpin://127.0.0.1:0?flavour=ardupilot", "udpin://127.0.0.1:0", "tcpin://127.0.0.1:00"]
 )
 async def test_endpoint_with_port_0_shows_its_real_port(url: str) -> None:
-    node = Node(clock=SystemClock())
+    node = Node(clock=SystemClock(), flavours=FLAVOURS)
     await node.start([url])
     (endpoint,) = node.endpoints
     port = endpoint.local_port

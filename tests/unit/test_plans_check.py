@@ -7,14 +7,15 @@ from pathlib import Path
 import pytest
 from plan_samples import LAT, LON, action, waypoint
 
+from anafi_mav.models import planned
 from anafi_mav.plans import files
 from anafi_mav.plans.check import Findings, Limits, Severity, check
-from anafi_mav.plans.models import MODELS
 from anafi_mav.plans.plan import GLOBAL, RELATIVE, Circle, Item, Plan, Point, Polygon
 from anafi_mav.sim.model import MODELS as SIMULATED
 
 MISSIONS = Path(__file__).parents[2] / "missions"
 HOME = Point(LAT, LON, 35.0)
+MODELS = planned()
 
 UP = Item(22, RELATIVE, (0.0, 0.0, 0.0, None, None, None, 20.0))
 BACK = action(20)
@@ -161,10 +162,11 @@ def test_the_samples_can_be_flown(path: Path, model: str) -> None:
 
 
 def test_the_figures_are_those_of_the_simulated_drones() -> None:
-    """Two tables of one paper: each room has its own."""
+    """Two tables of one paper: the simulator flies by its own."""
     assert set(MODELS) == set(SIMULATED)
     for name, model in MODELS.items():
         simulated = SIMULATED[name]
-        assert (model.version, model.max_speed) == (simulated.plan_version, simulated.airframe.max_speed)
-        assert model.flight_time == simulated.airframe.flight_time
-        assert model.ceiling == simulated.envelope.ceiling
+        figures = model.plans()
+        assert (figures.version, figures.max_speed) == (simulated.plan_version, simulated.airframe.max_speed)
+        assert figures.flight_time == simulated.airframe.flight_time
+        assert figures.ceiling == simulated.envelope.ceiling

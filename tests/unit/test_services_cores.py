@@ -9,10 +9,13 @@ import pytest
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.services import commands
+from anafi_mav.services.actions import flight_actions
 from anafi_mav.services.flavours import ARDUPILOT, PX4
+from anafi_mav.services.guided import GuidedService
 from anafi_mav.services.height import HeightReference, TakeoffRecord
 from anafi_mav.services.link_loss import GcsWatch
 from anafi_mav.services.modes import FlightMode
+from anafi_mav.services.modes_service import ModesService
 from anafi_mav.services.statustext import Severity, TextNumbers
 
 NAN = math.nan
@@ -230,8 +233,28 @@ def test_a_silence_on_the_ground_ends_the_latch() -> None:
     assert height.takeoff_amsl is None
 
 
-def command(id: int = 400, p1: float = 1.0) -> commands.Command:
-    return commands.Command(id, (p1, NAN, NAN, NAN), NAN, NAN, NAN, None)
+def named(id: int) -> commands.Definition:
+    """The row by which a system knows this MAV_CMD. Nothing is flown: no handler is called."""
+    nothing: Any = None
+    tables = (flight_actions(nothing), ModesService(nothing).actions(), GuidedService(nothing).actions())
+    return next(table[id] for table in tables if id in table)
+
+
+def command(id: int = dialect.MAV_CMD_COMPONENT_ARM_DISARM, p1: float = 1.0) -> commands.Command:
+    return commands.Command(id, named(id), (p1, NAN, NAN, NAN), NAN, NAN, NAN, None)
+
+
+MISSION_START = commands.Definition(
+    location=False,
+    altitude=commands.Altitude.UNUSED,
+    effect=commands.effect_of_mode,
+    mode=lambda command: FlightMode.MISSION,
+)
+
+
+def mode_command(id: int, *params: float) -> commands.Command:
+    definition = MISSION_START if id == dialect.MAV_CMD_MISSION_START else named(id)
+    return commands.Command(id, definition, (*params, *[NAN] * (4 - len(params))), NAN, NAN, NAN, None)
 
 
 def test_a_resent_command_is_known_while_it_runs_and_for_a_while_after_its_success() -> None:
@@ -257,7 +280,7 @@ def test_what_another_client_has_replaced_is_neither_flown_nor_confirmed_again()
     for client in ("a", "b"):
         execution = desk.begin(client, command())
         execution.result, execution.ended = dialect.MAV_RESULT_ACCEPTED, 0.0
-    stop = commands.Command(192, (NAN, NAN, NAN, NAN), NAN, NAN, NAN, None)
+    stop = command(dialect.MAV_CMD_DO_REPOSITION, NAN)
     stopped = desk.begin("c", stop)
     stopped.result, stopped.ended = dialect.MAV_RESULT_ACCEPTED, 0.0
     desk.supersede("b")
@@ -268,16 +291,16 @@ def test_what_another_client_has_replaced_is_neither_flown_nor_confirmed_again()
 
 def test_a_return_is_asked_for_anew_unless_another_client_has_taken_over() -> None:
     desk = commands.CommandDesk()
-    execution = desk.begin("a", command(id=20))
+    execution = desk.begin("a", command(dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH))
     execution.result, execution.ended = dialect.MAV_RESULT_ACCEPTED, 0.0
-    assert desk.retransmission("a", command(id=20), 1.0) is None
+    assert desk.retransmission("a", command(dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH), 1.0) is None
     desk.supersede("b")
-    assert desk.retransmission("a", command(id=20), 1.0) == dialect.MAV_RESULT_CANCELLED
+    assert desk.retransmission("a", command(dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH), 1.0) == dialect.MAV_RESULT_CANCELLED
 
 
 def test_offboard_that_has_ended_by_itself_is_entered_anew() -> None:
     desk = commands.CommandDesk()
-    offboard = commands.Command(176, (1.0, 6.0, 0.0, NAN), NAN, NAN, NAN, None)
+    offboard = mode_command(dialect.MAV_CMD_DO_SET_MODE, 1.0, 6.0, 0.0)
     execution = desk.begin("a", offboard)
     execution.result, execution.ended = dialect.MAV_RESULT_ACCEPTED, 0.0
     assert desk.retransmission("a", offboard, 1.0, FlightMode.OFFBOARD) == dialect.MAV_RESULT_ACCEPTED
@@ -289,9 +312,9 @@ def test_offboard_that_has_ended_by_itself_is_entered_anew() -> None:
 @pytest.mark.parametrize(
     "mission",
     [
-        commands.Command(300, (0.0, 0.0, NAN, NAN), NAN, NAN, NAN, None),
-        commands.Command(176, (1.0, 4.0, 4.0, NAN), NAN, NAN, NAN, None),
-        commands.Command(262, (6.0, NAN, NAN, NAN), NAN, NAN, NAN, None),
+        mode_command(dialect.MAV_CMD_MISSION_START, 0.0, 0.0),
+        mode_command(dialect.MAV_CMD_DO_SET_MODE, 1.0, 4.0, 4.0),
+        mode_command(dialect.MAV_CMD_DO_SET_STANDARD_MODE, 6.0),
     ],
 )
 def test_a_mission_that_is_not_flown_any_more_is_not_confirmed_again(mission: commands.Command) -> None:
@@ -309,7 +332,7 @@ def test_what_is_another_command() -> None:
     desk.begin("a", command())
     assert desk.retransmission("b", command(), 0.1) is None
     assert desk.retransmission("a", command(p1=0.0), 0.1) is None
-    assert desk.retransmission("a", command(id=22), 0.1) is None
+    assert desk.retransmission("a", command(dialect.MAV_CMD_NAV_TAKEOFF), 0.1) is None
     # arm, disarm, arm: the third is no repetition of the first
     desk.begin("a", command(p1=0.0))
     assert desk.retransmission("a", command(), 0.3) is None
@@ -326,32 +349,32 @@ def test_the_desk_remembers_a_bounded_number_of_clients() -> None:
 @pytest.mark.parametrize(
     ("id", "params", "place", "stops"),
     [
-        (192, (-1.0, 1.0, 0.0, NAN), (NAN, NAN, NAN), True),
-        (192, (-1.0, 1.0, 0.0, NAN), (NAN, NAN, 10.0), False),
-        (192, (-1.0, 1.0, 0.0, 0.0), (NAN, NAN, NAN), False),
-        (176, (1.0, 4.0, 3.0, NAN), (NAN, NAN, NAN), True),
-        (176, (1.0, 4.0, 5.0, NAN), (NAN, NAN, NAN), False),
-        (176, (1.0, 4.0, 6.0, NAN), (NAN, NAN, NAN), True),
-        (21, (NAN, NAN, NAN, NAN), (NAN, NAN, NAN), True),
-        (400, (0.0, NAN, NAN, NAN), (NAN, NAN, NAN), True),
-        (400, (1.0, NAN, NAN, NAN), (NAN, NAN, NAN), False),
-        (20, (NAN, NAN, NAN, NAN), (NAN, NAN, NAN), False),
+        (dialect.MAV_CMD_DO_REPOSITION, (-1.0, 1.0, 0.0, NAN), (NAN, NAN, NAN), True),
+        (dialect.MAV_CMD_DO_REPOSITION, (-1.0, 1.0, 0.0, NAN), (NAN, NAN, 10.0), False),
+        (dialect.MAV_CMD_DO_REPOSITION, (-1.0, 1.0, 0.0, 0.0), (NAN, NAN, NAN), False),
+        (dialect.MAV_CMD_DO_SET_MODE, (1.0, 4.0, 3.0, NAN), (NAN, NAN, NAN), True),
+        (dialect.MAV_CMD_DO_SET_MODE, (1.0, 4.0, 5.0, NAN), (NAN, NAN, NAN), False),
+        (dialect.MAV_CMD_DO_SET_MODE, (1.0, 4.0, 6.0, NAN), (NAN, NAN, NAN), True),
+        (dialect.MAV_CMD_NAV_LAND, (NAN, NAN, NAN, NAN), (NAN, NAN, NAN), True),
+        (dialect.MAV_CMD_COMPONENT_ARM_DISARM, (0.0, NAN, NAN, NAN), (NAN, NAN, NAN), True),
+        (dialect.MAV_CMD_COMPONENT_ARM_DISARM, (1.0, NAN, NAN, NAN), (NAN, NAN, NAN), False),
+        (dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH, (NAN, NAN, NAN, NAN), (NAN, NAN, NAN), False),
     ],
 )
 def test_orders_to_stop(id: int, params: Any, place: tuple[float, float, float], stops: bool) -> None:
-    assert commands.Command(id, params, *place, None).stops is stops
+    assert commands.Command(id, named(id), params, *place, None).effect.stops is stops
 
 
 def test_command_int_scales_places_only() -> None:
     def message(id: int, x: int, y: int) -> commands.Command:
-        return commands.from_int(dialect.MAVLink_command_int_message(1, 1, 5, id, 0, 0, 1, 2, 3, 4, x, y, 7))
+        return commands.from_int(dialect.MAVLink_command_int_message(1, 1, 5, id, 0, 0, 1, 2, 3, 4, x, y, 7), named(id))
 
-    goto = message(192, 488789000, -23677000)
+    goto = message(dialect.MAV_CMD_DO_REPOSITION, 488789000, -23677000)
     assert (goto.x, goto.y, goto.z, goto.frame) == (48.8789, -2.3677, 7, 5)
-    unset = message(192, 2**31 - 1, -(2**31))
+    unset = message(dialect.MAV_CMD_DO_REPOSITION, 2**31 - 1, -(2**31))
     assert math.isnan(unset.x)
     assert math.isnan(unset.y)
-    assert message(1000, 12, 0).x == 12
+    assert message(dialect.MAV_CMD_CONDITION_YAW, 12, 0).x == 12
 
 
 def test_a_ground_station_is_lost_once_for_each_silence() -> None:

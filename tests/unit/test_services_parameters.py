@@ -12,6 +12,7 @@ from MAVProxy.modules.lib.param_ftp import ftp_param_decode
 
 from anafi_mav.drone.battery import BatteryState
 from anafi_mav.mavlink.frames import pack
+from anafi_mav.models import MODELS, unknown
 from anafi_mav.services.flavours import ARDUPILOT, FLAVOURS, PX4
 from anafi_mav.services.parameter_codec import (
     HASH_NAME,
@@ -152,7 +153,7 @@ def test_the_tables_are_sound(flavour: object) -> None:
 
 
 def battery_parameters(model: str, state: BatteryState) -> dict[str, float]:
-    battery, identity = SimpleNamespace(state=state), SimpleNamespace(model=SimpleNamespace(key=model))
+    battery, identity = SimpleNamespace(state=state), SimpleNamespace(model=MODELS.get(model, unknown(0)))
     host: Any = SimpleNamespace(drone=SimpleNamespace(battery=battery, identity=identity))
     return {one.name: one.value(host) for one in SETUP_PX4 if one.name.startswith("BAT1_")}
 

@@ -61,7 +61,7 @@ def test_a_turn_is_counted_through() -> None:
     track = Track()
     track.attitude = [(n * 0.5, 0.0, 0.0, (n * math.pi / 2 + math.pi) % (2 * math.pi) - math.pi) for n in range(9)]
     assert [angle for _, angle in track.turned()] == pytest.approx([90.0 * n for n in range(9)])
-    results = by_name(yaw_results(track, "4k"))
+    results = by_name(yaw_results(track, 0.1))
     assert results["yaw: one turn"].measured == pytest.approx(2.0)
     assert results["yaw: rate"].measured == pytest.approx(180.0)
     assert not results["yaw: rate"].agrees  # 200 were asked for
@@ -152,7 +152,7 @@ def test_a_gimbal() -> None:
 
 
 def test_nothing_heard_does_not_agree() -> None:
-    results = [*tilt_results("roll", [], Track(), 10.0), *climb_results(Track()), *yaw_results(Track(), "ai")]
+    results = [*tilt_results("roll", [], Track(), 10.0), *climb_results(Track()), *yaw_results(Track(), 0.2)]
     assert not any(result.agrees for result in results)
 
 

@@ -29,11 +29,11 @@ from anafi_mav.errors import LocalProtocolError
 from anafi_mav.sim import optics, video
 from anafi_mav.sim.h264 import KEY_INTERVAL, Pictures, pictures
 from anafi_mav.sim.model import MODELS
-from anafi_mav.sim.video import STREAMS
+from anafi_mav.sim.video import streams_of
 
 
 def say(bench: Bench, stream: int = 0) -> FrameMetadata:
-    return video.metadata(bench.firmware, STREAMS[bench.firmware.model.name][stream])
+    return video.metadata(bench.firmware, streams_of(bench.firmware.model)[stream])
 
 
 # -- the picture
@@ -276,7 +276,7 @@ def test_every_step_has_a_number() -> None:
 def test_streams_have_the_names_that_olympe_asks_for(model: str) -> None:
     bench = Bench(model)
     text = format_description(
-        video.describe(bench.firmware, "127.0.0.1", "rtsp://127.0.0.1/live", "live", STREAMS[model])
+        video.describe(bench.firmware, "127.0.0.1", "rtsp://127.0.0.1/live", "live", streams_of(bench.firmware.model))
     )
     described = parse_description(text)
     assert described is not None
@@ -289,5 +289,5 @@ def test_streams_have_the_names_that_olympe_asks_for(model: str) -> None:
     assert described.attribute(MODEL_ID) == f"{MODELS[model].product_id:04x}"
     assert described.info == bench.firmware.identity.name
     assert [video.profile(MODELS[model])] == [PROTO_PROFILE if model == "ai" else V3_PROFILE]
-    for media, stream in zip(described.media, STREAMS[model], strict=True):
+    for media, stream in zip(described.media, streams_of(bench.firmware.model), strict=True):
         assert media.sps == pictures(stream.width, stream.height).sps
