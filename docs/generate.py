@@ -206,7 +206,8 @@ The interval of a stream is a lower bound: a message is sent when the drone has 
 A value that the drone has not reported is the field's "unknown". Enums keep Parrot's numbers. A later firmware may add
 numbers that are not listed.
 
-Python programs use the definitions of the package:
+Python programs use the definitions of the package, here with pymavlink, which this package does not install. The
+entries of `dialect.enums` have a name and `has_location`, but not pymavlink's descriptions:
 
 ```python
 from anafi_mav.mavlink import dialect
@@ -216,8 +217,9 @@ mavutil.mavlink = dialect
 connection = mavutil.mavlink_connection("udpin:127.0.0.1:14550", dialect=None)
 ```
 
-C programs include the headers that `python dialect/generate.py --c FOLDER` writes: `FOLDER/anafi/mavlink.h`. Other
-languages are made by pymavlink's `mavgen` from `dialect/anafi.xml` beside pymavlink's own definitions.
+C programs include the headers that `python dialect/generate.py --c FOLDER` writes (it needs pymavlink):
+`FOLDER/anafi/mavlink.h`. For other languages use pymavlink's `mavgen` with `dialect/anafi.xml` beside pymavlink's own
+definitions.
 
 | id | message | contents |
 |---|---|---|

@@ -27,7 +27,7 @@ clock.install()
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 
-pytest_plugins = ["support.repeats", "support.fuzz_seed"]
+pytest_plugins = ["support.order", "support.repeats", "support.fuzz_seed"]
 
 # Gateway, simulator and client share one event loop here: when it stalls, so does the Skycontroller that would be given
 # its axes back. Tests of the watchdog run the gateway as a process of its own.
@@ -44,12 +44,19 @@ HEAD = """\
 <!-- Made by `pytest tests/conformance tests/clients -m "not soak" --conformance=docs/conformance.md` from its results,
 with the combinations marked `full`. -->
 
-What a MAVLink client needs of a vehicle, item by item, shown over real sockets with a simulated drone behind the
-gateway and judged by the simulator's own log. The numbers are those of the tests' names, `test_conf_NNN`. A flavour is
-the autopilot that an endpoint shows its clients. A number is how many tests of this flavour have passed, a dash that
-the item does not concern it; items that do not depend on the flavour have one count. Times in an item are those of
-timers: most tests run on a clock that leaves out what client, gateway and simulated drone compute in their one process
-(`tests/support/clock.py`), which is what `tests/bench/` measures.
+For people who choose a client, or doubt an answer of the gateway. After reading you know what a client can rely on, and
+the test that shows it.
+
+Each item is shown over real sockets with a simulated drone behind the gateway, and judged by the simulator's own log.
+Its number is in the tests' names, `test_conf_NNN`. A flavour is the autopilot that an endpoint shows its clients.
+
+| cell | meaning |
+|---|---|
+| a number | so many tests of this flavour have passed; items that do not depend on the flavour have one count |
+| a dash | the item does not concern this flavour |
+
+Times in an item are those of timers. Most tests run on a clock that leaves out the computing time of client, gateway
+and simulated drone in their one process (`tests/support/clock.py`). `tests/bench/` measures that time.
 
 | | item | px4 | ardupilot | shown in |
 |---|---|---|---|---|

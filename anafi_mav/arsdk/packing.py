@@ -23,13 +23,18 @@ SMALLEST_COMMAND = 4
 """Bytes of a command without arguments."""
 
 _U16 = struct.Struct("<H")
+_SHORT = [encode_varint(length) for length in range(128)]
+"""Nearly every command is shorter than this."""
 
 
 def with_length(version: int, command: bytes) -> bytes:
     """A command as it lies in a payload."""
     if version == 1:
         return command
-    return (_U16.pack(len(command)) if version == 2 else encode_varint(len(command))) + command
+    length = len(command)
+    if version == 2:
+        return _U16.pack(length) + command
+    return (_SHORT[length] if length < len(_SHORT) else encode_varint(length)) + command
 
 
 def longest_command(version: int, acknowledged: bool) -> int:

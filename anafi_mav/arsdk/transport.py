@@ -187,6 +187,8 @@ class Transport:
         # The first frame has number 0 and must count as new, hence a wrap from the highest number.
         self._last_seq = dict.fromkeys(self._received_ids, self._seq_mask)
         self._unpacker = Unpacker(version)
+        self._longest = (longest_command(version, False), longest_command(version, True))
+        """Bytes of a command in the unacknowledged queue, and in an acknowledged one."""
         self._noack: deque[tuple[int, bytes]] = deque()
         self._noack_seq = -1
         self._queues = {id: _AckQueue(id) for id in (_ACK_ID[role], _LOW_PRIO_ID[role])}
@@ -301,7 +303,7 @@ class Transport:
         """
         data = wire.encode(message)
         buffer = message.BUFFER if isinstance(message, Message) else Buffer.ACK
-        longest = longest_command(self.version, buffer is not Buffer.NON_ACK)
+        longest = self._longest[buffer is not Buffer.NON_ACK]
         if len(data) > longest:
             raise LocalProtocolError(f"{type(message).__name__} has {len(data)} bytes, its queue takes {longest}")
         token = next(self._tokens)
@@ -412,15 +414,17 @@ class Transport:
         return datagrams
 
     def _next_noack(self) -> bytes:
-        payload = with_length(self.version, self._noack.popleft()[1])
-        self.counters["sent"] += 1
-        while self._noack and self.version > 1:
-            more = with_length(self.version, self._noack[0][1])
-            if len(payload) + len(more) > PACK_LIMIT[self.version]:
+        version, queue = self.version, self._noack
+        payload = with_length(version, queue.popleft()[1])
+        sent, limit = 1, PACK_LIMIT[version]
+        while queue and version > 1:
+            more = with_length(version, queue[0][1])
+            if len(payload) + len(more) > limit:
                 break
             payload += more
-            self._noack.popleft()
-            self.counters["sent"] += 1
+            queue.popleft()
+            sent += 1
+        self.counters["sent"] += sent
         self._noack_seq = (self._noack_seq + 1) & self._seq_mask
         return encode_frame(self.version, _NOACK, _NOACK_ID[self.role], self._noack_seq, payload)
 

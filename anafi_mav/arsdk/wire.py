@@ -226,7 +226,7 @@ class _Codec:
         return (self.message,)
 
     def encode(self, message: Message) -> bytes:
-        values = [getattr(message, name) for name in message.__struct_fields__]
+        values = msgspec.structs.astuple(message)
         try:
             if self._struct is not None:
                 return self._header + self._struct.pack(*values)

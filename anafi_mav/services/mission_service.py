@@ -13,7 +13,7 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import Action, Altitude, Command, Effect, effect_of_mode
-from anafi_mav.services.flavours import flavour_of
+from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.mission_kind import FIRST_LABEL, offset
 from anafi_mav.services.mission_progress import MAVLINK_STATES, State
 from anafi_mav.services.mission_record import Record
@@ -55,8 +55,8 @@ class MissionService(Service):
         self._flight.keeper.write = self._remember
         self._saved = -math.inf
         self._unsaved = False
-        self._sent: tuple[object, ...] | None = None
-        """What the last MISSION_CURRENT of ours said; None: the next one leaves whatever it says."""
+        self._sent: Mapping[bool, tuple[int, ...]] = {}
+        """What `_fields` was when MISSION_CURRENT last announced a change; empty: the next one leaves anyway."""
         self._sent_item: int | None = None
 
     def messages(self) -> Mapping[int, MessageHandler]:
@@ -85,10 +85,10 @@ class MissionService(Service):
         record = Record.read(kept, self._flight.progress.items)
         if kept is not None and record is None:
             self.host.text(Severity.WARNING, f"flown mission in {memory.path}: ignored, it is not of the mission there")
-        self._sent = self._sent_item = None
         self._flight.link_up(record)
 
     def link_down(self) -> None:
+        self._sent_item = None
         self._flight.link_down()  # before anybody is told that something has ended: the drone may fly on
 
     def subscriptions(self) -> Subscriptions:
@@ -116,7 +116,7 @@ class MissionService(Service):
         item, anew = command.params[:2]
         flight = self._flight
         await flight.storing.over()
-        self._sent = None
+        self._sent = {}
         if not flight.there:
             raise Refused("Current item refused: there is no mission", lasting=True)
         if math.isinf(item) or (not math.isnan(item) and item != int(item)):
@@ -130,46 +130,35 @@ class MissionService(Service):
     def _set_current(self, inbound: Inbound) -> None:
         """MISSION_SET_CURRENT: MISSION_CURRENT answers it, or a text."""
         client = client_of(inbound)
-        self._sent = None
+        self._sent = {}
         self.host.run_action(client, self._flight.choose(client, _ours(inbound.message.seq, client)))
 
     # What is told.
 
     def _current(self, vehicle: Vehicle, times: Times) -> dialect.MAVLink_message:
-        """MISSION_CURRENT."""
-        progress, ids = vehicle.mission.progress, vehicle.plan_ids
-        there = progress.state is not State.NONE
-        # ArduPilot is at home, its item 0, until the mission begins or a client sets another one.
-        at_home = times.flavour.zero_home and progress.is_untouched
-        mode = IN_MISSION_MODE if vehicle.mode is FlightMode.MISSION else NOT_IN_MISSION_MODE
-        return dialect.MAVLink_mission_current_message(
-            progress.current + offset(times.flavour) if there and not at_home else 0,
-            len(progress.items) if there else NO_TOTAL,
-            MAVLINK_STATES[progress.state],
-            mode if there else 0,
-            ids.get(dialect.MAV_MISSION_TYPE_MISSION, 0),
-            ids.get(dialect.MAV_MISSION_TYPE_FENCE, 0),
-            ids.get(dialect.MAV_MISSION_TYPE_RALLY, 0),
-        )
+        return dialect.MAVLink_mission_current_message(*_fields(vehicle)[times.flavour.zero_home])
 
     def _tell(self) -> None:
-        """MISSION_CURRENT, when it says something else than the last one; then, for a new item, a HEARTBEAT.
+        """Send MISSION_CURRENT to the clients for whom a field has changed; then, for a new item, a HEARTBEAT.
 
         QGroundControl takes an item for flown to when a HEARTBEAT in mode Mission follows it
         (MissionManager::_handleHeartbeat). Without one it offers to resume a mission that is complete.
         """
-        vehicle, times = self.host.vehicle, self.host.times()
-        progress, ids = vehicle.mission.progress, vehicle.plan_ids
-        in_mission = vehicle.mode is FlightMode.MISSION
-        said = progress.state, progress.current, progress.is_untouched, len(progress.items), in_mission
-        state = (*said, *sorted(ids.items()))
-        if state == self._sent:
+        vehicle = self.host.vehicle
+        fields, before = _fields(vehicle), self._sent
+        if fields == before:
             return
-        self._sent = state
-        self.host.send_by_flavour(lambda flavour: self._current(vehicle, times.for_flavour(flavour)))
-        if in_mission and progress.current != self._sent_item:
+        self._sent = fields
+
+        def changed(flavour: Flavour) -> dialect.MAVLink_message | None:
+            its = fields[flavour.zero_home]
+            return None if its == before.get(flavour.zero_home) else dialect.MAVLink_mission_current_message(*its)
+
+        self.host.send_by_flavour(changed)
+        current = vehicle.mission.progress.current
+        if vehicle.mode is FlightMode.MISSION and current != self._sent_item:
             self.host.send_heartbeat()
-        self._sent_item = progress.current
+        self._sent_item = current
 
     def _tell_reached(self, item: int) -> None:
         self.host.send_by_flavour(lambda flavour: dialect.MAVLink_mission_item_reached_message(item + offset(flavour)))
@@ -195,6 +184,24 @@ class MissionService(Service):
     async def _save(self) -> None:
         if (problem := await self.host.memory.save()) is not None:
             self.host.warn_throttled(problem)
+
+
+def _fields(vehicle: Vehicle) -> Mapping[bool, tuple[int, ...]]:
+    """Return the fields of MISSION_CURRENT by `Flavour.zero_home` of its receivers."""
+    progress, ids = vehicle.mission.progress, vehicle.plan_ids
+    there = progress.state is not State.NONE
+    mode = IN_MISSION_MODE if vehicle.mode is FlightMode.MISSION else NOT_IN_MISSION_MODE
+    same = (
+        len(progress.items) if there else NO_TOTAL,
+        MAVLINK_STATES[progress.state],
+        mode if there else 0,
+        ids.get(dialect.MAV_MISSION_TYPE_MISSION, 0),
+        ids.get(dialect.MAV_MISSION_TYPE_FENCE, 0),
+        ids.get(dialect.MAV_MISSION_TYPE_RALLY, 0),
+    )
+    # ArduPilot is at home, its item 0, until the mission begins or a client sets another one.
+    behind_home = progress.current + 1 if there and not progress.is_untouched else 0
+    return {False: (progress.current if there else 0, *same), True: (behind_home, *same)}
 
 
 def _first_number(client: Hashable) -> int:

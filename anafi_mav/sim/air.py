@@ -6,7 +6,7 @@ import random
 from collections.abc import Callable
 from typing import Any
 
-from anafi_mav.sim.faults import Faults, Impairment
+from anafi_mav.sim.faults import CLEAR, Faults, Impairment
 
 HELD = 0.1
 """s at most that a datagram waits for the next one to overtake it."""
@@ -34,7 +34,7 @@ class Air:
         faults = self._faults
         impairment = faults.up if inbound else faults.down
         held = self._held.pop(inbound, None)
-        if impairment.clear:
+        if impairment is CLEAR or impairment.clear:
             deliver(data)
         elif self._chance.random() >= impairment.loss:
             copies = 2 if self._chance.random() < impairment.duplicate else 1

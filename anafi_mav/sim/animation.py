@@ -75,6 +75,8 @@ class Animations:
         self._missing = _bits(Indicator.DRONE_FLYING)
         self._aimed = False
         """There is something to fly around."""
+        self._sensed: tuple[bool, ...] = ()
+        """What `sensors` was last called with."""
 
     @property
     def running(self) -> bool:
@@ -199,6 +201,10 @@ class Animations:
 
     def sensors(self, fix: bool, magneto: bool, guided: bool, free: bool, target: bool) -> None:
         """What figures need: `guided`, a drone in the air that takes commands; `free`, nothing else flies it."""
+        sensed = (fix, magneto, guided, free, target)
+        if sensed == self._sensed:
+            return
+        self._sensed = sensed
         needs = {
             Indicator.DRONE_GPS: fix,
             Indicator.DRONE_MAGNETO: magneto,

@@ -129,3 +129,4 @@ class Body:
         motion.position[:, i] = north, east, 0.0
         motion.velocity[:, i] = 0.0
         motion.yaw[i] = yaw
+        motion.stale = True

@@ -350,16 +350,18 @@ class SimulatedDrone:
             self._boot()
         if elapsed and (self.wind.spec is not CALM or self._body.windy):
             self._body.blow(*self.wind.advance(elapsed))
-        session = self._session
         if self.skycontroller is not None:
             self.skycontroller.tick(now)
-        if session is not None and self._in_reach:
+        session = self._session
+        if session is not None and now >= self._telemetry.next and self._in_reach:
+            untold = self.faults.untold
             for message in self._telemetry.due(now):
-                if not self._unreported(message):
+                if message.NAME not in untold:
                     session.send(message)
         if now >= self._next_pose:
             self._next_pose = max(self._next_pose + POSE_PERIOD, now)
-            self._log_pose(now, pose)
+            if self.log.used:
+                self._log_pose(now, pose)
 
     def _log_pose(self, now: float, pose: Pose) -> None:
         latitude, longitude = self.firmware.place()

@@ -159,14 +159,14 @@ class Simulator:
             self._turn(now, 1)
 
     def _turn(self, now: float, steps: int) -> None:
-        motion = self._motion
+        motion, scenarios = self._motion, self._scenarios
         for _ in range(steps):
             motion.step()
         elapsed = steps * STEP
         turns = zip(self.drones, motion.poses(), motion.arrived(), motion.still(), strict=True)
         for drone, pose, arrived, still in turns:
             drone.tick(now, elapsed, pose, arrived, still)
-            if (scenario := self._scenarios.get(drone.address)) is not None:
+            if scenarios and (scenario := scenarios.get(drone.address)) is not None:
                 scenario.tick(drone)
         if self._file is not None:
             self._file.flush()

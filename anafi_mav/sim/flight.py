@@ -166,14 +166,14 @@ class Flight:
 
     def blockers(self) -> frozenset[TakeoffChecklistType]:
         """What a take-off would be refused for."""
-        found = set(self.faults.refuse_take_off)
+        found = self.faults.refuse_take_off
         if self.warnings.motors:
-            found.add(TakeoffChecklistType.MOTOR_DOWN)
+            found = found | {TakeoffChecklistType.MOTOR_DOWN}
         if self.compass.required:
-            found.add(TakeoffChecklistType.MAGNETO_CALIBRATION)
+            found = found | {TakeoffChecklistType.MAGNETO_CALIBRATION}
         if self.battery.percent <= power.CRITICAL:
-            found.add(TakeoffChecklistType.BATTERY_CRITICAL)
-        return frozenset(found)
+            found = found | {TakeoffChecklistType.BATTERY_CRITICAL}
+        return found
 
     def flights_report(self) -> Message:
         return ardrone3.MotorFlightsStatusChanged(self._flights, round(self._last_flight), round(self._flown))
@@ -306,7 +306,8 @@ class Flight:
         # A drone that hovers stays HOVERING while a gust shakes it, but not while it is carried off.
         moving = math.hypot(self.pose.ground_speed, self.pose.vd) > STRAY if hovering else not still
         busy = self.guidance.busy or self.flight_plan.playing or self.animations.running or self.follow.flies
-        self._fire(Event.BUSY if busy or moving else Event.AT_REST)
+        if (self.state is FlyingState.HOVERING) == (busy or moving):  # else the event does not count
+            self._fire(Event.BUSY if busy or moving else Event.AT_REST)
 
     def _update_sensors(self, elapsed: float) -> None:
         for message in self.battery.drain(elapsed, self.state in AIRBORNE, self.faults.battery):
@@ -332,9 +333,10 @@ class Flight:
             self._alert = self.alert
             self._emit(ardrone3.AlertStateChanged(self._alert))
         blockers = self.blockers()
-        for check in sorted(blockers ^ self._blockers):
-            self._emit(check_changed(check, check in blockers))
-        self._blockers = blockers
+        if blockers != self._blockers:
+            for check in sorted(blockers ^ self._blockers):
+                self._emit(check_changed(check, check in blockers))
+            self._blockers = blockers
         self._mind_the_battery()
 
     def _tell_readiness(self) -> None:

@@ -75,6 +75,24 @@ class _Fix:
         return math.hypot(self.vn, self.ve)
 
 
+class _Conditions(NamedTuple):
+    """What following depends on."""
+
+    fix: bool
+    calibrated: bool
+    guided: bool
+    high: bool
+    by_controller: bool
+    satellite: bool
+    """The target's own place is known."""
+    picture: bool
+    """The target is seen."""
+    barometer: bool
+    too_near: bool
+    too_far: bool
+    too_fast: bool
+
+
 class _Vector(NamedTuple):
     """From the target to the drone: m, rad above the horizon, rad from north (RELATIVE: from where it goes)."""
 
@@ -118,6 +136,8 @@ class FollowMe:
         self._course = 0.0
         self._next = 0.0
         self._infos: dict[Mode, tuple[int, int]] = dict.fromkeys(MODES, (0, 0))
+        self._conditions: _Conditions | None = None
+        """Those that `_infos` is of."""
         self._valid = False
         self._time = 0.0
         self._pose: Pose | None = None
@@ -229,35 +249,33 @@ class FollowMe:
         self._time, self._pose, self._guided = time, pose, guided
         if not guided:
             self.stop()
-        for mode in MODES:
-            info = self._info(mode, fix, calibrated, pose, time)
-            if info != self._infos[mode]:
-                self._infos[mode] = info
-                self._emit(follow_me.ModeInfo(mode, *info))
+        conditions = self._look(fix, calibrated, pose, time)
+        if conditions != self._conditions:
+            self._conditions = conditions
+            for mode in MODES:
+                info = _info(mode, conditions)
+                if info != self._infos[mode]:
+                    self._infos[mode] = info
+                    self._emit(follow_me.ModeInfo(mode, *info))
         for message in (*self._judge_controller(), *self._judge()):
             self._emit(message)
 
-    def _info(self, mode: Mode, fix: bool, calibrated: bool, pose: Pose, time: float) -> tuple[int, int]:
-        """What is there and what would be welcome: bits that are set are fine (followme.xml mode_info)."""
+    def _look(self, fix: bool, calibrated: bool, pose: Pose, time: float) -> _Conditions:
         target = self._target(time)
         away = None if target is None else pose.bearing(*target.at(time)[:2])[1]
-        satellite, picture = Input.TARGET_GPS_GOOD_ACCURACY, Input.IMAGE_DETECTION
-        needed, welcome = (satellite, picture) if self._by_controller else (picture, satellite)
-        has = {satellite: self._has_controller(time), picture: self._sees(time)}
-        missing = {
-            Input.DRONE_CALIBRATED: not calibrated,
-            Input.DRONE_GPS_GOOD_ACCURACY: not fix,
-            Input.DRONE_HIGH_ENOUGH: not self._guided or (mode is not Mode.LOOK_AT and pose.up < HIGH),
-            Input.DRONE_FAR_ENOUGH: mode is not Mode.LOOK_AT and away is not None and away < FAR,
-            needed: not has[needed],
-        }
-        better = {
-            Input.TARGET_BAROMETER_OK: time - self._barometer_at > FRESH,
-            Input.DRONE_CLOSE_ENOUGH: away is not None and away > NEAR,
-            Input.TARGET_GOOD_SPEED: target is not None and target.speed > FAST,
-            welcome: not has[welcome],
-        }
-        return _ok(missing), _ok(better)
+        return _Conditions(
+            fix=fix,
+            calibrated=calibrated,
+            guided=self._guided,
+            high=pose.up >= HIGH,
+            by_controller=self._by_controller,
+            satellite=self._has_controller(time),
+            picture=self._sees(time),
+            barometer=time - self._barometer_at <= FRESH,
+            too_near=away is not None and away < FAR,
+            too_far=away is not None and away > NEAR,
+            too_fast=target is not None and target.speed > FAST,
+        )
 
     def _judge_controller(self) -> list[Message]:
         valid = self._has_controller(self._time)
@@ -387,6 +405,27 @@ class FollowMe:
             controller_info.Capabilities(1 << controller_info.SupportedCommand.GPS),
             controller_info.ValidityFromDrone(int(self._valid)),
         ]
+
+
+def _info(mode: Mode, now: _Conditions) -> tuple[int, int]:
+    """What is there and what would be welcome: bits that are set are fine (followme.xml mode_info)."""
+    satellite, picture = Input.TARGET_GPS_GOOD_ACCURACY, Input.IMAGE_DETECTION
+    needed, welcome = (satellite, picture) if now.by_controller else (picture, satellite)
+    has = {satellite: now.satellite, picture: now.picture}
+    missing = {
+        Input.DRONE_CALIBRATED: not now.calibrated,
+        Input.DRONE_GPS_GOOD_ACCURACY: not now.fix,
+        Input.DRONE_HIGH_ENOUGH: not now.guided or (mode is not Mode.LOOK_AT and not now.high),
+        Input.DRONE_FAR_ENOUGH: mode is not Mode.LOOK_AT and now.too_near,
+        needed: not has[needed],
+    }
+    better = {
+        Input.TARGET_BAROMETER_OK: not now.barometer,
+        Input.DRONE_CLOSE_ENOUGH: now.too_far,
+        Input.TARGET_GOOD_SPEED: now.too_fast,
+        welcome: not has[welcome],
+    }
+    return _ok(missing), _ok(better)
 
 
 def _ok(missing: dict[Input, bool]) -> int:

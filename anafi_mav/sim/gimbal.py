@@ -45,6 +45,11 @@ class _AxisState:
     def fixed(self) -> bool:
         return (self.low, self.high) == _FIXED
 
+    @property
+    def turns(self) -> bool:
+        """It can turn and is not where it is to be."""
+        return (self.rate is not None or self.angle != self.target) and not self.fixed
+
     def advance(self, seconds: float, speed: float) -> None:
         target, reach = self.target, speed * seconds
         if self.rate is not None:
@@ -99,7 +104,7 @@ class Gimbal:
     def advance(self, seconds: float) -> None:
         """Turn for so long."""
         for axis in self._axes.values():
-            if not axis.fixed:
+            if axis.turns:
                 axis.advance(seconds, self._speed)
 
     def tick(self, time: float) -> list[Message]:
@@ -165,14 +170,15 @@ class Gimbal:
     # -- reports
 
     def attitude(self, pose: Pose) -> gimbal.Attitude:
-        body = _body(pose)
-        both = {axis: state.both(body[axis]) for axis, state in self._axes.items()}
-        yaw, pitch, roll = both[Axis.YAW], both[Axis.PITCH], both[Axis.ROLL]
+        yaw_axis, pitch_axis, roll_axis = self._axes.values()
+        yaw = yaw_axis.both(pose.yaw * DEG_PER_RAD)
+        pitch = pitch_axis.both(pose.pitch * DEG_PER_RAD)
+        roll = roll_axis.both(pose.roll * DEG_PER_RAD)
         return gimbal.Attitude(
             self.id,
-            self._axes[Axis.YAW].frame,
-            self._axes[Axis.PITCH].frame,
-            self._axes[Axis.ROLL].frame,
+            yaw_axis.frame,
+            pitch_axis.frame,
+            roll_axis.frame,
             _wrap(yaw[0]),
             pitch[0],
             roll[0],

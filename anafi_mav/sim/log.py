@@ -65,6 +65,11 @@ class Log:
         self._file = file
         self._waiting: list[tuple[Callable[[LogEntry], bool], asyncio.Future[LogEntry]]] = []
 
+    @property
+    def used(self) -> bool:
+        """False when an entry would be kept nowhere and awaited by nothing: it need not be made."""
+        return bool(self._entries.maxlen or self._file is not None or self._waiting)
+
     def __len__(self) -> int:
         return len(self._entries)
 
@@ -79,6 +84,8 @@ class Log:
         return [e for e in self._entries if e.kind == kind and e.t >= since and e.name.endswith(name)]
 
     def add(self, now: float, kind: str, name: str, args: dict[str, Any]) -> None:
+        if not self.used:
+            return
         entry = LogEntry(now, self._drone, kind, name, args)
         self._entries.append(entry)
         if self._file is not None:
@@ -90,6 +97,8 @@ class Log:
 
     def add_message(self, now: float, kind: str, message: Message | UnknownMessage) -> None:
         """A message under Parrot's name with Parrot's arguments; in the file enums are numbers."""
+        if not self.used:
+            return
         if isinstance(message, UnknownMessage):
             self.add(now, kind, str(message.id), {"payload": message.payload.hex()})
         else:

@@ -240,12 +240,14 @@ class Motion:
         self._orders = _Orders(self)
         self.stale = False
         """Somebody was told something: the orders must be worked out anew."""
+        self._poses: list[Pose] | None = None
+        """None: a drone has moved since they were made."""
         self.yaw_line = DelayLine([frame.yaw_delay for frame in airframes], STEP)
         self.climb_line = DelayLine([frame.climb_delay for frame in airframes], STEP)
 
     def _current_orders(self) -> _Orders:
         if self.stale:
-            self._orders, self.stale = _Orders(self), False
+            self._orders, self.stale, self._poses = _Orders(self), False, None
         return self._orders
 
     def step(self) -> None:
@@ -253,6 +255,7 @@ class Motion:
         orders = self._current_orders()
         if not orders.any:
             return
+        self._poses = None
         velocity = self.velocity
         horizontal = velocity[:2]
         up = -self.position[2]
@@ -434,9 +437,11 @@ class Motion:
 
     def poses(self) -> list[Pose]:
         """Every drone's pose, in the order of the airframes."""
-        columns = np.concatenate((self.position, self.tilt, [self.yaw], self.velocity))
-        columns[2] = 0.0 - columns[2]  # not -0.0 for a drone on the ground
-        return [
-            Pose(n, e, up, roll, pitch, wrap_pi(yaw), vn, ve, vd)
-            for n, e, up, roll, pitch, yaw, vn, ve, vd in columns.T.tolist()
-        ]
+        if self._poses is None or self.stale:
+            columns = np.concatenate((self.position, self.tilt, [self.yaw], self.velocity))
+            columns[2] = 0.0 - columns[2]  # not -0.0 for a drone on the ground
+            self._poses = [
+                Pose(n, e, up, roll, pitch, wrap_pi(yaw), vn, ve, vd)
+                for n, e, up, roll, pitch, yaw, vn, ve, vd in columns.T.tolist()
+            ]
+        return self._poses

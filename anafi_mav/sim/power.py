@@ -61,11 +61,12 @@ class Battery:
         self.charge = max(0.0, self.charge - seconds * share * 100.0 / self._model.airframe.flight_time)
         if forced is not None:
             self.charge = float(min(max(forced, 0), 100))
-        if self.percent == self._reported:
+        percent = self.percent
+        if percent == self._reported:
             return []
         before = _level(self._reported)
-        self._reported = self.percent
-        messages: list[Message] = [common.BatteryStateChanged(self.percent)]
+        self._reported = percent
+        messages: list[Message] = [common.BatteryStateChanged(percent)]
         if self.level is not before:
             messages.append(self._alert_message())
         return messages

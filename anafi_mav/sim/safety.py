@@ -43,18 +43,19 @@ class Alarms:
     """Which alarms sound."""
 
     def __init__(self) -> None:
-        self._on: set[Type] = set()
+        self._on = 0
+        """Bits by type."""
 
     def set(self, type: Type, on: bool) -> list[Message]:
         """The event of a change; nothing when it was so before."""
-        if on == (type in self._on):
+        if on == bool(self._on >> type & 1):
             return []
-        (self._on.add if on else self._on.discard)(type)
+        self._on ^= 1 << type
         return [alarms.Alarms(type, _state(on), 0)]
 
     def report(self) -> list[Message]:
         return [
-            alarms.Alarms(type, _state(type in self._on), _flags(index, len(ALARMS)))
+            alarms.Alarms(type, _state(bool(self._on >> type & 1)), _flags(index, len(ALARMS)))
             for index, type in enumerate(ALARMS)
         ]
 

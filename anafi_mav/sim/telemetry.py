@@ -24,9 +24,13 @@ class Telemetry:
         self._motion = _Period(1.0 / rate, phase)
         self._gimbal = _Period(1.0 / max(rate, RATE), phase)
         self._position = _Period(1.0, phase)
+        self.next = 0.0
+        """When `due` has something to do: before that it returns nothing."""
 
     def due(self, now: float) -> list[Message]:
         """The messages to send now."""
+        if now < self.next:
+            return []
         firmware = self._firmware
         messages: list[Message] = []
         if self._motion.due(now):
@@ -41,23 +45,24 @@ class Telemetry:
             if Quirk.GPS_LOCATION_STOPS not in firmware.faults.quirks:
                 messages += firmware.position_report()
             messages.append(firmware.battery.voltage())
+        self.next = min(self._motion.next, self._gimbal.next, self._position.next)
         return messages
 
 
 class _Period:
     def __init__(self, period: float, phase: float) -> None:
         self._period = period
-        self._next = 0.0
+        self.next = 0.0
         self._phase = phase
 
     def due(self, now: float) -> bool:
-        if now < self._next:
+        if now < self.next:
             return False
-        if self._next == 0.0:
-            self._next = now + self._phase * self._period
+        if self.next == 0.0:
+            self.next = now + self._phase * self._period
             return False
         # One period on; after a pause the rhythm starts anew instead of catching up.
-        self._next += self._period
-        if self._next < now:
-            self._next = now + self._period
+        self.next += self._period
+        if self.next < now:
+            self.next = now + self._period
         return True

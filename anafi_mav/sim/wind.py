@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import random
 from dataclasses import dataclass
+from functools import cached_property
 
 from anafi_mav.arsdk.messages.ardrone3 import WarningLevel
 from anafi_mav.errors import ConfigError
@@ -51,7 +52,7 @@ class WindSpec:
         if not 0.0 <= self.gusts <= 1.0:
             raise ConfigError("gusts", f"expected a share of the speed from 0 to 1, got {self.gusts:g}")
 
-    @property
+    @cached_property
     def steady(self) -> tuple[float, float]:
         """Velocity of the air towards (north, east), m/s."""
         angle = self.direction * RAD_PER_DEG
@@ -93,6 +94,8 @@ class WindWatch:
 
     def feel(self, speed: float, seconds: float) -> WarningLevel:
         """It blew with `speed` m/s for so long."""
+        if speed == self._mean == 0.0:
+            return WarningLevel.OK
         self._mean += (speed - self._mean) * (1.0 - math.exp(-seconds / _SMOOTHING))
         found = WarningLevel.OK
         for level, threshold in self._thresholds.items():

@@ -1,4 +1,4 @@
-"""Flights of MAVSDK's example programs, the same calls in the same order: python mavsdk_examples.py URL PACE.
+"""Flights of MAVSDK's example programs, the same calls in the same order: python mavsdk_examples.py URL PACE NAME ...
 
 Each begins on the ground and arms by itself; five of them engage Offboard there. The examples' waits are `PACE` times
 shorter. Where an example leaves the drone in the air, it is landed afterwards. A line before and after each.
@@ -188,7 +188,7 @@ EXAMPLES = (
 )
 
 
-async def main(url: str, pace: float) -> None:
+async def main(url: str, pace: float, names: Sequence[str]) -> None:
     async with connected(url) as system:
         telemetry = TelemetryAsync(system)
         await until(telemetry.subscribe_health(), lambda h: h.is_global_position_ok and h.is_home_position_ok)
@@ -201,7 +201,7 @@ async def main(url: str, pace: float) -> None:
             pace,
             (home.latitude_deg, home.longitude_deg, home.absolute_altitude_m),
         )
-        for example in EXAMPLES:
+        for example in (example for example in EXAMPLES if example.__name__ in names):
             say("begin", example.__name__)
             await example(drone)
             say("end", example.__name__)
@@ -211,4 +211,4 @@ async def main(url: str, pace: float) -> None:
             say("down", example.__name__)
 
 
-asyncio.run(main(sys.argv[1], float(sys.argv[2])))
+asyncio.run(main(sys.argv[1], float(sys.argv[2]), sys.argv[3:]))

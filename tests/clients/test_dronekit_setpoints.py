@@ -10,7 +10,7 @@ import pytest
 from support.flavours import both
 from support.product import program
 from support.setpoints import allow_speed, held
-from support.world import world
+from support.world import TAKE_OFF_SPEED, world
 
 pytestmark = pytest.mark.third_party
 
@@ -20,10 +20,11 @@ SCRIPT = Path(__file__).with_name("dronekit_setpoints.py")
 @pytest.mark.timeout(180)
 @both
 async def test_conf_118_setpoints(flavour: str) -> None:
-    async with world(speed=1.0, flavour=flavour) as w:
+    async with world(speed=TAKE_OFF_SPEED, flavour=flavour) as w:
         words = (sys.executable, "-u", str(SCRIPT), f"tcp:{w.address}:5760", flavour)
         async with program(*words, stdin=PIPE) as script:
             await script.line(lambda line: line == "up", timeout=90.0)
+            w.simulator.speed = 1.0
             allow_speed(w)
             if flavour == "px4":
                 await held(w, script, "setpoints before Offboard")

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from support.product import Process, program
 from support.setpoints import allow_speed, heard, held
-from support.world import HOME, World, world
+from support.world import HOME, TAKE_OFF_SPEED, World, world
 
 from anafi_mav import geo
 
@@ -25,11 +25,13 @@ pytestmark = [pytest.mark.third_party, pytest.mark.timeout(240)]
 
 @asynccontextmanager
 async def flown(what: str) -> AsyncIterator[tuple[World, Process]]:
+    """The world goes at the clock's speed from when the drone is up."""
     async with (
-        world(speed=1.0) as w,
+        world(speed=TAKE_OFF_SPEED) as w,
         program(sys.executable, "-u", str(SCRIPT), what, f"tcpout://{w.address}:5760", stdin=PIPE) as script,
     ):
         await script.line(lambda line: line == "up", timeout=60.0)
+        w.simulator.speed = 1.0
         yield w, script
 
 

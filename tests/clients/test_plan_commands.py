@@ -127,7 +127,7 @@ async def test_where_nobody_is(tmp_path: Path) -> None:
 @pytest.mark.timeout(240)
 async def test_a_plan_is_flown_and_followed(tmp_path: Path) -> None:
     address = loopback()
-    config = fleet(address, loopback()).replace("sim: {", "sim: {speed: 4, ")
+    config = fleet(address, loopback()).replace("sim: {", "sim: {speed: 8, ")
     async with product(tmp_path, config) as p:
         flight = await plan("fly", MISSIONS / "loop.plan", "--endpoint", f"tcpout://{address}:5760")
         assert flight.process.returncode == 0, str(flight)
@@ -157,7 +157,8 @@ async def test_a_plan_is_flown_and_followed(tmp_path: Path) -> None:
 async def test_who_stops_following_leaves_the_flight_alone(tmp_path: Path) -> None:
     address = loopback()
     url = f"tcpout://{address}:5760"
-    async with product(tmp_path, fleet(address, loopback())) as p:
+    config = fleet(address, loopback()).replace("sim: {", "sim: {speed: 2, ")
+    async with product(tmp_path, config) as p:
         words = (sys.executable, "-m", "anafi_mav", "plan", "fly", str(MISSIONS / "orbit.plan"), "--endpoint", url)
         async with program(*words) as flight:
             await flight.line(lambda line: line.startswith("at item 2 "), timeout=90.0)

@@ -222,8 +222,9 @@ async def test_complete_mission_is_not_offered_for_resuming(flavour: str) -> Non
         assert [number for number, _ in itertools.groupby(modes[begun:])] == [MISSION_MODE[flavour], w.modes.returning]
 
 
-async def test_mission_current_leaves_once_per_change() -> None:
-    async with world(web=True) as w:
+@both
+async def test_mission_current_leaves_once_per_change(flavour: str) -> None:
+    async with world(flavour=flavour, web=True) as w:
         stop = dialect.MAV_CMD_SET_MESSAGE_INTERVAL  # what is left are the changes
         ack = await w.client.command(stop, dialect.MAVLINK_MSG_ID_MISSION_CURRENT, -1)
         assert ack.result == dialect.MAV_RESULT_ACCEPTED
@@ -236,9 +237,20 @@ async def test_mission_current_leaves_once_per_change() -> None:
         assert len(sent) == len(list(itertools.groupby(sent)))
         # To ask for the item that is the current one already is answered all the same.
         mark = w.client.mark()
-        current = len(ROUND) - 1
+        current = len(ROUND) - 1 + first(w)
         w.client.send(dialect.MAVLink_mission_set_current_message(1, 1, current))
         await w.client.wait("MISSION_CURRENT", lambda m: m.seq == current, since=mark)
+
+
+@both
+async def test_mission_current_without_a_mission_does_not_leave_when_the_mode_changes(flavour: str) -> None:
+    async with world(flavour=flavour) as w:
+        stop = dialect.MAV_CMD_SET_MESSAGE_INTERVAL
+        ack = await w.client.command(stop, dialect.MAVLINK_MSG_ID_MISSION_CURRENT, -1)
+        assert ack.result == dialect.MAV_RESULT_ACCEPTED
+        mark = w.client.mark()
+        await w.take_off()
+        assert w.client.since(mark, "MISSION_CURRENT") == []
 
 
 async def test_item_numbers_in_texts_are_those_of_the_map() -> None:

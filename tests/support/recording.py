@@ -1,13 +1,14 @@
 """Recordings of client sessions: their text form, and how two of them are compared.
 
 A recording is a list of lines: virtual time, recipient, name of the message, and all its fields. Two recordings are
-equal when every recipient gets the same messages of each type in the same order, each within one step of the simulator.
-The order of messages of different types is held by their times alone.
+equal when every recipient gets the same messages of each type in the same order, each within one step of the simulator
+and with the same whole numbers and texts. The order of messages of different types is held by their times alone.
 """
 
 from __future__ import annotations
 
 import json
+import math
 import re
 import zlib
 from collections import defaultdict
@@ -48,6 +49,13 @@ TIMES = {
     "tc1": 1e-9,
 }
 """Fields that hold a time of sending, and their unit in s: they may differ as much as the time of the line."""
+
+RELATIVE, ABSOLUTE = 2e-7, 1e-6
+"""How far two numbers with a fraction may be apart: what control loops integrate follows the microseconds of the clock,
+and the last bit of a single-precision float follows that."""
+
+EXACT = ("latitude", "longitude")
+"""Fields in deg, of which that much would be 0.1 m."""
 
 REPEATED = ("MISSION_CURRENT",)
 """Messages of which identical ones in a row count as one."""
@@ -238,6 +246,8 @@ class _Rules:
             return all(self._same("", a, b) for a, b in zip(old, new, strict=True))
         if key in TIMES and isinstance(old, int | float) and isinstance(new, int | float):
             return abs(old - new) * TIMES[key] <= self._apart
+        if isinstance(old, float) and isinstance(new, float) and key not in EXACT:
+            return math.isclose(old, new, rel_tol=RELATIVE, abs_tol=ABSOLUTE)
         return False
 
     def _same_text(self, old: str, new: str) -> bool:

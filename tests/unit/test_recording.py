@@ -66,6 +66,23 @@ def test_field_with_time_of_sending_may_differ_by_one_step(
     assert kinds([line(5.0, **old)], [line(5.0, **new)]) == expected
 
 
+@pytest.mark.parametrize(
+    ("field", "old", "new", "expected"),
+    [
+        ("q", [0.5, -0.08684554], [0.5, -0.08684552], []),
+        ("roll", 0.25, 0.2500005, []),
+        ("roll", 0.25, 0.25001, ["fields"]),
+        ("x", 20.0, 20.000002, []),
+        ("x", 0.00001, -0.00001, ["fields"]),
+        ("latitude", 48.8789, 48.8789001, ["fields"]),
+        ("roll", 36, 37, ["fields"]),
+        ("on", False, True, ["fields"]),
+    ],
+)
+def test_last_bits_of_fractions_may_differ(field: str, old: object, new: object, expected: list[str]) -> None:
+    assert kinds([line(1.0, **{field: old})], [line(1.0, **{field: new})]) == expected
+
+
 def test_order_of_types_at_one_instant_does_not_matter() -> None:
     old = [line(1.0, roll=0.1), line(1.0, "VFR_HUD", alt=3.0), line(1.0, recipient="drone", roll=0)]
     assert kinds(old, old[::-1]) == []

@@ -46,6 +46,18 @@ def test_messages_have_parrots_names(tmp_path: Path) -> None:
     assert (lines[2]["name"], lines[2]["args"]) == ("200-1-2", {"payload": "01ff"})
 
 
+async def test_log_without_memory_and_file_is_used_while_an_entry_is_awaited() -> None:
+    log = Log("d", 0, None)
+    assert not log.used
+    log.add(1.0, "state", "step", {})
+    waiting = asyncio.create_task(log.wait(lambda entry: entry.name == "step", 5.0))
+    await asyncio.sleep(0.0)
+    assert log.used
+    log.add(2.0, "state", "step", {})
+    assert (await waiting).t == 2.0
+    assert (log.used, len(log)) == (False, 0)
+
+
 def test_find() -> None:
     log = Log("d", 10, None)
     log.add(1.0, "command", "ardrone3.Piloting.moveTo", {})

@@ -96,6 +96,44 @@ def test_yaw_rate() -> None:
     assert flyer.run(1.0).yaw == pytest.approx(180.0 * RAD, abs=1.0 * RAD)
 
 
+def test_delays_of_every_model_are_whole_steps() -> None:
+    for model in MODELS.values():
+        for delay in (model.airframe.yaw_delay, model.airframe.climb_delay):
+            assert delay / STEP == pytest.approx(round(delay / STEP), abs=1e-9)
+
+
+@pytest.mark.parametrize("time", [0.1, 0.2, 0.5])
+def test_tilt_after_a_step_is_the_closed_form(time: float) -> None:
+    """10 rad/s with a damping of 0.9: x'' = -100 x - 18 x', whose roots are -9 +- 4.35890 i."""
+    flyer = Flyer()
+    flyer.body.sticks(10.0 * RAD, 0.0, 0.0, 0.0)
+    turned = 4.358898943540674 * time
+    left = math.exp(-9.0 * time) * (math.cos(turned) + 9.0 / 4.358898943540674 * math.sin(turned))
+    assert flyer.run(time).roll == pytest.approx(10.0 * RAD * (1.0 - left), abs=1e-9)
+
+
+@pytest.mark.parametrize("time", [0.3, 0.5])
+def test_yaw_and_climb_after_a_step_are_the_closed_form(time: float) -> None:
+    """First-order lags of 0.1 s behind 0.1 s (yaw) and of 0.12 s behind 0.15 s (climb): rate and its integral."""
+    flyer = Flyer()
+    flyer.body.sticks(0.0, 0.0, 1.0, 3.0)
+    pose = flyer.run(time)
+    assert pose.yaw == pytest.approx(time - 0.2 + 0.1 * math.exp(-(time - 0.1) / 0.1), abs=1e-9)
+    kept = math.exp(-(time - 0.15) / 0.12)
+    assert -pose.vd == pytest.approx(3.0 * (1.0 - kept), abs=1e-9)
+    assert pose.up - 50.0 == pytest.approx(3.0 * (time - 0.27 + 0.12 * kept), abs=1e-9)
+
+
+def test_poses_of_drones_at_rest_are_kept_until_one_is_carried() -> None:
+    motion = Motion([AIRFRAME] * 2)
+    motion.step()
+    before = motion.poses()
+    motion.step()
+    assert motion.poses() is before
+    Body(motion, 1).place(3.0, 4.0, 0.5)
+    assert motion.poses() == [before[0], Pose(3.0, 4.0, 0.0, 0.0, 0.0, 0.5, 0.0, 0.0, 0.0)]
+
+
 def test_tilt_is_no_faster_than_its_limit() -> None:
     flyer = Flyer()
     flyer.body.limits(tilt_rate=40.0 * RAD, ceiling=4000.0)

@@ -197,9 +197,8 @@ def test_a_return_may_be_switched_off(bench: Bench) -> None:
 def test_a_landing_is_announced_and_comes(bench: Bench) -> None:
     bench.send(rth.SetAutoTriggerMode(RthAutoTriggerMode.OFF))
     bench.faults.battery = 5
-    bench.run(0.2)
+    bench.run_until(lambda: bool(bench.of(ardrone3.ForcedLandingAutoTrigger)))  # it is looked at once a second
     bench.faults.battery = None
-    told = bench.of(ardrone3.ForcedLandingAutoTrigger)
     bench.run_until(lambda: bench.state is S.EMERGENCY_LANDING)
     told = bench.of(ardrone3.ForcedLandingAutoTrigger)
     # From 5 % to 4.5 % it takes 7.5 s.
