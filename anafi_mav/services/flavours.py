@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
-from anafi_mav.services.modes import FlightMode
+from anafi_mav.vehicle.base.modes import FlightMode
 
 PX4_BITS = 1 << 16
 """A mode number from here on is one of PX4's packed ones in whatever flavour it comes (conformance E5)."""
