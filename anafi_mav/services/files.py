@@ -8,7 +8,7 @@ from urllib.parse import parse_qs
 
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.flavours import Flavour
-from anafi_mav.services.ftp import Entry
+from anafi_mav.services.ftp.ftp import Entry
 
 Query = Mapping[str, str]
 """What stands behind the question mark of a path, as ArduPilot's clients write it."""

@@ -21,50 +21,50 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound, Node
 from anafi_mav.mavlink.router import EVERY_COMPONENT
-from anafi_mav.services import takeoff_point_service
-from anafi_mav.services.aborted_return_service import AbortedReturnService
-from anafi_mav.services.banner import BannerService
-from anafi_mav.services.command_service import CommandService
-from anafi_mav.services.compass_service import CompassService
-from anafi_mav.services.event_service import EventService
-from anafi_mav.services.fence_service import FenceService
+from anafi_mav.services.command.calibration_service import MaintenanceService
+from anafi_mav.services.command.command_service import CommandService
+from anafi_mav.services.command.compass_service import CompassService
+from anafi_mav.services.command.guided_service import GuidedService
+from anafi_mav.services.command.modes_service import ModesService
+from anafi_mav.services.command.orbit_service import OrbitService
+from anafi_mav.services.event.event_service import EventService
 from anafi_mav.services.flavours import Flavour, flavour_of
-from anafi_mav.services.flight_record import FlightRecordService
-from anafi_mav.services.follow_service import FollowService
-from anafi_mav.services.ftp_service import FtpService
-from anafi_mav.services.guided import GuidedService
-from anafi_mav.services.height import TakeoffRecord
-from anafi_mav.services.high_latency import HighLatencyService
-from anafi_mav.services.identity import IdentityService
-from anafi_mav.services.link_loss_service import LinkLossService
-from anafi_mav.services.logs import LogService
-from anafi_mav.services.maintenance import MaintenanceService
-from anafi_mav.services.manual_control import ManualControlService
+from anafi_mav.services.ftp.ftp_service import FtpService
+from anafi_mav.services.ftp.log_service import LogService
+from anafi_mav.services.ground_station.banner_service import BannerService
+from anafi_mav.services.ground_station.identity_service import IdentityService
+from anafi_mav.services.ground_station.node_status_service import NodeStatusService
+from anafi_mav.services.ground_station.shell_service import ShellService
+from anafi_mav.services.ground_station.time_service import TimeService
+from anafi_mav.services.ground_station.tune_service import TuneService
 from anafi_mav.services.memory import Memory
-from anafi_mav.services.message_service import MessageService
-from anafi_mav.services.mission_service import MissionService
-from anafi_mav.services.modes import FlightMode
-from anafi_mav.services.modes_service import ModesService
-from anafi_mav.services.node_status import NodeStatusService
-from anafi_mav.services.offboard_service import OffboardService
-from anafi_mav.services.orbit import OrbitService
-from anafi_mav.services.parameters import ParameterService
-from anafi_mav.services.pilot_service import PilotService
-from anafi_mav.services.plan_service import PlanService
-from anafi_mav.services.rally_service import RallyService
-from anafi_mav.services.roll_sign_service import RollSignService
+from anafi_mav.services.monitor import takeoff_point_service
+from anafi_mav.services.monitor.aborted_return_service import AbortedReturnService
+from anafi_mav.services.monitor.link_loss_service import LinkLossService
+from anafi_mav.services.monitor.pilot_service import PilotService
+from anafi_mav.services.monitor.roll_sign_service import RollSignService
+from anafi_mav.services.monitor.takeoff_point_service import TakeoffPointService
+from anafi_mav.services.monitor.warning_service import WarningService
+from anafi_mav.services.parameter.parameter_service import ParameterService
+from anafi_mav.services.plan.fence_service import FenceService
+from anafi_mav.services.plan.mission_service import MissionService
+from anafi_mav.services.plan.plan_service import PlanService
+from anafi_mav.services.plan.rally_service import RallyService
 from anafi_mav.services.service import MessageHandler, Service
-from anafi_mav.services.shell import ShellService
+from anafi_mav.services.setpoint.follow_service import FollowService
+from anafi_mav.services.setpoint.manual_control_service import ManualControlService
+from anafi_mav.services.setpoint.offboard_service import OffboardService
 from anafi_mav.services.statustext import Severity, TextNumbers
 from anafi_mav.services.stream import Times
-from anafi_mav.services.subscriptions import EventHandler, Subscriptions, in_order
-from anafi_mav.services.takeoff_point_service import TakeoffPointService
-from anafi_mav.services.telemetry import CHANGES, TelemetryService
-from anafi_mav.services.time_service import TimeService
-from anafi_mav.services.tune import TuneService
-from anafi_mav.services.vehicle import Health, Landed, Vehicle
-from anafi_mav.services.video_telemetry import VideoTelemetryService
-from anafi_mav.services.warnings import WarningService
+from anafi_mav.services.telemetry.flight_record_service import FlightRecordService
+from anafi_mav.services.telemetry.high_latency_service import HighLatencyService
+from anafi_mav.services.telemetry.message_service import MessageService
+from anafi_mav.services.telemetry.telemetry_service import CHANGES, TelemetryService
+from anafi_mav.services.telemetry.video_service import VideoTelemetryService
+from anafi_mav.vehicle.base.height import TakeoffRecord
+from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.subscriptions import EventHandler, Subscriptions, in_order
+from anafi_mav.vehicle.vehicle import Health, Landed, Vehicle
 
 logger = logging.getLogger(__name__)
 

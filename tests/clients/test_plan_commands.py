@@ -15,9 +15,9 @@ from support.plans import download
 from support.product import Process, product, program
 from support.world import loopback
 
-from anafi_mav.plans import files
+from anafi_mav.plans.formats import files
 from anafi_mav.plans.plan import Plan
-from anafi_mav.services.mission_items import as_carried, to_wire
+from anafi_mav.services.plan.mission_items import as_carried, to_wire
 
 MISSIONS = Path(__file__).parents[2] / "missions"
 

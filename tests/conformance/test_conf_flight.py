@@ -15,7 +15,7 @@ from support.world import ARMED, HOLD, HOME, LAND, POSITION, RETURN, World, worl
 from anafi_mav import geo
 from anafi_mav.arsdk.messages.rth import StateReason
 from anafi_mav.mavlink import dialect as newer
-from anafi_mav.services.takeoff import ARM_WAIT, AUTO_DISARM
+from anafi_mav.vehicle.takeoff import ARM_WAIT, AUTO_DISARM
 
 ACCEPTED, DENIED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_DENIED
 REJECTED = dialect.MAV_RESULT_TEMPORARILY_REJECTED

@@ -49,7 +49,7 @@ from support.plans import (
 from support.world import HOME, World, world
 
 from anafi_mav.services.memory import Memory
-from anafi_mav.sim.quirks import Quirk
+from anafi_mav.sim.world.quirks import Quirk
 
 ERROR, INVALID = 1, 5
 

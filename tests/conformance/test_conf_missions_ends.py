@@ -33,8 +33,8 @@ from support.trouble import return_by_itself
 from support.world import ARMED, World, world
 
 from anafi_mav.arsdk.messages import ardrone3, common
-from anafi_mav.sim.faults import Impairment
-from anafi_mav.sim.quirks import Quirk
+from anafi_mav.sim.world.faults import Impairment
+from anafi_mav.sim.world.quirks import Quirk
 
 WAIT = Item(93, 0.0, 0.0, p1=2.0, frame=2)
 

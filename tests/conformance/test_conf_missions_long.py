@@ -30,7 +30,7 @@ from support.trouble import somebody_else
 from support.world import World, world
 
 from anafi_mav.arsdk.messages import ardrone3, common
-from anafi_mav.plans.translate import MAX_LINES
+from anafi_mav.plans.translation.translate import MAX_LINES
 
 A, B, C = (10.0, 0.0), (10.0, 8.0), (0.0, 8.0)
 

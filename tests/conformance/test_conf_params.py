@@ -27,7 +27,7 @@ from anafi_mav import geo
 from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.config import Config, DroneConfig
 from anafi_mav.gateway import Gateway
-from anafi_mav.services.parameters import NATIVE_NAMES
+from anafi_mav.services.parameter.parameter_service import NATIVE_NAMES
 from anafi_mav.sim import DroneSpec, Simulator
 
 INT8, INT16, INT32, REAL32 = 2, 4, 6, 9

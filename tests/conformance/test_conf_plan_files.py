@@ -9,8 +9,8 @@ from support.ftp import ACK, NAK, NOT_FOUND, OPEN, TERMINATE, Ftp
 from support.plans import FENCE, MISSION, RALLY, Item, circle, content, download, rally, upload
 from support.world import HOME, World, world
 
-from anafi_mav.services.plan_files import PATHS, unpack_plan
-from anafi_mav.services.plan_items import PlanItem
+from anafi_mav.services.plan.plan_files import PATHS, unpack_plan
+from anafi_mav.vehicle.fence.plan_items import PlanItem
 
 CREATE, WRITE = 6, 7
 PLACE = (HOME[0], HOME[1])

@@ -12,9 +12,9 @@ from support.world import world
 
 from anafi_mav.drone.events import AttitudeChanged
 from anafi_mav.mavlink import dialect as newer
-from anafi_mav.services import telemetry_flight
 from anafi_mav.services.stream import Stream, Times
-from anafi_mav.services.vehicle import Vehicle
+from anafi_mav.services.telemetry import telemetry_flight
+from anafi_mav.vehicle.vehicle import Vehicle
 
 ACCEPTED, DENIED, UNSUPPORTED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_DENIED, dialect.MAV_RESULT_UNSUPPORTED
 SET, GET = dialect.MAV_CMD_SET_MESSAGE_INTERVAL, dialect.MAV_CMD_GET_MESSAGE_INTERVAL

@@ -21,7 +21,7 @@ from support.mav import Client
 from support.world import ARMED, HOLD, HOME, loopback, world
 
 from anafi_mav import geo
-from anafi_mav.arsdk.frame import FrameType, encode_frame
+from anafi_mav.arsdk.link.frame import FrameType, encode_frame
 from anafi_mav.config import Config, DroneConfig
 from anafi_mav.gateway import Gateway
 from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator

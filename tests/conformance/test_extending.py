@@ -12,12 +12,14 @@ from support.params import read
 from support.world import world
 
 from anafi_mav import models
-from anafi_mav.arsdk import wire
+from anafi_mav.arsdk.codec import wire
 from anafi_mav.arsdk.messages.ardrone3 import MotorFlightsStatusChanged, VibrationLevelChanged, WarningLevel
-from anafi_mav.drone import battery
+from anafi_mav.drone.status import battery
 from anafi_mav.mavlink import dialect
-from anafi_mav.services import flavours, parameters, system, telemetry_status
-from anafi_mav.sim import model
+from anafi_mav.services import flavours, system
+from anafi_mav.services.parameter import parameter_service
+from anafi_mav.services.telemetry import telemetry_status
+from anafi_mav.sim.world import model
 
 PAGE = Path(__file__).parents[2] / "docs" / "extending.md"
 
@@ -47,13 +49,13 @@ def sections() -> dict[str, list[str]]:
 def _restored(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """The tables of the program are as before when a test ends."""
     monkeypatch.setattr(system, "SERVICES", system.SERVICES)
-    monkeypatch.setattr(parameters, "NATIVE_NAMES", parameters.NATIVE_NAMES)
+    monkeypatch.setattr(parameter_service, "NATIVE_NAMES", parameter_service.NATIVE_NAMES)
     monkeypatch.setattr(telemetry_status, "STREAMS", telemetry_status.STREAMS)
     monkeypatch.setattr(battery.Battery, "NOTHING", battery.Battery.NOTHING)
     monkeypatch.setattr(battery.Battery, "REDUCERS", battery.Battery.REDUCERS)
     tables: list[dict[Any, Any]] = [
         wire._CODECS,
-        parameters.NAME_TABLES,
+        parameter_service.NAME_TABLES,
         flavours.FLAVOURS,
         models.MODELS,
         models.BY_ID,

@@ -25,7 +25,7 @@ from support.setpoints import COPTER_BRAKE, COPTER_GUIDED, POSITION_ONLY, VELOCI
 from support.world import HOME, World, world
 
 from anafi_mav.mavlink import dialect as newer
-from anafi_mav.sim.motion import Pose
+from anafi_mav.sim.world.motion import Pose
 
 FLAVOURS = ("px4", "ardupilot")
 ON_THE_GROUND, IN_THE_AIR = 10_000, {"hold": 10_000, "brake": 5_000, "guided": 5_000}

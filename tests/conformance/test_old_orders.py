@@ -28,9 +28,9 @@ from support.world import ARMED, HOME, World, world
 from anafi_mav import geo
 from anafi_mav.arsdk.messages import rth
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.offboard_moves import RETRY
-from anafi_mav.services.takeoff import AUTO_DISARM
-from anafi_mav.sim.faults import Impairment
+from anafi_mav.sim.world.faults import Impairment
+from anafi_mav.vehicle.offboard.moves import RETRY
+from anafi_mav.vehicle.takeoff import AUTO_DISARM
 
 SPEED, ALTITUDE, YAW, PAUSE, MISSION_START = 178, 186, 115, 193, 300
 COPTER_LOITER = 5

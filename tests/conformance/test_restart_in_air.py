@@ -14,13 +14,13 @@ from support.plans import Item
 from support.setpoints import POSITION_ONLY, engage, local, streaming
 from support.world import HOME, WEB_PORT, World, loopback, world
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import rth
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.config import Config, DroneConfig
 from anafi_mav.gateway import Gateway
 from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
-from anafi_mav.sim.faults import CLEAR, Impairment
-from anafi_mav.sim.quirks import Quirk
+from anafi_mav.sim.world.faults import CLEAR, Impairment
+from anafi_mav.sim.world.quirks import Quirk
 
 ACCEPTED, REJECTED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_TEMPORARILY_REJECTED
 GLOBAL, RELATIVE = dialect.MAV_FRAME_GLOBAL, dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT

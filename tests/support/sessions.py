@@ -22,7 +22,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from anafi_mav import geo
 from anafi_mav.errors import CommandTimeout
 from anafi_mav.mavlink import dialect as newer
-from anafi_mav.sim.faults import Impairment
+from anafi_mav.sim.world.faults import Impairment
 from support import setpoints
 from support.ftp import LIST, OPEN, READ, RESET, TERMINATE, Ftp
 from support.mav import NAN, Client

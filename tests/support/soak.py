@@ -23,7 +23,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from anafi_mav import geo
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.mavlink import dialect as newer
-from anafi_mav.sim.faults import CLEAR, Impairment
+from anafi_mav.sim.world.faults import CLEAR, Impairment
 from support.mav import NAN, Client
 from support.missions import ACTIVE, CORNERS, put, start, state, way
 from support.missions import RTL as ITEM_RTL
@@ -458,13 +458,15 @@ class Logged(logging.Handler):
 
 @contextmanager
 def errors_logged() -> Iterator[list[str]]:
-    """What is logged within the block, complaints of the garbage collector included."""
+    """What is logged within the block, complaints of the garbage collector about what was made in it included."""
     handler = Logged()
     logging.getLogger().addHandler(handler)
+    gc.freeze()  # or it would look through the whole process each time
     try:
         yield handler.records
         gc.collect()
     finally:
+        gc.unfreeze()
         logging.getLogger().removeHandler(handler)
 
 
@@ -515,13 +517,14 @@ async def begin(w: World, how: str) -> None:
 async def settle(flight: Flight) -> None:
     """Wait until each command has its final acknowledgement and the last stream is over."""
     w = flight.w
+    w.simulator.speed = 1.0
     await asyncio.sleep(GUIDED_TIMEOUT + flight.delay + SLACK)
     w.simulator.speed = SETTLING_SPEED
     limit = now() + FINAL_WITHIN
     while flight.unanswered() and now() < limit and not (flight.gaps() and now() > limit - FINAL_WITHIN + 10.0):
         await watched(0.2)  # acknowledgements of many commands, in any order
     w.drone.faults.up = w.drone.faults.down = CLEAR
-    w.simulator.speed = SPEED
+    w.simulator.speed = 1.0
     await asyncio.sleep(1.0)
 
 
@@ -552,7 +555,7 @@ async def compare(flight: Flight) -> None:
             return
 
 
-async def _differences(flight: Flight, seconds: float = 3.0) -> list[str]:
+async def _differences(flight: Flight, seconds: float = 2.4) -> list[str]:
     """What the clients see and the drone does not do, where neither changes for some seconds."""
     w, found = flight.w, []
     marks = [client.mark() for client in w.clients]

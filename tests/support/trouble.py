@@ -9,7 +9,7 @@ from typing import Any
 
 from anafi_mav import geo
 from anafi_mav.arsdk.messages.rth import StateReason
-from anafi_mav.sim.faults import Impairment
+from anafi_mav.sim.world.faults import Impairment
 from support.mav import NAN, Client
 from support.world import HOME, World
 
