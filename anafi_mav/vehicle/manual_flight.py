@@ -27,11 +27,11 @@ from anafi_mav.clock import Clock
 from anafi_mav.drone import PilotingCommand
 from anafi_mav.errors import LinkLost
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.statustext import Severity
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.clients import system_of
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.right import Extent, Right
+from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.joystick_override import JoystickOverride, Override
 from anafi_mav.vehicle.offboard.stream import SILENCE
 

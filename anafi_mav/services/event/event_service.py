@@ -19,8 +19,8 @@ from anafi_mav.services.files import ServedFile
 from anafi_mav.services.flavours import Flavour
 from anafi_mav.services.parameter.parameter_metadata import to_json
 from anafi_mav.services.service import Host, MessageHandler, Query, Service
-from anafi_mav.services.statustext import Severity
 from anafi_mav.services.stream import Stream, Times
+from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.vehicle import Landed, Vehicle
 

@@ -40,7 +40,7 @@ from anafi_mav.services.parameter.parameter_table_fence import FENCE_NATIVE
 from anafi_mav.services.parameter.parameter_table_follow import FOLLOW_NATIVE
 from anafi_mav.services.parameter.parameter_table_px4 import PX4_NAMES
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
-from anafi_mav.services.statustext import Severity
+from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 
 MAX_WRITES = 8

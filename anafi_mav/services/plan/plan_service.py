@@ -26,7 +26,7 @@ from anafi_mav.services.plan.mission_kind import MissionKind
 from anafi_mav.services.plan.plan_protocol import MESSAGES, PlanDesk
 from anafi_mav.services.plan.plan_transfer import MAX_ITEMS, Changed, Commit, Effect, Peer, PlanKind, Reply, Say
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
-from anafi_mav.services.statustext import Severity
+from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.fence.fence import FenceKind, summary
 from anafi_mav.vehicle.fence.plan_items import Fault, PlanItem
 from anafi_mav.vehicle.fence.rally import RallyKind, Return

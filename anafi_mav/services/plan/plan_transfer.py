@@ -19,7 +19,7 @@ import msgspec
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.flavours import PX4, Flavour
 from anafi_mav.services.plan.plan_requests import REQUEST_EVERY, Requests
-from anafi_mav.services.statustext import Severity
+from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.fence.plan_items import Fault, PlanItem, item_float, item_int, item_of, opaque_id
 
 MAX_ITEMS = 5000
