@@ -15,7 +15,6 @@ from anafi_mav.vehicle.fence.plan_items import Fault, PlanItem, place_fault
 SMALLEST_AREA = 1.0
 """m². A polygon that encloses less is a line or a point: a slip, and nobody can be in it."""
 
-
 _RETURN_POINT = dialect.MAV_CMD_NAV_FENCE_RETURN_POINT
 
 
