@@ -13,7 +13,7 @@ from collections.abc import Callable, Coroutine, Hashable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from anafi_mav.clock import Clock
+from anafi_mav.clock import Alarm, Clock
 from anafi_mav.drone import Drone
 from anafi_mav.drone.events import Message
 from anafi_mav.errors import AnafiMavError
@@ -160,7 +160,7 @@ class System:
         self._tasks: set[asyncio.Task[None]] = set()
         self._last_state: tuple[FlightMode, bool, Health, Landed] | None = None
         self._next_heartbeat = 0.0
-        self._mission_over: asyncio.TimerHandle | None = None
+        self._mission_over = Alarm(self._show_mode)
         """Runs while heartbeats still say Mission."""
         self._warned_at: dict[str, float] = {}
         self._muted: set[Channel] = set()
@@ -232,9 +232,7 @@ class System:
             self._undo = None
         if self._ticker is not None:
             self._ticker.cancel()
-        if self._mission_over is not None:
-            self._mission_over.cancel()
-            self._mission_over = None
+        self._mission_over.cancel()
         for service in self.services:
             service.link_down()
         for task in tuple(self._tasks):
@@ -353,7 +351,7 @@ class System:
         base = dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
         if vehicle.armed:
             base |= dialect.MAV_MODE_FLAG_SAFETY_ARMED
-        mode = FlightMode.MISSION if self._mission_over is not None else vehicle.mode
+        mode = FlightMode.MISSION if self._mission_over.is_set else vehicle.mode
         health = vehicle.health.value
         self.send_by_flavour(
             lambda flavour: dialect.MAVLink_heartbeat_message(
@@ -422,17 +420,14 @@ class System:
         """Let heartbeats say Mission a little longer when a mission has ended in the air and the drone hovers."""
         vehicle = self.vehicle
         hovers = vehicle.armed and vehicle.mode in (FlightMode.HOLD, FlightMode.GUIDED)
-        if self._mission_over is not None:
-            if hovers:
-                return
-            self._mission_over.cancel()
-            self._mission_over = None
+        if self._mission_over.is_set:
+            if not hovers:
+                self._mission_over.cancel()
         elif hovers and last is not None and last[0] is FlightMode.MISSION:
-            self._mission_over = asyncio.get_running_loop().call_later(MISSION_OVER, self._show_mode)
+            self._mission_over.set_in(MISSION_OVER)
 
     def _show_mode(self) -> None:
         """The mission is over and nothing has followed."""
-        self._mission_over = None
         if self.active:
             self.send_heartbeat()
 

@@ -11,7 +11,7 @@ import contextlib
 from collections.abc import Callable, Hashable
 
 from anafi_mav import geo
-from anafi_mav.clock import Clock
+from anafi_mav.clock import Alarm, Clock
 from anafi_mav.drone import PilotingCommand, events
 from anafi_mav.errors import LinkLost
 from anafi_mav.vehicle.base.aircraft import Aircraft
@@ -49,7 +49,7 @@ class FollowFlight:
         self._clock = clock
         self._leader: Hashable = None
         self._heard_at = 0.0
-        self._timer: asyncio.TimerHandle | None = None
+        self._silence = Alarm(self._expired)
         self._follower = Follower(self.settings)
         self._controller = Controller(self._motion())
         self._kept_height: float | None = None
@@ -123,7 +123,7 @@ class FollowFlight:
         """Something else flies now."""
         if self.state is not State.OFF:
             self.state = TRANSITIONS[self.state][Event.END]
-            self._cancel_timer()
+            self._silence.cancel()
             self._vehicle.forget_mode()
             with contextlib.suppress(LinkLost):
                 self._vehicle.drone.piloting.pilot(None)
@@ -131,7 +131,7 @@ class FollowFlight:
 
     def link_down(self) -> None:
         """The drone is gone, and follows nobody."""
-        self._cancel_timer()
+        self._silence.cancel()
         self.state = State.OFF
 
     def subscriptions(self) -> Subscriptions:
@@ -201,7 +201,6 @@ class FollowFlight:
         return height
 
     def _expired(self) -> None:
-        self._timer = None
         if self.state is State.OFF:
             return
         was, self.state = self.state, TRANSITIONS[self.state][Event.SILENCE]
@@ -212,11 +211,5 @@ class FollowFlight:
 
     def _watch(self, patience: float) -> None:
         """Come back when the target has said nothing for so long."""
-        self._cancel_timer()
         delay = max(self._heard_at + patience - self._clock.monotonic(), 0.0)
-        self._timer = asyncio.get_running_loop().call_later(delay, self._expired)
-
-    def _cancel_timer(self) -> None:
-        if self._timer is not None:
-            self._timer.cancel()
-            self._timer = None
+        self._silence.set_in(delay)

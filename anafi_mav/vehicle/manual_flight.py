@@ -18,7 +18,7 @@ from collections.abc import Callable, Coroutine, Hashable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from anafi_mav.clock import Clock
+from anafi_mav.clock import Alarm, Clock
 from anafi_mav.drone import PilotingCommand
 from anafi_mav.errors import LinkLost
 from anafi_mav.vehicle.base.aircraft import Aircraft
@@ -95,7 +95,7 @@ class ManualFlight:
         self._clock = clock
         self._pilot: Hashable = None
         self._said = -math.inf
-        self._timer: asyncio.TimerHandle | None = None
+        self._silence = Alarm(self._expired)
 
     def receive(self, sender: Hashable, sticks: Sticks, *, overrides: bool = False) -> None:
         """Take a client's stick positions. With `overrides` they may take the drone over from what flies it."""
@@ -121,7 +121,7 @@ class ManualFlight:
             return
         self.state, self._pilot = TRANSITIONS[self.state][Event.DEFLECTED], sender
         self._said = self._clock.monotonic()
-        if self._timer is None:
+        if not self._silence.is_set:
             self._watch()
         vehicle.drone.piloting.pilot(
             PilotingCommand(
@@ -181,7 +181,7 @@ class ManualFlight:
 
     def link_down(self) -> None:
         """Nobody holds the sticks of a drone that is gone."""
-        self._cancel_timer()
+        self._silence.cancel()
         self.override.forget()
         self._overriding = False
         self.state, self._pilot, self._said = State.IDLE, None, -math.inf
@@ -190,13 +190,12 @@ class ManualFlight:
         """Centre the sticks, if somebody held them."""
         held = self.state is State.HELD
         self.state, self._pilot = TRANSITIONS[self.state][event], None
-        self._cancel_timer()
+        self._silence.cancel()
         if held:
             with contextlib.suppress(LinkLost):
                 self._vehicle.drone.piloting.pilot(None)
 
     def _expired(self) -> None:
-        self._timer = None
         if self._clock.monotonic() - self._said < SILENCE:
             self._watch()
         elif self.state is State.HELD:
@@ -206,9 +205,4 @@ class ManualFlight:
     def _watch(self) -> None:
         """Come back when they have been silent for too long."""
         delay = max(self._said + SILENCE - self._clock.monotonic(), 0.0)
-        self._timer = asyncio.get_running_loop().call_later(delay, self._expired)
-
-    def _cancel_timer(self) -> None:
-        if self._timer is not None:
-            self._timer.cancel()
-            self._timer = None
+        self._silence.set_in(delay)

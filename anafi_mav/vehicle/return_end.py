@@ -17,8 +17,10 @@ import enum
 import logging
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
+from functools import partial
 
 from anafi_mav import geo
+from anafi_mav.clock import Alarm
 from anafi_mav.drone import Position
 from anafi_mav.drone.events import (
     FlyingState,
@@ -77,7 +79,7 @@ class Attempt:
     phase: _Phase
     task: asyncio.Task[None] | None = None
     """The wait above home and the landing."""
-    doubt: asyncio.TimerHandle | None = None
+    doubt: Alarm | None = None
     """Runs while the drone hovers at home and reports no end."""
     asked: bool = False
     """It has been asked for its states since."""
@@ -86,7 +88,6 @@ class Attempt:
         """Nothing more is sent for it. Returns the task that is about to end."""
         if self.doubt is not None:
             self.doubt.cancel()
-            self.doubt = None
         task, self.task = self.task, None
         if task is None or task is asyncio.current_task():
             return []
@@ -292,23 +293,22 @@ class ReturnEnd:
             return
         if attempt.doubt is not None:
             attempt.doubt.cancel()
-            attempt.doubt = None
         under_way = self._vehicle.drone.home.state.rth == RthState.IN_PROGRESS
         if under_way and self._vehicle.flying_state == FlyingState.HOVERING:
-            attempt.doubt = asyncio.get_running_loop().call_later(UNREPORTED, self._unreported, attempt)
+            attempt.doubt = Alarm(partial(self._unreported, attempt))
+            attempt.doubt.set_in(UNREPORTED)
 
     def _unreported(self, attempt: Attempt) -> None:
-        attempt.doubt = None
         metres = _metres(self._vehicle.place, self._vehicle.drone.home.state.location)
         if attempt is not self._attempt or metres is None or metres > NEAR_HOME:
             return
         attempt.asked = True
-        attempt.doubt = asyncio.get_running_loop().call_later(ANSWER, self._unanswered, attempt)
+        attempt.doubt = Alarm(partial(self._unanswered, attempt))
+        attempt.doubt.set_in(ANSWER)
         with contextlib.suppress(LinkLost):
             self._vehicle.drone.home.request_states()
 
     def _unanswered(self, attempt: Attempt) -> None:
-        attempt.doubt = None
         if attempt is self._attempt:
             self._hover("end not reported")
 

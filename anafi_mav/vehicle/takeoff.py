@@ -11,6 +11,7 @@ import contextlib
 from collections.abc import Callable, Coroutine, Hashable
 from typing import Any
 
+from anafi_mav.clock import Alarm
 from anafi_mav.drone.events import AltitudeChanged, FlyingState, FlyingStateChanged
 from anafi_mav.errors import AnafiMavError, CommandRejected
 from anafi_mav.vehicle.base.aircraft import STOP_WAIT, Aircraft
@@ -67,8 +68,10 @@ class Takeoff:
         self._climbing = False
         self._pending: tuple[float, Hashable] | None = None
         """Height of a take-off that waits for its client to arm, and the client."""
-        self._disarm_timer: asyncio.TimerHandle | None = None
-        self._pending_timer: asyncio.TimerHandle | None = None
+        self._disarming = Alarm(self._auto_disarm)
+        """Runs while an armed vehicle waits for a take-off."""
+        self._lapsing = Alarm(self._lapsed)
+        """Runs while a take-off waits for its client to arm."""
         self._background: asyncio.Task[None] | None = None
         self._tasks: set[asyncio.Task[None]] = set()
 
@@ -119,7 +122,7 @@ class Takeoff:
             self._armed_by.clear()
         self._armed = True
         self._armed_by.add(client)
-        self._rearm_disarm_timer()
+        self._disarming.set_in(AUTO_DISARM)
         vehicle.changed()
         if self._pending is not None and self._pending[1] == client:
             height, _ = self._pending
@@ -176,7 +179,7 @@ class Takeoff:
         await vehicle.take_over()  # also where it waits for arming: what lifts off then is replaced now
         if not self._armed:
             self._pending = (height, client)
-            self._set_timer("_pending_timer", ARM_WAIT, self._lapsed)
+            self._lapsing.set_in(ARM_WAIT)
             return
         await self._lift_off()
         if vehicle.selected is not FlightMode.GUIDED:
@@ -240,7 +243,7 @@ class Takeoff:
     def forget(self) -> None:
         """No take-off waits to be armed any more."""
         self._pending = None
-        self._cancel_timer("_pending_timer")
+        self._lapsing.cancel()
 
     def end(self) -> list[asyncio.Task[None]]:
         """Something else flies now: what goes on in the background is given up. Returns tasks that are about to end."""
@@ -262,7 +265,7 @@ class Takeoff:
 
     def left_ground(self) -> None:
         """The drone has left the ground: arming does not lapse any more."""
-        self._cancel_timer("_disarm_timer")
+        self._disarming.cancel()
 
     def link_down(self) -> None:
         """What was asked for before counts for nothing."""
@@ -274,13 +277,13 @@ class Takeoff:
 
     async def _lift_off(self) -> None:
         """The drone's own take-off. Until it has succeeded or failed, the armed state does not lapse."""
-        self._cancel_timer("_disarm_timer")
+        self._disarming.cancel()
         self._vehicle.paused = False  # a pause that comes from here on ends this take-off
         try:
             await self._vehicle.drone.piloting.take_off()
         finally:
             if self._armed and self._vehicle.on_ground:
-                self._rearm_disarm_timer()
+                self._disarming.set_in(AUTO_DISARM)
 
     async def _take_off_and_report(self, height: float) -> None:
         """The take-off that waited for arming: its command was answered long ago, so failures are texts."""
@@ -332,23 +335,12 @@ class Takeoff:
         self.forget()
         self._vehicle.text(Severity.WARNING, "Takeoff forgotten: nobody armed")
 
-    def _rearm_disarm_timer(self) -> None:
-        self._set_timer("_disarm_timer", AUTO_DISARM, self._auto_disarm)
-
     def _auto_disarm(self) -> None:
         if self._vehicle.drone.piloting.about_to_fly:
-            self._rearm_disarm_timer()  # a mission's start is with the drone: who says disarmed now may see it rise
+            self._disarming.set_in(
+                AUTO_DISARM
+            )  # a mission's start is with the drone: who says disarmed now may see it rise
         elif self._armed and self._vehicle.on_ground:
             self._armed = False
             self._vehicle.text(Severity.INFO, "Disarmed: no take-off followed")
             self._vehicle.changed()
-
-    def _set_timer(self, name: str, delay: float, callback: Callable[[], None]) -> None:
-        self._cancel_timer(name)
-        setattr(self, name, asyncio.get_running_loop().call_later(delay, callback))
-
-    def _cancel_timer(self, name: str) -> None:
-        timer: asyncio.TimerHandle | None = getattr(self, name)
-        if timer is not None:
-            timer.cancel()
-            setattr(self, name, None)

@@ -33,6 +33,7 @@ from anafi_mav.arsdk.messages.drone_manager import DroneManagerConnectionState a
 from anafi_mav.arsdk.messages.generic import ListFlags
 from anafi_mav.arsdk.messages.proto import controller_network, device_manager
 from anafi_mav.arsdk.messages.skyctrl import Source
+from anafi_mav.clock import Alarm
 from anafi_mav.drone.controller.state import REDUCERS, ControllerState, KnownDrone
 from anafi_mav.drone.element import Element, Reducer
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, loop_time
@@ -120,7 +121,7 @@ class Controller(Element[ControllerState]):
         self._pilot_keeps_until = -math.inf
         self._extra_axes = 0
         self._extra_buttons = 0
-        self._timer: asyncio.TimerHandle | None = None
+        self._watching = Alarm(self._look)
 
     # -- the connection
 
@@ -134,9 +135,7 @@ class Controller(Element[ControllerState]):
         self.model = 0
         self._extra_axes = self._extra_buttons = 0
         self._pilot_keeps_until = -math.inf
-        if self._timer is not None:
-            self._timer.cancel()
-            self._timer = None
+        self._watching.cancel()
 
     def link_silent(self) -> None:
         """The Skycontroller is not heard; what it is stays known, what we took is not ours any more."""
@@ -187,15 +186,13 @@ class Controller(Element[ControllerState]):
             self._commander.send(self._grab_message())
             self._commander.send(skyctrl.SetPilotingSource(Source.CONTROLLER))
             self._stand_by(self._hand_back())
-        if self._timer is None:
-            self._watch(LOOK_EVERY)
+        if not self._watching.is_set:
+            self._watching.set_in(LOOK_EVERY)
         return True
 
     def give_back(self) -> None:
         """Return sticks and piloting source to the pilot now; inputs of `grab` stay grabbed."""
-        if self._timer is not None:
-            self._timer.cancel()
-            self._timer = None
+        self._watching.cancel()
         if not self.taken:
             return
         self.taken = False
@@ -269,17 +266,13 @@ class Controller(Element[ControllerState]):
             self._take_over()
         self._pilot_keeps_until = loop_time() + PILOT_KEEPS
 
-    def _watch(self, delay: float) -> None:
-        self._timer = asyncio.get_running_loop().call_later(delay, self._look)
-
     def _look(self) -> None:
         """Is the motion over?"""
-        self._timer = None
         now = loop_time()
         if self._moving():
             self._last_motion = now
         if now - self._last_motion < QUIET:
-            self._watch(LOOK_EVERY)
+            self._watching.set_in(LOOK_EVERY)
         else:
             self.give_back()
 

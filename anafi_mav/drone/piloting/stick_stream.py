@@ -5,12 +5,12 @@ What is due when is decided in `sticks`, without I/O; this is its timer and its 
 
 from __future__ import annotations
 
-import asyncio
 import logging
 from collections.abc import Callable
 
 from anafi_mav.arsdk.messages.ardrone3 import PCMD, FlyingState
 from anafi_mav.arsdk.messages.common import PlayingState
+from anafi_mav.clock import Alarm
 from anafi_mav.drone.element import Element
 from anafi_mav.drone.expectation import Commander, loop_time
 from anafi_mav.drone.piloting.state import PilotingState, in_state
@@ -46,7 +46,7 @@ class StickStream:
         self._flight = flight
         self._home = home
         self._sticks = Sticks()
-        self._timer: asyncio.TimerHandle | None = None
+        self._next = Alarm(self.pump)
         self._after_gaz = False
         """The centred PCMDs that follow the gaz against a landing are sent although the drone is said to land."""
         self.landings_asked = 0
@@ -102,9 +102,7 @@ class StickStream:
 
     def pump(self) -> None:
         """Send the PCMD that is due and come back for the next."""
-        if self._timer is not None:
-            self._timer.cancel()
-            self._timer = None
+        self._next.cancel()
         lands = self._flight.state.flying == FlyingState.LANDING and not self.landings_asked
         if self.dead is not None and not (lands and self._after_gaz and self._commander.connected):
             self._sticks.stop()
@@ -114,7 +112,7 @@ class StickStream:
             self._send(pcmd)
         deadline = self._sticks.deadline
         if deadline is not None:
-            self._timer = asyncio.get_running_loop().call_at(deadline, self.pump)
+            self._next.set(deadline)
 
     def let_go(self) -> None:
         """Let go of what deflection there is. What begins now may be refused; the sticks must not stay as they are."""
@@ -125,9 +123,7 @@ class StickStream:
         """No more PCMDs: something else flies the drone now."""
         self._after_gaz = False
         self._sticks.stop()
-        if self._timer is not None:
-            self._timer.cancel()
-            self._timer = None
+        self._next.cancel()
 
     def release(self) -> None:
         """Send centred PCMDs, then none: a return waits for flag 0 (rth.xml 146-0-11), from any controller.

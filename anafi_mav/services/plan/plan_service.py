@@ -13,6 +13,7 @@ from contextlib import nullcontext
 from functools import partial
 
 from anafi_mav import units
+from anafi_mav.clock import Alarm
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
@@ -50,7 +51,7 @@ class PlanService(Service):
         super().__init__(host)
         self._mission = MissionKind(self._home_item, self._version)
         self._desk = PlanDesk([self._mission, FenceKind(), RallyKind()])
-        self._timer: asyncio.TimerHandle | None = None
+        self._alarm = Alarm(self._expire)
         self._due = 0.0
         """When the timer ends."""
 
@@ -191,17 +192,14 @@ class PlanService(Service):
         A timer that ends too early is let run, for the deadline goes on with each item of an upload; it looks again.
         """
         deadline = self._desk.deadline()
-        if self._timer is not None:
-            if deadline is not None and self._due <= deadline:
-                return
-            self._timer.cancel()
-            self._timer = None
+        if self._alarm.is_set and deadline is not None and self._due <= deadline:
+            return
+        self._alarm.cancel()
         if deadline is not None:
-            delay = max(deadline - self.host.clock.monotonic(), 0.0)
-            self._timer, self._due = asyncio.get_running_loop().call_later(delay, self._expire), deadline
+            self._alarm.set_in(max(deadline - self.host.clock.monotonic(), 0.0))
+            self._due = deadline
 
     def _expire(self) -> None:
-        self._timer = None
         self._perform(self._desk.expire(self.host.clock.monotonic()))
 
     # What missions need.

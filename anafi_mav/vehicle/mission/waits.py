@@ -4,12 +4,12 @@ stopped its plan."""
 from __future__ import annotations
 
 import asyncio
-import functools
 import math
 from collections.abc import Callable, Hashable, Iterator
 from contextlib import contextmanager
 
 from anafi_mav import geo
+from anafi_mav.clock import Alarm
 from anafi_mav.drone.events import AlertState, FlyingState, ForcedLandingReason, PlayError
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.refusal import Refused
@@ -65,13 +65,13 @@ class ArmWait:
         """`lapsed` is called when it did not."""
         self._lapsed = lapsed
         self._client: Hashable = None
-        self._timer: asyncio.TimerHandle | None = None
+        self._alarm = Alarm(self._lapse)
 
     def begin(self, client: Hashable) -> None:
         """It has been chosen; whoever was waited for before is not any more."""
         self.end()
         self._client = client
-        self._timer = asyncio.get_running_loop().call_later(ARM_WAIT, self._lapse)
+        self._alarm.set_in(ARM_WAIT)
 
     def ends_with(self, client: Hashable) -> bool:
         """This client has armed: was it waited for? If so that is over."""
@@ -79,10 +79,8 @@ class ArmWait:
 
     def end(self) -> bool:
         """Wait no more; whether anybody was waited for."""
-        waited, self._client = self._timer is not None, None
-        if self._timer is not None:
-            self._timer.cancel()
-            self._timer = None
+        waited, self._client = self._alarm.is_set, None
+        self._alarm.cancel()
         return waited
 
     def _lapse(self) -> None:
@@ -104,25 +102,29 @@ class EndWatch:
         self._progress = progress
         self._ended = ended
         self._target: WayPoint | None = None
-        self._timer: asyncio.TimerHandle | None = None
+        self._alarm = Alarm(self._late)
+        self._running = False
 
     @property
     def running(self) -> bool:
         """It is watched."""
-        return self._timer is not None
+        return self._running
 
     def begin(self, target: WayPoint | None = None) -> None:
         """The drone has stopped its plan before the last line. `target`: the last way point of a plan that ends there,
         None when the last line lands or returns."""
         self.end()
         self._target = target
-        late = functools.partial(self.look, last=True)
-        self._timer = asyncio.get_running_loop().call_later(END_WAIT, late)
+        self._running = True
+        self._alarm.set_in(END_WAIT)
         self.look()
+
+    def _late(self) -> None:
+        self.look(last=True)
 
     def look(self, *, last: bool = False) -> None:
         """Landing, return or flying state may have changed."""
-        if self._timer is None:
+        if not self._running:
             return
         target = self._target
         if target is None:
@@ -136,9 +138,8 @@ class EndWatch:
 
     def end(self) -> None:
         """Watch no more."""
-        if self._timer is not None:
-            self._timer.cancel()
-            self._timer = None
+        self._running = False
+        self._alarm.cancel()
 
     @property
     def _is_in_trouble(self) -> bool:

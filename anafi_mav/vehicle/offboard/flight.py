@@ -15,7 +15,7 @@ from collections.abc import Callable, Coroutine, Hashable
 from typing import Any, NamedTuple
 
 from anafi_mav import units
-from anafi_mav.clock import Clock
+from anafi_mav.clock import Alarm, Clock
 from anafi_mav.drone import Limits, PilotingCommand, events
 from anafi_mav.drone.events import FlyingState
 from anafi_mav.errors import AnafiMavError, LinkLost
@@ -86,9 +86,9 @@ class OffboardFlight:
         self._takeoff = takeoff
         self._lift = SetpointTakeoff()
         self._stream = OffboardStream()
-        self._timer: asyncio.TimerHandle | None = None
+        self._silence = Alarm(self._expired)
         self._watched_until = math.inf
-        """When the timer runs out."""
+        """The silence that the alarm is set for."""
         self._engaging: asyncio.Task[None] | None = None
         self._alone = False
         """What is being engaged is a single setpoint."""
@@ -138,7 +138,7 @@ class OffboardFlight:
         if not self._stream.receive(sender, setpoint, now, lasts(setpoint, self.guided_timeout if guided else None)):
             return "another program flies"
         deadline = self._stream.deadline()
-        if self._timer is None or (deadline is not None and deadline < self._watched_until):
+        if not self._silence.is_set or (deadline is not None and deadline < self._watched_until):
             self._watch()  # the pilot's newest setpoint may last for less time than the one before
         if stands:
             return self._on_ground(sender, setpoint, now, guided=guided)
@@ -374,7 +374,7 @@ class OffboardFlight:
 
     def link_down(self) -> None:
         """Setpoints of before count for nothing."""
-        self._cancel_timer()
+        self._silence.cancel()
         self._lift.stop()
         self._moves.forget()
         self._goal = self.flown = None
@@ -530,7 +530,6 @@ class OffboardFlight:
     # Silence.
 
     def _expired(self) -> None:
-        self._timer = None
         lifted, phase = self._lift.client, self._lift.phase
         expired = self._stream.expire(self._clock.monotonic())
         counted = phase is Phase.COUNTING and self._stream.newest(lifted) is None
@@ -557,17 +556,12 @@ class OffboardFlight:
 
     def _watch(self) -> None:
         """Come back when those that matter have been silent for too long."""
-        self._cancel_timer()
+        self._silence.cancel()
         deadline = self._stream.deadline()
         if deadline is not None:
             self._watched_until = deadline
             delay = max(deadline - self._clock.monotonic(), 0.0)
-            self._timer = asyncio.get_running_loop().call_later(delay, self._expired)
-
-    def _cancel_timer(self) -> None:
-        if self._timer is not None:
-            self._timer.cancel()
-            self._timer = None
+            self._silence.set_in(delay)
 
 
 def _at_once(client: Hashable, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
