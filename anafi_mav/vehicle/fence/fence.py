@@ -5,19 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-from anafi_mav.mavlink import dialect
+from anafi_mav import mav_enums
 from anafi_mav.plans.zones import Circle, Fence, Polygon, Zone
 from anafi_mav.vehicle.fence.plan_items import PlanItem
 
 POLYGONS = {
-    dialect.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION: True,
-    dialect.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION: False,
+    mav_enums.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION: True,
+    mav_enums.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION: False,
 }
 CIRCLES = {
-    dialect.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION: True,
-    dialect.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION: False,
+    mav_enums.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION: True,
+    mav_enums.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION: False,
 }
-HOME_CIRCLE = dialect.MAV_CMD_NAV_FENCE_HOME_CIRCLE_INCLUSION
+HOME_CIRCLE = mav_enums.MAV_CMD_NAV_FENCE_HOME_CIRCLE_INCLUSION
 
 
 def fence_of(items: Iterable[PlanItem]) -> Fence:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import msgspec
 
-from anafi_mav.mavlink import dialect
+from anafi_mav import mav_enums
 
 MAX_ITEMS = 5000
 """Items of a list: more than any client sends, small enough to be checked and stored at once."""
@@ -20,12 +20,10 @@ DEGREES = 1e7
 UNSET = 2**31 - 1
 """x and y that stand for "not set" (MAVLink mission.md); NaN in MISSION_ITEM."""
 
-AMSL_FRAMES = (dialect.MAV_FRAME_GLOBAL, dialect.MAV_FRAME_GLOBAL_INT)
-RELATIVE_FRAMES = (dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT, dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
+AMSL_FRAMES = (mav_enums.MAV_FRAME_GLOBAL, mav_enums.MAV_FRAME_GLOBAL_INT)
+RELATIVE_FRAMES = (mav_enums.MAV_FRAME_GLOBAL_RELATIVE_ALT, mav_enums.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
 
-PLACED = frozenset(
-    command for command, entry in dialect.enums["MAV_CMD"].items() if getattr(entry, "has_location", False)
-)
+PLACED = frozenset(command for command, entry in mav_enums.enums["MAV_CMD"].items() if entry.has_location)
 """Commands with a place, in items and in COMMAND_INT: MAVLink's hasLocation."""
 
 _CONTENT = struct.Struct("<HBB4fiif")
@@ -72,7 +70,7 @@ class PlanItem(msgspec.Struct, frozen=True):
 
 def has_place(command: int, frame: int) -> bool:
     """x and y of an item are degrees times 1e7, not plain numbers."""
-    return frame != dialect.MAV_FRAME_MISSION and command in PLACED
+    return frame != mav_enums.MAV_FRAME_MISSION and command in PLACED
 
 
 def opaque_id(items: Iterable[PlanItem]) -> int:
@@ -92,13 +90,13 @@ def opaque_id(items: Iterable[PlanItem]) -> int:
 def place_fault(item: PlanItem) -> Fault | None:
     """What is wrong with the place of an item that needs one."""
     if item.frame not in (*AMSL_FRAMES, *RELATIVE_FRAMES):
-        return Fault(dialect.MAV_MISSION_UNSUPPORTED_FRAME, f"frame {item.frame} is neither AMSL nor above home")
+        return Fault(mav_enums.MAV_MISSION_UNSUPPORTED_FRAME, f"frame {item.frame} is neither AMSL nor above home")
     if not abs(item.latitude) <= 90.0:
-        return Fault(dialect.MAV_MISSION_INVALID_PARAM5_X, "its latitude is none")
+        return Fault(mav_enums.MAV_MISSION_INVALID_PARAM5_X, "its latitude is none")
     if not abs(item.longitude) <= 180.0:
-        return Fault(dialect.MAV_MISSION_INVALID_PARAM6_Y, "its longitude is none")
+        return Fault(mav_enums.MAV_MISSION_INVALID_PARAM6_Y, "its longitude is none")
     if item.x == 0 and item.y == 0:
-        return Fault(dialect.MAV_MISSION_INVALID_PARAM5_X, "its latitude and longitude are both 0")
+        return Fault(mav_enums.MAV_MISSION_INVALID_PARAM5_X, "its latitude and longitude are both 0")
     return None
 
 
