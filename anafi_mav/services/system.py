@@ -54,7 +54,7 @@ from anafi_mav.services.service import MessageHandler, Service
 from anafi_mav.services.setpoint.follow_service import FollowService
 from anafi_mav.services.setpoint.manual_control_service import ManualControlService
 from anafi_mav.services.setpoint.offboard_service import OffboardService
-from anafi_mav.services.statustext import Severity, TextNumbers
+from anafi_mav.services.statustext import TextNumbers
 from anafi_mav.services.stream import Times
 from anafi_mav.services.telemetry.flight_record_service import FlightRecordService
 from anafi_mav.services.telemetry.high_latency_service import HighLatencyService
@@ -63,6 +63,7 @@ from anafi_mav.services.telemetry.telemetry_service import CHANGES, TelemetrySer
 from anafi_mav.services.telemetry.video_service import VideoTelemetryService
 from anafi_mav.vehicle.base.height import TakeoffRecord
 from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import EventHandler, Subscriptions, in_order
 from anafi_mav.vehicle.vehicle import Health, Landed, Vehicle
 

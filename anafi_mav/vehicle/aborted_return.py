@@ -9,9 +9,9 @@ import math
 
 from anafi_mav.drone.events import HomeReachability, ReturnReason, WarningLevel
 from anafi_mav.drone.status.alerts import spoken
-from anafi_mav.services.statustext import Severity
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.flying import LANDING
+from anafi_mav.vehicle.base.severity import Severity
 
 REPEAT_EVERY = 15.0
 """s between two reminders."""

@@ -15,7 +15,6 @@ import math
 from dataclasses import dataclass
 
 from anafi_mav import units
-from anafi_mav.mavlink import dialect
 from anafi_mav.vehicle.base.velocity_loop import Axis, Demand
 
 SILENCE = 2.5
@@ -221,24 +220,3 @@ class Follower:
             height=height,
             yaw=units.wrap_pi(bearing + math.pi),
         )
-
-
-def sighting(message: dialect.MAVLink_follow_target_message) -> Sighting | str:
-    """What a FOLLOW_TARGET says, or one sentence on why it cannot be followed.
-
-    Bits of est_capabilities: 0 position, 1 velocity (MAVLink common.xml FOLLOW_TARGET).
-    """
-    capabilities = message.est_capabilities
-    if not capabilities & 1:
-        return "it does not tell where it is"
-    latitude, longitude = message.lat / 1e7, message.lon / 1e7
-    altitude = message.alt
-    velocity = None
-    if capabilities & 2:
-        north, east = message.vel[0], message.vel[1]
-        if not math.isfinite(north + east):
-            return "its velocity is not a number"
-        if math.hypot(north, east) > FASTEST:
-            return f"it moves with {math.hypot(north, east):.0f} m/s"
-        velocity = (north, east)
-    return Sighting(latitude, longitude, altitude if math.isfinite(altitude) else None, velocity)

@@ -14,13 +14,13 @@ from anafi_mav import geo
 from anafi_mav.clock import Alarm, Clock
 from anafi_mav.drone import PilotingCommand, events
 from anafi_mav.errors import LinkLost
-from anafi_mav.services.statustext import Severity
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.bounds import LOWEST, amsl_to_ato, check_estimate, check_height, check_on_earth, check_place
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.place import Place
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.roll_sign import ROLL_INVERTED
+from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.base.velocity_loop import Controller, Motion
 from anafi_mav.vehicle.follow import (

@@ -1,14 +1,9 @@
-"""The sticks of ground stations: what MANUAL_CONTROL and RC_CHANNELS_OVERRIDE say, and the shell that flies by it.
+"""Flight by the sticks of ground stations.
 
 They fly the drone in mode Position (Loiter in ArduPilot's words) and in no other: a joystick that lies on the table is
 streamed all the time, and a goto or a mission is not ended by it. A stick of PX4's clients that leaves the middle takes
 over and selects that mode (`joystick_override`). A stick asks for a share of the drone's own MaxTilt,
-MaxVerticalSpeed and MaxRotationSpeed (arsdk 2.2):
-
-- MANUAL_CONTROL: x forward, y right, r clockwise, each -1000..1000; z 0..1000 with 500 in the middle, which holds the
-  height, as for every multicopter. 32767 is an axis that is not there. Buttons do nothing;
-- RC_CHANNELS_OVERRIDE: channels 1 roll, 2 pitch, 3 throttle, 4 yaw (ArduPilot's RCMAP_*), 1500 us in the middle,
-  pitch below it is forward. 0 releases a channel, 65535 leaves it as this client set it.
+MaxVerticalSpeed and MaxRotationSpeed (arsdk 2.2). `services.setpoint.stick_messages` reads them from messages.
 
 `SILENCE` after the last word of whoever flies the sticks are centred.
 """
@@ -26,32 +21,19 @@ from typing import Any
 from anafi_mav.clock import Alarm, Clock
 from anafi_mav.drone import PilotingCommand
 from anafi_mav.errors import LinkLost
-from anafi_mav.mavlink import dialect
-from anafi_mav.services.statustext import Severity
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.clients import system_of
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.right import Extent, Right
+from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.vehicle.base.silence import SILENCE
 from anafi_mav.vehicle.joystick_override import JoystickOverride, Override
-from anafi_mav.vehicle.offboard.stream import SILENCE
-
-DEAD_ZONE = 0.03
-"""Share of the way that a stick may be off its middle and count as centred: none of them returns exactly."""
 
 MEANT = 0.2
 """Share of the way from which a stick that does nothing is worth a word."""
 
 GESTURE = 0.95
 """Share of the way from which a stick is at its end: throttle down and yaw right arm an ArduPilot and a PX4."""
-
-NO_AXIS = 0x7FFF
-"""MANUAL_CONTROL: this axis does not exist."""
-
-RELEASED, KEPT = 0, 0xFFFF
-"""RC_CHANNELS_OVERRIDE: give the channel back; leave it as it is."""
-
-SHORTEST, LONGEST = 800, 2200
-"""us that a channel may be: what transmitters send, with their trims."""
 
 
 class State(enum.Enum):
@@ -95,59 +77,6 @@ class Sticks:
     @property
     def centred(self) -> bool:
         return not any((self.forward, self.right, self.turn, self.climb))
-
-
-def manual_sticks(message: dialect.MAVLink_manual_control_message) -> Sticks | str | None:
-    """The sticks of a MANUAL_CONTROL, or one sentence on why they are none; None: it has no axis at all."""
-    axes = (message.x, message.y, message.r, message.z)
-    if all(axis == NO_AXIS for axis in axes):
-        return None
-    if any(abs(axis) > 1000 and axis != NO_AXIS for axis in axes):
-        return "an axis is beyond 1000"
-    if message.z < 0:
-        return "its throttle is 0 to 1000 with 500 in the middle"
-    forward, right, turn = (0.0 if axis == NO_AXIS else axis / 1000.0 for axis in axes[:3])
-    climb = 0.0 if message.z == NO_AXIS else (message.z - 500) / 500.0
-    return Sticks(*map(_beyond_dead_zone, (forward, right, turn, climb)))
-
-
-@dataclass(frozen=True)
-class Channels:
-    """What a client has set of the four channels, us; None: released."""
-
-    roll: int | None = None
-    pitch: int | None = None
-    throttle: int | None = None
-    yaw: int | None = None
-
-    def after(self, message: dialect.MAVLink_rc_channels_override_message) -> Channels | str:
-        """What they are after one more RC_CHANNELS_OVERRIDE, or one sentence on why that is none."""
-        said = {
-            "roll": message.chan1_raw,
-            "pitch": message.chan2_raw,
-            "throttle": message.chan3_raw,
-            "yaw": message.chan4_raw,
-        }
-        said = {name: value for name, value in said.items() if value != KEPT}
-        if any(value != RELEASED and not SHORTEST <= value <= LONGEST for value in said.values()):
-            return f"a channel is not between {SHORTEST} and {LONGEST} us"
-        return replace(self, **{name: value or None for name, value in said.items()})
-
-    @property
-    def released(self) -> bool:
-        return self.roll is self.pitch is self.throttle is self.yaw is None
-
-    @property
-    def sticks(self) -> Sticks:
-        roll, pitch, throttle, yaw = (
-            0.0 if value is None else max(-1.0, min((value - 1500) / 500.0, 1.0))
-            for value in (self.roll, self.pitch, self.throttle, self.yaw)
-        )
-        return Sticks(*map(_beyond_dead_zone, (-pitch, roll, yaw, throttle)))
-
-
-def _beyond_dead_zone(share: float) -> float:
-    return share if abs(share) > DEAD_ZONE else 0.0
 
 
 class ManualFlight:

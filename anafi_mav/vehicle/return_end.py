@@ -32,10 +32,10 @@ from anafi_mav.drone.events import (
     RthState,
 )
 from anafi_mav.errors import AnafiMavError, LinkLost
-from anafi_mav.services.statustext import Severity
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.flying import LANDING
 from anafi_mav.vehicle.base.place import Place
+from anafi_mav.vehicle.base.severity import Severity
 
 logger = logging.getLogger(__name__)
 

@@ -14,12 +14,12 @@ from typing import Any
 from anafi_mav.clock import Alarm
 from anafi_mav.drone.events import AltitudeChanged, FlyingState, FlyingStateChanged
 from anafi_mav.errors import AnafiMavError, CommandRejected
-from anafi_mav.services.statustext import Severity
 from anafi_mav.vehicle.base.aircraft import STOP_WAIT, Aircraft
 from anafi_mav.vehicle.base.bounds import check_height
 from anafi_mav.vehicle.base.flying import AIRBORNE
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused, Unfinished
+from anafi_mav.vehicle.base.severity import Severity
 
 AUTO_DISARM = 10.0
 """s that an armed vehicle waits for a take-off (as PX4's COM_DISARM_PRFLT)."""

@@ -35,7 +35,6 @@ from anafi_mav.drone.events import (
 )
 from anafi_mav.drone.piloting.landing import ALREADY_LANDED
 from anafi_mav.errors import CommandRejected
-from anafi_mav.services.statustext import Severity
 from anafi_mav.vehicle.aborted_return import AbortedReturn
 from anafi_mav.vehicle.base.aircraft import STOP_WAIT, Aircraft
 from anafi_mav.vehicle.base.clients import system_of
@@ -48,6 +47,7 @@ from anafi_mav.vehicle.base.place import Place
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.right import Extent, Right
 from anafi_mav.vehicle.base.roll_sign import INVERTED
+from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.fence.rally import RallyPoints
 from anafi_mav.vehicle.follow_flight import FollowFlight

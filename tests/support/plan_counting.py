@@ -13,8 +13,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from anafi_mav.mavlink import dialect
+from anafi_mav.services.plan.item_messages import item_int
 from anafi_mav.services.plan.plan_transfer import Peer
-from anafi_mav.vehicle.fence.plan_items import PlanItem, item_int
+from anafi_mav.vehicle.fence.plan_items import PlanItem
 from support.plan_wire import FENCE
 
 LIMIT, TIMEOUT = 5, 0.5

@@ -9,9 +9,10 @@ from typing import Any
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.flavours import PX4, Flavour
+from anafi_mav.services.plan.item_messages import item_float, item_int, item_of
 from anafi_mav.services.plan.plan_protocol import PlanDesk
 from anafi_mav.services.plan.plan_transfer import Changed, Commit, Effect, Peer, PlanKind, Reply, Say
-from anafi_mav.vehicle.fence.plan_items import Fault, PlanItem, item_float, item_int, item_of
+from anafi_mav.vehicle.fence.plan_items import Fault, PlanItem
 
 MISSION, FENCE, RALLY = range(3)
 

@@ -15,8 +15,8 @@ from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.commands import Action, Altitude, Command, Effect, Progress
 from anafi_mav.services.service import Service
-from anafi_mav.services.statustext import Severity
 from anafi_mav.vehicle.base.refusal import Refused
+from anafi_mav.vehicle.base.severity import Severity
 
 _MAGNETOMETER, _HORIZON = 1.0, 2.0
 """param2 and param5 of MAV_CMD_PREFLIGHT_CALIBRATION that can be meant for an ANAFI (MAVLink common.xml)."""

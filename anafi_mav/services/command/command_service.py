@@ -36,10 +36,10 @@ from anafi_mav.services.commands import (
 )
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.service import Host, MessageHandler, Query, Service, client_of
-from anafi_mav.services.statustext import Severity
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused, Unsupported
 from anafi_mav.vehicle.base.right import Extent, Right
+from anafi_mav.vehicle.base.severity import Severity
 
 logger = logging.getLogger(__name__)
 

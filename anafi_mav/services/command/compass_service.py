@@ -17,8 +17,8 @@ from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.commands import Action, Altitude, Command, Effect
 from anafi_mav.services.service import Host, Service
-from anafi_mav.services.statustext import Severity
 from anafi_mav.vehicle.base.refusal import Refused
+from anafi_mav.vehicle.base.severity import Severity
 
 COMPASS_MASK = 1
 """param1 is a bit mask of compasses, 0 for all. There is the first one only."""

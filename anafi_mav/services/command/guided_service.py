@@ -20,11 +20,11 @@ from anafi_mav.services.command_targets import UnsupportedFrame, height, height_
 from anafi_mav.services.commands import Action, Altitude, Command, Effect
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.service import Host, Service, client_of
-from anafi_mav.services.statustext import Severity
 from anafi_mav.vehicle.base.bounds import FASTEST, SLOWEST, check_height, check_on_earth
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.place import Place
 from anafi_mav.vehicle.base.refusal import Refused
+from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.base.yaw import DEG_PER_TURN, heading_of
 from anafi_mav.vehicle.guided_flight import Goto

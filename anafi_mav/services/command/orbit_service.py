@@ -20,13 +20,13 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.services.command_targets import height, place
 from anafi_mav.services.commands import Action, Altitude, Command, Effect
 from anafi_mav.services.service import Host, Service
-from anafi_mav.services.statustext import Severity
 from anafi_mav.services.stream import Stream, Times
 from anafi_mav.vehicle.base.bounds import SLOWEST, check_height, check_on_earth, check_place
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.place import Place
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.roll_sign import ROLL_INVERTED
+from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.base.velocity_loop import Controller, tilt_limit
 from anafi_mav.vehicle.circle import (

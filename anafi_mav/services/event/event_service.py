@@ -11,16 +11,16 @@ from anafi_mav.drone import events as parrot
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import Command
+from anafi_mav.services.component_metadata import to_json
 from anafi_mav.services.event import event_table as table
 from anafi_mav.services.event.event_table import Event, events_file
 from anafi_mav.services.event.events import EventLog, Report, report
 from anafi_mav.services.files import Query as FileQuery
 from anafi_mav.services.files import ServedFile
 from anafi_mav.services.flavours import Flavour
-from anafi_mav.services.parameter.parameter_metadata import to_json
 from anafi_mav.services.service import Host, MessageHandler, Query, Service
-from anafi_mav.services.statustext import Severity
 from anafi_mav.services.stream import Stream, Times
+from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.vehicle import Landed, Vehicle
 

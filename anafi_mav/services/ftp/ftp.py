@@ -17,7 +17,8 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.parameter.parameter_codec import crc32
+from anafi_mav.services.checksum import crc32
+from anafi_mav.services.files import Entry
 
 PAYLOAD = 251
 """Bytes of the message's payload field."""
@@ -142,15 +143,6 @@ TRANSITIONS: Mapping[State, Mapping[Event, State]] = {
 }
 """What is not here does not happen: reading a closed session is answered with INVALID_SESSION, and so is writing to one
 that was opened to read."""
-
-
-@dataclass(frozen=True)
-class Entry:
-    """One line of a directory."""
-
-    name: str
-    size: int | None
-    """Bytes; None: a directory."""
 
 
 class Files(Protocol):

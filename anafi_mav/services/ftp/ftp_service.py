@@ -11,15 +11,15 @@ from functools import partial
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
+from anafi_mav.services import component_metadata
+from anafi_mav.services.capabilities import capability_bits
+from anafi_mav.services.checksum import crc32
 from anafi_mav.services.commands import Command
+from anafi_mav.services.component_metadata import COMPRESSED, GENERAL
 from anafi_mav.services.files import FileTree, Query, ServedFile, absolute
 from anafi_mav.services.flavours import FLAVOURS, Flavour, flavour_of
 from anafi_mav.services.ftp.ftp import FtpServer
-from anafi_mav.services.ground_station.identity_service import capability_bits
 from anafi_mav.services.paced_sender import Trickle
-from anafi_mav.services.parameter import parameter_metadata
-from anafi_mav.services.parameter.parameter_codec import crc32
-from anafi_mav.services.parameter.parameter_metadata import COMPRESSED, GENERAL
 from anafi_mav.services.service import Host, MessageHandler, Request, Service, client_of
 
 EXPIRE_EVERY = 1.0
@@ -120,7 +120,7 @@ class FtpService(Service):
                 content = self._content(plain + COMPRESSED, flavour, {}) if file.metadata is not None else None
                 if content is not None and file.metadata is not None:
                     others[plain + COMPRESSED] = (file.metadata, content)
-            return parameter_metadata.to_json(parameter_metadata.general_file(self.host.drone.identity, others))
+            return component_metadata.to_json(component_metadata.general_file(self.host.drone.identity, others))
 
         return self._once(path, flavour, make)
 
@@ -137,7 +137,7 @@ class FtpService(Service):
         """URI and CRC of the general metadata file."""
         content = self._general(GENERAL + COMPRESSED, flavour_of(inbound.channel), {})
         assert content is not None
-        return parameter_metadata.uri(GENERAL + COMPRESSED).encode(), crc32(content)
+        return component_metadata.uri(GENERAL + COMPRESSED).encode(), crc32(content)
 
     def _component_metadata(self, inbound: Inbound, command: Command) -> dialect.MAVLink_message:
         uri, crc = self._where(inbound)
@@ -187,7 +187,7 @@ class _ClientFiles:
 
 
 def _compressed(content: bytes | None) -> bytes | None:
-    return None if content is None else parameter_metadata.compress(content)
+    return None if content is None else component_metadata.compress(content)
 
 
 def _message(payload: bytes, inbound: Inbound) -> dialect.MAVLink_message:

@@ -15,7 +15,7 @@ from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import Command
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.service import Host, Query, Service, client_of
-from anafi_mav.services.statustext import Severity
+from anafi_mav.vehicle.base.severity import Severity
 
 GONE = 30.0
 """s of silence after which a client that speaks again is a new one: a ground station that was restarted."""

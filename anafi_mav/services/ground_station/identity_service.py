@@ -10,19 +10,10 @@ from anafi_mav import __version__
 from anafi_mav.drone import Drone
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
+from anafi_mav.services.capabilities import capability_bits
 from anafi_mav.services.commands import Command
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.service import MessageHandler, Request, Service
-
-
-def capability_bits(promised: int, flavour: Flavour) -> int:
-    """MAV_PROTOCOL_CAPABILITY bits that clients of a flavour are told, given those of the services."""
-    encoding = (
-        dialect.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
-        if flavour.bytewise
-        else dialect.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_C_CAST
-    )
-    return promised | encoding | dialect.MAV_PROTOCOL_CAPABILITY_MAVLINK2
 
 
 def _version(text: str) -> int:

@@ -9,9 +9,9 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.mavlink.stall import STALL
 from anafi_mav.services.service import Host, Service
-from anafi_mav.services.statustext import Severity
 from anafi_mav.vehicle.base.link_loss import GcsWatch, LossAction
 from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.vehicle import Landed
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from anafi_mav.services.service import Host, Service
-from anafi_mav.services.statustext import Severity
+from anafi_mav.vehicle.base.severity import Severity
 
 
 class PilotService(Service):

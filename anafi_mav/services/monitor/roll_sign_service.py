@@ -8,8 +8,8 @@ from typing import Any
 from anafi_mav.drone import events
 from anafi_mav.drone.piloting.state import Attitude, Velocity
 from anafi_mav.services.service import Service
-from anafi_mav.services.statustext import Severity
 from anafi_mav.vehicle.base.roll_sign import INVERTED, Sign
+from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 
 KEY = "roll_sign"

@@ -27,7 +27,7 @@ from anafi_mav.drone.status.alerts import Alerts, spoken
 from anafi_mav.drone.status.calibration import Calibration
 from anafi_mav.drone.status.home import Home
 from anafi_mav.services.service import Host, Service
-from anafi_mav.services.statustext import Severity
+from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 
 _LEVELS: Mapping[int, Severity] = {1: Severity.WARNING, 2: Severity.CRITICAL}

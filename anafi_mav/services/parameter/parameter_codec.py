@@ -8,10 +8,10 @@ from __future__ import annotations
 import enum
 import math
 import struct
-import zlib
 from collections.abc import Iterable, Sequence
 
 from anafi_mav.mavlink import dialect
+from anafi_mav.services.checksum import crc32
 
 NAME_LENGTH = 16
 """Characters of a param_id: a name of this length fills the field, without a NUL (MAVLink parameter.md)."""
@@ -104,11 +104,6 @@ def name_of(param_id: str | bytes) -> str:
     """The name in a param_id field."""
     text = param_id.decode(errors="replace") if isinstance(param_id, bytes) else param_id
     return text.split("\0", 1)[0]
-
-
-def crc32(data: bytes, crc: int = 0) -> int:
-    """MAVLink's CRC-32: the common one without its inversions at the beginning and at the end (MAVLink crc.md)."""
-    return zlib.crc32(data, crc ^ 0xFFFFFFFF) ^ 0xFFFFFFFF
 
 
 def hash_check(values: Iterable[tuple[str, float, Kind]]) -> int:

@@ -19,6 +19,7 @@ from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
+from anafi_mav.services.component_metadata import to_json
 from anafi_mav.services.files import Query, ServedFile
 from anafi_mav.services.flavours import FLAVOURS, Flavour, flavour_of
 from anafi_mav.services.paced_sender import Trickle
@@ -33,14 +34,14 @@ from anafi_mav.services.parameter.parameter_codec import (
     packed_file,
     param_value,
 )
-from anafi_mav.services.parameter.parameter_metadata import parameter_file, to_json
+from anafi_mav.services.parameter.parameter_metadata import parameter_file
 from anafi_mav.services.parameter.parameter_table import NATIVE
 from anafi_mav.services.parameter.parameter_table_ardupilot import ARDUPILOT_NAMES
 from anafi_mav.services.parameter.parameter_table_fence import FENCE_NATIVE
 from anafi_mav.services.parameter.parameter_table_follow import FOLLOW_NATIVE
 from anafi_mav.services.parameter.parameter_table_px4 import PX4_NAMES
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
-from anafi_mav.services.statustext import Severity
+from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 
 MAX_WRITES = 8

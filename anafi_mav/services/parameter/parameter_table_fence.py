@@ -7,8 +7,8 @@ from anafi_mav.services.parameter.parameter import Parameter, mapped, own, twin
 from anafi_mav.services.parameter.parameter_codec import Kind
 from anafi_mav.services.parameter.parameter_table import GEOFENCE, OFF_ON
 from anafi_mav.services.service import Host
-from anafi_mav.services.statustext import Severity
 from anafi_mav.vehicle.base.refusal import Refused
+from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.fence.fence_watch import (
     ARDUPILOT_ACTIONS,
     CEILING,

@@ -42,7 +42,7 @@ from anafi_mav.services.parameter.parameter_table_follow import FOLLOW_PX4
 from anafi_mav.services.parameter.parameter_table_setup import SETUP_PX4
 from anafi_mav.services.service import Host
 from anafi_mav.vehicle.base.refusal import Refused
-from anafi_mav.vehicle.offboard.stream import SILENCE
+from anafi_mav.vehicle.base.silence import SILENCE
 from anafi_mav.vehicle.return_end import LONGEST_WAIT, EndOfReturn
 from anafi_mav.vehicle.takeoff import AUTO_DISARM
 

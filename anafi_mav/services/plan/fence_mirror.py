@@ -18,7 +18,7 @@ from anafi_mav.drone import Range
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.plans.zones import Circle
 from anafi_mav.services.service import Host
-from anafi_mav.services.statustext import Severity
+from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.fence.fence_watch import Reaction
 
 NEAR, FAR = 5.0, 10.0

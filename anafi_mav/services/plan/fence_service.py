@@ -18,10 +18,10 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.services.commands import Action, Altitude, Command, Effect
 from anafi_mav.services.plan.fence_mirror import FenceMirror
 from anafi_mav.services.service import Host, Service
-from anafi_mav.services.statustext import Severity
 from anafi_mav.services.stream import Stream, Times
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
+from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.fence.fence_watch import CEILING, EVERYTHING, FLOOR, FenceWatch, Reaction, Sight, State
 from anafi_mav.vehicle.vehicle import Vehicle

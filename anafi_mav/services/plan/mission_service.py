@@ -16,10 +16,10 @@ from anafi_mav.services.commands import Action, Altitude, Command, Effect, effec
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.plan.mission_kind import FIRST_LABEL, offset
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
-from anafi_mav.services.statustext import Severity
 from anafi_mav.services.stream import Stream, Times
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
+from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.mission.progress import MAVLINK_STATES, State
 from anafi_mav.vehicle.mission.record import Record

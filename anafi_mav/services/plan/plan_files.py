@@ -11,7 +11,8 @@ import struct
 from collections.abc import Mapping, Sequence
 
 from anafi_mav.mavlink import dialect
-from anafi_mav.vehicle.fence.plan_items import Fault, PlanItem, item_int, item_of
+from anafi_mav.services.plan.item_messages import item_int, item_of
+from anafi_mav.vehicle.fence.plan_items import Fault, PlanItem
 
 PATHS: Mapping[int, str] = {
     dialect.MAV_MISSION_TYPE_MISSION: "/@MISSION/mission.dat",

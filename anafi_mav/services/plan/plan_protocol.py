@@ -15,7 +15,7 @@ from typing import Any
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.plan.plan_transfer import Commit, Effect, Peer, PlanKind, PlanTransfer, Reply, Say, State
-from anafi_mav.services.statustext import Severity
+from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.fence.plan_items import Fault
 
 ALL = dialect.MAV_MISSION_TYPE_ALL

@@ -23,14 +23,15 @@ from anafi_mav.services.files import Query, ServedFile
 from anafi_mav.services.flavours import PX4, Flavour, flavour_of
 from anafi_mav.services.memory import NOT_KEPT
 from anafi_mav.services.plan import plan_files
+from anafi_mav.services.plan.fence_kind import FenceKind, summary
 from anafi_mav.services.plan.mission_kind import MissionKind
 from anafi_mav.services.plan.plan_protocol import MESSAGES, PlanDesk
-from anafi_mav.services.plan.plan_transfer import MAX_ITEMS, Changed, Commit, Effect, Peer, PlanKind, Reply, Say
+from anafi_mav.services.plan.plan_transfer import Changed, Commit, Effect, Peer, PlanKind, Reply, Say
+from anafi_mav.services.plan.rally_kind import RallyKind
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
-from anafi_mav.services.statustext import Severity
-from anafi_mav.vehicle.fence.fence import FenceKind, summary
-from anafi_mav.vehicle.fence.plan_items import Fault, PlanItem
-from anafi_mav.vehicle.fence.rally import RallyKind, Return
+from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.vehicle.fence.plan_items import MAX_ITEMS, Fault, PlanItem
+from anafi_mav.vehicle.fence.rally import Return
 
 logger = logging.getLogger(__name__)
 

@@ -18,12 +18,10 @@ import msgspec
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.flavours import PX4, Flavour
+from anafi_mav.services.plan.item_messages import item_float, item_int, item_of
 from anafi_mav.services.plan.plan_requests import REQUEST_EVERY, Requests
-from anafi_mav.services.statustext import Severity
-from anafi_mav.vehicle.fence.plan_items import Fault, PlanItem, item_float, item_int, item_of, opaque_id
-
-MAX_ITEMS = 5000
-"""Items of a list: more than any client sends, small enough to be checked and stored at once."""
+from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.vehicle.fence.plan_items import MAX_ITEMS, Fault, PlanItem, opaque_id
 
 PATIENCE = 1.5
 """s of silence after which a client no longer keeps others away (the "1500 ms others" of conformance C5)."""

@@ -13,8 +13,8 @@ from anafi_mav.drone import Position
 from anafi_mav.drone.events import RthHomeType
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.services.service import Host, Service
-from anafi_mav.services.statustext import Severity
 from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.fence.rally import RallyPoint, RallyPoints, Return
 
 LOOK_EVERY = 1.0

@@ -1,4 +1,4 @@
-"""FOLLOW_TARGET as it arrives (conformance A10, B2). Where the drone belongs is in `follow`."""
+"""FOLLOW_TARGET as it arrives (conformance A10, B2). Where the drone belongs is in `vehicle.follow`."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
+from anafi_mav.services.setpoint.target_messages import sighting
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
-from anafi_mav.vehicle.follow import sighting
 
 
 class FollowService(Service):

@@ -1,6 +1,6 @@
 """The sticks of ground stations as they arrive (MAVLink manual_control.md; conformance A10, C15).
 
-What they mean and when they fly the drone is in `manual_flight`.
+What they mean is in `stick_messages`, when they fly the drone in `vehicle.manual_flight`.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.flavours import flavour_of
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
-from anafi_mav.vehicle.manual_flight import Channels, manual_sticks
-from anafi_mav.vehicle.offboard.stream import SILENCE
+from anafi_mav.services.setpoint.stick_messages import Channels, manual_sticks
+from anafi_mav.vehicle.base.silence import SILENCE
 
 MAX_CLIENTS = 8
 """Clients whose channels are remembered."""

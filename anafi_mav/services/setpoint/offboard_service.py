@@ -1,6 +1,6 @@
 """Setpoints of programs as they arrive, and what of them is being flown, told back (MAVLink offboard.md, C16).
 
-What the messages mean is in `offboard_setpoints`, how they are flown in `offboard_flight`.
+What the messages mean is in `setpoint_messages`, how they are flown in `vehicle.offboard.flight`.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.flavours import flavour_of
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
 from anafi_mav.services.setpoint.offboard_echo import STREAMS
+from anafi_mav.services.setpoint.setpoint_messages import attitude_setpoint, global_setpoint, local_setpoint
 from anafi_mav.services.stream import Stream
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
-from anafi_mav.vehicle.offboard import setpoints
 from anafi_mav.vehicle.offboard.setpoints import Setpoint
 
 
@@ -37,9 +37,9 @@ class OffboardService(Service):
 
     def messages(self) -> Mapping[int, MessageHandler]:
         return {
-            dialect.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET: self._takes(setpoints.attitude_setpoint),
-            dialect.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED: self._takes(setpoints.local_setpoint),
-            dialect.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT: self._takes(setpoints.global_setpoint),
+            dialect.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET: self._takes(attitude_setpoint),
+            dialect.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED: self._takes(local_setpoint),
+            dialect.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT: self._takes(global_setpoint),
         }
 
     def streams(self) -> Mapping[int, Stream]:

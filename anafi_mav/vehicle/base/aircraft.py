@@ -12,7 +12,6 @@ from collections.abc import Callable, Hashable
 
 from anafi_mav.drone import Drone
 from anafi_mav.drone.events import FlyingState, PilotingStyleStyle
-from anafi_mav.services.statustext import Severity
 from anafi_mav.vehicle.base.flying import AIRBORNE, ON_GROUND
 from anafi_mav.vehicle.base.height import HeightReference
 from anafi_mav.vehicle.base.helm import Helm
@@ -20,6 +19,7 @@ from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.place import Place, point_of
 from anafi_mav.vehicle.base.right import Right
 from anafi_mav.vehicle.base.roll_sign import RollCheck
+from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.fence.fence_watch import FenceWatch, OutsideFence
 
 STOP_WAIT = 0.5

@@ -3,27 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
-from anafi_mav.mavlink import dialect
+from anafi_mav import mav_enums
 from anafi_mav.plans.zones import Circle, Fence, Polygon, Zone
-from anafi_mav.services.flavours import PX4, Flavour
-from anafi_mav.services.plan.plan_transfer import PlanKind
-from anafi_mav.vehicle.fence.plan_items import Fault, PlanItem, place_fault
+from anafi_mav.vehicle.fence.plan_items import PlanItem
 
-SMALLEST_AREA = 1.0
-"""m². A polygon that encloses less is a line or a point: a slip, and nobody can be in it."""
-
-_RETURN_POINT = dialect.MAV_CMD_NAV_FENCE_RETURN_POINT
-_POLYGONS = {
-    dialect.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION: True,
-    dialect.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION: False,
+POLYGONS = {
+    mav_enums.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION: True,
+    mav_enums.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION: False,
 }
-_CIRCLES = {
-    dialect.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION: True,
-    dialect.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION: False,
+CIRCLES = {
+    mav_enums.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION: True,
+    mav_enums.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION: False,
 }
-_HOME_CIRCLE = dialect.MAV_CMD_NAV_FENCE_HOME_CIRCLE_INCLUSION
+HOME_CIRCLE = mav_enums.MAV_CMD_NAV_FENCE_HOME_CIRCLE_INCLUSION
 
 
 def fence_of(items: Iterable[PlanItem]) -> Fence:
@@ -31,98 +25,27 @@ def fence_of(items: Iterable[PlanItem]) -> Fence:
     zones: list[Zone] = []
     polygon: list[PlanItem] = []
     for number, item in enumerate(items):
-        if item.command in _POLYGONS:
+        if item.command in POLYGONS:
             polygon.append(item)
             if len(polygon) == int(item.params[0]):
                 corners = [(corner.latitude, corner.longitude) for corner in polygon]
-                inclusion = _POLYGONS[item.command]
-                name = f"{_word(inclusion)} polygon of items {number - len(polygon) + 1} to {number}"
-                zones.append(Polygon(name, inclusion, _group(item), corners))
+                inclusion = POLYGONS[item.command]
+                name = f"{inclusion_word(inclusion)} polygon of items {number - len(polygon) + 1} to {number}"
+                zones.append(Polygon(name, inclusion, group_of(item), corners))
                 polygon = []
-        elif item.command in _CIRCLES:
-            inclusion = _CIRCLES[item.command]
-            name = f"{_word(inclusion)} circle of item {number}"
-            zones.append(Circle(name, inclusion, _group(item), (item.latitude, item.longitude), item.params[0]))
-        elif item.command == _HOME_CIRCLE:
-            zones.append(Circle(f"circle around home of item {number}", True, _group(item), None, item.params[0]))
+        elif item.command in CIRCLES:
+            inclusion = CIRCLES[item.command]
+            name = f"{inclusion_word(inclusion)} circle of item {number}"
+            zones.append(Circle(name, inclusion, group_of(item), (item.latitude, item.longitude), item.params[0]))
+        elif item.command == HOME_CIRCLE:
+            zones.append(Circle(f"circle around home of item {number}", True, group_of(item), None, item.params[0]))
     return Fence(zones)
 
 
-def _word(inclusion: bool) -> str:
+def inclusion_word(inclusion: bool) -> str:
     return "inclusion" if inclusion else "exclusion"
 
 
-def _group(item: PlanItem) -> int:
+def group_of(item: PlanItem) -> int:
     """Inclusion group; clients that know no groups leave param2 0 or unset."""
     return 0 if math.isnan(item.params[1]) else int(item.params[1])
-
-
-def _is_void(item: PlanItem) -> bool:
-    """True for a circle of radius 0, in which no vehicle can be. Fence editors send it for a circle not yet drawn."""
-    return (item.command in _CIRCLES or item.command == _HOME_CIRCLE) and item.params[0] == 0.0
-
-
-class FenceKind(PlanKind):
-    """The list of fence items."""
-
-    mission_type = dialect.MAV_MISSION_TYPE_FENCE
-    name = "fence"
-
-    def check_item(self, item: PlanItem) -> Fault | None:
-        first, second = item.params[:2]
-        if item.command in _POLYGONS:
-            if not (math.isfinite(first) and first == int(first) and 3 <= first <= self.capacity):
-                return Fault(dialect.MAV_MISSION_INVALID_PARAM1, f"{first:g} is no number of corners")
-        elif item.command in _CIRCLES or item.command == _HOME_CIRCLE:
-            if not (math.isfinite(first) and first >= 0.0):  # `taken` leaves one of 0 out
-                return Fault(dialect.MAV_MISSION_INVALID_PARAM1, f"{first:g} is no radius")
-        elif item.command != _RETURN_POINT:
-            return Fault(dialect.MAV_MISSION_UNSUPPORTED, f"command {item.command} is no part of a fence")
-        if not (math.isnan(second) or (math.isfinite(second) and second == int(second))):
-            return Fault(dialect.MAV_MISSION_INVALID_PARAM2, f"{second:g} is no inclusion group")
-        return None if item.command == _HOME_CIRCLE or _is_void(item) else place_fault(item)
-
-    def taken(self, items: Sequence[PlanItem], flavour: Flavour) -> Sequence[PlanItem]:
-        return [item for item in items if not _is_void(item)]
-
-    def remarks(self, items: Sequence[PlanItem]) -> Sequence[str]:
-        return [f"Fence circle {number} ignored: radius 0" for number, item in enumerate(items) if _is_void(item)]
-
-    def check_plan(self, items: Sequence[PlanItem], flavour: Flavour = PX4) -> Fault | None:
-        number = 0
-        return_points = 0
-        while number < len(items):
-            item = items[number]
-            corners = int(item.params[0]) if item.command in _POLYGONS else 1
-            same = items[number : number + corners]
-            # Only an inclusion polygon has a group (MAVLink common.xml).
-            keys = {(one.command, one.params[0], _group(one) if _POLYGONS.get(one.command) else 0) for one in same}
-            if item.command in _POLYGONS and (len(same) < corners or len(keys) > 1):
-                reason = f"the polygon that begins with item {number} has not its {corners} corners"
-                return Fault(dialect.MAV_MISSION_INVALID_PARAM1, reason)
-            return_points += item.command == _RETURN_POINT
-            number += corners
-        if return_points > 1:
-            return Fault(dialect.MAV_MISSION_INVALID, "it has more than one return point")
-        for zone in fence_of(items).zones:
-            if isinstance(zone, Polygon) and zone.area < SMALLEST_AREA:
-                return Fault(dialect.MAV_MISSION_INVALID, f"the {zone.name} encloses nothing, or crosses itself")
-        return None
-
-
-def summary(items: Sequence[PlanItem]) -> str:
-    """A fence in a line, for people; what it asks for that is not done is told."""
-    zones = fence_of(items).zones
-    words = []
-    for inclusion in (True, False):
-        for kind, word in ((Polygon, "polygon"), (Circle, "circle")):
-            count = sum(isinstance(zone, kind) and zone.inclusion is inclusion for zone in zones)
-            if count:
-                words.append(f"{count} {_word(inclusion)} {word}{'s' if count > 1 else ''}")
-    line = ", ".join(words) or "no zones"
-    groups = [zone.group for zone in zones if zone.inclusion]
-    if len(groups) > len(set(groups)):
-        line += "; inside is what all inclusion zones of one group have in common"
-    if any(item.command == _RETURN_POINT for item in items):
-        line += "; the return point is kept and not used"
-    return line

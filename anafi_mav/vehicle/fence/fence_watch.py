@@ -16,9 +16,8 @@ from dataclasses import dataclass
 
 import msgspec
 
-from anafi_mav import geo
+from anafi_mav import geo, mav_enums
 from anafi_mav.errors import AnafiMavError
-from anafi_mav.mavlink import dialect
 from anafi_mav.plans.zones import Circle, Fence, LatLon, Margin
 from anafi_mav.vehicle.fence.fence import fence_of
 from anafi_mav.vehicle.fence.plan_items import PlanItem
@@ -89,17 +88,17 @@ NO_NUMBER = -1
 class Breach(enum.Enum):
     """Which boundary (MAVLink FENCE_BREACH)."""
 
-    NONE = dialect.FENCE_BREACH_NONE
-    FLOOR = dialect.FENCE_BREACH_MINALT
-    CEILING = dialect.FENCE_BREACH_MAXALT
-    BOUNDARY = dialect.FENCE_BREACH_BOUNDARY
+    NONE = mav_enums.FENCE_BREACH_NONE
+    FLOOR = mav_enums.FENCE_BREACH_MINALT
+    CEILING = mav_enums.FENCE_BREACH_MAXALT
+    BOUNDARY = mav_enums.FENCE_BREACH_BOUNDARY
 
 
 CEILING, HOME_CIRCLE, ZONES, FLOOR = (
-    dialect.FENCE_TYPE_ALT_MAX,
-    dialect.FENCE_TYPE_CIRCLE,
-    dialect.FENCE_TYPE_POLYGON,
-    dialect.FENCE_TYPE_ALT_MIN,
+    mav_enums.FENCE_TYPE_ALT_MAX,
+    mav_enums.FENCE_TYPE_CIRCLE,
+    mav_enums.FENCE_TYPE_POLYGON,
+    mav_enums.FENCE_TYPE_ALT_MIN,
 )
 """Kinds of boundaries (MAVLink FENCE_TYPE): the drone's own ceiling, a circle around home, uploaded zones, a floor."""
 

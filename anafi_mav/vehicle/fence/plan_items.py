@@ -1,21 +1,18 @@
-"""One item of a mission, fence or rally list, verbatim as MAVLink carries it, and the messages that do.
-
-MISSION_ITEM_INT is the form that is kept. What comes as MISSION_ITEM, with places in single precision, becomes the
-integers that give the same floats back (MAVLink mission.md; conformance C5, D2).
-"""
+"""One item of a mission, fence or rally list, with the fields of MISSION_ITEM_INT. No I/O."""
 
 from __future__ import annotations
 
-import math
 import struct
 import zlib
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
 
 import msgspec
 
-from anafi_mav.mavlink import dialect
+from anafi_mav import mav_enums
+
+MAX_ITEMS = 5000
+"""Items of a list: more than any client sends, small enough to be checked and stored at once."""
 
 DEGREES = 1e7
 """MISSION_ITEM_INT's x and y per degree, in items with a place."""
@@ -23,12 +20,10 @@ DEGREES = 1e7
 UNSET = 2**31 - 1
 """x and y that stand for "not set" (MAVLink mission.md); NaN in MISSION_ITEM."""
 
-AMSL_FRAMES = (dialect.MAV_FRAME_GLOBAL, dialect.MAV_FRAME_GLOBAL_INT)
-RELATIVE_FRAMES = (dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT, dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
+AMSL_FRAMES = (mav_enums.MAV_FRAME_GLOBAL, mav_enums.MAV_FRAME_GLOBAL_INT)
+RELATIVE_FRAMES = (mav_enums.MAV_FRAME_GLOBAL_RELATIVE_ALT, mav_enums.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
 
-PLACED = frozenset(
-    command for command, entry in dialect.enums["MAV_CMD"].items() if getattr(entry, "has_location", False)
-)
+PLACED = frozenset(command for command, entry in mav_enums.enums["MAV_CMD"].items() if entry.has_location)
 """Commands with a place, in items and in COMMAND_INT: MAVLink's hasLocation."""
 
 _CONTENT = struct.Struct("<HBB4fiif")
@@ -75,53 +70,7 @@ class PlanItem(msgspec.Struct, frozen=True):
 
 def has_place(command: int, frame: int) -> bool:
     """x and y of an item are degrees times 1e7, not plain numbers."""
-    return frame != dialect.MAV_FRAME_MISSION and command in PLACED
-
-
-def _integer(value: float, scale: float) -> int | None:
-    """x or y of a MISSION_ITEM as MISSION_ITEM_INT has it; None when that cannot hold it."""
-    if math.isnan(value):
-        return UNSET
-    if not abs(value * scale) < UNSET:
-        return None
-    return round(value * scale)
-
-
-def item_of(message: Any) -> PlanItem | Fault:
-    """What a client sent as MISSION_ITEM or MISSION_ITEM_INT."""
-    x: int | None = message.x
-    y: int | None = message.y
-    if message.get_msgId() == dialect.MAVLINK_MSG_ID_MISSION_ITEM:
-        scale = DEGREES if has_place(message.command, message.frame) else 1.0
-        x, y = _integer(message.x, scale), _integer(message.y, scale)
-    if x is None:
-        return Fault(dialect.MAV_MISSION_INVALID_PARAM5_X, f"{message.x:g} is no latitude")
-    if y is None:
-        return Fault(dialect.MAV_MISSION_INVALID_PARAM6_Y, f"{message.y:g} is no longitude")
-    params = (message.param1, message.param2, message.param3, message.param4)
-    return PlanItem(message.command, message.frame, params, x, y, message.z, message.autocontinue, message.current)
-
-
-def item_int(
-    item: PlanItem, seq: int, sysid: int, compid: int, mission_type: int
-) -> dialect.MAVLink_mission_item_int_message:
-    """MISSION_ITEM_INT to one client."""
-    return dialect.MAVLink_mission_item_int_message(
-        sysid, compid, seq, item.frame, item.command, item.current, item.autocontinue,
-        *item.params, item.x, item.y, item.z, mission_type,
-    )  # fmt: skip
-
-
-def item_float(
-    item: PlanItem, seq: int, sysid: int, compid: int, mission_type: int
-) -> dialect.MAVLink_mission_item_message:
-    """MISSION_ITEM to one client: places are as exact as single precision is, about 0.4 m."""
-    scale = DEGREES if item.has_place else 1.0
-    x, y = (math.nan if value == UNSET else value / scale for value in (item.x, item.y))
-    return dialect.MAVLink_mission_item_message(
-        sysid, compid, seq, item.frame, item.command, item.current, item.autocontinue,
-        *item.params, x, y, item.z, mission_type,
-    )  # fmt: skip
+    return frame != mav_enums.MAV_FRAME_MISSION and command in PLACED
 
 
 def opaque_id(items: Iterable[PlanItem]) -> int:
@@ -141,13 +90,13 @@ def opaque_id(items: Iterable[PlanItem]) -> int:
 def place_fault(item: PlanItem) -> Fault | None:
     """What is wrong with the place of an item that needs one."""
     if item.frame not in (*AMSL_FRAMES, *RELATIVE_FRAMES):
-        return Fault(dialect.MAV_MISSION_UNSUPPORTED_FRAME, f"frame {item.frame} is neither AMSL nor above home")
+        return Fault(mav_enums.MAV_MISSION_UNSUPPORTED_FRAME, f"frame {item.frame} is neither AMSL nor above home")
     if not abs(item.latitude) <= 90.0:
-        return Fault(dialect.MAV_MISSION_INVALID_PARAM5_X, "its latitude is none")
+        return Fault(mav_enums.MAV_MISSION_INVALID_PARAM5_X, "its latitude is none")
     if not abs(item.longitude) <= 180.0:
-        return Fault(dialect.MAV_MISSION_INVALID_PARAM6_Y, "its longitude is none")
+        return Fault(mav_enums.MAV_MISSION_INVALID_PARAM6_Y, "its longitude is none")
     if item.x == 0 and item.y == 0:
-        return Fault(dialect.MAV_MISSION_INVALID_PARAM5_X, "its latitude and longitude are both 0")
+        return Fault(mav_enums.MAV_MISSION_INVALID_PARAM5_X, "its latitude and longitude are both 0")
     return None
 
 

@@ -11,9 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from anafi_mav import geo
-from anafi_mav.mavlink import dialect
-from anafi_mav.services.plan.plan_transfer import PlanKind
-from anafi_mav.vehicle.fence.plan_items import Fault, PlanItem, height_ato, place_fault
+from anafi_mav.vehicle.fence.plan_items import PlanItem, height_ato
 
 CLOSER = 10.0
 """m that another place must be closer by before it replaces the chosen one: half way between two the choice would
@@ -50,20 +48,6 @@ class RallyPoint:
     longitude: float
     ato: float
     """m above the take-off point."""
-
-
-class RallyKind(PlanKind):
-    """The list of rally points."""
-
-    mission_type = dialect.MAV_MISSION_TYPE_RALLY
-    name = "rally points"
-
-    def check_item(self, item: PlanItem) -> Fault | None:
-        if item.command != dialect.MAV_CMD_NAV_RALLY_POINT:
-            return Fault(dialect.MAV_MISSION_UNSUPPORTED, f"command {item.command} is no rally point")
-        if not abs(item.z) <= 10_000.0:
-            return Fault(dialect.MAV_MISSION_INVALID_PARAM7, f"{item.z:g} m is no height")
-        return place_fault(item)
 
 
 class RallyPoints:

@@ -17,10 +17,10 @@ from anafi_mav.drone.events import FlyingState, PlayingState
 from anafi_mav.errors import AnafiMavError, CommandRejected, LinkLost
 from anafi_mav.plans.plan import Item
 from anafi_mav.plans.translation.translate import Leg
-from anafi_mav.services.statustext import Severity
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
+from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.mission.course import Course
 from anafi_mav.vehicle.mission.files import FilesOnDrone

@@ -9,8 +9,8 @@ import asyncio
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from anafi_mav import mav_enums
 from anafi_mav.errors import PlanError
-from anafi_mav.mavlink import dialect
 from anafi_mav.plans.plan import Item
 from anafi_mav.plans.translation.translate import Cursor, Leg, Start, Step, translate
 from anafi_mav.units import DEG_PER_RAD
@@ -27,7 +27,7 @@ BREATH = 20
 ACCEPTANCE = 5.0
 """m around a way point that names no radius (Parrot's flight plan page)."""
 
-_AMSL_FRAMES = (dialect.MAV_FRAME_GLOBAL, dialect.MAV_FRAME_GLOBAL_INT)
+_AMSL_FRAMES = (mav_enums.MAV_FRAME_GLOBAL, mav_enums.MAV_FRAME_GLOBAL_INT)
 
 _COMMAND, _RADIUS, _LATITUDE, _LONGITUDE, _HEIGHT = 3, 5, 8, 9, 10
 """Columns of a line (arsdk.md §3.3, Parrot's flight plan page)."""
@@ -107,7 +107,7 @@ def way_points(leg: Leg, after: int = -1) -> Iterator[WayPoint]:
     lines = leg.content.decode().splitlines()[1:]
     for line, item in zip(lines[after + 1 :], leg.origins[after + 1 :], strict=False):
         columns = line.split("\t")
-        if int(columns[_COMMAND]) == dialect.MAV_CMD_NAV_WAYPOINT:
+        if int(columns[_COMMAND]) == mav_enums.MAV_CMD_NAV_WAYPOINT:
             place = Place(float(columns[_LATITUDE]), float(columns[_LONGITUDE]))
             radius = float(columns[_RADIUS])
             yield WayPoint(item, place, float(columns[_HEIGHT]), radius if radius > 0.0 else ACCEPTANCE)

@@ -9,11 +9,11 @@ from __future__ import annotations
 import enum
 from collections.abc import Sequence
 
-from anafi_mav.mavlink import dialect
+from anafi_mav import mav_enums
 from anafi_mav.plans.plan import DO_JUMP, Item
 from anafi_mav.plans.translation.translate import Leg
 
-ENDINGS = (dialect.MAV_CMD_NAV_LAND, dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH)
+ENDINGS = (mav_enums.MAV_CMD_NAV_LAND, mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH)
 """Items that end in a landing or a return, which is the plan's own and no take-over of the drone's."""
 
 
@@ -65,11 +65,11 @@ TRANSITIONS: dict[State, dict[Event, State]] = {
 """What is not here does not happen: an active mission is stopped before another item of it is begun."""
 
 MAVLINK_STATES = {
-    State.NONE: dialect.MISSION_STATE_NO_MISSION,
-    State.READY: dialect.MISSION_STATE_NOT_STARTED,
-    State.ACTIVE: dialect.MISSION_STATE_ACTIVE,
-    State.PAUSED: dialect.MISSION_STATE_PAUSED,
-    State.COMPLETE: dialect.MISSION_STATE_COMPLETE,
+    State.NONE: mav_enums.MISSION_STATE_NO_MISSION,
+    State.READY: mav_enums.MISSION_STATE_NOT_STARTED,
+    State.ACTIVE: mav_enums.MISSION_STATE_ACTIVE,
+    State.PAUSED: mav_enums.MISSION_STATE_PAUSED,
+    State.COMPLETE: mav_enums.MISSION_STATE_COMPLETE,
 }
 
 
@@ -121,7 +121,7 @@ class Progress:
         leg = self.leg
         if leg is None or not self.leg_done or self.state not in (State.ACTIVE, State.COMPLETE):
             return False
-        return self.items[leg.origins[-1]].command == dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH
+        return self.items[leg.origins[-1]].command == mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH
 
     @property
     def at_last_line(self) -> bool:

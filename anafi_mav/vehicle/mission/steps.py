@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 
-from anafi_mav import units
+from anafi_mav import mav_enums, units
 from anafi_mav.errors import CommandRejected
-from anafi_mav.mavlink import dialect
 from anafi_mav.plans.plan import Item
 from anafi_mav.plans.rules.rules_flight import is_relative
 from anafi_mav.vehicle.base.aircraft import Aircraft
@@ -21,9 +20,9 @@ async def fly_step(vehicle: Aircraft, item: Item) -> None:
     if not vehicle.in_air or vehicle.returning:
         raise CommandRejected("the drone does something else")
     match item.command:
-        case dialect.MAV_CMD_CONDITION_YAW:
+        case mav_enums.MAV_CMD_CONDITION_YAW:
             await _turn(vehicle, item)
-        case dialect.MAV_CMD_SET_CAMERA_ZOOM:
+        case mav_enums.MAV_CMD_SET_CAMERA_ZOOM:
             await _zoom(vehicle, item)
         case _:
             raise CommandRejected(f"command {item.command} is not flown by the gateway")
@@ -42,7 +41,7 @@ async def _turn(vehicle: Aircraft, item: Item) -> None:
 async def _zoom(vehicle: Aircraft, item: Item) -> None:
     """param1 ZOOM_TYPE, param2 its value: RANGE is a share of the camera's range in %."""
     kind, value = item.params[:2]
-    if kind != dialect.ZOOM_TYPE_RANGE or value is None or not math.isfinite(value):
+    if kind != mav_enums.ZOOM_TYPE_RANGE or value is None or not math.isfinite(value):
         raise CommandRejected("a zoom is flown as a share of the camera's range")
     camera = vehicle.drone.camera
     largest = camera[0].zoom_max

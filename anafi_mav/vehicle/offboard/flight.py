@@ -19,13 +19,14 @@ from anafi_mav.clock import Alarm, Clock
 from anafi_mav.drone import Limits, PilotingCommand, events
 from anafi_mav.drone.events import FlyingState
 from anafi_mav.errors import AnafiMavError, LinkLost
-from anafi_mav.services.statustext import Severity
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.bounds import TooLow
 from anafi_mav.vehicle.base.clients import system_of
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.roll_sign import ROLL_INVERTED
+from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.vehicle.base.silence import SILENCE
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.base.velocity_loop import (
     CAUTIOUS_TILT,
@@ -40,7 +41,7 @@ from anafi_mav.vehicle.base.velocity_loop import (
 from anafi_mav.vehicle.offboard.goals import Goal, demand, resolve
 from anafi_mav.vehicle.offboard.moves import OffboardMoves
 from anafi_mav.vehicle.offboard.setpoints import NOTHING, AttitudeSetpoint, MotionSetpoint, Setpoint
-from anafi_mav.vehicle.offboard.stream import GUIDED_TIMEOUT, SILENCE, OffboardStream, State, ends, lasts
+from anafi_mav.vehicle.offboard.stream import GUIDED_TIMEOUT, OffboardStream, State, ends, lasts
 from anafi_mav.vehicle.offboard.takeoff import Launcher, Phase, SetpointTakeoff, Step, climbs
 
 WARN_AGAIN = 1.0

@@ -16,10 +16,8 @@ import enum
 from collections.abc import Hashable
 from typing import NamedTuple
 
+from anafi_mav.vehicle.base.silence import SILENCE
 from anafi_mav.vehicle.offboard.setpoints import NOTHING, MotionSetpoint, Setpoint
-
-SILENCE = 0.45
-"""s without a setpoint until the drone is told to hover, so that it has been told within half a second."""
 
 GUIDED_TIMEOUT = 1.5
 """s that a velocity of ArduPilot's Guided lasts, unless a client sets another (dronekit's documents send one a

@@ -21,7 +21,8 @@ from anafi_mav.mavlink.plan_client import (
     Transfer,
     Upload,
 )
-from anafi_mav.vehicle.fence.plan_items import PlanItem, item_float, item_int, item_of
+from anafi_mav.services.plan.item_messages import item_float, item_int, item_of
+from anafi_mav.vehicle.fence.plan_items import PlanItem
 
 
 def builds(plan: tuple[PlanItem, ...]) -> list[Build]:

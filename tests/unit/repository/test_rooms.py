@@ -117,6 +117,7 @@ def test_the_table_was_read() -> None:
     assert TABLE["drone"] == KIT | {"arsdk"}
     assert TABLE["sim"] == KIT | {"arsdk"}
     assert TABLE["plans"] == KIT | {"mav_enums"}
+    assert TABLE["vehicle"] == KIT | {"mav_enums", "drone", "plans"}
     assert TABLE["mav_enums"] == set()
     assert TABLE["gateway"] == set(TABLE) - {"gateway", "cli", "__main__", "sim"}
     speakers = {"mavlink", "vehicle", "services", "plans", "gateway", "cli", "__main__"}

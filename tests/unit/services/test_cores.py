@@ -13,10 +13,11 @@ from anafi_mav.services.command.actions import flight_actions
 from anafi_mav.services.command.guided_service import GuidedService
 from anafi_mav.services.command.modes_service import ModesService
 from anafi_mav.services.flavours import ARDUPILOT, PX4
-from anafi_mav.services.statustext import Severity, TextNumbers
+from anafi_mav.services.statustext import TextNumbers
 from anafi_mav.vehicle.base.height import HeightReference, TakeoffRecord
 from anafi_mav.vehicle.base.link_loss import GcsWatch
 from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.severity import Severity
 
 NAN = math.nan
 

@@ -8,7 +8,8 @@ from typing import Any
 import pytest
 
 from anafi_mav.mavlink import dialect
-from anafi_mav.vehicle.follow import FORESIGHT, TRANSITIONS, Event, Follower, FollowSettings, Sighting, State, sighting
+from anafi_mav.services.setpoint.target_messages import sighting
+from anafi_mav.vehicle.follow import FORESIGHT, TRANSITIONS, Event, Follower, FollowSettings, Sighting, State
 
 NAN = math.nan
 

@@ -7,7 +7,8 @@ from typing import Any
 import pytest
 
 from anafi_mav.mavlink import dialect
-from anafi_mav.vehicle.manual_flight import TRANSITIONS, Channels, Event, State, Sticks, manual_sticks
+from anafi_mav.services.setpoint.stick_messages import Channels, manual_sticks
+from anafi_mav.vehicle.manual_flight import TRANSITIONS, Event, State, Sticks
 
 
 def test_every_state_of_the_sticks_knows_its_events() -> None:

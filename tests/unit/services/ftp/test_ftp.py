@@ -7,6 +7,7 @@ import struct
 
 import pytest
 
+from anafi_mav.services.checksum import crc32
 from anafi_mav.services.files import FileTree, Query
 from anafi_mav.services.ftp.ftp import (
     ACK,
@@ -25,7 +26,6 @@ from anafi_mav.services.ftp.ftp import (
     Opcode,
     State,
 )
-from anafi_mav.services.parameter.parameter_codec import crc32
 
 CONTENT = bytes(range(256)) * 4
 OTHER = b"other"

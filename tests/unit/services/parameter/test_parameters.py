@@ -13,6 +13,7 @@ from MAVProxy.modules.lib.param_ftp import ftp_param_decode
 from anafi_mav.drone.status.battery import BatteryState
 from anafi_mav.mavlink.frames import pack
 from anafi_mav.models import MODELS, unknown
+from anafi_mav.services.checksum import crc32
 from anafi_mav.services.flavours import ARDUPILOT, FLAVOURS, PX4
 from anafi_mav.services.parameter.parameter_codec import (
     HASH_NAME,
@@ -20,7 +21,6 @@ from anafi_mav.services.parameter.parameter_codec import (
     Kind,
     carried,
     carrier,
-    crc32,
     hash_check,
     name_of,
     packed_file,

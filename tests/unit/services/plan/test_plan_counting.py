@@ -10,9 +10,9 @@ from support.plan_wire import FENCE, Wire, desk, items, peer, replies
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.flavours import ARDUPILOT
+from anafi_mav.services.plan.item_messages import item_int
 from anafi_mav.services.plan.plan_protocol import PlanDesk
 from anafi_mav.services.plan.plan_requests import REQUEST_EVERY
-from anafi_mav.vehicle.fence.plan_items import item_int
 
 ME = peer(245, 190)
 

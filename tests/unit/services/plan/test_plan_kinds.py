@@ -10,12 +10,13 @@ from support.plan_wire import FENCE, MISSION, peer, replies, texts
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.flavours import ARDUPILOT, PX4, STANDARD, Flavour
+from anafi_mav.services.plan.fence_kind import FenceKind
+from anafi_mav.services.plan.item_messages import item_int
 from anafi_mav.services.plan.mission_kind import MissionKind
 from anafi_mav.services.plan.plan_protocol import PlanDesk
 from anafi_mav.services.plan.plan_transfer import Commit
 from anafi_mav.services.statustext import CHUNK
-from anafi_mav.vehicle.fence.fence import FenceKind
-from anafi_mav.vehicle.fence.plan_items import PlanItem, item_int
+from anafi_mav.vehicle.fence.plan_items import PlanItem
 
 LAT, LON = 488789000, 23677000
 ACCEPTED, INVALID_PARAM1 = dialect.MAV_MISSION_ACCEPTED, dialect.MAV_MISSION_INVALID_PARAM1

@@ -12,11 +12,11 @@ from support.plan_wire import FENCE, MISSION, RALLY, Client, Kind, Wire, an_item
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.flavours import ARDUPILOT, PX4, STANDARD, Flavour
+from anafi_mav.services.plan.item_messages import item_float, item_int, item_of
 from anafi_mav.services.plan.plan_protocol import ALL, MAX_WAITING, PlanDesk
 from anafi_mav.services.plan.plan_requests import MAX_TRIES, REQUEST_EVERY
 from anafi_mav.services.plan.plan_transfer import (
     ECHOES,
-    MAX_ITEMS,
     PATIENCE,
     RECENT,
     TRANSITIONS,
@@ -28,7 +28,7 @@ from anafi_mav.services.plan.plan_transfer import (
     Reply,
     State,
 )
-from anafi_mav.vehicle.fence.plan_items import Fault, PlanItem, item_float, item_int, item_of, opaque_id
+from anafi_mav.vehicle.fence.plan_items import MAX_ITEMS, Fault, PlanItem, opaque_id
 
 ACCEPTED, ERROR, UNSUPPORTED = dialect.MAV_MISSION_ACCEPTED, dialect.MAV_MISSION_ERROR, dialect.MAV_MISSION_UNSUPPORTED
 DENIED, NO_SPACE = dialect.MAV_MISSION_DENIED, dialect.MAV_MISSION_NO_SPACE

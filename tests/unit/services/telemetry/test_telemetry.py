@@ -17,7 +17,7 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Node
 from anafi_mav.services.flavours import ARDUPILOT, PX4, STANDARD
 from anafi_mav.services.ground_station.shell_service import PROMPT, answer
-from anafi_mav.services.statustext import Severity, TextNumbers
+from anafi_mav.services.statustext import TextNumbers
 from anafi_mav.services.stream import Times
 from anafi_mav.services.system import System
 from anafi_mav.services.telemetry import (
@@ -29,6 +29,7 @@ from anafi_mav.services.telemetry import (
 )
 from anafi_mav.services.telemetry.flight_record_service import FlightRecord
 from anafi_mav.services.telemetry.update_tracker import News
+from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.vehicle import Landed
 
 NOW = Times(1_234_567_890)

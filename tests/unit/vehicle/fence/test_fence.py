@@ -17,7 +17,8 @@ from msgspec.structs import replace
 from anafi_mav import geo
 from anafi_mav.mavlink import dialect
 from anafi_mav.plans.zones import Circle, Fence, Polygon
-from anafi_mav.vehicle.fence.fence import FenceKind, fence_of, summary
+from anafi_mav.services.plan.fence_kind import FenceKind, summary
+from anafi_mav.vehicle.fence.fence import fence_of
 from anafi_mav.vehicle.fence.fence_watch import (
     ARDUPILOT_ACTIONS,
     BACK_INSIDE,

@@ -8,19 +8,12 @@ from typing import Any
 import pytest
 
 from anafi_mav.mavlink import dialect
+from anafi_mav.services.setpoint.setpoint_messages import attitude_setpoint, global_setpoint, local_setpoint
+from anafi_mav.vehicle.base.silence import SILENCE
 from anafi_mav.vehicle.base.velocity_loop import turn_towards
-from anafi_mav.vehicle.offboard.setpoints import (
-    AttitudeSetpoint,
-    MotionSetpoint,
-    Origin,
-    Setpoint,
-    attitude_setpoint,
-    global_setpoint,
-    local_setpoint,
-)
+from anafi_mav.vehicle.offboard.setpoints import AttitudeSetpoint, MotionSetpoint, Origin, Setpoint
 from anafi_mav.vehicle.offboard.stream import (
     MAX_PILOTS,
-    SILENCE,
     STRAGGLING,
     TOGETHER,
     TRANSITIONS,
