@@ -35,7 +35,7 @@ from support.missions import (
     way,
     whole,
 )
-from support.plans import ACCEPTED, FENCE, MISSION, UNSUPPORTED_FRAME, around, square, upload
+from support.plans import ACCEPTED, FENCE, MISSION, UNSUPPORTED_FRAME, Item, around, square, upload
 from support.trouble import return_by_itself
 from support.world import ARMED, world
 
@@ -369,6 +369,53 @@ async def test_conf_072_the_current_item(flavour: str) -> None:
         await state(w, ACTIVE, seq=3, since=mark)
         await state(w, COMPLETE, since=mark)
         assert reached(w) == [3, 4], "what was not flown is not reached"
+
+
+@both
+async def test_conf_072_a_reset_in_flight_keeps_the_item(flavour: str) -> None:
+    """param1 -1, param2 1: a mission without loops is flown on as it is, and begins anew only after its end."""
+    async with world(flavour=flavour, web=True) as w:
+        await put(w, ROUND)
+        await start(w)
+        await state(w, ACTIVE, seq=2, since=0)
+        mark = w.client.mark()
+        ack = await w.client.command(dialect.MAV_CMD_DO_SET_MISSION_CURRENT, -1, 1)
+        assert ack.result == dialect.MAV_RESULT_ACCEPTED
+        await state(w, COMPLETE, since=mark)
+        assert {m.seq - first(w) for _, m in w.client.since(mark, "MISSION_CURRENT")} <= {2, 3, 4}
+        assert reached(w) == [0, 1, 2, 3, 4]
+        assert len(w.commands("common.Mavlink.Start")) == 1
+        other, mark = await w.connect(254), w.client.mark()
+        ack = await other.command(dialect.MAV_CMD_DO_SET_MISSION_CURRENT, -1, 1)
+        assert ack.result == dialect.MAV_RESULT_ACCEPTED
+        await state(w, NOT_STARTED, seq=0, since=mark)
+
+
+@both
+@pytest.mark.parametrize("paused", [False, True])
+async def test_conf_072_a_reset_gives_a_loop_its_turns_again_at_the_same_item(flavour: str, paused: bool) -> None:
+    """Between the two ways of the second turn: the drone flies on to the second one, and then a third turn."""
+    async with world(flavour=flavour, web=True) as w:
+        jump = Item(dialect.MAV_CMD_DO_JUMP, 0.0, 0.0, p1=1.0 + first(w), p2=1.0, frame=2)
+        await put(w, [takeoff(6.0), way(9.0, 0.0, 6.0), way(9.0, 9.0, 6.0), jump, way(0.0, 9.0, 6.0)])
+        await start(w)
+        await state(w, ACTIVE, seq=2, since=0)
+        mark = w.client.mark()
+        await state(w, ACTIVE, seq=1, since=mark)
+        mark = w.client.mark()
+        await state(w, ACTIVE, seq=2, since=mark)
+        if paused:
+            ack = await w.client.command(dialect.MAV_CMD_DO_PAUSE_CONTINUE, 0)
+            assert ack.result == dialect.MAV_RESULT_ACCEPTED
+        ack = await w.client.command(dialect.MAV_CMD_DO_SET_MISSION_CURRENT, -1, 1)
+        assert ack.result == dialect.MAV_RESULT_ACCEPTED
+        if paused:
+            await state(w, PAUSED, seq=2)
+            ack = await w.client.command(dialect.MAV_CMD_MISSION_START, 0, 0)
+            assert ack.result == dialect.MAV_RESULT_ACCEPTED
+        await state(w, COMPLETE, since=mark)
+        assert reached(w) == [0, 1, 2, 3, 1, 2, 3, 1, 2, 3, 4]
+        assert flown(w).count("takeoff") == 1
 
 
 async def test_conf_072_an_ai_begins_in_the_middle_of_the_file_that_it_has() -> None:
