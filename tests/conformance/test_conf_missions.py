@@ -467,6 +467,23 @@ async def test_conf_141_items_that_are_orders(flavour: str, as_int: bool) -> Non
         assert current.seq == 0
 
 
+@pytest.mark.parametrize("current", [2, 3])
+@pytest.mark.parametrize("number", [17, 5], ids=["brake", "loiter"])
+async def test_conf_141_outside_guided_an_item_moves_nothing(number: int, current: int) -> None:
+    """ArduCopter flies them in Guided only: neither a drone that is held nor one that a stick may fly goes anywhere."""
+    async with world(flavour="ardupilot") as w:
+        await w.take_off(5.0)
+        assert (await w.client.command(dialect.MAV_CMD_DO_SET_MODE, 1, number)).result == dialect.MAV_RESULT_ACCEPTED
+        mark = w.client.mark()
+        place = around(PLACE, (20.0, -10.0))[0]
+        assert (await order(w.client, current, *place, 8.0, as_int=True)).type == dialect.MAV_MISSION_DENIED
+        await said(w, "not in Guided", since=mark)
+        await mode(w, number, since=w.client.mark())
+        assert [e for e in w.drone.log if e.kind == "command" and e.name.endswith("Piloting.moveTo")] == []
+        assert (await w.client.command(dialect.MAV_CMD_DO_SET_MODE, 1, 4)).result == dialect.MAV_RESULT_ACCEPTED
+        assert (await order(w.client, current, *place, 8.0, as_int=True)).type == ACCEPTED
+
+
 @both
 async def test_conf_141_a_height_said_as_a_command_and_as_an_item(flavour: str) -> None:
     """MAVProxy's changealt says both at once. Both are answered by the one move that the drone is asked for."""
