@@ -1,4 +1,4 @@
-"""Conversions between ARSDK's units, MAVLink's and ours. Pure functions of plain numbers.
+"""Conversions between ARSDK's units, MAVLink's and ours. Pure functions of plain numbers. No I/O.
 
 Angles wrap here and nowhere else. MAVLink integers saturate instead of wrapping round: a value the field
 cannot hold is reported as the nearest it can.

@@ -1,4 +1,4 @@
-"""What a configuration file may say. Data only: reading and checking is `anafi_mav.config.load`.
+"""What a configuration file may say. Data only. No I/O: reading and checking is `anafi_mav.config.load`.
 
 Each key carries its meaning (`description`) and, as `expected`, what a value must be. Both are used twice: the
 first makes docs/configuration.md, the second makes that page and the error messages.

@@ -1,4 +1,4 @@
-"""The mission protocol from a ground station's side, without I/O: one list of items up to a vehicle, or down from it.
+"""The mission protocol from a ground station's side: one list of items up to a vehicle, or down. No I/O.
 
 Both transfers are driven alike: `start`, then `receive` for each message of the vehicle and `expire` when `deadline` is
 there, until `result` is set; each returns the messages that are to be sent. Rules and times: MAVLink mission.md.

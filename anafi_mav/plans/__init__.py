@@ -1,1 +1,4 @@
-"""Flight plans: one neutral `Plan` (`plan`), its file formats (`files`) and what of it these cannot hold (`Loss`)."""
+"""Flight plans: one neutral `Plan` (`plan`), its file formats (`formats`), and its translation for a drone.
+
+No I/O, except that `formats.files` reads and writes files.
+"""

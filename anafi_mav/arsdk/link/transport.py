@@ -1,4 +1,4 @@
-"""The ARSDK transport without I/O: queues, acknowledgements, retries, pings, for both ends of the link.
+"""The ARSDK transport for both ends of the link: queues, acknowledgements, retries, pings. No I/O.
 
 The same object plays the controller and the device; `Role` picks the queue ids. The shell hands datagrams and the
 time to `receive`, sends what `outgoing` returns and calls `expire` when `deadline` has come.
