@@ -53,7 +53,7 @@ class Flavour:
     """custom_mode is a main mode in bits 16..23 and a sub mode in bits 24..31. DO_SET_MODE may name the two as param2
     and param3, HIGH_LATENCY2 has room for the upper half alone. Otherwise it is one number below 65536."""
     parameter_names: str
-    """The table of names by which clients know parameters, in `parameters.NAME_TABLES`."""
+    """The table of names by which clients know parameters, in `parameter_service.NAME_TABLES`."""
     rssi_full: int
     """RC_CHANNELS.rssi of a perfect link (conformance A6, F 134)."""
     bytewise: bool

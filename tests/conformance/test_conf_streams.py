@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
 
-import msgspec
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.flavours import both
 from support.mav import NAN, Client
 from support.world import world
 
-from anafi_mav.arsdk.codec import wire
 from anafi_mav.drone.events import AttitudeChanged
-from anafi_mav.drone.status.link import Link, LinkState
 from anafi_mav.mavlink import dialect as newer
 from anafi_mav.services.stream import Stream, Times
-from anafi_mav.services.telemetry import telemetry_flight, telemetry_link
+from anafi_mav.services.telemetry import telemetry_flight
 from anafi_mav.vehicle.vehicle import Vehicle
 
 ACCEPTED, DENIED, UNSUPPORTED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_DENIED, dialect.MAV_RESULT_UNSUPPORTED
@@ -167,36 +163,6 @@ async def test_message_added_by_one_row_leaves_at_its_default_interval(monkeypat
         assert (await w.client.command(dialect.MAV_CMD_REQUEST_MESSAGE, IDS["NAMED_VALUE_FLOAT"])).result == ACCEPTED
 
 
-async def test_arsdk_value_added_by_message_reducer_and_row_leaves_on_mavlink(monkeypatch: pytest.MonkeyPatch) -> None:
-    """An event that Parrot has not invented: declared, reduced to a state of an element, built into a message."""
-    monkeypatch.setattr(wire, "_CODECS", {**wire._CODECS})
-
-    @wire.event("common.CommonState.NoiseChanged", 0, 5, 200)
-    class NoiseChanged(wire.Message, frozen=True):
-        dbm: Annotated[int, wire.I16]
-
-    def reduced(state: LinkState, message: NoiseChanged) -> LinkState:
-        return msgspec.structs.replace(state, rssi_dbm=message.dbm)
-
-    monkeypatch.setattr(Link, "REDUCERS", {**Link.REDUCERS, NoiseChanged: reduced})
-
-    def noise(vehicle: Vehicle, times: Times) -> newer.MAVLink_message | None:
-        dbm = vehicle.drone.link.state.rssi_dbm
-        return None if dbm is None else newer.MAVLink_named_value_int_message(times.boot_ms, b"noise", dbm)
-
-    row = Stream(noise, (NoiseChanged,), every=0.2)
-    monkeypatch.setitem(telemetry_link.STREAMS, newer.MAVLINK_MSG_ID_NAMED_VALUE_INT, row)
-    async with world(speed=1.0) as w:
-        mark = w.client.mark()
-        for dbm in (-91, -92):
-            w.drone.inject(NoiseChanged(dbm))
-            told = await w.client.wait("NAMED_VALUE_INT", lambda m, dbm=dbm: m.value == dbm, since=mark)
-            assert told.name == "noise"
-            over = told.time_boot_ms + 300  # the default interval
-            await w.client.wait("SYSTEM_TIME", lambda m, over=over: m.time_boot_ms >= over, since=mark)
-        assert len(w.client.since(mark, "NAMED_VALUE_INT")) == 2
-
-
 @both
 async def test_conf_109_message_interval(flavour: str) -> None:
     async with world(flavour=flavour) as w:
@@ -207,7 +173,7 @@ async def test_conf_109_message_interval(flavour: str) -> None:
         for impossible in (-1, 65536, 30.5, NAN, math.inf):
             assert (await w.client.command(GET, impossible)).result == DENIED
         mark = w.client.mark()  # and by REQUEST_MESSAGE, as the message's own description has it
-        assert (await w.client.command(512, 244, IDS["BATTERY_STATUS"])).result == ACCEPTED
+        assert (await w.client.command(dialect.MAV_CMD_REQUEST_MESSAGE, 244, IDS["BATTERY_STATUS"])).result == ACCEPTED
         told = await w.client.wait("MESSAGE_INTERVAL", since=mark)
         assert (told.message_id, told.interval_us) == (IDS["BATTERY_STATUS"], 1_000_000)
 
@@ -267,7 +233,7 @@ async def test_conf_150_high_latency(flavour: str, hold: int) -> None:
         assert (second.altitude, second.battery, second.failure_flags) == (35, w.drone.battery.percent, 0)
         assert (second.eph, second.epv, second.groundspeed, second.climb_rate) == (10, 20, 0, 0)
         # Commands are answered all the same, the other client misses nothing.
-        assert (await expensive.command(512, 148)).result == ACCEPTED
+        assert (await expensive.command(dialect.MAV_CMD_REQUEST_MESSAGE, 148)).result == ACCEPTED
         await other.heartbeat(lambda beat: True, timeout=1.5)
         assert (await expensive.command(control, 2)).result == DENIED
         assert (await expensive.command(control, 0)).result == ACCEPTED

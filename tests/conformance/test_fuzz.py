@@ -179,7 +179,7 @@ async def throw(w: World, frames: list[bytes], pause: float = BATCH_EVERY) -> No
     # What was cut off at the end swallows what follows, up to the longest frame.
     w.client.send_raw(b"".join(frames) + bytes(LONGEST))
     # An unsupported command is answered behind all of it.
-    assert (await w.client.command(211, timeout=20.0)).result == UNSUPPORTED
+    assert (await w.client.command(dialect.MAV_CMD_DO_GRIPPER, timeout=20.0)).result == UNSUPPORTED
     await asyncio.sleep(pause)
 
 

@@ -32,7 +32,13 @@ from anafi_mav.sim.world.faults import Impairment
 from anafi_mav.vehicle.offboard.moves import RETRY
 from anafi_mav.vehicle.takeoff import AUTO_DISARM
 
-SPEED, ALTITUDE, YAW, PAUSE, MISSION_START = 178, 186, 115, 193, 300
+SPEED, ALTITUDE, YAW, PAUSE, MISSION_START = (
+    dialect.MAV_CMD_DO_CHANGE_SPEED,
+    dialect.MAV_CMD_DO_CHANGE_ALTITUDE,
+    dialect.MAV_CMD_CONDITION_YAW,
+    dialect.MAV_CMD_DO_PAUSE_CONTINUE,
+    dialect.MAV_CMD_MISSION_START,
+)
 COPTER_LOITER = 5
 
 SLOW = Impairment(delay=0.4)

@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 
 from hypothesis import strategies as st
 
+from anafi_mav import mav_enums
 from anafi_mav.plans.plan import (
     DO_JUMP,
     GLOBAL,
@@ -51,18 +52,18 @@ def action(command: int, *params: float | None) -> Item:
 
 FLIGHT = Plan(
     items=(
-        Item(22, RELATIVE, (15.0, 0.0, 0.0, None, LAT, LON, 15.0)),
-        action(178, 1.0, 4.0, -1.0),
+        Item(mav_enums.MAV_CMD_NAV_TAKEOFF, RELATIVE, (15.0, 0.0, 0.0, None, LAT, LON, 15.0)),
+        action(mav_enums.MAV_CMD_DO_CHANGE_SPEED, 1.0, 4.0, -1.0),
         waypoint(1, 0, 20.0, 0.0, 2.0, 0.0, 90.0),
-        action(2000, 0.0, 0.0, 1.0, 0.0),
-        action(93, 10.0),
+        action(mav_enums.MAV_CMD_IMAGE_START_CAPTURE, 0.0, 0.0, 1.0, 0.0),
+        action(mav_enums.MAV_CMD_NAV_DELAY, 10.0),
         waypoint(1, 2, 25.0),
         action(DO_JUMP, 2.0, 3.0),
-        Item(201, RELATIVE, (3.0, 0.0, 0.0, 0.0, LAT, LON, 5.0)),
+        Item(mav_enums.MAV_CMD_DO_SET_ROI, RELATIVE, (3.0, 0.0, 0.0, 0.0, LAT, LON, 5.0)),
         waypoint(0, 2, 60.0, frame=GLOBAL),
-        action(2500, 0.0),
-        action(2501),
-        action(20),
+        action(mav_enums.MAV_CMD_VIDEO_START_CAPTURE, 0.0),
+        action(mav_enums.MAV_CMD_VIDEO_STOP_CAPTURE),
+        action(mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH),
     ),
     home=Point(LAT, LON, 35.0),
     zones=(

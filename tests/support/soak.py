@@ -340,7 +340,7 @@ class Flight:
                 self.stream(n, dialect.MAVLink_manual_control_message(1, x, y, 500, 0, 0), third)
             case "upload":
                 items = [item_takeoff(height), way(first, second, height), way(second, first, height + 1.0), ITEM_RTL]
-                listed = [Item(16, *HOME), *items] if copter else items
+                listed = [Item(dialect.MAV_CMD_NAV_WAYPOINT, *HOME), *items] if copter else items
                 self.spawn(self._upload(n, listed))
             case "start":
                 if first > 0.0:

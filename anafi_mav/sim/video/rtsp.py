@@ -1,10 +1,10 @@
 """The drone's video server: RTSP on TCP 554, pictures in RTP over UDP.
 
-``/live`` has a stream for each camera, ``/replay/<resource id>`` plays a recording and stops at its end. Pictures come
-thirty times a second of the machine's clock, whatever the speed of the simulated world, and only while somebody
-plays; each says the state of drone and camera at its moment. Who joins gets a key picture first. A session whose
-client is silent for a minute, in RTSP and RTCP, is forgotten; it survives the end of its RTSP connection, as Parrot's
-client expects.
+``/live`` has a stream for each camera, ``/replay/<resource id>`` plays a recording and stops at its end. Pictures are
+sent thirty times a second of the host's clock, whatever the speed of the simulated world, and only while a client
+plays; each contains the state of drone and camera at its moment. A client that joins gets a key picture first. A
+session whose client is silent for a minute, in RTSP and RTCP, is removed; it survives the end of its RTSP connection,
+as Parrot's client expects.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ _PUBLIC = "OPTIONS, DESCRIBE, SETUP, PLAY, PAUSE, TEARDOWN, GET_PARAMETER"
 
 @dataclass(frozen=True)
 class _Resource:
-    """What is at a URL."""
+    """Resource at a URL."""
 
     name: str
     streams: tuple[Stream, ...]
@@ -54,7 +54,7 @@ class _Resource:
 
 @dataclass
 class _Session:
-    """What a client has set up."""
+    """RTSP session that a client has set up."""
 
     id: str
     resource: _Resource
@@ -64,7 +64,7 @@ class _Session:
     position: float = 0.0
     """s of a recording."""
     until: float = 0.0
-    """Where it stops."""
+    """s of a recording at which it stops."""
     timer: asyncio.TimerHandle | None = None
 
 
@@ -77,7 +77,10 @@ class _Refused(Exception):
 
 
 class VideoServer:
-    """One drone's. `note` hears what clients do; `hears` says whether the air carries anything; `send` is the air."""
+    """One drone's.
+
+    `note` hears what clients do; `hears` says whether the air carries anything; `send` is the air.
+    """
 
     def __init__(
         self,
@@ -103,7 +106,10 @@ class VideoServer:
         self.port = 0
 
     async def start(self, address: str, port: int) -> None:
-        """Listen. Raises `OSError` when the port is taken or not permitted; 0 lets the system choose."""
+        """Listen.
+
+        Raises `OSError` when the port is taken or not permitted; 0 lets the system choose.
+        """
         self._address = address
         server = await asyncio.start_server(self._serve, address, port)
         self._server = server
@@ -282,7 +288,7 @@ class VideoServer:
     # -- resources and sessions
 
     def _find(self, uri: str) -> tuple[_Resource, str]:
-        """What a URL names, and which stream of it; "" is all."""
+        """Return the resource of a URL and the name of its stream; "" means all streams."""
         url = rtsp.split_url(uri)
         path = "" if url is None else url[2].rstrip("/")
         if path == _LIVE or path.startswith(_LIVE + "/"):
@@ -341,7 +347,7 @@ class VideoServer:
     # -- pictures
 
     async def _run(self) -> None:
-        """Take pictures as long as somebody looks."""
+        """Take pictures as long as a client plays."""
         loop = asyncio.get_running_loop()
         due = loop.time()
         while any(session.playing for session in self._sessions.values()):

@@ -20,7 +20,7 @@ from support.mav import Client
 from support.product import Product, free_udp_port, product
 from support.world import HOLD, HOME, loopback
 
-from anafi_mav import geo
+from anafi_mav import geo, mav_enums
 from anafi_mav.cli import main
 from anafi_mav.cli.addresses import Reservations
 from anafi_mav.cli.run import configuration, place
@@ -67,11 +67,13 @@ async def under_way(folder: Path) -> AsyncIterator[tuple[Product, Client, str, s
     address, drone = loopback(), loopback()
     async with product(folder, fleet(address, drone)) as p:
         client = await Client().connect(5760, address)
-        assert (await client.command(400, 1)).result == 0
-        assert (await client.command(22, x=0.0, y=0.0, z=5.0)).result == 0
+        assert (await client.command(mav_enums.MAV_CMD_COMPONENT_ARM_DISARM, 1)).result == 0
+        assert (await client.command(mav_enums.MAV_CMD_NAV_TAKEOFF, x=0.0, y=0.0, z=5.0)).result == 0
         await client.heartbeat(lambda beat: beat.custom_mode == HOLD, timeout=20.0)
         place = geo.destination(*HOME[:2], 200.0, 0.0)
-        assert (await client.command(192, -1, 1, 0, frame=6, x=place[0], y=place[1], z=5.0)).result == 0
+        assert (
+            await client.command(mav_enums.MAV_CMD_DO_REPOSITION, -1, 1, 0, frame=6, x=place[0], y=place[1], z=5.0)
+        ).result == 0
         await p.entry("pose", "", lambda pose: pose["vn"] > 3.0)
         yield p, client, address, drone
         await client.close()

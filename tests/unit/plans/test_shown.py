@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 from support.plan_samples import FLIGHT, document, encoded, structure_scan, waypoint
 
+from anafi_mav import mav_enums
 from anafi_mav.errors import PlanError
 from anafi_mav.plans import path, plot, table
 from anafi_mav.plans.formats import files
@@ -108,9 +109,9 @@ def test_profile_of_a_plan_has_climb_and_return() -> None:
     """There and back along a line: 20 m north of home at 30 m, then home."""
     home = Point(48.8789, 2.3677, 35.0)
     items = (
-        Item(22, 3, (0.0, 0.0, 0.0, None, home.latitude, home.longitude, 10.0)),
+        Item(mav_enums.MAV_CMD_NAV_TAKEOFF, 3, (0.0, 0.0, 0.0, None, home.latitude, home.longitude, 10.0)),
         waypoint(20.0, 0.0, 30.0),
-        Item(20, 2, (0.0,) * 7),
+        Item(mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH, 2, (0.0,) * 7),
     )
     plan = Plan(items, home)
     flown, back = plot.profile_of(plan, list(path.way(plan)))
@@ -176,7 +177,9 @@ def test_pictures_that_cannot_be() -> None:
 def test_a_line_on_a_map_is_a_plan(text: str) -> None:
     plan = files.parse(text.encode(), "walk", height=20.0)
     places = ((48.8789, 2.3677), (48.8789, 2.3687), (48.8799, 2.3687))
-    assert plan == Plan(tuple(Item(16, RELATIVE, (0.0, 0.0, 0.0, None, *place, 20.0)) for place in places))
+    assert plan == Plan(
+        tuple(Item(mav_enums.MAV_CMD_NAV_WAYPOINT, RELATIVE, (0.0, 0.0, 0.0, None, *place, 20.0)) for place in places)
+    )
     with pytest.raises(PlanError, match=r"^walk: it is a line on a map: a height above take-off has to be said for it"):
         files.parse(text.encode(), "walk")
 

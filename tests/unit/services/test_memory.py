@@ -10,14 +10,24 @@ from pathlib import Path
 
 import pytest
 
+from anafi_mav import mav_enums
 from anafi_mav.services.memory import MAX_BYTES, Memory
 from anafi_mav.state_lock import state_folder
 from anafi_mav.vehicle.fence.plan_items import PlanItem, opaque_id
 
 SERIAL = "PI040443BA8K000123"
 ITEMS = (
-    PlanItem(5003, 0, (50.0, 0.0, math.nan, -1.5), 488789000, -23677000, 12.25, 1, 1),
-    PlanItem(16, 3, (math.inf, -math.inf, 1.401298464324817e-45, 3.4028234663852886e38), 2**31 - 1, -(2**31), math.nan),
+    PlanItem(
+        mav_enums.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, 0, (50.0, 0.0, math.nan, -1.5), 488789000, -23677000, 12.25, 1, 1
+    ),
+    PlanItem(
+        mav_enums.MAV_CMD_NAV_WAYPOINT,
+        3,
+        (math.inf, -math.inf, 1.401298464324817e-45, 3.4028234663852886e38),
+        2**31 - 1,
+        -(2**31),
+        math.nan,
+    ),
 )
 
 
@@ -117,7 +127,10 @@ def test_the_good_one_is_good(tmp_path: Path) -> None:
     (tmp_path / f"{SERIAL}.json").write_text(json.dumps(valid()))
     memory = Memory(tmp_path)
     assert memory.load(SERIAL) is None
-    assert same(memory.plans[1], (PlanItem(5003, 0, (1.0, math.nan, math.inf, 0.0), 1, 2, 3.0),))
+    assert same(
+        memory.plans[1],
+        (PlanItem(mav_enums.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, 0, (1.0, math.nan, math.inf, 0.0), 1, 2, 3.0),),
+    )
 
 
 async def test_what_cannot_be_read_now_is_not_replaced(tmp_path: Path) -> None:

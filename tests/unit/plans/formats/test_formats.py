@@ -28,7 +28,7 @@ from support.plan_samples import (
     waypoint,
 )
 
-from anafi_mav import geo
+from anafi_mav import geo, mav_enums
 from anafi_mav.errors import PlanError
 from anafi_mav.plans.formats import files, parrot, qgc_plan, waypoints
 from anafi_mav.plans.formats.files import Format
@@ -49,7 +49,7 @@ def test_a_plan_of_qgroundcontrol() -> None:
     )
     plan = qgc_plan.read(encoded(stored), "x.plan")
     assert [item.command for item in plan.items] == [22, 16, 177, 16, 206, 16, 206, 177, 20]
-    assert plan.items[0] == Item(22, RELATIVE, (15.0, 0.0, 0.0, None, LAT, LON, 50.0))
+    assert plan.items[0] == Item(mav_enums.MAV_CMD_NAV_TAKEOFF, RELATIVE, (15.0, 0.0, 0.0, None, LAT, LON, 50.0))
     assert plan.items[2].params[:2] == (1.0, 5.0)  # the item with doJumpId 2 is the second
     assert plan.items[7].params[0] == 3.0  # an item of the survey
     assert plan.home == Point(LAT, LON, 35.25)
@@ -69,7 +69,7 @@ def test_a_plan_of_qgroundcontrol() -> None:
 
 def test_a_block_whose_items_changed_is_written_item_by_item() -> None:
     plan = qgc_plan.read(encoded(document(survey(1))), "x")
-    changed = replace(plan, items=(plan.items[0], action(93, 5.0), *plan.items[1:]))
+    changed = replace(plan, items=(plan.items[0], action(mav_enums.MAV_CMD_NAV_DELAY, 5.0), *plan.items[1:]))
     data, losses = qgc_plan.write(changed)
     assert [str(loss) for loss in losses] == [
         "item 0: its items are not those of the survey any more: written one by one"
@@ -83,7 +83,9 @@ def test_numbers_in_a_block_follow_its_place() -> None:
     """An item more in front of a survey: it is a survey still."""
     plan = qgc_plan.read(encoded(document(survey(1))), "x")
     (block,) = plan.blocks
-    moved = replace(plan, items=(action(93, 5.0), *plan.items), blocks=(replace(block, first=1),))
+    moved = replace(
+        plan, items=(action(mav_enums.MAV_CMD_NAV_DELAY, 5.0), *plan.items), blocks=(replace(block, first=1),)
+    )
     data, losses = qgc_plan.write(moved)
     assert losses == []
     stored = json.loads(data)["mission"]["items"][1]
@@ -276,7 +278,9 @@ def test_parrots_file_as_the_simulated_drone_reads_it(version: parrot.Version) -
 
 def test_numbers_have_all_digits_and_no_exponent() -> None:
     """Readers that take `%f` only would stop at an e; six decimals of a degree are 0.11 m."""
-    data, _ = parrot.write(Plan((Item(16, RELATIVE, (0.0, 0.0, 0.0, 0.0, 48.878900123, -1.25e-05, 1e16)),)), 1)
+    data, _ = parrot.write(
+        Plan((Item(mav_enums.MAV_CMD_NAV_WAYPOINT, RELATIVE, (0.0, 0.0, 0.0, 0.0, 48.878900123, -1.25e-05, 1e16)),)), 1
+    )
     assert data.split(b"\t")[8:11] == [b"48.878900123", b"-0.0000125", b"10000000000000000"]
 
 
@@ -310,9 +314,9 @@ def test_what_parrots_format_cannot_hold() -> None:
     plan = Plan(
         (
             waypoint(0, 0, 20.0, frame=10),
-            action(530, 0.0, 2.0),
-            Item(16, RELATIVE, (0.0, 0.0, 3.0, 0.0, None, None, 20.0)),
-            Item(16, RELATIVE, (0.0, 0.0, 3.0, 0.0, LAT, LON, 20.0), autocontinue=False),
+            action(mav_enums.MAV_CMD_SET_CAMERA_MODE, 0.0, 2.0),
+            Item(mav_enums.MAV_CMD_NAV_WAYPOINT, RELATIVE, (0.0, 0.0, 3.0, 0.0, None, None, 20.0)),
+            Item(mav_enums.MAV_CMD_NAV_WAYPOINT, RELATIVE, (0.0, 0.0, 3.0, 0.0, LAT, LON, 20.0), autocontinue=False),
         ),
         home=Point(LAT, LON),
         rally=(Point(LAT, LON),),

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import pytest
 
+from anafi_mav import mav_enums
 from anafi_mav.plans.plan import Item
 from anafi_mav.plans.rules.rules_flight import is_relative
 from anafi_mav.plans.translation.translate import examine
 
-TURN = 115
+TURN = mav_enums.MAV_CMD_CONDITION_YAW
 
 
 @pytest.mark.parametrize(

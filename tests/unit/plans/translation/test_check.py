@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from support.plan_samples import LAT, LON, action, waypoint
 
+from anafi_mav import mav_enums
 from anafi_mav.models import planned
 from anafi_mav.plans.formats import files
 from anafi_mav.plans.plan import GLOBAL, RELATIVE, Circle, Item, Plan, Point, Polygon
@@ -17,8 +18,8 @@ MISSIONS = Path(__file__).parents[4] / "missions"
 HOME = Point(LAT, LON, 35.0)
 MODELS = planned()
 
-UP = Item(22, RELATIVE, (0.0, 0.0, 0.0, None, None, None, 20.0))
-BACK = action(20)
+UP = Item(mav_enums.MAV_CMD_NAV_TAKEOFF, RELATIVE, (0.0, 0.0, 0.0, None, None, None, 20.0))
+BACK = action(mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH)
 
 
 def found(*items: Item, model: str = "4k", limits: Limits | None = None, **more: object) -> Findings:
@@ -31,7 +32,13 @@ def told(findings: Findings, severity: Severity = Severity.ERROR) -> list[str]:
 
 def test_a_flight_by_hand() -> None:
     """5 s of take-off, up 20 m at 3 m/s, 111.2 m north at 4, 10 s there, a photo of 2 s, back at 4, down 20 m at 1."""
-    findings = found(UP, action(178, 1.0, 4.0), waypoint(10, 0, 20.0, 10.0), action(2000, 0.0, 0.0, 1.0), BACK)
+    findings = found(
+        UP,
+        action(mav_enums.MAV_CMD_DO_CHANGE_SPEED, 1.0, 4.0),
+        waypoint(10, 0, 20.0, 10.0),
+        action(mav_enums.MAV_CMD_IMAGE_START_CAPTURE, 0.0, 0.0, 1.0),
+        BACK,
+    )
     assert findings.problems == ()
     assert findings.distance == pytest.approx(20.0 + 2 * 111.2, abs=0.1)
     assert findings.seconds == pytest.approx(5.0 + 20.0 / 3.0 + 27.8 + 10.0 + 2.0 + 27.8 + 20.0, abs=0.1)
@@ -45,7 +52,7 @@ def test_the_planners_speed_counts_where_the_mission_has_none() -> None:
 
 
 def test_what_cannot_be_flown() -> None:
-    findings = found(UP, action(183, 1.0), waypoint(1, 0, frame=10))
+    findings = found(UP, action(mav_enums.MAV_CMD_DO_SET_SERVO, 1.0), waypoint(1, 0, frame=10))
     assert told(findings) == [
         "item 1: DO_SET_SERVO: the drone has no actuator that a flight plan could move",
         "item 2: NAV_WAYPOINT: its height is above the terrain, which the drone does not know",
@@ -99,32 +106,34 @@ def test_distances() -> None:
     )
     begins_there = found(waypoint(100, 0), BACK)
     assert told(begins_there) == []
-    far_take_off = Item(22, RELATIVE, (0.0, 0.0, 0.0, None, None, None, 0.0))
+    far_take_off = Item(mav_enums.MAV_CMD_NAV_TAKEOFF, RELATIVE, (0.0, 0.0, 0.0, None, None, None, 0.0))
     assert "item 1: it is 1112 m from home: the drone may refuse to begin so far away" in told(
         found(far_take_off, waypoint(100, 0), BACK), Severity.WARNING
     )
 
 
 def test_speeds() -> None:
-    items = (UP, action(178, 1.0, 15.5), waypoint(1, 0), BACK)
+    items = (UP, action(mav_enums.MAV_CMD_DO_CHANGE_SPEED, 1.0, 15.5), waypoint(1, 0), BACK)
     assert told(found(*items)) == ["item 1: 15.5 m/s is more than the 15 that an ANAFI 4K flies"]
     assert told(found(*items, model="ai")) == []
 
 
 def test_the_battery() -> None:
-    assert told(found(UP, action(93, 1500.0), BACK)) == ["it takes 26 min of the 25 that an ANAFI 4K flies"]
-    findings = found(UP, action(93, 1500.0), BACK, model="usa")
+    assert told(found(UP, action(mav_enums.MAV_CMD_NAV_DELAY, 1500.0), BACK)) == [
+        "it takes 26 min of the 25 that an ANAFI 4K flies"
+    ]
+    findings = found(UP, action(mav_enums.MAV_CMD_NAV_DELAY, 1500.0), BACK, model="usa")
     assert (told(findings), told(findings, Severity.WARNING)) == (
         [],
         [],
     )
-    assert told(found(UP, action(93, 1700.0), BACK, model="usa"), Severity.WARNING) == [
+    assert told(found(UP, action(mav_enums.MAV_CMD_NAV_DELAY, 1700.0), BACK, model="usa"), Severity.WARNING) == [
         "it takes 29 min of the 32 that an ANAFI USA flies"
     ]
 
 
 def test_a_plan_without_an_end() -> None:
-    findings = found(UP, waypoint(1, 0), waypoint(2, 0), action(177, 1.0, -1.0))
+    findings = found(UP, waypoint(1, 0), waypoint(2, 0), action(mav_enums.MAV_CMD_DO_JUMP, 1.0, -1.0))
     assert not findings.errors
     assert "it is flown until the battery is low" in told(findings, Severity.WARNING)
     assert findings.seconds is None
@@ -135,7 +144,7 @@ def test_a_plan_without_an_end() -> None:
 
 def test_how_an_ai_begins() -> None:
     """At its return height above the first way point, if that is lower (Parrot's flight plan page)."""
-    low = Item(22, RELATIVE, (0.0, 0.0, 0.0, None, None, None, 10.0))
+    low = Item(mav_enums.MAV_CMD_NAV_TAKEOFF, RELATIVE, (0.0, 0.0, 0.0, None, None, None, 10.0))
     findings = found(low, waypoint(1, 0, 10.0), BACK, model="ai", limits=Limits(return_height=30.0))
     assert told(findings, Severity.WARNING) == [
         "item 0: an Ai begins at 30 m above take-off: it rises there first, goes over to above it and sinks"
@@ -146,7 +155,7 @@ def test_how_an_ai_begins() -> None:
 
 
 def test_what_the_gateway_flies_is_told() -> None:
-    findings = found(UP, action(531, 2.0, 50.0), waypoint(1, 0), BACK)
+    findings = found(UP, action(mav_enums.MAV_CMD_SET_CAMERA_ZOOM, 2.0, 50.0), waypoint(1, 0), BACK)
     assert told(findings, Severity.WARNING) == [
         "item 1: flown by the gateway: SET_CAMERA_ZOOM: the gateway zooms: a flight plan cannot"
     ]

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from support.sim_bench import HOME, Bench
 
-from anafi_mav import geo
+from anafi_mav import geo, mav_enums
 from anafi_mav.arsdk.messages import camera, common
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.messages.common import MavlinkType, PlayingState
@@ -20,7 +20,7 @@ from anafi_mav.units import DEG_PER_RAD
 
 MISSIONS = Path(__file__).parents[4] / "missions"
 
-ZOOM, TURN = 531, 115
+ZOOM, TURN = mav_enums.MAV_CMD_SET_CAMERA_ZOOM, mav_enums.MAV_CMD_CONDITION_YAW
 
 WITHIN = 2.0
 """m."""

@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.plan_samples import LAT, LON, action, waypoint
 
+from anafi_mav import mav_enums
 from anafi_mav.errors import PlanError
 from anafi_mav.plans.formats.parrot import Version
 from anafi_mav.plans.plan import DO_JUMP, GLOBAL, RELATIVE, TERRAIN, Item, Loss
@@ -38,7 +39,7 @@ VERSIONS: tuple[Version, ...] = (1, 2)
 
 def take_off(height: float | None, *place: float, heading: float | None = None) -> Item:
     latitude, longitude = place or (None, None)
-    return Item(22, RELATIVE, (0.0, 0.0, 0.0, heading, latitude, longitude, height))
+    return Item(mav_enums.MAV_CMD_NAV_TAKEOFF, RELATIVE, (0.0, 0.0, 0.0, heading, latitude, longitude, height))
 
 
 def lines(flight: Flight, part: int = 0) -> list[str]:
@@ -58,8 +59,14 @@ def lines(flight: Flight, part: int = 0) -> list[str]:
 
 def test_a_flight_of_version_1() -> None:
     """0.0001 degrees of longitude are 7.335 m here, of latitude 11.12 m."""
-    items = [take_off(15.0), action(178, 1.0, 4.0, -1.0), waypoint(1, 0, 20.0, 3.0, 2.0, 0.0, 90.0),
-             waypoint(1, 1, 25.0), action(93, 10.0), action(20)]  # fmt: skip
+    items = [
+        take_off(15.0),
+        action(mav_enums.MAV_CMD_DO_CHANGE_SPEED, 1.0, 4.0, -1.0),
+        waypoint(1, 0, 20.0, 3.0, 2.0, 0.0, 90.0),
+        waypoint(1, 1, 25.0),
+        action(mav_enums.MAV_CMD_NAV_DELAY, 10.0),
+        action(mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH),
+    ]
     flight = translate(items, 1, GROUND)
     found = lines(flight)
     # A heading that is not set is towards the way point: east, less half the convergence of the meridians.
@@ -84,8 +91,13 @@ def test_a_flight_of_version_1() -> None:
 
 
 def test_a_flight_of_version_2() -> None:
-    items = [take_off(15.0), action(178, 1.0, 4.0, -1.0), waypoint(1, 0, 20.0, 3.0, 2.0, 0.0, 90.0),
-             waypoint(1, 1, 25.0), action(21)]  # fmt: skip
+    items = [
+        take_off(15.0),
+        action(mav_enums.MAV_CMD_DO_CHANGE_SPEED, 1.0, 4.0, -1.0),
+        waypoint(1, 0, 20.0, 3.0, 2.0, 0.0, 90.0),
+        waypoint(1, 1, 25.0),
+        action(mav_enums.MAV_CMD_NAV_LAND),
+    ]
     assert lines(translate(items, 2, GROUND)) == [
         "3 22 nan nan nan nan nan nan nan",
         f"3 16 0.0 1.0 nan nan {LAT} {LON} 15.0",
@@ -98,7 +110,11 @@ def test_a_flight_of_version_2() -> None:
 
 
 def test_a_take_off_at_a_place_goes_up_and_then_over() -> None:
-    found = lines(translate([take_off(15.0, LAT, LON + 1e-4, heading=45.0), action(20)], 2, GROUND))
+    found = lines(
+        translate(
+            [take_off(15.0, LAT, LON + 1e-4, heading=45.0), action(mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH)], 2, GROUND
+        )
+    )
     assert found[1:3] == [
         f"3 16 0.0 1.0 nan 45.0 {LAT} {LON} 15.0",
         f"3 16 0.0 1.0 nan 45.0 {LAT} {LON + 1e-4} 15.0",
@@ -118,7 +134,7 @@ def test_in_the_air_a_take_off_alone_is_nothing_to_do() -> None:
 
 
 def test_without_a_take_off_it_is_put_in_front_and_told() -> None:
-    items = [action(178, 1.0, 4.0), waypoint(1, 0, 20.0)]
+    items = [action(mav_enums.MAV_CMD_DO_CHANGE_SPEED, 1.0, 4.0), waypoint(1, 0, 20.0)]
     flight = translate(items, 1, GROUND)
     assert [line.split()[1] for line in lines(flight)] == ["22", "16", "178", "16"]
     assert lines(flight)[1] == f"3 16 0.0 1.0 0.0 30.0 {LAT} {LON} 20.0"  # straight up
@@ -137,14 +153,16 @@ def test_a_way_point_below_the_take_off_is_not_sunk_to_first() -> None:
 
 
 def test_on_the_ground_there_is_nothing_to_land() -> None:
-    assert examine([action(20)], 1).faults == ()
-    assert [line.split()[1] for line in lines(translate([action(20)], 1, AIR))] == ["20"]
+    assert examine([action(mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH)], 1).faults == ()
+    assert [line.split()[1] for line in lines(translate([action(mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH)], 1, AIR))] == [
+        "20"
+    ]
     with pytest.raises(PlanError, match="nowhere to fly to"):
-        translate([action(20)], 1, GROUND)
+        translate([action(mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH)], 1, GROUND)
 
 
 def test_landing_at_a_place_goes_over_it_first() -> None:
-    land = Item(21, RELATIVE, (0.0, 0.0, 0.0, None, LAT, LON, 0.0))
+    land = Item(mav_enums.MAV_CMD_NAV_LAND, RELATIVE, (0.0, 0.0, 0.0, None, LAT, LON, 0.0))
     assert lines(translate([waypoint(1, 0, 20.0), land], 2, AIR))[1:] == [
         f"3 16 0.0 1.0 nan nan {LAT} {LON} 20.0",
         "3 21 nan nan nan nan nan nan nan",
@@ -162,19 +180,21 @@ def test_heights_above_the_sea_count_from_the_take_off_point() -> None:
 
 
 def test_what_an_item_does_not_say_stays_as_it_is() -> None:
-    here = Item(16, RELATIVE, (5.0, 0.0, 0.0, None, None, None, None))
-    there = Item(16, RELATIVE, (0.0, 0.0, 0.0, None, LAT + 1e-4, LON, None))
-    zeros = Item(16, RELATIVE, (0.0,) * 7)
+    here = Item(mav_enums.MAV_CMD_NAV_WAYPOINT, RELATIVE, (5.0, 0.0, 0.0, None, None, None, None))
+    there = Item(mav_enums.MAV_CMD_NAV_WAYPOINT, RELATIVE, (0.0, 0.0, 0.0, None, LAT + 1e-4, LON, None))
+    zeros = Item(mav_enums.MAV_CMD_NAV_WAYPOINT, RELATIVE, (0.0,) * 7)
     found = lines(translate([waypoint(0, 1, 20.0), here, there, zeros], 2, AIR))
     places = [line.split()[6:] for line in found if line.split()[1] == "16"]
     assert places == [
-        [str(LAT), str(LON + 1e-4), "20.0"], [str(LAT), str(LON + 1e-4), "20.0"],
-        [str(LAT + 1e-4), str(LON), "20.0"], [str(LAT + 1e-4), str(LON), "20.0"],
-    ]  # fmt: skip
+        [str(LAT), str(LON + 1e-4), "20.0"],
+        [str(LAT), str(LON + 1e-4), "20.0"],
+        [str(LAT + 1e-4), str(LON), "20.0"],
+        [str(LAT + 1e-4), str(LON), "20.0"],
+    ]
 
 
 def test_jumps_are_written_out() -> None:
-    items = [waypoint(1, 0), waypoint(2, 0), action(DO_JUMP, 0.0, 2.0), action(20)]
+    items = [waypoint(1, 0), waypoint(2, 0), action(DO_JUMP, 0.0, 2.0), action(mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH)]
     flight = translate(items, 1, AIR)
     (leg,) = flight.parts
     assert isinstance(leg, Leg)
@@ -184,7 +204,13 @@ def test_jumps_are_written_out() -> None:
 
 
 def test_a_jump_without_end_is_flown_file_after_file() -> None:
-    items = [take_off(20.0), waypoint(1, 0), waypoint(2, 0), action(DO_JUMP, 1.0, -1.0), action(20)]
+    items = [
+        take_off(20.0),
+        waypoint(1, 0),
+        waypoint(2, 0),
+        action(DO_JUMP, 1.0, -1.0),
+        action(mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH),
+    ]
     report = examine(items, 2)
     assert report.faults == ()
     assert report.approximations == (Loss("it is never reached", 4),)
@@ -199,11 +225,17 @@ def test_a_jump_without_end_is_flown_file_after_file() -> None:
 
 def test_a_long_mission_is_flown_file_after_file_and_told_of_to_its_end() -> None:
     items = [take_off(20.0), *[waypoint(number % 9, 0) for number in range(MAX_LINES)]]
-    items += [action(112, 5.0), action(115, 90.0, 0.0, 0.0, 0.0), action(20), action(189)]
+    items += [
+        action(mav_enums.MAV_CMD_CONDITION_DELAY, 5.0),
+        action(mav_enums.MAV_CMD_CONDITION_YAW, 90.0, 0.0, 0.0, 0.0),
+        action(mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH),
+        action(mav_enums.MAV_CMD_DO_LAND_START),
+    ]
     report = examine(items, 2)
     assert [(loss.item, loss.what[:9]) for loss in report.approximations] == [
-        (MAX_LINES + 1, "the drone"), (MAX_LINES + 4, "it is nev"),
-    ]  # fmt: skip
+        (MAX_LINES + 1, "the drone"),
+        (MAX_LINES + 4, "it is nev"),
+    ]
     assert [loss.item for loss in report.stepped] == [MAX_LINES + 2, None]
     done: list[int] = []
     flight = translate(items, 2, GROUND)
@@ -225,7 +257,13 @@ def test_a_loop_in_a_loop_counts_for_the_whole_mission() -> None:
 
 
 def test_a_turn_in_place_is_flown_by_the_gateway() -> None:
-    items = [waypoint(1, 0), action(178, 0.0, 3.0), action(115, 90.0, 0.0, 0.0, 0.0), action(189), waypoint(1, 1)]
+    items = [
+        waypoint(1, 0),
+        action(mav_enums.MAV_CMD_DO_CHANGE_SPEED, 0.0, 3.0),
+        action(mav_enums.MAV_CMD_CONDITION_YAW, 90.0, 0.0, 0.0, 0.0),
+        action(mav_enums.MAV_CMD_DO_LAND_START),
+        waypoint(1, 1),
+    ]
     report = examine(items, 1)
     assert [loss.item for loss in report.stepped] == [2]
     flight = translate(items, 1, AIR)
@@ -240,7 +278,13 @@ def test_a_turn_in_place_is_flown_by_the_gateway() -> None:
 
 
 def test_begin_in_the_middle() -> None:
-    items = [take_off(15.0), action(178, 1.0, 7.0), waypoint(1, 0, 20.0), waypoint(2, 0, 30.0), action(20)]
+    items = [
+        take_off(15.0),
+        action(mav_enums.MAV_CMD_DO_CHANGE_SPEED, 1.0, 7.0),
+        waypoint(1, 0, 20.0),
+        waypoint(2, 0, 30.0),
+        action(mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH),
+    ]
     assert [line.split()[1] for line in lines(translate(items, 1, AIR, 3))] == ["178", "16", "20"]
     flight = translate(items, 1, GROUND, 3)
     found = lines(flight)
@@ -254,19 +298,19 @@ def test_begin_in_the_middle() -> None:
 
 WRONG = {
     "unknown": (
-        [waypoint(0, 1), action(3000)],
+        [waypoint(0, 1), action(mav_enums.MAV_CMD_DO_VTOL_TRANSITION)],
         Fault(1, "DO_VTOL_TRANSITION: no flight plan has it", FaultKind.COMMAND),
     ),
     "circle": (
-        [Item(18, RELATIVE, (1.0, 0.0, 5.0, 0.0, LAT, LON, 9.0))],
+        [Item(mav_enums.MAV_CMD_NAV_LOITER_TURNS, RELATIVE, (1.0, 0.0, 5.0, 0.0, LAT, LON, 9.0))],
         Fault(0, "NAV_LOITER_TURNS: the drone flies straight lines: draw the circle as way points", FaultKind.COMMAND),
     ),
     "latitude": (
-        [Item(16, RELATIVE, (0.0, 0.0, 0.0, 0.0, 91.0, LON, 9.0))],
+        [Item(mav_enums.MAV_CMD_NAV_WAYPOINT, RELATIVE, (0.0, 0.0, 0.0, 0.0, 91.0, LON, 9.0))],
         Fault(0, "NAV_WAYPOINT: 91 is no latitude", FaultKind.PARAM, 5),
     ),
     "longitude": (
-        [Item(16, RELATIVE, (0.0, 0.0, 0.0, 0.0, LAT, None, 9.0))],
+        [Item(mav_enums.MAV_CMD_NAV_WAYPOINT, RELATIVE, (0.0, 0.0, 0.0, 0.0, LAT, None, 9.0))],
         Fault(0, "NAV_WAYPOINT: it has no longitude", FaultKind.PARAM, 6),
     ),
     "infinite": ([waypoint(0, 1, float("inf"))], Fault(0, "inf is no number", FaultKind.PARAM, 7)),
@@ -279,16 +323,20 @@ WRONG = {
         Fault(0, "it waits to be continued, which the drone does not", FaultKind.COMMAND),
     ),
     "speed": (
-        [waypoint(0, 1), action(178, 1.0, 0.0)],
+        [waypoint(0, 1), action(mav_enums.MAV_CMD_DO_CHANGE_SPEED, 1.0, 0.0)],
         Fault(1, "DO_CHANGE_SPEED: it says a speed of 0 m/s", FaultKind.PARAM, 2),
     ),
     "climbing": (
-        [waypoint(0, 1), action(178, 2.0, 1.0)],
-        Fault(1, "DO_CHANGE_SPEED: a flight plan has a speed over ground only, not one for climbing and sinking",
-              FaultKind.PARAM, 1),
+        [waypoint(0, 1), action(mav_enums.MAV_CMD_DO_CHANGE_SPEED, 2.0, 1.0)],
+        Fault(
+            1,
+            "DO_CHANGE_SPEED: a flight plan has a speed over ground only, not one for climbing and sinking",
+            FaultKind.PARAM,
+            1,
+        ),
     ),
     "clock": (
-        [waypoint(0, 1), action(93, -1.0, 12.0, 0.0, 0.0)],
+        [waypoint(0, 1), action(mav_enums.MAV_CMD_NAV_DELAY, -1.0, 12.0, 0.0, 0.0)],
         Fault(1, "NAV_DELAY: it waits for a time of day, which the drone cannot", FaultKind.PARAM, 1),
     ),
     "jump": (
@@ -301,11 +349,11 @@ WRONG = {
         Fault(2, "the mission jumps more than 65535 times", FaultKind.PARAM, 2),
     ),
     "for ever": (
-        [waypoint(0, 1), action(93, 0.0), action(DO_JUMP, 1.0, -1.0)],
+        [waypoint(0, 1), action(mav_enums.MAV_CMD_NAV_DELAY, 0.0), action(DO_JUMP, 1.0, -1.0)],
         Fault(2, "it goes round for ever and flies nowhere", FaultKind.PLAN),
     ),
     "for ever at one place": (
-        [waypoint(0, 1), action(178, 1.0, 4.0), action(DO_JUMP, 1.0, -1.0)],
+        [waypoint(0, 1), action(mav_enums.MAV_CMD_DO_CHANGE_SPEED, 1.0, 4.0), action(DO_JUMP, 1.0, -1.0)],
         Fault(2, "it goes round for ever and flies nowhere", FaultKind.PLAN),
     ),
     "for ever at one way point": (
@@ -317,50 +365,75 @@ WRONG = {
         Fault(2, "it goes round for ever and flies nowhere", FaultKind.PLAN),
     ),
     "for ever after more than is written at once": (
-        [take_off(8.0), *[waypoint(n % 2 * 5, 1) for n in range(2 * MAX_LINES)], action(178, 1.0, 4.0),
-         action(DO_JUMP, 2.0 * MAX_LINES + 1.0, -1.0)],
+        [
+            take_off(8.0),
+            *[waypoint(n % 2 * 5, 1) for n in range(2 * MAX_LINES)],
+            action(mav_enums.MAV_CMD_DO_CHANGE_SPEED, 1.0, 4.0),
+            action(DO_JUMP, 2.0 * MAX_LINES + 1.0, -1.0),
+        ],
         Fault(2 * MAX_LINES + 2, "it goes round for ever and flies nowhere", FaultKind.PLAN),
     ),
     "for ever when the count is used up": (
-        [waypoint(0, 1), action(178, 1.0, 4.0), action(DO_JUMP, 0.0, 3.0), action(DO_JUMP, 1.0, -1.0)],
+        [
+            waypoint(0, 1),
+            action(mav_enums.MAV_CMD_DO_CHANGE_SPEED, 1.0, 4.0),
+            action(DO_JUMP, 0.0, 3.0),
+            action(DO_JUMP, 1.0, -1.0),
+        ],
         Fault(3, "it goes round for ever and flies nowhere", FaultKind.PLAN),
     ),
     "very often": (
-        [take_off(8.0), waypoint(0, 1), action(189), action(DO_JUMP, 2.0, 65535.0)],
+        [take_off(8.0), waypoint(0, 1), action(mav_enums.MAV_CMD_DO_LAND_START), action(DO_JUMP, 2.0, 65535.0)],
         Fault(3, "it goes round and round and flies nowhere", FaultKind.PLAN),
     ),
     "very often with a region": (
-        [take_off(8.0), Item(195, RELATIVE, (0.0, 0.0, 0.0, None, LAT, LON, 9.0)), action(197),
-         action(DO_JUMP, 1.0, 2000.0)],
+        [
+            take_off(8.0),
+            Item(mav_enums.MAV_CMD_DO_SET_ROI_LOCATION, RELATIVE, (0.0, 0.0, 0.0, None, LAT, LON, 9.0)),
+            action(mav_enums.MAV_CMD_DO_SET_ROI_NONE),
+            action(DO_JUMP, 1.0, 2000.0),
+        ],
         Fault(3, "it goes round and round and flies nowhere", FaultKind.PLAN),
     ),
     "after the landing": (
-        [waypoint(0, 1), action(21), action(189)],
+        [waypoint(0, 1), action(mav_enums.MAV_CMD_NAV_LAND), action(mav_enums.MAV_CMD_DO_LAND_START)],
         Fault(2, "a landing stands before it, which ends the plan", FaultKind.PLAN),
     ),
-    "nothing flies": ([action(178, 1.0, 4.0)], Fault(0, "nothing of the mission flies", FaultKind.PLAN)),
-}  # fmt: skip
+    "nothing flies": (
+        [action(mav_enums.MAV_CMD_DO_CHANGE_SPEED, 1.0, 4.0)],
+        Fault(0, "nothing of the mission flies", FaultKind.PLAN),
+    ),
+}
 
 
 IDLE = {
-    "speed": [action(178, 1.0, 4.0)],
-    "region": [Item(195, RELATIVE, (0.0, 0.0, 0.0, None, LAT, LON, 9.0)), action(197)],
-    "gimbal": [action(1000, -45.0, 0.0)],
+    "speed": [action(mav_enums.MAV_CMD_DO_CHANGE_SPEED, 1.0, 4.0)],
+    "region": [
+        Item(mav_enums.MAV_CMD_DO_SET_ROI_LOCATION, RELATIVE, (0.0, 0.0, 0.0, None, LAT, LON, 9.0)),
+        action(mav_enums.MAV_CMD_DO_SET_ROI_NONE),
+    ],
+    "gimbal": [action(mav_enums.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, -45.0, 0.0)],
     "take-off": [take_off(8.0)],
-    "no wait": [action(93, 0.0)],
-    "photo": [action(2000, 0.0, 0.0, 1.0)],
-    "photos": [action(2000, 0.0, 3.0, 0.0), action(2001)],
-    "video": [action(2500), action(2501)],
-    "zoom": [action(531, 2.0, 40.0)],
-    "turned already": [action(115, 90.0, 0.0, 0.0, 0.0)],
-    "no place": [Item(16, RELATIVE, (0.0, 0.0, 0.0, None, 0.0, 0.0, 0.0))],
+    "no wait": [action(mav_enums.MAV_CMD_NAV_DELAY, 0.0)],
+    "photo": [action(mav_enums.MAV_CMD_IMAGE_START_CAPTURE, 0.0, 0.0, 1.0)],
+    "photos": [
+        action(mav_enums.MAV_CMD_IMAGE_START_CAPTURE, 0.0, 3.0, 0.0),
+        action(mav_enums.MAV_CMD_IMAGE_STOP_CAPTURE),
+    ],
+    "video": [action(mav_enums.MAV_CMD_VIDEO_START_CAPTURE), action(mav_enums.MAV_CMD_VIDEO_STOP_CAPTURE)],
+    "zoom": [action(mav_enums.MAV_CMD_SET_CAMERA_ZOOM, 2.0, 40.0)],
+    "turned already": [action(mav_enums.MAV_CMD_CONDITION_YAW, 90.0, 0.0, 0.0, 0.0)],
+    "no place": [Item(mav_enums.MAV_CMD_NAV_WAYPOINT, RELATIVE, (0.0, 0.0, 0.0, None, 0.0, 0.0, 0.0))],
 }
 BUSY = {
-    "wait": [action(93, 0.5)],
-    "wait at no place": [Item(16, RELATIVE, (3.0, 0.0, 0.0, None, 0.0, 0.0, 0.0))],
-    "turn": [action(115, 90.0, 0.0, 1.0, 1.0)],
-    "two turns": [action(115, 90.0, 0.0, 0.0, 0.0), action(115, 0.0, 0.0, 0.0, 0.0)],
-    "panorama": [action(2800, 360.0)],
+    "wait": [action(mav_enums.MAV_CMD_NAV_DELAY, 0.5)],
+    "wait at no place": [Item(mav_enums.MAV_CMD_NAV_WAYPOINT, RELATIVE, (3.0, 0.0, 0.0, None, 0.0, 0.0, 0.0))],
+    "turn": [action(mav_enums.MAV_CMD_CONDITION_YAW, 90.0, 0.0, 1.0, 1.0)],
+    "two turns": [
+        action(mav_enums.MAV_CMD_CONDITION_YAW, 90.0, 0.0, 0.0, 0.0),
+        action(mav_enums.MAV_CMD_CONDITION_YAW, 0.0, 0.0, 0.0, 0.0),
+    ],
+    "panorama": [action(mav_enums.MAV_CMD_PANORAMA_CREATE, 360.0)],
     "up and down": [waypoint(0, 1, 20.0), waypoint(0, 1, 25.0)],
 }
 
@@ -376,13 +449,22 @@ def test_loops_without_end_in_which_something_or_nothing_is_flown(what: str, ver
 
 
 def test_a_few_photos_of_one_place_are_a_loop_with_an_end() -> None:
-    flight = translate([waypoint(0, 1), action(2000, 0.0, 0.0, 1.0), action(DO_JUMP, 1.0, 300.0)], 2, AIR)
+    flight = translate(
+        [waypoint(0, 1), action(mav_enums.MAV_CMD_IMAGE_START_CAPTURE, 0.0, 0.0, 1.0), action(DO_JUMP, 1.0, 300.0)],
+        2,
+        AIR,
+    )
     assert len([line for line in lines(flight) if line.startswith("2 2000 ")]) == 301
 
 
 def test_a_loop_of_many_items_that_need_no_line() -> None:
     """It is cut by the items that are come by, not by its lines: 2000 of them were ten million items."""
-    items = [waypoint(0, 1), waypoint(5, 1), *[action(189)] * 4000, action(DO_JUMP, 0.0, -1.0)]
+    items = [
+        waypoint(0, 1),
+        waypoint(5, 1),
+        *[action(mav_enums.MAV_CMD_DO_LAND_START)] * 4000,
+        action(DO_JUMP, 0.0, -1.0),
+    ]
     flight = translate(items, 1, AIR)
     (leg,) = flight.parts
     assert isinstance(leg, Leg)
@@ -410,7 +492,12 @@ def test_an_empty_mission() -> None:
 
 @pytest.mark.parametrize("version", VERSIONS)
 def test_the_simulated_drone_reads_what_is_written(version: Version) -> None:
-    items = [take_off(15.0), waypoint(1, 0, 20.0, 3.0), waypoint(1, 1e-3, 25.0), action(20)]
+    items = [
+        take_off(15.0),
+        waypoint(1, 0, 20.0, 3.0),
+        waypoint(1, 1e-3, 25.0),
+        action(mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH),
+    ]
     flight = translate(items, version, GROUND)
     (leg,) = flight.parts
     assert isinstance(leg, Leg)
@@ -419,8 +506,38 @@ def test_the_simulated_drone_reads_what_is_written(version: Version) -> None:
     assert read[4].longitude == LON + 1e-7  # a centimetre is not lost
 
 
-QGROUNDCONTROL = (16, 17, 19, 20, 21, 22, 31, 93, 115, 4501, 177, 178, 179, 183, 187, 189, 195, 196, 197, 203, 204, 205,
-                  206, 211, 530, 2000, 2001, 2500, 2501, 1000)  # fmt: skip
+QGROUNDCONTROL = (
+    16,
+    17,
+    19,
+    20,
+    21,
+    22,
+    31,
+    93,
+    115,
+    4501,
+    177,
+    178,
+    179,
+    183,
+    187,
+    189,
+    195,
+    196,
+    197,
+    203,
+    204,
+    205,
+    206,
+    211,
+    530,
+    2000,
+    2001,
+    2500,
+    2501,
+    1000,
+)
 """What it may put into a plan for a multicopter (PX4FirmwarePlugin.cc), and the gimbal of its surveys."""
 
 PARROT = (16, 20, 21, 22, 93, 112, 178, 195, 197, 201, 205, 206, 214, 2000, 2001, 2500, 2501, 2800, 50000, 50001)
@@ -456,18 +573,36 @@ def mission(seed: int) -> list[Item]:
         return Item(command, frame, (one, random.choice([0.0, 2.0, None]), 0.0, heading, where[0], where[1], where[2]))
 
     makers: list[Callable[[], Item]] = [
-        lambda: nav(16, random.choice([0.0, 2.5])), lambda: nav(19, 4.0), lambda: nav(31, 0.0), lambda: nav(22, 0.0),
-        lambda: action(20), lambda: nav(21, 0.0), lambda: action(93, 3.0), lambda: action(112, 2.0),
-        lambda: action(115, 90.0, 0.0, 1.0, random.choice([0.0, 1.0])), lambda: action(531, 2.0, 40.0),
-        lambda: action(178, 1.0, random.uniform(1.0, 10.0), -1.0), lambda: nav(195, 0.0), lambda: action(197),
-        lambda: action(196, 0.0, 0.0, 0.0, 0.0, -10.0, 0.0, 90.0), lambda: action(205, random.uniform(-90.0, 0.0)),
-        lambda: action(206, random.choice([0.0, 15.0]), 0.0, 1.0), lambda: action(214, 2500.0),
-        lambda: action(530, 0.0, 1.0),
-        lambda: action(1000, -45.0, 0.0), lambda: action(1001, -2.0), lambda: action(2000, 0.0, 0.0, 1.0),
-        lambda: action(2000, 0.0, 3.0, random.choice([0.0, 5.0])), lambda: action(2001), lambda: action(2500),
-        lambda: action(2501), lambda: action(2800, 360.0), lambda: action(189), lambda: action(50001, 1.0, 9.0, 13.0),
+        lambda: nav(mav_enums.MAV_CMD_NAV_WAYPOINT, random.choice([0.0, 2.5])),
+        lambda: nav(mav_enums.MAV_CMD_NAV_LOITER_TIME, 4.0),
+        lambda: nav(mav_enums.MAV_CMD_NAV_LOITER_TO_ALT, 0.0),
+        lambda: nav(mav_enums.MAV_CMD_NAV_TAKEOFF, 0.0),
+        lambda: action(mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH),
+        lambda: nav(mav_enums.MAV_CMD_NAV_LAND, 0.0),
+        lambda: action(mav_enums.MAV_CMD_NAV_DELAY, 3.0),
+        lambda: action(mav_enums.MAV_CMD_CONDITION_DELAY, 2.0),
+        lambda: action(mav_enums.MAV_CMD_CONDITION_YAW, 90.0, 0.0, 1.0, random.choice([0.0, 1.0])),
+        lambda: action(mav_enums.MAV_CMD_SET_CAMERA_ZOOM, 2.0, 40.0),
+        lambda: action(mav_enums.MAV_CMD_DO_CHANGE_SPEED, 1.0, random.uniform(1.0, 10.0), -1.0),
+        lambda: nav(mav_enums.MAV_CMD_DO_SET_ROI_LOCATION, 0.0),
+        lambda: action(mav_enums.MAV_CMD_DO_SET_ROI_NONE),
+        lambda: action(mav_enums.MAV_CMD_DO_SET_ROI_WPNEXT_OFFSET, 0.0, 0.0, 0.0, 0.0, -10.0, 0.0, 90.0),
+        lambda: action(mav_enums.MAV_CMD_DO_MOUNT_CONTROL, random.uniform(-90.0, 0.0)),
+        lambda: action(mav_enums.MAV_CMD_DO_SET_CAM_TRIGG_DIST, random.choice([0.0, 15.0]), 0.0, 1.0),
+        lambda: action(mav_enums.MAV_CMD_DO_SET_CAM_TRIGG_INTERVAL, 2500.0),
+        lambda: action(mav_enums.MAV_CMD_SET_CAMERA_MODE, 0.0, 1.0),
+        lambda: action(mav_enums.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, -45.0, 0.0),
+        lambda: action(mav_enums.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE, -2.0),
+        lambda: action(mav_enums.MAV_CMD_IMAGE_START_CAPTURE, 0.0, 0.0, 1.0),
+        lambda: action(mav_enums.MAV_CMD_IMAGE_START_CAPTURE, 0.0, 3.0, random.choice([0.0, 5.0])),
+        lambda: action(mav_enums.MAV_CMD_IMAGE_STOP_CAPTURE),
+        lambda: action(mav_enums.MAV_CMD_VIDEO_START_CAPTURE),
+        lambda: action(mav_enums.MAV_CMD_VIDEO_STOP_CAPTURE),
+        lambda: action(mav_enums.MAV_CMD_PANORAMA_CREATE, 360.0),
+        lambda: action(mav_enums.MAV_CMD_DO_LAND_START),
+        lambda: action(50001, 1.0, 9.0, 13.0),
         lambda: action(DO_JUMP, float(random.randrange(size)), float(random.randrange(-1, 4))),
-    ]  # fmt: skip
+    ]
     return [random.choice(makers)() for _ in range(size)]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from support.plan_samples import LAT, LON, PARROTS_EXAMPLE, action, waypoint
 
+from anafi_mav import mav_enums
 from anafi_mav.errors import PlanError
 from anafi_mav.plans.formats import files, parrot
 from anafi_mav.plans.formats.parrot import Version
@@ -31,14 +32,21 @@ def read(items: list[Item], version: Version, start: Start = AIR) -> list[plan_f
 def told(items: list[Item], version: Version, start: Start = AIR) -> list[tuple[float, ...]]:
     """Command and what it says: of version 1 all seven, of version 2 those that are set."""
     return [
-        (int(item.command), *(value for value in item[2:] if value == value)) if version == 2
+        (int(item.command), *(value for value in item[2:] if value == value))
+        if version == 2
         else (int(item.command), *item[2:])
         for item in read(items, version, start)
-    ]  # fmt: skip
+    ]
 
 
-def roi(latitude: float | None = LAT, longitude: float | None = LON, height: float = 5.0, command: int = 195,
-        mode: float = 0.0, frame: int = RELATIVE) -> Item:  # fmt: skip
+def roi(
+    latitude: float | None = LAT,
+    longitude: float | None = LON,
+    height: float = 5.0,
+    command: int = 195,
+    mode: float = 0.0,
+    frame: int = RELATIVE,
+) -> Item:
     return Item(command, frame, (mode, 0.0, 0.0, 0.0, latitude, longitude, height))
 
 
@@ -73,29 +81,49 @@ def test_parrots_own_example() -> None:
 
 @pytest.mark.parametrize("version", VERSIONS)
 def test_photos(version: Version) -> None:
-    items = [GO, action(2000, 0.0, 0.0, 1.0, 7.0), action(2000, 0.0, 5.0, 0.0), waypoint(2, 0), action(2001),
-             action(2000, 0.0, 3.0, 10.0)]  # fmt: skip
+    items = [
+        GO,
+        action(mav_enums.MAV_CMD_IMAGE_START_CAPTURE, 0.0, 0.0, 1.0, 7.0),
+        action(mav_enums.MAV_CMD_IMAGE_START_CAPTURE, 0.0, 5.0, 0.0),
+        waypoint(2, 0),
+        action(mav_enums.MAV_CMD_IMAGE_STOP_CAPTURE),
+        action(mav_enums.MAV_CMD_IMAGE_START_CAPTURE, 0.0, 3.0, 10.0),
+    ]
     found = told(items, version)[1:]
     if version == 1:
         zeros = (0.0,) * 4
         assert [row for row in found if row[0] != 16] == [
-            (50001, 0.0, 2.0, 0.0, *zeros), (2000, 0.0, 1.0, 12.0, *zeros),
-            (50001, 0.0, 5.0, 0.0, *zeros), (2000, 5.0, 0.0, 12.0, *zeros),
+            (50001, 0.0, 2.0, 0.0, *zeros),
+            (2000, 0.0, 1.0, 12.0, *zeros),
+            (50001, 0.0, 5.0, 0.0, *zeros),
+            (2000, 5.0, 0.0, 12.0, *zeros),
             (2001, 0.0, 0.0, 0.0, *zeros),
-            (50001, 0.0, 3.0, 0.0, *zeros), (2000, 3.0, 10.0, 12.0, *zeros),
-        ]  # fmt: skip
+            (50001, 0.0, 3.0, 0.0, *zeros),
+            (2000, 3.0, 10.0, 12.0, *zeros),
+        ]
     else:
         assert [row for row in found if row[0] != 16] == [
-            (50001, 0.0, 2.0, 12.0), (2000, 0.0, 1.0, 1.0), (50001, 0.0, 5.0, 12.0), (2000, 5.0, 0.0),
-            (2001,), (50001, 0.0, 3.0, 12.0), (2000, 3.0, 10.0),
-        ]  # fmt: skip
+            (50001, 0.0, 2.0, 12.0),
+            (2000, 0.0, 1.0, 1.0),
+            (50001, 0.0, 5.0, 12.0),
+            (2000, 5.0, 0.0),
+            (2001,),
+            (50001, 0.0, 3.0, 12.0),
+            (2000, 3.0, 10.0),
+        ]
 
 
 @pytest.mark.parametrize("version", VERSIONS)
 def test_a_survey_as_qgroundcontrol_writes_it(version: Version) -> None:
     """Camera mode, gimbal, photos by distance with one at the beginning and one at the end."""
-    items = [action(530, 0.0, 2.0), action(1000, -90.0, 0.0, None, None, 0.0, None, 0.0), GO,
-             action(206, 25.0, 0.0, 1.0), waypoint(3, 0), action(206, 0.0, 0.0, 1.0)]  # fmt: skip
+    items = [
+        action(mav_enums.MAV_CMD_SET_CAMERA_MODE, 0.0, 2.0),
+        action(mav_enums.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, -90.0, 0.0, None, None, 0.0, None, 0.0),
+        GO,
+        action(mav_enums.MAV_CMD_DO_SET_CAM_TRIGG_DIST, 25.0, 0.0, 1.0),
+        waypoint(3, 0),
+        action(mav_enums.MAV_CMD_DO_SET_CAM_TRIGG_DIST, 0.0, 0.0, 1.0),
+    ]
     assert examine(items, version).approximations == (
         Loss("no item takes off: the drone rises straight to 20 m above take-off first", 2),
     )
@@ -115,10 +143,17 @@ def test_a_survey_as_qgroundcontrol_writes_it(version: Version) -> None:
 def test_mavsdks_items(version: Version) -> None:
     """MAVSDK mission_impl.cpp: way point, speed, gimbal of nobody in particular, delay, camera action."""
     items = [
-        waypoint(1, 0, 20.0, 0.0, 1.0, 0.0, None), action(178, 1.0, 5.0, -1.0), action(1001, -2.0, -2.0, -1.0, -1.0),
-        action(1000, -45.0, 0.0, None, None, 0.0, None, 0.0), action(93, 2.0), action(2500, 0.0), action(2501, 0.0),
-        action(214, 2000.0, 0.0), action(2001, 0.0), action(20),
-    ]  # fmt: skip
+        waypoint(1, 0, 20.0, 0.0, 1.0, 0.0, None),
+        action(mav_enums.MAV_CMD_DO_CHANGE_SPEED, 1.0, 5.0, -1.0),
+        action(mav_enums.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE, -2.0, -2.0, -1.0, -1.0),
+        action(mav_enums.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, -45.0, 0.0, None, None, 0.0, None, 0.0),
+        action(mav_enums.MAV_CMD_NAV_DELAY, 2.0),
+        action(mav_enums.MAV_CMD_VIDEO_START_CAPTURE, 0.0),
+        action(mav_enums.MAV_CMD_VIDEO_STOP_CAPTURE, 0.0),
+        action(mav_enums.MAV_CMD_DO_SET_CAM_TRIGG_INTERVAL, 2000.0, 0.0),
+        action(mav_enums.MAV_CMD_IMAGE_STOP_CAPTURE, 0.0),
+        action(mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH),
+    ]
     found = read(items, version)
     assert [int(item.command) for item in found] == [
         16,
@@ -138,15 +173,36 @@ def test_mavsdks_items(version: Version) -> None:
 
 def test_a_region_of_interest_of_version_1() -> None:
     """It is numbered, and the view mode looks at its number; the same one is not numbered twice."""
-    items = [roi(), GO, action(197), roi(height=45.0, frame=GLOBAL), waypoint(2, 0), roi(), waypoint(3, 0), action(197)]
+    items = [
+        roi(),
+        GO,
+        action(mav_enums.MAV_CMD_DO_SET_ROI_NONE),
+        roi(height=45.0, frame=GLOBAL),
+        waypoint(2, 0),
+        roi(),
+        waypoint(3, 0),
+        action(mav_enums.MAV_CMD_DO_SET_ROI_NONE),
+    ]
     assert [row[:3] if row[0] != 201 else (201, row[1], row[7]) for row in told(items, 1) if row[0] != 16] == [
-        (201, 3.0, 5.0), (50000, 2.0, 0.0), (50000, 0.0, 0.0), (205, 0.0, 0.0),
-        (201, 3.0, 10.0), (50000, 2.0, 1.0), (50000, 2.0, 0.0), (50000, 0.0, 0.0), (205, 0.0, 0.0),
-    ]  # fmt: skip
+        (201, 3.0, 5.0),
+        (50000, 2.0, 0.0),
+        (50000, 0.0, 0.0),
+        (205, 0.0, 0.0),
+        (201, 3.0, 10.0),
+        (50000, 2.0, 1.0),
+        (50000, 2.0, 0.0),
+        (50000, 0.0, 0.0),
+        (205, 0.0, 0.0),
+    ]
 
 
 def test_a_region_of_interest_of_version_2() -> None:
-    items = [roi(command=201, mode=3.0), waypoint(1, 0, 20.0, 0.0, 0.0, 0.0, 90.0), action(201, 0.0), waypoint(2, 0)]
+    items = [
+        roi(command=mav_enums.MAV_CMD_DO_SET_ROI, mode=3.0),
+        waypoint(1, 0, 20.0, 0.0, 0.0, 0.0, 90.0),
+        action(mav_enums.MAV_CMD_DO_SET_ROI, 0.0),
+        waypoint(2, 0),
+    ]
     assert told(items, 2) == [
         (195, LAT, LON, 5.0),
         (16, 0.0, 1.0, LAT + 1e-4, LON, 20.0),  # its heading does not count
@@ -158,21 +214,30 @@ def test_a_region_of_interest_of_version_2() -> None:
 
 def test_where_a_view_mode_numbers_regions_they_are_only_numbered() -> None:
     """Parrot's version 1; the number is that of the whole mission."""
-    items = [roi(command=201, mode=3.0), roi(height=9.0, command=201, mode=3.0), GO, action(50000, 2.0, 1.0),
-             waypoint(2, 0), action(50000, 1.0, 0.0), waypoint(3, 0)]  # fmt: skip
+    items = [
+        roi(command=mav_enums.MAV_CMD_DO_SET_ROI, mode=3.0),
+        roi(height=9.0, command=mav_enums.MAV_CMD_DO_SET_ROI, mode=3.0),
+        GO,
+        action(50000, 2.0, 1.0),
+        waypoint(2, 0),
+        action(50000, 1.0, 0.0),
+        waypoint(3, 0),
+    ]
     assert [(row[0], row[1], row[-1]) for row in told(items, 1) if row[0] != 16] == [
-        (201, 3.0, 9.0), (50000, 2.0, 0.0), (50000, 1.0, 0.0),
-    ]  # fmt: skip
+        (201, 3.0, 9.0),
+        (50000, 2.0, 0.0),
+        (50000, 1.0, 0.0),
+    ]
 
 
 @pytest.mark.parametrize("version", VERSIONS)
 def test_looking_beside_the_way(version: Version) -> None:
     """QGroundControl's structure scan: the camera looks right and 5 degrees down, on the way north and east."""
     items = [
-        action(196, 0.0, 0.0, 0.0, 0.0, -5.0, 0.0, 90.0),
+        action(mav_enums.MAV_CMD_DO_SET_ROI_WPNEXT_OFFSET, 0.0, 0.0, 0.0, 0.0, -5.0, 0.0, 90.0),
         waypoint(1, 0),
         waypoint(1, 1),
-        action(197),
+        action(mav_enums.MAV_CMD_DO_SET_ROI_NONE),
         waypoint(2, 1),
     ]
     found = read(items, version)
@@ -184,20 +249,28 @@ def test_looking_beside_the_way(version: Version) -> None:
 
 @pytest.mark.parametrize("version", VERSIONS)
 def test_aiming_the_gimbal_ends_looking_at_something(version: Version) -> None:
-    found = read([roi(), GO, action(205, -30.0, 0.0, 0.0, None, None, None, 2.0), waypoint(2, 0)], version)
+    found = read(
+        [roi(), GO, action(mav_enums.MAV_CMD_DO_MOUNT_CONTROL, -30.0, 0.0, 0.0, None, None, None, 2.0), waypoint(2, 0)],
+        version,
+    )
     ends = Command.SET_VIEW_MODE if version == 1 else Command.SET_ROI_NONE
     assert [item.command for item in found][-3:] == [ends, Command.MOUNT_CONTROL, Command.WAYPOINT]
 
 
 def test_what_the_gimbal_is_not_told_stays() -> None:
     """Version 1 has no word for it: a line with 0 would be an order to look ahead."""
-    items = [GO, action(1000, None, 0.0, None, None, 0.0, None, 0.0)]
+    items = [GO, action(mav_enums.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, None, 0.0, None, None, 0.0, None, 0.0)]
     assert [row[0] for row in told(items, 1)] == [16]
     assert translate(items, 1, AIR).parts[0].done == ((0, 1),)
 
 
 def test_zooming_is_flown_by_the_gateway() -> None:
-    items = [GO, action(205, -30.0, 0.0, 0.0, None, None, None, 2.0), action(531, 2.0, 50.0), waypoint(2, 0)]
+    items = [
+        GO,
+        action(mav_enums.MAV_CMD_DO_MOUNT_CONTROL, -30.0, 0.0, 0.0, None, None, None, 2.0),
+        action(mav_enums.MAV_CMD_SET_CAMERA_ZOOM, 2.0, 50.0),
+        waypoint(2, 0),
+    ]
     first, step, last = translate(items, 1, AIR).parts
     assert isinstance(first, Leg)
     assert isinstance(last, Leg)
@@ -208,7 +281,12 @@ def test_zooming_is_flown_by_the_gateway() -> None:
 
 def test_an_ai_takes_a_photo_where_it_is_to_be_taken() -> None:
     """It begins a file by going to above its first way point: a photo before that one is kept here by a way point."""
-    items = [GO, action(531, 2.0, 40.0), action(2000, 0.0, 0.0, 1.0), waypoint(5, 0)]
+    items = [
+        GO,
+        action(mav_enums.MAV_CMD_SET_CAMERA_ZOOM, 2.0, 40.0),
+        action(mav_enums.MAV_CMD_IMAGE_START_CAPTURE, 0.0, 0.0, 1.0),
+        waypoint(5, 0),
+    ]
     first, step, last = translate(items, 2, AIR).parts
     assert step == Step(1, (1,))
     assert isinstance(first, Leg)
@@ -220,7 +298,7 @@ def test_an_ai_takes_a_photo_where_it_is_to_be_taken() -> None:
     assert rows[0].p4 == pytest.approx(0.0, abs=1e-6)  # it has flown north
     assert last.done == ((), (), (2,), (3,))
     # Nothing has to be kept here when only settings stand before the way point, nor on the others.
-    (leg,) = translate([action(178, 1.0, 4.0), GO], 2, AIR).parts
+    (leg,) = translate([action(mav_enums.MAV_CMD_DO_CHANGE_SPEED, 1.0, 4.0), GO], 2, AIR).parts
     assert isinstance(leg, Leg)
     assert [row.command for row in plan_file.read(leg.content, 2)] == [178, 16]
     last = translate(items, 1, AIR).parts[2]
@@ -230,21 +308,40 @@ def test_an_ai_takes_a_photo_where_it_is_to_be_taken() -> None:
 
 def test_beginning_in_the_middle_begins_what_runs_there() -> None:
     """As PX4 does when it resumes a survey: else it would be flown without a photo, and nobody would know."""
-    items = [action(205, -90.0), roi(), GO, action(206, 25.0, 0.0, 1.0), waypoint(2, 0), action(206, 0.0)]
+    items = [
+        action(mav_enums.MAV_CMD_DO_MOUNT_CONTROL, -90.0),
+        roi(),
+        GO,
+        action(mav_enums.MAV_CMD_DO_SET_CAM_TRIGG_DIST, 25.0, 0.0, 1.0),
+        waypoint(2, 0),
+        action(mav_enums.MAV_CMD_DO_SET_CAM_TRIGG_DIST, 0.0),
+    ]
     (leg,) = translate(items, 1, AIR, 4).parts
     assert isinstance(leg, Leg)
     assert [int(item.command) for item in plan_file.read(leg.content, 1)] == [
-        205, 201, 50000, 2001, 50001, 2000, 16, 2001,
-    ]  # fmt: skip
+        205,
+        201,
+        50000,
+        2001,
+        50001,
+        2000,
+        16,
+        2001,
+    ]
     assert set(leg.origins) == {4, 5}
-    video = [GO, action(2500), waypoint(2, 0), action(2501)]
+    video = [
+        GO,
+        action(mav_enums.MAV_CMD_VIDEO_START_CAPTURE),
+        waypoint(2, 0),
+        action(mav_enums.MAV_CMD_VIDEO_STOP_CAPTURE),
+    ]
     (leg,) = translate(video, 1, AIR, 2).parts
     assert isinstance(leg, Leg)
     assert [int(item.command) for item in plan_file.read(leg.content, 1)] == [2500, 16, 2501]
 
 
 def test_a_camera_mode_that_nothing_comes_of_is_told() -> None:
-    items = [action(530, 0.0, 1.0), GO]
+    items = [action(mav_enums.MAV_CMD_SET_CAMERA_MODE, 0.0, 1.0), GO]
     assert examine(items, 2).approximations[-1] == Loss(
         "the camera's mode changes only with a photo or video, and none comes after it", 0
     )
@@ -254,12 +351,12 @@ def test_photos_that_are_stopped_twice_are_stopped_once() -> None:
     """QGroundControl ends photos by both commands."""
     items = [
         GO,
-        action(206, 10.0, 0.0, 1.0),
+        action(mav_enums.MAV_CMD_DO_SET_CAM_TRIGG_DIST, 10.0, 0.0, 1.0),
         waypoint(2, 0),
-        action(206, 0.0),
-        action(2001),
+        action(mav_enums.MAV_CMD_DO_SET_CAM_TRIGG_DIST, 0.0),
+        action(mav_enums.MAV_CMD_IMAGE_STOP_CAPTURE),
         waypoint(3, 0),
-        action(2001),
+        action(mav_enums.MAV_CMD_IMAGE_STOP_CAPTURE),
     ]
     flight = translate(items, 1, AIR)
     assert [row[0] for row in told(items, 1)] == [16, 50001, 2000, 16, 2001, 16]
@@ -267,39 +364,115 @@ def test_photos_that_are_stopped_twice_are_stopped_once() -> None:
 
 
 def test_a_panorama() -> None:
-    assert told([GO, action(2800, 360.0, 30.0, 20.0, 10.0)], 2)[1] == (2800, 360.0, 30.0, 20.0, 10.0)
-    assert told([GO, action(2800, 360.0)], 1)[1] == (2800, 360.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    assert told([GO, action(mav_enums.MAV_CMD_PANORAMA_CREATE, 360.0, 30.0, 20.0, 10.0)], 2)[1] == (
+        2800,
+        360.0,
+        30.0,
+        20.0,
+        10.0,
+    )
+    assert told([GO, action(mav_enums.MAV_CMD_PANORAMA_CREATE, 360.0)], 1)[1] == (
+        2800,
+        360.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+    )
 
 
 def test_old_names_of_a_photo() -> None:
-    assert [row[0] for row in told([GO, action(203, 0.0, 0.0, 0.0, 0.0, 1.0), action(204, 2.0, 1.0, 1.0, 1.0)], 2)] == [
-        16, 50001, 2000,
-    ]  # fmt: skip
+    assert [
+        row[0]
+        for row in told(
+            [
+                GO,
+                action(mav_enums.MAV_CMD_DO_DIGICAM_CONTROL, 0.0, 0.0, 0.0, 0.0, 1.0),
+                action(mav_enums.MAV_CMD_DO_MOUNT_CONFIGURE, 2.0, 1.0, 1.0, 1.0),
+            ],
+            2,
+        )
+    ] == [
+        16,
+        50001,
+        2000,
+    ]
 
 
 WRONG = {
-    "no interval": ([action(2000, 0.0, 0.0, 0.0)], "it does not say how often", FaultKind.PARAM, 2),
-    "too often": ([action(2000, 0.0, 1.0, 0.0)], "the camera needs 2 s between photos, not 1", FaultKind.PARAM, 2),
-    "too near": ([action(206, 0.5)], "the camera needs 1 m between photos, not 0.5", FaultKind.PARAM, 1),
-    "camera": ([action(2000, 101.0, 0.0, 1.0)], "the flight plan's camera is component 100, not this (101)",
-               FaultKind.PARAM, 1),
-    "both": ([action(2500), action(2000, 0.0, 0.0, 1.0)],
-             "a photo while the video runs: the camera does one of the two", FaultKind.PLAN, None),
-    "both again": ([action(206, 10.0), action(2500)], "photos are being taken, and the camera does one of the two",
-                   FaultKind.PLAN, None),
+    "no interval": (
+        [action(mav_enums.MAV_CMD_IMAGE_START_CAPTURE, 0.0, 0.0, 0.0)],
+        "it does not say how often",
+        FaultKind.PARAM,
+        2,
+    ),
+    "too often": (
+        [action(mav_enums.MAV_CMD_IMAGE_START_CAPTURE, 0.0, 1.0, 0.0)],
+        "the camera needs 2 s between photos, not 1",
+        FaultKind.PARAM,
+        2,
+    ),
+    "too near": (
+        [action(mav_enums.MAV_CMD_DO_SET_CAM_TRIGG_DIST, 0.5)],
+        "the camera needs 1 m between photos, not 0.5",
+        FaultKind.PARAM,
+        1,
+    ),
+    "camera": (
+        [action(mav_enums.MAV_CMD_IMAGE_START_CAPTURE, 101.0, 0.0, 1.0)],
+        "the flight plan's camera is component 100, not this (101)",
+        FaultKind.PARAM,
+        1,
+    ),
+    "both": (
+        [action(mav_enums.MAV_CMD_VIDEO_START_CAPTURE), action(mav_enums.MAV_CMD_IMAGE_START_CAPTURE, 0.0, 0.0, 1.0)],
+        "a photo while the video runs: the camera does one of the two",
+        FaultKind.PLAN,
+        None,
+    ),
+    "both again": (
+        [action(mav_enums.MAV_CMD_DO_SET_CAM_TRIGG_DIST, 10.0), action(mav_enums.MAV_CMD_VIDEO_START_CAPTURE)],
+        "photos are being taken, and the camera does one of the two",
+        FaultKind.PLAN,
+        None,
+    ),
     "no place": ([roi(None, None)], "it has no place", FaultKind.PARAM, 5),
-    "a target": ([roi(command=201, mode=4.0)], "only a place can be looked at, no way point and no target",
-                 FaultKind.PARAM, 1),
+    "a target": (
+        [roi(command=mav_enums.MAV_CMD_DO_SET_ROI, mode=4.0)],
+        "only a place can be looked at, no way point and no target",
+        FaultKind.PARAM,
+        1,
+    ),
     "a region": ([action(50000, 2.0, 3.0)], "it looks at a region that is not there", FaultKind.PARAM, 2),
-    "north": ([action(1000, 0.0, 90.0, None, None, 16.0)], "the camera", FaultKind.PARAM, 2),
-    "rate": ([action(1000, 0.0, 0.0, 5.0)], "a flight plan aims at an angle, it does not turn with a speed (5)",
-             FaultKind.PARAM, 3),
-    "zoom": ([action(531, 1.0, 5.0)], "only a zoom range in percent can be flown", FaultKind.PARAM, 1),
-    "tilt": ([action(205, -120.0)], "the camera tilts from", FaultKind.PARAM, 1),
-    "nothing": ([action(2800, 0.0, 0.0)], "its angles are nothing", FaultKind.PARAM, 1),
-    "servo": ([action(183, 5.0, 1500.0)], "the drone has no actuator that a flight plan could move",
-              FaultKind.COMMAND, None),
-}  # fmt: skip
+    "north": (
+        [action(mav_enums.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, 0.0, 90.0, None, None, 16.0)],
+        "the camera",
+        FaultKind.PARAM,
+        2,
+    ),
+    "rate": (
+        [action(mav_enums.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, 0.0, 0.0, 5.0)],
+        "a flight plan aims at an angle, it does not turn with a speed (5)",
+        FaultKind.PARAM,
+        3,
+    ),
+    "zoom": (
+        [action(mav_enums.MAV_CMD_SET_CAMERA_ZOOM, 1.0, 5.0)],
+        "only a zoom range in percent can be flown",
+        FaultKind.PARAM,
+        1,
+    ),
+    "tilt": ([action(mav_enums.MAV_CMD_DO_MOUNT_CONTROL, -120.0)], "the camera tilts from", FaultKind.PARAM, 1),
+    "nothing": ([action(mav_enums.MAV_CMD_PANORAMA_CREATE, 0.0, 0.0)], "its angles are nothing", FaultKind.PARAM, 1),
+    "servo": (
+        [action(mav_enums.MAV_CMD_DO_SET_SERVO, 5.0, 1500.0)],
+        "the drone has no actuator that a flight plan could move",
+        FaultKind.COMMAND,
+        None,
+    ),
+}
 
 
 @pytest.mark.parametrize("version", VERSIONS)
@@ -315,7 +488,14 @@ def test_what_is_refused(items: list[Item], reason: str, kind: FaultKind, param:
 
 def test_what_only_a_jump_brings_together_is_refused_too() -> None:
     """The video is begun a second time with photos being taken, which the list does not show."""
-    items = [GO, action(2500), waypoint(2, 0), action(2501), action(206, 10.0), action(177, 1.0, 1.0)]
+    items = [
+        GO,
+        action(mav_enums.MAV_CMD_VIDEO_START_CAPTURE),
+        waypoint(2, 0),
+        action(mav_enums.MAV_CMD_VIDEO_STOP_CAPTURE),
+        action(mav_enums.MAV_CMD_DO_SET_CAM_TRIGG_DIST, 10.0),
+        action(mav_enums.MAV_CMD_DO_JUMP, 1.0, 1.0),
+    ]
     (fault,) = examine(items, 1).faults
     assert (fault.item, fault.kind) == (1, FaultKind.PLAN)
     with pytest.raises(PlanError, match="photos are being taken"):
@@ -323,8 +503,8 @@ def test_what_only_a_jump_brings_together_is_refused_too() -> None:
 
 
 def test_the_versions_differ_in_what_the_gimbal_can() -> None:
-    tilted = [GO, action(205, 100.0)]
-    turned = [GO, action(205, 0.0, 0.0, 20.0)]
+    tilted = [GO, action(mav_enums.MAV_CMD_DO_MOUNT_CONTROL, 100.0)]
+    turned = [GO, action(mav_enums.MAV_CMD_DO_MOUNT_CONTROL, 0.0, 0.0, 20.0)]
     for items in (tilted, turned):
         assert [fault.kind for fault in examine(items, 1).faults] == [FaultKind.PARAM]
         assert examine(items, 2).faults == ()

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from support.plan_samples import FLIGHT, LAT, LON, action, plans, waypoint
 
+from anafi_mav import mav_enums
 from anafi_mav.plans.plan import MISSION, RELATIVE, Item, Plan
 from anafi_mav.services.plan.item_messages import item_int, item_of
 from anafi_mav.services.plan.mission_items import as_carried, from_wire, to_wire
@@ -15,16 +16,20 @@ from anafi_mav.vehicle.fence.plan_items import UNSET, PlanItem, has_place
 
 
 def test_a_place_is_degrees_times_1e7_and_nothing_is_not_zero() -> None:
-    wire = to_wire(Item(16, RELATIVE, (0.0, 2.5, 0.0, None, 48.87890004, -2.3677, 20.1), False))
+    wire = to_wire(
+        Item(mav_enums.MAV_CMD_NAV_WAYPOINT, RELATIVE, (0.0, 2.5, 0.0, None, 48.87890004, -2.3677, 20.1), False)
+    )
     assert (wire.command, wire.frame, wire.x, wire.y, wire.autocontinue) == (16, 3, 488789000, -23677000, 0)
     assert wire.params[:3] == (0.0, 2.5, 0.0)
     assert math.isnan(wire.params[3])
     assert wire.z == 20.100000381469727  # single precision
-    assert from_wire(wire) == Item(16, RELATIVE, (0.0, 2.5, 0.0, None, 48.8789, -2.3677, 20.1), False)
+    assert from_wire(wire) == Item(
+        mav_enums.MAV_CMD_NAV_WAYPOINT, RELATIVE, (0.0, 2.5, 0.0, None, 48.8789, -2.3677, 20.1), False
+    )
 
 
 def test_without_a_place_the_same_fields_are_plain_numbers() -> None:
-    wire = to_wire(Item(205, MISSION, (-30.0, None, 0.0, 0.0, 7.0, None, 2.0)))
+    wire = to_wire(Item(mav_enums.MAV_CMD_DO_MOUNT_CONTROL, MISSION, (-30.0, None, 0.0, 0.0, 7.0, None, 2.0)))
     assert (wire.x, wire.y, wire.z) == (7, UNSET, 2.0)
     assert from_wire(wire).params == (-30.0, None, 0.0, 0.0, 7.0, None, 2.0)
 
@@ -42,13 +47,20 @@ def test_without_a_place_the_same_fields_are_plain_numbers() -> None:
     ],
 )
 def test_numbers_come_back_as_short_as_they_mean_the_same(single: float, shortest: str) -> None:
-    assert repr(from_wire(PlanItem(205, MISSION, (single, 0.0, 0.0, 0.0), 0, 0, 0.0)).params[0]) == shortest
+    assert (
+        repr(
+            from_wire(PlanItem(mav_enums.MAV_CMD_DO_MOUNT_CONTROL, MISSION, (single, 0.0, 0.0, 0.0), 0, 0, 0.0)).params[
+                0
+            ]
+        )
+        == shortest
+    )
 
 
 @pytest.mark.parametrize("params", [(1e39,), (0, 0, 0, 0, 3e9), (0, 0, 0, 0, 0, -3e9)])
 def test_what_a_message_cannot_carry(params: tuple[float, ...]) -> None:
     with pytest.raises(ValueError, match="too large a number"):
-        to_wire(action(4501, *params))
+        to_wire(action(mav_enums.MAV_CMD_CONDITION_GATE, *params))
 
 
 def test_a_flight_as_carried() -> None:

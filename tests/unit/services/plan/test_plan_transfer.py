@@ -841,7 +841,7 @@ def test_a_float_that_is_no_integer(value: float) -> None:
 
 
 def test_unset_parameters_stay_unset() -> None:
-    sent = PlanItem(16, 6, (math.nan, 1.0, math.nan, math.nan), 1, 2, math.nan)
+    sent = PlanItem(dialect.MAV_CMD_NAV_WAYPOINT, 6, (math.nan, 1.0, math.nan, math.nan), 1, 2, math.nan)
     for kept in (item_of(item_int(sent, 0, 1, 1, 0)), item_of(item_float(sent, 0, 1, 1, 0))):
         assert isinstance(kept, PlanItem)
         assert [math.isnan(value) for value in (*kept.params, kept.z)] == [True, False, True, True, True]
@@ -853,15 +853,17 @@ def test_opaque_ids() -> None:
     assert opaque_id([]) == 0
     assert opaque_id(base) == opaque_id(list(base)) != 0
     others = [
-        PlanItem(16, 3, (0.0, 0.0, 0.0, 0.0), 1, 2, 3.0),
-        PlanItem(16, 3, (0.0, 0.0, 0.0, 0.0), 1, 2, 3.5),
-        PlanItem(16, 3, (0.0, 0.0, 0.0, 0.0), 1, 2, 3.0, autocontinue=0),
-        PlanItem(16, 6, (0.0, 0.0, 0.0, 0.0), 1, 2, 3.0),
-        PlanItem(17, 3, (0.0, 0.0, 0.0, 0.0), 1, 2, 3.0),
-        PlanItem(16, 3, (0.0, 0.0, 0.0, math.nan), 1, 2, 3.0),
+        PlanItem(dialect.MAV_CMD_NAV_WAYPOINT, 3, (0.0, 0.0, 0.0, 0.0), 1, 2, 3.0),
+        PlanItem(dialect.MAV_CMD_NAV_WAYPOINT, 3, (0.0, 0.0, 0.0, 0.0), 1, 2, 3.5),
+        PlanItem(dialect.MAV_CMD_NAV_WAYPOINT, 3, (0.0, 0.0, 0.0, 0.0), 1, 2, 3.0, autocontinue=0),
+        PlanItem(dialect.MAV_CMD_NAV_WAYPOINT, 6, (0.0, 0.0, 0.0, 0.0), 1, 2, 3.0),
+        PlanItem(dialect.MAV_CMD_NAV_LOITER_UNLIM, 3, (0.0, 0.0, 0.0, 0.0), 1, 2, 3.0),
+        PlanItem(dialect.MAV_CMD_NAV_WAYPOINT, 3, (0.0, 0.0, 0.0, math.nan), 1, 2, 3.0),
     ]
     assert len({opaque_id([one]) for one in others}) == len(others)
-    assert opaque_id([others[0]]) == opaque_id([PlanItem(16, 3, (0.0, 0.0, 0.0, 0.0), 1, 2, 3.0, current=1)])
+    assert opaque_id([others[0]]) == opaque_id(
+        [PlanItem(dialect.MAV_CMD_NAV_WAYPOINT, 3, (0.0, 0.0, 0.0, 0.0), 1, 2, 3.0, current=1)]
+    )
     assert opaque_id(base) != opaque_id(base[::-1])
 
 

@@ -217,11 +217,11 @@ def test_a_fence_of_items() -> None:
     items = [
         *corners(5001, 5, 1.0),
         *corners(5001, 3, math.nan),
-        item(5003, LAT, LON, 50.0, 2.0),
-        item(5000),
+        item(dialect.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, LAT, LON, 50.0, 2.0),
+        item(dialect.MAV_CMD_NAV_FENCE_RETURN_POINT),
         *corners(5002, 4, 9.0),
-        item(5004, LAT, LON, 7.5),
-        item(5005, 0.0, 0.0, 80.0, 3.0),
+        item(dialect.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION, LAT, LON, 7.5),
+        item(dialect.MAV_CMD_NAV_FENCE_HOME_CIRCLE_INCLUSION, 0.0, 0.0, 80.0, 3.0),
     ]
     assert FenceKind().check_plan(items) is None
     assert all(FenceKind().check_item(one) is None for one in items)
@@ -243,23 +243,41 @@ def test_a_fence_of_items() -> None:
 @pytest.mark.parametrize(
     ("bad", "result"),
     [
-        (item(16), dialect.MAV_MISSION_UNSUPPORTED),
-        (item(5100), dialect.MAV_MISSION_UNSUPPORTED),
-        (item(5001, LAT, LON, 2.0), dialect.MAV_MISSION_INVALID_PARAM1),
-        (item(5001, LAT, LON, 3.5), dialect.MAV_MISSION_INVALID_PARAM1),
-        (item(5001, LAT, LON, math.inf), dialect.MAV_MISSION_INVALID_PARAM1),
-        (item(5002, LAT, LON, 6000.0), dialect.MAV_MISSION_INVALID_PARAM1),
-        (item(5003, LAT, LON, -0.5), dialect.MAV_MISSION_INVALID_PARAM1),
-        (item(5003, LAT, LON, math.nan), dialect.MAV_MISSION_INVALID_PARAM1),
-        (item(5004, LAT, LON, math.inf), dialect.MAV_MISSION_INVALID_PARAM1),
-        (item(5005, 0.0, 0.0, -1.0), dialect.MAV_MISSION_INVALID_PARAM1),
-        (item(5003, LAT, LON, 5.0, 1.5), dialect.MAV_MISSION_INVALID_PARAM2),
-        (item(5003, LAT, LON, 5.0, math.inf), dialect.MAV_MISSION_INVALID_PARAM2),
-        (item(5003, LAT, LON, 5.0, frame=10), dialect.MAV_MISSION_UNSUPPORTED_FRAME),
-        (item(5003, LAT, LON, 5.0, frame=1), dialect.MAV_MISSION_UNSUPPORTED_FRAME),
-        (item(5000, 0.0, 0.0), dialect.MAV_MISSION_INVALID_PARAM5_X),
-        (PlanItem(5003, 0, (5.0, 0.0, 0.0, 0.0), 900000001, 0, 0.0), dialect.MAV_MISSION_INVALID_PARAM5_X),
-        (PlanItem(5003, 0, (5.0, 0.0, 0.0, 0.0), 1, 1800000001, 0.0), dialect.MAV_MISSION_INVALID_PARAM6_Y),
+        (item(dialect.MAV_CMD_NAV_WAYPOINT), dialect.MAV_MISSION_UNSUPPORTED),
+        (item(dialect.MAV_CMD_NAV_RALLY_POINT), dialect.MAV_MISSION_UNSUPPORTED),
+        (item(dialect.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION, LAT, LON, 2.0), dialect.MAV_MISSION_INVALID_PARAM1),
+        (item(dialect.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION, LAT, LON, 3.5), dialect.MAV_MISSION_INVALID_PARAM1),
+        (
+            item(dialect.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION, LAT, LON, math.inf),
+            dialect.MAV_MISSION_INVALID_PARAM1,
+        ),
+        (
+            item(dialect.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION, LAT, LON, 6000.0),
+            dialect.MAV_MISSION_INVALID_PARAM1,
+        ),
+        (item(dialect.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, LAT, LON, -0.5), dialect.MAV_MISSION_INVALID_PARAM1),
+        (item(dialect.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, LAT, LON, math.nan), dialect.MAV_MISSION_INVALID_PARAM1),
+        (item(dialect.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION, LAT, LON, math.inf), dialect.MAV_MISSION_INVALID_PARAM1),
+        (item(dialect.MAV_CMD_NAV_FENCE_HOME_CIRCLE_INCLUSION, 0.0, 0.0, -1.0), dialect.MAV_MISSION_INVALID_PARAM1),
+        (item(dialect.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, LAT, LON, 5.0, 1.5), dialect.MAV_MISSION_INVALID_PARAM2),
+        (item(dialect.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, LAT, LON, 5.0, math.inf), dialect.MAV_MISSION_INVALID_PARAM2),
+        (
+            item(dialect.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, LAT, LON, 5.0, frame=10),
+            dialect.MAV_MISSION_UNSUPPORTED_FRAME,
+        ),
+        (
+            item(dialect.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, LAT, LON, 5.0, frame=1),
+            dialect.MAV_MISSION_UNSUPPORTED_FRAME,
+        ),
+        (item(dialect.MAV_CMD_NAV_FENCE_RETURN_POINT, 0.0, 0.0), dialect.MAV_MISSION_INVALID_PARAM5_X),
+        (
+            PlanItem(dialect.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, 0, (5.0, 0.0, 0.0, 0.0), 900000001, 0, 0.0),
+            dialect.MAV_MISSION_INVALID_PARAM5_X,
+        ),
+        (
+            PlanItem(dialect.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, 0, (5.0, 0.0, 0.0, 0.0), 1, 1800000001, 0.0),
+            dialect.MAV_MISSION_INVALID_PARAM6_Y,
+        ),
     ],
 )
 def test_bad_items(bad: PlanItem, result: int) -> None:
@@ -272,12 +290,21 @@ def test_bad_items(bad: PlanItem, result: int) -> None:
     ("items", "words"),
     [
         (corners(5001, 4)[:3], "begins with item 0 has not its 4 corners"),
-        ([item(5003, LAT, LON, 5.0), *corners(5001, 4)[:2], *corners(5002, 4)], "begins with item 1"),
+        (
+            [item(dialect.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, LAT, LON, 5.0), *corners(5001, 4)[:2], *corners(5002, 4)],
+            "begins with item 1",
+        ),
         ([*corners(5001, 4)[:3], *corners(5001, 4, 1.0)[3:]], "begins with item 0"),
         ([*corners(5001, 4)[:3], *corners(5001, 5)], "begins with item 0"),
-        ([item(5000), item(5000)], "more than one return point"),
-        ([item(5001, LAT, LON, 3.0)] * 3, "encloses nothing"),
-        ([item(5001, LAT + n * 1e-3, LON, 3.0) for n in range(3)], "encloses nothing"),
+        (
+            [item(dialect.MAV_CMD_NAV_FENCE_RETURN_POINT), item(dialect.MAV_CMD_NAV_FENCE_RETURN_POINT)],
+            "more than one return point",
+        ),
+        ([item(dialect.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION, LAT, LON, 3.0)] * 3, "encloses nothing"),
+        (
+            [item(dialect.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION, LAT + n * 1e-3, LON, 3.0) for n in range(3)],
+            "encloses nothing",
+        ),
     ],
 )
 def test_bad_plans(items: list[PlanItem], words: str) -> None:
@@ -311,7 +338,7 @@ def sight(north: float = 0.0, east: float = 0.0, speed: tuple[float, float] = (0
 def watching(action: Reaction = Reaction.HOLD, radius: float = 100.0) -> FenceWatch:
     watch = FenceWatch()
     watch.action = action
-    watch.take([item(5003, LAT, LON, radius)])
+    watch.take([item(dialect.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, LAT, LON, radius)])
     return watch
 
 
@@ -607,7 +634,12 @@ def test_a_warning_of_the_ceiling_stops_nobody() -> None:
 def test_what_is_enabled() -> None:
     watch = FenceWatch()
     assert (watch.present, watch.in_force, watch.enabled) == (False, False, True)
-    watch.take([item(5003, LAT, LON, 100.0), item(5005, 0.0, 0.0, 50.0, 0.0)])
+    watch.take(
+        [
+            item(dialect.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, LAT, LON, 100.0),
+            item(dialect.MAV_CMD_NAV_FENCE_HOME_CIRCLE_INCLUSION, 0.0, 0.0, 50.0, 0.0),
+        ]
+    )
     watch.floor = 3.0
     assert (watch.present, watch.in_force) == (True, True)
     assert len(watch.zones.zones) == 2
@@ -633,7 +665,12 @@ def test_places_are_asked_for_before() -> None:
     with pytest.raises(OutsideFence, match="no GPS fix") as info:
         watch.check_place(None, HERE)
     assert not info.value.lasting
-    watch.take([item(5003, LAT, LON, 100.0), item(5004, LAT, LON, 20.0)])
+    watch.take(
+        [
+            item(dialect.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, LAT, LON, 100.0),
+            item(dialect.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION, LAT, LON, 20.0),
+        ]
+    )
     with pytest.raises(OutsideFence, match="the way there leaves the fence at the exclusion circle of item 1"):
         watch.check_place(beside(50.0), HERE, beside(-50.0))
     watch.check_place(beside(50.0), HERE, beside(50.0, 30.0))
@@ -647,7 +684,7 @@ def test_another_fence_is_another_matter() -> None:
     watch = watching()
     watch.look(sight(110.0), 0.0)
     watch.done(2)
-    watch.take([item(5003, LAT, LON, 105.0)])
+    watch.take([item(dialect.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, LAT, LON, 105.0)])
     assert watch.look(sight(110.0, orders=2), 1.0) is Reaction.HOLD
 
 

@@ -7,6 +7,7 @@ from collections.abc import AsyncIterator
 import pytest
 from support.simulated import connected
 
+from anafi_mav import mav_enums
 from anafi_mav.plans.plan import Item
 from anafi_mav.plans.translation.translate import Leg, Start, translate
 from anafi_mav.vehicle.mission.files import FilesOnDrone
@@ -18,7 +19,7 @@ def way(latitude: float, command: int = 16) -> Item:
 
 
 UP, A, B, C, D = way(48.0, 22), way(48.0), way(48.001), way(48.002), way(48.003)
-X = Item(16, 3, (0.0, None, None, None, 48.0005, 2.001, 20.0))
+X = Item(mav_enums.MAV_CMD_NAV_WAYPOINT, 3, (0.0, None, None, None, 48.0005, 2.001, 20.0))
 WHOLE = (UP, A, B, C, D)
 GROUND = Start(48.0, 2.0, 0.0, flying=False, takeoff_amsl=0.0)
 AIR = Start(48.0002, 2.0, 20.0, flying=True, takeoff_amsl=0.0)

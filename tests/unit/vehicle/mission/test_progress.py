@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from anafi_mav import mav_enums
 from anafi_mav.plans.plan import Item
 from anafi_mav.plans.translation.translate import Leg
 from anafi_mav.vehicle.mission.progress import TRANSITIONS, Event, Progress, State
@@ -56,7 +57,7 @@ def test_line_after_line() -> None:
     assert (progress.state, progress.first) == (State.COMPLETE, 0)
 
 
-JUMP = Item(177, 2, (1.0, 3.0, None, None, None, None, None))
+JUMP = Item(mav_enums.MAV_CMD_DO_JUMP, 2, (1.0, 3.0, None, None, None, None, None))
 
 
 def test_turns_of_loops_are_counted() -> None:
