@@ -1,4 +1,4 @@
-"""Time as a value that is handed in. Cores never read a clock: their shell passes `now`.
+"""Time as a value that is handed in, and the one timer. Cores never read a clock: their shell passes `now`.
 
 `Clock.monotonic` is the one time base of the process (seconds, never steps back); the asyncio loop's own
 time is the same clock, so deadlines of cores can be given to `loop.call_at` unchanged.
@@ -6,7 +6,9 @@ time is the same clock, so deadlines of cores can be given to `loop.call_at` unc
 
 from __future__ import annotations
 
+import asyncio
 import time
+from collections.abc import Callable
 from typing import Protocol
 
 
@@ -28,3 +30,38 @@ class SystemClock:
 
     def time(self) -> float:
         return time.time()
+
+
+class Alarm:
+    """Calls a function once, at a time of the event loop's clock. Setting it again replaces the time set before."""
+
+    __slots__ = ("_call", "_handle")
+
+    def __init__(self, call: Callable[[], None]) -> None:
+        """`call` may set the alarm again."""
+        self._call = call
+        self._handle: asyncio.TimerHandle | None = None
+
+    @property
+    def is_set(self) -> bool:
+        """True until it is cancelled or has called."""
+        return self._handle is not None
+
+    def set(self, at: float) -> None:
+        """Call at this time (s, loop clock), or as soon as possible when it has passed."""
+        self.cancel()
+        self._handle = asyncio.get_running_loop().call_at(at, self._fire)
+
+    def set_in(self, seconds: float) -> None:
+        """Call after this many seconds."""
+        self.set(asyncio.get_running_loop().time() + seconds)
+
+    def cancel(self) -> None:
+        """Do not call. Cancelling twice does no harm."""
+        if self._handle is not None:
+            self._handle.cancel()
+            self._handle = None
+
+    def _fire(self) -> None:
+        self._handle = None
+        self._call()

@@ -19,7 +19,7 @@ from types import TracebackType
 
 from typing_extensions import Self
 
-from anafi_mav.arsdk.rtsp import DEFAULT_PORT as RTSP_PORT
+from anafi_mav.arsdk.video.rtsp import DEFAULT_PORT as RTSP_PORT
 from anafi_mav.clock import Clock, SystemClock
 from anafi_mav.config import Config, DroneConfig
 from anafi_mav.drone import Drone, events
@@ -29,11 +29,11 @@ from anafi_mav.errors import AnafiMavError, ConfigError, HandshakeRefused
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Node
 from anafi_mav.services.flavours import FLAVOURS
-from anafi_mav.services.flying import ON_GROUND
-from anafi_mav.services.statustext import Severity
 from anafi_mav.services.system import System
 from anafi_mav.state_lock import FILE, NO_LOCKS, HeldDrone, Holder, StateLock, state_folder
 from anafi_mav.subject import DRONE
+from anafi_mav.vehicle.base.flying import ON_GROUND
+from anafi_mav.vehicle.base.severity import Severity
 
 logger = logging.getLogger(__name__)
 

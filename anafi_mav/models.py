@@ -2,7 +2,7 @@
 
 These are facts of Parrot's data sheets and of the anafi_ros paper's table of models, and the same for everybody. What a
 drone reports is not here: the simulator sends its own values, and the other side takes what it receives. How an
-airframe flies is not here either: those are the simulator's figures (`sim.model`).
+airframe flies is not here either: those are the simulator's figures (`sim.world.model`).
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ class Model(msgspec.Struct, frozen=True, kw_only=True):
     firmware: tuple[int, ...]
     """First parts of the version that this program is written for; later ones are taken to be like it."""
     simulated: bool
-    """True when `sim.model` has its airframe, so that a configuration may ask for a simulated one."""
+    """True when `sim.world.model` has its airframe, so that a configuration may ask for a simulated one."""
 
     @property
     def plan_version(self) -> int | None:

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import msgspec
-from python_api import classes, members
+from support.python_api import classes, members
 
 from anafi_mav import drone
 from anafi_mav.drone.element import Element

@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 
 HERE = Path(__file__).parent
-TESTS = HERE.parent / "tests" / "unit"
+TESTS = HERE.parent / "tests"
 DIALECT_XML = HERE.parent / "dialect" / "anafi.xml"
 sys.path[:0] = [str(HERE.parent), str(TESTS), str(HERE)]
 
@@ -123,14 +123,14 @@ def configuration() -> str:
 SEED = """\
 # The rows of the anafi_ros paper
 
-<!-- Made by docs/generate.py from tests/unit/seed_rows.py. -->
+<!-- Made by docs/generate.py from tests/support/seed_rows.py. -->
 
 For users of anafi_ros, and of the Python API. After reading you know the name in `anafi_mav.drone.Drone` for each
 function of that paper.
 
 The appendix of the paper lists what a program can do with an ANAFI: 5 topics to command it, 29 topics to read, 24
 services and 25 parameters. Each row has its counterpart in `Drone`. The last columns have the results of
-`tests/unit/test_drone_seed_rows.py` on each model of the simulator, over its real sockets:
+`tests/unit/drone/test_seed_rows.py` on each model of the simulator, over its real sockets:
 
 * **yes**: the row is read or driven, and the drone confirms it;
 * **no**: this model does not have it, and the verb raises `NotSupported`;
@@ -140,7 +140,7 @@ services and 25 parameters. Each row has its counterpart in `Drone`. The last co
 
 def seed() -> str:
     """docs/seed.md."""
-    from seed_rows import MODELS, ROWS, Row
+    from support.seed_rows import MODELS, ROWS, Row
 
     def shown(row: Row, model: str) -> str:
         if row.drive is None:
@@ -163,7 +163,7 @@ def seed() -> str:
 SEED_MAVLINK = """\
 # The rows of the anafi_ros paper over MAVLink
 
-<!-- Made by docs/generate.py from tests/unit/seed_mavlink.py. -->
+<!-- Made by docs/generate.py from tests/support/seed_mavlink.py. -->
 
 For users of anafi_ros who change to MAVLink. After reading you know the MAVLink message, command or parameter for each
 function of that paper ([seed.md](seed.md)). Messages that begin with `ANAFI_` are in [dialect.md](dialect.md),
@@ -176,7 +176,7 @@ parameters that begin with `ANF_` in [parameters.md](parameters.md).
 
 def seed_mavlink() -> str:
     """docs/seed-mavlink.md."""
-    from seed_mavlink import REACHED
+    from support.seed_mavlink import REACHED
 
     rows = []
     for name, reach in REACHED.items():
@@ -310,10 +310,10 @@ does not have is listed with a neutral value: "not available on ANAFI".
 
 def parameters() -> str:
     """docs/parameters.md."""
-    from anafi_mav.services.parameter_table_ardupilot import ARDUPILOT_NAMES
-    from anafi_mav.services.parameter_table_px4 import PX4_NAMES
-    from anafi_mav.services.parameter_table_setup import NOT_AVAILABLE
-    from anafi_mav.services.parameters import NATIVE_NAMES
+    from anafi_mav.services.parameter.parameter_service import NATIVE_NAMES
+    from anafi_mav.services.parameter.parameter_table_ardupilot import ARDUPILOT_NAMES
+    from anafi_mav.services.parameter.parameter_table_px4 import PX4_NAMES
+    from anafi_mav.services.parameter.parameter_table_setup import NOT_AVAILABLE
 
     def twins(name: str, names: Any) -> str:
         found = [f"`{one.name}`" + (f" ({one.unit})" if one.unit else "") for one in names if one.native == name]
@@ -349,19 +349,19 @@ def parameters() -> str:
 SILENCE = """\
 # Commands that the simulator does not answer
 
-<!-- Made by docs/generate.py from tests/unit/silent_commands.py. -->
+<!-- Made by docs/generate.py from tests/support/silent_commands.py. -->
 
 For programmers who test an ARSDK controller on the simulator. After reading you know which commands have no event in
 answer, and why.
 
-`tests/unit/test_sim_silence.py` sends every declared command to each model and each Skycontroller, with several values
+`tests/unit/sim/test_silence.py` sends every declared command to each model and each Skycontroller, with several values
 and in every relevant state. The simulator answers all of them at once by an event, except these.
 """
 
 
 def silence() -> str:
     """docs/silence.md."""
-    from silent_commands import CONTROLLERS, DRONES
+    from support.silent_commands import CONTROLLERS, DRONES
 
     parts = [SILENCE]
     for title, column, table in (("Drones", "models", DRONES), ("Skycontrollers", "generations", CONTROLLERS)):
@@ -387,14 +387,19 @@ deferred, or it cannot happen. The module's text has the reason.
 
 def states() -> str:
     """docs/states.md."""
-    from anafi_mav.services import fence_watch, follow, ftp, manual_flight, mission_progress, offboard, plan_transfer
-    from anafi_mav.sim import machine
+    from anafi_mav.services.ftp import ftp
+    from anafi_mav.services.plan import plan_transfer
+    from anafi_mav.sim.autopilot import machine
+    from anafi_mav.vehicle import follow, manual_flight
+    from anafi_mav.vehicle.fence import fence_watch
+    from anafi_mav.vehicle.mission import progress
+    from anafi_mav.vehicle.offboard import stream
 
     tables: list[tuple[str, Any]] = [
         ("Transfer of a mission, a fence or rally points", plan_transfer),
-        ("A mission", mission_progress),
+        ("A mission", progress),
         ("The fence: zones, floor and ceiling each", fence_watch),
-        ("Setpoints of a program", offboard),
+        ("Setpoints of a program", stream),
         ("Sticks of a ground station", manual_flight),
         ("Following a target", follow),
         ("A session of MAVLink FTP", ftp),
@@ -421,7 +426,7 @@ def states() -> str:
 PLAN_TRANSLATION = """\
 # What a mission becomes
 
-<!-- Made by docs/generate.py from the table of anafi_mav/plans/rules.py. -->
+<!-- Made by docs/generate.py from the table of anafi_mav/plans/rules/rules.py. -->
 
 For people who plan missions. After reading you know how an ANAFI flies each command, and which ones it refuses.
 
@@ -460,11 +465,12 @@ Rules for all of them:
 
 def plan_translation() -> str:
     """docs/plan-translation.md."""
-    from anafi_mav.plans import pen, rules, translate
-    from anafi_mav.plans.row import Verdict
+    from anafi_mav.plans.rules import flight_plan_writer, rules
+    from anafi_mav.plans.rules.row import Verdict
+    from anafi_mav.plans.translation import translate
 
     meanings = {verdict.name.lower(): verdict.value for verdict in Verdict}
-    parts = [PLAN_TRANSLATION.format(**meanings, acceptance=pen.ACCEPTANCE, lines=translate.MAX_LINES)]
+    parts = [PLAN_TRANSLATION.format(**meanings, acceptance=flight_plan_writer.ACCEPTANCE, lines=translate.MAX_LINES)]
     for row in rules.TABLE.values():
         parts.append(f"| {row.command} {row.name} | {row.verdict.name.lower()} | {row.how} |\n")
     return "".join(parts)

@@ -18,7 +18,7 @@ import pytest
 from support import clock, flavours
 from support.conformance_items import ITEMS
 
-from anafi_mav.arsdk import watchdog
+from anafi_mav.arsdk.link import watchdog
 
 clock.install()
 

@@ -9,7 +9,7 @@ import socket
 from collections.abc import Collection
 from typing import NamedTuple
 
-from anafi_mav.arsdk.handshake import C2D_PORT, HANDSHAKE_PORT
+from anafi_mav.arsdk.link.handshake import C2D_PORT, HANDSHAKE_PORT
 from anafi_mav.errors import ConfigError
 
 HTTP_PORT, HTTP_PORT_FOR_USERS = 80, 8080

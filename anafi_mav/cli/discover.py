@@ -14,14 +14,14 @@ from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
-from anafi_mav.arsdk.handshake import DeviceInfo
-from anafi_mav.arsdk.interface import networks
-from anafi_mav.arsdk.mux_link import look_either
+from anafi_mav.arsdk.link.handshake import DeviceInfo
+from anafi_mav.arsdk.link.interface import networks
+from anafi_mav.arsdk.mux.mux_link import look_either
 from anafi_mav.cli import interrupts, log
 from anafi_mav.cli.addresses import spot
 from anafi_mav.cli.terminal import complain, say, say_json
-from anafi_mav.drone.controller import MODELS as CONTROLLERS
-from anafi_mav.drone.product import MODELS
+from anafi_mav.drone.controller.controller import MODELS as CONTROLLERS
+from anafi_mav.drone.status.product import MODELS
 from anafi_mav.errors import AnafiMavError, ConfigError
 from anafi_mav.printable import printable
 

@@ -13,19 +13,19 @@ import socket
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from anafi_mav.arsdk import mux
-from anafi_mav.arsdk.handshake import DISCOVERY_PORT, HANDSHAKE_PORT, DeviceInfo
-from anafi_mav.arsdk.interface import bind_to_interface, networks, open_connection
-from anafi_mav.arsdk.mux_link import look_either
-from anafi_mav.arsdk.rtsp import DEFAULT_PORT as RTSP_PORT
+from anafi_mav.arsdk.link.handshake import DISCOVERY_PORT, HANDSHAKE_PORT, DeviceInfo
+from anafi_mav.arsdk.link.interface import bind_to_interface, networks, open_connection
+from anafi_mav.arsdk.mux import mux
+from anafi_mav.arsdk.mux.mux_link import look_either
+from anafi_mav.arsdk.video.rtsp import DEFAULT_PORT as RTSP_PORT
 from anafi_mav.cli import consent, interrupts, log, options
 from anafi_mav.cli.addresses import spot
 from anafi_mav.cli.terminal import say, say_json
 from anafi_mav.drone import Drone
-from anafi_mav.drone.controller import MODELS as CONTROLLERS
+from anafi_mav.drone.controller.controller import MODELS as CONTROLLERS
 from anafi_mav.drone.drone import CONTROLLER_PORTS
-from anafi_mav.drone.product import MODELS
 from anafi_mav.drone.rest import HTTP_PORT
+from anafi_mav.drone.status.product import MODELS
 from anafi_mav.errors import AnafiMavError, ConfigError, LinkLost
 
 ANSWER_LIMIT = 2.0

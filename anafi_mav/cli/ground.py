@@ -140,7 +140,7 @@ class Ground:
     @property
     def first_item_is_home(self) -> bool:
         """In its missions, as ArduPilot has them."""
-        return bool(self.heartbeat.autopilot == dialect.MAV_AUTOPILOT_ARDUPILOTMEGA)
+        return any(flavour.zero_home for flavour in FLAVOURS.values() if flavour.autopilot == self.heartbeat.autopilot)
 
     # What is done with it.
 

@@ -12,8 +12,8 @@ from typing import Any
 
 import msgspec
 
-from anafi_mav.arsdk.mux_link import look_either
-from anafi_mav.arsdk.wire import Message
+from anafi_mav.arsdk.codec.wire import Message
+from anafi_mav.arsdk.mux.mux_link import look_either
 from anafi_mav.cli import consent, interrupts, log
 from anafi_mav.cli.addresses import spot
 from anafi_mav.cli.terminal import complain, say, say_json

@@ -14,13 +14,14 @@ from anafi_mav.cli.plan_options import PARROT, height_of, limits, load, target_f
 from anafi_mav.cli.terminal import say, say_json, say_table
 from anafi_mav.errors import ConfigError, PlanError
 from anafi_mav.models import Model, planned
-from anafi_mav.plans import files, table
 from anafi_mav.plans import plot as drawing
-from anafi_mav.plans.check import Findings, Severity
-from anafi_mav.plans.check import check as lint
-from anafi_mav.plans.files import Format
+from anafi_mav.plans import table
+from anafi_mav.plans.formats import files
+from anafi_mav.plans.formats.files import Format
 from anafi_mav.plans.plan import Circle, Plan
-from anafi_mav.plans.twin import twin
+from anafi_mav.plans.translation.check import Findings, Severity
+from anafi_mav.plans.translation.check import check as lint
+from anafi_mav.plans.translation.parrot_export import twin
 
 
 def show(arguments: argparse.Namespace) -> int:

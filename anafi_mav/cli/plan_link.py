@@ -16,11 +16,12 @@ from anafi_mav.errors import AnafiMavError, PlanError
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.mavlink.plan_client import Download, Outcome, Upload
-from anafi_mav.plans.lists import fence_items, points_of, rally_items, zones_of
+from anafi_mav.plans.formats.lists import fence_items, points_of, rally_items, zones_of
 from anafi_mav.plans.plan import GLOBAL, WAYPOINT, Item, Plan, Point, counted, shifted
 from anafi_mav.services.memory import NOT_KEPT
-from anafi_mav.services.mission_items import from_wire, to_wire
-from anafi_mav.services.plan_items import Fault, PlanItem, item_int, item_of
+from anafi_mav.services.plan.item_messages import item_int, item_of
+from anafi_mav.services.plan.mission_items import from_wire, to_wire
+from anafi_mav.vehicle.fence.plan_items import Fault, PlanItem
 
 MISSION, FENCE, RALLY = (
     dialect.MAV_MISSION_TYPE_MISSION,

@@ -11,11 +11,12 @@ from pathlib import Path
 from anafi_mav.cli import options
 from anafi_mav.errors import ConfigError
 from anafi_mav.models import planned
-from anafi_mav.plans import files, plot
-from anafi_mav.plans.check import Limits
-from anafi_mav.plans.files import Format
-from anafi_mav.plans.parrot import Version
+from anafi_mav.plans import plot
+from anafi_mav.plans.formats import files
+from anafi_mav.plans.formats.files import Format
+from anafi_mav.plans.formats.parrot import Version
 from anafi_mav.plans.plan import Plan
+from anafi_mav.plans.translation.check import Limits
 
 PARROT = ".mavlink"
 

@@ -23,7 +23,7 @@ from anafi_mav.errors import ConfigError
 from anafi_mav.gateway import Gateway, state_in_use
 from anafi_mav.mavlink.endpoint import is_open_to_network, parse_endpoint
 from anafi_mav.services.flavours import FLAVOURS
-from anafi_mav.sim import quirks
+from anafi_mav.sim.world import quirks
 from anafi_mav.state_lock import read_holder, state_folder
 
 READY_LIMIT = 15.0

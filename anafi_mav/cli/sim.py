@@ -20,10 +20,10 @@ from anafi_mav.cli.scenarios import load as load_scenario
 from anafi_mav.cli.terminal import say
 from anafi_mav.errors import ConfigError
 from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
-from anafi_mav.sim.model import MODELS
-from anafi_mav.sim.quirks import QUIRKS
 from anafi_mav.sim.scenario import Scenario
-from anafi_mav.sim.wind import CALM, WindSpec
+from anafi_mav.sim.world.model import MODELS
+from anafi_mav.sim.world.quirks import QUIRKS
+from anafi_mav.sim.world.wind import CALM, WindSpec
 
 MAX_COUNT = 254
 """Drones of one process: the hosts of one /24, where their addresses live."""

@@ -23,12 +23,11 @@ from anafi_mav.arsdk.messages.gimbal import FrameOfReference
 from anafi_mav.cli import interrupts, options
 from anafi_mav.cli.terminal import complain, say
 from anafi_mav.drone import Drone, PilotingCommand
-from anafi_mav.drone.gimbal import Aim
-from anafi_mav.drone.sticks import HOLD_LIMIT
-from anafi_mav.drone.video import VideoFrame
+from anafi_mav.drone.payload.gimbal import Aim
+from anafi_mav.drone.piloting.sticks import HOLD_LIMIT
+from anafi_mav.drone.video.video import VideoFrame
 from anafi_mav.errors import CommandTimeout, ConfigError
 from anafi_mav.sim import DroneSpec, LogEntry, SimulatedDrone, Simulator
-from anafi_mav.sim.model import MODELS
 from anafi_mav.sim.validation import (
     AFTER,
     CLIMB,
@@ -43,6 +42,7 @@ from anafi_mav.sim.validation import (
     tilt_results,
     yaw_results,
 )
+from anafi_mav.sim.world.model import MODELS
 
 HEIGHT = 30.0
 """m above take-off that everything is flown at."""

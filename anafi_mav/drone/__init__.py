@@ -10,25 +10,22 @@ The names in `__all__` are stable, and so are those of `anafi_mav.drone.events`,
 docs/python-api.md is the guide, docs/python-api-reference.md the reference.
 """
 
-from anafi_mav.arsdk.rtp_h264 import Picture
-from anafi_mav.arsdk.video_metadata import FrameMetadata, Location, Ned, Quaternion, WifiLink
+from anafi_mav.arsdk.video.rtp_h264 import Picture
+from anafi_mav.arsdk.video.video_metadata import FrameMetadata, Location, Ned, Quaternion, WifiLink
 from anafi_mav.drone import events
-from anafi_mav.drone.alerts import Alerts, AlertsState, Blocker, BlockerKind
-from anafi_mav.drone.animations import Animations, AnimationsState
-from anafi_mav.drone.battery import Battery, BatteryState
-from anafi_mav.drone.calibration import Calibration, CalibrationState
-from anafi_mav.drone.camera import Camera
-from anafi_mav.drone.camera_state import (
-    CamerasState,
-    CameraState,
-    ExposureSettings,
-    PhotoOption,
-    PhotoSettings,
-    RecordingOption,
-    RecordingSettings,
-    StyleSettings,
-)
-from anafi_mav.drone.camera_words import (
+from anafi_mav.drone.automatic.animations import Animations, AnimationsState
+from anafi_mav.drone.automatic.flight_plan import FlightPlan, FlightPlanState, PlanOnDrone, Recovery
+from anafi_mav.drone.automatic.follow_me import FollowMe, FollowMeState, Trajectory
+from anafi_mav.drone.automatic.poi import Poi, PoiState
+from anafi_mav.drone.connection import connect
+from anafi_mav.drone.controller.controller import Controller
+from anafi_mav.drone.controller.state import ControllerState, KnownDrone
+from anafi_mav.drone.drone import Drone
+from anafi_mav.drone.element import Position, Range
+from anafi_mav.drone.events import FlyingState, PlayingState
+from anafi_mav.drone.features import Feature, Support
+from anafi_mav.drone.payload.camera import Camera
+from anafi_mav.drone.payload.camera_enums import (
     Antiflicker,
     Bracketing,
     Burst,
@@ -45,31 +42,34 @@ from anafi_mav.drone.camera_words import (
     Style,
     WhiteBalance,
 )
-from anafi_mav.drone.connection import connect
-from anafi_mav.drone.controller import Controller
-from anafi_mav.drone.controller_state import ControllerState, KnownDrone
-from anafi_mav.drone.drone import Drone
-from anafi_mav.drone.element import Position, Range
-from anafi_mav.drone.events import FlyingState, PlayingState
-from anafi_mav.drone.features import Feature, Support
-from anafi_mav.drone.flight_plan import FlightPlan, FlightPlanState, PlanOnDrone, Recovery
-from anafi_mav.drone.follow_me import FollowMe, FollowMeState, Trajectory
-from anafi_mav.drone.gimbal import Aim, Angles, Gimbal, GimbalAttitude, GimbalState
-from anafi_mav.drone.gps import Gps, GpsState
-from anafi_mav.drone.home import Home, HomeState
-from anafi_mav.drone.link import Link, LinkState
-from anafi_mav.drone.media import Media, MediaItem, MediaState, Notification, Place, Resource
-from anafi_mav.drone.moves import Displacement, Move, MoveEnd
-from anafi_mav.drone.piloting import Piloting
-from anafi_mav.drone.piloting_state import Attitude, Avoidance, PilotingState, Velocity
-from anafi_mav.drone.poi import Poi, PoiState
-from anafi_mav.drone.product import MODELS, Identity, Product, ProductState
-from anafi_mav.drone.sound import Sound, SoundState
-from anafi_mav.drone.sticks import Limits, PilotingCommand
-from anafi_mav.drone.storage import Storage, StorageState
-from anafi_mav.drone.thermal import Colour, Palette, Thermal, ThermalState
-from anafi_mav.drone.video import Video, VideoFrame, VideoState
-from anafi_mav.drone.video_stream import Shown
+from anafi_mav.drone.payload.camera_state import (
+    CamerasState,
+    CameraState,
+    ExposureSettings,
+    PhotoOption,
+    PhotoSettings,
+    RecordingOption,
+    RecordingSettings,
+    StyleSettings,
+)
+from anafi_mav.drone.payload.gimbal import Aim, Angles, Gimbal, GimbalAttitude, GimbalState
+from anafi_mav.drone.payload.media import Media, MediaItem, MediaState, Notification, Place, Resource
+from anafi_mav.drone.payload.storage import Storage, StorageState
+from anafi_mav.drone.payload.thermal import Colour, Palette, Thermal, ThermalState
+from anafi_mav.drone.piloting.moves import Displacement, Move, MoveEnd
+from anafi_mav.drone.piloting.piloting import Piloting
+from anafi_mav.drone.piloting.state import Attitude, Avoidance, PilotingState, Velocity
+from anafi_mav.drone.piloting.sticks import Limits, PilotingCommand
+from anafi_mav.drone.status.alerts import Alerts, AlertsState, Blocker, BlockerKind
+from anafi_mav.drone.status.battery import Battery, BatteryState
+from anafi_mav.drone.status.calibration import Calibration, CalibrationState
+from anafi_mav.drone.status.gps import Gps, GpsState
+from anafi_mav.drone.status.home import Home, HomeState
+from anafi_mav.drone.status.link import Link, LinkState
+from anafi_mav.drone.status.product import MODELS, Identity, Product, ProductState
+from anafi_mav.drone.status.sound import Sound, SoundState
+from anafi_mav.drone.video.stream import Shown
+from anafi_mav.drone.video.video import Video, VideoFrame, VideoState
 from anafi_mav.errors import (
     AnafiMavError,
     CommandRejected,

@@ -7,9 +7,9 @@ import logging
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
-from anafi_mav.arsdk.handshake import DISCOVERY_PORT
+from anafi_mav.arsdk.link.handshake import DISCOVERY_PORT
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
-from anafi_mav.arsdk.rtsp import DEFAULT_PORT as RTSP_PORT
+from anafi_mav.arsdk.video.rtsp import DEFAULT_PORT as RTSP_PORT
 from anafi_mav.drone.drone import Drone
 from anafi_mav.drone.rest import HTTP_PORT
 from anafi_mav.errors import AnafiMavError

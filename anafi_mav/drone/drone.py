@@ -16,9 +16,9 @@ from functools import partial
 from typing import Any, TypeAlias, TypeVar
 
 from anafi_mav import models
-from anafi_mav.arsdk import mux_link
-from anafi_mav.arsdk.controller import ControllerSession
-from anafi_mav.arsdk.handshake import DISCOVERY_PORT
+from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
+from anafi_mav.arsdk.link.controller import ControllerSession
+from anafi_mav.arsdk.link.handshake import DISCOVERY_PORT
 from anafi_mav.arsdk.messages import ardrone3, common, drone_manager, rth, skyctrl
 from anafi_mav.arsdk.messages import flight_plan as modern_plan
 from anafi_mav.arsdk.messages.animation import Type as AnimationType
@@ -27,37 +27,37 @@ from anafi_mav.arsdk.messages.common import PlayingState
 from anafi_mav.arsdk.messages.drone_manager import DroneManagerConnectionState as Connection
 from anafi_mav.arsdk.messages.follow_me import Mode as FollowMeMode
 from anafi_mav.arsdk.messages.proto import device_manager
-from anafi_mav.arsdk.rtsp import DEFAULT_PORT as RTSP_PORT
-from anafi_mav.arsdk.wire import Message, UnknownMessage
+from anafi_mav.arsdk.mux import mux_link
+from anafi_mav.arsdk.video.rtsp import DEFAULT_PORT as RTSP_PORT
 from anafi_mav.clock import Clock, SystemClock
-from anafi_mav.drone import inquiry
-from anafi_mav.drone.alerts import Alerts, Blocker, spoken, takeoff_blockers
-from anafi_mav.drone.animations import Animations
-from anafi_mav.drone.battery import Battery
-from anafi_mav.drone.calibration import Calibration
-from anafi_mav.drone.camera import Camera
-from anafi_mav.drone.controller import MODELS as CONTROLLERS
-from anafi_mav.drone.controller import Controller, is_motion
+from anafi_mav.drone import startup_queries
+from anafi_mav.drone.automatic.animations import Animations
+from anafi_mav.drone.automatic.flight_plan import FlightPlan
+from anafi_mav.drone.automatic.follow_me import FollowMe
+from anafi_mav.drone.automatic.poi import Poi
+from anafi_mav.drone.controller.controller import MODELS as CONTROLLERS
+from anafi_mav.drone.controller.controller import Controller, is_motion
 from anafi_mav.drone.element import Element, Reducer
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, loop_time
 from anafi_mav.drone.features import Feature, Support, features
-from anafi_mav.drone.flight_plan import FlightPlan
-from anafi_mav.drone.follow_me import FollowMe
-from anafi_mav.drone.gimbal import Gimbal
-from anafi_mav.drone.gps import Gps
-from anafi_mav.drone.home import Home, modern
-from anafi_mav.drone.link import Link
-from anafi_mav.drone.media import Media
-from anafi_mav.drone.moves import Move
-from anafi_mav.drone.piloting import Piloting
-from anafi_mav.drone.poi import Poi
-from anafi_mav.drone.product import MODELS, Identity, Product
+from anafi_mav.drone.payload.camera import Camera
+from anafi_mav.drone.payload.gimbal import Gimbal
+from anafi_mav.drone.payload.media import Media
+from anafi_mav.drone.payload.storage import Storage
+from anafi_mav.drone.payload.thermal import Thermal
+from anafi_mav.drone.piloting.moves import Move
+from anafi_mav.drone.piloting.piloting import Piloting
 from anafi_mav.drone.rest import HTTP_PORT, Rest
-from anafi_mav.drone.sound import Sound
-from anafi_mav.drone.storage import Storage
-from anafi_mav.drone.thermal import Thermal
-from anafi_mav.drone.video import Video
-from anafi_mav.drone.video_route import Direct, Mux, Route
+from anafi_mav.drone.status.alerts import Alerts, Blocker, spoken, takeoff_blockers
+from anafi_mav.drone.status.battery import Battery
+from anafi_mav.drone.status.calibration import Calibration
+from anafi_mav.drone.status.gps import Gps
+from anafi_mav.drone.status.home import Home, modern
+from anafi_mav.drone.status.link import Link
+from anafi_mav.drone.status.product import MODELS, Identity, Product
+from anafi_mav.drone.status.sound import Sound
+from anafi_mav.drone.video.route import Direct, Mux, Route
+from anafi_mav.drone.video.video import Video
 from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, LocalProtocolError
 
 log = logging.getLogger("anafi_mav")
@@ -225,8 +225,12 @@ class Drone:
                 await self._find_web_server(session)
                 await self._read_states()
                 if self._model.protobuf:
-                    await inquiry.ask(self._commander, self.name, [*self.camera.questions(), *self.storage.questions()])
-                    await inquiry.ask(self._commander, self.name, [*self.camera.details(), *self.storage.details()])
+                    await startup_queries.ask(
+                        self._commander, self.name, [*self.camera.questions(), *self.storage.questions()]
+                    )
+                    await startup_queries.ask(
+                        self._commander, self.name, [*self.camera.details(), *self.storage.details()]
+                    )
             except BaseException:
                 await self.close()
                 raise
@@ -401,7 +405,7 @@ class Drone:
         the Skycontroller first, if there is one, then of the drone behind it."""
         date = datetime.fromtimestamp(self._clock.time()).astimezone().strftime("%Y%m%dT%H%M%S%z")
         if self.controller.present:
-            await inquiry.read(
+            await startup_queries.read(
                 self._commander,
                 "Skycontroller",
                 (skyctrl.CurrentDateTime(date), skyctrl.AllStates(), skyctrl.AllSettings()),
@@ -410,7 +414,7 @@ class Drone:
             for question in self.controller.questions():
                 self._commander.send(question)
             await self._find_drone()
-        await inquiry.read(
+        await startup_queries.read(
             self._commander,
             "drone",
             (common.CurrentDateTime(date), common.AllStates(), common.AllSettings()),

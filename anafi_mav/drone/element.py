@@ -14,8 +14,8 @@ from typing import Any, ClassVar, Generic, TypeAlias, TypeVar
 
 import msgspec
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages.generic import ListFlags
-from anafi_mav.arsdk.wire import Message
 
 StateT = TypeVar("StateT")
 KeyT = TypeVar("KeyT")

@@ -4,6 +4,7 @@ They are Parrot's, declared in `anafi_mav.arsdk.messages`; who works with a `Dro
 know the wire.
 """
 
+from anafi_mav.arsdk.codec.wire import Message as Message
 from anafi_mav.arsdk.messages.alarms import TakeoffChecklist as TakeoffChecklist
 from anafi_mav.arsdk.messages.alarms import TakeoffChecklistType as TakeoffChecklistType
 from anafi_mav.arsdk.messages.animation import PlayMode as PlayMode
@@ -106,9 +107,8 @@ from anafi_mav.arsdk.messages.thermal import ThermalMode as ThermalMode
 from anafi_mav.arsdk.messages.user_storage import FormattingType as FormattingType
 from anafi_mav.arsdk.messages.user_storage import FsState as FsState
 from anafi_mav.arsdk.messages.user_storage import PhyState as PhyState
-from anafi_mav.arsdk.wire import Message as Message
-from anafi_mav.drone.alerts import Blocker as Blocker
-from anafi_mav.drone.alerts import BlockerKind as BlockerKind
+from anafi_mav.drone.status.alerts import Blocker as Blocker
+from anafi_mav.drone.status.alerts import BlockerKind as BlockerKind
 
 __all__ = [
     "AlertLevel",

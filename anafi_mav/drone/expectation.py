@@ -14,7 +14,7 @@ import weakref
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
-from anafi_mav.arsdk.wire import Message, UnknownMessage
+from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost
 
 message_log = logging.getLogger("anafi_mav.message")

@@ -12,19 +12,19 @@ from anafi_mav.arsdk.messages.mediastore import MediastoreState
 from anafi_mav.arsdk.messages.obstacle_avoidance import Availability as AvoidanceAvailability
 from anafi_mav.arsdk.messages.precise_home import PreciseHomeState
 from anafi_mav.arsdk.messages.rth import RthState
-from anafi_mav.drone.animations import Animations
-from anafi_mav.drone.calibration import Calibration
-from anafi_mav.drone.camera import Camera
-from anafi_mav.drone.flight_plan import FlightPlan
-from anafi_mav.drone.follow_me import FollowMe
-from anafi_mav.drone.gimbal import Gimbal
-from anafi_mav.drone.home import Home
-from anafi_mav.drone.media import Media
-from anafi_mav.drone.piloting import Piloting
-from anafi_mav.drone.poi import Poi
-from anafi_mav.drone.sound import Sound
-from anafi_mav.drone.storage import Storage
-from anafi_mav.drone.thermal import Thermal
+from anafi_mav.drone.automatic.animations import Animations
+from anafi_mav.drone.automatic.flight_plan import FlightPlan
+from anafi_mav.drone.automatic.follow_me import FollowMe
+from anafi_mav.drone.automatic.poi import Poi
+from anafi_mav.drone.payload.camera import Camera
+from anafi_mav.drone.payload.gimbal import Gimbal
+from anafi_mav.drone.payload.media import Media
+from anafi_mav.drone.payload.storage import Storage
+from anafi_mav.drone.payload.thermal import Thermal
+from anafi_mav.drone.piloting.piloting import Piloting
+from anafi_mav.drone.status.calibration import Calibration
+from anafi_mav.drone.status.home import Home
+from anafi_mav.drone.status.sound import Sound
 
 
 class Elements(Protocol):

@@ -16,7 +16,7 @@ from typing import Any
 import aiohttp
 import msgspec
 
-from anafi_mav.arsdk.interface import bind_to_interface
+from anafi_mav.arsdk.link.interface import bind_to_interface
 from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, RemoteProtocolError
 
 HTTP_PORT = 80

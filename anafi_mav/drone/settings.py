@@ -13,7 +13,7 @@ from collections import Counter
 from collections.abc import Callable, Hashable
 from typing import Any, TypeAlias, TypeVar
 
-from anafi_mav.arsdk.wire import Message
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.drone.element import Element, StateT
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, Expectation
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LocalProtocolError, NotSupported

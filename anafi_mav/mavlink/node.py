@@ -46,8 +46,8 @@ class Inbound(msgspec.Struct, frozen=True):
     """When it arrived, by the clock's monotonic time."""
 
 
-Host = Callable[[Inbound], None]
-"""Takes the messages for one of our components."""
+Receiver = Callable[[Inbound], None]
+"""Takes the messages for one of our hosts."""
 
 
 class Node:
@@ -69,7 +69,7 @@ class Node:
         """In the order of the URLs."""
         self._clock = clock or SystemClock()
         self._telemetry: set[int] = set()
-        self._router: Router[Channel, Host] = Router()
+        self._router: Router[Channel, Receiver] = Router()
         self._delivers = True
         self._flavours = flavours
         self._closed_counters: Counter[str] = Counter()
@@ -105,7 +105,7 @@ class Node:
         while self.endpoints:
             await self.endpoints.pop().close()
 
-    def add_host(self, sysid: int, compid: int, host: Host) -> None:
+    def add_host(self, sysid: int, compid: int, host: Receiver) -> None:
         """Deliver messages for this component of this system to `host`.
 
         Component 0 stands for all components of the system that have no host of their own.

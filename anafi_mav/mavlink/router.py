@@ -1,9 +1,8 @@
 """Routes messages to our own hosts and to other channels (MAVLink routing.md §rules). No I/O.
 
 A host is a component of ours, looked up by system and component. Our hosts are on every channel; other systems are
-learned from what they send. Rules beyond
-routing.md: a frame that comes back to us is not passed on again, for endpoints are easily wired into a ring, and
-SETUP_SIGNING, which carries a key, never is.
+learned from what they send. Rules beyond routing.md: a frame that comes back to us is not passed on again, for
+endpoints are easily wired into a ring, and SETUP_SIGNING, which carries a key, never is.
 """
 
 from __future__ import annotations

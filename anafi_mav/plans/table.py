@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from anafi_mav import geo, mav_enums
 from anafi_mav.plans import path
-from anafi_mav.plans.parrot import SET_STILL_MODE, SET_VIEW_MODE
+from anafi_mav.plans.formats.parrot import SET_STILL_MODE, SET_VIEW_MODE
 from anafi_mav.plans.plan import (
     DO_JUMP,
     GLOBAL,

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.flavours import PX4, Flavour
-from anafi_mav.services.modes import FlightMode
-from anafi_mav.services.plan_items import DEGREES, PLACED
-from anafi_mav.services.right import Extent, Right
+from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.right import Extent, Right
+from anafi_mav.vehicle.fence.plan_items import DEGREES, PLACED
 
 RESEND_WINDOW = 3.5
 """s after an action succeeded in which the same one from the same client is a retransmission: MAVSDK resends 3 s after

@@ -8,13 +8,21 @@ from urllib.parse import parse_qs
 
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.flavours import Flavour
-from anafi_mav.services.ftp import Entry
 
 Query = Mapping[str, str]
 """What stands behind the question mark of a path, as ArduPilot's clients write it."""
 
 MAX_QUERY = 8
 """Words of a query: ArduPilot knows three."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One line of a directory."""
+
+    name: str
+    size: int | None
+    """Bytes; None: a directory."""
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
-from anafi_mav.services.modes import FlightMode
+from anafi_mav.vehicle.base.modes import FlightMode
 
 PX4_BITS = 1 << 16
 """A mode number from here on is one of PX4's packed ones in whatever flavour it comes (conformance E5)."""
@@ -53,7 +53,7 @@ class Flavour:
     """custom_mode is a main mode in bits 16..23 and a sub mode in bits 24..31. DO_SET_MODE may name the two as param2
     and param3, HIGH_LATENCY2 has room for the upper half alone. Otherwise it is one number below 65536."""
     parameter_names: str
-    """The table of names by which clients know parameters, in `parameters.NAME_TABLES`."""
+    """The table of names by which clients know parameters, in `parameter_service.NAME_TABLES`."""
     rssi_full: int
     """RC_CHANNELS.rssi of a perfect link (conformance A6, F 134)."""
     bytewise: bool

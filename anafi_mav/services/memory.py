@@ -21,8 +21,7 @@ from typing import Annotated, Any, Literal
 import msgspec
 from msgspec import Meta
 
-from anafi_mav.services.plan_items import PlanItem
-from anafi_mav.services.plan_transfer import MAX_ITEMS
+from anafi_mav.vehicle.fence.plan_items import MAX_ITEMS, PlanItem
 
 logger = logging.getLogger(__name__)
 

@@ -19,10 +19,10 @@ from anafi_mav.services.commands import Action, Command
 from anafi_mav.services.files import ServedFile
 from anafi_mav.services.flavours import Flavour
 from anafi_mav.services.memory import Memory
-from anafi_mav.services.statustext import Severity
 from anafi_mav.services.stream import Stream, Times
-from anafi_mav.services.subscriptions import Subscriptions
-from anafi_mav.services.vehicle import Vehicle
+from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.vehicle.base.subscriptions import Subscriptions
+from anafi_mav.vehicle.vehicle import Vehicle
 
 MessageHandler = Callable[[Inbound], None]
 """Takes a message that is addressed to our autopilot, or to everybody."""

@@ -2,34 +2,16 @@
 
 from __future__ import annotations
 
-import enum
 import itertools
 
 from anafi_mav.mavlink import dialect
+from anafi_mav.vehicle.base.severity import Severity
 
 CHUNK = 50
 """Bytes of text that one message carries."""
 
 LONGEST = 500
 """Bytes of a text: ten lines of a ground station, and far below the 255 chunks that could be numbered."""
-
-
-class Severity(enum.IntEnum):
-    """MAV_SEVERITY, the ones in use."""
-
-    EMERGENCY = 0
-    """The motors were cut in the air."""
-    ALERT = 1
-    """The drone does something by itself that nobody can stop."""
-    CRITICAL = 2
-    """Something fails that flight depends on."""
-    ERROR = 3
-    """Something that a user asked for did not work."""
-    WARNING = 4
-    """A request was refused, or the drone warns."""
-    NOTICE = 5
-    """Out of the ordinary, and no reason to worry."""
-    INFO = 6
 
 
 def _clean(text: str) -> bytes:

@@ -10,7 +10,7 @@ import msgspec
 from anafi_mav.drone.events import Message
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.flavours import PX4, Flavour
-from anafi_mav.services.vehicle import Vehicle
+from anafi_mav.vehicle.vehicle import Vehicle
 
 
 class Times(msgspec.Struct, frozen=True):

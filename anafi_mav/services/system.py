@@ -13,7 +13,7 @@ from collections.abc import Callable, Coroutine, Hashable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from anafi_mav.clock import Clock
+from anafi_mav.clock import Alarm, Clock
 from anafi_mav.drone import Drone
 from anafi_mav.drone.events import Message
 from anafi_mav.errors import AnafiMavError
@@ -21,50 +21,51 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound, Node
 from anafi_mav.mavlink.router import EVERY_COMPONENT
-from anafi_mav.services import takeoff_point_service
-from anafi_mav.services.aborted_return_service import AbortedReturnService
-from anafi_mav.services.banner import BannerService
-from anafi_mav.services.command_service import CommandService
-from anafi_mav.services.compass_service import CompassService
-from anafi_mav.services.event_service import EventService
-from anafi_mav.services.fence_service import FenceService
+from anafi_mav.services.command.calibration_service import MaintenanceService
+from anafi_mav.services.command.command_service import CommandService
+from anafi_mav.services.command.compass_service import CompassService
+from anafi_mav.services.command.guided_service import GuidedService
+from anafi_mav.services.command.modes_service import ModesService
+from anafi_mav.services.command.orbit_service import OrbitService
+from anafi_mav.services.event.event_service import EventService
 from anafi_mav.services.flavours import Flavour, flavour_of
-from anafi_mav.services.flight_record import FlightRecordService
-from anafi_mav.services.follow_service import FollowService
-from anafi_mav.services.ftp_service import FtpService
-from anafi_mav.services.guided import GuidedService
-from anafi_mav.services.height import TakeoffRecord
-from anafi_mav.services.high_latency import HighLatencyService
-from anafi_mav.services.identity import IdentityService
-from anafi_mav.services.link_loss_service import LinkLossService
-from anafi_mav.services.logs import LogService
-from anafi_mav.services.maintenance import MaintenanceService
-from anafi_mav.services.manual_control import ManualControlService
+from anafi_mav.services.ftp.ftp_service import FtpService
+from anafi_mav.services.ftp.log_service import LogService
+from anafi_mav.services.ground_station.banner_service import BannerService
+from anafi_mav.services.ground_station.identity_service import IdentityService
+from anafi_mav.services.ground_station.node_status_service import NodeStatusService
+from anafi_mav.services.ground_station.shell_service import ShellService
+from anafi_mav.services.ground_station.time_service import TimeService
+from anafi_mav.services.ground_station.tune_service import TuneService
 from anafi_mav.services.memory import Memory
-from anafi_mav.services.message_service import MessageService
-from anafi_mav.services.mission_service import MissionService
-from anafi_mav.services.modes import FlightMode
-from anafi_mav.services.modes_service import ModesService
-from anafi_mav.services.node_status import NodeStatusService
-from anafi_mav.services.offboard_service import OffboardService
-from anafi_mav.services.orbit import OrbitService
-from anafi_mav.services.parameters import ParameterService
-from anafi_mav.services.pilot_service import PilotService
-from anafi_mav.services.plan_service import PlanService
-from anafi_mav.services.rally_service import RallyService
-from anafi_mav.services.roll_sign_service import RollSignService
+from anafi_mav.services.monitor import takeoff_point_service
+from anafi_mav.services.monitor.aborted_return_service import AbortedReturnService
+from anafi_mav.services.monitor.link_loss_service import LinkLossService
+from anafi_mav.services.monitor.pilot_service import PilotService
+from anafi_mav.services.monitor.roll_sign_service import RollSignService
+from anafi_mav.services.monitor.takeoff_point_service import TakeoffPointService
+from anafi_mav.services.monitor.warning_service import WarningService
+from anafi_mav.services.parameter.parameter_service import ParameterService
+from anafi_mav.services.plan.fence_service import FenceService
+from anafi_mav.services.plan.mission_service import MissionService
+from anafi_mav.services.plan.plan_service import PlanService
+from anafi_mav.services.plan.rally_service import RallyService
 from anafi_mav.services.service import MessageHandler, Service
-from anafi_mav.services.shell import ShellService
-from anafi_mav.services.statustext import Severity, TextNumbers
+from anafi_mav.services.setpoint.follow_service import FollowService
+from anafi_mav.services.setpoint.manual_control_service import ManualControlService
+from anafi_mav.services.setpoint.offboard_service import OffboardService
+from anafi_mav.services.statustext import TextNumbers
 from anafi_mav.services.stream import Times
-from anafi_mav.services.subscriptions import EventHandler, Subscriptions, in_order
-from anafi_mav.services.takeoff_point_service import TakeoffPointService
-from anafi_mav.services.telemetry import CHANGES, TelemetryService
-from anafi_mav.services.time_service import TimeService
-from anafi_mav.services.tune import TuneService
-from anafi_mav.services.vehicle import Health, Landed, Vehicle
-from anafi_mav.services.video_telemetry import VideoTelemetryService
-from anafi_mav.services.warnings import WarningService
+from anafi_mav.services.telemetry.flight_record_service import FlightRecordService
+from anafi_mav.services.telemetry.high_latency_service import HighLatencyService
+from anafi_mav.services.telemetry.message_service import MessageService
+from anafi_mav.services.telemetry.telemetry_service import CHANGES, TelemetryService
+from anafi_mav.services.telemetry.video_service import VideoTelemetryService
+from anafi_mav.vehicle.base.height import TakeoffRecord
+from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.vehicle.base.subscriptions import EventHandler, Subscriptions, in_order
+from anafi_mav.vehicle.vehicle import Health, Landed, Vehicle
 
 logger = logging.getLogger(__name__)
 
@@ -159,7 +160,7 @@ class System:
         self._tasks: set[asyncio.Task[None]] = set()
         self._last_state: tuple[FlightMode, bool, Health, Landed] | None = None
         self._next_heartbeat = 0.0
-        self._mission_over: asyncio.TimerHandle | None = None
+        self._mission_over = Alarm(self._show_mode)
         """Runs while heartbeats still say Mission."""
         self._warned_at: dict[str, float] = {}
         self._muted: set[Channel] = set()
@@ -231,9 +232,7 @@ class System:
             self._undo = None
         if self._ticker is not None:
             self._ticker.cancel()
-        if self._mission_over is not None:
-            self._mission_over.cancel()
-            self._mission_over = None
+        self._mission_over.cancel()
         for service in self.services:
             service.link_down()
         for task in tuple(self._tasks):
@@ -352,7 +351,7 @@ class System:
         base = dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
         if vehicle.armed:
             base |= dialect.MAV_MODE_FLAG_SAFETY_ARMED
-        mode = FlightMode.MISSION if self._mission_over is not None else vehicle.mode
+        mode = FlightMode.MISSION if self._mission_over.is_set else vehicle.mode
         health = vehicle.health.value
         self.send_by_flavour(
             lambda flavour: dialect.MAVLink_heartbeat_message(
@@ -421,17 +420,14 @@ class System:
         """Let heartbeats say Mission a little longer when a mission has ended in the air and the drone hovers."""
         vehicle = self.vehicle
         hovers = vehicle.armed and vehicle.mode in (FlightMode.HOLD, FlightMode.GUIDED)
-        if self._mission_over is not None:
-            if hovers:
-                return
-            self._mission_over.cancel()
-            self._mission_over = None
+        if self._mission_over.is_set:
+            if not hovers:
+                self._mission_over.cancel()
         elif hovers and last is not None and last[0] is FlightMode.MISSION:
-            self._mission_over = asyncio.get_running_loop().call_later(MISSION_OVER, self._show_mode)
+            self._mission_over.set_in(MISSION_OVER)
 
     def _show_mode(self) -> None:
         """The mission is over and nothing has followed."""
-        self._mission_over = None
         if self.active:
             self.send_heartbeat()
 

@@ -11,34 +11,34 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from anafi_mav.arsdk import handshake
-from anafi_mav.arsdk.device import DeviceServer, DeviceSession
-from anafi_mav.arsdk.handshake import DeviceInfo
+from anafi_mav.arsdk.codec.wire import Buffer, Message, UnknownMessage
+from anafi_mav.arsdk.link import handshake
+from anafi_mav.arsdk.link.device import DeviceServer, DeviceSession
+from anafi_mav.arsdk.link.handshake import DeviceInfo
+from anafi_mav.arsdk.link.session import OnMessage
 from anafi_mav.arsdk.messages import common
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
-from anafi_mav.arsdk.mux_link import MuxServer
-from anafi_mav.arsdk.rtsp import DEFAULT_PORT as RTSP_PORT
-from anafi_mav.arsdk.session import OnMessage
-from anafi_mav.arsdk.wire import Buffer, Message, UnknownMessage
+from anafi_mav.arsdk.mux.mux_link import MuxServer
+from anafi_mav.arsdk.video.rtsp import DEFAULT_PORT as RTSP_PORT
 from anafi_mav.errors import ConfigError
-from anafi_mav.sim import quirks
-from anafi_mav.sim.air import Air
-from anafi_mav.sim.body import Body
-from anafi_mav.sim.faults import Faults
-from anafi_mav.sim.firmware import Firmware, Identity
+from anafi_mav.sim.autopilot.firmware import Firmware, Identity
+from anafi_mav.sim.autopilot.power import Battery
 from anafi_mav.sim.http import WebServer
 from anafi_mav.sim.log import Log, LogEntry
-from anafi_mav.sim.model import model_of
-from anafi_mav.sim.motion import Pose
-from anafi_mav.sim.place import Origin
-from anafi_mav.sim.power import Battery
-from anafi_mav.sim.quirks import Quirk
-from anafi_mav.sim.rtsp import VideoServer
 from anafi_mav.sim.skycontroller import MODELS as SKYCONTROLLERS
 from anafi_mav.sim.skycontroller import Skycontroller
 from anafi_mav.sim.states import all_settings, all_states
 from anafi_mav.sim.telemetry import RATE, Telemetry
-from anafi_mav.sim.wind import CALM, Wind, WindSpec
+from anafi_mav.sim.video.rtsp import VideoServer
+from anafi_mav.sim.world import quirks
+from anafi_mav.sim.world.airframe import Body
+from anafi_mav.sim.world.faults import Faults
+from anafi_mav.sim.world.link_emulation import Air
+from anafi_mav.sim.world.model import model_of
+from anafi_mav.sim.world.motion import Pose
+from anafi_mav.sim.world.place import Origin
+from anafi_mav.sim.world.quirks import Quirk
+from anafi_mav.sim.world.wind import CALM, Wind, WindSpec
 
 POSE_PERIOD = 0.1
 """s between two poses in the log."""

@@ -9,12 +9,12 @@ from pathlib import Path
 from types import TracebackType
 
 from anafi_mav.errors import ConfigError
-from anafi_mav.sim.body import Body
 from anafi_mav.sim.drone import DroneSpec, SimulatedDrone
 from anafi_mav.sim.log import Log, LogFile
-from anafi_mav.sim.model import model_of
-from anafi_mav.sim.motion import STEP, Motion
 from anafi_mav.sim.scenario import Scenario
+from anafi_mav.sim.world.airframe import Body
+from anafi_mav.sim.world.model import model_of
+from anafi_mav.sim.world.motion import STEP, Motion
 
 TURN, FAST_TURN = STEP, 0.005
 """s of the machine's clock between two turns of the world; the second when telemetry is wanted that fast. At `speed` 1

@@ -15,8 +15,8 @@ from typing import Any
 from aiohttp import WSCloseCode, web
 from aiohttp.typedefs import Handler
 
-from anafi_mav.sim.media import Kind, MediaStore
-from anafi_mav.sim.plan_store import FlightPlanStore
+from anafi_mav.sim.payload.media import Kind, MediaStore
+from anafi_mav.sim.plan.plan_store import FlightPlanStore
 
 MAX_BODY = 1 << 20
 """Bytes of a request body that are read; a flight plan of a thousand items is a tenth of it."""

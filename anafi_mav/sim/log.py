@@ -17,7 +17,7 @@ from typing import Any, BinaryIO
 
 import msgspec
 
-from anafi_mav.arsdk.wire import Message, UnknownMessage
+from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
 from anafi_mav.errors import CommandTimeout
 
 

@@ -29,11 +29,11 @@ from anafi_mav.arsdk.messages.alarms import TakeoffChecklistType
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState, MotorError, WarningLevel
 from anafi_mav.arsdk.messages.common import FlightPlanComponent
 from anafi_mav.errors import ConfigError
-from anafi_mav.sim.faults import Faults, Impairment
-from anafi_mav.sim.motion import Pose
-from anafi_mav.sim.power import Battery
-from anafi_mav.sim.quirks import QUIRKS
-from anafi_mav.sim.wind import GUSTS, Wind, WindSpec
+from anafi_mav.sim.autopilot.power import Battery
+from anafi_mav.sim.world.faults import Faults, Impairment
+from anafi_mav.sim.world.motion import Pose
+from anafi_mav.sim.world.quirks import QUIRKS
+from anafi_mav.sim.world.wind import GUSTS, Wind, WindSpec
 
 MAX_STEPS = 1000
 """Steps are looked at every turn of the world."""

@@ -12,8 +12,9 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from anafi_mav.arsdk.envelope import ProtobufMessage
-from anafi_mav.arsdk.handshake import DeviceInfo
+from anafi_mav.arsdk.codec.envelope import ProtobufMessage
+from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
+from anafi_mav.arsdk.link.handshake import DeviceInfo
 from anafi_mav.arsdk.messages import ardrone3, camera, drone_manager, gimbal, mapper, rth, skyctrl
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.messages.drone_manager import DroneManagerConnectionState as Connection
@@ -21,8 +22,7 @@ from anafi_mav.arsdk.messages.generic import ListFlags
 from anafi_mav.arsdk.messages.mapper import AxisAction, ButtonAction, ButtonEvent
 from anafi_mav.arsdk.messages.proto import device_manager
 from anafi_mav.arsdk.messages.skyctrl import Source
-from anafi_mav.arsdk.wire import Message, UnknownMessage
-from anafi_mav.sim.device_manager import DeviceManager
+from anafi_mav.sim.features.device_manager import DeviceManager
 
 MODELS = {3: 0x0918, 4: 0x091D}
 """Generation -> product number."""

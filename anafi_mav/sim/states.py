@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import (
     ardrone3,
     common,
@@ -15,10 +16,9 @@ from anafi_mav.arsdk.messages import (
     precise_home,
     wifi,
 )
-from anafi_mav.arsdk.wire import Message
-from anafi_mav.sim.firmware import Firmware
-from anafi_mav.sim.safety import checklist
-from anafi_mav.sim.wireless import COUNTRIES, RSSI
+from anafi_mav.sim.autopilot.firmware import Firmware
+from anafi_mav.sim.autopilot.safety import checklist
+from anafi_mav.sim.features.wireless import COUNTRIES, RSSI
 
 
 def _bits(values: Iterable[int]) -> int:

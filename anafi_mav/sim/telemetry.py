@@ -7,10 +7,10 @@ for.
 
 from __future__ import annotations
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import ardrone3
-from anafi_mav.arsdk.wire import Message
-from anafi_mav.sim.firmware import Firmware
-from anafi_mav.sim.quirks import Quirk
+from anafi_mav.sim.autopilot.firmware import Firmware
+from anafi_mav.sim.world.quirks import Quirk
 
 RATE = 5.0
 """Hz of the aircraft."""

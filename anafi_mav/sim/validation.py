@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
-from anafi_mav.arsdk.video_metadata import FrameMetadata, Quaternion
+from anafi_mav.arsdk.video.video_metadata import FrameMetadata, Quaternion
 from anafi_mav.units import DEG_PER_RAD, euler_from_quaternion, wrap_pi
 
 Series: TypeAlias = Sequence[tuple[float, float]]

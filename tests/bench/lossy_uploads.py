@@ -6,7 +6,7 @@ MAVSDK (mavlink_mission_transfer_client.cpp, 158e33932) counts the items that it
 it has heard no request. At five it gives up: at the next request of an item that it has sent already, or at the end of
 the next such half second. A request of exactly the item after the one that it has sent last sets the count to one, one
 of a later item is not heard. Its count and that item are a Markov chain, which is followed here round by round, each
-with the requests that the gateway makes. tests/unit/plan_counting.py is the same machine, played message by message
+with the requests that the gateway makes. tests/support/plan_counting.py is the same machine, played message by message
 against the gateway's own.
 
 A message is lost or not whatever became of others, and takes no time.
@@ -18,7 +18,7 @@ import sys
 from collections import defaultdict
 from collections.abc import Callable, Sequence
 
-from anafi_mav.services.plan_requests import REQUEST_EVERY, asked_for
+from anafi_mav.services.plan.plan_requests import REQUEST_EVERY, asked_for
 
 LIMIT, HALF_SECOND = 5, 0.5
 ROUNDS = 40

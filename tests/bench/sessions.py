@@ -113,7 +113,7 @@ def _record(folder: Path, only: list[str]) -> int:
     from support import sessions, virtual_time
     from support.recording import write
 
-    from anafi_mav.arsdk import watchdog
+    from anafi_mav.arsdk.link import watchdog
 
     watchdog.LIMIT = None  # gateway and Skycontroller share one process
     gc.disable()

@@ -19,13 +19,13 @@ from contextlib import contextmanager
 
 from common import loopback, machine
 
-from anafi_mav.arsdk.device import DeviceSession
-from anafi_mav.arsdk.handshake import ConnectRequest
+from anafi_mav.arsdk.link.device import DeviceSession
+from anafi_mav.arsdk.link.handshake import ConnectRequest
+from anafi_mav.arsdk.link.transport import Role, Transport
 from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
-from anafi_mav.arsdk.transport import Role, Transport
 from anafi_mav.sim import DroneSpec, Simulator
-from anafi_mav.sim.wind import WindSpec
+from anafi_mav.sim.world.wind import WindSpec
 
 RATE = 30.0
 WINDY = WindSpec(8.0, 90.0)

@@ -28,7 +28,7 @@ clock.install()
 
 from support.soak import draw, known, rounds_flown  # noqa: E402 (the clock comes first)
 
-from anafi_mav.arsdk import watchdog  # noqa: E402
+from anafi_mav.arsdk.link import watchdog  # noqa: E402
 
 watchdog.LIMIT = None
 

@@ -17,7 +17,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from support.steps import velocity_step
 
-from anafi_mav.sim.wind import WindSpec
+from anafi_mav.sim.world.wind import WindSpec
 
 WINDS = {
     "calm": WindSpec(),

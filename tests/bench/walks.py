@@ -377,7 +377,7 @@ def main() -> int:
     sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
     from support import virtual_time
 
-    from anafi_mav.arsdk import watchdog
+    from anafi_mav.arsdk.link import watchdog
 
     class Loop(virtual_time.Loop):
         """Tells the tracer of its iterations."""

@@ -21,10 +21,10 @@ ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), ROOT / "missions" / "README.md"]
 
 NOT_RUN = {
-    "python3 -m venv": "it installs from the network; what it starts then is run by tests/unit/test_cli.py",
+    "python3 -m venv": "it installs from the network; what it starts then is run by tests/unit/cli/test_run.py",
     "mavproxy.py": "MAVProxy is flown by tests/clients/test_mavproxy.py",
-    "anafi-mav doctor 192.168.42.1": "it wants an aircraft; tests/unit/test_cli_doctor.py runs it on simulated ones",
-    "for name in missions/*.plan; do": "tests/unit/test_missions.py makes each of these files by the same command",
+    "anafi-mav doctor 192.168.42.1": "it wants an aircraft; tests/unit/cli/test_doctor.py runs it on simulated ones",
+    "for name in missions/*.plan; do": "tests/unit/plans/test_missions.py makes each of them by the same command",
 }
 """Beginnings of commands that are not run here, with the reason."""
 

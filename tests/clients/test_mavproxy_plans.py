@@ -16,6 +16,7 @@ from support.plans import FENCE, MISSION, RALLY, Item, around, circle, download,
 from support.product import Process, program
 from support.world import HOME, World, world
 
+from anafi_mav import mav_enums
 from anafi_mav.mavlink import dialect as newer
 
 pytestmark = pytest.mark.third_party
@@ -140,14 +141,14 @@ async def test_conf_119_142_missions(tmp_path: Path) -> None:
 
             north, corner = around(PLACE, (15.0, 0.0), (15.0, 12.0))
             wanted = [
-                Item(16, *HOME),
-                Item(22, *PLACE, z=6.0, frame=3),
-                Item(178, 0.0, 0.0, p1=1.0, p2=4.0, frame=3),
-                Item(16, *north, z=6.0, frame=3),
-                Item(205, 0.0, 0.0, p1=-60.0, z=2.0, frame=3),
-                Item(2000, 0.0, 0.0, p3=1.0, frame=3),
-                Item(16, *corner, z=6.0, p1=1.0, frame=3),
-                Item(20, 0.0, 0.0, frame=3),
+                Item(mav_enums.MAV_CMD_NAV_WAYPOINT, *HOME),
+                Item(mav_enums.MAV_CMD_NAV_TAKEOFF, *PLACE, z=6.0, frame=3),
+                Item(mav_enums.MAV_CMD_DO_CHANGE_SPEED, 0.0, 0.0, p1=1.0, p2=4.0, frame=3),
+                Item(mav_enums.MAV_CMD_NAV_WAYPOINT, *north, z=6.0, frame=3),
+                Item(mav_enums.MAV_CMD_DO_MOUNT_CONTROL, 0.0, 0.0, p1=-60.0, z=2.0, frame=3),
+                Item(mav_enums.MAV_CMD_IMAGE_START_CAPTURE, 0.0, 0.0, p3=1.0, frame=3),
+                Item(mav_enums.MAV_CMD_NAV_WAYPOINT, *corner, z=6.0, p1=1.0, frame=3),
+                Item(mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH, 0.0, 0.0, frame=3),
             ]
             command = f"wp load {waypoint_file(tmp_path / 'way.txt', wanted)}"
             assert same(await changed(w, MISSION, command, mavproxy), wanted)

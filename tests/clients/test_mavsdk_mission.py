@@ -11,8 +11,8 @@ from support.plans import ACCEPTED, MISSION, download, mission, upload
 from support.product import program
 from support.world import HOME, World, world
 
-from anafi_mav.plans import files
-from anafi_mav.services.mission_items import to_wire
+from anafi_mav.plans.formats import files
+from anafi_mav.services.plan.mission_items import to_wire
 
 pytestmark = pytest.mark.third_party
 

@@ -11,6 +11,8 @@ from support.params import fetch
 from support.product import Process, program
 from support.world import world
 
+from anafi_mav import mav_enums
+
 pytestmark = pytest.mark.third_party
 
 SCRIPT = Path(__file__).with_name("mavsdk_setup.py")
@@ -75,5 +77,5 @@ async def test_conf_116_mavsdk_param_ftp_metadata_events(flavour: str, tmp_path:
             line = await script.line(lambda line: "No GPS fix (gps)" in line, since=since)
             assert "can_arm=True" in line  # an ANAFI hovers without
             w.drone.faults.gps = True
-            assert (await w.client.command(400, 1)).result == 0
+            assert (await w.client.command(mav_enums.MAV_CMD_COMPONENT_ARM_DISARM, 1)).result == 0
             await script.line(lambda line: line == "event anafi armed Armed")

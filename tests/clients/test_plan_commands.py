@@ -15,9 +15,10 @@ from support.plans import download
 from support.product import Process, product, program
 from support.world import loopback
 
-from anafi_mav.plans import files
+from anafi_mav import mav_enums
+from anafi_mav.plans.formats import files
 from anafi_mav.plans.plan import Plan
-from anafi_mav.services.mission_items import as_carried, to_wire
+from anafi_mav.services.plan.mission_items import as_carried, to_wire
 
 MISSIONS = Path(__file__).parents[2] / "missions"
 
@@ -164,9 +165,9 @@ async def test_who_stops_following_leaves_the_flight_alone(tmp_path: Path) -> No
             await flight.line(lambda line: line.startswith("at item 2 "), timeout=90.0)
             other = await Client().connect(5761, address)
             mark = len(flight.lines)
-            assert (await other.command(193, 0)).result == 0
+            assert (await other.command(mav_enums.MAV_CMD_DO_PAUSE_CONTINUE, 0)).result == 0
             await flight.line(lambda line: line.startswith("paused at item 2 NAV_WAYPOINT"), since=mark)
-            assert (await other.command(193, 1)).result == 0
+            assert (await other.command(mav_enums.MAV_CMD_DO_PAUSE_CONTINUE, 1)).result == 0
             await flight.line(lambda line: line == "goes on", since=mark)
             flight.process.send_signal(signal.SIGINT)
             assert await flight.end() == 130
@@ -177,7 +178,7 @@ async def test_who_stops_following_leaves_the_flight_alone(tmp_path: Path) -> No
             # On the ground again the flight is over before the mission is.
             async with program(*words) as second:
                 await second.line(lambda line: line.startswith("begun"), timeout=90.0)
-                assert (await other.command(21, timeout=60.0)).result == 0
+                assert (await other.command(mav_enums.MAV_CMD_NAV_LAND, timeout=60.0)).result == 0
                 await second.line(lambda line: line.startswith("paused at "))
                 assert await second.end(timeout=90.0) == 1
                 assert "the flight is over and the mission is not" in second.complaints[-1]

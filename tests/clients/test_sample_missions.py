@@ -24,7 +24,7 @@ from support.product import product, program
 from support.samples import SAMPLES, ZOOMS, judge, path_of
 from support.world import HOME, loopback
 
-from anafi_mav.plans import files
+from anafi_mav.plans.formats import files
 
 pytestmark = pytest.mark.third_party
 

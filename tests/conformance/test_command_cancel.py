@@ -27,7 +27,11 @@ from support.world import HOME, RETURN, world
 from anafi_mav import geo
 from anafi_mav.mavlink import dialect
 
-MAV_CMD_DO_FLIGHTTERMINATION, PAUSE, STANDARD_MODE = 185, 193, 262
+MAV_CMD_DO_FLIGHTTERMINATION, PAUSE, STANDARD_MODE = (
+    dialect.MAV_CMD_DO_FLIGHTTERMINATION,
+    dialect.MAV_CMD_DO_PAUSE_CONTINUE,
+    dialect.MAV_CMD_DO_SET_STANDARD_MODE,
+)
 
 
 def call_off(client: Client, command: int) -> None:

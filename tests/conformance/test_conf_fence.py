@@ -21,7 +21,7 @@ from support.plans import ACCEPTED as TAKEN
 from support.plans import FENCE, RALLY, Item, around, circle, clear, content, download, rally, square, upload
 from support.world import HOME, MODES, World, world
 
-from anafi_mav import geo
+from anafi_mav import geo, mav_enums
 from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.config import Config, DroneConfig
 from anafi_mav.gateway import Gateway
@@ -287,9 +287,9 @@ async def test_conf_076_no_takeoff_outside(flavour: str) -> None:
             "SYS_STATUS", lambda m: not m.onboard_control_sensors_health & dialect.MAV_SYS_STATUS_PREARM_CHECK
         )
         mark = w.client.mark()
-        assert (await w.client.command(400, 1)).result == REJECTED
+        assert (await w.client.command(mav_enums.MAV_CMD_COMPONENT_ARM_DISARM, 1)).result == REJECTED
         await said(w.client, "beyond the inclusion circle", since=mark)
-        assert (await w.client.command(22, x=0.0, y=0.0, z=5.0)).result in (DENIED, REJECTED)
+        assert (await w.client.command(mav_enums.MAV_CMD_NAV_TAKEOFF, x=0.0, y=0.0, z=5.0)).result in (DENIED, REJECTED)
         assert w.commands("ardrone3.Piloting.TakeOff") == []
         assert (await w.client.command(ENABLE, 0)).result == ACCEPTED
         await w.take_off()
@@ -301,7 +301,7 @@ async def test_conf_076_no_takeoff_without_knowing_where() -> None:
         w.drone.faults.gps = False
         await w.client.wait("GPS_RAW_INT", lambda m: m.fix_type < 2)
         mark = w.client.mark()
-        assert (await w.client.command(400, 1)).result == REJECTED
+        assert (await w.client.command(mav_enums.MAV_CMD_COMPONENT_ARM_DISARM, 1)).result == REJECTED
         await said(w.client, "no GPS fix", since=mark)
 
 
@@ -379,7 +379,11 @@ async def until(condition: Callable[[], bool], timeout: float = 5.0) -> None:
 
 
 @both
-@pytest.mark.parametrize("item", [circle(PLACE, 60.0), Item(5005, 0.0, 0.0, p1=60.0)], ids=["circle", "home"])
+@pytest.mark.parametrize(
+    "item",
+    [circle(PLACE, 60.0), Item(mav_enums.MAV_CMD_NAV_FENCE_HOME_CIRCLE_INCLUSION, 0.0, 0.0, p1=60.0)],
+    ids=["circle", "home"],
+)
 async def test_a_circle_around_the_start_is_the_drones_own_too(flavour: str, item: Item) -> None:
     async with world(flavour=flavour) as w:
         before = own_fence(w)
@@ -533,11 +537,11 @@ async def test_conf_077_rally_points_used_where_rtl_type_says_so() -> None:
         assert geo.distance(location.args["latitude"], location.args["longitude"], *near) < 0.1
         assert location.args["altitude"] == pytest.approx(25.0)
         await w.client.wait("HOME_POSITION", lambda m: geo.distance(m.latitude / 1e7, m.longitude / 1e7, *near) < 1.0)
-        assert (await w.client.command(20)).result == ACCEPTED
+        assert (await w.client.command(mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH)).result == ACCEPTED
         await w.drone.wait_log(
             lambda e: e.kind == "pose" and math.hypot(e.args["north"] - 40.0, e.args["east"] - 30.0) < 1.0, 60.0
         )
-        assert (await w.client.command(21)).result == ACCEPTED
+        assert (await w.client.command(mav_enums.MAV_CMD_NAV_LAND)).result == ACCEPTED
         await w.client.heartbeat(lambda beat: not beat.base_mode & 128, timeout=60.0)
         await until(lambda: len(preferred(w)) == 2)
         assert preferred(w) == [3, 1]  # custom, then take-off again
@@ -615,7 +619,7 @@ async def test_conf_077_a_home_that_is_set_while_a_rally_point_counts_stays() ->
         await set_home(w, 10.0)
         assert (await upload(w.client, [rally(around(PLACE, (0.0, 20.0))[0], 20.0)], RALLY)).type == TAKEN
         await said(w.client, "Rally points not used: the drone returns to the home that was set", timeout=10.0)
-        assert (await w.client.command(21)).result == ACCEPTED
+        assert (await w.client.command(mav_enums.MAV_CMD_NAV_LAND)).result == ACCEPTED
         await w.client.heartbeat(lambda beat: not beat.base_mode & 128, timeout=60.0)
         await looked(w)
         assert homes(w) == [(30, 0), (10, 0)]
@@ -629,7 +633,7 @@ async def test_conf_077_a_home_that_is_set_just_before_the_landing_stays() -> No
         assert (await upload(w.client, [rally(around(PLACE, (30.0, 0.0))[0], 20.0)], RALLY)).type == TAKEN
         await w.take_off()
         await said(w.client, "Returns end at rally point 0", since=0, timeout=10.0)
-        assert (await w.client.command(21)).result == ACCEPTED
+        assert (await w.client.command(mav_enums.MAV_CMD_NAV_LAND)).result == ACCEPTED
         await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["up"] < 0.5, 30.0, since=w.drone.log[-1].t)
         await set_home(w, 10.0)
         await w.client.heartbeat(lambda beat: not beat.base_mode & 128, timeout=60.0)

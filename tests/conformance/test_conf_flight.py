@@ -15,11 +15,16 @@ from support.world import ARMED, HOLD, HOME, LAND, POSITION, RETURN, World, worl
 from anafi_mav import geo
 from anafi_mav.arsdk.messages.rth import StateReason
 from anafi_mav.mavlink import dialect as newer
-from anafi_mav.services.takeoff import ARM_WAIT, AUTO_DISARM
+from anafi_mav.vehicle.takeoff import ARM_WAIT, AUTO_DISARM
 
 ACCEPTED, DENIED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_DENIED
 REJECTED = dialect.MAV_RESULT_TEMPORARILY_REJECTED
-ARM, TAKE_OFF, REPOSITION, SET_MODE = 400, 22, 192, 176
+ARM, TAKE_OFF, REPOSITION, SET_MODE = (
+    dialect.MAV_CMD_COMPONENT_ARM_DISARM,
+    dialect.MAV_CMD_NAV_TAKEOFF,
+    dialect.MAV_CMD_DO_REPOSITION,
+    dialect.MAV_CMD_DO_SET_MODE,
+)
 FLAVOURS = ("px4", "ardupilot")
 
 
@@ -140,7 +145,7 @@ async def test_conf_023_land_by_mode(flavour: str) -> None:
 async def test_conf_024_land_by_command(flavour: str) -> None:
     async with world(flavour=flavour) as w:
         await w.take_off()
-        assert (await w.client.command(21)).result == ACCEPTED
+        assert (await w.client.command(dialect.MAV_CMD_NAV_LAND)).result == ACCEPTED
         assert w.drone.flying_state.name == "LANDING"
         await w.client.heartbeat(lambda beat: not beat.base_mode & ARMED, timeout=20.0)
 
@@ -155,7 +160,11 @@ async def test_conf_025_return(how: str, flavour: str) -> None:
         if how == "SET_MODE":
             w.client.send(dialect.MAVLink_set_mode_message(1, 1, w.modes.returning))
         else:
-            ack = await (w.client.command(SET_MODE, 1, *numbers) if how == "DO_SET_MODE" else w.client.command(20))
+            ack = await (
+                w.client.command(SET_MODE, 1, *numbers)
+                if how == "DO_SET_MODE"
+                else w.client.command(dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH)
+            )
             assert ack.result == ACCEPTED
         await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.returning, since=mark)
         assert len(w.commands("rth.return_to_home")) == 1
@@ -172,7 +181,9 @@ async def test_conf_025_return_to_its_end(flavour: str, end: int) -> None:
         assert value_of(value, flavour) == end
         if end == newer.ANAFI_RETURN_END_HOVERING:  # the gateway would land it
             await write(client, "ANF_RTL_END", 1, 6 if flavour == "px4" else 9, flavour)
-        assert (await client.command(511, newer.MAVLINK_MSG_ID_ANAFI_HOME, 20_000)).result == ACCEPTED
+        assert (
+            await client.command(dialect.MAV_CMD_SET_MESSAGE_INTERVAL, newer.MAVLINK_MSG_ID_ANAFI_HOME, 20_000)
+        ).result == ACCEPTED
         await client.wait("ANAFI_HOME", lambda m: (m.end, m.min_altitude, m.hovering_altitude) == (end, 20.0, 10.0))
         await w.take_off()
         place = geo.destination(*HOME[:2], 30.0, 20.0)
@@ -206,7 +217,7 @@ async def test_conf_025_return_to_its_end(flavour: str, end: int) -> None:
             assert w.drone.flying_state.name == "HOVERING"
             assert at_home(w)
             assert w.drone.pose.up == pytest.approx(10.0, abs=0.3)
-            assert (await client.command(21)).result == ACCEPTED
+            assert (await client.command(dialect.MAV_CMD_NAV_LAND)).result == ACCEPTED
             flying = client.mark()
         # A landing that is a return's own is shown as Return to its end.
         mode = w.modes.land if end == newer.ANAFI_RETURN_END_HOVERING else w.modes.returning
@@ -344,7 +355,7 @@ async def test_conf_032_landed_state(flavour: str) -> None:
     async with world(flavour=flavour) as w:
         mark = w.client.mark()
         await w.take_off()
-        await w.client.command(21)
+        await w.client.command(dialect.MAV_CMD_NAV_LAND)
         await w.client.wait("EXTENDED_SYS_STATE", lambda m: m.landed_state == 1, timeout=20.0)
         states = [m.landed_state for _, m in w.client.since(mark, "EXTENDED_SYS_STATE")]
         order = [state for index, state in enumerate(states) if index == 0 or states[index - 1] != state]
@@ -356,7 +367,7 @@ async def test_conf_033_auto_disarm(flavour: str) -> None:
     async with world(flavour=flavour) as w:
         await w.take_off()
         mark = w.client.mark()
-        await w.client.command(21)
+        await w.client.command(dialect.MAV_CMD_NAV_LAND)
         await w.client.wait("EXTENDED_SYS_STATE", lambda m: m.landed_state == 1, since=mark, timeout=20.0)
         await w.client.heartbeat(lambda beat: not beat.base_mode & ARMED, since=mark, timeout=10.0)
 
@@ -367,6 +378,6 @@ async def test_a_newer_action_ends_the_older_one() -> None:
         await w.client.command(ARM, 1)
         await w.client.command(TAKE_OFF, x=0.0, y=0.0, z=30.0)
         await w.client.wait("ALTITUDE", lambda m: m.altitude_relative > 4.0, timeout=20.0)
-        assert (await w.client.command(21)).result == ACCEPTED
+        assert (await w.client.command(dialect.MAV_CMD_NAV_LAND)).result == ACCEPTED
         await w.client.heartbeat(lambda beat: not beat.base_mode & ARMED, timeout=30.0)
         assert max(entry.args["up"] for entry in w.drone.log if entry.kind == "pose") < 20.0

@@ -14,10 +14,10 @@ from support.mav import NAN, Client
 from support.setpoints import allow_speed, heard, idle_mode, motion, said, streaming
 from support.world import HOLD, HOME, World, world
 
-from anafi_mav import geo
+from anafi_mav import geo, mav_enums
 from anafi_mav.arsdk.messages import ardrone3, piloting_style
 
-SET_MODE = 176
+SET_MODE = mav_enums.MAV_CMD_DO_SET_MODE
 PX4_FOLLOW, COPTER_FOLLOW = 0x08040000, 23
 REJECTED = dialect.MAV_RESULT_TEMPORARILY_REJECTED
 

@@ -15,7 +15,12 @@ from anafi_mav.mavlink import dialect as newer
 
 ACCEPTED, UNSUPPORTED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_UNSUPPORTED
 IN_PROGRESS = dialect.MAV_RESULT_IN_PROGRESS
-ARM, TAKE_OFF, REPOSITION, SET_MODE = 400, 22, 192, 176
+ARM, TAKE_OFF, REPOSITION, SET_MODE = (
+    dialect.MAV_CMD_COMPONENT_ARM_DISARM,
+    dialect.MAV_CMD_NAV_TAKEOFF,
+    dialect.MAV_CMD_DO_REPOSITION,
+    dialect.MAV_CMD_DO_SET_MODE,
+)
 FLAVOURS = ("px4", "ardupilot")
 AUTOPILOTS = {"px4": dialect.MAV_AUTOPILOT_PX4, "ardupilot": dialect.MAV_AUTOPILOT_ARDUPILOTMEGA}
 
@@ -115,9 +120,9 @@ async def test_conf_009_other_components_are_not_ours(flavour: str) -> None:
     async with world(flavour=flavour) as w:
         mark = w.client.mark()
         for component in (100, 154, 190):
-            w.client.send_command(31000, target=(1, component))
-        w.client.send_command(31000, target=(2, 1))
-        assert (await w.client.command(211)).result == UNSUPPORTED
+            w.client.send_command(dialect.MAV_CMD_WAYPOINT_USER_1, target=(1, component))
+        w.client.send_command(dialect.MAV_CMD_WAYPOINT_USER_1, target=(2, 1))
+        assert (await w.client.command(dialect.MAV_CMD_DO_GRIPPER)).result == UNSUPPORTED
         assert [ack.command for _, ack in w.client.since(mark, "COMMAND_ACK")] == [211]
 
 
@@ -183,15 +188,15 @@ async def test_conf_013_long_and_int(frame: int | None, flavour: str) -> None:
 async def test_conf_014_autopilot_version(flavour: str) -> None:
     async with world(flavour=flavour) as w:
         mark = w.client.mark()
-        assert (await w.client.command(512, 148)).result == ACCEPTED
+        assert (await w.client.command(dialect.MAV_CMD_REQUEST_MESSAGE, 148)).result == ACCEPTED
         version = await w.client.wait("AUTOPILOT_VERSION", since=mark)
         serial = bytes(version.uid2).rstrip(b"\0").decode()
         assert serial == w.drone.identity.serial
         mark = w.client.mark()
-        assert (await w.client.command(520, 1)).result == ACCEPTED
+        assert (await w.client.command(dialect.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES, 1)).result == ACCEPTED
         await w.client.wait("AUTOPILOT_VERSION", since=mark)
         mark = w.client.mark()
-        assert (await w.client.command(512, 300)).result == ACCEPTED
+        assert (await w.client.command(dialect.MAV_CMD_REQUEST_MESSAGE, 300)).result == ACCEPTED
         assert (await w.client.wait("PROTOCOL_VERSION", since=mark)).max_version == 200
 
 
@@ -199,7 +204,7 @@ async def test_conf_014_autopilot_version(flavour: str) -> None:
 async def test_conf_015_capabilities(flavour: str) -> None:
     async with world(flavour=flavour) as w:
         mark = w.client.mark()
-        await w.client.command(512, 148)
+        await w.client.command(dialect.MAV_CMD_REQUEST_MESSAGE, 148)
         bits = (await w.client.wait("AUTOPILOT_VERSION", since=mark)).capabilities
         # MISSION_FLOAT 1, MISSION_INT 4, COMMAND_INT 8, FTP 32, SET_ATTITUDE_TARGET 64, SET_POSITION_TARGET_LOCAL_NED
         # 128 and _GLOBAL_INT 256, MAVLINK2 8192, FENCE 16384, RALLY 32768; PARAM_ENCODE_BYTEWISE 16 or _C_CAST 131072
@@ -208,7 +213,7 @@ async def test_conf_015_capabilities(flavour: str) -> None:
         assert bits == served | encoding
     async with world(flavour=flavour, allow_kill=True) as w:
         mark = w.client.mark()
-        await w.client.command(512, 148)
+        await w.client.command(dialect.MAV_CMD_REQUEST_MESSAGE, 148)
         bits = (await w.client.wait("AUTOPILOT_VERSION", since=mark)).capabilities
         assert bits == served | encoding | 2048
 
@@ -216,7 +221,7 @@ async def test_conf_015_capabilities(flavour: str) -> None:
 async def test_conf_016_version_number() -> None:
     async with world() as w:
         mark = w.client.mark()
-        await w.client.command(512, 148)
+        await w.client.command(dialect.MAV_CMD_REQUEST_MESSAGE, 148)
         version = (await w.client.wait("AUTOPILOT_VERSION", since=mark)).flight_sw_version
         assert version & 0xFF == 0
         assert (version >> 24, version >> 16 & 0xFF) >= (1, 14)

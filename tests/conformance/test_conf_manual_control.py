@@ -12,9 +12,9 @@ from support.flavours import both
 from support.setpoints import COPTER_GUIDED, earth, heard, motion, said, streaming, texts
 from support.world import HOLD, HOME, POSITION, World, world
 
-from anafi_mav import geo
+from anafi_mav import geo, mav_enums
 
-SET_MODE, GOTO = 176, 192
+SET_MODE, GOTO = mav_enums.MAV_CMD_DO_SET_MODE, mav_enums.MAV_CMD_DO_REPOSITION
 COPTER_LOITER = 5
 
 CENTRED_WITHIN = 0.5

@@ -21,7 +21,7 @@ from anafi_mav import geo
 from anafi_mav.mavlink import dialect as newer  # the stock dialect has never heard of events
 
 ACCEPTED, TEMPORARILY_REJECTED = 0, 1
-RUN_PREARM_CHECKS, ARM = 401, 400
+RUN_PREARM_CHECKS, ARM = dialect.MAV_CMD_RUN_PREARM_CHECKS, dialect.MAV_CMD_COMPONENT_ARM_DISARM
 
 
 def crc32(data: bytes) -> int:
@@ -30,7 +30,7 @@ def crc32(data: bytes) -> int:
 
 async def requested(client: Client, id: int, kind: str) -> Any:
     mark = client.mark()
-    assert (await client.command(512, id)).result == ACCEPTED
+    assert (await client.command(dialect.MAV_CMD_REQUEST_MESSAGE, id)).result == ACCEPTED
     return await client.wait(kind, since=mark, timeout=1.0)
 
 
@@ -229,7 +229,7 @@ async def test_conf_126_what_happens() -> None:
         events = await reader(w.client)
         mark = w.client.mark()
         await w.take_off(3.0)
-        assert (await w.client.command(21)).result == ACCEPTED
+        assert (await w.client.command(dialect.MAV_CMD_NAV_LAND)).result == ACCEPTED
         await w.client.wait("EVENT", lambda m: events.read(m)[0] == "disarmed", since=mark, timeout=20.0)
         names = [events.read(m)[0] for _, m in w.client.since(mark, "EVENT")]
         assert [name for name in names if "summary" not in name] == [

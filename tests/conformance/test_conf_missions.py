@@ -115,7 +115,7 @@ async def test_conf_027_059_mode_mission_by_every_way(flavour: str) -> None:
             assert ack.result == dialect.MAV_RESULT_ACCEPTED
             assert len(w.commands("common.Mavlink.Start")) == starts
             mark = w.client.mark()
-            assert (await other.command(192, -1, 1, 0)).result == dialect.MAV_RESULT_ACCEPTED
+            assert (await other.command(dialect.MAV_CMD_DO_REPOSITION, -1, 1, 0)).result == dialect.MAV_RESULT_ACCEPTED
             await state(w, PAUSED, since=mark)
             await mode(w, w.modes.hold, since=mark)
 
@@ -224,10 +224,10 @@ async def test_conf_074_paused_flown_elsewhere_and_resumed_by_the_mode(flavour: 
         await put(w, ROUND)
         await start(w)
         await state(w, ACTIVE, seq=2, since=0)
-        assert (await w.client.command(192, -1, 1, 0)).result == dialect.MAV_RESULT_ACCEPTED
+        assert (await w.client.command(dialect.MAV_CMD_DO_REPOSITION, -1, 1, 0)).result == dialect.MAV_RESULT_ACCEPTED
         await state(w, PAUSED, seq=2)
         x, y = around(PLACE, (5.0, 0.0))[0]
-        ack = await w.client.command(192, -1, 1, 0, frame=6, x=x, y=y, z=6.0)
+        ack = await w.client.command(dialect.MAV_CMD_DO_REPOSITION, -1, 1, 0, frame=6, x=x, y=y, z=6.0)
         assert ack.result == dialect.MAV_RESULT_ACCEPTED
         await settled(w, (5.0, 0.0, 6.0))
         await state(w, PAUSED, seq=2)
@@ -254,7 +254,7 @@ async def test_conf_074_whatever_takes_over_pauses_it(flavour: str, order: str) 
             ack = await w.client.command(dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH)
         else:
             x, y = around(PLACE, (0.0, -15.0))[0]
-            ack = await w.client.command(192, -1, 1, 0, frame=6, x=x, y=y, z=6.0)
+            ack = await w.client.command(dialect.MAV_CMD_DO_REPOSITION, -1, 1, 0, frame=6, x=x, y=y, z=6.0)
         assert ack.result == dialect.MAV_RESULT_ACCEPTED, ack
         await state(w, PAUSED, since=mark)
         if order == "goto":
@@ -318,10 +318,14 @@ async def test_conf_072_the_current_item(flavour: str) -> None:
         mark = w.client.mark()
         w.client.send(dialect.MAVLink_mission_set_current_message(1, 1, 2 + first(w)))
         await state(w, NOT_STARTED, seq=2, since=mark)
-        assert (await w.client.command(224, 1 + first(w), 0)).result == dialect.MAV_RESULT_ACCEPTED
+        assert (
+            await w.client.command(dialect.MAV_CMD_DO_SET_MISSION_CURRENT, 1 + first(w), 0)
+        ).result == dialect.MAV_RESULT_ACCEPTED
         await state(w, NOT_STARTED, seq=1)
         for wrong in (len(ROUND) + first(w), 99, math.inf, 1.5, -7):
-            assert (await w.client.command(224, wrong, 0)).result == dialect.MAV_RESULT_DENIED
+            assert (
+                await w.client.command(dialect.MAV_CMD_DO_SET_MISSION_CURRENT, wrong, 0)
+            ).result == dialect.MAV_RESULT_DENIED
         mark = w.client.mark()
         w.client.send(dialect.MAVLink_mission_set_current_message(1, 1, 77))
         await said(w, f"there is no item {78 - first(w)}", since=mark)
@@ -329,7 +333,9 @@ async def test_conf_072_the_current_item(flavour: str) -> None:
         await state(w, ACTIVE, seq=1, since=mark)
         await w.drone.wait_log(lambda e: e.name == "item" and e.args["command"] == "waypoint", timeout=20.0)
         mark = w.client.mark()
-        assert (await w.client.command(224, 3 + first(w), 0)).result == dialect.MAV_RESULT_ACCEPTED
+        assert (
+            await w.client.command(dialect.MAV_CMD_DO_SET_MISSION_CURRENT, 3 + first(w), 0)
+        ).result == dialect.MAV_RESULT_ACCEPTED
         await state(w, ACTIVE, seq=3, since=mark)
         await state(w, COMPLETE, since=mark)
         assert reached(w) == [3, 4], "what was not flown is not reached"
@@ -341,7 +347,9 @@ async def test_conf_072_an_ai_begins_in_the_middle_of_the_file_that_it_has() -> 
         await start(w)
         await w.drone.wait_log(lambda e: e.name == "item" and e.args["command"] == "waypoint", timeout=20.0)
         mark = w.client.mark()
-        assert (await w.client.command(224, 3, 0)).result == dialect.MAV_RESULT_ACCEPTED
+        assert (
+            await w.client.command(dialect.MAV_CMD_DO_SET_MISSION_CURRENT, 3, 0)
+        ).result == dialect.MAV_RESULT_ACCEPTED
         await state(w, ACTIVE, seq=3, since=mark)
         await state(w, COMPLETE, since=mark)
         before, again = w.commands("flight_plan.start_at_v2")

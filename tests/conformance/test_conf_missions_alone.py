@@ -37,6 +37,7 @@ from support.plans import Item
 from support.product import Process, program
 from support.world import HOME, WEB_PORT, World, loopback, world
 
+from anafi_mav import mav_enums
 from anafi_mav.config import Config, DroneConfig
 from anafi_mav.gateway import Gateway
 from anafi_mav.sim import DroneSpec, Simulator
@@ -45,10 +46,10 @@ INT32 = 6
 FAR = [takeoff(6.0), way(8.0, 0.0, 6.0), way(600.0, 0.0, 6.0), way(600.0, 8.0, 6.0)]
 """Its third item takes longer than a link is lost here."""
 
-TURN = Item(115, 0.0, 0.0, p1=90.0, frame=2)
+TURN = Item(mav_enums.MAV_CMD_CONDITION_YAW, 0.0, 0.0, p1=90.0, frame=2)
 """East, in place: no flight plan of Parrot's can say that."""
 
-ZOOM = Item(531, 0.0, 0.0, p1=2.0, p2=50.0, frame=2)
+ZOOM = Item(mav_enums.MAV_CMD_SET_CAMERA_ZOOM, 0.0, 0.0, p1=2.0, p2=50.0, frame=2)
 """Half of what the camera can."""
 
 
@@ -81,7 +82,7 @@ async def test_conf_122_the_drone_flies_on_while_the_link_is_lost() -> None:
         assert reached(w) == [0, 1]
         # And it obeys.
         mark = w.client.mark()
-        await w.client.command(192, -1, 1, 0)
+        await w.client.command(mav_enums.MAV_CMD_DO_REPOSITION, -1, 1, 0)
         await state(w, PAUSED, seq=2, since=mark)
 
 
@@ -160,7 +161,7 @@ async def test_conf_122_a_gateway_that_was_killed_knows_the_drones_plan_again(tm
             assert after.mission_id == before.mission_id != 0
             await mode(w, 0x04040000)
             assert reached(w) == []
-            await w.client.command(192, -1, 1, 0)
+            await w.client.command(mav_enums.MAV_CMD_DO_REPOSITION, -1, 1, 0)
             await state(w, PAUSED, seq=2)
             await w.client.close()
     assert len(w.commands("common.Mavlink.Start")) == 1
@@ -269,7 +270,7 @@ async def test_without_the_gateway_what_it_flies_and_what_follows_is_not_flown(r
         assert [entry for entry in w.commands("ardrone3.Piloting.moveBy") if entry.args["dPsi"]] == []
 
 
-SLOW_TURN = Item(115, 0.0, 0.0, p1=180.0, p2=9.0, frame=2)
+SLOW_TURN = Item(mav_enums.MAV_CMD_CONDITION_YAW, 0.0, 0.0, p1=180.0, p2=9.0, frame=2)
 """Round to the south: twenty seconds in which something can happen."""
 
 STEPS = [takeoff(6.0), way(8.0, 0.0, 6.0), ZOOM, SLOW_TURN, way(8.0, 8.0, 6.0)]
@@ -325,7 +326,9 @@ async def test_a_link_that_is_lost_between_two_files_does_not_take_the_mission_b
         await turning(w)
         await lost_and_back(w)
         await state(w, PAUSED, seq=3)
-        assert (await w.client.command(224, 4, 0)).result == dialect.MAV_RESULT_ACCEPTED
+        assert (
+            await w.client.command(mav_enums.MAV_CMD_DO_SET_MISSION_CURRENT, 4, 0)
+        ).result == dialect.MAV_RESULT_ACCEPTED
         await state(w, PAUSED, seq=4)
         await lost_and_back(w)
         await state(w, PAUSED, seq=4)

@@ -39,9 +39,10 @@ from support.plans import ACCEPTED, MISSION, Item, clear
 from support.trouble import somebody_else
 from support.world import World, world
 
+from anafi_mav import mav_enums
 from anafi_mav.arsdk.messages import common
 
-TURN = Item(115, 0.0, 0.0, p1=90.0, p4=1.0, frame=2)
+TURN = Item(mav_enums.MAV_CMD_CONDITION_YAW, 0.0, 0.0, p1=90.0, p4=1.0, frame=2)
 """By 90 deg, to the right: no flight plan of Parrot's can say that."""
 
 PLAYS = "common.MavlinkState.MavlinkFilePlayingStateChanged"
@@ -178,7 +179,7 @@ async def test_conf_074_the_same_mission_while_a_start_fails_is_a_new_one(flavou
         await put(w, CORNERS)
         assert (await w.client.command(dialect.MAV_CMD_MISSION_START, 0, 0)).result == dialect.MAV_RESULT_ACCEPTED
         await state(w, ACTIVE, seq=2, since=0)
-        assert (await w.client.command(192, -1, 1, 0)).result == dialect.MAV_RESULT_ACCEPTED
+        assert (await w.client.command(mav_enums.MAV_CMD_DO_REPOSITION, -1, 1, 0)).result == dialect.MAV_RESULT_ACCEPTED
         await state(w, PAUSED, seq=2)
         w.drone.faults.untold = frozenset({PLAYS})
         mark = w.client.mark()
@@ -186,7 +187,7 @@ async def test_conf_074_the_same_mission_while_a_start_fails_is_a_new_one(flavou
         await w.drone.wait_log(lambda e: e.name == "plan" and e.args["state"] == "playing", 10.0)
         await put(w, CORNERS)
         await said(w, "the same again, it goes on at item 3"[:40], since=mark)
-        assert (await w.client.command(192, -1, 1, 0)).result == dialect.MAV_RESULT_ACCEPTED
+        assert (await w.client.command(mav_enums.MAV_CMD_DO_REPOSITION, -1, 1, 0)).result == dialect.MAV_RESULT_ACCEPTED
         await state(w, NOT_STARTED, seq=0, since=mark)
         await mode(w, w.modes.hold, since=mark)
 
@@ -198,14 +199,22 @@ async def test_conf_074_paused_before_a_file_begins_it_goes_on_behind_what_was_f
     """A loop whose turn was just made: the drone turns as often as without the pause, and goes round as often."""
     async with world(web=True) as w:
         await w.take_off(6.0)
-        await put(w, [way(6.0, 0.0, 6.0), way(6.0, 6.0, 6.0), TURN, Item(177, 0.0, 0.0, p1=0.0, p2=2.0, frame=2)])
+        await put(
+            w,
+            [
+                way(6.0, 0.0, 6.0),
+                way(6.0, 6.0, 6.0),
+                TURN,
+                Item(mav_enums.MAV_CMD_DO_JUMP, 0.0, 0.0, p1=0.0, p2=2.0, frame=2),
+            ],
+        )
         started = w.client.mark()
         assert (await w.client.command(dialect.MAV_CMD_MISSION_START, 0, 0)).result == dialect.MAV_RESULT_ACCEPTED
         await w.drone.wait_log(lambda e: e.name.endswith("moveByEnd") and turned(w) == 1, 30.0)
         w.drone.faults.untold = frozenset({PLAYS})  # the next file is on its way
         await state(w, ACTIVE, seq=0, since=w.client.mark())
         mark = w.client.mark()
-        assert (await w.client.command(192, -1, 1, 0)).result == dialect.MAV_RESULT_ACCEPTED
+        assert (await w.client.command(mav_enums.MAV_CMD_DO_REPOSITION, -1, 1, 0)).result == dialect.MAV_RESULT_ACCEPTED
         await state(w, PAUSED, seq=0, since=mark)
         w.drone.faults.untold = frozenset()
         assert (await w.client.command(dialect.MAV_CMD_MISSION_START, 0, 0)).result == dialect.MAV_RESULT_ACCEPTED
@@ -226,7 +235,7 @@ async def test_conf_074_what_somebody_else_continues_is_followed(flavour: str, a
     """Paused, and uploaded once more or begun elsewhere next: the drone flies our file, so that is what is told."""
     async with world(flavour=flavour, web=True) as w:
         await on_the_way(w, 2)
-        assert (await w.client.command(192, -1, 1, 0)).result == dialect.MAV_RESULT_ACCEPTED
+        assert (await w.client.command(mav_enums.MAV_CMD_DO_REPOSITION, -1, 1, 0)).result == dialect.MAV_RESULT_ACCEPTED
         await state(w, PAUSED, seq=2)
         mark = w.client.mark()
         if after == "the same again":

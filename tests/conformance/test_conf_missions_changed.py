@@ -48,16 +48,20 @@ from support.plans import (
 )
 from support.world import HOME, World, world
 
+from anafi_mav import mav_enums
 from anafi_mav.services.memory import Memory
-from anafi_mav.sim.quirks import Quirk
+from anafi_mav.sim.world.quirks import Quirk
 
 ERROR, INVALID = 1, 5
 
-SERVO = [takeoff(6.0), way(10.0, 0.0, 6.0), Item(183, 0.0, 0.0, p1=1.0, p2=1500.0, frame=2)]
-NOTHING = [Item(178, 0.0, 0.0, p1=1.0, p2=4.0, p3=-1.0, frame=2), Item(189, 0.0, 0.0, frame=2)]
+SERVO = [takeoff(6.0), way(10.0, 0.0, 6.0), Item(mav_enums.MAV_CMD_DO_SET_SERVO, 0.0, 0.0, p1=1.0, p2=1500.0, frame=2)]
+NOTHING = [
+    Item(mav_enums.MAV_CMD_DO_CHANGE_SPEED, 0.0, 0.0, p1=1.0, p2=4.0, p3=-1.0, frame=2),
+    Item(mav_enums.MAV_CMD_DO_LAND_START, 0.0, 0.0, frame=2),
+]
 """No item of it flies."""
 
-ROUND_AND_ROUND = [takeoff(6.0), Item(178, 0.0, 0.0, p1=1.0, p2=4.0, p3=-1.0, frame=2)]
+ROUND_AND_ROUND = [takeoff(6.0), Item(mav_enums.MAV_CMD_DO_CHANGE_SPEED, 0.0, 0.0, p1=1.0, p2=4.0, p3=-1.0, frame=2)]
 """Nothing of what a jump back to its last item repeats flies."""
 
 
@@ -80,7 +84,7 @@ async def without_its_ack(w: World, items: list[Item]) -> tuple[AckLost, list[It
     client = AckLost(254, 190)
     await client.connect(5760, w.address)
     w.clients.append(client)
-    listed = [Item(16, *HOME), *items] if first(w) else items
+    listed = [Item(mav_enums.MAV_CMD_NAV_WAYPOINT, *HOME), *items] if first(w) else items
     mark = send_count(client, len(listed), MISSION)
     for seq, item in enumerate(listed):
         await client.wait(REQUESTS, lambda m, seq=seq: m.seq == seq, since=mark)  # type: ignore[misc]
@@ -92,8 +96,8 @@ async def without_its_ack(w: World, items: list[Item]) -> tuple[AckLost, list[It
 @pytest.mark.parametrize("often", [-1.0, 60000.0])
 async def test_conf_066_a_loop_in_which_nothing_is_flown_is_refused_at_upload(flavour: str, often: float) -> None:
     async with world(flavour=flavour) as w:
-        jump = Item(177, 0.0, 0.0, p1=1.0 + first(w), p2=often, frame=2)
-        listed = [*([Item(16, *HOME)] if first(w) else []), *ROUND_AND_ROUND, jump]
+        jump = Item(mav_enums.MAV_CMD_DO_JUMP, 0.0, 0.0, p1=1.0 + first(w), p2=often, frame=2)
+        listed = [*([Item(mav_enums.MAV_CMD_NAV_WAYPOINT, *HOME)] if first(w) else []), *ROUND_AND_ROUND, jump]
         assert (await upload(w.client, listed, MISSION)).type == INVALID
         how = "for ever" if often < 0.0 else "and round"
         words = f"Mission refused: item 3: it goes round {how} and flies nowhere"
@@ -132,7 +136,7 @@ async def test_conf_074_the_same_mission_again_disturbs_nothing(flavour: str) ->
         other = await w.connect(254)
         mark = w.client.mark()
         for client in (w.client, other):
-            listed = [Item(16, *HOME), *CORNERS] if first(w) else CORNERS
+            listed = [Item(mav_enums.MAV_CMD_NAV_WAYPOINT, *HOME), *CORNERS] if first(w) else CORNERS
             assert (await upload(client, listed, MISSION)).type == ACCEPTED
             await said(w, "the same again, it goes on at item 3"[:40], since=mark)
         assert pauses(w) == before
@@ -151,7 +155,7 @@ async def test_conf_074_the_same_mission_again_after_its_end_is_a_new_one(flavou
     """A program that uploads, starts and waits for the end must not take the last end for this one's."""
     async with world(flavour=flavour, web=True) as w:
         await on_the_way(w, 2)
-        assert (await w.client.command(192, -1, 1, 0)).result == dialect.MAV_RESULT_ACCEPTED
+        assert (await w.client.command(mav_enums.MAV_CMD_DO_REPOSITION, -1, 1, 0)).result == dialect.MAV_RESULT_ACCEPTED
         await state(w, PAUSED, seq=2)
         mark = w.client.mark()
         await put(w, CORNERS)
@@ -205,13 +209,17 @@ async def test_conf_063_an_upload_that_fails_does_not_touch_the_flight(flavour: 
     async with world(flavour=flavour, web=True) as w:
         await on_the_way(w, 1)
         before, mark = pauses(w), w.client.mark()
-        home = [Item(16, *HOME)] if first(w) else []
+        home = [Item(mav_enums.MAV_CMD_NAV_WAYPOINT, *HOME)] if first(w) else []
         if how == "given up":
             send_count(w.client, 9, MISSION)
             await w.client.wait(REQUESTS, since=mark)
             w.client.send(dialect.MAVLink_mission_ack_message(1, 1, CANCELLED, MISSION))
         else:
-            bad = SERVO if how == "refused" else [*ROUND_AND_ROUND, Item(177, 0.0, 0.0, p1=1.0, p2=-1.0, frame=2)]
+            bad = (
+                SERVO
+                if how == "refused"
+                else [*ROUND_AND_ROUND, Item(mav_enums.MAV_CMD_DO_JUMP, 0.0, 0.0, p1=1.0, p2=-1.0, frame=2)]
+            )
             assert (await upload(w.client, [*home, *bad], MISSION)).type in (UNSUPPORTED, INVALID)
         await state(w, COMPLETE, since=mark)
         assert pauses(w) == [*before, "stopped"]
@@ -225,7 +233,7 @@ OTHER_WAY = [takeoff(6.0), way(0.0, 12.0, 6.0), way(0.0, 15.0, 6.0), LAND]
 
 async def up_to_the_last_item(w: World, items: list[Item]) -> None:
     """Upload, and do not wait for the acknowledgement."""
-    listed = [Item(16, *HOME), *items] if first(w) else items
+    listed = [Item(mav_enums.MAV_CMD_NAV_WAYPOINT, *HOME), *items] if first(w) else items
     position = send_count(w.client, len(listed), MISSION)
     for seq, item in enumerate(listed):
         await w.client.wait(REQUESTS, lambda m, seq=seq: m.seq == seq, since=position)
@@ -294,7 +302,9 @@ async def test_conf_074_an_edited_mission_is_flown_with_the_new_numbers(flavour:
         await state(w, NOT_STARTED, seq=0, since=mark)
         if begin:
             number = begin + first(w)
-            assert (await w.client.command(224, number, 0)).result == dialect.MAV_RESULT_ACCEPTED
+            assert (
+                await w.client.command(mav_enums.MAV_CMD_DO_SET_MISSION_CURRENT, number, 0)
+            ).result == dialect.MAV_RESULT_ACCEPTED
         assert (await w.client.command(dialect.MAV_CMD_MISSION_START, 0, 0)).result == dialect.MAV_RESULT_ACCEPTED
         await state(w, ACTIVE, seq=begin, since=mark)
         await state(w, COMPLETE, since=mark)

@@ -32,11 +32,12 @@ from support.plans import Item
 from support.trouble import return_by_itself
 from support.world import ARMED, World, world
 
+from anafi_mav import mav_enums
 from anafi_mav.arsdk.messages import ardrone3, common
-from anafi_mav.sim.faults import Impairment
-from anafi_mav.sim.quirks import Quirk
+from anafi_mav.sim.world.faults import Impairment
+from anafi_mav.sim.world.quirks import Quirk
 
-WAIT = Item(93, 0.0, 0.0, p1=2.0, frame=2)
+WAIT = Item(mav_enums.MAV_CMD_NAV_DELAY, 0.0, 0.0, p1=2.0, frame=2)
 
 
 def while_it_waits(w: World, do: Callable[[], Any]) -> asyncio.Future[Any]:
@@ -142,7 +143,7 @@ async def test_conf_074_a_return_of_the_batterys_at_the_last_line_is_not_the_pla
 
 PLAIN = {
     "way-point": [takeoff(6.0), way(9.0, 0.0, 6.0), way(9.0, 9.0, 6.0)],
-    "wait": [takeoff(6.0), way(9.0, 9.0, 6.0), Item(93, 0.0, 0.0, p1=1.0, frame=2)],
+    "wait": [takeoff(6.0), way(9.0, 9.0, 6.0), Item(mav_enums.MAV_CMD_NAV_DELAY, 0.0, 0.0, p1=1.0, frame=2)],
 }
 plain = pytest.mark.parametrize("items", PLAIN.values(), ids=PLAIN)
 EXECUTED = common.MissionItemExecuted.NAME

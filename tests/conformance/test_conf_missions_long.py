@@ -29,8 +29,9 @@ from support.plans import Item
 from support.trouble import somebody_else
 from support.world import World, world
 
+from anafi_mav import mav_enums
 from anafi_mav.arsdk.messages import ardrone3, common
-from anafi_mav.plans.translate import MAX_LINES
+from anafi_mav.plans.translation.translate import MAX_LINES
 
 A, B, C = (10.0, 0.0), (10.0, 8.0), (0.0, 8.0)
 
@@ -40,8 +41,8 @@ SETS = 498
 
 def loop(often: float) -> list[Item]:
     """Up, then round by A and B, and in the end to C: way points are items 1 and 2."""
-    sets = [Item(178, 0.0, 0.0, p1=1.0, p2=8.0, p3=-1.0, frame=2)] * SETS
-    jump = Item(177, 0.0, 0.0, p1=1.0, p2=often, frame=2)
+    sets = [Item(mav_enums.MAV_CMD_DO_CHANGE_SPEED, 0.0, 0.0, p1=1.0, p2=8.0, p3=-1.0, frame=2)] * SETS
+    jump = Item(mav_enums.MAV_CMD_DO_JUMP, 0.0, 0.0, p1=1.0, p2=often, frame=2)
     return [takeoff(6.0), way(*A, 6.0), way(*B, 6.0), *sets, jump, way(*C, 6.0)]
 
 
@@ -103,7 +104,9 @@ async def test_a_loop_without_end_is_flown_file_after_file(model: str, cuts: int
         await w.drone.wait_log(lambda e: e.kind == "pose", since=w.drone.log[-1].t)  # the log's last pose is older
         assert told.count(JUMP) >= 4 * cuts
         assert visits(w, A, B) == "AB" * told.count(2)
-        assert (await w.client.command(224, LAST, 0)).result == dialect.MAV_RESULT_ACCEPTED
+        assert (
+            await w.client.command(mav_enums.MAV_CMD_DO_SET_MISSION_CURRENT, LAST, 0)
+        ).result == dialect.MAV_RESULT_ACCEPTED
         await state(w, ACTIVE, seq=LAST, since=mark)
         await state(w, COMPLETE, since=mark, timeout=60.0)
         await mode(w, w.modes.idle, since=mark)
@@ -121,7 +124,7 @@ async def test_a_long_loop_has_as_many_turns_as_it_says() -> None:
         await begun(w, 2)
         await state(w, ACTIVE, seq=2, timeout=60.0)
         mark = w.client.mark()
-        assert (await w.client.command(192, -1, 1, 0)).result == dialect.MAV_RESULT_ACCEPTED
+        assert (await w.client.command(mav_enums.MAV_CMD_DO_REPOSITION, -1, 1, 0)).result == dialect.MAV_RESULT_ACCEPTED
         await state(w, PAUSED, seq=2, since=mark)
         somebody_else(w, common.Stop())
         await w.drone.wait_log(lambda e: e.name == "plan" and e.args["state"] == "stopped", since=paused(w))
@@ -140,16 +143,20 @@ def paused(w: World) -> float:
 async def test_jumps_and_chosen_items_on_an_ai_begin_in_the_middle_of_its_file() -> None:
     """Where what is left to fly is the end of the file that it has; the counts of a loop that is chosen begin anew."""
     async with world(web=True, model="ai") as w:
-        jump = Item(177, 0.0, 0.0, p1=1.0, p2=2.0, frame=2)
+        jump = Item(mav_enums.MAV_CMD_DO_JUMP, 0.0, 0.0, p1=1.0, p2=2.0, frame=2)
         await put(w, [takeoff(6.0), way(*A, 6.0), way(*B, 6.0), jump, way(*C, 6.0)])
         await start(w)
         await state(w, ACTIVE, seq=1, since=0)
         mark = w.client.mark()
-        assert (await w.client.command(224, 2, 0)).result == dialect.MAV_RESULT_ACCEPTED
+        assert (
+            await w.client.command(mav_enums.MAV_CMD_DO_SET_MISSION_CURRENT, 2, 0)
+        ).result == dialect.MAV_RESULT_ACCEPTED
         await state(w, ACTIVE, seq=2, since=mark)
         await state(w, ACTIVE, seq=1, since=w.client.mark())  # again, and not still
         mark = w.client.mark()
-        assert (await w.client.command(224, 4, 0)).result == dialect.MAV_RESULT_ACCEPTED
+        assert (
+            await w.client.command(mav_enums.MAV_CMD_DO_SET_MISSION_CURRENT, 4, 0)
+        ).result == dialect.MAV_RESULT_ACCEPTED
         await state(w, ACTIVE, seq=4, since=mark)
         await state(w, COMPLETE, since=mark)
         starts = w.commands("flight_plan.start_at_v2")

@@ -19,7 +19,7 @@ from support.world import World, world
 from anafi_mav.arsdk.messages import alarms, ardrone3, common
 from anafi_mav.arsdk.messages.alarms import TakeoffChecklistType
 from anafi_mav.arsdk.messages.common import FlightPlanComponent as Part
-from anafi_mav.sim.faults import Faults
+from anafi_mav.sim.world.faults import Faults
 
 COMPONENT = common.ComponentStateListChanged.NAME
 

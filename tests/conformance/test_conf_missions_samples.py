@@ -13,9 +13,9 @@ from support.plans import Item
 from support.samples import SAMPLES, ZOOMS, judge, path_of
 from support.world import World, world
 
-from anafi_mav.plans import files
+from anafi_mav.plans.formats import files
 from anafi_mav.plans.plan import Item as PlanItem
-from anafi_mav.services.mission_items import DEGREES, to_wire
+from anafi_mav.services.plan.mission_items import DEGREES, to_wire
 from anafi_mav.sim import drone
 
 SPEED = 8.0

@@ -33,12 +33,12 @@ from support.setpoints import (
 )
 from support.world import HOLD, HOME, World, world
 
-from anafi_mav import geo
+from anafi_mav import geo, mav_enums
 from anafi_mav.arsdk.messages import ardrone3, piloting_style
-from anafi_mav.services.offboard import GUIDED_TIMEOUT, STRAGGLING
+from anafi_mav.vehicle.offboard.stream import GUIDED_TIMEOUT, STRAGGLING
 
 REJECTED = dialect.MAV_RESULT_TEMPORARILY_REJECTED
-SET_MODE, GOTO = 176, 192
+SET_MODE, GOTO = mav_enums.MAV_CMD_DO_SET_MODE, mav_enums.MAV_CMD_DO_REPOSITION
 NAN = math.nan
 
 HOVER_WITHIN = 0.5

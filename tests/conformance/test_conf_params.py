@@ -23,11 +23,11 @@ from support.mav import Client
 from support.params import fetch, read, send_set, value_of, write
 from support.world import HOLD, HOME, LAND, RETURN, World, loopback, world
 
-from anafi_mav import geo
+from anafi_mav import geo, mav_enums
 from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.config import Config, DroneConfig
 from anafi_mav.gateway import Gateway
-from anafi_mav.services.parameters import NATIVE_NAMES
+from anafi_mav.services.parameter.parameter_service import NATIVE_NAMES
 from anafi_mav.sim import DroneSpec, Simulator
 
 INT8, INT16, INT32, REAL32 = 2, 4, 6, 9
@@ -509,7 +509,9 @@ async def test_what_nav_dll_act_promises_is_done(action: int, mode: int, command
     async with world() as w:
         onlooker = await lost_ground_station(w, action)
         place = geo.destination(*HOME[:2], 200.0, 0.0)
-        assert (await w.client.command(192, -1, 1, 0, frame=6, x=place[0], y=place[1], z=8.0)).result == 0
+        assert (
+            await w.client.command(mav_enums.MAV_CMD_DO_REPOSITION, -1, 1, 0, frame=6, x=place[0], y=place[1], z=8.0)
+        ).result == 0
         assert not w.commands(command)
         mark = onlooker.mark()
         await onlooker.wait("STATUSTEXT", lambda m: "No ground station for 2 s" in m.text, timeout=5.0)

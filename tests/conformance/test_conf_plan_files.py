@@ -9,13 +9,18 @@ from support.ftp import ACK, NAK, NOT_FOUND, OPEN, TERMINATE, Ftp
 from support.plans import FENCE, MISSION, RALLY, Item, circle, content, download, rally, upload
 from support.world import HOME, World, world
 
-from anafi_mav.services.plan_files import PATHS, unpack_plan
-from anafi_mav.services.plan_items import PlanItem
+from anafi_mav import mav_enums
+from anafi_mav.services.plan.plan_files import PATHS, unpack_plan
+from anafi_mav.vehicle.fence.plan_items import PlanItem
 
 CREATE, WRITE = 6, 7
 PLACE = (HOME[0], HOME[1])
 LISTS = {
-    MISSION: [Item(16, *HOME), Item(22, *PLACE, z=6.0, frame=3), Item(16, HOME[0] + 1e-4, HOME[1], z=8.0, frame=3)],
+    MISSION: [
+        Item(mav_enums.MAV_CMD_NAV_WAYPOINT, *HOME),
+        Item(mav_enums.MAV_CMD_NAV_TAKEOFF, *PLACE, z=6.0, frame=3),
+        Item(mav_enums.MAV_CMD_NAV_WAYPOINT, HOME[0] + 1e-4, HOME[1], z=8.0, frame=3),
+    ],
     FENCE: [circle(PLACE, 80.0), circle(PLACE, 9.0, inclusion=False)],
     RALLY: [rally(PLACE, 20.0), rally((PLACE[0] + 0.001, PLACE[1]), 25.0)],
 }
@@ -94,7 +99,13 @@ async def test_mission_that_cannot_be_flown_is_refused_by_a_text() -> None:
     """It is examined after the file is closed."""
     async with world(flavour="ardupilot") as w:
         mark = w.client.mark()
-        assert await write(w, MISSION, file_of([Item(16, *HOME), Item(84, *PLACE)], MISSION)) == (ACK, b"")
+        assert await write(
+            w,
+            MISSION,
+            file_of(
+                [Item(mav_enums.MAV_CMD_NAV_WAYPOINT, *HOME), Item(mav_enums.MAV_CMD_NAV_VTOL_TAKEOFF, *PLACE)], MISSION
+            ),
+        ) == (ACK, b"")
         await w.client.wait("STATUSTEXT", lambda m: m.text.startswith("Mission refused: item 1: "), since=mark)
         assert await download(w.client, MISSION) == []
 

@@ -240,28 +240,65 @@ async def test_conf_065_a_second_client_is_refused(flavour: str, kind: int) -> N
 
 
 BAD_ITEMS = [
-    (FENCE, [Item(16, *PLACE)], UNSUPPORTED, "item 0"),
-    (FENCE, [circle(PLACE, 50.0), Item(5100, *PLACE)], UNSUPPORTED, "item 1"),
-    (RALLY, [Item(5001, *PLACE, p1=3)], UNSUPPORTED, "item 0"),
+    (FENCE, [Item(dialect.MAV_CMD_NAV_WAYPOINT, *PLACE)], UNSUPPORTED, "item 0"),
+    (FENCE, [circle(PLACE, 50.0), Item(dialect.MAV_CMD_NAV_RALLY_POINT, *PLACE)], UNSUPPORTED, "item 1"),
+    (RALLY, [Item(dialect.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION, *PLACE, p1=3)], UNSUPPORTED, "item 0"),
     (FENCE, [circle(PLACE, -5.0)], INVALID_PARAM1, "item 0"),
     (FENCE, [circle(PLACE, float("nan"))], INVALID_PARAM1, "item 0"),
-    (FENCE, [Item(5001, *PLACE, p1=2)], INVALID_PARAM1, "item 0"),
+    (FENCE, [Item(dialect.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION, *PLACE, p1=2)], INVALID_PARAM1, "item 0"),
     (FENCE, square(PLACE, 50.0)[:3], INVALID_PARAM1, "begins with item 0"),
     (FENCE, [circle(PLACE, 50.0), *square(PLACE, 50.0)[:3], circle(PLACE, 50.0)], INVALID_PARAM1, "begins with item 1"),
-    (FENCE, [Item(5003, *PLACE, p1=50, p2=0.5)], INVALID_PARAM1 + 1, "item 0"),
-    (FENCE, [Item(5003, 95.0, 2.0, p1=50)], INVALID_PARAM1 + 4, "item 0"),
-    (FENCE, [Item(5003, 48.0, 190.0, p1=50)], INVALID_PARAM1 + 5, "item 0"),
-    (FENCE, [Item(5003, 0.0, 0.0, p1=50)], INVALID_PARAM1 + 4, "item 0"),
-    (FENCE, [Item(5003, *PLACE, p1=50, frame=10)], UNSUPPORTED_FRAME, "item 0"),
-    (RALLY, [Item(5100, *PLACE, z=20, frame=11)], UNSUPPORTED_FRAME, "item 0"),
-    (RALLY, [Item(5100, *PLACE, z=float("inf"), frame=3)], INVALID_PARAM1 + 6, "item 0"),
+    (FENCE, [Item(dialect.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, *PLACE, p1=50, p2=0.5)], INVALID_PARAM1 + 1, "item 0"),
+    (FENCE, [Item(dialect.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, 95.0, 2.0, p1=50)], INVALID_PARAM1 + 4, "item 0"),
+    (FENCE, [Item(dialect.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, 48.0, 190.0, p1=50)], INVALID_PARAM1 + 5, "item 0"),
+    (FENCE, [Item(dialect.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, 0.0, 0.0, p1=50)], INVALID_PARAM1 + 4, "item 0"),
+    (FENCE, [Item(dialect.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, *PLACE, p1=50, frame=10)], UNSUPPORTED_FRAME, "item 0"),
+    (RALLY, [Item(dialect.MAV_CMD_NAV_RALLY_POINT, *PLACE, z=20, frame=11)], UNSUPPORTED_FRAME, "item 0"),
+    (RALLY, [Item(dialect.MAV_CMD_NAV_RALLY_POINT, *PLACE, z=float("inf"), frame=3)], INVALID_PARAM1 + 6, "item 0"),
     (FENCE, polygon([PLACE, PLACE, PLACE]), 5, "encloses nothing"),
-    (FENCE, [Item(5000, *PLACE), Item(5000, *PLACE)], 5, "return point"),
-    (MISSION, [Item(16, *PLACE, z=20, frame=3), Item(211, 0.0, 0.0, p2=1, frame=2)], UNSUPPORTED, "item {}"),
-    (MISSION, [Item(16, *PLACE, z=20, frame=3), Item(16, *PLACE, z=20, frame=10)], UNSUPPORTED_FRAME, "item {}"),
-    (MISSION, [Item(16, *PLACE, z=20, frame=3), Item(16, 95.0, 2.0, z=20, frame=3)], INVALID_PARAM1 + 4, "item {}"),
-    (MISSION, [Item(16, *PLACE, z=20, frame=3), Item(16, 48.0, 190.0, z=20, frame=3)], INVALID_PARAM1 + 5, "item {}"),
-]  # fmt: skip
+    (
+        FENCE,
+        [Item(dialect.MAV_CMD_NAV_FENCE_RETURN_POINT, *PLACE), Item(dialect.MAV_CMD_NAV_FENCE_RETURN_POINT, *PLACE)],
+        5,
+        "return point",
+    ),
+    (
+        MISSION,
+        [
+            Item(dialect.MAV_CMD_NAV_WAYPOINT, *PLACE, z=20, frame=3),
+            Item(dialect.MAV_CMD_DO_GRIPPER, 0.0, 0.0, p2=1, frame=2),
+        ],
+        UNSUPPORTED,
+        "item {}",
+    ),
+    (
+        MISSION,
+        [
+            Item(dialect.MAV_CMD_NAV_WAYPOINT, *PLACE, z=20, frame=3),
+            Item(dialect.MAV_CMD_NAV_WAYPOINT, *PLACE, z=20, frame=10),
+        ],
+        UNSUPPORTED_FRAME,
+        "item {}",
+    ),
+    (
+        MISSION,
+        [
+            Item(dialect.MAV_CMD_NAV_WAYPOINT, *PLACE, z=20, frame=3),
+            Item(dialect.MAV_CMD_NAV_WAYPOINT, 95.0, 2.0, z=20, frame=3),
+        ],
+        INVALID_PARAM1 + 4,
+        "item {}",
+    ),
+    (
+        MISSION,
+        [
+            Item(dialect.MAV_CMD_NAV_WAYPOINT, *PLACE, z=20, frame=3),
+            Item(dialect.MAV_CMD_NAV_WAYPOINT, 48.0, 190.0, z=20, frame=3),
+        ],
+        INVALID_PARAM1 + 5,
+        "item {}",
+    ),
+]
 
 
 @both
@@ -412,7 +449,9 @@ async def test_conf_072_there_is_no_current_item_without_a_mission(flavour: str)
     async with world(flavour=flavour) as w:
         current = await w.client.wait("MISSION_CURRENT")
         assert (whole(current).seq, whole(current).total, whole(current).mission_state) == (0, 0xFFFF, 1)
-        assert (await w.client.command(224, 0, 0)).result == dialect.MAV_RESULT_DENIED
+        assert (
+            await w.client.command(dialect.MAV_CMD_DO_SET_MISSION_CURRENT, 0, 0)
+        ).result == dialect.MAV_RESULT_DENIED
         mark = w.client.mark()
         w.client.send(dialect.MAVLink_mission_set_current_message(1, 1, 3))
         await w.client.wait("MISSION_CURRENT", since=mark, timeout=2.0)
@@ -441,7 +480,11 @@ async def test_conf_142_single_items_replaced(kind: int) -> None:
 
 async def test_conf_069_home_is_item_0_to_ardupilots_clients_alone() -> None:
     """One mission, two numberings: a jump names the same item to both, and no heading is 0 here and NaN there."""
-    plan = [*a_plan(MISSION, 3)[:2], Item(16, *PLACE, z=20.0, frame=3), Item(177, 0.0, 0.0, p1=2.0, p2=1.0, frame=2)]
+    plan = [
+        *a_plan(MISSION, 3)[:2],
+        Item(dialect.MAV_CMD_NAV_WAYPOINT, *PLACE, z=20.0, frame=3),
+        Item(dialect.MAV_CMD_DO_JUMP, 0.0, 0.0, p1=2.0, p2=1.0, frame=2),
+    ]
     async with world(flavour="ardupilot", also="px4") as w:
         copter, px4 = w.client, await w.connect(port=5761)
         assert (await upload(copter, plan, MISSION)).type == ACCEPTED

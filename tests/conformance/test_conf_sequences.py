@@ -23,13 +23,19 @@ from support.params import fetch
 from support.plans import REQUESTS, content, mission, send_item
 from support.world import ARMED, HOME, World, loopback, world
 
-from anafi_mav import geo
+from anafi_mav import geo, mav_enums
 from anafi_mav.config import Config, DroneConfig
 from anafi_mav.gateway import Gateway
 from anafi_mav.sim import DroneSpec, Simulator
 
 ACCEPTED, UNSUPPORTED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_UNSUPPORTED
-ARM, TAKE_OFF, REPOSITION, SET_MODE, REQUEST = 400, 22, 192, 176, 512
+ARM, TAKE_OFF, REPOSITION, SET_MODE, REQUEST = (
+    mav_enums.MAV_CMD_COMPONENT_ARM_DISARM,
+    mav_enums.MAV_CMD_NAV_TAKEOFF,
+    mav_enums.MAV_CMD_DO_REPOSITION,
+    mav_enums.MAV_CMD_DO_SET_MODE,
+    mav_enums.MAV_CMD_REQUEST_MESSAGE,
+)
 FLAVOURS = ("px4", "ardupilot")
 
 
@@ -51,7 +57,9 @@ async def test_conf_051_qgroundcontrol_connects(flavour: str) -> None:
         frame = dialect.MAVLink_command_long_message(1, 1, REQUEST, 0, 148, 0, 0, 0, 0, 0, 0)
         client.send_raw(frame.pack(dialect.MAVLink(None, 255, 190), force_mavlink1=flavour == "px4"))
         if flavour == "ardupilot":  # it does not wait for the first answer
-            assert (await client.command(511, 242, 1e6, timeout=1.2)).result == ACCEPTED
+            assert (
+                await client.command(mav_enums.MAV_CMD_SET_MESSAGE_INTERVAL, 242, 1e6, timeout=1.2)
+            ).result == ACCEPTED
         version = await client.wait("AUTOPILOT_VERSION", since=mark, timeout=1.0)
         assert version.capabilities & dialect.MAV_PROTOCOL_CAPABILITY_FTP
         if flavour == "px4":
@@ -64,7 +72,7 @@ async def test_conf_051_qgroundcontrol_connects(flavour: str) -> None:
         where = await requested(client, "COMPONENT_METADATA", 397)
         if flavour == "px4":
             await metadata(client, where.uri)
-            assert (await client.command(401, timeout=1.2)).result == ACCEPTED
+            assert (await client.command(mav_enums.MAV_CMD_RUN_PREARM_CHECKS, timeout=1.2)).result == ACCEPTED
             values = await fetch(client, flavour)
             assert len(values) == next(iter(values.values())).param_count
         else:
@@ -179,7 +187,9 @@ async def test_the_same_flight_ends_at_the_same_place_in_both_flavours() -> None
                 assert (await client.command(REPOSITION, NAN, 1, NAN, 1.0)).result == ACCEPTED
             else:
                 degrees = 180.0 / 3.141592653589793
-                assert (await client.command(115, degrees, 0, 0, 0, timeout=20.0)).result == ACCEPTED
+                assert (
+                    await client.command(mav_enums.MAV_CMD_CONDITION_YAW, degrees, 0, 0, 0, timeout=20.0)
+                ).result == ACCEPTED
             await w.drone.wait_log(lambda e: e.kind == "pose" and abs(e.args["yaw"] - 1.0) < 0.05, 20.0)
             client.send(dialect.MAVLink_set_mode_message(1, 1, w.modes.land))
             await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landed", 30.0)
@@ -200,7 +210,7 @@ async def test_conf_120_mission_planner() -> None:
         await client.wait("AUTOPILOT_VERSION", since=mark, timeout=1.0)
         await requested(client, "AUTOPILOT_VERSION", 148)
         mark = client.mark()
-        assert (await client.command(42428)).result == ACCEPTED
+        assert (await client.command(mav_enums.MAV_CMD_DO_SEND_BANNER)).result == ACCEPTED
         await client.wait("STATUSTEXT", lambda m: m.text.startswith("ArduCopter V4.5"), since=mark)
         values = await fetch(client, "ardupilot")
         assert {"SYSID_THISMAV", "RTL_ALT"} <= set(values)
@@ -210,7 +220,7 @@ async def test_conf_120_mission_planner() -> None:
                 assert (await client.command(REQUEST, camera, target=target)).result == UNSUPPORTED
                 assert time.monotonic() - began < 0.2
         mark = client.mark()
-        client.send_command(410)
+        client.send_command(mav_enums.MAV_CMD_GET_HOME_POSITION)
         await client.wait("HOME_POSITION", since=mark, timeout=0.7)
 
         # It sets a mode by the command, then twice by the message, and does not look.
@@ -368,7 +378,7 @@ async def test_conf_146_noise_changes_nothing(flavour: str) -> None:
                 bad[noise.randrange(len(bad))] = noise.randrange(256)
             w.client.send_raw(bytes(bad[: noise.randint(1, len(bad))]))
             w.client.send_raw(noise.randbytes(noise.randint(0, 400)))
-        assert (await w.client.command(211)).result == UNSUPPORTED
+        assert (await w.client.command(mav_enums.MAV_CMD_DO_GRIPPER)).result == UNSUPPORTED
         beats = [at for at, _ in w.client.since(mark, "HEARTBEAT")]
         assert all(b - a < 1.2 for a, b in itertools.pairwise(beats))
         await w.client.wait("ATTITUDE")

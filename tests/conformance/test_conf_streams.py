@@ -12,9 +12,9 @@ from support.world import world
 
 from anafi_mav.drone.events import AttitudeChanged
 from anafi_mav.mavlink import dialect as newer
-from anafi_mav.services import telemetry_flight
 from anafi_mav.services.stream import Stream, Times
-from anafi_mav.services.vehicle import Vehicle
+from anafi_mav.services.telemetry import telemetry_flight
+from anafi_mav.vehicle.vehicle import Vehicle
 
 ACCEPTED, DENIED, UNSUPPORTED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_DENIED, dialect.MAV_RESULT_UNSUPPORTED
 SET, GET = dialect.MAV_CMD_SET_MESSAGE_INTERVAL, dialect.MAV_CMD_GET_MESSAGE_INTERVAL
@@ -173,7 +173,7 @@ async def test_conf_109_message_interval(flavour: str) -> None:
         for impossible in (-1, 65536, 30.5, NAN, math.inf):
             assert (await w.client.command(GET, impossible)).result == DENIED
         mark = w.client.mark()  # and by REQUEST_MESSAGE, as the message's own description has it
-        assert (await w.client.command(512, 244, IDS["BATTERY_STATUS"])).result == ACCEPTED
+        assert (await w.client.command(dialect.MAV_CMD_REQUEST_MESSAGE, 244, IDS["BATTERY_STATUS"])).result == ACCEPTED
         told = await w.client.wait("MESSAGE_INTERVAL", since=mark)
         assert (told.message_id, told.interval_us) == (IDS["BATTERY_STATUS"], 1_000_000)
 
@@ -233,7 +233,7 @@ async def test_conf_150_high_latency(flavour: str, hold: int) -> None:
         assert (second.altitude, second.battery, second.failure_flags) == (35, w.drone.battery.percent, 0)
         assert (second.eph, second.epv, second.groundspeed, second.climb_rate) == (10, 20, 0, 0)
         # Commands are answered all the same, the other client misses nothing.
-        assert (await expensive.command(512, 148)).result == ACCEPTED
+        assert (await expensive.command(dialect.MAV_CMD_REQUEST_MESSAGE, 148)).result == ACCEPTED
         await other.heartbeat(lambda beat: True, timeout=1.5)
         assert (await expensive.command(control, 2)).result == DENIED
         assert (await expensive.command(control, 0)).result == ACCEPTED

@@ -108,7 +108,7 @@ async def test_conf_112_long_texts_and_severities(flavour: str) -> None:
     async with world(flavour=flavour) as w:
         mark = w.client.mark()
         high = {"x": 0.0, "y": 0.0, "z": 3000.0}
-        assert (await w.client.command(22, 0, 0, 0, 0, **high)).result != ACCEPTED
+        assert (await w.client.command(dialect.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, **high)).result != ACCEPTED
         await w.client.heartbeat(lambda beat: True)
         [(severity, refusal)] = heard(w.client, mark)
         assert len(refusal) > 50
@@ -172,7 +172,9 @@ async def test_conf_149_banner_and_version(flavour: str, first: str) -> None:
         assert (await late.command(dialect.MAV_CMD_DO_SEND_BANNER)).result == ACCEPTED
         assert [said for _, said in heard(late, mark)] == [first, drone]
         assert heard(w.client, others) == []
-        assert (await late.command(512, dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION)).result == ACCEPTED
+        assert (
+            await late.command(dialect.MAV_CMD_REQUEST_MESSAGE, dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
+        ).result == ACCEPTED
         version = await late.wait("AUTOPILOT_VERSION", since=mark)
         numbers = [int(part) for part in __version__.split(".")[:3]]
         assert version.middleware_sw_version == numbers[0] << 24 | numbers[1] << 16 | numbers[2] << 8

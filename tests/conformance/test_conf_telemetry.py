@@ -150,7 +150,9 @@ async def test_conf_039_prearm(flavour: str) -> None:
         w.drone.faults.magneto_required = True
         await w.client.wait("SYS_STATUS", lambda m: not m.onboard_control_sensors_health & (PREARM | MAG))
         mark = w.client.mark()
-        assert (await w.client.command(400, 1)).result == dialect.MAV_RESULT_TEMPORARILY_REJECTED
+        assert (
+            await w.client.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)
+        ).result == dialect.MAV_RESULT_TEMPORARILY_REJECTED
         await w.client.wait("STATUSTEXT", lambda m: m.text.startswith("PreArm: "), since=mark)
 
 
@@ -160,7 +162,9 @@ async def test_conf_040_attitude_signs(flavour: str) -> None:
     async with world(speed=1.0, flavour=flavour) as w:
         await airborne(w, 5.0)
         east = geo.destination(*HOME[:2], 0.0, 40.0)
-        ack = await w.client.command(192, -1, 1, 0, math.pi / 2, frame=6, x=east[0], y=east[1], z=5.0)
+        ack = await w.client.command(
+            dialect.MAV_CMD_DO_REPOSITION, -1, 1, 0, math.pi / 2, frame=6, x=east[0], y=east[1], z=5.0
+        )
         assert ack.result == ACCEPTED
         attitude = await w.client.wait(
             "ATTITUDE", lambda m: m.pitch < -0.03 and abs(m.yaw - math.pi / 2) < 0.2, timeout=15
@@ -179,7 +183,7 @@ async def test_conf_041_velocity_signs(flavour: str) -> None:
         for north, east, up in ((25.0, 0.0, 5.0), (25.0, -25.0, 5.0), (25.0, -25.0, 25.0)):
             place = geo.destination(*HOME[:2], north, east)
             mark = w.client.mark()
-            await w.client.command(192, -1, 1, 0, NAN, frame=6, x=place[0], y=place[1], z=up)
+            await w.client.command(dialect.MAV_CMD_DO_REPOSITION, -1, 1, 0, NAN, frame=6, x=place[0], y=place[1], z=up)
             if up > 5.0:
                 local = await w.client.wait("LOCAL_POSITION_NED", lambda m: m.vz < -0.8, since=mark, timeout=15)
                 globe = await w.client.wait("GLOBAL_POSITION_INT", lambda m: m.vz < -80, since=mark, timeout=15)
@@ -223,7 +227,9 @@ async def test_conf_132_flight_information(flavour: str) -> None:
     async with world(flavour=flavour) as w:
         before = await ask(w.client, flight_information)
         assert (before.arming_time_utc, before.takeoff_time_utc, before.landing_time) == (0, 0, 0)
-        assert (await w.client.command(511, flight_information, 1e6)).result == ACCEPTED
+        assert (
+            await w.client.command(dialect.MAV_CMD_SET_MESSAGE_INTERVAL, flight_information, 1e6)
+        ).result == ACCEPTED
         mark = w.client.mark()
         clock = await w.client.wait("ATTITUDE")
         await airborne(w, 3.0)
@@ -255,8 +261,8 @@ async def test_conf_133_what_is_below_and_nothing_invented(flavour: str) -> None
         assert found.distance == pytest.approx(w.drone.pose.up, abs=0.5)
         # An ANAFI grades wind and vibration as fine, worse and bad; numbers of them would be made up.
         for id in (dialect.MAVLINK_MSG_ID_WIND_COV, dialect.MAVLINK_MSG_ID_VIBRATION, dialect.MAVLINK_MSG_ID_WIND):
-            assert (await w.client.command(511, id, 1e6)).result == UNSUPPORTED
-            assert (await w.client.command(512, id)).result == UNSUPPORTED
+            assert (await w.client.command(dialect.MAV_CMD_SET_MESSAGE_INTERVAL, id, 1e6)).result == UNSUPPORTED
+            assert (await w.client.command(dialect.MAV_CMD_REQUEST_MESSAGE, id)).result == UNSUPPORTED
         mark = w.client.mark()
         w.drone.inject(ardrone3.WindStateChanged(ardrone3.WarningLevel.CRITICAL))
         text = await w.client.wait("STATUSTEXT", lambda m: "Wind" in m.text, since=mark)
@@ -340,11 +346,17 @@ async def test_conf_155_nodes(flavour: str) -> None:
 async def test_distance_to_the_target_of_a_move() -> None:
     async with world() as w:
         await airborne(w, 5.0)
-        assert (await w.client.command(511, dialect.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT, 2e5)).result == ACCEPTED
+        assert (
+            await w.client.command(
+                dialect.MAV_CMD_SET_MESSAGE_INTERVAL, dialect.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT, 2e5
+            )
+        ).result == ACCEPTED
         still = await w.client.wait("NAV_CONTROLLER_OUTPUT")
         assert still.wp_dist == 0
         place = geo.destination(*HOME[:2], 0.0, 60.0)
-        assert (await w.client.command(192, -1, 1, 0, NAN, frame=6, x=place[0], y=place[1], z=9.0)).result == ACCEPTED
+        assert (
+            await w.client.command(dialect.MAV_CMD_DO_REPOSITION, -1, 1, 0, NAN, frame=6, x=place[0], y=place[1], z=9.0)
+        ).result == ACCEPTED
         going = await w.client.wait("NAV_CONTROLLER_OUTPUT", lambda m: m.wp_dist > 0)
         assert going.target_bearing == pytest.approx(90, abs=3)
         assert going.wp_dist == pytest.approx(60.0 - w.drone.pose.east, abs=12)

@@ -20,8 +20,8 @@ from support.lines import SerialClient, UdpClient, pseudo_terminal
 from support.mav import Client
 from support.world import ARMED, HOLD, HOME, loopback, world
 
-from anafi_mav import geo
-from anafi_mav.arsdk.frame import FrameType, encode_frame
+from anafi_mav import geo, mav_enums
+from anafi_mav.arsdk.link.frame import FrameType, encode_frame
 from anafi_mav.config import Config, DroneConfig
 from anafi_mav.gateway import Gateway
 from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
@@ -29,7 +29,12 @@ from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
 ACCEPTED = 0
 LINK_TIMEOUT = 3.0
 """s without a heartbeat after which MAVSDK calls a system lost; QGroundControl waits a little longer."""
-ARM, TAKE_OFF, REPOSITION, LAND = 400, 22, 192, 21
+ARM, TAKE_OFF, REPOSITION, LAND = (
+    mav_enums.MAV_CMD_COMPONENT_ARM_DISARM,
+    mav_enums.MAV_CMD_NAV_TAKEOFF,
+    mav_enums.MAV_CMD_DO_REPOSITION,
+    mav_enums.MAV_CMD_NAV_LAND,
+)
 
 
 @asynccontextmanager

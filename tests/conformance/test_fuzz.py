@@ -25,7 +25,7 @@ from support.setpoints import COPTER_BRAKE, COPTER_GUIDED, POSITION_ONLY, VELOCI
 from support.world import HOME, World, world
 
 from anafi_mav.mavlink import dialect as newer
-from anafi_mav.sim.motion import Pose
+from anafi_mav.sim.world.motion import Pose
 
 FLAVOURS = ("px4", "ardupilot")
 ON_THE_GROUND, IN_THE_AIR = 10_000, {"hold": 10_000, "brake": 5_000, "guided": 5_000}
@@ -179,7 +179,7 @@ async def throw(w: World, frames: list[bytes], pause: float = BATCH_EVERY) -> No
     # What was cut off at the end swallows what follows, up to the longest frame.
     w.client.send_raw(b"".join(frames) + bytes(LONGEST))
     # An unsupported command is answered behind all of it.
-    assert (await w.client.command(211, timeout=20.0)).result == UNSUPPORTED
+    assert (await w.client.command(dialect.MAV_CMD_DO_GRIPPER, timeout=20.0)).result == UNSUPPORTED
     await asyncio.sleep(pause)
 
 

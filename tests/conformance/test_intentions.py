@@ -25,9 +25,14 @@ from support.world import HOME, World, world
 from anafi_mav import geo
 from anafi_mav.arsdk.messages import ardrone3, rth
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.link_loss import LossAction
+from anafi_mav.vehicle.base.link_loss import LossAction
 
-PAUSE, SET_HOME, ALTITUDE, ROI_NONE = 193, 179, 186, 197
+PAUSE, SET_HOME, ALTITUDE, ROI_NONE = (
+    dialect.MAV_CMD_DO_PAUSE_CONTINUE,
+    dialect.MAV_CMD_DO_SET_HOME,
+    dialect.MAV_CMD_DO_CHANGE_ALTITUDE,
+    dialect.MAV_CMD_DO_SET_ROI_NONE,
+)
 
 
 async def leaves(w: World, north: float) -> None:

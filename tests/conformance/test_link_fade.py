@@ -11,7 +11,7 @@ from support.trouble import ACCEPTED, FAILED, GOTO, RTL, goto, results
 from support.world import HOME, RETURN, World, world
 
 from anafi_mav import geo
-from anafi_mav.sim.quirks import Quirk
+from anafi_mav.sim.world.quirks import Quirk
 
 
 def sessions(w: World) -> list[str]:

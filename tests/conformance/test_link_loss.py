@@ -16,7 +16,7 @@ from support.params import write
 from support.process import simulator_process
 from support.world import ARMED, HOLD, OFFBOARD, TAKEOFF, loopback, world
 
-from anafi_mav import geo
+from anafi_mav import geo, mav_enums
 from anafi_mav.config import Config, DroneConfig
 from anafi_mav.gateway import Gateway
 
@@ -57,13 +57,17 @@ def gateway(drone: str, address: str) -> Gateway:
 async def fly(client: Client, height: float = 5.0) -> None:
     """Take off, then set out for a place far away."""
     target = (7, 1)
-    assert (await client.command(400, 1, target=target)).result == 0
+    assert (await client.command(mav_enums.MAV_CMD_COMPONENT_ARM_DISARM, 1, target=target)).result == 0
     mark = client.mark()
-    assert (await client.command(22, x=0.0, y=0.0, z=height, target=target)).result == 0
+    assert (await client.command(mav_enums.MAV_CMD_NAV_TAKEOFF, x=0.0, y=0.0, z=height, target=target)).result == 0
     await client.heartbeat(lambda beat: beat.custom_mode == TAKEOFF, since=mark)
     await client.heartbeat(lambda beat: beat.custom_mode == HOLD, timeout=20.0)
     place = geo.destination(*HOME[:2], 80.0, 0.0)
-    assert (await client.command(192, -1, 1, 0, frame=6, x=place[0], y=place[1], z=height, target=target)).result == 0
+    assert (
+        await client.command(
+            mav_enums.MAV_CMD_DO_REPOSITION, -1, 1, 0, frame=6, x=place[0], y=place[1], z=height, target=target
+        )
+    ).result == 0
     await client.wait("LOCAL_POSITION_NED", lambda m: m.vx > 1.0, timeout=15.0)
 
 
@@ -140,7 +144,7 @@ async def test_all_datagrams_lost(engaged: bool) -> None:
         try:
             if engaged:
                 await client.wait("HEARTBEAT")
-                assert (await client.command(176, 1, 6, 0, target=(7, 1))).result == 0
+                assert (await client.command(mav_enums.MAV_CMD_DO_SET_MODE, 1, 6, 0, target=(7, 1))).result == 0
                 await client.heartbeat(lambda beat: beat.custom_mode == OFFBOARD)
                 await client.wait("LOCAL_POSITION_NED", lambda m: m.vz < -0.5)
             w.drone.faults.mute = True

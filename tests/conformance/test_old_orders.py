@@ -28,11 +28,17 @@ from support.world import ARMED, HOME, World, world
 from anafi_mav import geo
 from anafi_mav.arsdk.messages import rth
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.offboard_moves import RETRY
-from anafi_mav.services.takeoff import AUTO_DISARM
-from anafi_mav.sim.faults import Impairment
+from anafi_mav.sim.world.faults import Impairment
+from anafi_mav.vehicle.offboard.moves import RETRY
+from anafi_mav.vehicle.takeoff import AUTO_DISARM
 
-SPEED, ALTITUDE, YAW, PAUSE, MISSION_START = 178, 186, 115, 193, 300
+SPEED, ALTITUDE, YAW, PAUSE, MISSION_START = (
+    dialect.MAV_CMD_DO_CHANGE_SPEED,
+    dialect.MAV_CMD_DO_CHANGE_ALTITUDE,
+    dialect.MAV_CMD_CONDITION_YAW,
+    dialect.MAV_CMD_DO_PAUSE_CONTINUE,
+    dialect.MAV_CMD_MISSION_START,
+)
 COPTER_LOITER = 5
 
 SLOW = Impairment(delay=0.4)

@@ -13,7 +13,8 @@ from support.ftp import Ftp
 from support.params import send_set, value_of
 from support.world import world
 
-from anafi_mav.services import memory, parameters
+from anafi_mav.services import memory
+from anafi_mav.services.parameter import parameter_service
 from anafi_mav.state_lock import state_folder
 
 REAL32 = 9
@@ -28,7 +29,7 @@ def stored(serial: str) -> dict[str, float]:
     path = folder / f"{serial}.json"
     if not Path(path).exists():
         return {}
-    kept: dict[str, float] = json.loads(path.read_text())["settings"].get(parameters.KEY, {})
+    kept: dict[str, float] = json.loads(path.read_text())["settings"].get(parameter_service.KEY, {})
     return kept
 
 
@@ -79,13 +80,13 @@ async def test_parameters_written_at_once_are_all_stored_before_their_echo() -> 
 
 async def test_param_pck_is_made_once_per_change(monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[int] = []
-    make = parameters.packed_file
+    make = parameter_service.packed_file
 
     def counted(*arguments: object) -> bytes:
         made.append(1)
         return make(*arguments)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(parameters, "packed_file", counted)
+    monkeypatch.setattr(parameter_service, "packed_file", counted)
     async with world(flavour="ardupilot") as w:
         ftp = Ftp(w.client)
         first = await ftp.download("@PARAM/param.pck")

@@ -14,13 +14,14 @@ from support.plans import Item
 from support.setpoints import POSITION_ONLY, engage, local, streaming
 from support.world import HOME, WEB_PORT, World, loopback, world
 
+from anafi_mav import mav_enums
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import rth
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.config import Config, DroneConfig
 from anafi_mav.gateway import Gateway
 from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
-from anafi_mav.sim.faults import CLEAR, Impairment
-from anafi_mav.sim.quirks import Quirk
+from anafi_mav.sim.world.faults import CLEAR, Impairment
+from anafi_mav.sim.world.quirks import Quirk
 
 ACCEPTED, REJECTED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_TEMPORARILY_REJECTED
 GLOBAL, RELATIVE = dialect.MAV_FRAME_GLOBAL, dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT
@@ -108,7 +109,13 @@ async def test_restart_in_flight_without_flight_id_estimates_and_keeps_away_from
 
 async def test_restart_in_flight_without_flight_id_refuses_low_mission_items_above_sea_level(tmp_path: Path) -> None:
     async with flying(tmp_path, 20.0, Quirk.NO_FLIGHT_ID) as w:
-        await put(w, [way(6.0, 0.0, 18.0), Item(16, HOME[0] + 9 * METRE, HOME[1], z=HOME[2] + 12.0, frame=GLOBAL)])
+        await put(
+            w,
+            [
+                way(6.0, 0.0, 18.0),
+                Item(mav_enums.MAV_CMD_NAV_WAYPOINT, HOME[0] + 9 * METRE, HOME[1], z=HOME[2] + 12.0, frame=GLOBAL),
+            ],
+        )
         ack = await w.client.command(dialect.MAV_CMD_MISSION_START, 0, 0)
         assert ack.result == REJECTED
         await said(w, "Mission refused: item 2: estimated AMSL < 15 m")

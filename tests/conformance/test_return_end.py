@@ -24,8 +24,8 @@ from support.world import ARMED, HOLD, HOME, World, world
 
 from anafi_mav import geo
 from anafi_mav.arsdk.messages import ardrone3, rth
-from anafi_mav.sim.faults import Impairment
-from anafi_mav.sim.quirks import Quirk
+from anafi_mav.sim.world.faults import Impairment
+from anafi_mav.sim.world.quirks import Quirk
 
 ACCEPTED, REJECTED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_TEMPORARILY_REJECTED
 RTL, LAND = dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH, dialect.MAV_CMD_NAV_LAND

@@ -14,12 +14,12 @@ from support.world import HOLD, HOME, World, loopback, world
 
 from anafi_mav.config import Config, DroneConfig
 from anafi_mav.gateway import Gateway
-from anafi_mav.services.roll_sign import INVERTED, Sign
-from anafi_mav.services.roll_sign_service import VERIFIED
+from anafi_mav.services.monitor.roll_sign_service import VERIFIED
 from anafi_mav.sim import DroneSpec, Simulator
-from anafi_mav.sim.faults import Impairment
-from anafi_mav.sim.quirks import Quirk
-from anafi_mav.sim.wind import WindSpec
+from anafi_mav.sim.world.faults import Impairment
+from anafi_mav.sim.world.quirks import Quirk
+from anafi_mav.sim.world.wind import WindSpec
+from anafi_mav.vehicle.base.roll_sign import INVERTED, Sign
 
 SET_MODE, ORBIT = dialect.MAV_CMD_DO_SET_MODE, dialect.MAV_CMD_DO_ORBIT
 ACCEPTED, REJECTED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_TEMPORARILY_REJECTED

@@ -40,7 +40,7 @@ from support.trouble import (
 )
 from support.world import HOLD, HOME, LAND, OFFBOARD, RETURN, World, world
 
-from anafi_mav import geo
+from anafi_mav import geo, mav_enums
 from anafi_mav.arsdk.messages import ardrone3, common, rth
 from anafi_mav.units import quaternion_from_euler
 
@@ -582,9 +582,9 @@ async def test_a_speed_alone_is_refused() -> None:
 
 async def test_an_interval_beyond_what_can_be_said_is_still_answered() -> None:
     async with world() as w:
-        assert (await w.client.command(511, 30, 1e12)).result == ACCEPTED
+        assert (await w.client.command(mav_enums.MAV_CMD_SET_MESSAGE_INTERVAL, 30, 1e12)).result == ACCEPTED
         mark = w.client.mark()
-        assert (await w.client.command(510, 30)).result == ACCEPTED
+        assert (await w.client.command(mav_enums.MAV_CMD_GET_MESSAGE_INTERVAL, 30)).result == ACCEPTED
         assert (await w.client.wait("MESSAGE_INTERVAL", since=mark)).interval_us == 2**31 - 1
 
 

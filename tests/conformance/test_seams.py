@@ -32,7 +32,7 @@ from support.world import HOLD, HOME, OFFBOARD, World, world
 from anafi_mav import geo
 from anafi_mav.arsdk.messages import ardrone3, rth
 from anafi_mav.services.commands import RESEND_WINDOW
-from anafi_mav.sim.faults import Impairment
+from anafi_mav.sim.world.faults import Impairment
 
 ARM, TAKEOFF, LAND = dialect.MAV_CMD_COMPONENT_ARM_DISARM, dialect.MAV_CMD_NAV_TAKEOFF, dialect.MAV_CMD_NAV_LAND
 GOTO, SET_MODE, PAUSE = dialect.MAV_CMD_DO_REPOSITION, dialect.MAV_CMD_DO_SET_MODE, dialect.MAV_CMD_DO_PAUSE_CONTINUE

@@ -14,7 +14,7 @@ from support.mav import Client
 from support.trouble import GOTO, goto
 from support.world import World, loopback, world
 
-from anafi_mav.arsdk import controller
+from anafi_mav.arsdk.link import controller
 from anafi_mav.arsdk.messages import common
 from anafi_mav.config import Config, DroneConfig
 from anafi_mav.errors import LinkLost

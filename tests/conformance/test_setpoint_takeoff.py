@@ -28,8 +28,8 @@ from support.setpoints import (
 from support.world import ARMED, HOLD, HOME, OFFBOARD, World, world
 
 from anafi_mav import geo
-from anafi_mav.sim.faults import Impairment
-from anafi_mav.sim.quirks import Quirk
+from anafi_mav.sim.world.faults import Impairment
+from anafi_mav.sim.world.quirks import Quirk
 
 ACCEPTED, FAILED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_FAILED
 CANCELLED = 6

@@ -14,7 +14,7 @@ from support.trouble import ACCEPTED, REJECTED, RTL, goto, heard
 from support.world import HOME, World, world
 
 from anafi_mav.arsdk.messages.skyctrl import Source
-from anafi_mav.sim.faults import Impairment
+from anafi_mav.sim.world.faults import Impairment
 
 PITCH_STICK = 3
 """Its axis at the Skycontroller (mapper.xml)."""

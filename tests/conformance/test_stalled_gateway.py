@@ -23,7 +23,7 @@ from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.messages.skyctrl import Source
 from anafi_mav.gateway import Gateway
 from anafi_mav.sim import DroneSpec, Simulator
-from anafi_mav.sim.faults import Impairment
+from anafi_mav.sim.world.faults import Impairment
 from anafi_mav.units import quaternion_from_euler
 
 PITCH_STICK = 3

@@ -32,10 +32,10 @@ from support.world import HOLD, LAND, POSITION, RETURN, World, world
 
 from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.errors import AnafiMavError
-from anafi_mav.services.modes import FlightMode
-from anafi_mav.services.right import Extent, Right
-from anafi_mav.sim.faults import Impairment
-from anafi_mav.sim.quirks import Quirk
+from anafi_mav.sim.world.faults import Impairment
+from anafi_mav.sim.world.quirks import Quirk
+from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.right import Extent, Right
 
 BAD_AIR = Impairment(loss=0.25, delay=0.2)
 PX4_POSITION = (1, 3, 0)

@@ -28,8 +28,8 @@ from support.trouble import (
 from support.world import ARMED, World, world
 
 from anafi_mav.arsdk.messages import ardrone3, rth
-from anafi_mav.sim.faults import Impairment
-from anafi_mav.sim.quirks import Quirk
+from anafi_mav.sim.world.faults import Impairment
+from anafi_mav.sim.world.quirks import Quirk
 
 FORCE = 21196
 PAUSE = dialect.MAV_CMD_DO_PAUSE_CONTINUE

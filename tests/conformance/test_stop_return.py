@@ -18,11 +18,11 @@ from anafi_mav.arsdk.messages import ardrone3, rth
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.messages.rth import RthHomeReachability, StateReason
 from anafi_mav.errors import AnafiMavError
-from anafi_mav.services.hold_rule import APART
-from anafi_mav.sim import power
-from anafi_mav.sim.faults import Impairment
-from anafi_mav.sim.homing import Phase
-from anafi_mav.sim.quirks import Quirk
+from anafi_mav.sim.autopilot import power
+from anafi_mav.sim.autopilot.homing import Phase
+from anafi_mav.sim.world.faults import Impairment
+from anafi_mav.sim.world.quirks import Quirk
+from anafi_mav.vehicle.hold_rule import APART
 
 BAD_AIR = Impairment(loss=0.25, delay=0.2)
 PX4_POSITION = (1, 3, 0)

@@ -8,8 +8,8 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.world import HOME, World, world
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import ardrone3
-from anafi_mav.arsdk.wire import Message
 
 TEXT = "Take-off altitude inaccurate: GPS +-12 m"
 

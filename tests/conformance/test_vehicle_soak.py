@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from support.soak import AFTER_CANCEL, BLAMED, Draw, Step, draw, fly, known, rounds_flown
 
-from anafi_mav.sim.faults import CLEAR, Impairment
+from anafi_mav.sim.world.faults import CLEAR, Impairment
 
 pytestmark = pytest.mark.soak
 

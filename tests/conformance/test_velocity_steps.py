@@ -7,7 +7,7 @@ import math
 import pytest
 from support.steps import velocity_step
 
-from anafi_mav.sim.wind import WindSpec
+from anafi_mav.sim.world.wind import WindSpec
 
 WINDS = [
     WindSpec(),

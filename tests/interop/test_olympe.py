@@ -8,12 +8,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from check_controller import check_controller
-from check_flight import check_flight
-from check_look import check_look
-from check_payload import BROKEN, check_payload
-from check_plan import check_plan
 from support import olympe
+from support.check_controller import check_controller
+from support.check_flight import check_flight
+from support.check_look import check_look
+from support.check_payload import BROKEN, check_payload
+from support.check_plan import check_plan
 
 SPEED = "5"
 """Simulated seconds per second."""

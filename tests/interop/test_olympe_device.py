@@ -17,13 +17,14 @@ from typing import Any, TypeAlias
 import pytest
 
 import anafi_mav.arsdk.messages
-from anafi_mav.arsdk import transport, wire
-from anafi_mav.arsdk.controller import ControllerSession, connect
-from anafi_mav.arsdk.envelope import ProtobufMessage
+from anafi_mav.arsdk.codec import wire
+from anafi_mav.arsdk.codec.envelope import ProtobufMessage
+from anafi_mav.arsdk.codec.wire import Message, MessageId, UnknownMessage
+from anafi_mav.arsdk.link import transport
+from anafi_mav.arsdk.link.controller import ControllerSession, connect
 from anafi_mav.arsdk.messages import ardrone3, common, mission
 from anafi_mav.arsdk.messages.generic import ListFlags
 from anafi_mav.arsdk.messages.proto import camera2
-from anafi_mav.arsdk.wire import Message, MessageId, UnknownMessage
 
 CLONE_NEWNET = 0x40000000
 SCRIPT = Path(__file__).with_name("olympe_device.py")

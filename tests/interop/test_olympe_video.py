@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from check_look import PRODUCTS, check_pictures
 from support import olympe
+from support.check_look import PRODUCTS, check_pictures
 
 from anafi_mav.geo import offset
 from anafi_mav.units import quaternion_from_euler

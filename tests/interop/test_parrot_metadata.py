@@ -14,7 +14,7 @@ from typing import Any
 import msgspec
 import pytest
 
-from anafi_mav.arsdk.video_metadata import (
+from anafi_mav.arsdk.video.video_metadata import (
     V3_PROFILE,
     FlyingState,
     FrameMetadata,
@@ -31,7 +31,7 @@ from anafi_mav.arsdk.video_metadata import (
     decode_v3,
     encode_v3,
 )
-from anafi_mav.arsdk.video_metadata_proto import decode_proto, encode_proto
+from anafi_mav.arsdk.video.video_metadata_proto import decode_proto, encode_proto
 
 SCRIPT = Path(__file__).with_name("parrot_metadata.py")
 

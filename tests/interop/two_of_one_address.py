@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from anafi_mav.drone import Drone
-from anafi_mav.drone.camera_state import PhotoSettings
-from anafi_mav.drone.camera_words import CameraMode, PhotoMode
+from anafi_mav.drone.payload.camera_enums import CameraMode, PhotoMode
+from anafi_mav.drone.payload.camera_state import PhotoSettings
 
 
 async def visit(address: str, interface: str, folder: Path, watching: asyncio.Event, other: asyncio.Event) -> Any:

@@ -6,8 +6,8 @@ import asyncio
 from collections.abc import Awaitable, Callable
 from typing import Any
 
-from anafi_mav.services.link_loss import LossAction
-from anafi_mav.services.manual_flight import Event
+from anafi_mav.vehicle.base.link_loss import LossAction
+from anafi_mav.vehicle.manual_flight import Event
 from support.world import World
 
 

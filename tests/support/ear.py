@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
-from anafi_mav.arsdk.wire import Message, UnknownMessage
+from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
 
 T = TypeVar("T")
 

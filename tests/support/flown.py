@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
 
-from anafi_mav import geo
+from anafi_mav import geo, mav_enums
 from anafi_mav.plans.plan import GLOBAL, Item, Plan
 from support.missions import apart
 from support.world import HOME
@@ -16,7 +16,13 @@ from support.world import HOME
 WITHIN = 2.0
 """m from a way point."""
 
-REGION, AHEAD, DISTANCE, PHOTOS, PANORAMA = 195, 197, 206, 2000, 2800
+REGION, AHEAD, DISTANCE, PHOTOS, PANORAMA = (
+    mav_enums.MAV_CMD_DO_SET_ROI_LOCATION,
+    mav_enums.MAV_CMD_DO_SET_ROI_NONE,
+    mav_enums.MAV_CMD_DO_SET_CAM_TRIGG_DIST,
+    mav_enums.MAV_CMD_IMAGE_START_CAPTURE,
+    mav_enums.MAV_CMD_PANORAMA_CREATE,
+)
 
 LINES = {
     16: ("waypoint",), 17: ("waypoint",), 19: ("waypoint",),

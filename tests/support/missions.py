@@ -21,16 +21,25 @@ NAN = float("nan")
 
 def way(north: float, east: float, up: float, **more: float) -> Item:
     """A way point so many m north and east of home, `up` above it."""
-    return Item(16, *around(PLACE, (north, east))[0], z=up, p4=NAN, frame=3, **more)  # type: ignore[arg-type]
+    return Item(dialect.MAV_CMD_NAV_WAYPOINT, *around(PLACE, (north, east))[0], z=up, p4=NAN, frame=3, **more)  # type: ignore[arg-type]
 
 
 def takeoff(up: float) -> Item:
-    return Item(22, 0.0, 0.0, z=up, p4=NAN, frame=3)
+    return Item(dialect.MAV_CMD_NAV_TAKEOFF, 0.0, 0.0, z=up, p4=NAN, frame=3)
 
 
-RTL, LAND = Item(20, 0.0, 0.0, frame=2), Item(21, 0.0, 0.0, p4=NAN, frame=3)
+RTL, LAND = (
+    Item(dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH, 0.0, 0.0, frame=2),
+    Item(dialect.MAV_CMD_NAV_LAND, 0.0, 0.0, p4=NAN, frame=3),
+)
 
-ROUND = [takeoff(6.0), way(12.0, 0.0, 6.0), way(12.0, 15.0, 7.0), Item(93, 0.0, 0.0, p1=2.0, frame=2), RTL]
+ROUND = [
+    takeoff(6.0),
+    way(12.0, 0.0, 6.0),
+    way(12.0, 15.0, 7.0),
+    Item(dialect.MAV_CMD_NAV_DELAY, 0.0, 0.0, p1=2.0, frame=2),
+    RTL,
+]
 """Up, two way points, a wait, home."""
 
 
@@ -41,7 +50,7 @@ def first(w: World) -> int:
 
 async def put(w: World, items: list[Item]) -> None:
     """Upload a mission as clients of the flavour do, with home in front for ArduPilot's."""
-    listed = [Item(16, *HOME), *items] if first(w) else items
+    listed = [Item(dialect.MAV_CMD_NAV_WAYPOINT, *HOME), *items] if first(w) else items
     assert (await upload(w.client, listed, MISSION)).type == ACCEPTED
 
 

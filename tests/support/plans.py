@@ -10,7 +10,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from anafi_mav import geo
+from anafi_mav import geo, mav_enums
 from support.mav import Client
 
 MISSION, FENCE, RALLY, ALL = 0, 1, 2, 255
@@ -75,13 +75,14 @@ def mission(home: tuple[float, float, float], size: int, shift: float = 0.0) -> 
     turns = [2.0 * math.pi * n / max(size - 1, 1) for n in range(size - 1)]
     circle = around(home[:2], *[(30.0 * math.cos(turn), 30.0 * math.sin(turn)) for turn in turns])
     points = [
-        Item(16, *place, z=15.0 + n % 7 + shift, p4=10.0 * (n % 30 + 1), frame=3) for n, place in enumerate(circle)
+        Item(mav_enums.MAV_CMD_NAV_WAYPOINT, *place, z=15.0 + n % 7 + shift, p4=10.0 * (n % 30 + 1), frame=3)
+        for n, place in enumerate(circle)
     ]
-    return [Item(16, *home), *points]
+    return [Item(mav_enums.MAV_CMD_NAV_WAYPOINT, *home), *points]
 
 
 def rally(place: tuple[float, float], height: float) -> Item:
-    return Item(5100, *place, z=height, frame=3)
+    return Item(mav_enums.MAV_CMD_NAV_RALLY_POINT, *place, z=height, frame=3)
 
 
 def send_count(client: Client, count: int, kind: int) -> int:

@@ -64,7 +64,8 @@ async def gateway_process(config: Path, limit: float) -> AsyncIterator[asyncio.s
 
     Real time counts for it: the limit is longer than the machine makes it wait.
     """
-    code = f"import sys; from anafi_mav.arsdk import watchdog; from anafi_mav.cli import main; watchdog.LIMIT = {limit}"
+    imports = "from anafi_mav.arsdk.link import watchdog; from anafi_mav.cli import main"
+    code = f"import sys; {imports}; watchdog.LIMIT = {limit}"
     process = await asyncio.create_subprocess_exec(
         sys.executable, "-c", f"{code}; sys.exit(main(sys.argv[1:]))", "run", "-c", str(config),
         stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.PIPE,

@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from anafi_mav.services.roll_sign import Sign
-from anafi_mav.services.roll_sign_service import KEY, written
+from anafi_mav.services.monitor.roll_sign_service import KEY, written
 from anafi_mav.sim import SimulatedDrone
+from anafi_mav.vehicle.base.roll_sign import Sign
 
 
 def remember_roll(folder: Path, drone: SimulatedDrone, sign: Sign = Sign.RIGHT, firmware: str = "") -> None:

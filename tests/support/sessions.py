@@ -22,7 +22,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from anafi_mav import geo
 from anafi_mav.errors import CommandTimeout
 from anafi_mav.mavlink import dialect as newer
-from anafi_mav.sim.faults import Impairment
+from anafi_mav.sim.world.faults import Impairment
 from support import setpoints
 from support.ftp import LIST, OPEN, READ, RESET, TERMINATE, Ftp
 from support.mav import NAN, Client
@@ -214,7 +214,11 @@ class Session:
 
     async def upload(self, items: list[Item], kind: int = MISSION, **more: Any) -> int:
         """Upload a plan in the manner of the flavour; the type of the MISSION_ACK."""
-        listed = [Item(16, *HOME), *items] if kind == MISSION and self.w.flavour == "ardupilot" else items
+        listed = (
+            [Item(dialect.MAV_CMD_NAV_WAYPOINT, *HOME), *items]
+            if kind == MISSION and self.w.flavour == "ardupilot"
+            else items
+        )
         ack = await upload(self.w.client, listed, kind, **more)
         self.note("upload", kind=kind, type=int(ack.type))
         return int(ack.type)
@@ -512,20 +516,20 @@ async def mission(s: Session) -> None:
     items = [
         takeoff(6.0),
         way(10.0, 0.0, 6.0),
-        Item(178, 0.0, 0.0, p1=1.0, p2=4.0, p3=-1.0, frame=2),
+        Item(dialect.MAV_CMD_DO_CHANGE_SPEED, 0.0, 0.0, p1=1.0, p2=4.0, p3=-1.0, frame=2),
         way(10.0, 10.0, 7.0),
-        Item(93, 0.0, 0.0, p1=1.5, frame=2),
-        Item(2000, 0.0, 0.0, p3=1.0, frame=2),
-        Item(2500, 0.0, 0.0, frame=2),
+        Item(dialect.MAV_CMD_NAV_DELAY, 0.0, 0.0, p1=1.5, frame=2),
+        Item(dialect.MAV_CMD_IMAGE_START_CAPTURE, 0.0, 0.0, p3=1.0, frame=2),
+        Item(dialect.MAV_CMD_VIDEO_START_CAPTURE, 0.0, 0.0, frame=2),
         way(0.0, 10.0, 6.0),
-        Item(2501, 0.0, 0.0, frame=2),
-        Item(177, 0.0, 0.0, p1=3.0, p2=1.0, frame=2),
+        Item(dialect.MAV_CMD_VIDEO_STOP_CAPTURE, 0.0, 0.0, frame=2),
+        Item(dialect.MAV_CMD_DO_JUMP, 0.0, 0.0, p1=3.0, p2=1.0, frame=2),
         RTL,
     ]
     async with s.world(web=True) as w:
         client = w.client
         await s.mode("mission")  # none is there
-        await s.upload([takeoff(6.0), Item(84, *PLACE, z=5.0, frame=3)])  # VTOL take-off
+        await s.upload([takeoff(6.0), Item(dialect.MAV_CMD_NAV_VTOL_TAKEOFF, *PLACE, z=5.0, frame=3)])  # VTOL take-off
         for left in ((5, 6), (5, 6, 8), ()):
             if await s.upload([item for index, item in enumerate(items) if index not in left]) == 0:
                 break

@@ -13,7 +13,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from anafi_mav import geo
 from anafi_mav.arsdk.messages import ardrone3
-from anafi_mav.sim.motion import Pose
+from anafi_mav.sim.world.motion import Pose
 from support.mav import Client
 from support.product import Process
 from support.world import HOLD, HOME, OFFBOARD, World

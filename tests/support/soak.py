@@ -23,7 +23,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from anafi_mav import geo
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.mavlink import dialect as newer
-from anafi_mav.sim.faults import CLEAR, Impairment
+from anafi_mav.sim.world.faults import CLEAR, Impairment
 from support.mav import NAN, Client
 from support.missions import ACTIVE, CORNERS, put, start, state, way
 from support.missions import RTL as ITEM_RTL
@@ -340,7 +340,7 @@ class Flight:
                 self.stream(n, dialect.MAVLink_manual_control_message(1, x, y, 500, 0, 0), third)
             case "upload":
                 items = [item_takeoff(height), way(first, second, height), way(second, first, height + 1.0), ITEM_RTL]
-                listed = [Item(16, *HOME), *items] if copter else items
+                listed = [Item(dialect.MAV_CMD_NAV_WAYPOINT, *HOME), *items] if copter else items
                 self.spawn(self._upload(n, listed))
             case "start":
                 if first > 0.0:

@@ -16,8 +16,8 @@ from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.config import Config, DroneConfig
 from anafi_mav.gateway import Gateway
 from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
-from anafi_mav.sim.model import MODELS
-from anafi_mav.sim.wind import WindSpec
+from anafi_mav.sim.world.model import MODELS
+from anafi_mav.sim.world.wind import WindSpec
 from support.mav import Client
 from support.roll import remember_roll
 from support.world import HOLD, HOME, TAKE_OFF_SPEED, TAKEOFF, loopback

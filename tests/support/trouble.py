@@ -7,14 +7,21 @@ import asyncio
 from collections.abc import Callable
 from typing import Any
 
-from anafi_mav import geo
+from anafi_mav import geo, mav_enums
 from anafi_mav.arsdk.messages.rth import StateReason
-from anafi_mav.sim.faults import Impairment
+from anafi_mav.sim.world.faults import Impairment
 from support.mav import NAN, Client
 from support.world import HOME, World
 
 ACCEPTED, REJECTED, DENIED, FAILED, IN_PROGRESS, CANCELLED = 0, 1, 2, 4, 5, 6
-ARM, TAKEOFF_CMD, LAND_CMD, RTL, GOTO, SET_MODE = 400, 22, 21, 20, 192, 176
+ARM, TAKEOFF_CMD, LAND_CMD, RTL, GOTO, SET_MODE = (
+    mav_enums.MAV_CMD_COMPONENT_ARM_DISARM,
+    mav_enums.MAV_CMD_NAV_TAKEOFF,
+    mav_enums.MAV_CMD_NAV_LAND,
+    mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH,
+    mav_enums.MAV_CMD_DO_REPOSITION,
+    mav_enums.MAV_CMD_DO_SET_MODE,
+)
 PX4_HOLD = (1, 4, 3)
 PX4_OFFBOARD = (1, 6, 0)
 

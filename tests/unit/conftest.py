@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import AsyncIterator
 
 import pytest
-from scripted_device import SETTINGS, STATES, ScriptedDevice
+from support.scripted_device import SETTINGS, STATES, ScriptedDevice
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import common
-from anafi_mav.arsdk.wire import Message
 from anafi_mav.drone import Drone
 
 

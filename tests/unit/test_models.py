@@ -14,11 +14,11 @@ from anafi_mav import models
 from anafi_mav.config import from_mapping
 from anafi_mav.drone import MODELS as ANNOUNCED
 from anafi_mav.errors import ConfigError
-from anafi_mav.plans.check import check
 from anafi_mav.plans.plan import WAYPOINT, Item, Plan
+from anafi_mav.plans.translation.check import check
 from anafi_mav.sim import DroneSpec
-from anafi_mav.sim.model import MODELS as SIMULATED
-from anafi_mav.sim.model import model_of
+from anafi_mav.sim.world.model import MODELS as SIMULATED
+from anafi_mav.sim.world.model import model_of
 
 
 @pytest.fixture
@@ -75,7 +75,9 @@ def test_record_that_is_added_is_known_in_every_room() -> None:
 @pytest.mark.usefixtures("_restored")
 def test_simulated_model_without_figures_says_which_are_missing() -> None:
     models.add(scout())
-    with pytest.raises(ConfigError, match=re.escape("no figures of 'scout': anafi_mav/sim/model.py lacks its entry")):
+    with pytest.raises(
+        ConfigError, match=re.escape("no figures of 'scout': anafi_mav/sim/world/model.py lacks its entry")
+    ):
         DroneSpec(model="scout")
     with pytest.raises(ValueError, match="scout: a simulated drone needs lenses"):
         replace(SIMULATED["4k"], name="scout", lenses=())

@@ -1,7 +1,7 @@
 """Parrot's message tables, one module per project or feature, in Parrot's words.
 
 Importing this package declares all of them. Ids, argument names, types and enum values are facts of Parrot's own
-XML (arsdk-xml, in the parrot-olympe wheel) and are compared with it by ``tests/unit/test_arsdk_xml.py``.
+XML (arsdk-xml, in the parrot-olympe wheel) and are compared with it by ``tests/unit/arsdk/messages/test_xml.py``.
 A message class is the PascalCase of Parrot's name; arguments keep Parrot's spelling. What the Ai says in protobuf is in
 `proto`.
 """

@@ -4,15 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated
 
+from anafi_mav.arsdk.codec.wire import ENUM, U8, Bits, Message, OpenEnum, event
 from anafi_mav.arsdk.messages.generic import ListFlags
-from anafi_mav.arsdk.wire import (
-    ENUM,
-    U8,
-    Bits,
-    Message,
-    OpenEnum,
-    event,
-)
 
 
 class Type(OpenEnum):

@@ -8,18 +8,8 @@ from __future__ import annotations
 
 from typing import Annotated
 
+from anafi_mav.arsdk.codec.wire import ENUM, F32, U8, U32, Bits, Message, OpenEnum, command, event
 from anafi_mav.arsdk.messages.generic import ListFlags
-from anafi_mav.arsdk.wire import (
-    ENUM,
-    F32,
-    U8,
-    U32,
-    Bits,
-    Message,
-    OpenEnum,
-    command,
-    event,
-)
 
 
 class Type(OpenEnum):

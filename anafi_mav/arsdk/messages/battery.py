@@ -4,19 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated
 
+from anafi_mav.arsdk.codec.wire import ENUM, STRING, U8, U16, U32, Bits, Buffer, Message, OpenEnum, event
 from anafi_mav.arsdk.messages.generic import ListFlags
-from anafi_mav.arsdk.wire import (
-    ENUM,
-    STRING,
-    U8,
-    U16,
-    U32,
-    Bits,
-    Buffer,
-    Message,
-    OpenEnum,
-    event,
-)
 
 
 class BatteryAlert(OpenEnum):

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from anafi_mav.arsdk.messages.generic import ListFlags
-from anafi_mav.arsdk.wire import (
+from anafi_mav.arsdk.codec.wire import (
     ENUM,
     F32,
     I8,
@@ -21,6 +20,7 @@ from anafi_mav.arsdk.wire import (
     command,
     event,
 )
+from anafi_mav.arsdk.messages.generic import ListFlags
 
 
 class Model(OpenEnum):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from anafi_mav.arsdk.wire import (
+from anafi_mav.arsdk.codec.wire import (
     ENUM,
     F64,
     I16,

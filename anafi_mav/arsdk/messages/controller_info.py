@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from anafi_mav.arsdk.wire import F32, F64, U8, Bits, Buffer, Message, OpenEnum, command, event
+from anafi_mav.arsdk.codec.wire import F32, F64, U8, Bits, Buffer, Message, OpenEnum, command, event
 
 
 class SupportedCommand(OpenEnum):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from anafi_mav.arsdk.wire import OpenEnum
+from anafi_mav.arsdk.codec.wire import OpenEnum
 
 
 class ListFlags(OpenEnum):

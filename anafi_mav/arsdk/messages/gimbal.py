@@ -4,17 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from anafi_mav.arsdk.wire import (
-    ENUM,
-    F32,
-    U8,
-    Bits,
-    Buffer,
-    Message,
-    OpenEnum,
-    command,
-    event,
-)
+from anafi_mav.arsdk.codec.wire import ENUM, F32, U8, Bits, Buffer, Message, OpenEnum, command, event
 
 
 class Model(OpenEnum):

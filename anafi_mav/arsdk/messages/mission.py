@@ -4,19 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated
 
+from anafi_mav.arsdk.codec.wire import BINARY, ENUM, STRING, U8, U16, Bits, Message, OpenEnum, command, event
 from anafi_mav.arsdk.messages.generic import ListFlags
-from anafi_mav.arsdk.wire import (
-    BINARY,
-    ENUM,
-    STRING,
-    U8,
-    U16,
-    Bits,
-    Message,
-    OpenEnum,
-    command,
-    event,
-)
 
 
 class MissionState(OpenEnum):

@@ -4,16 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from anafi_mav.arsdk.wire import (
-    ENUM,
-    U16,
-    U32,
-    Bits,
-    Message,
-    OpenEnum,
-    command,
-    event,
-)
+from anafi_mav.arsdk.codec.wire import ENUM, U16, U32, Bits, Message, OpenEnum, command, event
 
 
 class Mode(OpenEnum):

@@ -4,13 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from anafi_mav.arsdk.wire import (
-    U32,
-    Bits,
-    Message,
-    OpenEnum,
-    event,
-)
+from anafi_mav.arsdk.codec.wire import U32, Bits, Message, OpenEnum, event
 
 
 class Indicator(OpenEnum):

@@ -8,20 +8,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from anafi_mav.arsdk.wire import (
-    ENUM,
-    F32,
-    F64,
-    I16,
-    STRING,
-    U8,
-    U16,
-    Buffer,
-    Message,
-    OpenEnum,
-    command,
-    event,
-)
+from anafi_mav.arsdk.codec.wire import ENUM, F32, F64, I16, STRING, U8, U16, Buffer, Message, OpenEnum, command, event
 
 
 class Variant(OpenEnum):

@@ -4,15 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from anafi_mav.arsdk.wire import (
-    ENUM,
-    U8,
-    U16,
-    Bits,
-    Message,
-    OpenEnum,
-    event,
-)
+from anafi_mav.arsdk.codec.wire import ENUM, U8, U16, Bits, Message, OpenEnum, event
 
 
 class Model(OpenEnum):

@@ -4,18 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated
 
+from anafi_mav.arsdk.codec.wire import ENUM, I16, STRING, U8, Bits, Message, OpenEnum, command, event
 from anafi_mav.arsdk.messages.generic import ListFlags
-from anafi_mav.arsdk.wire import (
-    ENUM,
-    I16,
-    STRING,
-    U8,
-    Bits,
-    Message,
-    OpenEnum,
-    command,
-    event,
-)
 
 
 class Band(OpenEnum):

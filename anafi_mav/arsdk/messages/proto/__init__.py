@@ -3,7 +3,7 @@
 A message of a service is named as its class: `Command.Configure` of camera2 is `camera2.Configure`. A message in a
 message is the path to it: `Event.State.Photo` is `StatePhoto`. Enum values go without the prefix that repeats the name
 of their enum. Numbers, types and values are compared with Parrot's descriptors by
-``tests/unit/test_arsdk_protobuf_tables.py``.
+``tests/unit/arsdk/messages/test_protobuf_tables.py``.
 """
 
 from anafi_mav.arsdk.messages.proto import (

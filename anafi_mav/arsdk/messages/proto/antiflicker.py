@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from anafi_mav.arsdk.envelope import ProtobufMessage, Service
-from anafi_mav.arsdk.protobuf import BOOL, ENUM, RECORD, Empty, Field, Record
-from anafi_mav.arsdk.wire import OpenEnum
+from anafi_mav.arsdk.codec.envelope import ProtobufMessage, Service
+from anafi_mav.arsdk.codec.protobuf import BOOL, ENUM, RECORD, Empty, Field, Record
+from anafi_mav.arsdk.codec.wire import OpenEnum
 
 COMMAND = Service("arsdk.antiflicker.Command", "antiflicker.Command")
 EVENT = Service("arsdk.antiflicker.Event", "antiflicker.Event")

@@ -10,7 +10,21 @@ from typing import Annotated, ClassVar
 
 import msgspec
 
-from anafi_mav.arsdk.envelope import ProtobufMessage, Service
+from anafi_mav.arsdk.codec.envelope import ProtobufMessage, Service
+from anafi_mav.arsdk.codec.protobuf import (
+    BOOL,
+    DOUBLE,
+    ENUM,
+    FLOAT,
+    RECORD,
+    STRING,
+    UINT32,
+    UINT64,
+    Field,
+    Map,
+    Record,
+    Wrapped,
+)
 from anafi_mav.arsdk.messages.proto import thermal_rendering
 from anafi_mav.arsdk.messages.proto.camera2_values import (
     AudioRecordingMode,
@@ -58,20 +72,6 @@ from anafi_mav.arsdk.messages.proto.camera2_values import (
     ZoomGotoPresetEnum,
     ZoomPresetEnum,
     ZoomVelocityControlQualityMode,
-)
-from anafi_mav.arsdk.protobuf import (
-    BOOL,
-    DOUBLE,
-    ENUM,
-    FLOAT,
-    RECORD,
-    STRING,
-    UINT32,
-    UINT64,
-    Field,
-    Map,
-    Record,
-    Wrapped,
 )
 
 COMMAND = Service("arsdk.camera.Command", "camera2.Command")

@@ -6,9 +6,9 @@ from typing import Annotated
 
 import msgspec
 
-from anafi_mav.arsdk.envelope import ProtobufMessage, Service
-from anafi_mav.arsdk.protobuf import BOOL, BYTES, ENUM, INT32, RECORD, STRING, UINT32, Field, Map, Record, Wrapped
-from anafi_mav.arsdk.wire import OpenEnum
+from anafi_mav.arsdk.codec.envelope import ProtobufMessage, Service
+from anafi_mav.arsdk.codec.protobuf import BOOL, BYTES, ENUM, INT32, RECORD, STRING, UINT32, Field, Map, Record, Wrapped
+from anafi_mav.arsdk.codec.wire import OpenEnum
 
 COMMAND = Service("arsdk.connectivity.Command", "connectivity.Command")
 EVENT = Service("arsdk.connectivity.Event", "connectivity.Event")

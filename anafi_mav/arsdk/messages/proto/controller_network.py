@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from anafi_mav.arsdk.envelope import ProtobufMessage, Service
+from anafi_mav.arsdk.codec.envelope import ProtobufMessage, Service
+from anafi_mav.arsdk.codec.protobuf import RECORD, Field
 from anafi_mav.arsdk.messages.proto import network
-from anafi_mav.arsdk.protobuf import RECORD, Field
 
 COMMAND = Service("arsdk.controllernetwork.Command", "controllerNetwork.Command")
 EVENT = Service("arsdk.controllernetwork.Event", "controllerNetwork.Event")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from anafi_mav.arsdk.envelope import ProtobufMessage, Service
-from anafi_mav.arsdk.protobuf import BOOL, RECORD, STRING, Field, Record
+from anafi_mav.arsdk.codec.envelope import ProtobufMessage, Service
+from anafi_mav.arsdk.codec.protobuf import BOOL, RECORD, STRING, Field, Record
 
 COMMAND = Service("arsdk.developer.Command", "developer.Command")
 EVENT = Service("arsdk.developer.Event", "developer.Event")

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from anafi_mav.arsdk.envelope import ProtobufMessage, Service
+from anafi_mav.arsdk.codec.envelope import ProtobufMessage, Service
+from anafi_mav.arsdk.codec.protobuf import BOOL, ENUM, RECORD, SINT32, STRING, UINT32, Field, Record, Wrapped
+from anafi_mav.arsdk.codec.wire import OpenEnum
 from anafi_mav.arsdk.messages.proto import backuplink, microhard
-from anafi_mav.arsdk.protobuf import BOOL, ENUM, RECORD, SINT32, STRING, UINT32, Field, Record, Wrapped
-from anafi_mav.arsdk.wire import OpenEnum
 
 COMMAND = Service("arsdk.devicemanager.Command", "devicemanager.Command")
 EVENT = Service("arsdk.devicemanager.Event", "devicemanager.Event")

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from anafi_mav.arsdk.envelope import ProtobufMessage, Service
-from anafi_mav.arsdk.protobuf import ENUM, STRING, UINT32, Field
-from anafi_mav.arsdk.wire import OpenEnum
+from anafi_mav.arsdk.codec.envelope import ProtobufMessage, Service
+from anafi_mav.arsdk.codec.protobuf import ENUM, STRING, UINT32, Field
+from anafi_mav.arsdk.codec.wire import OpenEnum
 
 COMMAND = Service("arsdk.logsync.Command", "logsync.Command")
 EVENT = Service("arsdk.logsync.Event", "logsync.Event")

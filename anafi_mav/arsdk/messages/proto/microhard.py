@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from anafi_mav.arsdk.protobuf import ENUM, Field, Record
-from anafi_mav.arsdk.wire import OpenEnum
+from anafi_mav.arsdk.codec.protobuf import ENUM, Field, Record
+from anafi_mav.arsdk.codec.wire import OpenEnum
 
 
 class Bandwidth(OpenEnum):

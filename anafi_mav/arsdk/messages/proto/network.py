@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from anafi_mav.arsdk.envelope import ProtobufMessage, Service
-from anafi_mav.arsdk.protobuf import BOOL, ENUM, INT32, RECORD, STRING, Empty, Field, Record, Wrapped
-from anafi_mav.arsdk.wire import OpenEnum
+from anafi_mav.arsdk.codec.envelope import ProtobufMessage, Service
+from anafi_mav.arsdk.codec.protobuf import BOOL, ENUM, INT32, RECORD, STRING, Empty, Field, Record, Wrapped
+from anafi_mav.arsdk.codec.wire import OpenEnum
 
 COMMAND = Service("arsdk.network.Command", "network.Command")
 EVENT = Service("arsdk.network.Event", "network.Event")

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from anafi_mav.arsdk.envelope import ProtobufMessage, Service
-from anafi_mav.arsdk.protobuf import BOOL, ENUM, FLOAT, RECORD, Field, Record, Wrapped
-from anafi_mav.arsdk.wire import OpenEnum
+from anafi_mav.arsdk.codec.envelope import ProtobufMessage, Service
+from anafi_mav.arsdk.codec.protobuf import BOOL, ENUM, FLOAT, RECORD, Field, Record, Wrapped
+from anafi_mav.arsdk.codec.wire import OpenEnum
 
 COMMAND = Service("arsdk.piloting.Command", "piloting.Command")
 EVENT = Service("arsdk.piloting.Event", "piloting.Event")

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from anafi_mav.arsdk.envelope import ProtobufMessage, Service
+from anafi_mav.arsdk.codec.envelope import ProtobufMessage, Service
+from anafi_mav.arsdk.codec.protobuf import BOOL, DOUBLE, ENUM, RECORD, Empty, Field, Record
+from anafi_mav.arsdk.codec.wire import OpenEnum
 from anafi_mav.arsdk.messages.proto import backuplink
-from anafi_mav.arsdk.protobuf import BOOL, DOUBLE, ENUM, RECORD, Empty, Field, Record
-from anafi_mav.arsdk.wire import OpenEnum
 
 COMMAND = Service("arsdk.pointnfly.Command", "pointnfly.Command")
 EVENT = Service("arsdk.pointnfly.Event", "pointnfly.Event")

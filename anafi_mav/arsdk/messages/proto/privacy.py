@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from anafi_mav.arsdk.envelope import ProtobufMessage, Service
-from anafi_mav.arsdk.protobuf import BOOL, ENUM, RECORD, STRING, Field, Record
-from anafi_mav.arsdk.wire import OpenEnum
+from anafi_mav.arsdk.codec.envelope import ProtobufMessage, Service
+from anafi_mav.arsdk.codec.protobuf import BOOL, ENUM, RECORD, STRING, Field, Record
+from anafi_mav.arsdk.codec.wire import OpenEnum
 
 COMMAND = Service("arsdk.privacy.Command", "privacy.Command")
 EVENT = Service("arsdk.privacy.Event", "privacy.Event")

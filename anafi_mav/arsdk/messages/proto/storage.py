@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from anafi_mav.arsdk.envelope import ProtobufMessage, Service
-from anafi_mav.arsdk.protobuf import BOOL, ENUM, RECORD, STRING, UINT32, UINT64, Field, Record, Wrapped
-from anafi_mav.arsdk.wire import OpenEnum
+from anafi_mav.arsdk.codec.envelope import ProtobufMessage, Service
+from anafi_mav.arsdk.codec.protobuf import BOOL, ENUM, RECORD, STRING, UINT32, UINT64, Field, Record, Wrapped
+from anafi_mav.arsdk.codec.wire import OpenEnum
 
 COMMAND = Service("arsdk.storage.Command", "storage.Command")
 EVENT = Service("arsdk.storage.Event", "storage.Event")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from anafi_mav.arsdk.protobuf import BOOL, ENUM, FLOAT, RECORD, Field, Record, Wrapped
-from anafi_mav.arsdk.wire import OpenEnum
+from anafi_mav.arsdk.codec.protobuf import BOOL, ENUM, FLOAT, RECORD, Field, Record, Wrapped
+from anafi_mav.arsdk.codec.wire import OpenEnum
 
 
 class MixingMode(OpenEnum):

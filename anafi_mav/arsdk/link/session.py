@@ -1,0 +1,266 @@
+"""The asyncio shell around one `Transport`: a UDP socket and one timer.
+
+Messages that are sent within one turn of the loop leave together, which packs them into few frames. The timer is
+armed again only when the next deadline comes earlier; when it fires too early it goes back to sleep. At a
+hundred drones with a hundred events a second each, that is what keeps the loop idle.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import os
+import socket
+from collections import Counter
+from collections.abc import Callable
+from typing import TypeAlias, cast
+
+from typing_extensions import assert_never
+
+from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
+from anafi_mav.arsdk.link.transport import (
+    Delivered,
+    Event,
+    Garbage,
+    LinkDown,
+    Received,
+    Silent,
+    Speaks,
+    Transport,
+    Undelivered,
+)
+
+log = logging.getLogger("anafi_mav.arsdk")
+raw_log = logging.getLogger("anafi_mav.raw")
+
+OnMessage: TypeAlias = Callable[[Message | UnknownMessage, float], None]
+"""Called with each message and the loop time of its arrival."""
+
+Air: TypeAlias = Callable[[bytes, bool, Callable[[bytes], None]], None]
+"""Called with each datagram, whether it came in, and what hands it on, which may be called later, twice or never."""
+
+SOCKET_BUFFER = 1 << 18
+"""Bytes the kernel may hold for us while the loop is busy: some seconds of a drone's telemetry."""
+
+
+def reason_of(error: OSError) -> str:
+    """The system's own words for an error; asyncio hides them behind "Connect call failed"."""
+    return os.strerror(error.errno) if error.errno is not None and error.errno > 0 else error.strerror or str(error)
+
+
+class Session(asyncio.DatagramProtocol):
+    """One ARSDK connection over UDP. `open` makes one from a transport and a bound socket.
+
+    `peer` is for a socket that is not connected: where datagrams go, and the only source that is heard. Messages arrive
+    at `on_message`; an exception in it is reported to the loop's exception handler and does not cost the messages
+    behind it.
+    """
+
+    def __init__(self, transport: Transport, on_message: OnMessage, peer: tuple[str, int] | None = None) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._transport = transport
+        self.on_message = on_message
+        self.mute = False
+        """True: everything is dropped, both ways, as if the air were gone (faults of the simulator)."""
+        self.air: Air | None = None
+        """What happens to datagrams on their way (faults of the simulator); None: nothing."""
+        self.lost: asyncio.Future[str] = self._loop.create_future()
+        """Done when the link is down or closed; its result says why."""
+        self._peer = peer
+        self.on_delivered: Callable[[int, bool], None] = lambda token, arrived: None
+        """Told what became of each acknowledged command, by the token of `send`: received, or given up (version 1)."""
+        self.on_silent: Callable[[str], None] = lambda reason: None
+        """Called when the peer is not heard any more; nothing but pings and answers is sent until it speaks."""
+        self.on_speaks: Callable[[], None] = lambda: None
+        """Called when it is heard again, before its messages."""
+        self._endpoint: asyncio.DatagramTransport | None = None
+        self._closed = asyncio.Event()
+        self._timer: asyncio.TimerHandle | None = None
+        self._timer_at = float("inf")
+        self._flush_due = False
+        self._congested = False
+
+    async def open(self, sock: socket.socket) -> None:
+        """Begin on this bound socket, which belongs to the session from now on."""
+        sock.setblocking(False)
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, SOCKET_BUFFER)
+        await self._loop.create_datagram_endpoint(lambda: self, sock=sock)
+        self._flush()
+
+    @property
+    def address(self) -> tuple[str, int]:
+        """Our own UDP address, once open."""
+        assert self._endpoint is not None
+        ip, port = self._endpoint.get_extra_info("sockname")
+        return ip, port
+
+    @property
+    def version(self) -> int:
+        """Negotiated protocol version."""
+        return self._transport.version
+
+    @property
+    def last_received(self) -> float:
+        """Loop time at which the peer was heard last; the beginning of the session if never."""
+        return self._transport.last_received
+
+    @property
+    def silent(self) -> bool:
+        """The peer is not heard, and commands are dropped."""
+        return self._transport.silent
+
+    @property
+    def counters(self) -> Counter[str]:
+        """See `Transport.counters`."""
+        return self._transport.counters
+
+    def send(self, message: Message | UnknownMessage) -> int:
+        """Send a message at the end of this turn of the loop; the token is for `cancel`.
+
+        Raises `LocalProtocolError` when it cannot be encoded. On a link that is lost it does nothing.
+        """
+        token = self._transport.send(message, self._loop.time())
+        self._flush_soon()
+        return token
+
+    def cancel(self, token: int) -> None:
+        """See `Transport.cancel`: the message is not sent (again)."""
+        self._transport.cancel(token)
+        self._flush_soon()
+
+    async def close(self) -> None:
+        """Send what is queued, once, then end the session and free its port. Idempotent."""
+        self._flush()
+        self.end("closed")
+        if self._endpoint is not None:
+            await self._closed.wait()
+
+    def end(self, reason: str) -> None:
+        """End at once: nothing is sent or received any more, `lost` is done with this reason. Idempotent."""
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        if self._endpoint is not None:
+            self._endpoint.abort()
+        if not self.lost.done():
+            self.lost.set_result(reason)
+
+    # -- called by asyncio
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        self._endpoint = cast(asyncio.DatagramTransport, transport)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._closed.set()
+        self.end("closed" if exc is None else f"UDP socket failed: {exc}")
+
+    def datagram_received(self, data: bytes, addr: tuple[str, int]) -> None:
+        if self.mute or self.lost.done():
+            return
+        if self._peer is not None and addr != self._peer:
+            self._transport.counters["foreign"] += 1
+            return
+        if raw_log.isEnabledFor(logging.DEBUG):
+            raw_log.debug("%s > %s", addr, data.hex())
+        if self.air is None:
+            self._take(data)
+        else:
+            self.air(data, True, self._take)
+
+    def _take(self, data: bytes) -> None:
+        if self.mute or self.lost.done():
+            return
+        now = self._loop.time()
+        # Whatever the receivers send leaves in the flush below.
+        self._flush_due = True
+        self._handle(self._transport.receive(data, now), now)
+        self._flush()
+
+    def error_received(self, exc: Exception) -> None:
+        # ICMP "port unreachable" on a connected socket: nobody is there. libarsdk ends the link on it too.
+        if isinstance(exc, ConnectionRefusedError):
+            self.end("the drone's UDP port is closed")
+        else:
+            log.debug("UDP error: %s", exc)
+
+    def pause_writing(self) -> None:
+        # The network takes nothing and asyncio's buffer is full: telemetry that waits is telemetry that is old.
+        self._congested = True
+
+    def resume_writing(self) -> None:
+        self._congested = False
+
+    # -- inside
+
+    def _handle(self, events: list[Event], now: float) -> None:
+        for event in events:
+            if self.lost.done():
+                return
+            if type(event) is Received:
+                try:
+                    self.on_message(event.message, now)
+                except Exception as error:
+                    self._loop.call_exception_handler(
+                        {"message": f"receiver of {event.message!r} failed", "exception": error, "protocol": self}
+                    )
+                continue
+            match event:
+                case Received():
+                    pass
+                case Delivered(token):
+                    self.on_delivered(token, True)
+                case Undelivered(token, reason):
+                    self.on_delivered(token, False)
+                    log.debug("message %d undelivered: %s", token, reason)
+                case Garbage(reason):
+                    log.debug("unreadable bytes from the peer: %s", reason)
+                case Silent(reason):
+                    self.on_silent(reason)
+                case Speaks():
+                    self.on_speaks()
+                case LinkDown(reason):
+                    self.end(reason)
+                case _:
+                    assert_never(event)
+
+    def _flush_later(self, delay: float) -> None:
+        self._flush_due = True
+        self._loop.call_later(delay, self._flush)
+
+    def _flush_soon(self) -> None:
+        if not self._flush_due:
+            self._flush_due = True
+            self._loop.call_soon(self._flush)
+
+    def _flush(self) -> None:
+        self._flush_due = False
+        endpoint = self._endpoint
+        if endpoint is None or self.lost.done():
+            return
+        for datagram in self._transport.outgoing(self._loop.time()):
+            if self._congested:
+                self.counters["dropped.congested"] += 1
+            elif self.air is None:
+                self._give(datagram)
+            else:
+                self.air(datagram, False, self._give)
+        deadline = self._transport.deadline()
+        if deadline is not None and deadline < self._timer_at:
+            if self._timer is not None:
+                self._timer.cancel()
+            self._timer_at = deadline
+            self._timer = self._loop.call_at(deadline, self._expire)
+
+    def _give(self, datagram: bytes) -> None:
+        if not self.mute and self._endpoint is not None and not self.lost.done():
+            self._endpoint.sendto(datagram, self._peer)
+
+    def _expire(self) -> None:
+        self._timer = None
+        self._timer_at = float("inf")
+        if self.lost.done():
+            return
+        now = self._loop.time()
+        self._flush_due = True
+        self._handle(self._transport.expire(now), now)
+        self._flush()

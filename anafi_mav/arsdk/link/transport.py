@@ -1,0 +1,522 @@
+"""The ARSDK transport without I/O: queues, acknowledgements, retries, pings, for both ends of the link.
+
+The same object plays the controller and the device; `Role` picks the queue ids. The shell hands datagrams and the
+time to `receive`, sends what `outgoing` returns and calls `expire` when `deadline` has come.
+
+Rules (arsdk-ng libarsdk/src/cmd_itf/arsdk_cmd_itf{1,2,3}.c and arsdk_transport.c):
+
+- an acknowledged queue is stop-and-wait: one frame is in flight and is repeated with its sequence number until it
+  is acknowledged; versions 2 and 3 repeat for ever, in version 1 a controller gives up after five repetitions;
+- a receiver takes an unacknowledged frame when its sequence number is above the last one, or more than ten below it (a
+  wrap, or a peer that began anew). DEVIATION: libarsdk has the same rule for acknowledged frames, and so takes a copy
+  that is eleven frames late, or from before a wrap, for a new one; here the numbers of acknowledged frames, of which
+  one is in flight, are compared around the wrap and what is behind is a copy. A copy is acknowledged too, since it is
+  the acknowledgement that got lost;
+- a side that has received nothing for a while pings; three pings without any answer end the link.
+"""
+
+from __future__ import annotations
+
+import enum
+import itertools
+import struct
+from collections import Counter, deque
+from collections.abc import Sequence
+from typing import TypeAlias
+
+import msgspec
+
+from anafi_mav.arsdk.codec import wire
+from anafi_mav.arsdk.codec.wire import Buffer, Message, MessageId, UnknownMessage
+from anafi_mav.arsdk.link.frame import VERSIONS, FrameType, decode_frames, encode_frame
+from anafi_mav.arsdk.link.packing import PACK_LIMIT, Piece, Unpacker, Waiting, longest_command, pack, with_length
+from anafi_mav.errors import LocalProtocolError
+
+PING, PONG = 0, 1
+"""Queue ids of the link check (arsdk-ng libarsdk/src/arsdk_transport_ids.h, as all ids here)."""
+
+ACK_OFFSET = 128
+"""The acknowledgement of queue n travels as id n + 128."""
+
+ACK_TIMEOUT = 0.15
+"""s until a frame in flight is repeated (arsdk-ng libarsdkctrl/src/arsdk_device.c, ack_timeout_ms)."""
+
+MAX_RETRIES_V1 = 5
+"""Repetitions after which a version 1 controller gives a command up (same file, default_max_retry_count)."""
+
+MAX_UNANSWERED_PINGS = 3
+"""arsdk-ng arsdk_transport.c, send_ping."""
+
+RETRIED_FOR_EVER = frozenset(MessageId(*numbers) for numbers in [(0, 2, 0), (0, 4, 0), (1, 0, 4), (4, 4, 0), (4, 6, 0)])
+"""AllSettings and AllStates (of drone and Skycontroller) and Emergency: commands with timeout="RETRY" in Parrot's
+XML; version 1 does not give them up either."""
+
+STALL = 0.3
+"""s that a ping may be late before the host counts as stalled."""
+
+MAX_QUEUED = 4096
+"""Messages waiting in an acknowledged queue. All states and settings of a drone are a few hundred; a queue this
+long means that the peer is gone, and the pings will say so."""
+
+MAX_QUEUED_NOACK = 512
+"""Messages waiting in the unacknowledged queue; beyond it the oldest is dropped, as the newest value counts."""
+
+MAX_REPLIES = 512
+"""Acknowledgements and pongs waiting to be sent: a datagram can hold thousands of pings, we need not answer all."""
+
+
+class Role(enum.Enum):
+    """Which end of the link."""
+
+    CONTROLLER = "controller"
+    DEVICE = "device"
+
+
+class Received(msgspec.Struct, frozen=True):
+    """The peer sent a message; each acknowledged one arrives once and in order."""
+
+    message: Message | UnknownMessage
+
+
+class Delivered(msgspec.Struct, frozen=True):
+    """The peer acknowledged the frame that carried the last byte of this message."""
+
+    token: int
+
+
+class Undelivered(msgspec.Struct, frozen=True):
+    """This message was given up: "no acknowledgement" (version 1 only) or "queue full"."""
+
+    token: int
+    reason: str
+
+
+class Garbage(msgspec.Struct, frozen=True):
+    """The peer sent something unreadable; `reason` is the key it is counted under."""
+
+    reason: str
+
+
+class Silent(msgspec.Struct, frozen=True):
+    """The peer is not heard any more. Commands are dropped until it speaks; only pings and answers are sent."""
+
+    reason: str
+
+
+class Speaks(msgspec.Struct, frozen=True):
+    """The peer is heard again after a silence."""
+
+
+class LinkDown(msgspec.Struct, frozen=True):
+    """The link is dead. Nothing is sent or received any more; a new connection needs a new transport."""
+
+    reason: str
+
+
+Event: TypeAlias = Received | Delivered | Undelivered | Garbage | Silent | Speaks | LinkDown
+
+_ACK, _NOACK, _WITHACK = int(FrameType.ACK), int(FrameType.NOACK), int(FrameType.WITHACK)
+
+_NOACK_ID = {Role.CONTROLLER: 10, Role.DEVICE: 127}
+_ACK_ID = {Role.CONTROLLER: 11, Role.DEVICE: 126}
+_LOW_PRIO_ID = {Role.CONTROLLER: 11, Role.DEVICE: 125}
+_RECEIVED_IDS = {Role.CONTROLLER: frozenset({125, 126, 127}), Role.DEVICE: frozenset({10, 11, 12})}
+
+_U16 = struct.Struct("<H")
+_U64 = struct.Struct("<Q")
+_NEVER = float("inf")
+
+
+class _AckQueue:
+    """Sending side of one acknowledged queue."""
+
+    __slots__ = ("due", "flight", "id", "sendings", "seq", "waiting")
+
+    def __init__(self, id: int) -> None:
+        self.id = id
+        self.waiting: deque[Waiting] = deque()
+        self.flight: list[Piece] = []
+        """The frame that waits for its acknowledgement; empty: none does."""
+        self.seq = -1
+        self.due = _NEVER
+        """When the frame in flight has to be sent (again)."""
+        self.sendings = 0
+
+    def land(self) -> None:
+        """Nothing is in flight any more."""
+        self.flight = []
+        self.due = _NEVER
+
+
+class Transport:
+    """One connection. Construct it when the handshake is done; `version` is the negotiated protocol version.
+
+    A ping goes out when nothing was received for `ping_after` seconds, and again every `ping_after`. The link is
+    down after three unanswered pings, or when nothing was received for `silence_limit` seconds. With `fades` it is
+    silent then: everything queued is dropped, and the session goes on when the peer speaks again.
+
+    Call `outgoing` after every `receive`, `send`, `cancel` and `expire`.
+    """
+
+    def __init__(
+        self,
+        role: Role,
+        version: int,
+        now: float,
+        *,
+        ping_after: float = 2.0,
+        silence_limit: float | None = None,
+        gives_up: bool = True,
+        fades: bool = False,
+    ) -> None:
+        """`gives_up` False: a controller of version 1 repeats every command for ever, too."""
+        if version not in VERSIONS:
+            raise LocalProtocolError(f"protocol version {version}, expected one of {VERSIONS}")
+        if ping_after <= 0 or (silence_limit is not None and silence_limit <= 0):
+            raise LocalProtocolError("ping_after and silence_limit must be positive")
+        self.role = role
+        self.version = version
+        self.counters: Counter[str] = Counter()
+        """What happened how often: "received", "sent", "retransmitted", "duplicate", "garbage.<reason>", …"""
+        self._gives_up = gives_up and version == 1 and role is Role.CONTROLLER
+        self._ping_after = ping_after
+        self._silence_limit = _NEVER if silence_limit is None else silence_limit
+        self._tokens = itertools.count(1)
+        self._seq_mask = 0xFF if version == 1 else 0xFFFF
+        self._received_ids = _RECEIVED_IDS[role]
+        # The first frame has number 0 and must count as new, hence a wrap from the highest number.
+        self._last_seq = dict.fromkeys(self._received_ids, self._seq_mask)
+        self._unpacker = Unpacker(version)
+        self._longest = (longest_command(version, False), longest_command(version, True))
+        """Bytes of a command in the unacknowledged queue, and in an acknowledged one."""
+        self._noack: deque[tuple[int, bytes]] = deque()
+        self._noack_seq = -1
+        self._queues = {id: _AckQueue(id) for id in (_ACK_ID[role], _LOW_PRIO_ID[role])}
+        self._ack_seq = -1
+        self._replies: list[bytes] = []
+        self._pending: list[Event] = []
+        self._last_received = now
+        self._ping_due = now + ping_after
+        self._ping_seq = -1
+        self._unanswered = 0
+        self._fades = fades
+        self._silent = False
+        self._down = False
+
+    @property
+    def last_received(self) -> float:
+        """When the peer was heard last, s; the beginning of the session if never."""
+        return self._last_received
+
+    @property
+    def silent(self) -> bool:
+        """The peer has not been heard for too long, and commands are dropped."""
+        return self._silent
+
+    # -- receiving
+
+    def receive(self, data: bytes, now: float) -> list[Event]:
+        """What this datagram means. Never raises, whatever the bytes are."""
+        if self._down:
+            return []
+        events = self._take_pending()
+        frames, garbage = decode_frames(self.version, data)
+        if frames:
+            # Any frame proves that the peer lives, not the pong alone.
+            self._last_received = now
+            self._ping_due = now + self._ping_after
+            self._unanswered = 0
+            if self._silent:
+                self._silent = False
+                events.append(Speaks())
+        for type, id, seq, payload in frames:
+            if id in self._received_ids and type != _ACK:
+                if type == _WITHACK:
+                    self._acknowledge(id, seq)
+                if self._is_copy(type, seq, self._last_seq[id]):
+                    self.counters["duplicate"] += 1
+                    continue
+                self._last_seq[id] = seq
+                commands, readable = self._unpacker.unpack(id, type == _WITHACK, payload)
+                for command in commands:
+                    self._command(command, events)
+                if not readable:
+                    self._garbage("payload", events)
+            elif type == _ACK and id - ACK_OFFSET in self._queues:
+                self._acknowledged(self._queues[id - ACK_OFFSET], payload, events)
+            elif id == PING and type != _ACK:
+                self._reply(encode_frame(self.version, type, PONG, seq, payload))
+            elif id != PONG or type == _ACK:
+                self._garbage("queue", events)
+        if garbage is not None:
+            self._garbage(garbage, events)
+        return events
+
+    def _is_copy(self, type: int, seq: int, last: int) -> bool:
+        if type == _WITHACK:
+            return (last - seq) & self._seq_mask <= self._seq_mask >> 1
+        return -10 <= seq - last <= 0
+
+    def _command(self, data: bytes, events: list[Event]) -> None:
+        message = wire.decode(data)
+        if message is None:
+            self._garbage("command", events)
+        else:
+            self.counters["received"] += 1
+            events.append(Received(message))
+
+    def _acknowledge(self, id: int, seq: int) -> None:
+        self._ack_seq = (self._ack_seq + 1) & self._seq_mask
+        payload = bytes((seq,)) if self.version == 1 else _U16.pack(seq)
+        self._reply(encode_frame(self.version, _ACK, id + ACK_OFFSET, self._ack_seq, payload))
+
+    def _reply(self, frame: bytes) -> None:
+        if len(self._replies) < MAX_REPLIES:
+            self._replies.append(frame)
+        else:
+            self.counters["dropped.reply"] += 1
+
+    def _acknowledged(self, queue: _AckQueue, payload: bytes, events: list[Event]) -> None:
+        width = 1 if self.version == 1 else 2
+        if len(payload) < width:
+            self._garbage("ack", events)
+        elif not queue.flight or int.from_bytes(payload[:width], "little") != queue.seq:
+            # It answers another copy of a frame that is done with.
+            self.counters["stale ack"] += 1
+        else:
+            events.extend(Delivered(piece.source.token) for piece in queue.flight if piece.last)
+            queue.land()
+
+    def _garbage(self, reason: str, events: list[Event]) -> None:
+        self.counters["garbage." + reason] += 1
+        events.append(Garbage(reason))
+
+    # -- sending
+
+    def send(self, message: Message | UnknownMessage, now: float) -> int:
+        """Queue a message; the token names it in `cancel`, `Delivered` and `Undelivered`.
+
+        An unknown message travels in the acknowledged queue. A HIGH_PRIO message takes the place of everything that was
+        not delivered, in the same queue: its own (12) is read by no Parrot program that we know.
+        Raises `LocalProtocolError` when it cannot be encoded or is too long for its queue. On a link that is down
+        the message is counted and forgotten.
+        """
+        data = wire.encode(message)
+        buffer = message.BUFFER if isinstance(message, Message) else Buffer.ACK
+        longest = self._longest[buffer is not Buffer.NON_ACK]
+        if len(data) > longest:
+            raise LocalProtocolError(f"{type(message).__name__} has {len(data)} bytes, its queue takes {longest}")
+        token = next(self._tokens)
+        if self._down or self._silent:
+            self.counters["dropped.down" if self._down else "dropped.silent"] += 1
+        elif buffer is Buffer.NON_ACK:
+            if len(self._noack) >= MAX_QUEUED_NOACK:
+                self._noack.popleft()
+                self.counters["dropped.noack"] += 1
+            self._noack.append((token, data))
+        else:
+            self._enqueue(buffer, token, data)
+        return token
+
+    def _enqueue(self, buffer: Buffer, token: int, data: bytes) -> None:
+        if buffer is Buffer.HIGH_PRIO:
+            # Nothing of before may follow it, nor may it wait for the acknowledgement of what is in flight.
+            self.abandon("overtaken")
+        queue = self._queues[(_LOW_PRIO_ID if buffer is Buffer.LOW_PRIO else _ACK_ID)[self.role]]
+        if len(queue.waiting) >= MAX_QUEUED:
+            self.counters["dropped.full"] += 1
+            self._pending.append(Undelivered(token, "queue full"))
+            return
+        forever = not self._gives_up or MessageId(*wire.HEADER.unpack_from(data)) in RETRIED_FOR_EVER
+        entry = Waiting(token, data, forever)
+        if buffer is not Buffer.HIGH_PRIO:
+            queue.waiting.append(entry)
+        else:
+            # In front of all, but not between the parts of a split command.
+            queue.waiting.insert(1 if queue.waiting and queue.waiting[0].packed else 0, entry)
+
+    def cancel(self, token: int) -> None:
+        """Forget a message that is not yet acknowledged: it is never sent (again). Unknown tokens are ignored.
+
+        A frame in flight is repeated without it, under the same number: a peer that has the frame drops the
+        repetition, one that has not never sees the message. The exception is a command too long for one frame
+        (1000 bytes in version 3) of which a part was sent: the peer would take whatever follows for its rest, so
+        it is completed.
+        """
+        for index, (queued, _) in enumerate(self._noack):
+            if queued == token:
+                del self._noack[index]
+                return
+        for queue in self._queues.values():
+            for index, entry in enumerate(queue.waiting):
+                if entry.token == token and not entry.packed:
+                    del queue.waiting[index]
+                    return
+            kept = [piece for piece in queue.flight if piece.source.token != token or piece.source.packed]
+            if len(kept) != len(queue.flight):
+                queue.flight = kept
+                if not kept:
+                    queue.land()
+                return
+
+    def encode_ahead(self, messages: Sequence[Message]) -> list[tuple[int, bytes]]:
+        """Return (sequence number, bytes) of the frames that would carry these messages next, without sending them."""
+        queue = self._queues[_ACK_ID[self.role]]
+        waiting = deque(Waiting(0, wire.encode(message), True) for message in messages)
+        frames = []
+        seq = queue.seq
+        while waiting:
+            seq = (seq + 1) & self._seq_mask
+            payload = b"".join([piece.data for piece in pack(self.version, waiting)])
+            frames.append((seq, encode_frame(self.version, _WITHACK, queue.id, seq, payload)))
+        return frames
+
+    @property
+    def next_seq(self) -> int:
+        """Sequence number of the next frame that carries acknowledged commands."""
+        return (self._queues[_ACK_ID[self.role]].seq + 1) & self._seq_mask
+
+    def abandon(self, reason: str, skip: int = 0) -> None:
+        """Drop everything that was not delivered, and pass over `skip` sequence numbers that another process used."""
+        self._noack.clear()
+        for queue in self._queues.values():
+            # Of a split command that was begun the peer would take whatever follows for the rest: it is completed.
+            begun = [entry for entry in queue.waiting if entry.packed]
+            dropped = [piece.source for piece in queue.flight if piece.last] if not begun else []
+            dropped += [entry for entry in queue.waiting if not entry.packed]
+            self._pending.extend(Undelivered(entry.token, reason) for entry in dropped)
+            queue.waiting = deque(begun)
+            if not begun:
+                queue.land()
+        queue = self._queues[_ACK_ID[self.role]]
+        queue.seq = (queue.seq + skip) & self._seq_mask
+
+    def outgoing(self, now: float) -> list[bytes]:
+        """The datagrams to send now; they are forgotten here, repetitions come by themselves."""
+        if self._down:
+            return []
+        datagrams = self._replies
+        self._replies = []
+        while self._noack:
+            datagrams.append(self._next_noack())
+        for queue in self._queues.values():
+            if queue.flight and now >= queue.due:
+                self._give_up(queue)
+            if not queue.flight:
+                if not queue.waiting:
+                    continue
+                queue.seq = (queue.seq + 1) & self._seq_mask
+                queue.flight = pack(self.version, queue.waiting)
+                queue.sendings = 0
+                queue.due = now
+            if now >= queue.due:
+                datagrams.append(self._sending(queue, now))
+        return datagrams
+
+    def _next_noack(self) -> bytes:
+        version, queue = self.version, self._noack
+        payload = with_length(version, queue.popleft()[1])
+        sent, limit = 1, PACK_LIMIT[version]
+        while queue and version > 1:
+            more = with_length(version, queue[0][1])
+            if len(payload) + len(more) > limit:
+                break
+            payload += more
+            queue.popleft()
+            sent += 1
+        self.counters["sent"] += sent
+        self._noack_seq = (self._noack_seq + 1) & self._seq_mask
+        return encode_frame(self.version, _NOACK, _NOACK_ID[self.role], self._noack_seq, payload)
+
+    def _sending(self, queue: _AckQueue, now: float) -> bytes:
+        if queue.sendings:
+            self.counters["retransmitted"] += 1
+        else:
+            self.counters["sent"] += sum(piece.last for piece in queue.flight)
+        queue.sendings += 1
+        queue.due = now + ACK_TIMEOUT
+        payload = b"".join([piece.data for piece in queue.flight])
+        return encode_frame(self.version, _WITHACK, queue.id, queue.seq, payload)
+
+    def _give_up(self, queue: _AckQueue) -> None:
+        """Version 1, controller: a command is repeated five times, then the next one has its turn."""
+        if queue.sendings > MAX_RETRIES_V1 and not queue.flight[0].source.forever:
+            self.counters["undelivered"] += 1
+            self._pending.append(Undelivered(queue.flight[0].source.token, "no acknowledgement"))
+            queue.land()
+
+    # -- time
+
+    def deadline(self) -> float | None:
+        """When `expire` wants to be called; None when the link is down. It may move later without notice."""
+        if self._down:
+            return None
+        if self._pending:
+            return self._last_received
+        deadline = self._ping_due
+        if not self._silent:
+            deadline = min(deadline, self._last_received + self._silence_limit)
+        for queue in self._queues.values():
+            if queue.due < deadline:
+                deadline = queue.due
+        return deadline
+
+    def expire(self, now: float) -> list[Event]:
+        """What the time that passed means: pings and repetitions for `outgoing`, messages given up, a dead link."""
+        if self._down:
+            return []
+        for queue in self._queues.values():
+            if queue.flight and now >= queue.due:
+                self._give_up(queue)
+        events = self._take_pending()
+        late = now - self._ping_due
+        if late >= STALL:
+            # The host stalled, and what arrived meanwhile may not have been read yet: that is no silence of the peer's.
+            self._last_received += late
+        silence = now - self._last_received
+        if self._silent:
+            if now >= self._ping_due:
+                self._send_ping(now)
+        elif silence >= self._silence_limit:
+            self._lose(f"nothing received for {silence:.1f} s", now, events)
+        elif now >= self._ping_due:
+            if self._unanswered >= MAX_UNANSWERED_PINGS:
+                self._lose(f"{self._unanswered} pings unanswered, nothing received for {silence:.1f} s", now, events)
+            else:
+                self._send_ping(now)
+        return events
+
+    def _lose(self, reason: str, now: float, events: list[Event]) -> None:
+        """The peer is not heard any more."""
+        if not self._fades:
+            self._go_down(reason, events)
+            return
+        self._silent = True
+        self._send_ping(now)
+        events.append(Silent(reason))  # first: that the link is silent explains the others
+        self.abandon("the link is silent")
+        events.extend(self._take_pending())
+
+    def _send_ping(self, now: float) -> None:
+        self._unanswered += 1
+        self._ping_due = now + self._ping_after
+        self._ping_seq = (self._ping_seq + 1) & self._seq_mask
+        payload = _U64.pack(int(now * 1e6) & 0xFFFF_FFFF_FFFF_FFFF)
+        self.counters["ping"] += 1
+        self._reply(encode_frame(self.version, _NOACK, PING, self._ping_seq, payload))
+
+    def _go_down(self, reason: str, events: list[Event]) -> None:
+        self._down = True
+        self._noack.clear()
+        self._replies.clear()
+        for queue in self._queues.values():
+            queue.waiting.clear()
+            queue.land()
+        events.append(LinkDown(reason))
+
+    def _take_pending(self) -> list[Event]:
+        events = self._pending
+        if events:
+            self._pending = []
+            return events
+        return []

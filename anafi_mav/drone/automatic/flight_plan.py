@@ -1,0 +1,314 @@
+"""Element flight plan: plans are uploaded to the drone's web server and flown by the drone.
+
+Parrot's file format is not known here: a plan is bytes. 4K, Thermal and USA fly version 1 of it, the Ai version 2; the
+drone says which by what it reports (feature flight_plan).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar
+
+import msgspec
+from msgspec.structs import replace
+
+from anafi_mav.arsdk.codec.wire import Message
+from anafi_mav.arsdk.messages import common
+from anafi_mav.arsdk.messages import flight_plan as modern
+from anafi_mav.arsdk.messages.common import FlightPlanComponent, MavlinkType, PlayError, PlayingState
+from anafi_mav.arsdk.messages.flight_plan import Indicator, SupportedCapabilities
+from anafi_mav.drone.element import Reducer, members, with_item
+from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, loop_time
+from anafi_mav.drone.rest import Rest
+from anafi_mav.drone.settings import Commanding
+from anafi_mav.drone.status.alerts import spoken
+from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost, NotSupported, RemoteProtocolError
+from anafi_mav.models import NO_MODEL, Model
+
+API = "/api/v1/upload"
+START_TIMEOUT = 20.0
+"""s; as Olympe (common.Mavlink.Start): the drone reads the whole file before it says anything."""
+
+_UID = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,127}")
+
+
+class PlanOnDrone(msgspec.Struct, frozen=True):
+    """A plan on the drone."""
+
+    uid: str
+    date: str = ""
+
+
+class Recovery(msgspec.Struct, frozen=True):
+    """Place at which the last plan was interrupted, to resume it there."""
+
+    uid: str
+    custom_id: str
+    item: int
+    seconds: int
+    """Duration flown."""
+
+
+class FlightPlanState(msgspec.Struct, frozen=True):
+    """The flight plan under way, and what the drone needs to fly one."""
+
+    playing: PlayingState | None = None
+    uid: str | None = None
+    """Id of the plan that plays or is paused; empty without one."""
+    type: MavlinkType | None = None
+    item: int | None = None
+    """Index of the last completed item, from 0; None before the first."""
+    skipped: int | None = None
+    """Waypoint that was left out. Ai only."""
+    available: bool | None = None
+    """True when a plan can be started."""
+    components: Mapping[FlightPlanComponent, bool] = {}
+    """Requirement of a plan -> fulfilled."""
+    missing: frozenset[Indicator] | None = None
+    """Requirements that a plan lacks. Ai only."""
+    capabilities: frozenset[SupportedCapabilities] | None = None
+    """Ai only."""
+    error: PlayError | None = None
+    """Why the drone refused or stopped a plan; None once it plays one."""
+    returns_on_disconnect: bool | None = None
+    """A lost link ends the plan with a return home."""
+    recovery: Recovery | None = None
+
+    @property
+    def unavailable(self) -> tuple[str, ...]:
+        """Requirements that prevent the flight of a plan, in words."""
+        words = [spoken(part) for part, ok in self.components.items() if not ok]
+        words += [spoken(one) for one in sorted(self.missing or ())]
+        return tuple(words)
+
+
+def _playing(state: FlightPlanState, message: common.MavlinkFilePlayingStateChanged) -> FlightPlanState:
+    begins = message.state == PlayingState.PLAYING and (state.playing != PlayingState.PAUSED or state.item is None)
+    same = message.filepath == state.uid
+    return replace(
+        state,
+        playing=message.state,
+        uid=message.filepath,
+        type=message.type,
+        item=None if begins and not (same and state.playing == PlayingState.PLAYING) else state.item,
+        skipped=None if begins else state.skipped,
+        error=None if begins else state.error,
+    )
+
+
+def _recovery(state: FlightPlanState, message: modern.RecoveryInfo) -> FlightPlanState:
+    known = Recovery(message.flightplan_id, message.custom_id, message.item, message.running_time)
+    return replace(state, recovery=known if message.flightplan_id else None)
+
+
+class FlightPlan(Commanding[FlightPlanState]):
+    """Flight plans: files in Parrot's format that the drone flies by itself."""
+
+    NOTHING = FlightPlanState()
+    REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = {
+        common.MavlinkFilePlayingStateChanged: _playing,
+        common.MissionItemExecuted: lambda state, m: replace(state, item=m.idx),
+        common.AvailabilityStateChanged: lambda state, m: replace(state, available=m.AvailabilityState != 0),
+        common.ComponentStateListChanged: lambda state, m: replace(
+            state, components=with_item(state.components, m.component, m.State != 0, 0)
+        ),
+        common.MavlinkPlayErrorStateChanged: lambda state, m: replace(state, error=m.error),
+        common.ReturnHomeOnDisconnectChanged: lambda state, m: replace(state, returns_on_disconnect=m.state != 0),
+        modern.Info: lambda state, m: replace(state, missing=members(m.missing_inputs, Indicator)),
+        modern.Capabilities: lambda state, m: replace(
+            state, capabilities=members(m.supported_capabilities, SupportedCapabilities)
+        ),
+        modern.WaypointSkipped: lambda state, m: replace(state, skipped=m.item),
+        modern.RecoveryInfo: _recovery,
+    }
+
+    def __init__(self, commander: Commander, rest: Rest) -> None:
+        super().__init__(commander)
+        self._rest = rest
+        self.model: Callable[[], Model] = lambda: NO_MODEL
+        """Which drone it is; the drone sets it."""
+        self._starts = 0
+        self._asked: str | None = None
+        """The plan whose start was asked for last."""
+        self._unwanted: tuple[str, float] | None = None
+        """A plan whose start was given up, and until when the drone may still begin it."""
+
+    def reset(self) -> None:
+        super().reset()
+        self._asked = self._unwanted = None
+
+    def on_playing(self, message: common.MavlinkFilePlayingStateChanged, now: float) -> None:
+        """A flight plan plays, is paused or stopped."""
+        if self._unwanted is None or message.state != PlayingState.PLAYING:
+            return
+        uid, until = self._unwanted
+        if uid == message.filepath and now < until:
+            # It took the drone so long to read the plan that the order against it came before its beginning.
+            self._commander.halt_if_connected(common.Stop())
+
+    @property
+    def version(self) -> int:
+        """Version of the file format that this drone flies: 1, or 2 on the Ai.
+
+        The model decides. Of a model that is not known, the events that the Ai alone is known to send.
+        """
+        known = self.model().plan_version
+        if known is not None:
+            return known
+        return 1 if self.state.missing is None and self.state.capabilities is None else 2
+
+    @property
+    def starts_anywhere(self) -> bool:
+        """True when `start` takes an `item` and `continue_on_disconnect`."""
+        return SupportedCapabilities.START_AT_V2 in (self.state.capabilities or frozenset())
+
+    # -- files
+
+    async def upload(self, plan: bytes) -> str:
+        """Upload a plan; return the id that the drone gives it, for `start`.
+
+        Raises `CommandRejected` when the web server refuses it, `CommandTimeout`, `RemoteProtocolError`.
+        """
+        self._available()
+        uid = await self._rest.json("PUT", f"{API}/flightplan", plan)
+        if not isinstance(uid, str) or not _UID.fullmatch(uid):
+            raise RemoteProtocolError(f"the drone took the flight plan and gave it no name: {uid!r:.80}")
+        return uid
+
+    async def list(self) -> tuple[PlanOnDrone, ...]:
+        """Return the plans on the drone."""
+        self._available()
+        told = await self._rest.json("GET", f"{API}/flightplans")
+        try:
+            return msgspec.convert(told, tuple[PlanOnDrone, ...], strict=False)
+        except (msgspec.ValidationError, RecursionError) as error:
+            raise RemoteProtocolError(f"the drone's list of flight plans: {error}") from error
+
+    async def get(self, uid: str) -> dict[str, Any]:
+        """Return the details of one plan. Raises `CommandRejected` when the drone has none with this id."""
+        self._available()
+        told = await self._rest.json("GET", f"{API}/flightplan/{_checked(uid)}")
+        if not isinstance(told, dict):
+            raise RemoteProtocolError(f"the drone tells nothing of flight plan {uid}")
+        return told
+
+    async def delete(self, uid: str) -> bool:
+        """Delete a plan; False when the drone does not: Parrot documents no way to do it."""
+        self._available()
+        try:
+            await self._rest.read("DELETE", f"{API}/flightplan/{_checked(uid)}")
+        except CommandRejected:
+            return False
+        return True
+
+    # -- flying
+
+    async def start(
+        self,
+        uid: str,
+        item: int = 0,
+        type: MavlinkType | None = None,
+        *,
+        continue_on_disconnect: bool | None = None,
+        timeout: float = START_TIMEOUT,
+    ) -> None:
+        """Fly an uploaded plan, or resume the paused one; returns when it plays.
+
+        `item` (from 0) is where it begins, `continue_on_disconnect` flies on without a link: Ai only. Raises
+        `CommandRejected` with what the drone lacks, `CommandTimeout`. A start that times out or is cancelled is
+        withdrawn, also when the drone begins the plan only then.
+        """
+        self._available()
+        command = self._start(uid, item, type, continue_on_disconnect)
+        others = {self.state.uid, self._asked} - {uid, ""}
+
+        def judge(message: Any) -> bool | AnafiMavError | None:
+            if isinstance(message, common.StartingErrorEvent):
+                return CommandRejected(self._why())
+            return True if message.state == PlayingState.PLAYING and message.filepath not in others else None
+
+        self._starts += 1
+        number, self._asked, self._unwanted = self._starts, uid, None
+        try:
+            await self._commander.begin(
+                command,
+                (common.MavlinkFilePlayingStateChanged, common.StartingErrorEvent),
+                judge,
+                timeout,
+                common.Stop(),
+            )
+        except LinkLost:
+            raise
+        except BaseException as error:
+            if number == self._starts and self._commander.may_begin(common.Stop, START_TIMEOUT):
+                self._unwanted = uid, loop_time() + START_TIMEOUT
+            if isinstance(error, CommandTimeout) and self.state.unavailable:
+                raise CommandRejected(self._why()) from None
+            raise
+
+    def _start(self, uid: str, item: int, type: MavlinkType | None, goes_on: bool | None) -> Message:
+        kind = type
+        if kind is None:
+            kind = MavlinkType.FLIGHT_PLAN if self.version == 1 else MavlinkType.FLIGHT_PLAN_V2
+        if item == 0 and goes_on is None:
+            return common.Start(uid, kind)
+        can = self.state.capabilities or frozenset()
+        other = modern.MavlinkType(kind)
+        if SupportedCapabilities.START_AT_V2 in can:
+            return modern.StartAtV2(uid, uid, other, item, int(bool(goes_on)))
+        if SupportedCapabilities.START_AT in can and goes_on is None:
+            return modern.StartAt(uid, uid, other, item)
+        raise NotSupported("start of a flight plan in its middle" if item else "flight plans without a link")
+
+    def _why(self) -> str:
+        reasons = ", ".join(self.state.unavailable)
+        return f"the flight plan cannot be flown: {reasons}" if reasons else "the drone cannot start the flight plan"
+
+    def suspend(self) -> None:
+        """Pause without waiting for the drone's confirmation; an unconfirmed start is withdrawn."""
+        self._commander.call_off("something else flies", common.Stop)
+        if self.state.playing == PlayingState.PLAYING:
+            self._commander.halt_if_connected(common.Pause())
+
+    async def pause(self, timeout: float = ANSWER_TIMEOUT) -> None:
+        """Hover; `start` with the same plan resumes it. Raises `CommandRejected` when no plan plays."""
+        self._available()
+        if self.state.playing != PlayingState.PLAYING:
+            raise CommandRejected("no flight plan plays")
+        await self._end(common.Pause(), PlayingState.PAUSED, timeout)
+
+    async def stop(self, timeout: float = ANSWER_TIMEOUT) -> None:
+        """End the plan and hover; returns at once when none is playing, paused or starting."""
+        self._available()
+        self._commander.call_off("stopped", common.Stop)
+        await self._commander.halted(common.Stop.NAME, timeout)
+        if self.state.playing == PlayingState.STOPPED:
+            return
+        await self._end(common.Stop(), PlayingState.STOPPED, timeout)
+
+    async def _end(self, command: Message, wanted: PlayingState, timeout: float) -> None:
+        ends = (wanted, PlayingState.STOPPED)
+        judge: Callable[[Any], bool | None] = lambda message: True if message.state in ends else None  # noqa: E731
+        await self._commander.confirm(command, (common.MavlinkFilePlayingStateChanged,), judge, timeout)
+        if self.state.playing != wanted:
+            raise CommandRejected("the flight plan has ended")
+
+    async def set_returns_on_disconnect(self, on: bool) -> bool:
+        """Set if a lost link ends a plan with a return home."""
+        self._require(self.state.returns_on_disconnect, common.ReturnHomeOnDisconnect.NAME)
+        return await self._change(
+            common.ReturnHomeOnDisconnect(int(on)),
+            common.ReturnHomeOnDisconnectChanged,
+            lambda message: bool(message.state),
+        )
+
+    def _available(self) -> None:
+        self._require(self.state.playing, "flight plans")
+
+
+def _checked(uid: str) -> str:
+    """A name that can stand in a path."""
+    if not _UID.fullmatch(uid):
+        raise CommandRejected(f"{uid!r} is no flight plan of the drone")
+    return uid

@@ -1,0 +1,96 @@
+"""Element poi: the nose, and if wanted the camera, held on a place while the pilot flies the rest."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import msgspec
+from msgspec.structs import replace
+
+from anafi_mav.arsdk.codec.wire import Message
+from anafi_mav.arsdk.messages import ardrone3
+from anafi_mav.arsdk.messages import poi as modern
+from anafi_mav.arsdk.messages.ardrone3 import PoiMode, PoiStatus
+from anafi_mav.arsdk.messages.poi import Indicator
+from anafi_mav.drone.element import Position, Reducer, members, position
+from anafi_mav.drone.expectation import ANSWER_TIMEOUT
+from anafi_mav.drone.settings import Commanding
+from anafi_mav.drone.status.alerts import spoken
+from anafi_mav.errors import AnafiMavError, CommandRejected, LocalProtocolError
+
+_SAME_PLACE_DEG = 1e-7
+"""About a centimetre."""
+
+
+class PoiState(msgspec.Struct, frozen=True):
+    """The point of interest that the drone looks at."""
+
+    status: PoiStatus | None = None
+    target: Position | None = None
+    """Altitude above the take-off point."""
+    mode: PoiMode | None = None
+    """Relation of the gimbal to the place."""
+    missing: frozenset[Indicator] | None = None
+    """What it lacks; empty = available. Ai only."""
+
+
+class Poi(Commanding[PoiState]):
+    """A place that the drone looks at while a pilot flies it."""
+
+    NOTHING = PoiState()
+    REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = {
+        ardrone3.PilotedPOIV2: lambda state, m: replace(
+            state, status=m.status, target=position(m.latitude, m.longitude, m.altitude), mode=m.mode
+        ),
+        modern.Info: lambda state, m: replace(state, missing=members(m.missing_inputs, Indicator)),
+    }
+
+    async def start(
+        self,
+        latitude: float,
+        longitude: float,
+        altitude: float,
+        mode: PoiMode = PoiMode.LOCKED_GIMBAL,
+        timeout: float = ANSWER_TIMEOUT,
+    ) -> None:
+        """Look at a place (deg, deg, m above take-off); returns when the drone does, or will once it hovers.
+
+        LOCKED_GIMBAL points the camera too, FREE_GIMBAL leaves it to the gimbal's verbs. Raises `CommandRejected` when
+        it is unavailable: not flying, or no GPS. A start that times out or is cancelled is withdrawn.
+        """
+        if position(latitude, longitude, altitude) is None:
+            raise LocalProtocolError(f"no place on earth: {latitude}, {longitude}, {altitude}")
+        self._require(self.state.status, "points of interest")
+        if self.state.status == PoiStatus.UNAVAILABLE:
+            raise CommandRejected(self._why())
+
+        def judge(message: Any) -> bool | AnafiMavError | None:
+            if message.status == PoiStatus.UNAVAILABLE:
+                return CommandRejected(self._why())
+            same = math.isclose(message.latitude, latitude, rel_tol=0.0, abs_tol=_SAME_PLACE_DEG) and math.isclose(
+                message.longitude, longitude, rel_tol=0.0, abs_tol=_SAME_PLACE_DEG
+            )
+            return True if same and message.status in (PoiStatus.RUNNING, PoiStatus.PENDING) else None
+
+        command = ardrone3.StartPilotedPOIV2(latitude, longitude, altitude, mode)
+        await self._commander.begin(command, (ardrone3.PilotedPOIV2,), judge, timeout, ardrone3.StopPilotedPOI())
+
+    async def stop(self, timeout: float = ANSWER_TIMEOUT) -> None:
+        """End looking at the place; returns at once when there is none."""
+        self._require(self.state.status, "points of interest")
+        self._commander.call_off("stopped", ardrone3.StopPilotedPOI)
+        await self._commander.halted(ardrone3.StopPilotedPOI.NAME, timeout)
+        if self.state.status not in (PoiStatus.RUNNING, PoiStatus.PENDING):
+            return
+        await self._commander.confirm(
+            ardrone3.StopPilotedPOI(),
+            (ardrone3.PilotedPOIV2,),
+            lambda message: True if message.status in (PoiStatus.AVAILABLE, PoiStatus.UNAVAILABLE) else None,
+            timeout,
+        )
+
+    def _why(self) -> str:
+        lacks = ", ".join(spoken(one) for one in sorted(self.state.missing or ()))
+        return f"a point of interest is unavailable: {lacks}" if lacks else "a point of interest is unavailable"

@@ -1,0 +1,1 @@
+"""Elements of the payload: cameras, gimbal, thermal camera, storage and media."""

@@ -1,0 +1,376 @@
+"""Element camera: pictures, films, zoom and light, the same for the cameras of every model.
+
+What the two features of Parrot call it is in `camera_classic` (4K, Thermal, USA) and `camera_modern` (Ai). A camera
+belongs to the one that reports it. Verbs that change a setting return the camera's state as the drone confirmed it: a
+value that the drone does not take is clamped or refused by leaving it as it was.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar, TypeAlias
+
+from anafi_mav.arsdk.codec.wire import Message
+from anafi_mav.arsdk.messages.proto import antiflicker as mains
+from anafi_mav.arsdk.messages.proto import camera2
+from anafi_mav.drone.element import Reducer
+from anafi_mav.drone.expectation import ANSWER_TIMEOUT
+from anafi_mav.drone.payload import camera_classic, camera_modern
+from anafi_mav.drone.payload.camera_classic import Classic
+from anafi_mav.drone.payload.camera_enums import Antiflicker, CameraMode, PhotoMode, Streaming, Style, WhiteBalance
+from anafi_mav.drone.payload.camera_modern import Modern
+from anafi_mav.drone.payload.camera_state import (
+    CamerasState,
+    CameraState,
+    ExposureSettings,
+    News,
+    PhotoSettings,
+    Progress,
+    RecordingSettings,
+)
+from anafi_mav.drone.settings import Commanding, Question, number
+from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LocalProtocolError, NotSupported
+from anafi_mav.units import clip
+
+MAIN = 0
+"""Id of the camera that every model has."""
+
+SAVE_TIMEOUT = 30.0
+"""s between two signs of life of a photo: a burst or a full resolution DNG takes a while to be stored."""
+ZOOM_TIMEOUT = 60.0
+"""s that a zoom may take; how fast it is depends on a setting whose unit is tan(deg)/s."""
+ZOOM_ARRIVED = 0.01
+"""Of the wanted zoom."""
+ZOOM_STILL = 1e-3
+
+SERIES = frozenset({PhotoMode.TIME_LAPSE, PhotoMode.GPS_LAPSE})
+"""Photo modes that go on until they are stopped."""
+
+_SPEECH: Mapping[str, type[Classic] | type[Modern]] = {
+    camera_classic.FEATURE: Classic,
+    camera_modern.FEATURE: Modern,
+}
+
+Ask: TypeAlias = tuple[Message, type[Message]]
+
+
+class Camera(Commanding[CamerasState]):
+    """All cameras of the drone; `camera[id]` is the state of one, the verbs use the main one unless `id` says another.
+
+    Verbs that change a setting return the value that the drone confirmed: one that it does not take is clamped, or the
+    setting stays as it was. Raises `NotSupported` for what this camera does not have.
+    """
+
+    NOTHING = CamerasState()
+    REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = {**camera_classic.REDUCERS, **camera_modern.REDUCERS}
+
+    def __getitem__(self, id: int) -> CameraState:
+        """The state of this camera, an empty one when the drone has not reported it."""
+        return self.state.cameras.get(id, CameraState())
+
+    # -- pictures
+
+    async def set_mode(self, mode: CameraMode, id: int = MAIN) -> CameraMode | None:
+        """Change to photo or recording mode."""
+        return (await self._ask(id, "mode", lambda s, now: s.mode(id, now, mode))).mode
+
+    async def set_photo(self, wish: PhotoSettings, id: int = MAIN) -> PhotoSettings | None:
+        """Change the photo settings; a field that is None stays as it is."""
+        if wish.interval is not None:
+            number(wish.interval, "interval")
+        return (await self._ask(id, "photo", lambda s, now: s.photo(id, now, wish))).photo
+
+    async def take_photo(self, id: int = MAIN, timeout: float = SAVE_TIMEOUT) -> str | None:
+        """Take a photo; return its media id once it is stored. A series returns None as soon as it has begun.
+
+        Raises `CommandRejected` when no photo can be taken (in mode RECORDING, or the storage is full).
+        """
+        speech, now = self._known(id)
+        if now.photo_available is False:
+            raise CommandRejected("the camera cannot take a photo now")
+        series = now.photo is not None and now.photo.mode in SERIES
+
+        def judge(news: News) -> str | bool | AnafiMavError | None:
+            if news.progress is Progress.SAVED:
+                return news.media
+            if news.progress is Progress.FAILED:
+                return CommandRejected(f"photo: {news.reason}")
+            return True if series and news.progress is Progress.STARTED else None
+
+        result = await self._capture(
+            id, speech.take_photo(id), speech.photo_events, speech.photo_news, judge, ANSWER_TIMEOUT, timeout
+        )
+        return result if isinstance(result, str) else None
+
+    async def stop_photo(self, id: int = MAIN, timeout: float = SAVE_TIMEOUT) -> str | None:
+        """End a series; return its media id if the drone reports one. Raises `CommandRejected` without a series."""
+        speech, now = self._known(id)
+        if now.taking is False:
+            raise CommandRejected("no photo is being taken")
+        saved: str | None = None
+
+        def judge(news: News) -> str | bool | AnafiMavError | None:
+            nonlocal saved
+            if news.progress is Progress.SAVED:
+                saved = news.media
+                return saved if speech is Modern else None
+            if news.progress is Progress.FAILED:
+                return CommandRejected(f"photo: {news.reason}")
+            return True if news.progress is Progress.ENDED else None
+
+        await self._capture(
+            id, speech.stop_photo(id), speech.photo_events, speech.photo_news, judge, ANSWER_TIMEOUT, timeout
+        )
+        return saved
+
+    # -- films
+
+    async def set_recording(self, wish: RecordingSettings, id: int = MAIN) -> RecordingSettings | None:
+        """Change the recording settings; a field that is None stays as it is."""
+        return (await self._ask(id, "recording", lambda s, now: s.recording(id, now, wish))).recording
+
+    async def start_recording(self, id: int = MAIN) -> None:
+        """Start to record; returns when the camera records. Raises `CommandRejected` in mode PHOTO."""
+        speech, now = self._known(id)
+        if now.recording_now:
+            return
+        if now.recording_available is False:
+            raise CommandRejected("the camera cannot record now")
+
+        def judge(news: News) -> bool | AnafiMavError | None:
+            if news.progress is Progress.STARTED:
+                return True
+            return CommandRejected(f"recording: {news.reason}") if news.progress is Progress.FAILED else None
+
+        command = speech.start_recording(id)
+        await self._capture(id, command, speech.recording_events, speech.recording_news, judge, ANSWER_TIMEOUT, None)
+
+    async def stop_recording(self, id: int = MAIN, timeout: float = 2 * ANSWER_TIMEOUT) -> str:
+        """Stop recording; return the media id once the video is stored."""
+        speech, now = self._known(id)
+        if now.recording_now is False:
+            raise CommandRejected("the camera does not record")
+
+        def judge(news: News) -> str | AnafiMavError | None:
+            if news.progress is Progress.ENDED:
+                return news.media
+            return CommandRejected(f"recording: {news.reason}") if news.progress is Progress.FAILED else None
+
+        command = speech.stop_recording(id)
+        return str(
+            await self._capture(id, command, speech.recording_events, speech.recording_news, judge, timeout, None)
+        )
+
+    async def set_autorecord(self, on: bool, id: int = MAIN) -> bool | None:
+        """Switch automatic recording from take-off to landing."""
+        return (await self._ask(id, "autorecord", lambda s, now: s.autorecord(id, now, on))).autorecord
+
+    # -- zoom
+
+    async def zoom(self, level: float, id: int = MAIN, timeout: float = ZOOM_TIMEOUT) -> float:
+        """Zoom to a factor (1: no zoom; clipped to the range of the camera); return it once it is reached."""
+        speech, now = self._known(id)
+        wanted = clip(number(level, "zoom"), 1.0, self._zoom_max(now))
+
+        def judge(message: Any) -> float | None:
+            there = speech.camera_of(message) == id and abs(message.level - wanted) <= ZOOM_ARRIVED * wanted
+            return float(message.level) if there else None
+
+        answer = self._commander.expect((speech.zoom_event,), judge)
+        return await self._insist(("zoom", id), speech.zoom(id, wanted), answer, timeout)
+
+    def zoom_to(self, level: float, id: int = MAIN) -> None:
+        """Send a zoom factor once, without waiting: for targets that arrive in a stream."""
+        speech, now = self._known(id)
+        self._order(("zoom", id), speech.zoom(id, clip(number(level, "zoom"), 1.0, self._zoom_max(now))))
+
+    def zoom_rate(self, share: float, id: int = MAIN) -> None:
+        """Zoom in (up to 1) or out (down to -1), as a share of `CameraState.zoom_speed`, sent once.
+
+        The drone goes on until the next target or the end of the range. Zero stops it, but it can be lost: `stop_zoom`
+        makes sure.
+        """
+        speech, now = self._known(id)
+        self._zoom_max(now)
+        self._order(("zoom", id), speech.zoom_rate(id, clip(number(share, "zoom rate"), -1.0, 1.0)))
+
+    async def stop_zoom(self, id: int = MAIN) -> float:
+        """Stop the zoom; return the factor at which it stands."""
+        speech, now = self._known(id)
+        self._zoom_max(now)
+        last = math.nan
+        seen = 0
+
+        def judge(message: Any) -> float | None:
+            nonlocal last, seen
+            if speech.camera_of(message) != id:
+                return None
+            stands = seen > 1 and abs(message.level - last) <= ZOOM_STILL
+            last, seen = message.level, seen + 1
+            return float(message.level) if stands else None
+
+        answer = self._commander.expect((speech.zoom_event,), judge)
+        return await self._insist(("zoom", id), speech.zoom_rate(id, 0.0), answer, ANSWER_TIMEOUT)
+
+    async def reset_zoom(self, id: int = MAIN) -> float:
+        """Reset the zoom; return the factor then."""
+        speech, now = self._known(id)
+        self._zoom_max(now)
+        self._orders["zoom", id] += 1
+
+        def judge(message: Any) -> float | None:
+            there = speech.camera_of(message) == id and abs(message.level - 1.0) <= ZOOM_ARRIVED
+            return float(message.level) if there else None
+
+        return await self._commander.confirm(speech.reset_zoom(id), (speech.zoom_event,), judge, ZOOM_TIMEOUT)
+
+    async def set_zoom_speed(self, speed: float, id: int = MAIN) -> float | None:
+        """Set the highest zoom speed, tan(deg)/s."""
+        number(speed, "zoom speed")
+        return (await self._ask(id, "zoom_speed", lambda s, now: s.zoom_speed(id, now, speed))).zoom_speed
+
+    async def set_zoom_may_degrade(self, allowed: bool, id: int = MAIN) -> bool | None:
+        """Allow or forbid a zoom by rate beyond the lossless range."""
+        state = await self._ask(id, "zoom_may_degrade", lambda s, now: s.zoom_may_degrade(id, now, allowed))
+        return state.zoom_may_degrade
+
+    # -- light
+
+    async def set_ev(self, ev: float, id: int = MAIN) -> float | None:
+        """Set the exposure compensation, EV, to the nearest third."""
+        return (await self._ask(id, "ev", lambda s, now: s.ev(id, now, ev))).ev
+
+    async def set_exposure(self, wish: ExposureSettings, id: int = MAIN) -> ExposureSettings | None:
+        """Change the exposure; a field that is None stays. Shutter and ISO take the nearest step."""
+        return (await self._ask(id, "exposure", lambda s, now: s.exposure(id, now, wish))).exposure
+
+    async def lock_exposure(
+        self, on: bool = True, at: tuple[float, float] | None = None, id: int = MAIN
+    ) -> bool | None:
+        """Lock or unlock the exposure; `at` (x, y: 0 to 1 from the upper left) locks it to what suits that place."""
+        if not self[id].exposure_lockable:
+            self._require(None, "exposure lock")
+        return (await self._ask(id, "exposure", lambda s, now: s.lock_exposure(id, now, on, at))).exposure_locked
+
+    async def set_white_balance(
+        self, mode: WhiteBalance, temperature_k: float | None = None, id: int = MAIN
+    ) -> tuple[WhiteBalance | None, float | None]:
+        """Set the white balance; `temperature_k` (to the nearest 250 K) is for CUSTOM. Return both."""
+        state = await self._ask(id, "white_balance", lambda s, now: s.white_balance(id, now, mode, temperature_k))
+        return state.white_balance, state.temperature_k
+
+    async def lock_white_balance(self, on: bool = True, id: int = MAIN) -> bool | None:
+        """Lock or unlock the white balance."""
+        if not self[id].white_balance_lockable:
+            self._require(None, "white balance lock")
+        state = await self._ask(id, "white_balance", lambda s, now: s.lock_white_balance(id, now, on))
+        return state.white_balance_locked
+
+    async def set_hdr(self, on: bool, id: int = MAIN) -> bool | None:
+        """Switch HDR on or off."""
+        return (await self._ask(id, "hdr", lambda s, now: s.hdr(id, now, on))).hdr
+
+    async def set_style(self, style: Style, id: int = MAIN) -> Style | None:
+        """Choose the style of the picture."""
+        now = (await self._ask(id, "style", lambda s, now: s.style(id, now, style))).style
+        return None if now is None else now.style
+
+    async def set_style_params(
+        self, saturation: float, contrast: float, sharpness: float, id: int = MAIN
+    ) -> CameraState:
+        """Set the levels of the present style; their ranges are in `StyleSettings`."""
+        number(saturation + contrast + sharpness, "style")
+        return await self._ask(id, "style", lambda s, now: s.style_params(id, now, saturation, contrast, sharpness))
+
+    async def set_streaming(self, mode: Streaming, id: int = MAIN) -> Streaming | None:
+        """Choose between low latency and reliability of the live video."""
+        return (await self._ask(id, "streaming", lambda s, now: s.streaming(id, now, mode))).streaming
+
+    async def set_alignment(self, yaw: float, pitch: float, roll: float, id: int = MAIN) -> CameraState:
+        """Set the corrections against the other camera, deg."""
+        number(yaw + pitch + roll, "alignment")
+        return await self._ask(id, "alignment", lambda s, now: s.alignment(id, now, yaw, pitch, roll))
+
+    async def set_antiflicker(self, mode: Antiflicker) -> Antiflicker | None:
+        """Set the mains frequency that the exposure adapts to; one for all cameras."""
+        self._require(self.state.antiflicker, "antiflicker")
+        speech, _ = self._known(min(self.state.cameras, default=MAIN))
+        command, answer = speech.antiflicker(mode)
+        return await self._change(command, answer, lambda message: self.state.antiflicker)
+
+    # -- the connection
+
+    def questions(self) -> list[Question]:
+        """What to ask a drone that speaks protobuf: it tells nothing of its cameras unasked."""
+        return [
+            (camera2.ListCameras(), camera2.CameraList, lambda message: True),
+            (mains.GetState(include_default_capabilities=True), mains.State, lambda message: True),
+        ]
+
+    def details(self) -> list[Question]:
+        """What to ask once the cameras are known."""
+
+        def about(id: int) -> Question:
+            command = camera2.GetState(camera_id=id, include_default_capabilities=True)
+            return command, camera2.State, lambda message: True if Modern.camera_of(message) == id else None
+
+        return [about(id) for id, camera in self.state.cameras.items() if camera.feature == camera_modern.FEATURE]
+
+    # -- inside
+
+    def _known(self, id: int) -> tuple[type[Classic] | type[Modern], CameraState]:
+        """How to ask this camera, and its state."""
+        now = self[id]
+        self._require(now.feature, f"camera {id}")
+        assert now.feature is not None
+        return _SPEECH[now.feature], now
+
+    @staticmethod
+    def _zoom_max(now: CameraState) -> float:
+        if now.zoom_max is None or now.zoom_max <= 1.0:
+            raise NotSupported("zoom")
+        return now.zoom_max
+
+    async def _ask(
+        self, id: int, field: str, ask: Callable[[type[Classic] | type[Modern], CameraState], Ask]
+    ) -> CameraState:
+        """Change a setting; returns the state after the drone's answer. `field` must have been reported."""
+        speech, now = self._known(id)
+        self._require(getattr(now, field), f"camera {id}: {field.replace('_', ' ')}")
+        command, answer = ask(speech, now)
+        if isinstance(command, camera2.Configure) and command.config == camera2.Config():
+            raise LocalProtocolError("nothing to change")
+
+        def judge(message: Any) -> CameraState | None:
+            mine = speech.camera_of(message) == id
+            # A state of camera2 can be about something else, such as the end of a photo.
+            if isinstance(command, camera2.Configure) and message.config is None:
+                mine = False
+            return self[id] if mine else None
+
+        return await self._change(command, answer, judge)
+
+    async def _capture(
+        self,
+        id: int,
+        command: Message,
+        events: tuple[type[Message], ...],
+        read: Callable[[Any], News | None],
+        judge: Callable[[News], Any],
+        first: float,
+        next: float | None,
+    ) -> Any:
+        """Send a command and judge the news of this camera; each of them gives the drone `next` more seconds."""
+
+        def listen(message: Any) -> Any:
+            news = read(message)
+            if news is None or news.camera != id:
+                return None
+            if next is not None:
+                answer.expire_after(next, CommandTimeout(command.NAME, next))
+            return judge(news)
+
+        answer = self._commander.expect(events, listen)
+        self._commander.dispatch(answer, command, first)
+        return await answer.wait()

@@ -1,0 +1,391 @@
+"""Element gimbal: where the cameras look.
+
+All angles are degrees with Parrot's signs: pitch + up, yaw + clockwise seen from above, roll + clockwise seen from
+behind. Each axis has a frame of its own: relative to the drone's body, or absolute, to the horizon and to north.
+
+On the wire a velocity is a share of the axis' speed setting, not deg/s (gimbal.xml 148-0-5); here it is deg/s and
+converted with the speed that the drone reports. Targets are not acknowledged and can be lost, so that the verbs that
+wait repeat them until the attitude shows that they came.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import ClassVar
+
+import msgspec
+from msgspec.structs import replace
+
+from anafi_mav.arsdk.codec.wire import Message
+from anafi_mav.arsdk.messages import gimbal
+from anafi_mav.arsdk.messages.gimbal import (
+    Axis,
+    ControlMode,
+    Error,
+    FrameOfReference,
+    GimbalCalibrationResult,
+    GimbalCalibrationState,
+    Model,
+)
+from anafi_mav.drone.element import Range, Reducer, members, with_item
+from anafi_mav.drone.expectation import ANSWER_TIMEOUT
+from anafi_mav.drone.settings import Commanding
+from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LocalProtocolError, NotSupported
+from anafi_mav.units import clip
+
+MAIN = 0
+"""Id of the gimbal that carries the cameras; the Ai's stereo camera has one of its own."""
+
+ARRIVED_DEG = 0.5
+STILL_DEG = 0.1
+"""Between two attitudes of a gimbal that stands."""
+SETTLING = 3
+"""Attitudes before a gimbal that stands is believed: the first may be older than the command."""
+CALIBRATION_TIMEOUT = 60.0
+"""s."""
+
+
+class Aim(msgspec.Struct, frozen=True):
+    """Target of one axis: an angle (deg) for `aim` and `point`, a rate (deg/s) for `turn`."""
+
+    value: float
+    frame: FrameOfReference = FrameOfReference.ABSOLUTE
+
+
+class Angles(msgspec.Struct, frozen=True):
+    """Angles of the three axes, deg: yaw + clockwise, pitch + up, roll + right."""
+
+    yaw: float
+    pitch: float
+    roll: float
+
+    def of(self, axis: Axis) -> float:
+        """Return the angle of one axis."""
+        return (self.yaw, self.pitch, self.roll)[axis]
+
+
+class GimbalAttitude(msgspec.Struct, frozen=True):
+    """Attitude of a gimbal in both frames."""
+
+    frames: Mapping[Axis, FrameOfReference]
+    """Frame that each axis holds: RELATIVE moves with the body, ABSOLUTE stays with the horizon or north."""
+    relative: Angles
+    """To the body."""
+    absolute: Angles
+    """To the horizon; yaw to magnetic north."""
+
+    def angle(self, axis: Axis, frame: FrameOfReference) -> float:
+        """Return the angle of one axis in a frame, deg."""
+        return (self.relative if frame == FrameOfReference.RELATIVE else self.absolute).of(axis)
+
+
+class GimbalState(msgspec.Struct, frozen=True):
+    """One gimbal: its attitude, ranges and calibration."""
+
+    model: Model | None = None
+    axes: frozenset[Axis] | None = None
+    """Axes that turn."""
+    attitude: GimbalAttitude | None = None
+    relative_bounds: Mapping[Axis, tuple[float, float]] = {}
+    absolute_bounds: Mapping[Axis, tuple[float, float]] = {}
+    max_speed: Mapping[Axis, Range] = {}
+    """deg/s."""
+    offsets: Mapping[Axis, Range] = {}
+    """Corrections by hand, deg."""
+    offsets_open: bool | None = None
+    """True while `set_offsets` is accepted."""
+    locked: frozenset[Axis] | None = None
+    """Axes that do not turn at present."""
+    calibration: GimbalCalibrationState | None = None
+    calibration_result: GimbalCalibrationResult | None = None
+    """Of the last calibration since the connection."""
+    errors: frozenset[Error] | None = None
+    stabilized: bool | None = None
+
+
+def _ranges(message: gimbal.MaxSpeed | gimbal.Offsets) -> dict[Axis, Range]:
+    values = {
+        Axis.YAW: (message.current_yaw, message.min_bound_yaw, message.max_bound_yaw),
+        Axis.PITCH: (message.current_pitch, message.min_bound_pitch, message.max_bound_pitch),
+        Axis.ROLL: (message.current_roll, message.min_bound_roll, message.max_bound_roll),
+    }
+    return {axis: Range(*numbers) for axis, numbers in values.items() if all(map(math.isfinite, numbers))}
+
+
+def _bounds(message: gimbal.RelativeAttitudeBounds | gimbal.AbsoluteAttitudeBounds) -> dict[Axis, tuple[float, float]]:
+    values = {
+        Axis.YAW: (message.min_yaw, message.max_yaw),
+        Axis.PITCH: (message.min_pitch, message.max_pitch),
+        Axis.ROLL: (message.min_roll, message.max_roll),
+    }
+    return {axis: (low, high) for axis, (low, high) in values.items() if low <= high}
+
+
+def _attitude(message: gimbal.Attitude) -> GimbalAttitude | None:
+    relative = Angles(message.yaw_relative, message.pitch_relative, message.roll_relative)
+    absolute = Angles(message.yaw_absolute, message.pitch_absolute, message.roll_absolute)
+    # One sum instead of six questions: this comes as often as anything. It is not finite if one of them is not.
+    if not math.isfinite(relative.yaw + relative.pitch + relative.roll + absolute.yaw + absolute.pitch + absolute.roll):
+        return None
+    frames = {
+        Axis.YAW: message.yaw_frame_of_reference,
+        Axis.PITCH: message.pitch_frame_of_reference,
+        Axis.ROLL: message.roll_frame_of_reference,
+    }
+    return GimbalAttitude(frames, relative, absolute)
+
+
+Gimbals = Mapping[int, GimbalState]
+
+
+def _with(state: Gimbals, id: int, **changes: object) -> Gimbals:
+    return with_item(state, id, replace(state.get(id, GimbalState()), **changes), 0)
+
+
+class Gimbal(Commanding[Gimbals]):
+    """All gimbals of the drone; `gimbal[id]` is the state of one, the verbs use the main one by default."""
+
+    NOTHING: ClassVar[Gimbals] = {}
+    REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = {
+        gimbal.GimbalCapabilities: lambda state, m: _with(
+            state, m.gimbal_id, model=m.model, axes=members(m.axes, Axis)
+        ),
+        gimbal.Attitude: lambda state, m: _with(state, m.gimbal_id, attitude=_attitude(m)),
+        gimbal.RelativeAttitudeBounds: lambda state, m: _with(state, m.gimbal_id, relative_bounds=_bounds(m)),
+        gimbal.AbsoluteAttitudeBounds: lambda state, m: _with(state, m.gimbal_id, absolute_bounds=_bounds(m)),
+        gimbal.MaxSpeed: lambda state, m: _with(state, m.gimbal_id, max_speed=_ranges(m)),
+        gimbal.Offsets: lambda state, m: _with(
+            state, m.gimbal_id, offsets=_ranges(m), offsets_open=m.update_state == gimbal.State.ACTIVE
+        ),
+        gimbal.AxisLockState: lambda state, m: _with(state, m.gimbal_id, locked=members(m.locked, Axis)),
+        gimbal.CalibrationState: lambda state, m: _with(state, m.gimbal_id, calibration=m.state),
+        gimbal.CalibrationResult: lambda state, m: _with(state, m.gimbal_id, calibration_result=m.result),
+        gimbal.Alert: lambda state, m: _with(state, m.gimbal_id, errors=members(m.error, Error)),
+        gimbal.StabilizationState: lambda state, m: _with(
+            state, m.gimbal_id, stabilized=m.state == gimbal.State.ACTIVE
+        ),
+    }
+
+    def __getitem__(self, id: int) -> GimbalState:
+        """The state of this gimbal, an empty one when the drone has not reported it."""
+        return self.state.get(id, GimbalState())
+
+    # -- where to look
+
+    def aim(self, *, yaw: Aim | None = None, pitch: Aim | None = None, roll: Aim | None = None, id: int = MAIN) -> None:
+        """Send angles (deg) once, without waiting: for targets that arrive in a stream. None leaves an axis alone.
+
+        Angles beyond the bounds are clipped to them. Raises `NotSupported` for an axis that this gimbal does not have.
+        """
+        targets = self._targets({Axis.YAW: yaw, Axis.PITCH: pitch, Axis.ROLL: roll}, id)
+        self._order(id, self._command(targets, ControlMode.POSITION, id))
+
+    def turn(
+        self, *, yaw: Aim | None = None, pitch: Aim | None = None, roll: Aim | None = None, id: int = MAIN
+    ) -> None:
+        """Turn with these rates (deg/s), sent once: the drone holds them until the next target or the end of the range.
+
+        Rates beyond the speed setting are clipped to it. Zero stops an axis, but it can be lost: `stop` makes sure.
+        """
+        rates = {Axis.YAW: yaw, Axis.PITCH: pitch, Axis.ROLL: roll}
+        shares = {axis: self._share(axis, aim, id) for axis, aim in rates.items() if aim is not None}
+        self._order(id, self._command(shares, ControlMode.VELOCITY, id))
+
+    async def point(
+        self,
+        *,
+        yaw: Aim | None = None,
+        pitch: Aim | None = None,
+        roll: Aim | None = None,
+        id: int = MAIN,
+        timeout: float | None = None,
+    ) -> GimbalAttitude:
+        """Point the gimbal at angles (deg); return its attitude once they are reached.
+
+        Without a `timeout` it has the time that the turn takes. Raises `CommandRejected` when a newer target replaces
+        this one.
+        """
+        targets = self._targets({Axis.YAW: yaw, Axis.PITCH: pitch, Axis.ROLL: roll}, id)
+        if timeout is None:
+            timeout = ANSWER_TIMEOUT + self._way(targets, id)
+
+        def judge(message: gimbal.Attitude) -> GimbalAttitude | None:
+            attitude = _attitude(message) if message.gimbal_id == id else None
+            if attitude is None:
+                return None
+            there = all(
+                abs(_turn(attitude.angle(axis, aim.frame), aim.value)) <= ARRIVED_DEG for axis, aim in targets.items()
+            )
+            return attitude if there else None
+
+        answer = self._commander.expect((gimbal.Attitude,), judge)
+        return await self._insist(id, self._command(targets, ControlMode.POSITION, id), answer, timeout)
+
+    async def stop(self, id: int = MAIN, timeout: float = ANSWER_TIMEOUT) -> GimbalAttitude:
+        """Stop all axes; return the attitude once the gimbal stands."""
+        axes = self._axes(id)
+        attitude = self[id].attitude
+        frames = {} if attitude is None else attitude.frames
+        still = {axis: Aim(0.0, frames.get(axis, FrameOfReference.RELATIVE)) for axis in axes}
+        answer = self._commander.expect((gimbal.Attitude,), _Standing(id))
+        return await self._insist(id, self._command(still, ControlMode.VELOCITY, id), answer, timeout)
+
+    async def reset_orientation(self, id: int = MAIN, timeout: float = 2 * ANSWER_TIMEOUT) -> GimbalAttitude:
+        """Turn to the drone's reference orientation; return the attitude once the gimbal stands there."""
+        self._axes(id)
+        self._orders[id] += 1
+        return await self._commander.confirm(gimbal.ResetOrientation(id), (gimbal.Attitude,), _Standing(id), timeout)
+
+    # -- settings
+
+    async def set_max_speed(self, degrees_per_second: float, id: int = MAIN) -> Mapping[Axis, Range]:
+        """Set the highest rate, deg/s, one for all axes (gimbal.xml 148-0-4); return the setting of each axis."""
+        if not math.isfinite(degrees_per_second):
+            raise LocalProtocolError("a speed is not a number")
+        self._require(self[id].max_speed, gimbal.SetMaxSpeed.NAME)
+        return await self._change(
+            gimbal.SetMaxSpeed(id, degrees_per_second, degrees_per_second, degrees_per_second),
+            gimbal.MaxSpeed,
+            lambda message: self[id].max_speed if message.gimbal_id == id else None,
+        )
+
+    async def open_offsets(self, on: bool, id: int = MAIN) -> bool:
+        """Begin or end the correction by offsets; while it is open the gimbal keeps to them."""
+        self._require(self[id].offsets_open, gimbal.StartOffsetsUpdate.NAME)
+        return await self._change(
+            gimbal.StartOffsetsUpdate(id) if on else gimbal.StopOffsetsUpdate(id),
+            gimbal.Offsets,
+            lambda message: message.update_state == gimbal.State.ACTIVE if message.gimbal_id == id else None,
+        )
+
+    async def set_offsets(
+        self, *, yaw: float | None = None, pitch: float | None = None, roll: float | None = None, id: int = MAIN
+    ) -> Mapping[Axis, Range]:
+        """Set the offsets, deg, while they are open; None keeps one. Return those of the drone."""
+        now = self[id].offsets
+        self._require(now, gimbal.SetOffsets.NAME)
+        wanted = []
+        for axis, value in ((Axis.YAW, yaw), (Axis.PITCH, pitch), (Axis.ROLL, roll)):
+            kept = now[axis].current if axis in now else 0.0
+            wanted.append(kept if value is None else value)
+        if not math.isfinite(sum(wanted)):
+            raise LocalProtocolError("an offset is not a number")
+        return await self._change(
+            gimbal.SetOffsets(id, *wanted),
+            gimbal.Offsets,
+            lambda message: self[id].offsets if message.gimbal_id == id else None,
+        )
+
+    # -- calibration
+
+    async def calibrate(self, id: int = MAIN, timeout: float = CALIBRATION_TIMEOUT) -> None:
+        """Calibrate the gimbal; returns when that succeeded. Raises `CommandRejected` when it failed."""
+        self._require(self[id].calibration, gimbal.Calibrate.NAME)
+
+        def judge(message: gimbal.CalibrationResult | gimbal.CalibrationState) -> bool | AnafiMavError | None:
+            if message.gimbal_id != id:
+                return None
+            if isinstance(message, gimbal.CalibrationState):
+                if message.state == GimbalCalibrationState.IN_PROGRESS:
+                    answer.expire_after(timeout, CommandTimeout(gimbal.Calibrate.NAME, timeout))
+                return None
+            if message.result == GimbalCalibrationResult.SUCCESS:
+                return True
+            return CommandRejected(f"gimbal calibration: {message.result.name.lower()}")
+
+        answer = self._commander.expect((gimbal.CalibrationResult, gimbal.CalibrationState), judge)
+        self._commander.dispatch(answer, gimbal.Calibrate(id), ANSWER_TIMEOUT)
+        await answer.wait()
+
+    async def cancel_calibration(self, id: int = MAIN) -> None:
+        """Cancel the calibration; returns when none is running."""
+        self._require(self[id].calibration, gimbal.CancelCalibration.NAME)
+        await self._change(
+            gimbal.CancelCalibration(id),
+            gimbal.CalibrationState,
+            lambda message: (
+                True if message.gimbal_id == id and message.state != GimbalCalibrationState.IN_PROGRESS else None
+            ),
+            stops=True,
+        )
+
+    # -- inside
+
+    def _axes(self, id: int) -> frozenset[Axis]:
+        axes = self[id].axes
+        self._require(axes, f"gimbal {id}")
+        return axes or frozenset()
+
+    def _targets(self, wanted: Mapping[Axis, Aim | None], id: int) -> dict[Axis, Aim]:
+        axes = self._axes(id)
+        targets = {}
+        for axis, aim in wanted.items():
+            if aim is None:
+                continue
+            if axis not in axes:
+                raise NotSupported(f"gimbal axis {axis.name.lower()}")
+            if not math.isfinite(aim.value) or aim.frame == FrameOfReference.NONE:
+                raise LocalProtocolError(f"no target for the gimbal: {aim}")
+            state = self[id]
+            known = state.relative_bounds if aim.frame == FrameOfReference.RELATIVE else state.absolute_bounds
+            low, high = known.get(axis, (-math.inf, math.inf))
+            targets[axis] = Aim(clip(aim.value, low, high), aim.frame)
+        return targets
+
+    def _share(self, axis: Axis, aim: Aim, id: int) -> Aim:
+        if axis not in self._axes(id):
+            raise NotSupported(f"gimbal axis {axis.name.lower()}")
+        if not math.isfinite(aim.value) or aim.frame == FrameOfReference.NONE:
+            raise LocalProtocolError(f"no rate for the gimbal: {aim}")
+        speed = self[id].max_speed.get(axis)
+        if speed is None:
+            raise NotSupported("reported gimbal speed")
+        # A speed setting of zero is an axis that may not turn at all.
+        return Aim(clip(aim.value / speed.current, -1.0, 1.0) if speed.current > 0.0 else 0.0, aim.frame)
+
+    def _way(self, targets: Mapping[Axis, Aim], id: int) -> float:
+        """s that the gimbal needs to get there at its speed setting."""
+        state = self[id]
+        if state.attitude is None:
+            return 0.0
+        seconds = 0.0
+        for axis, aim in targets.items():
+            speed = state.max_speed.get(axis)
+            if speed is not None and speed.current > 0.0:
+                seconds = max(seconds, abs(aim.value - state.attitude.angle(axis, aim.frame)) / speed.current)
+        return seconds
+
+    @staticmethod
+    def _command(targets: Mapping[Axis, Aim], mode: ControlMode, id: int) -> gimbal.SetTarget:
+        idle = Aim(0.0, FrameOfReference.NONE)
+        yaw, pitch, roll = (targets.get(axis, idle) for axis in (Axis.YAW, Axis.PITCH, Axis.ROLL))
+        return gimbal.SetTarget(id, mode, yaw.frame, yaw.value, pitch.frame, pitch.value, roll.frame, roll.value)
+
+
+class _Standing:
+    """A judge: the attitude at which the gimbal has come to a stand, in the frame that each axis holds."""
+
+    def __init__(self, id: int) -> None:
+        self._id = id
+        self._last: GimbalAttitude | None = None
+        self._seen = 0
+
+    def __call__(self, message: gimbal.Attitude) -> GimbalAttitude | None:
+        attitude = _attitude(message) if message.gimbal_id == self._id else None
+        if attitude is None:
+            return None
+        last, self._last = self._last, attitude
+        self._seen += 1
+        if last is None or self._seen < SETTLING:
+            return None
+        moved = max(
+            abs(_turn(last.angle(axis, attitude.frames[axis]), attitude.angle(axis, attitude.frames[axis])))
+            for axis in Axis
+        )
+        return attitude if moved <= STILL_DEG else None
+
+
+def _turn(start: float, end: float) -> float:
+    """The shorter way from one angle to another, deg."""
+    return (end - start + 180.0) % 360.0 - 180.0

@@ -1,0 +1,177 @@
+"""Guided moves: a moveBy and a moveTo as verbs, and how what they started is stopped.
+
+Which of them has not ended is kept in `moves`, which reads the drone's events; the commands are sent from here.
+"""
+
+from __future__ import annotations
+
+import math
+
+from anafi_mav.arsdk.codec.wire import Message
+from anafi_mav.arsdk.messages import ardrone3
+from anafi_mav.arsdk.messages import move as guided
+from anafi_mav.arsdk.messages.ardrone3 import FlyingState, OrientationMode
+from anafi_mav.drone.element import Element, Position
+from anafi_mav.drone.expectation import Commander, loop_time
+from anafi_mav.drone.piloting.moves import Displacement, Move, Moves
+from anafi_mav.drone.piloting.state import PilotingState, in_state
+from anafi_mav.drone.piloting.stick_stream import StickStream
+from anafi_mav.drone.status.home import Home
+from anafi_mav.errors import CommandRejected, LocalProtocolError, NotSupported
+from anafi_mav.units import RAD_PER_DEG, wrap_360
+
+MOVE_BY_MARGIN = 20.0
+"""s that a relative move may take beyond the flight itself."""
+MOVE_BY_SLOWEST = 0.5
+"""m/s and rad/s below which a relative move is given up: the speed is the drone's choice, this is far below it."""
+
+FASTEST = 16.0
+"""m/s over ground, the Ai's top speed (anafi_ros paper, table I): stands for "no limit" where Parrot has no word for it
+and another limit is given."""
+
+
+class GuidedMoves:
+    """The moves that are verbs. `Piloting` says what its verbs of the same names promise."""
+
+    def __init__(
+        self, commander: Commander, flight: Element[PilotingState], home: Home, sticks: StickStream, moves: Moves
+    ) -> None:
+        self._commander = commander
+        self._flight = flight
+        self._home = home
+        self._sticks = sticks
+        self._moves = moves
+
+    async def move_by(
+        self,
+        front: float,
+        right: float,
+        down: float,
+        turn: float,
+        timeout: float | None,
+        turn_rate_dps: float | None,
+    ) -> Displacement:
+        if not math.isfinite(front + right + down + turn):
+            raise LocalProtocolError("a relative move is not a number")
+        self.require_free()
+        command = self._move_by_command(front, right, down, turn, turn_rate_dps)
+        if timeout is None:
+            timeout = MOVE_BY_MARGIN + (math.hypot(front, right, down) + abs(turn)) / MOVE_BY_SLOWEST
+            if turn_rate_dps is not None:
+                timeout += abs(turn) / (turn_rate_dps * RAD_PER_DEG)
+        move = Move(self._commander.expect((), _decided_elsewhere))
+        self._sticks.let_go()
+        self._commander.call_off("a move was asked for")
+        self._moves.by.append(move)
+        try:
+            self._commander.dispatch(move.answer, command, timeout)
+            flown: Displacement = await move.answer.wait()
+        finally:
+            if move in self._moves.by:  # given up: neither the drone nor hover has ended it
+                self._moves.drop_by(move, loop_time())
+                # Otherwise the drone is busy with what is not ours to disturb.
+                if self._sticks.blocked is None and not self._home.state.returning:
+                    self._commander.halt_if_connected(ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0))
+        return flown
+
+    def _move_by_command(
+        self, front: float, right: float, down: float, turn: float, turn_rate_dps: float | None
+    ) -> Message:
+        if turn_rate_dps is None:
+            return ardrone3.MoveBy(front, right, down, turn)
+        if not (math.isfinite(turn_rate_dps) and turn_rate_dps > 0.0):
+            raise LocalProtocolError("a turn needs a rate above zero")
+        limits = self._flight.state.limits
+        if limits is None:
+            raise NotSupported("reported speed limits")
+        return guided.ExtendedMoveBy(front, right, down, turn, FASTEST, limits.climb_mps, turn_rate_dps)
+
+    async def move_to(
+        self,
+        latitude: float,
+        longitude: float,
+        altitude: float,
+        heading_deg: float | None,
+        horizontal_speed: float | None,
+        vertical_speed: float | None,
+        timeout: float,
+    ) -> Move:
+        if not math.isfinite(
+            latitude + longitude + altitude + (heading_deg or 0.0) + (horizontal_speed or 0.0) + (vertical_speed or 0.0)
+        ):
+            raise LocalProtocolError("a target is not a number")
+        self.require_free()
+        target = self._moves.distinct(Position(latitude, longitude, altitude))
+        command = self._move_to_command(target, heading_deg, horizontal_speed, vertical_speed)
+        move = Move(self._commander.expect((), _decided_elsewhere), target)
+        self._sticks.let_go()
+        self._commander.call_off("a move was asked for")
+        obsolete = self._moves.begin_to(move)
+        if obsolete is not None and obsolete.answer.token is not None:
+            self._commander.cancel(obsolete.answer.token)
+        try:
+            self._commander.dispatch(move.answer, command, timeout)
+            await move.answer.wait()
+            if self._moves.to is move:
+                self._sticks.silence()
+        finally:
+            if not move.running and self._moves.to is move:  # given up: it must not start later
+                self._moves.cancel_to("given up")
+                move.answer.close()  # not awaited when it was refused before it was sent
+                self._commander.halt_if_connected(ardrone3.CancelMoveTo())
+        return move
+
+    def _move_to_command(
+        self,
+        to: Position,
+        heading_deg: float | None,
+        horizontal_speed: float | None,
+        vertical_speed: float | None,
+    ) -> Message:
+        mode = OrientationMode.NONE if heading_deg is None else OrientationMode.HEADING_DURING
+        heading = 0.0 if heading_deg is None else wrap_360(heading_deg)
+        if horizontal_speed is None and vertical_speed is None:
+            return ardrone3.MoveTo(to.latitude, to.longitude, to.altitude, mode, heading)
+        if any(speed is not None and speed <= 0.0 for speed in (horizontal_speed, vertical_speed)):
+            raise LocalProtocolError("a moveTo needs a speed above zero")
+        limits = self._flight.state.limits
+        if limits is None:
+            raise NotSupported("reported speed limits")
+        return guided.ExtendedMoveTo(
+            to.latitude,
+            to.longitude,
+            to.altitude,
+            guided.OrientationMode(mode.value),
+            heading,
+            FASTEST if horizontal_speed is None else horizontal_speed,
+            limits.climb_mps if vertical_speed is None else vertical_speed,
+            limits.yaw_rate_dps,
+        )
+
+    def stop(self, why: str) -> bool:
+        """Cancel our moveTo and moveBys; in the order of the queue, so a later move is not hit.
+
+        True when a moveTo was cancelled.
+        """
+        journey = self._moves.cancel_to(why)
+        if journey is not None:
+            if journey.answer.token is not None:
+                self._commander.cancel(journey.answer.token)
+            self._commander.halt(ardrone3.CancelMoveTo())
+        moves = self._moves.cancel_by(why, loop_time())
+        for move in moves:
+            if move.answer.token is not None:
+                self._commander.cancel(move.answer.token)
+        if moves:
+            self._commander.halt(ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0))
+        return journey is not None
+
+    def require_free(self) -> None:
+        if self._home.state.returning_by_itself:
+            raise CommandRejected("the drone returns home by itself")
+        if self._flight.state.flying in (FlyingState.LANDING, FlyingState.EMERGENCY_LANDING):
+            raise CommandRejected(in_state(self._flight.state.flying))
+
+
+def _decided_elsewhere(message: Message) -> None:
+    """The judge of moves: `Moves` knows which of them an event speaks of."""

@@ -1,0 +1,111 @@
+"""How a landing is ended: positive gaz, as ardrone3.xml 1-0-3 says, and a take-off command where one was asked for.
+
+Gaz starts nothing on the ground. A TakeOff does, so it is withdrawn when the drone reports that it has landed, and a
+firmware that executes it all the same is made to land again (`Motors.stay_down`).
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+
+from anafi_mav.arsdk.messages import ardrone3
+from anafi_mav.arsdk.messages.ardrone3 import FlyingState
+from anafi_mav.drone.element import Element
+from anafi_mav.drone.expectation import Commander, loop_time
+from anafi_mav.drone.piloting.motors import Motors
+from anafi_mav.drone.piloting.state import PilotingState
+from anafi_mav.drone.piloting.stick_stream import StickStream
+from anafi_mav.drone.piloting.sticks import PERIOD, Percent
+from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout
+
+GAZ_FOR = 1.0
+"""s of gaz at most; then the sticks are centred, whatever the drone reports."""
+
+FULL_GAZ = Percent(0, 0, 0, 100)
+
+ALREADY_LANDED = "already landed"
+"""The reason of a refusal: LANDED was reported before the landing was ended."""
+
+STILL_LANDING = "drone still landing"
+"""The reason of a failure: neither the end of the landing nor LANDED was reported in time."""
+
+MOTORS_CUT, FORCED = "motors cut", "forced landing"
+"""The reasons of a refusal: what the landing has become."""
+
+SMART_WAIT = 1.5
+"""s for SmartTakeOffLand alone to end a landing, before gaz is tried."""
+
+
+class LandingEnd:
+    """Ends landings. `Piloting.end_landing` says what it promises."""
+
+    def __init__(
+        self,
+        commander: Commander,
+        flight: Element[PilotingState],
+        sticks: StickStream,
+        motors: Motors,
+        is_modern: Callable[[], bool],
+    ) -> None:
+        """`is_modern` returns True for an Ai, which takes SmartTakeOffLand (GroundSDK)."""
+        self._commander = commander
+        self._flight = flight
+        self._sticks = sticks
+        self._motors = motors
+        self._is_modern = is_modern
+
+    async def end(self, timeout: float, *, take_off: bool) -> None:
+        self._commander.require_link()
+        if self._flight.state.flying == FlyingState.LANDED:
+            raise CommandRejected(ALREADY_LANDED)
+        if self._flight.state.flying != FlyingState.LANDING:
+            return
+        answer = self._commander.expect((ardrone3.FlyingStateChanged,), _judge)
+        answer.expire_after(timeout, CommandTimeout("the end of the landing", timeout))
+        self._motors.landing_doubtful()
+        try:
+            if take_off and self._is_modern():
+                answer.token = self._commander.send(ardrone3.SmartTakeOffLand())
+                self._motors.take_off_against_landing()
+                # It toggles: were the landing ended by gaz before it arrives, it would begin another one.
+                await asyncio.wait({answer.future}, timeout=SMART_WAIT)
+                self._commander.cancel(answer.token)
+            elif take_off:
+                answer.token = self._commander.send(ardrone3.TakeOff())
+                self._motors.take_off_against_landing()
+            await self._hold_gaz(answer.future)
+            await answer.wait()
+            if take_off:
+                self._motors.landing_over()
+        except BaseException as error:
+            if answer.token is not None:
+                self._motors.take_off_withdrawn()
+            if isinstance(error, CommandTimeout):
+                raise CommandRejected(STILL_LANDING) from None
+            raise
+        finally:
+            if answer.token is not None:  # whatever ended this: it must not arrive on the ground
+                self._commander.cancel(answer.token)
+            answer.close()
+            self._sticks.centre_after_gaz()
+
+    async def _hold_gaz(self, ended: asyncio.Future[bool]) -> None:
+        """Send full gaz every 50 ms until the drone reports something else than a landing, for `GAZ_FOR` at most."""
+        until = loop_time() + GAZ_FOR
+        while not ended.done() and loop_time() < until:
+            self._sticks.send_now(FULL_GAZ)
+            await asyncio.wait({ended}, timeout=PERIOD)
+
+
+def _judge(message: ardrone3.FlyingStateChanged) -> bool | AnafiMavError | None:
+    match message.state:
+        case FlyingState.LANDING:
+            return None
+        case FlyingState.LANDED:
+            return CommandRejected(ALREADY_LANDED)
+        case FlyingState.EMERGENCY:
+            return CommandRejected(MOTORS_CUT)
+        case FlyingState.EMERGENCY_LANDING:
+            return CommandRejected(FORCED)
+    return True

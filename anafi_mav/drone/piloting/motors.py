@@ -1,0 +1,372 @@
+"""Up and down: the verbs that start the motors, and those that end a flight.
+
+A take-off that was given up may have reached the drone all the same: a landing and an emergency have to catch what may
+still begin.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Callable
+
+from anafi_mav.arsdk.codec.wire import Message
+from anafi_mav.arsdk.messages import ardrone3, common
+from anafi_mav.arsdk.messages.ardrone3 import FlyingState
+from anafi_mav.drone.element import Element
+from anafi_mav.drone.expectation import QUIET, Commander, Expectation, loop_time
+from anafi_mav.drone.piloting.state import MOTORS_OFF, PilotingState, in_state
+from anafi_mav.drone.piloting.stick_stream import StickStream
+from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost
+
+RAMPING_TIMEOUT = 10.0
+"""s that the motors may take from their first turn to the take-off."""
+
+TAKE_OFF_MEMORY = 10.0
+"""s after a take-off was given up in which the drone may still carry it out, or already does and could not say so."""
+
+LAND_INSISTS = 10.0
+"""s for which a Landing is repeated while the motors ramp up or the drone rises: ardrone3.xml 1-0-3 promises a landing
+to a drone that takes off, hovers or flies, and none to one whose motors ramp up."""
+
+LAND_MEMORY = 3.0
+"""s after a Landing was withdrawn in which the drone may land all the same, and after a landing was to be ended in
+which the reported landing may be over."""
+
+STAYS_DOWN = 3.0
+"""s after LANDED in which a TakeOff that was to end the landing may still be executed."""
+
+STOP_MOTORS_TIMEOUT = 15.0
+"""s until propellers that turn near the ground stand still: the way down from half a metre is in it."""
+
+FORCED_AFTER = 0.3
+"""s that motors may go on ramping up after a forced disarm before they are cut."""
+
+EMERGENCY_TIMEOUT = 30.0
+"""s that cutting the motors is tried for while the link seems to live but delivers nothing."""
+
+_RISING = frozenset({FlyingState.MOTOR_RAMPING, FlyingState.TAKINGOFF, FlyingState.HOVERING, FlyingState.FLYING})
+_TAKEN_OFF = frozenset({FlyingState.TAKINGOFF, FlyingState.HOVERING, FlyingState.FLYING})
+TURNING = frozenset({FlyingState.MOTOR_RAMPING, FlyingState.USERTAKEOFF})
+"""The motors turn and the drone is not in the air."""
+_LANDING = frozenset({FlyingState.LANDING, FlyingState.LANDED, FlyingState.EMERGENCY_LANDING, FlyingState.EMERGENCY})
+_MOTORS_CUT = frozenset({FlyingState.EMERGENCY, FlyingState.LANDED})
+
+
+class Motors:
+    """Take-off, hand launch, landing, emergency. `Piloting` says what its verbs of the same names promise."""
+
+    def __init__(
+        self,
+        commander: Commander,
+        flight: Element[PilotingState],
+        sticks: StickStream,
+        takeoff_blockers: Callable[[], list[str]],
+    ) -> None:
+        self._commander = commander
+        self._flight = flight
+        self._sticks = sticks
+        self._takeoff_blockers = takeoff_blockers
+        self._launches: set[Expectation[bool]] = set()
+        """Waits of take-offs and hand launches whose command may not have left."""
+        self._may_take_off_until = -math.inf
+        self._may_land_until = -math.inf
+        """Until when a Landing that was withdrawn may be reported to have begun."""
+        self._doubtful_until = -math.inf
+        """Until when the reported LANDING may be over: its end was asked for."""
+        self._withdrawn_until = -math.inf
+        """Until when a TakeOff against a landing that was withdrawn may arrive, or be executed."""
+        self._stays_down_until = -math.inf
+        """Until when motors that start are stopped: no take-off that began after the touchdown is wanted."""
+
+    def link_lost(self) -> None:
+        """Commands of before do not count for the next connection."""
+        self._may_take_off_until = self._may_land_until = -math.inf
+        self._doubtful_until = self._stays_down_until = self._withdrawn_until = -math.inf
+
+    def on_flying_state(self, message: ardrone3.FlyingStateChanged) -> None:
+        """Stop what starts after a touchdown although nothing that is wanted starts it."""
+        if message.state != FlyingState.LANDING:
+            self._doubtful_until = -math.inf
+        if message.state == FlyingState.LANDED and loop_time() < self._withdrawn_until:
+            self._stay_down()
+        if loop_time() >= self._stays_down_until:
+            return
+        if message.state == FlyingState.MOTOR_RAMPING:
+            self._commander.halt_if_connected(ardrone3.UserTakeOff(0))
+        if message.state in _RISING:
+            self._commander.halt_if_connected(ardrone3.Landing())
+
+    def take_off_wanted(self) -> None:
+        """A command that starts the motors is about to be sent: those that start from now on are wanted."""
+        self._stays_down_until = self._withdrawn_until = -math.inf
+
+    def landing_doubtful(self) -> None:
+        """The landing is about to be ended: until a state is reported, LANDING proves nothing."""
+        self._doubtful_until = loop_time() + LAND_MEMORY
+
+    def take_off_against_landing(self) -> None:
+        """A TakeOff was sent against a landing: from LANDED on, what it starts is stopped.
+
+        LANDED and the motors that ramp up may arrive together, before the command that waits has noticed the first.
+        """
+        self._withdrawn_until = math.inf
+
+    def landing_over(self) -> None:
+        """The TakeOff against the landing has done its work in the air."""
+        self._withdrawn_until = -math.inf
+
+    def take_off_withdrawn(self) -> None:
+        """A TakeOff against a landing was withdrawn and may have arrived: a drone that has landed must stay down."""
+        self._withdrawn_until = loop_time() + STAYS_DOWN
+        if self._flight.state.flying == FlyingState.LANDED:
+            self._stay_down()
+
+    def _stay_down(self) -> None:
+        self._stays_down_until = self._may_take_off_until = loop_time() + STAYS_DOWN
+
+    async def settle_landing(self, timeout: float) -> bool:
+        """Return True when a Landing that was withdrawn has begun all the same; False when it certainly does not.
+
+        That is known once the drone has received a later command, and then reports nothing.
+        """
+        flies = self._flight.state.flying in _TAKEN_OFF
+        if loop_time() >= self._may_land_until or not flies:
+            return self._flight.state.flying == FlyingState.LANDING
+        answer = self._commander.expect(
+            (ardrone3.FlyingStateChanged,), lambda message: True if message.state in _LANDING else None
+        )
+        try:
+            began = await answer.came(
+                self._commander.halt(ardrone3.CancelMoveTo()), ardrone3.CancelMoveTo.NAME, timeout
+            )
+            self._may_land_until = -math.inf
+        finally:
+            answer.close()
+        return began
+
+    @property
+    def about_to_fly(self) -> bool:
+        return self._flight.state.flying == FlyingState.LANDED and (
+            bool(self._launches)
+            or loop_time() < self._may_take_off_until
+            or self._commander.may_begin(common.Stop, TAKE_OFF_MEMORY)
+        )
+
+    async def take_off(self, timeout: float) -> None:
+        self._commander.require_link()
+        flying = self._flight.state.flying
+        if flying in _TAKEN_OFF:
+            return
+        if flying not in (FlyingState.LANDED, FlyingState.MOTOR_RAMPING):
+            raise CommandRejected(in_state(flying))
+        await self._launch(ardrone3.TakeOff(), _TAKEN_OFF, timeout)
+
+    async def hand_launch(self, timeout: float) -> None:
+        self._commander.require_link()
+        flying = self._flight.state.flying
+        if flying == FlyingState.USERTAKEOFF:
+            return
+        if flying != FlyingState.LANDED:
+            raise CommandRejected(in_state(flying))
+        if self._launches:
+            raise CommandRejected("the drone is about to take off")
+        try:
+            await self._launch(ardrone3.UserTakeOff(1), _TAKEN_OFF | {FlyingState.USERTAKEOFF}, timeout)
+        except LinkLost:
+            raise
+        except BaseException:
+            # Given up: the motors of a drone that somebody holds must not start a moment later.
+            self._commander.halt_if_connected(ardrone3.UserTakeOff(0))
+            raise
+
+    async def _launch(self, command: Message, up: frozenset[FlyingState], timeout: float) -> None:
+        """Send a command that starts the motors; returns when the drone is in one of these states."""
+        self._sticks.silence()
+
+        def judge(message: ardrone3.FlyingStateChanged) -> bool | AnafiMavError | None:
+            if message.state in up:
+                return True
+            if message.state == FlyingState.MOTOR_RAMPING:
+                answer.expire_after(RAMPING_TIMEOUT, CommandTimeout(command.NAME, RAMPING_TIMEOUT))
+            elif message.state in _MOTORS_CUT:
+                return CommandRejected(self._why_on_the_ground("the motors stopped again"))
+            return None
+
+        answer = self._commander.expect((ardrone3.FlyingStateChanged,), judge)
+        self._commander.dispatch(answer, command, timeout)
+        self._launches.add(answer)
+        try:
+            await answer.wait()
+        except CommandRejected:
+            raise
+        except BaseException as error:
+            self._may_take_off_until = loop_time() + TAKE_OFF_MEMORY
+            if isinstance(error, CommandTimeout) and (reasons := self._why_on_the_ground("")):
+                raise CommandRejected(reasons) from None
+            raise
+        finally:
+            self._launches.discard(answer)
+
+    async def cancel_hand_launch(self, timeout: float) -> None:
+        self._commander.require_link()
+        if self.about_to_fly:
+            await self.land(timeout)
+            return
+        if self._flight.state.flying in MOTORS_OFF:
+            return
+        if self._flight.state.in_air:
+            raise CommandRejected("the drone flies")
+        await self._commander.confirm(
+            ardrone3.UserTakeOff(0),
+            (ardrone3.FlyingStateChanged,),
+            lambda message: True if message.state in MOTORS_OFF else None,
+            timeout,
+        )
+
+    def _why_on_the_ground(self, otherwise: str) -> str:
+        return ", ".join(self._takeoff_blockers()) or otherwise
+
+    async def land(self, timeout: float) -> None:
+        self._commander.require_link()
+        self._commander.call_off("the drone is to land")
+        if self._lands and not self.about_to_fly:
+            return
+        # Level at once, then nothing, from here on and not from the drone's answer on: a positive gaz would cancel
+        # the landing.
+        self._sticks.let_go()
+        self._sticks.silence()
+        self._sticks.landings_asked += 1
+        try:
+            if self.about_to_fly:
+                await self._catch_take_off(timeout)
+            if self._lands:
+                return
+            self._end_hand_launch()
+            await self._insist(timeout)
+        finally:
+            self._sticks.landings_asked -= 1
+
+    @property
+    def _lands(self) -> bool:
+        """True while the drone certainly lands, or has landed."""
+        state = self._flight.state.flying
+        return state in _LANDING and (state != FlyingState.LANDING or loop_time() >= self._doubtful_until)
+
+    async def _insist(self, timeout: float) -> None:
+        """Send Landing until the drone lands: again at each state that shows that the one before did not count.
+
+        Withdrawn when this is cancelled or fails; the drone may have received it all the same (`settle_landing`).
+        """
+        doubtful = self._flight.state.flying == FlyingState.LANDING
+        rising = self._flight.state.flying in TURNING or self._flight.state.flying == FlyingState.TAKINGOFF
+        sent: list[asyncio.Future[None]] = []
+
+        def send() -> None:
+            if not sent or sent[-1].done():
+                sent.append(self._commander.deliver(ardrone3.Landing()))
+
+        def judge(message: ardrone3.FlyingStateChanged) -> bool | None:
+            if message.state in _TAKEN_OFF:
+                send()
+            return True if message.state in _LANDING else None
+
+        answer = self._commander.expect((ardrone3.FlyingStateChanged,), judge)
+        seconds = max(timeout, LAND_INSISTS) if rising else timeout
+        answer.expire_after(seconds, CommandTimeout(ardrone3.Landing.NAME, seconds))
+        try:
+            send()
+            began = doubtful and await answer.came(sent[0], ardrone3.Landing.NAME, timeout)
+            if doubtful and not began and self._flight.state.flying in _LANDING:
+                self._doubtful_until = -math.inf  # it has received the Landing, and reports nothing else
+                return
+            await answer.wait()
+        except BaseException:
+            self._may_land_until = loop_time() + LAND_MEMORY
+            for delivery in sent:
+                self._commander.take_back(delivery, CommandRejected("the landing was withdrawn"))
+            raise
+        finally:
+            answer.close()
+
+    async def stop_motors(self, *, force: bool) -> None:
+        self._commander.require_link()
+        self._commander.call_off("the motors are to stop")
+        self._sticks.let_go()
+        self._sticks.silence()
+        for launch in self._launches:
+            launch.fail(CommandRejected("the motors are to stop"))
+            if launch.token is not None:
+                self._commander.cancel(launch.token)
+        cut: asyncio.Future[None] | None = None
+
+        def judge(message: ardrone3.FlyingStateChanged) -> bool | None:
+            if message.state in _TAKEN_OFF:
+                self._commander.halt(ardrone3.Landing())
+                if cut is not None:  # from here on it would fall
+                    self._commander.take_back(cut, CommandRejected("the drone has left the ground"))
+            return True if message.state in MOTORS_OFF else None
+
+        answer = self._commander.expect((ardrone3.FlyingStateChanged,), judge)
+        answer.expire_after(STOP_MOTORS_TIMEOUT, CommandTimeout(ardrone3.Landing.NAME, STOP_MOTORS_TIMEOUT))
+        self._sticks.landings_asked += 1
+        try:
+            if self._flight.state.flying in TURNING:
+                self._commander.halt(ardrone3.UserTakeOff(0))
+            self._commander.halt(ardrone3.Landing())
+            if force:
+                await asyncio.wait({answer.future}, timeout=FORCED_AFTER)
+                if self._flight.state.flying == FlyingState.MOTOR_RAMPING:
+                    cut = self._commander.deliver(ardrone3.Emergency())
+            await answer.wait()
+        finally:
+            self._sticks.landings_asked -= 1
+            answer.close()
+
+    def _end_hand_launch(self) -> None:
+        """A drone that idles in a hand has no use for a Landing: it waits to be thrown, or for this."""
+        if self.about_to_fly or self._flight.state.flying in TURNING:
+            self._commander.halt(ardrone3.UserTakeOff(0))
+
+    async def _catch_take_off(self, timeout: float) -> None:
+        """Return when the drone is off the ground, or when it certainly stays there.
+
+        That is known once it has received a Landing, behind any take-off of ours, and then says nothing. Raises
+        `CommandTimeout` while it is not known; the Landing is not taken back.
+        """
+        self._end_hand_launch()
+        answer = self._commander.expect(
+            (ardrone3.FlyingStateChanged,),
+            lambda message: None if message.state in (FlyingState.MOTOR_RAMPING, FlyingState.USERTAKEOFF) else True,
+        )
+        try:
+            delivery = self._commander.deliver(ardrone3.Landing())
+            if not await answer.came(delivery, ardrone3.Landing.NAME, timeout):
+                self._may_take_off_until = -math.inf
+                self._commander.certainly_not(common.Stop)
+        finally:
+            answer.close()
+
+    async def emergency(self) -> None:
+        self._commander.require_link()
+        self._sticks.silence()
+        cut = self._flight.state.flying in _MOTORS_CUT and not self.about_to_fly
+        # Emergency overtakes what waits in the queue: nothing of that may follow it.
+        self._commander.call_off("the motors are cut")
+        for launch in self._launches:
+            launch.fail(CommandRejected("the motors are cut"))
+            if launch.token is not None:
+                self._commander.cancel(launch.token)
+        answer = self._commander.expect(
+            (ardrone3.FlyingStateChanged,), lambda message: True if message.state in _MOTORS_CUT else None
+        )
+        try:
+            delivery = self._commander.deliver(ardrone3.Emergency())
+            said = await answer.came(delivery, ardrone3.Emergency.NAME, EMERGENCY_TIMEOUT)
+        except CommandTimeout as error:
+            self._commander.take_back(delivery, error)  # said to have failed, it must not be carried out later
+            raise
+        finally:
+            answer.close()
+        if not said and not cut:
+            raise CommandTimeout(ardrone3.Emergency.NAME, QUIET)

@@ -1,0 +1,359 @@
+"""What we started and has not ended: the moveTo, the moveBys and the return home of this connection.
+
+Hover must cancel exactly these, and only these. The drone's events say how a move goes on and ends; this module
+reads them, `piloting` sends the commands.
+
+Two facts make the bookkeeping more than a flag. A new moveTo replaces the running one without a word about it, and
+a new moveBy makes the previous one end as "interrupted" (ardrone3.xml 1-0-10, 1-0-7). And an event does not say
+which command it answers: it may belong to a move that was cancelled a moment ago. Of a moveTo it tells the target, so
+two that could be confused do not get the same one.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import enum
+import math
+from collections import deque
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import msgspec
+
+from anafi_mav import geo
+from anafi_mav.arsdk.codec.wire import Message
+from anafi_mav.arsdk.messages import ardrone3, rth
+from anafi_mav.arsdk.messages.ardrone3 import MoveByError, MoveToStatus
+from anafi_mav.arsdk.messages.rth import StateReason
+from anafi_mav.drone.element import Position, position
+from anafi_mav.drone.expectation import Expectation
+from anafi_mav.drone.piloting.state import MOTORS_OFF
+from anafi_mav.drone.status.home import Home
+from anafi_mav.errors import CommandRejected
+
+MAX_UNHEARD = 8
+"""moveTos that are remembered after they were called off; the drone answers one within a few tenths of a second."""
+
+STRAY_FOR = 2.0
+"""s after a cancelled moveBy in which a moveByEnd may still be its own, or that of the zero move that cancelled it."""
+
+_SAME_PLACE_DEG = 1e-7
+"""About a centimetre. The drone echoes a target as it got it; this tolerates a detour through single precision."""
+_SAME_HEIGHT = 1e-3
+_ROUNDED = 1.0
+"""m by which the echo of the only moveTo that is waited for may differ from its target."""
+_APART, _APART_SHARE = 2e-3, 2e-6
+"""m, and share of the height, between two moveTos that are told apart by it: twice what `_same` lets pass."""
+_NO_MOVE = 1e-3
+"""m or rad below which a moveBy went nowhere."""
+
+
+class MoveEnd(enum.Enum):
+    """How a move ended."""
+
+    DONE = "done"
+    CANCELED = "canceled"
+    """By this program, by a landing or by another controller."""
+    ERROR = "error"
+    """The drone could not do it."""
+    REPLACED = "replaced"
+    """A newer move took its place."""
+    LINK_LOST = "link lost"
+    """Unknown: the link was lost on the way."""
+
+
+class Displacement(msgspec.Struct, frozen=True):
+    """Distance flown by a moveBy, in the axes of the body at its start."""
+
+    front: float
+    """m."""
+    right: float
+    """m."""
+    down: float
+    """m."""
+    turn: float
+    """rad, + clockwise."""
+
+
+class Move:
+    """A move under way. `target` is set for a moveTo only; its altitude is above the take-off point."""
+
+    __slots__ = ("answer", "echo", "ended", "running", "target")
+
+    def __init__(self, answer: Expectation[Any], target: Position | None = None) -> None:
+        self.answer = answer
+        """The wait of the verb that started it."""
+        self.target = target
+        self.echo: Position | None = None
+        """The target as the drone reports it, where that differs from `target`."""
+        self.running = False
+        """The drone said that it is under way."""
+        self.ended: asyncio.Future[MoveEnd] = asyncio.get_running_loop().create_future()
+        """Do not await this one, a cancelled wait would cancel it: use `result`."""
+
+    async def under_way(self) -> bool:
+        """Wait until the drone flies this moveTo, or will not: for others than the verb that started it."""
+        answer = self.answer.future
+        await asyncio.wait({answer})
+        return not answer.cancelled() and answer.exception() is None
+
+    async def result(self) -> MoveEnd:
+        """Wait until the move has ended; return how. Never raises."""
+        return await asyncio.shield(self.ended)
+
+    def end(self, how: MoveEnd) -> None:
+        if not self.ended.done():
+            self.ended.set_result(how)
+
+    def is_to(self, message: ardrone3.MoveToChanged) -> bool:
+        """Does this event speak of this move's target?"""
+        return any(place is not None and _same(message, place) for place in (self.target, self.echo))
+
+    def may_be_to(self, message: ardrone3.MoveToChanged) -> bool:
+        """True when this event's target is this move's but for rounding, as by a detour through another frame."""
+        target = self.target
+        if target is None or position(message.latitude, message.longitude, message.altitude) is None:
+            return False
+        away = geo.distance(target.latitude, target.longitude, message.latitude, message.longitude)
+        return math.hypot(away, target.altitude - message.altitude) <= _ROUNDED
+
+
+def _same(one: ardrone3.MoveToChanged | Position, other: Position) -> bool:
+    return (
+        math.isclose(one.latitude, other.latitude, rel_tol=0.0, abs_tol=_SAME_PLACE_DEG)
+        and math.isclose(one.longitude, other.longitude, rel_tol=0.0, abs_tol=_SAME_PLACE_DEG)
+        and math.isclose(one.altitude, other.altitude, rel_tol=1e-6, abs_tol=_SAME_HEIGHT)
+    )
+
+
+_MOVE_TO_ENDS = {
+    MoveToStatus.DONE: MoveEnd.DONE,
+    MoveToStatus.CANCELED: MoveEnd.CANCELED,
+    MoveToStatus.ERROR: MoveEnd.ERROR,
+}
+
+_MOVE_BY_REFUSALS = {
+    MoveByError.BUSY: "the drone is busy",
+    MoveByError.NOT_AVAILABLE: "a relative move is not available now",
+    MoveByError.INTERRUPTED: "the move was interrupted",
+}
+
+_RETURN_ENDS = {StateReason.FINISHED: MoveEnd.DONE, StateReason.STOPPED: MoveEnd.CANCELED}
+
+
+class Moves:
+    """The moves of ours that have not ended."""
+
+    def __init__(self, home: Home) -> None:
+        self._home = home
+        self.to: Move | None = None
+        self.by: deque[Move] = deque()
+        """Oldest first: the drone ends them in this order."""
+        self.returning: Move | None = None
+        self._older: Move | None = None
+        """The moveTo that still runs while `to` waits for its answer: a refused newer one leaves it alone."""
+        self._cancelling: Move | None = None
+        """The moveTo that we cancelled and whose CANCELED has not come yet."""
+        self._unheard: deque[Position] = deque(maxlen=MAX_UNHEARD)
+        """Targets of moveTos that were called off or replaced before the drone had said anything of them. It may still,
+        until it flies a newer one."""
+        self._stray_until = 0.0
+        self.inherited = True
+        """The drone was found flying: a moveBy of an earlier connection may be under way, which no event tells."""
+        self.aborting = False
+        """A return is being aborted: until the drone has answered, what it last said of a return is not true."""
+
+    def started(self) -> tuple[Move, ...]:
+        """All of them."""
+        return tuple(move for move in (self.to, *self.by, self.returning) if move is not None)
+
+    # -- what we do
+
+    def distinct(self, target: Position) -> Position:
+        """The target for a new moveTo: this one, or a little below it where the drone's words on a move that was called
+        off would be taken for its own. Not above it, which the ceiling may forbid."""
+        while any(_same(target, other) for other in self._unheard):
+            step = max(_APART, _APART_SHARE * abs(target.altitude))
+            target = msgspec.structs.replace(target, altitude=target.altitude - step)
+        return target
+
+    def begin_to(self, move: Move) -> Move | None:
+        """A moveTo is about to be sent. Returns one that nobody waits for any more, it was not under way yet."""
+        before, self.to = self.to, move
+        if before is None:
+            return None
+        if before.running:
+            self._older = before
+            return None
+        self._unhear(before)
+        before.end(MoveEnd.REPLACED)
+        before.answer.fail(CommandRejected("replaced by a newer moveTo"))
+        return before
+
+    def cancel_to(self, why: str) -> Move | None:
+        """Whatever moveTo there is, is about to be cancelled. Returns the newest.
+
+        One that was under way ends when the drone says so.
+        """
+        newest, older = self.to, self._older
+        self.to = self._older = None
+        for move in (newest, older):
+            if move is None:
+                continue
+            move.answer.fail(CommandRejected(why))
+            if move.running:
+                self._cancelling = move
+            else:
+                self._unhear(move)
+                move.end(MoveEnd.CANCELED)
+        return newest
+
+    def _unhear(self, move: Move) -> None:
+        if move.target is not None:
+            self._unheard.append(move.target)
+
+    def cancel_by(self, why: str, now: float) -> list[Move]:
+        """The moveBys are about to be cancelled; returns them. They end here: the drone's event names none of them."""
+        moves, self.by = list(self.by), deque()
+        for move in moves:
+            move.answer.fail(CommandRejected(why))
+            move.end(MoveEnd.CANCELED)
+        if moves:
+            self._stray_until = now + STRAY_FOR
+        return moves
+
+    def drop_by(self, move: Move, now: float) -> None:
+        """The verb of this moveBy has given it up."""
+        if move in self.by:
+            self.by.remove(move)
+            self._stray_until = now + STRAY_FOR
+        move.end(MoveEnd.CANCELED)
+
+    def aborted(self) -> None:
+        """The drone has had an abort, and had time to answer."""
+        self.aborting = False
+
+    def expect_stray(self, now: float) -> None:
+        """A moveBy that is nobody's is about to be ended; its event is not about a move of ours."""
+        self.inherited = False
+        self._stray_until = now + STRAY_FOR
+
+    def clear(self, how: MoveEnd) -> None:
+        """All have ended, as far as we are concerned."""
+        for move in (*self.started(), self._older, self._cancelling):
+            if move is not None:
+                move.end(how)
+                move.answer.fail(CommandRejected(how.value))
+        self.to = self.returning = self._older = self._cancelling = None
+        self.by.clear()
+        self._unheard.clear()
+        self._stray_until = 0.0
+        self.aborting = False
+        self.inherited = True
+
+    # -- what the drone says
+
+    def reactions(self) -> Mapping[type[Message], Callable[[Any, float], None]]:
+        """Who wants to hear which event, after the reducers."""
+        return {
+            ardrone3.MoveToChanged: self._on_move_to,
+            ardrone3.MoveByEnd: self._on_move_by_end,
+        }
+
+    def _on_move_to(self, message: ardrone3.MoveToChanged, now: float) -> None:
+        move = self.to
+        if message.status == MoveToStatus.RUNNING:
+            if move is None:
+                return
+            if not move.is_to(message) and not move.running and self._is_alone and move.may_be_to(message):
+                move.echo = position(message.latitude, message.longitude, message.altitude)
+            if move.is_to(message):
+                self._under_way(move)
+            return
+        how = _MOVE_TO_ENDS.get(message.status)
+        if how is None:
+            return
+        if move is None or not move.running:
+            # Commands are carried out in their order, so this may still speak of what was before.
+            if self._cancelling is not None and self._cancelling.is_to(message):
+                self._cancelling.end(how)
+                self._cancelling = None
+                return
+            if self._older is not None and self._older.is_to(message):
+                self._older.end(how)
+                self._older = None
+                return
+        if any(_same(message, target) for target in self._unheard):
+            return
+        if move is None or (not move.is_to(message) and (move.running or how is MoveEnd.DONE)):
+            return
+        self.to, self._older = self._older, None
+        move.end(how)
+        move.answer.fail(CommandRejected(f"the drone answered the moveTo with {how.value}"))
+
+    @property
+    def _is_alone(self) -> bool:
+        """True when no other moveTo of ours is left that the drone's next event could be about."""
+        return not self._unheard and self._older is None and self._cancelling is None
+
+    def _under_way(self, move: Move) -> None:
+        """The newest moveTo is being flown, so that all before it are over."""
+        if self._older is not None:
+            self._older.end(MoveEnd.REPLACED)
+            self._older = None
+        if self._cancelling is not None:
+            self._cancelling.end(MoveEnd.CANCELED)
+            self._cancelling = None
+        self._unheard.clear()
+        move.running = True
+        move.answer.succeed(move)
+
+    def _on_move_by_end(self, message: ardrone3.MoveByEnd, now: float) -> None:
+        if not self.by or self._is_stray(message, now):
+            return
+        move = self.by.popleft()
+        if message.error == MoveByError.OK:
+            move.end(MoveEnd.DONE)
+            move.answer.succeed(Displacement(message.dX, message.dY, message.dZ, message.dPsi))
+            return
+        move.end(MoveEnd.CANCELED if message.error == MoveByError.INTERRUPTED else MoveEnd.ERROR)
+        move.answer.fail(CommandRejected(_MOVE_BY_REFUSALS.get(message.error, "the drone could not make the move")))
+
+    def _is_stray(self, message: ardrone3.MoveByEnd, now: float) -> bool:
+        """Does this event belong to a moveBy that was cancelled before the present one was asked for?
+
+        Nothing but a newer moveBy interrupts one, and a move that is not zero does not succeed by staying.
+        """
+        if now >= self._stray_until:
+            return False
+        if message.error == MoveByError.INTERRUPTED:
+            return len(self.by) == 1  # of two, the newer has interrupted the older
+        went_nowhere = max(abs(message.dX), abs(message.dY), abs(message.dZ), abs(message.dPsi)) < _NO_MOVE
+        return message.error == MoveByError.OK and went_nowhere
+
+    def on_flying_state(self, message: ardrone3.FlyingStateChanged, now: float) -> None:
+        """Motors that stand end every move."""
+        if message.state in MOTORS_OFF:
+            self.inherited = False
+            self.cancel_to("the motors are off")
+            if self._cancelling is not None:
+                self._cancelling.end(MoveEnd.CANCELED)
+                self._cancelling = None
+            self.cancel_by("the motors are off", now)
+
+    def on_return(self, message: rth.State, now: float) -> None:
+        """A return of ours goes on or ends, or has become one of the drone's own."""
+        if not self._home.state.returning:
+            self.aborting = False
+        move = self.returning
+        if move is None:
+            return
+        if self._home.state.returning_by_itself:
+            # The drone has reasons of its own now: it is no longer ours to stop.
+            self.returning = None
+            move.end(MoveEnd.REPLACED)
+        elif self._home.state.returning:
+            move.running = True
+        elif move.running:
+            self.returning = None
+            move.end(_RETURN_ENDS.get(message.reason, MoveEnd.ERROR))

@@ -1,0 +1,382 @@
+"""Element piloting: the verbs that fly the drone. Each returns when the drone has confirmed it.
+
+A verb raises `CommandRejected` when the drone, or what it reported, refuses; `CommandTimeout` when it stays silent,
+and then its command is taken back; `LinkLost` when the link dies meanwhile. Signs and units are the drone's own:
+body axes front, right, down; heights above the take-off point.
+
+What the verbs promise is said here. How they do it is in `piloting_motors` (up and down), `piloting_moves` (guided
+moves), `piloting_return` (home) and `piloting_sticks` (PCMDs); here is what concerns them all, `hover` above all.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar
+
+from anafi_mav.arsdk.codec.wire import Message
+from anafi_mav.arsdk.messages import animation, ardrone3, common, follow_me, rth
+from anafi_mav.arsdk.messages.ardrone3 import FlyingState, MoveToStatus, PoiStatus
+from anafi_mav.arsdk.messages.common import PlayingState
+from anafi_mav.arsdk.messages.follow_me import Mode as FollowMeMode
+from anafi_mav.drone.element import Reducer
+from anafi_mav.drone.expectation import ANSWER_TIMEOUT, QUIET, Commander, loop_time
+from anafi_mav.drone.piloting.guided_moves import GuidedMoves
+from anafi_mav.drone.piloting.landing import LandingEnd
+from anafi_mav.drone.piloting.motors import Motors
+from anafi_mav.drone.piloting.moves import Displacement, Move, MoveEnd, Moves
+from anafi_mav.drone.piloting.return_home import Returns
+from anafi_mav.drone.piloting.settings import PilotingSettings
+from anafi_mav.drone.piloting.state import REDUCERS, PilotingState
+from anafi_mav.drone.piloting.stick_stream import StickStream
+from anafi_mav.drone.piloting.sticks import Limits, PilotingCommand, percent
+from anafi_mav.drone.status.home import Home
+from anafi_mav.errors import CommandTimeout, NotSupported
+
+_IN_FLIGHT = frozenset({FlyingState.HOVERING, FlyingState.FLYING})
+
+
+class Piloting(PilotingSettings):
+    """The verbs that fly the drone. `pilot` and `hover` act at once; all others are coroutines.
+
+    A coroutine returns when the drone has confirmed it. It raises `CommandRejected` when the drone, or its reported
+    state, refuses; `CommandTimeout` when the drone stays silent; `LinkLost` when the link is lost meanwhile. A command
+    that has not been delivered by then is withdrawn.
+    """
+
+    NOTHING = PilotingState()
+    REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = REDUCERS
+
+    def __init__(self, commander: Commander, home: Home, takeoff_blockers: Callable[[], list[str]]) -> None:
+        super().__init__(commander)
+        self._home = home
+        self._moves = Moves(home)
+        self.pilot_has_source: Callable[[], bool] = lambda: False
+        """True while the pilot at a Skycontroller has the piloting source; set by `Drone`."""
+        self._sticks = StickStream(commander, self, home, lambda: self.pilot_has_source())
+        self._motors = Motors(commander, self, self._sticks, takeoff_blockers)
+        self._guided = GuidedMoves(commander, self, home, self._sticks, self._moves)
+        self._returns = Returns(commander, self, home, self._sticks, self._moves)
+        self.is_modern: Callable[[], bool] = lambda: False
+        """True for an Ai; set by `Drone`."""
+        self._landing_end = LandingEnd(commander, self, self._sticks, self._motors, lambda: self.is_modern())
+        self._stopping: dict[type[Message], float] = {}
+        """Orders to stop something that the drone has not answered yet: until when once is enough."""
+
+    def reset(self) -> None:
+        super().reset()
+        self.link_lost()
+
+    def link_lost(self) -> None:
+        """Nothing of before is sent again, and what was started is nobody's any more."""
+        self._sticks.silence()
+        self._moves.clear(MoveEnd.LINK_LOST)
+        self._stopping.clear()
+        self._motors.link_lost()
+        self._returns.link_lost()
+
+    def reactions(self) -> Mapping[type[Message], Callable[[Any, float], None]]:
+        """Events to be shown to this element beyond its reducers."""
+        return {
+            **self._moves.reactions(),
+            ardrone3.FlyingStateChanged: self._on_flying_state,
+            rth.State: self._returns.on_state,
+            follow_me.State: lambda message, now: self._obeyed(follow_me.Stop),
+            animation.State: lambda message, now: self._obeyed(animation.Cancel),
+        }
+
+    def _on_flying_state(self, message: ardrone3.FlyingStateChanged, now: float) -> None:
+        self._moves.on_flying_state(message, now)
+        self._motors.on_flying_state(message)
+
+    def _obeyed(self, order: type[Message]) -> None:
+        self._stopping.pop(order, None)
+
+    def on_plan(self, message: common.MavlinkFilePlayingStateChanged) -> None:
+        """A flight plan plays, is paused or stopped."""
+        if message.state == PlayingState.PLAYING:
+            self._sticks.silence()
+
+    # -- facts about what we do
+
+    @property
+    def moves_started(self) -> tuple[Move, ...]:
+        """The moves of ours that have not ended; empty after a new connection."""
+        return self._moves.started()
+
+    @property
+    def move(self) -> Move | None:
+        """The moveTo of this program that has not ended."""
+        return self._moves.to
+
+    @property
+    def moving(self) -> bool:
+        """True while a moveTo or moveBy of this program has not ended."""
+        return self._moves.to is not None or bool(self._moves.by)
+
+    @property
+    def sticks_held(self) -> bool:
+        """A setpoint of ours holds the sticks, level or not."""
+        return self._sticks.held
+
+    @property
+    def sticks_blocked(self) -> str | None:
+        """Reason why no stick position is sent at present; None when `pilot` works."""
+        return self._sticks.blocked
+
+    @property
+    def limits(self) -> Limits | None:
+        """See `PilotingState.limits`."""
+        return self.state.limits
+
+    @property
+    def about_to_fly(self) -> bool:
+        """True when the drone is landed and a take-off of this program may still begin.
+
+        It has been sent, or was and cannot be withdrawn; the same holds for a hand launch and a flight plan.
+        """
+        return self._motors.about_to_fly
+
+    def require_free(self) -> None:
+        """Raise `CommandRejected` while the drone returns for reasons of its own, or lands: no move of ours gets in its
+        way."""
+        self._guided.require_free()
+
+    # -- up and down
+
+    async def take_off(self, timeout: float = ANSWER_TIMEOUT) -> None:
+        """Start the motors and rise to about a metre; returns when the drone reports that it is taking off.
+
+        A drone refuses by silence; `CommandRejected` then names what it has reported against a take-off.
+        """
+        await self._motors.take_off(timeout)
+
+    async def hand_launch(self, timeout: float = ANSWER_TIMEOUT) -> None:
+        """Let the motors idle for a throw or release by hand; returns when the drone waits for that.
+
+        Refused as a take-off is. The drone flies as soon as it leaves the hand; `cancel_hand_launch` ends the wait.
+        """
+        await self._motors.hand_launch(timeout)
+
+    async def cancel_hand_launch(self, timeout: float = ANSWER_TIMEOUT) -> None:
+        """Stop the idling motors; returns when they stand, at once when they do and nothing may start them."""
+        await self._motors.cancel_hand_launch(timeout)
+
+    async def land(self, timeout: float = ANSWER_TIMEOUT) -> None:
+        """Land here; returns when the drone is landing, at once when it is or has landed.
+
+        A drone that is `about_to_fly` is watched until it certainly stays on the ground, or has been made to land.
+        """
+        await self._motors.land(timeout)
+
+    async def end_landing(self, timeout: float = ANSWER_TIMEOUT, *, take_off: bool = False) -> None:
+        """End a landing; returns when the drone reports another state, at once when it does not land.
+
+        By gaz for a second at most, and with `take_off` by TakeOff too (SmartTakeOffLand on the Ai), which starts the
+        motors of a drone that has landed: only for a user who wants just that. The sticks are centred then. Raises
+        `CommandRejected` when LANDED is reported first, or the drone goes on landing: nothing of this is sent after it.
+        """
+        await self._landing_end.end(timeout, take_off=take_off)
+
+    async def settle_landing(self, timeout: float = ANSWER_TIMEOUT) -> bool:
+        """Return True when the drone lands, also by a Landing of ours that was withdrawn and arrived all the same."""
+        return await self._motors.settle_landing(timeout)
+
+    async def stop_motors(self, *, force: bool = False) -> None:
+        """Stop propellers that turn on the ground or just above it; returns when the drone reports that they stand.
+
+        `force` cuts them when they still ramp up after `piloting_motors.FORCED_AFTER`, never once the drone has
+        left the ground.
+        """
+        await self._motors.stop_motors(force=force)
+
+    def take_off_wanted(self) -> None:
+        """A command that starts the motors is about to be sent."""
+        self._motors.take_off_wanted()
+
+    async def emergency(self) -> None:
+        """Cut the motors at once: in the air the drone falls. Returns when it reports that they are cut.
+
+        Cancelling this does not withdraw it: it is repeated while there is a link, as Parrot does (arsdk-ng: timeout
+        policy RETRY), for at most `piloting_motors.EMERGENCY_TIMEOUT` while a caller waits. Commands that wait to be
+        sent are withdrawn.
+        """
+        await self._motors.emergency()
+
+    # -- guided moves
+
+    async def move_by(
+        self,
+        front: float,
+        right: float,
+        down: float,
+        turn: float,
+        timeout: float | None = None,
+        turn_rate_dps: float | None = None,
+    ) -> Displacement:
+        """Fly a straight line relative to the body (m) while turning clockwise by `turn` (rad).
+
+        `turn_rate_dps` (deg/s) limits the turn; None leaves it to the drone.
+        Returns at the end of the move the distance flown. Without a `timeout` the time allowed grows with the move.
+        A timeout or the cancellation of this coroutine stops the drone.
+        """
+        return await self._guided.move_by(front, right, down, turn, timeout, turn_rate_dps)
+
+    async def move_to(
+        self,
+        latitude: float,
+        longitude: float,
+        altitude: float,
+        heading_deg: float | None = None,
+        horizontal_speed: float | None = None,
+        vertical_speed: float | None = None,
+        timeout: float = ANSWER_TIMEOUT,
+    ) -> Move:
+        """Fly to a place (deg, deg, m above take-off); returns when the drone is on its way.
+
+        `heading_deg` (clockwise from north) is turned to on the way; None keeps the heading. `horizontal_speed`
+        and `vertical_speed` (m/s) limit the speed; None leaves it to the drone. `Move.result` waits for the
+        end. A newer moveTo replaces an older one.
+        """
+        return await self._guided.move_to(
+            latitude, longitude, altitude, heading_deg, horizontal_speed, vertical_speed, timeout
+        )
+
+    # -- home
+
+    async def return_home(self, timeout: float = ANSWER_TIMEOUT) -> Move | None:
+        """Fly home; returns when the return is running or pending. None: the drone was returning already."""
+        return await self._returns.return_home(timeout)
+
+    async def cancel_return_home(self, timeout: float = ANSWER_TIMEOUT, *, even_its_own: bool = False) -> None:
+        """Stop a return that a user commanded, through this program or not, also one that has not begun yet.
+
+        One that the drone began by itself is stopped only with `even_its_own`, else `CommandRejected` is raised.
+        """
+        await self._returns.cancel_return_home(timeout, even_its_own=even_its_own)
+
+    async def set_min_altitude(self, metres: float) -> float:
+        """See `Home.set_min_altitude`."""
+        return await self._home.set_min_altitude(metres)
+
+    # -- sticks, and the end of everything
+
+    def pilot(self, command: PilotingCommand | None, age: float = 0.0) -> None:
+        """Hold a stick position: a PCMD leaves now and every 50 ms, for 0.5 s (`sticks.HOLD_LIMIT`) unless repeated.
+
+        None centres the sticks for two seconds, and so does the end of the repetition. `age` (s) is the time since the
+        position was set: one that is corrected on the way is not a new one. A position ends a moveTo or moveBy of
+        this program, during which the drone would ignore it. Nothing is sent and nothing kept while `sticks_blocked`.
+        Raises `NotSupported` before the drone has reported its limits, `LinkLost` without a link.
+        """
+        self._commander.require_link()
+        if command is None:
+            self._sticks.let_go()
+            return
+        limits = self.state.limits
+        if limits is None:
+            raise NotSupported("reported tilt and speed limits")
+        position = percent(command, limits)
+        if self._sticks.blocked is None:
+            self._guided.stop("taken over by the sticks")
+            if self.state.following != FollowMeMode.LOOK_AT:  # which leaves the flying to the sticks
+                self._stop_following()
+            self._stop_animation()
+            self._sticks.hold(position, age)
+        else:
+            self._sticks.pump()
+
+    def hover(self) -> None:
+        """Stop everything that this program began, and hover: takes effect before it returns.
+
+        Cancels moveTo and moveBys (those of an earlier connection or another controller too, as far as the drone
+        reports them), a running point of interest, an animation, the following of a target, a playing flight plan (it
+        is paused) and a return that this program commanded, also those that have not begun; then centres the sticks
+        for two seconds, since a PCMD alone neither stops a moveTo nor is it acknowledged. A landing and a return that
+        the drone began by itself continue. Raises `LinkLost` without a link.
+        """
+        self._commander.require_link()
+        state = self.state
+        self._commander.call_off("stopped by hover")
+        cancelled = self._guided.stop("stopped by hover")
+        if not self._home.state.returning_by_itself:
+            if state.move_to == MoveToStatus.RUNNING and not cancelled:
+                self._commander.halt(ardrone3.CancelMoveTo())
+            if self._moves.inherited and state.flying in _IN_FLIGHT and not self._home.state.returning:
+                self._moves.expect_stray(loop_time())
+                self._commander.halt(ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0))
+        if state.poi in (PoiStatus.RUNNING, PoiStatus.PENDING):
+            self._commander.halt(ardrone3.StopPilotedPOI())
+        self._stop_following()
+        self._stop_animation()
+        if state.plan == PlayingState.PLAYING:
+            self._commander.halt(common.Pause())
+        if self._returns.drop("stopped by hover"):
+            self._returns.abort()
+        self._sticks.centre()
+
+    async def stop(self, timeout: float = ANSWER_TIMEOUT) -> None:
+        """Hover, and return when the drone has confirmed the end of everything that was running."""
+        answers = []
+        if (self._moves.to is not None and self._moves.to.running) or self.state.move_to == MoveToStatus.RUNNING:
+            answers.append(self._commander.expect((ardrone3.MoveToChanged,), _ends_move_to))
+        if self._moves.by:
+            answers.append(self._commander.expect((ardrone3.MoveByEnd,), lambda message: True))
+        if self.state.plan == PlayingState.PLAYING:
+            answers.append(self._commander.expect((common.MavlinkFilePlayingStateChanged,), _ends_playing))
+        if self._moves.returning is not None and self._moves.returning.running:
+            answers.append(self._commander.expect((rth.State,), self._returns.ends_ours))
+        if self.state.following not in (None, FollowMeMode.NONE):
+            answers.append(self._commander.expect((follow_me.State,), _ends_following))
+        if self.state.animation not in (None, animation.Type.NONE):
+            answers.append(self._commander.expect((animation.State,), _ends_animation))
+        began = loop_time()
+        try:
+            self.hover()
+            for answer in answers:
+                answer.expire_after(timeout, CommandTimeout("hover", timeout))
+            for answer in answers:
+                await answer.wait()
+            # Of what was given up before it was confirmed no event may speak; but the order to stop has to arrive.
+            await self._commander.halted("hover", timeout - (loop_time() - began))
+        finally:
+            for answer in answers:
+                answer.close()
+
+    def _stop_following(self) -> None:
+        if self.state.following not in (None, FollowMeMode.NONE):
+            self._stop_once(follow_me.Stop())
+
+    def _stop_animation(self) -> None:
+        if self.state.animation not in (None, animation.Type.NONE):
+            self._stop_once(animation.Cancel())
+
+    def _stop_once(self, order: Message) -> None:
+        """Halt what setpoints take over from many times a second. Once it was heard and not obeyed, say it again."""
+        kind = type(order)
+        if loop_time() < self._stopping.get(kind, -math.inf):
+            return
+        self._stopping[kind] = math.inf
+
+        def heard(delivery: asyncio.Future[None]) -> None:
+            if kind in self._stopping:
+                self._stopping[kind] = loop_time() + QUIET
+
+        self._commander.halt(order).add_done_callback(heard)
+
+
+def _ends_move_to(message: ardrone3.MoveToChanged) -> bool | None:
+    return True if message.status != ardrone3.MoveToStatus.RUNNING else None
+
+
+def _ends_following(message: follow_me.State) -> bool | None:
+    return True if message.mode == FollowMeMode.NONE else None
+
+
+def _ends_animation(message: animation.State) -> bool | None:
+    return True if message.type == animation.Type.NONE else None
+
+
+def _ends_playing(message: common.MavlinkFilePlayingStateChanged) -> bool | None:
+    return True if message.state != PlayingState.PLAYING else None

@@ -1,0 +1,127 @@
+"""Element calibration: the magnetometer's calibration and the health of the sensors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import msgspec
+from msgspec.structs import replace
+
+from anafi_mav.arsdk.codec.wire import Message
+from anafi_mav.arsdk.messages import common
+from anafi_mav.arsdk.messages.common import CalibrationAxis, Sensor
+from anafi_mav.drone.element import Reducer, with_item
+from anafi_mav.drone.expectation import ANSWER_TIMEOUT
+from anafi_mav.drone.settings import Commanding
+from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout
+
+_REQUIRED, _RECOMMENDED = 1, 2
+
+TURNING_TIMEOUT = 60.0
+"""s between two signs of life: somebody turns the drone by hand about one axis after the other."""
+
+
+_AXES = (CalibrationAxis.X_AXIS, CalibrationAxis.Y_AXIS, CalibrationAxis.Z_AXIS)
+
+
+class CalibrationState(msgspec.Struct, frozen=True):
+    """Calibration of the magnetometer and health of the sensors."""
+
+    magneto_required: bool | None = None
+    """The drone does not take off before its magnetometer is calibrated."""
+    magneto_recommended: bool | None = None
+    started: bool | None = None
+    """A calibration is running."""
+    failed: bool | None = None
+    """The last calibration failed."""
+    axis: CalibrationAxis | None = None
+    """The axis to turn the drone about now."""
+    done: frozenset[CalibrationAxis] | None = None
+    """The axes that are calibrated."""
+    sensors: Mapping[Sensor, bool] = {}
+    """Sensor -> works."""
+
+    @property
+    def sensors_ok(self) -> bool | None:
+        """True when all reported sensors work; None when the drone reported none."""
+        return all(self.sensors.values()) if self.sensors else None
+
+
+class Calibration(Commanding[CalibrationState]):
+    """Calibration of the magnetometer, which a person does by turning the drone."""
+
+    NOTHING = CalibrationState()
+    REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = {
+        common.MagnetoCalibrationRequiredState: lambda state, message: replace(
+            state,
+            magneto_required=message.required == _REQUIRED,
+            magneto_recommended=message.required == _RECOMMENDED,
+        ),
+        common.MagnetoCalibrationStartedChanged: lambda state, message: replace(state, started=message.started != 0),
+        common.MagnetoCalibrationStateChanged: lambda state, message: replace(
+            state,
+            failed=message.calibrationFailed != 0,
+            done=frozenset(
+                axis
+                for axis, done in zip(
+                    _AXES, (message.xAxisCalibration, message.yAxisCalibration, message.zAxisCalibration), strict=True
+                )
+                if done
+            ),
+        ),
+        common.MagnetoCalibrationAxisToCalibrateChanged: lambda state, message: replace(state, axis=message.axis),
+        common.SensorsStatesListChanged: lambda state, message: replace(
+            state, sensors=with_item(state.sensors, message.sensorName, message.sensorState != 0, 0)
+        ),
+    }
+
+    async def start_magnetometer(self, timeout: float = ANSWER_TIMEOUT) -> None:
+        """Begin to calibrate the magnetometer; returns when the drone waits to be turned about `state.axis`."""
+        self._require(self.state.started, "magnetometer calibration")
+        await self._change(
+            common.MagnetoCalibration(1),
+            common.MagnetoCalibrationStartedChanged,
+            lambda message: True if message.started else None,
+            timeout,
+        )
+
+    async def abort_magnetometer(self, timeout: float = ANSWER_TIMEOUT) -> None:
+        """Abort the calibration; returns when none is running."""
+        self._require(self.state.started, "magnetometer calibration")
+        await self._change(
+            common.MagnetoCalibration(0),
+            common.MagnetoCalibrationStartedChanged,
+            lambda message: None if message.started else True,
+            timeout,
+            stops=True,
+        )
+
+    async def magnetometer_done(self, timeout: float = TURNING_TIMEOUT) -> None:
+        """Wait for the end of a running calibration, at once when none runs.
+
+        Raises `CommandRejected` when it failed, `CommandTimeout` after so long without progress.
+        """
+        self._require(self.state.started, "magnetometer calibration")
+        if not self.state.started:
+            return
+        error = CommandTimeout(common.MagnetoCalibration.NAME, timeout)
+
+        def judge(message: Any) -> bool | AnafiMavError | None:
+            if self.state.failed:
+                return CommandRejected("the calibration of the magnetometer failed")
+            if not self.state.started:
+                return True
+            answer.expire_after(timeout, error)
+            return None
+
+        answer = self._commander.expect(
+            (
+                common.MagnetoCalibrationStartedChanged,
+                common.MagnetoCalibrationStateChanged,
+                common.MagnetoCalibrationAxisToCalibrateChanged,
+            ),
+            judge,
+        )
+        answer.expire_after(timeout, error)
+        await answer.wait()

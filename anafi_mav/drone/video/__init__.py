@@ -1,0 +1,1 @@
+"""Element video: the live stream, its pictures and their metadata."""

@@ -1,0 +1,125 @@
+"""`QGC WPL 110`, the text of MAVProxy, Mission Planner and pymavlink: a line an item, twelve columns between tabs.
+
+Item 0 of a mission is home, as in an ArduPilot (QGroundControl MissionController.cc reads it so); a first item that is
+no NAV_WAYPOINT is none. A file whose items are all of a fence, or all rally points, is one of those: MAVProxy keeps
+them so. 120 in the first line is Parrot's, see `parrot`.
+"""
+
+from __future__ import annotations
+
+import math
+from decimal import Decimal
+
+from anafi_mav import mav_enums
+from anafi_mav.errors import PlanError
+from anafi_mav.plans.formats.lists import fence_items, points_of, rally_items, zones_of
+from anafi_mav.plans.plan import GLOBAL, MAX_ITEMS, WAYPOINT, Item, Loss, Params, Plan, Point, counted, shifted
+
+HEADER = "QGC WPL 110"
+
+COLUMNS = 12
+
+_FENCE = range(mav_enums.MAV_CMD_NAV_FENCE_RETURN_POINT, mav_enums.MAV_CMD_NAV_FENCE_RETURN_POINT + 6)
+_RALLY = (mav_enums.MAV_CMD_NAV_RALLY_POINT,)
+
+
+def rows(text: str, source: str) -> list[Item]:
+    """The items of a file, whatever its first line says, in the order of the lines. Raises `PlanError`."""
+    lines = [line for line in text.splitlines()[1:] if line.strip() and not line.startswith("#")]
+    if len(lines) > MAX_ITEMS + 1:
+        raise PlanError(source, f"{len(lines)} items are more than {MAX_ITEMS}")
+    return [_row(number, line.split(), source) for number, line in enumerate(lines)]
+
+
+def _row(number: int, words: list[str], source: str) -> Item:
+    if len(words) != COLUMNS:
+        raise PlanError(source, f"{len(words)} columns, expected {COLUMNS}", number)
+    whole = []
+    for column, name, top in ((2, "frame", 0xFF), (3, "command", 0xFFFF), (11, "autocontinue", 1)):
+        word = words[column]
+        if not (word.isascii() and word.isdigit() and int(word) <= top):
+            raise PlanError(source, f"{word[:20]!r} is no {name}", number)
+        whole.append(int(word))
+    numbers = [_number(word, number, source) for word in words[4:11]]
+    frame, command, autocontinue = whole
+    return Item(command, frame, _params(numbers), autocontinue == 1)
+
+
+def _params(numbers: list[float | None]) -> Params:
+    one, two, three, four, five, six, seven = numbers
+    return one, two, three, four, five, six, seven
+
+
+def _number(word: str, item: int, source: str) -> float | None:
+    try:
+        value = float(word)
+    except ValueError:
+        value = math.inf
+    if math.isinf(value) or not word.isascii():
+        raise PlanError(source, f"{word[:20]!r} is no number", item)
+    return None if math.isnan(value) else value
+
+
+def text_of(header: str, items: list[Item], current: int | None = 0) -> bytes:
+    """A file of these items; `current` is the one that is marked."""
+    lines = [header]
+    for number, item in enumerate(items):
+        numbers = "\t".join(["nan" if value is None else _decimal(value) for value in item.params])
+        head = f"{number}\t{int(number == current)}\t{item.frame}\t{item.command}"
+        lines.append(f"{head}\t{numbers}\t{int(item.autocontinue)}")
+    return ("\n".join(lines) + "\n").encode()
+
+
+def _decimal(value: float) -> str:
+    """All digits that make the same number again, and no exponent: not every reader knows them."""
+    text = repr(float(value))
+    return format(Decimal(text), "f") if "e" in text else text
+
+
+def read(text: str, source: str) -> Plan:
+    """The plan in a file. Raises `PlanError`."""
+    items = rows(text, source)
+    if items and all(item.command in _FENCE for item in items):
+        zones, back = zones_of(items, source)
+        return Plan(zones=zones, breach_return=back)
+    if items and all(item.command in _RALLY for item in items):
+        return Plan(rally=points_of(items, source))
+    if not items or items[0].command != WAYPOINT:
+        return Plan(tuple(items))
+    first, *rest = items
+    latitude, longitude, height = first.params[4:]
+    home = None
+    if latitude is not None and longitude is not None and (latitude, longitude) != (0.0, 0.0):
+        home = Point(latitude, longitude, height or 0.0)
+    return Plan(tuple(shifted(item, -1) for item in rest), home)
+
+
+def write(plan: Plan) -> tuple[bytes, list[Loss]]:
+    """A file of the plan's mission, or of its fence or rally points if it has nothing else."""
+    losses: list[Loss] = []
+    if plan.items or not (plan.zones or plan.rally):
+        home = plan.home or Point(0.0, 0.0)
+        first = Item(WAYPOINT, GLOBAL, (0.0, 0.0, 0.0, 0.0, home.latitude, home.longitude, home.height))
+        data = text_of(HEADER, [first, *(shifted(item, 1) for item in plan.items)])
+        if plan.zones or plan.breach_return:
+            losses.append(Loss(f"the fence of {counted(len(plan.zones), 'zone')}: a file of its own would hold it"))
+        if plan.rally:
+            losses.append(Loss(f"{counted(len(plan.rally), 'rally point')}: a file of their own would hold them"))
+    else:
+        data = text_of(HEADER, fence_items(plan) if plan.zones else rally_items(plan))
+        if plan.zones and plan.rally:
+            losses.append(Loss(f"{counted(len(plan.rally), 'rally point')}: a file of their own would hold them"))
+        if plan.home is not None:
+            losses.append(Loss("the planned home"))
+    return data, losses + editor_losses(plan)
+
+
+def editor_losses(plan: Plan) -> list[Loss]:
+    """What only QGroundControl's own format holds."""
+    losses = [
+        Loss(f"the {block.kind} of {block.count} items from here on can no longer be edited as one", block.first)
+        for block in plan.blocks
+    ]
+    if plan.hover_speed is not None or plan.cruise_speed is not None:
+        losses.append(Loss("the speeds that the planner assumed"))
+    return losses

@@ -1,0 +1,309 @@
+"""Commands of the camera and the gimbal, and what is looked at: see `rules`."""
+
+from __future__ import annotations
+
+from anafi_mav import mav_enums
+from anafi_mav.plans.formats.parrot import SET_STILL_MODE, SET_VIEW_MODE
+from anafi_mav.plans.plan import Item, Point
+from anafi_mav.plans.rules.flight_plan_writer import SHORTEST_INTERVAL, SHORTEST_STEP, Pen
+from anafi_mav.plans.rules.row import Row, Verdict, only
+
+_CAMERAS = frozenset({None, 0.0, 1.0, 100.0})
+"""Camera ids that mean the one of the flight plan: all, the first, and its component."""
+
+_GIMBALS = frozenset({None, 0.0, 1.0, 154.0})
+
+_TILT = {1: (-90.0, 90.0), 2: (-116.0, 176.0)}
+"""deg that the camera tilts, by version of the flight plan (data sheets of the 4K, Thermal, USA; of the Ai)."""
+
+_FORMATS = frozenset({None, 0.0, 12.0, 13.0, 14.0, 15.0})
+_UNSET = frozenset({None, 0.0, -1.0})
+
+
+def _camera(pen: Pen, item: Item, number: int) -> None:
+    only(pen, item, number, "the flight plan's camera is component 100, not this", _CAMERAS)
+
+
+def _gimbal(pen: Pen, item: Item, number: int) -> None:
+    only(pen, item, number, "the gimbal is component 154, not this", _GIMBALS)
+
+
+# What is looked at.
+
+
+def _look(pen: Pen, item: Item) -> None:
+    if not pen.names_place(item):
+        pen.refuse("it has no place", 5)
+    latitude, longitude = item.params[4:6]
+    pen.look_at(Point(latitude or 0.0, longitude or 0.0, pen.height(item) or 0.0))
+
+
+def _roi_location(pen: Pen, item: Item) -> None:
+    _gimbal(pen, item, 1)
+    _look(pen, item)
+
+
+def _roi_beside(pen: Pen, item: Item) -> None:
+    _gimbal(pen, item, 1)
+    pitch, roll, yaw = item.params[4:]
+    if roll not in (None, 0.0):
+        pen.refuse("a flight plan does not roll the camera", 6)
+    pen.look_ahead()
+    pen.look_beside(yaw or 0.0)
+    _tilt(pen, pitch or 0.0, 5)
+
+
+def _roi_none(pen: Pen, item: Item) -> None:
+    _gimbal(pen, item, 1)
+    _look_ahead(pen)
+
+
+def _look_ahead(pen: Pen) -> None:
+    looked = pen.settings.roi is not None or pen.settings.beside is not None
+    pen.look_ahead()
+    if looked:
+        pen.aim(0.0)
+
+
+def _roi(pen: Pen, item: Item) -> None:
+    mode = item.params[0]
+    if mode not in (None, 0.0, float(mav_enums.MAV_ROI_LOCATION)):
+        pen.refuse("only a place can be looked at, no way point and no target", 1)
+    if pen.numbers_regions:
+        if not pen.names_place(item):
+            pen.refuse("it has no place", 5)
+        pen.height(item)
+        return
+    if mode or pen.names_place(item):
+        _look(pen, item)
+    else:
+        _look_ahead(pen)
+
+
+def _view_mode(pen: Pen, item: Item) -> None:
+    mode, number, gimbal = item.params[:3]
+    if mode in (0.0, 1.0):
+        pen.view(mode, gimbal)
+        return
+    if mode != 2.0:
+        pen.refuse("there is no such view mode", 1)
+    if number is None or not number.is_integer() or not 0 <= number < len(pen.regions):
+        pen.refuse("it looks at a region that is not there", 2)
+    _look(pen, pen.regions[int(number)])
+
+
+# The gimbal.
+
+
+def _tilt(pen: Pen, pitch: float | None, number: int, roll: float | None = None, yaw: float | None = None) -> None:
+    lowest, highest = _TILT[pen.version]
+    if pitch is not None and not lowest <= pitch <= highest:
+        pen.refuse(f"the camera tilts from {lowest:g} to {highest:g} deg, not to {pitch:g}", number)
+    if pen.settings.roi is not None:
+        pen.look_ahead()
+    pen.aim(pitch, roll, yaw)
+
+
+def _mount(pen: Pen, item: Item) -> None:
+    pitch, roll, yaw = item.params[:3]
+    mode = item.params[6]
+    if mode == mav_enums.MAV_MOUNT_MODE_NEUTRAL:
+        _tilt(pen, 0.0, 1, 0.0, 0.0)
+        return
+    if mode not in (None, float(mav_enums.MAV_MOUNT_MODE_RETRACT), float(mav_enums.MAV_MOUNT_MODE_MAVLINK_TARGETING)):
+        pen.refuse("the gimbal is aimed by angles only", 7)
+    if mode == mav_enums.MAV_MOUNT_MODE_RETRACT:
+        pen.say("the gimbal cannot be put away: it is aimed")
+    if pen.version == 1:
+        only(pen, item, 2, "the flight plan does not roll the camera")
+        only(pen, item, 3, "the camera does not turn to the side: turn the drone")
+    _tilt(pen, pitch, 1, roll, yaw)
+
+
+def _mount_mode(pen: Pen, item: Item) -> None:
+    mode = item.params[0]
+    if mode not in (None, 0.0, 1.0, float(mav_enums.MAV_MOUNT_MODE_MAVLINK_TARGETING)):
+        pen.refuse("the gimbal is aimed by angles only", 1)
+    if mode == mav_enums.MAV_MOUNT_MODE_NEUTRAL:
+        _tilt(pen, 0.0, 1, 0.0, 0.0)
+
+
+def _pitch_yaw(pen: Pen, item: Item) -> None:
+    pitch, yaw, _, _, flags = item.params[:5]
+    _gimbal(pen, item, 7)
+    only(pen, item, 3, "a flight plan aims at an angle, it does not turn with a speed")
+    only(pen, item, 4, "a flight plan aims at an angle, it does not turn with a speed")
+    bits = int(flags or 0.0)
+    if bits & (mav_enums.GIMBAL_MANAGER_FLAGS_RETRACT | mav_enums.GIMBAL_MANAGER_FLAGS_NEUTRAL):
+        _tilt(pen, 0.0, 1, 0.0, 0.0)
+        if bits & mav_enums.GIMBAL_MANAGER_FLAGS_RETRACT:
+            pen.say("the gimbal cannot be put away: it looks ahead")
+        return
+    earth = bits & (mav_enums.GIMBAL_MANAGER_FLAGS_YAW_LOCK | mav_enums.GIMBAL_MANAGER_FLAGS_YAW_IN_EARTH_FRAME)
+    if yaw is not None and (earth or (yaw != 0.0 and pen.version == 1)):
+        pen.refuse("the camera looks where the drone's nose does: turn the drone" if pen.version == 1
+                   else "the camera is aimed from the drone's nose, not from north", 2)  # fmt: skip
+    _tilt(pen, pitch, 1, None, yaw)
+
+
+def _gimbal_owner(pen: Pen, item: Item) -> None:
+    _gimbal(pen, item, 7)
+
+
+# The camera.
+
+
+def _camera_mode(pen: Pen, item: Item) -> None:
+    _camera(pen, item, 1)
+    if item.params[1] not in (0.0, 1.0, 2.0):
+        pen.refuse("there is no such camera mode", 2)
+    pen.want_mode()
+
+
+def _still_mode(pen: Pen, item: Item) -> None:
+    mode, step, form = item.params[:3]
+    if mode not in (0.0, 1.0):
+        pen.refuse("photos are taken by time or by distance", 1)
+    only(pen, item, 3, "there is no such format of photos", _FORMATS)
+    pen.set_still(mode, step or 0.0, form or 0.0)
+
+
+def _interval(pen: Pen, seconds: float, number: int) -> None:
+    if seconds < SHORTEST_INTERVAL:
+        pen.refuse(f"the camera needs {SHORTEST_INTERVAL:g} s between photos, not {seconds:g}", number)
+
+
+def _distance(pen: Pen, metres: float, number: int) -> None:
+    if metres < SHORTEST_STEP:
+        pen.refuse(f"the camera needs {SHORTEST_STEP:g} m between photos, not {metres:g}", number)
+
+
+def _photos(pen: Pen, item: Item) -> None:
+    interval, count = item.params[1:3]
+    _camera(pen, item, 1)
+    if count is None or count < 0.0 or not count.is_integer():
+        pen.refuse("it does not say how many photos", 3)
+    if count == 1.0:
+        pen.photo()
+    elif interval:
+        _interval(pen, interval, 2)
+        pen.photos_in_time(interval, count)
+    elif pen.settings.still is None:
+        pen.refuse("it does not say how often", 2)
+    elif pen.settings.still[0] == 1.0:
+        _distance(pen, pen.settings.still[1], 2)
+        pen.photos_on_the_way(pen.settings.still[1], count)
+    else:
+        _interval(pen, pen.settings.still[1], 2)
+        pen.photos_in_time(pen.settings.still[1], count)
+
+
+def _stop_photos(pen: Pen, item: Item) -> None:
+    _camera(pen, item, 1)
+    pen.stop_photos()
+
+
+def _trigger_distance(pen: Pen, item: Item) -> None:
+    metres, shutter, at_once = item.params[:3]
+    _camera(pen, item, 4)
+    if metres is None or metres < 0.0:
+        pen.refuse("it does not say how far apart", 1)
+    if metres == 0.0:
+        pen.stop_photos()
+        if at_once:
+            pen.photo()
+        return
+    _distance(pen, metres, 1)
+    if shutter not in _UNSET:
+        pen.say(f"the camera chooses its shutter time itself, not {shutter:g} ms")
+    if not at_once:
+        pen.say("the first photo is taken at once")
+    pen.photos_on_the_way(metres, 0.0)
+
+
+def _trigger_interval(pen: Pen, item: Item) -> None:
+    period, shutter = item.params[:2]
+    _camera(pen, item, 3)
+    if period in _UNSET:
+        return
+    _interval(pen, (period or 0.0) / 1000.0, 1)
+    if shutter not in _UNSET:
+        pen.say(f"the camera chooses its shutter time itself, not {shutter:g} ms")
+    pen.photos_in_time((period or 0.0) / 1000.0, 0.0)
+
+
+def _digicam(pen: Pen, item: Item) -> None:
+    for number, what in ((1, "there is no lens to be shown"), (2, "zoom by SET_CAMERA_ZOOM"),
+                         (3, "zoom by SET_CAMERA_ZOOM"), (4, "a flight plan cannot focus")):  # fmt: skip
+        only(pen, item, number, what)
+    only(pen, item, 5, "there is no such shooting command", frozenset({None, 0.0, 1.0}))
+    if item.params[4] == 1.0:
+        pen.photo()
+
+
+def _video(pen: Pen, item: Item) -> None:
+    _camera(pen, item, 3)
+    pen.film()
+
+
+def _stop_video(pen: Pen, item: Item) -> None:
+    _camera(pen, item, 3)
+    pen.stop_film()
+
+
+def _panorama(pen: Pen, item: Item) -> None:
+    if not item.params[0] and not item.params[1]:
+        pen.refuse("its angles are nothing", 1)
+    pen.panorama(*item.params[:4])
+
+
+def _zoom(pen: Pen, item: Item) -> None:
+    kind, value = item.params[:2]
+    _camera(pen, item, 3)
+    if kind != float(mav_enums.ZOOM_TYPE_RANGE):
+        pen.refuse("only a zoom range in percent can be flown", 1)
+    if value is None or not 0.0 <= value <= 100.0:
+        pen.refuse("a zoom range is from 0 to 100 %", 2)
+
+
+_EXACT, _NEARLY, _STEPPED = Verdict.EXACT, Verdict.APPROXIMATED, Verdict.STEPPED
+
+_ONE_CAMERA = "Another camera than the main one (0, 1 or 100) is refused."
+_ONE_GIMBAL = "Another gimbal than the one (0, 1 or 154) is refused."
+
+CAMERA = (
+    Row(195, _EXACT, "Version 1: a numbered region of interest, and the view mode that looks at it. Version 2: itself. "
+        f"Headings of way points count for nothing meanwhile. {_ONE_GIMBAL}", _roi_location),
+    Row(196, _EXACT, "Gimbal to param5, and each way point's heading is the way to it and param7 more. A roll is "
+        f"refused. {_ONE_GIMBAL}", _roi_beside),
+    Row(197, _EXACT, "Version 1: the view mode of way points. Version 2: itself. The camera looks ahead again if "
+        f"something was looked at. {_ONE_GIMBAL}", _roi_none),
+    Row(201, _EXACT, "As 195 with a place, also with param1 = 0, as ArduPilot has it; as 197 without. Way points and "
+        "targets are refused. Where SET_VIEW_MODE numbers them, it only numbers.", _roi),
+    Row(203, _EXACT, "One photo with param5 = 1, nothing with 0. Lens, zoom and focus are refused.", _digicam),
+    Row(204, _EXACT, "Nothing, for the gimbal is always aimed by angles; param1 = 1 looks ahead. Other modes are "
+        "refused.", _mount_mode),
+    Row(205, _EXACT, "Gimbal. Version 1 refuses roll and yaw. Angles beyond -90 to 90 deg (Ai: -116 to 176) and "
+        "modes 3 to 6 are refused; param7 = 0 aims too, which is said.", _mount),
+    Row(206, _NEARLY, "Photos by distance (GPS lapse), which begin with one: said if param3 is 0. With 0 m they end, "
+        "and param3 = 1 then takes one more. Less than 1 m is refused; a shutter time is left out and said. "
+        f"{_ONE_CAMERA}", _trigger_distance),
+    Row(214, _EXACT, "Photos by time, which begin with one. Less than 2000 ms is refused; a shutter time is left out "
+        f"and said. {_ONE_CAMERA}", _trigger_interval),
+    Row(530, _NEARLY, "Nothing: photos and videos of a plan set the mode themselves; it is said where none comes after "
+        f"it. {_ONE_CAMERA}", _camera_mode),
+    Row(531, _STEPPED, "The gateway zooms: a flight plan cannot. Other types than a range (2) are refused. "
+        f"{_ONE_CAMERA}", _zoom, moves=True),
+    Row(1000, _EXACT, "Gimbal. Speeds, a yaw from north and, in version 1, any yaw are refused; putting it away looks "
+        f"ahead, which is said. {_ONE_GIMBAL}", _pitch_yaw),
+    Row(1001, _EXACT, f"Nothing: the flight plan aims the gimbal itself. {_ONE_GIMBAL}", _gimbal_owner),
+    Row(2000, _EXACT, "Photos, with the still mode before them: one (param3 = 1), or every param2 s. Less than 2 s is "
+        f"refused. {_ONE_CAMERA}", _photos),
+    Row(2001, _EXACT, f"Itself. {_ONE_CAMERA}", _stop_photos),
+    Row(2500, _EXACT, "Itself. Photos while it runs, and video while photos are taken without end, are refused: the "
+        f"camera does one of them. {_ONE_CAMERA}", _video),
+    Row(2501, _EXACT, f"Itself. {_ONE_CAMERA}", _stop_video),
+    Row(2800, _EXACT, "Itself.", _panorama, moves=True),
+    Row(SET_VIEW_MODE, _EXACT, "Itself, or with param1 = 2 as 195 with the 201 of that number.", _view_mode),
+    Row(SET_STILL_MODE, _EXACT, "Put in front of the next photos.", _still_mode),
+)  # fmt: skip

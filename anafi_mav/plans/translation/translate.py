@@ -1,0 +1,365 @@
+"""From a mission to what the drone flies: files of Parrot's, and between them what the gateway flies itself.
+
+`examine` judges a mission when it is uploaded; `translate` writes the files when it begins. What each command becomes
+is the table of `rules`; how lines are written is `pen`; this is the way through the items, with its jumps.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import chain
+
+from anafi_mav import mav_enums
+from anafi_mav.errors import PlanError
+from anafi_mav.plans.formats.parrot import Version
+from anafi_mav.plans.plan import DO_JUMP, Item, Loss
+from anafi_mav.plans.rules.flight_plan_writer import Pen
+from anafi_mav.plans.rules.legs import Fault, FaultKind, Leg, Refused, Settings, Start, Step
+from anafi_mav.plans.rules.row import Row, Verdict
+from anafi_mav.plans.rules.rules import TABLE
+
+__all__ = [
+    "Cursor",
+    "Fault",
+    "FaultKind",
+    "Flight",
+    "Leg",
+    "Report",
+    "Start",
+    "Step",
+    "Verdict",
+    "examine",
+    "translate",
+]
+
+MAX_LINES = 2000
+"""Lines that are written at once: more than a battery flies, and a file of some 100 kB."""
+
+MAX_VISITS = 20_000
+"""Items that are looked at for that, each turn of a loop anew: many may need no line."""
+
+MAX_IDLE = 100
+"""Items, beyond twice those of the mission, that may come one after the other in loops without anything being flown or
+photographed: what they set has been set by then."""
+
+_ENDLESS = -1.0
+MAX_JUMPS = 0xFFFF
+"""Of a mission, those without end not counted: each is a turn of a loop here, and no battery flies so many."""
+
+
+@dataclass(frozen=True)
+class Report:
+    """What a mission is to a drone, known when it is uploaded."""
+
+    faults: tuple[Fault, ...]
+    """Not empty: it is refused."""
+    approximations: tuple[Loss, ...]
+    stepped: tuple[Loss, ...]
+    """Items that the gateway itself flies, and why; not empty: the mission stops where the gateway does."""
+
+
+@dataclass(frozen=True)
+class Cursor:
+    """Where a flight goes on that was too long to be written at once."""
+
+    item: int
+    jumps: tuple[tuple[int, int], ...]
+    """Item of a jump, and how often it was taken."""
+    settings: Settings
+    anew: bool = False
+    """Photos and videos that the settings have are begun."""
+
+
+@dataclass(frozen=True)
+class Flight:
+    """What is flown."""
+
+    parts: tuple[Leg | Step, ...]
+    """Empty when nothing is to be done, such as a take-off in the air."""
+    notes: tuple[Loss, ...]
+    """What is not as the mission has it."""
+    rest: Cursor | None
+    """How it goes on when the parts have been flown: `translate` it with what is known then. None: it is over."""
+    done: tuple[int, ...] = ()
+    """The items that are done before anything is flown; only where there are no parts, which else tell it."""
+
+
+def examine(items: Sequence[Item], version: Version) -> Report:
+    """Can a drone of this version fly the mission?"""
+    faults, said = _judged(items, version)
+    faults = faults or _wrong_ways(items, version)
+    if faults:
+        return Report(tuple(faults), (), ())
+    place = next((item.params for item in items if TABLE[item.command].place and item.params[4]), None)
+    latitude, longitude = (0.0, 0.0) if place is None else (place[4] or 0.0, place[5] or 0.0)
+    start = Start(latitude, longitude, 0.0, flying=_way_up(items, 0) is None, takeoff_amsl=0.0)
+    try:
+        flight = _fly(items, version, start, Cursor(0, (), Settings()))
+    except Refused as error:  # by what came before it on the way, which is not what stands before it
+        return Report((error.fault,), (), ())
+    flown = _reached(items) if flight.rest else {*flight.done, *chain(*map(_done, flight.parts))}
+    never = [Loss("it is never reached", number) for number in range(len(items)) if number not in flown]
+    # Of a long mission, only the beginning has been flown here.
+    notes = dict.fromkeys([*flight.notes, *(loss for loss in said if flight.rest and loss.item in flown), *never])
+    return Report((), tuple(notes), tuple(_stepped(items, flown, flight)))
+
+
+def _done(part: Leg | Step) -> Iterator[int]:
+    return chain(*part.done) if isinstance(part, Leg) else iter(part.done)
+
+
+def translate(
+    items: Sequence[Item],
+    version: Version,
+    start: Start,
+    first: int | Cursor = 0,
+    jumps: Mapping[int, int] | None = None,
+) -> Flight:
+    """Write what is flown from an item on, or from where another flight ended.
+
+    `jumps` are items that jump, and how often they have when it begins at an item.
+
+    What items before `first` have set holds, and photos and videos that they began and did not end are begun. Raises
+    `PlanError` for what `examine` finds wrong, and when heights above mean sea level cannot be had.
+    """
+    wrong = _judged(items, version)[0] or _wrong_ways(items, version)
+    if wrong:
+        raise PlanError("mission", wrong[0].reason, wrong[0].item)
+    cursor = first if isinstance(first, Cursor) else _cursor(items, version, start, first, jumps or {})
+    try:
+        return _fly(items, version, start, cursor)
+    except Refused as error:
+        raise PlanError("mission", error.fault.reason, error.fault.item) from None
+
+
+# What is wrong with it.
+
+
+def _judged(items: Sequence[Item], version: Version) -> tuple[list[Fault], list[Loss]]:
+    """Each item by itself, after those that stand before it: at most one fault of each, and what is left out."""
+    pen = Pen(version, Start(0.0, 0.0, 0.0, flying=True, takeoff_amsl=0.0), items)
+    pen.muted = True
+    faults = []
+    for pen.item, item in enumerate(items):
+        fault = _wrong_item(pen, item, len(items))
+        if fault is not None:
+            faults.append(fault)
+    pen.end_modes()
+    return faults, list(pen.notes)
+
+
+def _wrong_item(pen: Pen, item: Item, count: int) -> Fault | None:
+    row = TABLE.get(item.command)
+    if row is None or row.verdict is Verdict.REFUSED:
+        name = Row(item.command, Verdict.REFUSED, "").name
+        return Fault(pen.item, f"{name}: {row.why if row else 'no flight plan has it'}", FaultKind.COMMAND)
+    for number, value in enumerate(item.params, 1):
+        if value is not None and not math.isfinite(value):
+            return Fault(pen.item, f"{value} is no number", FaultKind.PARAM, number)
+    if not item.autocontinue:
+        return Fault(pen.item, "it waits to be continued, which the drone does not", FaultKind.COMMAND)
+    if item.command == DO_JUMP:
+        return _wrong_jump(pen.item, item, count)
+    try:
+        _write(pen, item)
+    except Refused as error:
+        return error.fault
+    return None
+
+
+def _write(pen: Pen, item: Item) -> None:
+    row = TABLE[item.command]
+    assert row.write is not None, "what is not refused is written"
+    try:
+        row.write(pen, item)
+    except Refused as error:
+        raise Refused(replace(error.fault, reason=f"{row.name}: {error.fault.reason}")) from None
+
+
+def _wrong_jump(number: int, item: Item, count: int) -> Fault | None:
+    target, often = item.params[:2]
+    if target is None or not target.is_integer() or not 0 <= target < count:
+        return Fault(number, "it jumps to an item that is not there", FaultKind.PARAM, 1)
+    if often is None or not often.is_integer() or not _ENDLESS <= often <= MAX_JUMPS:
+        times = "nobody knows how often" if often is None else f"{often:g} times"
+        return Fault(number, f"it jumps {times}", FaultKind.PARAM, 2)
+    return None
+
+
+def _wrong_ways(items: Sequence[Item], version: Version) -> list[Fault]:
+    """What no item is to blame for by itself."""
+    if not items:
+        return []
+    ways = _reached(items)
+    faults = []
+    if sum(max(item.params[1] or 0.0, 0.0) for item in items if item.command == DO_JUMP) > MAX_JUMPS:
+        last = max(number for number, item in enumerate(items) if item.command == DO_JUMP)
+        faults.append(Fault(last, f"the mission jumps more than {MAX_JUMPS} times", FaultKind.PARAM, 2))
+    for number, item in enumerate(items):
+        if item.command == mav_enums.MAV_CMD_NAV_LAND and number in ways:
+            after = next((other for other in range(number + 1, len(items)) if other not in ways), None)
+            if after is not None:
+                faults.append(Fault(after, "a landing stands before it, which ends the plan", FaultKind.PLAN))
+                break
+    if not any(TABLE[items[number].command].moves for number in ways):
+        faults.append(Fault(0, "nothing of the mission flies", FaultKind.PLAN))
+    for loop in _endless(items, ways):
+        if not _flies(items, version, loop):
+            last = max(number for number in loop if items[number].command == DO_JUMP)
+            faults.append(Fault(last, "it goes round for ever and flies nowhere", FaultKind.PLAN))
+    return faults
+
+
+def _endless(items: Sequence[Item], ways: set[int]) -> Iterator[list[int]]:
+    """The loops without end, each from one of its items round to it: where a flight stays when all counts are used."""
+    walks: dict[int, int] = {}
+    """Items that were come by, and on which walk."""
+    for start in sorted(ways):
+        number = start
+        while number < len(items) and number not in walks:
+            walks[number] = start
+            number = _after(items, number)
+        if walks.get(number) != start:
+            continue  # it ended, or has come to where another walk was
+        loop = [number]
+        while (following := _after(items, loop[-1])) != number:
+            loop.append(following)
+        yield loop
+
+
+def _after(items: Sequence[Item], number: int) -> int:
+    """The item that follows one for good."""
+    item = items[number]
+    if item.command == DO_JUMP and item.params[1] == _ENDLESS:
+        return int(item.params[0] or 0.0)
+    return len(items) if TABLE[item.command].ends else number + 1
+
+
+def _flies(items: Sequence[Item], version: Version, loop: Sequence[int]) -> bool:
+    """Something of a loop takes its time. The first turn leads to where the second begins."""
+    pen = Pen(version, Start(0.0, 0.0, 0.0, flying=True, takeoff_amsl=0.0), items)
+    for turn in range(2):
+        before = pen.flown
+        for pen.item in loop:
+            if TABLE[items[pen.item].command].moves:
+                _write(pen, items[pen.item])
+            if turn and pen.flown > before:
+                return True
+    return False
+
+
+def _reached(items: Sequence[Item]) -> set[int]:
+    """The items that could ever be flown; a count that is used up may keep some from it."""
+    reached: set[int] = set()
+    open_ways = [0]
+    while open_ways:
+        number = open_ways.pop()
+        if number in reached or number >= len(items):
+            continue
+        reached.add(number)
+        item = items[number]
+        if item.command == DO_JUMP and item.params[1] != 0.0:
+            open_ways.append(int(item.params[0] or 0.0))
+            if item.params[1] == _ENDLESS:
+                continue
+        if not TABLE[item.command].ends:
+            open_ways.append(number + 1)
+    return reached
+
+
+def _stepped(items: Sequence[Item], flown: set[int], flight: Flight) -> Iterator[Loss]:
+    for number in sorted(flown):
+        row = TABLE[items[number].command]
+        if row.verdict is Verdict.STEPPED:
+            yield Loss(f"{row.name}: {row.why}", number)
+    if flight.rest is not None:
+        jumps = [number for number, item in enumerate(items) if item.command == DO_JUMP and item.params[1]]
+        what = f"flown in files of {MAX_LINES} lines"
+        yield Loss(f"{what}: the jump goes on for so long" if jumps else what, max(jumps) if jumps else None)
+
+
+# The way through it.
+
+
+def _cursor(items: Sequence[Item], version: Version, start: Start, first: int, jumps: Mapping[int, int]) -> Cursor:
+    """What holds at an item, from all that stand before it in the list."""
+    if not 0 <= first < len(items):
+        raise PlanError("mission", f"it has {len(items)} items", first)
+    pen = Pen(version, start, items)
+    pen.muted = True
+    for pen.item, item in enumerate(items[:first]):
+        if item.command != DO_JUMP:
+            _write(pen, item)
+    return Cursor(first, tuple(sorted(jumps.items())), pen.settings, anew=True)
+
+
+def _fly(items: Sequence[Item], version: Version, start: Start, cursor: Cursor) -> Flight:
+    pen = Pen(version, start, items, cursor.settings)
+    pen.films_again = cursor.anew
+    jumps = dict(cursor.jumps)
+    index, visits, busy, lively = cursor.item, 0, 0, 0
+    """`busy`: what has been flown and photographed by then, and `lively`: when it became more."""
+    if not start.flying and items:
+        _rise(pen, items, index)
+    while index < len(items) and pen.written < MAX_LINES and visits < MAX_VISITS:
+        item, pen.item = items[index], index
+        row = TABLE[item.command]
+        following = index + 1
+        visits += 1
+        if pen.flown + pen.photographed > busy:
+            busy, lively = pen.flown + pen.photographed, visits
+        if item.command == DO_JUMP:
+            target, often = int(item.params[0] or 0.0), item.params[1]
+            if often == _ENDLESS:
+                following = target
+            elif jumps.get(index, 0) < (often or 0.0):
+                if visits - lively > 2 * len(items) + MAX_IDLE:
+                    pen.refuse("it goes round and round and flies nowhere", kind=FaultKind.PLAN)
+                jumps[index], following = jumps.get(index, 0) + 1, target
+        else:
+            if row.verdict is Verdict.STEPPED:
+                pen.step()
+            _write(pen, item)
+        pen.finish()
+        index = len(items) if row.ends else following
+    pen.close()
+    if index >= len(items):
+        pen.end_modes()
+    rest = Cursor(index, tuple(sorted(jumps.items())), pen.settings) if index < len(items) else None
+    return Flight(tuple(pen.parts), tuple(pen.notes), rest, () if pen.parts else tuple(pen.waiting))
+
+
+def _way_up(items: Sequence[Item], first: int) -> int | None:
+    """The item that says how high to rise from the ground; None: there is nowhere to fly to."""
+    for number in range(first, len(items)):
+        row = TABLE[items[number].command]
+        if items[number].command == mav_enums.MAV_CMD_NAV_TAKEOFF or row.place:
+            return number
+        if row.ends:
+            return None
+    return None
+
+
+def _rise(pen: Pen, items: Sequence[Item], first: int) -> None:
+    """From the ground: without an item that takes off, straight up to the height of the first way point."""
+    pen.item = first
+    number = _way_up(items, first)
+    if number is None:
+        raise PlanError("mission", "on the ground it has nowhere to fly to", first)
+    if items[number].command == mav_enums.MAV_CMD_NAV_TAKEOFF:
+        if any(TABLE[item.command].moves for item in items[first:number]):
+            pen.say("the drone takes off first")
+        pen.take_off(None)
+        return
+    pen.item = number
+    there = pen.destination(items[number])
+    climbs = there.height > pen.place.height
+    pen.say(
+        f"no item takes off: the drone rises straight to {there.height:g} m above take-off first"
+        if climbs
+        else "no item takes off"
+    )
+    pen.item = first
+    pen.take_off(replace(pen.place, height=there.height) if climbs else None)

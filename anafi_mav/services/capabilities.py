@@ -1,0 +1,16 @@
+"""MAV_PROTOCOL_CAPABILITY bits as a flavour's clients read them. No I/O."""
+
+from __future__ import annotations
+
+from anafi_mav.mavlink import dialect
+from anafi_mav.services.flavours import Flavour
+
+
+def capability_bits(promised: int, flavour: Flavour) -> int:
+    """MAV_PROTOCOL_CAPABILITY bits that clients of a flavour are told, given those of the services."""
+    encoding = (
+        dialect.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
+        if flavour.bytewise
+        else dialect.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_C_CAST
+    )
+    return promised | encoding | dialect.MAV_PROTOCOL_CAPABILITY_MAVLINK2

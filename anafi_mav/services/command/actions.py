@@ -1,0 +1,171 @@
+"""The command table: MAV_CMD → what the vehicle does. A handler returns when the drone confirmed, or raises."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+
+from anafi_mav.mavlink import dialect
+from anafi_mav.services.command.guided_service import guided_mode
+from anafi_mav.services.command_targets import height, place
+from anafi_mav.services.commands import Action, Altitude, Command, Effect, Progress, effect_of_mode
+from anafi_mav.vehicle.base.bounds import FASTEST, SLOWEST
+from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.refusal import Refused, Unsupported
+from anafi_mav.vehicle.base.right import Right
+from anafi_mav.vehicle.vehicle import Vehicle
+
+FORCE = 21196
+"""param2 of an arm or disarm that overrides checks (MAVLink common.xml MAV_CMD_COMPONENT_ARM_DISARM)."""
+
+CHANGE_MODE = dialect.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
+RELATIVE_YAW = dialect.MAV_DO_REPOSITION_FLAGS_RELATIVE_YAW
+
+
+async def arm_disarm(vehicle: Vehicle, command: Command) -> None:
+    """MAV_CMD_COMPONENT_ARM_DISARM: param1 1 arm, 0 disarm; param2 21196 disarms by force."""
+    if command.params[0] == 1.0:
+        await vehicle.takeoff.arm(command.client)
+    elif command.params[0] == 0.0:
+        await vehicle.takeoff.disarm(force=command.params[1] == FORCE)
+    else:
+        raise Refused("Refused: param1 is 1 to arm, 0 to disarm", lasting=True)
+
+
+async def takeoff(vehicle: Vehicle, command: Command) -> None:
+    """MAV_CMD_NAV_TAKEOFF. What z means depends on who asks (conformance E2).
+
+    Unset: the height of MIS_TAKEOFF_ALT. COMMAND_LONG with latitude and longitude exactly 0, or from a client whose
+    family means it so: above the take-off point (MAVProxy, dronekit, Mission Planner). Any other COMMAND_LONG: AMSL
+    (QGroundControl). COMMAND_INT: as its frame says. The position is not used: an ANAFI takes off where it stands.
+    """
+    relative = command.flavour.relative_takeoff or (command.x == 0.0 and command.y == 0.0)
+    if command.frame is None and relative and not math.isnan(command.z):
+        await vehicle.take_off(command.z, command.right)
+        return
+    await vehicle.take_off(height(vehicle, command), command.right)
+
+
+async def land(vehicle: Vehicle, command: Command) -> None:
+    """MAV_CMD_NAV_LAND: here, whatever position it names."""
+    await vehicle.land()
+
+
+async def return_to_launch(vehicle: Vehicle, command: Command) -> None:
+    """MAV_CMD_NAV_RETURN_TO_LAUNCH."""
+    await vehicle.return_home(command.right)
+
+
+async def reposition(vehicle: Vehicle, command: Command) -> None:
+    """MAV_CMD_DO_REPOSITION: param1 speed in m/s (unset or <= 0: the drone's own), param4 heading in rad, x, y, z.
+
+    param2 bit 0 (CHANGE_MODE): see `_require_change_of_mode`; bit 1 (RELATIVE_YAW): the heading counts from the present
+    one. z obeys the frame: 0 and 5 AMSL, 3 and 6 above take-off. ArduPilot's clients send a heading of 0 for none
+    (conformance D1). All unset is pause, with or without CHANGE_MODE: it stops something. A speed alone is refused.
+    """
+    speed, flags, yaw = command.params[0], command.params[1], command.params[3]
+    if math.isinf(speed) or abs(yaw) > 2.0 * math.pi:
+        raise Refused("Refused: speed is in m/s, heading in radians of up to a turn", lasting=True)
+    if speed > 0.0 and not SLOWEST <= speed <= FASTEST:
+        raise Refused(f"Refused: a speed is {SLOWEST:g} to {FASTEST:g} m/s", lasting=True)
+    where, ato = place(command), height(vehicle, command)
+    heading = None if math.isnan(yaw) else yaw
+    if heading == 0.0 and command.flavour.zero_is_unset:
+        heading = None
+    mode = guided_mode(command.flavour)
+    if where is None and ato is None and heading is None:
+        if speed > 0.0:
+            raise Refused("Refused: a speed needs a place, a height or a heading to go to", lasting=True)
+        await vehicle.hold(mode, command.right, pause=True)
+        return
+    bits = int(flags) if math.isfinite(flags) else 0
+    if not bits & CHANGE_MODE:
+        _require_change_of_mode(vehicle, command)
+    if heading is not None and bits & RELATIVE_YAW:
+        attitude = vehicle.drone.piloting.state.attitude
+        if attitude is None:
+            raise Refused("Refused: the present heading is not known")
+        heading += attitude.yaw
+    if vehicle.takeoff.rises:
+        vehicle.guided.check(where, ato)  # one that is refused replaces none that waits
+        await vehicle.takeoff.over("Goto")
+    await vehicle.guided.reposition(where, ato, heading, speed if speed > 0.0 else None, mode)
+
+
+def _require_change_of_mode(vehicle: Vehicle, command: Command) -> None:
+    """Refuse a reposition without CHANGE_MODE where it would change the mode.
+
+    PX4 supports none without it (Commander.cpp), ArduCopter takes it in Guided (GCS_MAVLink_Copter.cpp).
+    """
+    flavour = command.flavour
+    if not flavour.guided_setpoints:
+        raise Unsupported("Goto refused: flag CHANGE_MODE is missing")
+    if flavour.custom_mode(vehicle.mode) != flavour.custom_mode(FlightMode.GUIDED):
+        raise Refused("Goto refused: not in Guided, no CHANGE_MODE", lasting=True)
+
+
+async def set_mode(vehicle: Vehicle, command: Command) -> None:
+    """MAV_CMD_DO_SET_MODE, in the numbers of the sender's flavour."""
+    await change_mode(vehicle, command.mode, command.right)
+
+
+async def change_mode(vehicle: Vehicle, mode: FlightMode | None, by: Right) -> None:
+    """Enter a mode that some message named; None is one that we do not have."""
+    if mode is None:
+        raise Refused("Mode refused: an ANAFI has no such mode", lasting=True)
+    await vehicle.set_mode(mode, by)
+
+
+async def terminate(vehicle: Vehicle, command: Command) -> None:
+    """MAV_CMD_DO_FLIGHTTERMINATION: param1 1 cuts the motors."""
+    if command.params[0] != 1.0:
+        raise Refused("Refused: flight termination cannot be taken back", lasting=True)
+    await vehicle.terminate()
+
+
+def _effect_of_arm(command: Command) -> Effect:
+    return Effect.STOP if command.params[0] == 0.0 else Effect.CHANGE
+
+
+def _effect_of_reposition(command: Command) -> Effect:
+    """A reposition with nothing set is a pause."""
+    heading = command.params[3]
+    no_heading = math.isnan(heading) or (heading == 0.0 and command.flavour.zero_is_unset)
+    unset = no_heading and all(math.isnan(value) for value in (command.x, command.y, command.z))
+    return Effect.HOLD if unset else Effect.CHANGE
+
+
+def flight_actions(vehicle: Vehicle) -> dict[int, Action]:
+    """The commands that begin and end flights. The newest one wins."""
+    return {
+        dialect.MAV_CMD_COMPONENT_ARM_DISARM: Action(
+            partial(arm_disarm, vehicle), location=False, altitude=Altitude.UNUSED, effect=_effect_of_arm
+        ),
+        dialect.MAV_CMD_NAV_TAKEOFF: Action(
+            partial(takeoff, vehicle), location=True, altitude=Altitude.BY_FRAME, effect=Effect.IRREVOCABLE
+        ),
+        dialect.MAV_CMD_NAV_LAND: Action(
+            partial(land, vehicle), location=True, altitude=Altitude.UNUSED, effect=Effect.LAND
+        ),
+        dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH: Action(
+            partial(return_to_launch, vehicle), location=False, altitude=Altitude.UNUSED, effect=Effect.RETURN
+        ),
+        dialect.MAV_CMD_DO_REPOSITION: Action(
+            partial(reposition, vehicle),
+            location=True,
+            altitude=Altitude.BY_FRAME,
+            effect=_effect_of_reposition,
+            progress=Progress.EARLY,
+        ),
+        dialect.MAV_CMD_DO_SET_MODE: Action(
+            partial(set_mode, vehicle),
+            location=False,
+            altitude=Altitude.UNUSED,
+            effect=effect_of_mode,
+            mode=lambda command: command.flavour.mode_of_parameters(command.params[1], command.params[2]),
+            progress=Progress.LATE,
+        ),
+        dialect.MAV_CMD_DO_FLIGHTTERMINATION: Action(
+            partial(terminate, vehicle), location=False, altitude=Altitude.UNUSED, effect=Effect.STOP
+        ),
+    }

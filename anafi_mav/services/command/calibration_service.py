@@ -1,0 +1,191 @@
+"""What is done on the ground: calibration with progress texts, and a restart.
+
+Texts are PX4's own, which QGroundControl and MAVSDK read ("[cal] ...": MAVSDK plugins/calibration, conformance B2).
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import math
+from collections.abc import Awaitable, Callable, Mapping
+
+from anafi_mav.drone.events import CalibrationAxis, MagnetoCalibrationStateChanged, Message
+from anafi_mav.errors import AnafiMavError
+from anafi_mav.mavlink import dialect
+from anafi_mav.services.commands import Action, Altitude, Command, Effect, Progress
+from anafi_mav.services.service import Service
+from anafi_mav.vehicle.base.refusal import Refused
+from anafi_mav.vehicle.base.severity import Severity
+
+_MAGNETOMETER, _HORIZON = 1.0, 2.0
+"""param2 and param5 of MAV_CMD_PREFLIGHT_CALIBRATION that can be meant for an ANAFI (MAVLink common.xml)."""
+
+VERSION = 2
+"""Of the texts, and part of the first; MAVSDK believes no other."""
+
+_NO_SUCH = "an ANAFI has the magnetometer's and the gimbal's only"
+
+RESTART_WAIT = 15.0
+"""s after which a drone that was to restart should have disconnected."""
+
+_RESTART = 1.0
+"""param1 of MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN."""
+
+_SIDES: dict[CalibrationAxis | None, tuple[str, str]] = {
+    CalibrationAxis.X_AXIS: ("front", "roll: turn it about its long axis"),
+    CalibrationAxis.Y_AXIS: ("left", "pitch: turn it nose over tail"),
+    CalibrationAxis.Z_AXIS: ("down", "yaw: turn it about its vertical axis"),
+}
+"""By the axis that the drone wants to be turned about (arsdk common.xml 0-14-2): the side that is down in PX4's picture
+of that turn, and what to do with the drone in hand. QGroundControl shows the pictures of CAL_MAG_SIDES."""
+
+
+Work = Callable[[], Awaitable[None]]
+
+
+class MaintenanceService(Service):
+    """Refused with turning motors, all of it."""
+
+    def actions(self) -> Mapping[int, Action]:
+        return {
+            dialect.MAV_CMD_PREFLIGHT_CALIBRATION: Action(
+                self._calibrate,
+                location=False,
+                altitude=Altitude.UNUSED,
+                effect=Effect.CHANGE,
+                progress=Progress.FINAL_ONLY,
+            ),
+            dialect.MAV_CMD_GIMBAL_REQUEST_AXIS_CALIBRATION: Action(
+                lambda command: self._on_ground(self._gimbal),
+                location=False,
+                altitude=Altitude.UNUSED,
+                effect=Effect.CHANGE,
+            ),
+            dialect.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: Action(
+                self._reboot,
+                location=False,
+                altitude=Altitude.UNUSED,
+                effect=Effect.IRREVOCABLE,
+                progress=Progress.FINAL_ONLY,
+            ),
+        }
+
+    async def _calibrate(self, command: Command) -> None:
+        """MAV_CMD_PREFLIGHT_CALIBRATION: param2 1 the magnetometer, param5 2 the horizon, which is the gimbal's; all 0
+        ends what is under way. It ends with the calibration: accepted when the drone says that it has succeeded."""
+        values = [0.0 if math.isnan(value) else value for value in (*command.params, command.x, command.y, command.z)]
+        wanted = {index: value for index, value in enumerate(values, 1) if value != 0.0}
+        if not wanted:
+            await self.host.vehicle.take_over()  # ends the one that runs
+        elif wanted == {2: _MAGNETOMETER}:
+            await self._on_ground(self._magnetometer)
+        elif wanted == {5: _HORIZON}:
+            await self._on_ground(self._gimbal)
+        else:
+            # MAVSDK takes a refusal alone for a success; it believes the texts.
+            self._say(f"calibration failed: {_NO_SUCH}", Severity.ERROR)
+            raise Refused(f"Calibration refused: {_NO_SUCH}", lasting=True)
+
+    async def _on_ground(self, work: Work) -> None:
+        vehicle = self.host.vehicle
+        if not vehicle.on_ground or vehicle.drone.piloting.about_to_fly:
+            raise Refused("Refused: the drone is not on the ground")
+        await vehicle.take_over()
+        await work()
+
+    async def _told(
+        self, name: str, work: Callable[[], Awaitable[None]], undo: Callable[[], Awaitable[object]]
+    ) -> None:
+        """Run a calibration, with the texts of its beginning and its end; given up, it is undone."""
+        self._say(f"calibration started: {VERSION} {name}")
+        try:
+            await work()
+        except asyncio.CancelledError:
+            self._say("calibration cancelled")
+            await self._undone(undo)
+            raise
+        except AnafiMavError as error:
+            self._say(f"calibration failed: {error}", Severity.ERROR)
+            await self._undone(undo)
+            raise
+        self._say(f"calibration done: {name}")
+
+    @staticmethod
+    async def _undone(undo: Callable[[], Awaitable[object]]) -> None:
+        with contextlib.suppress(AnafiMavError):  # there is nobody to tell it to, and the drone says how it stands
+            await undo()
+
+    async def _magnetometer(self) -> None:
+        element = self.host.drone.calibration
+
+        async def turn() -> None:
+            await element.start_magnetometer()
+            watching = self.host.spawn(self._watch_axes())
+            try:
+                await element.magnetometer_done()
+            finally:
+                watching.cancel()
+
+        await self._told("mag", turn, element.abort_magnetometer)
+
+    async def _watch_axes(self) -> None:
+        """Send which way to turn the drone, which axes are done and the progress, whenever one of them changes.
+
+        Axes that were done before count for nothing: what a drone reports of them until its first news is of the last
+        calibration.
+        """
+        done: frozenset[CalibrationAxis] | None = None
+        axis: CalibrationAxis | None = None
+        fresh = False
+        news = asyncio.Event()
+
+        def hear(message: Message, now: float) -> None:
+            nonlocal fresh
+            fresh = fresh or isinstance(message, MagnetoCalibrationStateChanged)
+            news.set()
+
+        undo = self.host.drone.subscribe(hear)
+        try:
+            while True:
+                state = self.host.drone.calibration.state
+                now = (state.done or frozenset()) if fresh else frozenset()
+                for finished in sorted(now - (done or frozenset())):
+                    self._say(f"{_SIDES[finished][0]} side done, rotate to a different side")
+                if done is None or len(now) != len(done):
+                    self._say(f"progress <{100 * len(now) // len(_SIDES)}>")
+                if state.axis != axis and state.axis in _SIDES:
+                    side, what = _SIDES[state.axis]
+                    self._say(what)
+                    self._say(f"{side} orientation detected")
+                done, axis = now, state.axis
+                news.clear()
+                await news.wait()
+        finally:
+            undo()
+
+    async def _gimbal(self) -> None:
+        gimbal = self.host.drone.gimbal
+        await self._told("level", gimbal.calibrate, gimbal.cancel_calibration)
+
+    async def _reboot(self, command: Command) -> None:
+        """MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: param1 1. ACCEPTED once the drone has received it, as on every autopilot.
+
+        dronekit2 waits half a second for the acknowledgement, and the link is lost later. A text follows if it is not.
+        """
+        if command.params[0] != _RESTART:
+            raise Refused("Refused: an ANAFI can only be restarted", lasting=True)
+        await self._on_ground(self._restart)
+
+    async def _restart(self) -> None:
+        self.host.text(Severity.NOTICE, "The drone restarts")
+        await self.host.drone.request_reboot()
+        self.host.spawn(self._watch_restart())
+
+    async def _watch_restart(self) -> None:
+        """Report a drone that received the command and stays connected. The loss of the link cancels this."""
+        await asyncio.sleep(RESTART_WAIT)
+        self.host.text(Severity.ERROR, "Restart failed: drone is still connected")
+
+    def _say(self, text: str, severity: Severity = Severity.INFO) -> None:
+        self.host.text(severity, f"[cal] {text}")

@@ -1,0 +1,269 @@
+"""The command protocol's service: runs commands, keeps their senders informed, ends what a newer one replaces.
+
+What a command means is in the table of actions; whether it is a new one, `CommandDesk` knows (both without I/O).
+Rules: conformance R5-R10, C2, MAVLink command.md.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+import logging
+from collections.abc import Callable, Coroutine, Hashable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, NotSupported
+from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.node import Inbound
+from anafi_mav.services.command.actions import change_mode, flight_actions
+from anafi_mav.services.command_targets import UnsupportedFrame
+from anafi_mav.services.commands import (
+    EFFECT_OF_MODE,
+    MODE_PROGRESS_AFTER,
+    PROGRESS_AFTER,
+    PROGRESS_EVERY,
+    QUERY,
+    Action,
+    Command,
+    CommandDesk,
+    Definition,
+    Effect,
+    Execution,
+    Progress,
+    from_int,
+    from_long,
+)
+from anafi_mav.services.flavours import Flavour, flavour_of
+from anafi_mav.services.service import Host, MessageHandler, Query, Service, client_of
+from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.refusal import Refused, Unsupported
+from anafi_mav.vehicle.base.right import Extent, Right
+from anafi_mav.vehicle.base.severity import Severity
+
+logger = logging.getLogger(__name__)
+
+SETTLE = 0.1
+"""s that commands get to end by themselves when the link is lost; they wait for the drone, which says so at once."""
+
+_Decode = Callable[[Any, Definition, Hashable, Flavour], Command]
+
+_RESULT_BY_ERROR: tuple[tuple[type[AnafiMavError], int], ...] = (
+    (UnsupportedFrame, dialect.MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME),
+    (Unsupported, dialect.MAV_RESULT_UNSUPPORTED),
+    (NotSupported, dialect.MAV_RESULT_UNSUPPORTED),
+    (CommandRejected, dialect.MAV_RESULT_TEMPORARILY_REJECTED),
+    (CommandTimeout, dialect.MAV_RESULT_FAILED),
+)
+
+
+@dataclass(frozen=True)
+class _Running:
+    """Something that changes what the vehicle does, under way."""
+
+    client: Hashable
+    answer: tuple[Inbound, Execution] | None
+    """Whom to answer; None for messages that have no answer."""
+
+
+class CommandService(Service):
+    """COMMAND_LONG, COMMAND_INT, COMMAND_CANCEL and SET_MODE of one system."""
+
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self._desk = CommandDesk()
+        self._queries: Mapping[int, Query] = {}
+        self._actions: Mapping[int, Action] = {}
+        self._running: dict[asyncio.Task[None], _Running] = {}
+        """Oldest first."""
+
+    def take_tables(self, queries: Mapping[int, Query], actions: Mapping[int, Action]) -> None:
+        """Register the commands of all services. Raises `ValueError` when a row contradicts MAVLink or another."""
+        if twice := queries.keys() & actions.keys():
+            raise ValueError(f"{sorted(twice)} are both queries and actions")
+        for id in queries:
+            QUERY.check(id)
+        for id, action in actions.items():
+            action.check(id)
+        self._queries, self._actions = queries, actions
+
+    def acts_on(self, command: int) -> bool:
+        """True for a command that changes what the vehicle does, and is no query."""
+        return command in self._actions
+
+    def actions(self) -> Mapping[int, Action]:
+        return flight_actions(self.host.vehicle)
+
+    def capabilities(self) -> int:
+        cut = dialect.MAV_PROTOCOL_CAPABILITY_FLIGHT_TERMINATION if self.host.vehicle.allow_kill else 0
+        return dialect.MAV_PROTOCOL_CAPABILITY_COMMAND_INT | cut
+
+    def messages(self) -> Mapping[int, MessageHandler]:
+        return {
+            dialect.MAVLINK_MSG_ID_COMMAND_LONG: lambda inbound: self._receive(inbound, from_long),
+            dialect.MAVLINK_MSG_ID_COMMAND_INT: lambda inbound: self._receive(inbound, from_int),
+            dialect.MAVLINK_MSG_ID_COMMAND_CANCEL: self._cancel,
+            dialect.MAVLINK_MSG_ID_SET_MODE: self._set_mode,
+        }
+
+    async def settle(self, limit: float = SETTLE) -> None:
+        """Let commands that wait for the drone end, when the link is lost: a restart, for one, has succeeded."""
+        if self._running:
+            await asyncio.wait(tuple(self._running), timeout=limit)
+
+    def link_down(self) -> None:
+        """Whoever waits is told that it failed; the tasks end with the host's."""
+        for running in tuple(self._running.values()):
+            if running.answer is not None:
+                self._finish(*running.answer, dialect.MAV_RESULT_FAILED)
+        self._desk.forget()
+
+    async def end_all(self) -> None:
+        """Cancel everything that runs, and wait for it."""
+        for task in tuple(self._running):
+            task.cancel()
+        if self._running:
+            await asyncio.wait(tuple(self._running))
+
+    def run(self, client: Hashable, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
+        """Run an action that came by a message without acknowledgement; a refusal of it becomes a text."""
+        self._desk.forget(client)  # the vehicle was moved by other means than this client's newest command
+        return self._spawn(self._explained(work), _Running(client, None))
+
+    def end_others(self) -> list[asyncio.Task[None]]:
+        """What begins now replaces what was under way; whoever waits for that learns that it was cancelled.
+
+        A newer action than this one goes on: it has come to replace this one.
+        """
+        current = asyncio.current_task()
+        others = list(itertools.takewhile(lambda task: task is not current, self._running))
+        for task in others:
+            task.cancel()
+        running = None if current is None else self._running.get(current)
+        self._desk.supersede(None if running is None else running.client)
+        return others
+
+    def _receive(self, inbound: Inbound, decode: _Decode) -> None:
+        id = inbound.message.command
+        definition: Definition | None = QUERY if id in self._queries else self._actions.get(id)
+        if definition is None:
+            self._acknowledge(inbound, id, dialect.MAV_RESULT_UNSUPPORTED)
+            return
+        command = decode(inbound.message, definition, client_of(inbound), flavour_of(inbound.channel))
+        if definition is QUERY:
+            result = dialect.MAV_RESULT_FAILED
+            try:
+                result = self._queries[id](inbound, command)
+            finally:  # whatever went wrong, the client learns that it did
+                self._acknowledge(inbound, id, result)
+            return
+        self._act(inbound, command)
+
+    def _act(self, inbound: Inbound, command: Command) -> None:
+        now, mode = self.host.clock.monotonic(), self.host.vehicle.mode
+        # Before it is known whether it is a retransmission: a program that repeats its Hold is to be noticed.
+        counted = command.effect is not Effect.HOLD or self.host.vehicle.holds.arrive(command.client, now)
+        command = replace(command, at=now, counted=counted)
+        ended_at = self.host.vehicle.landing_ended_at
+        repeated = self._desk.retransmission(command.client, command, now, mode, ended_at)
+        if repeated is not None:
+            quiet = command.progress in (Progress.LATE, None)  # IN_PROGRESS is sent later, or not at all
+            if not (quiet and repeated == dialect.MAV_RESULT_IN_PROGRESS):
+                self._acknowledge(inbound, command.id, repeated)
+            return
+        execution = self._desk.begin(command.client, command)
+        self._spawn(self._execute(inbound, execution), _Running(command.client, (inbound, execution)))
+
+    async def _execute(self, inbound: Inbound, execution: Execution) -> None:
+        command = execution.command
+        if command.progress is Progress.EARLY and self.host.vehicle.takeoff.rises:
+            self._acknowledge(inbound, command.id, dialect.MAV_RESULT_IN_PROGRESS)  # it waits for the climb's end
+        progress = self.host.spawn(self._report_progress(inbound, command))
+        result = dialect.MAV_RESULT_FAILED
+        try:
+            await self._actions[command.id].handler(command)
+            result = dialect.MAV_RESULT_ACCEPTED
+        except AnafiMavError as error:
+            result = self._explain(error)
+        except asyncio.CancelledError:
+            result = dialect.MAV_RESULT_CANCELLED
+            raise
+        except Exception:
+            logger.exception("%s: command %d failed", self.host.drone.name, command.id)
+        finally:
+            progress.cancel()
+            self._finish(inbound, execution, result)
+
+    def _finish(self, inbound: Inbound, execution: Execution, result: int) -> None:
+        """The one final acknowledgement of an action."""
+        if execution.result == dialect.MAV_RESULT_IN_PROGRESS:
+            execution.result, execution.ended = result, self.host.clock.monotonic()
+            self._acknowledge(inbound, execution.command.id, result)
+
+    def _spawn(self, work: Coroutine[Any, Any, None], running: _Running) -> asyncio.Task[None]:
+        task = self.host.spawn(work)
+        self._running[task] = running
+        task.add_done_callback(self._done)
+        return task
+
+    def _done(self, task: asyncio.Task[None]) -> None:
+        running = self._running.pop(task, None)
+        if running is not None and running.answer is not None:
+            # It has answered by itself, unless it was cancelled before it began.
+            self._finish(*running.answer, dialect.MAV_RESULT_CANCELLED)
+
+    def _cancel(self, inbound: Inbound) -> None:
+        """COMMAND_CANCEL: end a running action of that number, whoever began it; its sender gets CANCELLED.
+
+        Without one there is nothing to say (MAVLink command.md). What has been accepted is not taken back, and what
+        cannot be called off honestly goes on to its own answer.
+        """
+        for task, running in tuple(self._running.items()):
+            if running.answer is None:
+                continue
+            command = running.answer[1].command
+            if command.id == inbound.message.command and command.effect.is_revocable:
+                task.cancel()
+
+    def _explain(self, error: AnafiMavError) -> int:
+        """Tell everybody why something was refused; the MAV_RESULT that says so."""
+        critical = isinstance(error, Refused) and error.critical
+        self.host.text(Severity.CRITICAL if critical else Severity.WARNING, str(error))
+        for kind, result in _RESULT_BY_ERROR:
+            if isinstance(error, kind):
+                return result
+        if isinstance(error, Refused):
+            return dialect.MAV_RESULT_DENIED if error.lasting else dialect.MAV_RESULT_TEMPORARILY_REJECTED
+        return dialect.MAV_RESULT_FAILED
+
+    async def _explained(self, work: Coroutine[Any, Any, None]) -> None:
+        try:
+            await work
+        except AnafiMavError as error:
+            self._explain(error)
+        finally:
+            work.close()  # cancelled before it began, it would complain that nobody awaited it
+
+    async def _report_progress(self, inbound: Inbound, command: Command) -> None:
+        if command.progress is None:
+            return
+        await asyncio.sleep(MODE_PROGRESS_AFTER if command.progress is Progress.LATE else PROGRESS_AFTER)
+        while True:
+            self._acknowledge(inbound, command.id, dialect.MAV_RESULT_IN_PROGRESS)
+            await asyncio.sleep(PROGRESS_EVERY)
+
+    def _acknowledge(self, inbound: Inbound, command: int, result: int) -> None:
+        self.host.send(
+            dialect.MAVLink_command_ack_message(
+                command, result, 255, 0, target_system=inbound.sysid, target_component=inbound.compid
+            ),
+            inbound.channel,
+        )
+
+    def _set_mode(self, inbound: Inbound) -> None:
+        """SET_MODE has no acknowledgement: the heartbeat shows the mode, a text the refusal."""
+        mode: FlightMode | None = flavour_of(inbound.channel).mode_of_number(inbound.message.custom_mode)
+        client, vehicle, now = client_of(inbound), self.host.vehicle, self.host.clock.monotonic()
+        is_hold = mode is not None and EFFECT_OF_MODE[mode] is Effect.HOLD
+        counted = not is_hold or vehicle.holds.arrive(client, now)
+        self.run(client, change_mode(vehicle, mode, Right(client, Extent.ALL, now, counted)))

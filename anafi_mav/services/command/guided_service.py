@@ -1,0 +1,329 @@
+"""Guided flight by single commands: speed, height, heading, pause, regions of interest, home.
+
+What goes to a place is `actions.reposition`; what circles is `orbit`. A handler returns when the drone confirmed.
+Conformance A4, B1, B2, D1 and items 78-83, 143.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from anafi_mav import units
+from anafi_mav.drone.events import FlyingStateChanged, PoiMode, RthHomeType
+from anafi_mav.errors import AnafiMavError
+from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.node import Inbound
+from anafi_mav.services.command_targets import UnsupportedFrame, height, height_in_frame, place
+from anafi_mav.services.commands import Action, Altitude, Command, Effect
+from anafi_mav.services.flavours import Flavour, flavour_of
+from anafi_mav.services.service import Host, Service, client_of
+from anafi_mav.vehicle.base.bounds import FASTEST, SLOWEST, check_height, check_on_earth
+from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.place import Place
+from anafi_mav.vehicle.base.refusal import Refused
+from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.vehicle.base.subscriptions import Subscriptions
+from anafi_mav.vehicle.base.yaw import DEG_PER_TURN, heading_of
+from anafi_mav.vehicle.guided_flight import Goto
+from anafi_mav.vehicle.vehicle import Vehicle
+
+KEEP, DEFAULT = -1.0, -2.0
+"""What stands for "no change" and "back to the default" in speed and throttle (MAVLink common.xml DO_CHANGE_SPEED)."""
+
+_AIRSPEED, _GROUNDSPEED = 0.0, 1.0
+_UPWARDS, _DOWNWARDS = 2.0, 3.0
+"""SPEED_TYPE."""
+
+SLOWEST_TURN = 1.0
+"""deg/s. A turn that is slower than this is a number in the wrong place, and would take for ever."""
+
+_ITEM_GOTO, _ITEM_ALTITUDE = 2, 3
+"""`current` of a mission item that is an order (ArduPilot, MAVLink mission.md)."""
+
+
+def guided_mode(flavour: Flavour) -> FlightMode:
+    """The mode that a vehicle is in when a client of this flavour has sent it somewhere."""
+    return FlightMode.GUIDED if flavour.guided_setpoints else FlightMode.HOLD
+
+
+def is_guided_item(item: Any) -> bool:
+    """A mission item that belongs to no mission: ArduPilot's older way of saying "go there" and "go to that height"."""
+    return item.current in (_ITEM_GOTO, _ITEM_ALTITUDE)
+
+
+def fly_item(host: Host, inbound: Inbound) -> None:
+    """Carry out a MISSION_ITEM or MISSION_ITEM_INT that `is_guided_item`; the MISSION_ACK says how it ended.
+
+    dronekit's simple_goto, MAVProxy's and Mission Planner's change of altitude (conformance D1-D3, item 141).
+    """
+    host.run_action(client_of(inbound), _fly_item(host, inbound))
+
+
+async def _fly_item(host: Host, inbound: Inbound) -> None:
+    item, flavour = inbound.message, flavour_of(inbound.channel)
+    scale = 1e7 if item.get_msgId() == dialect.MAVLINK_MSG_ID_MISSION_ITEM_INT else 1.0
+    vehicle = host.vehicle
+    result = dialect.MAV_MISSION_ERROR
+    try:
+        ato = height_in_frame(vehicle, item.z, item.frame)
+        if item.current == _ITEM_GOTO:
+            if item.command != dialect.MAV_CMD_NAV_WAYPOINT:
+                raise Refused("Goto refused: the item is no way point", lasting=True)
+            where = Place(item.x / scale, item.y / scale)
+            check_on_earth(where, "Goto")
+            if vehicle.takeoff.rises:
+                vehicle.guided.check(where, ato)
+                await vehicle.takeoff.over("Goto")
+            await vehicle.guided.reposition(where, ato, None, mode=guided_mode(flavour))
+        else:
+            await change_altitude(vehicle, ato, flavour)
+        result = dialect.MAV_MISSION_ACCEPTED
+    except UnsupportedFrame:
+        result = dialect.MAV_MISSION_UNSUPPORTED_FRAME
+        raise
+    except Refused as error:
+        result = dialect.MAV_MISSION_INVALID if error.lasting else dialect.MAV_MISSION_DENIED
+        raise
+    except asyncio.CancelledError:
+        result = dialect.MAV_MISSION_OPERATION_CANCELLED
+        raise
+    finally:
+        host.send(dialect.MAVLink_mission_ack_message(inbound.sysid, inbound.compid, result), inbound.channel)
+
+
+async def change_altitude(vehicle: Vehicle, ato: float, flavour: Flavour) -> None:
+    """Go to a height (m above take-off): on the way to a place there, else here."""
+    goto = vehicle.guided.goto
+    if goto is None:
+        await vehicle.guided.reposition(None, ato, None, mode=guided_mode(flavour))
+    else:
+        check_height(vehicle, ato)
+        move = vehicle.drone.piloting.move
+        # MAVProxy says it as a command and as an item at once, and means one move. If nothing comes of that, the newer
+        # order stands for itself.
+        if goto.at_height(ato) != goto or move is None or not await move.under_way():
+            await vehicle.guided.go(goto.at_height(ato))
+
+
+def _effect_of_pause(command: Command) -> Effect:
+    return Effect.HOLD if command.params[0] == 0.0 else Effect.CHANGE
+
+
+class GuidedService(Service):
+    """Changes what is being flown, and what the drone looks at."""
+
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self._paused: tuple[Goto, int] | None = None
+        """Where the drone was going when it was told to pause, and the vehicle's count of orders then."""
+        self._mission_paused: int | None = None
+        """The vehicle's count of orders when a mission was paused."""
+
+    def actions(self) -> Mapping[int, Action]:
+        return {
+            dialect.MAV_CMD_DO_CHANGE_SPEED: Action(
+                self._change_speed, location=False, altitude=Altitude.UNUSED, effect=Effect.CHANGE
+            ),
+            dialect.MAV_CMD_DO_CHANGE_ALTITUDE: Action(
+                self._change_altitude, location=False, altitude=Altitude.UNUSED, effect=Effect.CHANGE
+            ),
+            dialect.MAV_CMD_CONDITION_YAW: Action(
+                self._turn, location=False, altitude=Altitude.UNUSED, effect=Effect.CHANGE
+            ),
+            dialect.MAV_CMD_DO_PAUSE_CONTINUE: Action(
+                self._pause_or_continue, location=False, altitude=Altitude.UNUSED, effect=_effect_of_pause
+            ),
+            dialect.MAV_CMD_DO_SET_ROI_LOCATION: Action(
+                self._look_at, location=True, altitude=Altitude.AMSL, effect=Effect.CHANGE
+            ),
+            dialect.MAV_CMD_DO_SET_ROI_NONE: Action(
+                self._look_anywhere, location=False, altitude=Altitude.UNUSED, effect=Effect.STOP
+            ),
+            dialect.MAV_CMD_DO_SET_ROI: Action(
+                self._legacy_roi, location=True, altitude=Altitude.BY_FRAME, effect=Effect.CHANGE
+            ),
+            dialect.MAV_CMD_DO_SET_HOME: Action(
+                self._set_home, location=True, altitude=Altitude.AMSL, effect=Effect.CHANGE
+            ),
+        }
+
+    def link_down(self) -> None:
+        self._paused = self._mission_paused = None
+
+    def subscriptions(self) -> Subscriptions:
+        return {FlyingStateChanged: self._on_flying_state}
+
+    def _on_flying_state(self, message: FlyingStateChanged, now: float) -> None:
+        if not self.host.vehicle.in_air:
+            self._paused = self._mission_paused = None  # the next flight's heights count from elsewhere
+
+    @property
+    def _interrupted(self) -> Goto | None:
+        """Where a pause stopped the drone; None when something else was ordered since."""
+        goto, orders = self._paused or (None, 0)
+        return goto if orders == self.host.vehicle.orders else None
+
+    @property
+    def _mission_interrupted(self) -> bool:
+        """A pause stopped a mission, and nothing else was ordered since."""
+        return self.host.vehicle.mission.paused and self._mission_paused == self.host.vehicle.orders
+
+    async def _change_speed(self, command: Command) -> None:
+        """MAV_CMD_DO_CHANGE_SPEED: param1 SPEED_TYPE, param2 m/s. A move that is under way changes its speed at once.
+
+        -1 and unset change nothing, -2 gives the speed back to the drone. What is more than the drone can, it limits
+        itself. An ANAFI measures no airspeed: both horizontal types are over ground.
+        """
+        kind, speed, throttle = command.params[:3]
+        if not (math.isnan(throttle) or throttle in (0.0, KEEP, DEFAULT)):
+            raise Refused("Speed refused: an ANAFI's throttle cannot be set", lasting=True)
+        if math.isnan(kind):
+            kind = _GROUNDSPEED
+        if kind not in (_AIRSPEED, _GROUNDSPEED, _UPWARDS, _DOWNWARDS):
+            raise Refused("Speed refused: param1 is 0 to 3", lasting=True)
+        if math.isnan(speed) or speed == KEEP:
+            return
+        if speed != DEFAULT and not SLOWEST <= speed <= FASTEST:
+            raise Refused(f"Speed refused: param2 is {SLOWEST:g} to {FASTEST:g} m/s, -1 or -2", lasting=True)
+        wanted = None if speed == DEFAULT else speed
+        vehicle = self.host.vehicle
+        if kind in (_AIRSPEED, _GROUNDSPEED):
+            vehicle.cruise_speed = wanted
+        else:
+            vehicle.climb_speed = wanted
+        if (goto := vehicle.guided.goto) is not None:
+            await vehicle.guided.go(goto)
+
+    async def _change_altitude(self, command: Command) -> None:
+        """MAV_CMD_DO_CHANGE_ALTITUDE: param1 height in m, param2 MAV_FRAME. On the way to a place, there."""
+        vehicle = self.host.vehicle
+        frame = command.params[1]
+        if not math.isfinite(frame):
+            raise Refused("Refused: param2 is a frame", lasting=True)
+        ato = height_in_frame(vehicle, command.params[0], int(frame))
+        await change_altitude(vehicle, ato, command.flavour)
+
+    async def _turn(self, command: Command) -> None:
+        """MAV_CMD_CONDITION_YAW: param1 deg, param2 deg/s (unset or 0: the drone's own), param3 way, param4 relative.
+
+        On the way to a place the drone turns while it flies on, the shorter way; else it turns where it hovers.
+        """
+        angle, rate, way, relative = command.params
+        if not math.isfinite(angle) or abs(angle) > DEG_PER_TURN:
+            raise Refused("Turn refused: param1 is an angle of up to 360 degrees", lasting=True)
+        if math.isinf(rate) or rate < 0.0 or 0.0 < rate < SLOWEST_TURN or math.isinf(way):
+            raise Refused(f"Turn refused: param2 is {SLOWEST_TURN:g} deg/s or more, param3 -1, 0 or 1", lasting=True)
+        if not (math.isnan(relative) or relative in (0.0, 1.0)):  # ArduCopter refuses it too
+            raise Refused("Turn refused: param4 is 0 (absolute) or 1", lasting=True)
+        vehicle = self.host.vehicle
+        attitude = vehicle.drone.piloting.state.attitude
+        if not vehicle.in_air or attitude is None:
+            raise Refused("Turn refused: the drone is not in the air, or does not tell its heading")
+        now = attitude.yaw * units.DEG_PER_RAD
+        turn = heading_of(angle, 0.0 if math.isnan(way) else way, relative == 1.0, now)
+        if (goto := vehicle.guided.goto) is not None:
+            await vehicle.guided.go(goto.with_heading((now + turn) * units.RAD_PER_DEG))
+        else:
+            await vehicle.guided.turn(
+                turn * units.RAD_PER_DEG, rate if rate > 0.0 else None, guided_mode(command.flavour)
+            )
+
+    async def _pause_or_continue(self, command: Command) -> None:
+        """MAV_CMD_DO_PAUSE_CONTINUE: param1 0 hovers, 1 goes on to where the pause stopped it, or with its mission.
+
+        Not after anybody has ordered anything else, or the drone has landed.
+        """
+        vehicle = self.host.vehicle
+        if command.params[0] == 0.0:
+            goto = vehicle.guided.goto or self._interrupted
+            mission = vehicle.mission.flying or self._mission_interrupted
+            await vehicle.hold(guided_mode(command.flavour), command.right, pause=True)
+            self._paused = None if goto is None else (goto, vehicle.orders)
+            self._mission_paused = vehicle.orders if mission else None
+        elif command.params[0] == 1.0:
+            goto = self._interrupted
+            if self._mission_interrupted:
+                await vehicle.set_mode(FlightMode.MISSION, command.right)
+                return
+            if goto is None and vehicle.paused:
+                vehicle.paused = False  # setpoints may fly it again
+                return
+            if goto is None:
+                raise Refused("Continue refused: nothing was paused, or something else was ordered since")
+            await vehicle.guided.go(goto)
+            self._paused = None
+        else:
+            raise Refused("Refused: param1 is 0 to pause, 1 to continue", lasting=True)
+
+    # Regions of interest.
+
+    async def _look_at(self, command: Command) -> None:
+        """MAV_CMD_DO_SET_ROI_LOCATION: nose and camera follow the place until something else is flown (Parrot's
+        piloted POI, which needs a hovering drone and waits for it). An unset height is that of the take-off point."""
+        where = place(command)
+        if where is None:
+            raise Refused("Region of interest refused: it has no place", lasting=True)
+        await self._look(where, height(self.host.vehicle, command) or 0.0)
+
+    async def _look_anywhere(self, command: Command) -> None:
+        """MAV_CMD_DO_SET_ROI_NONE."""
+        await self.host.drone.poi.stop()
+
+    async def _legacy_roi(self, command: Command) -> None:
+        """MAV_CMD_DO_SET_ROI: param1 MAV_ROI; none or a location. At 0/0 MAVProxy means none."""
+        kind = command.params[0]
+        if kind == dialect.MAV_ROI_NONE or (command.x == 0.0 and command.y == 0.0):
+            await self._look_anywhere(command)
+        elif kind == dialect.MAV_ROI_LOCATION or math.isnan(kind):
+            await self._look_at(command)
+        else:
+            raise Refused("Region of interest refused: only a location or none", lasting=True)
+
+    async def _look(self, where: Place, ato: float) -> None:
+        vehicle = self.host.vehicle
+        check_on_earth(where, "Region of interest")
+        if not vehicle.in_air:
+            raise Refused("Region of interest refused: the drone is not in the air")
+        await self.host.drone.poi.start(where.latitude, where.longitude, ato, PoiMode.LOCKED_GIMBAL)
+
+    # Home.
+
+    async def _prefer(self, kind: RthHomeType) -> None:
+        try:
+            await self.host.drone.home.set_preferred_type(kind)
+        except AnafiMavError as error:
+            self.host.text(
+                Severity.CRITICAL, f"The drone prefers a custom home, and could not be told otherwise: {error}"
+            )
+
+    async def _set_home(self, command: Command) -> None:
+        """MAV_CMD_DO_SET_HOME: param1 1 where the drone is, else the command's place.
+
+        The drone's home becomes one of Parrot's type custom, and stays that until somebody changes it: a text says so.
+        """
+        vehicle, home = self.host.vehicle, self.host.drone.home
+        if command.params[0] == 1.0:
+            where, ato = vehicle.place, 0.0  # below the drone, not where it flies
+            if where is None:
+                raise Refused("Home refused: the drone does not know where it is")
+        else:
+            where = place(command)
+            if where is None:
+                raise Refused("Home refused: it has no place", lasting=True)
+            ato = height(vehicle, command, flown=False) or 0.0
+        check_on_earth(where, "Home")
+        async with vehicle.home_choice:
+            before = home.state.preferred_type
+            try:
+                await home.set_preferred_type(RthHomeType.CUSTOM)
+                given = await home.set_custom_location(where.latitude, where.longitude, ato)
+            except BaseException:
+                # The custom home of some other day must not stay: a return that replaces this waits until it is gone.
+                if before is not None and before != RthHomeType.CUSTOM:
+                    await asyncio.wait([self.host.spawn(self._prefer(before))])
+                raise
+        vehicle.return_end.set_home(given, "set home")
+        self.host.text(Severity.NOTICE, "Home set: the drone returns there until its home type is changed")

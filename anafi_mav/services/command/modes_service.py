@@ -1,0 +1,143 @@
+"""Standard modes: which modes there are, which one holds, and one way to choose them whatever the autopilot.
+
+AVAILABLE_MODES, AVAILABLE_MODES_MONITOR, CURRENT_MODE, MAV_CMD_DO_SET_STANDARD_MODE (MAVLink standard_modes.md,
+conformance A2, A3, C10).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.node import Inbound
+from anafi_mav.services.command.actions import change_mode
+from anafi_mav.services.commands import Action, Altitude, Command, effect_of_mode
+from anafi_mav.services.flavours import STANDARD_MODES, Flavour, flavour_of, mode_of_standard
+from anafi_mav.services.service import Answer, Host, Request, Service
+from anafi_mav.services.stream import Stream, Times
+from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.vehicle import Vehicle
+
+_BY_ITSELF = (FlightMode.ORBIT, FlightMode.TERMINATED)
+"""Shown, but entered by a command only."""
+
+_ADVANCED = (FlightMode.OFFBOARD, FlightMode.GUIDED)
+_AUTOMATIC = (
+    FlightMode.MISSION,
+    FlightMode.RETURN,
+    FlightMode.LAND,
+    FlightMode.TAKEOFF,
+    FlightMode.FOLLOW,
+    FlightMode.ORBIT,
+)
+
+
+def properties(mode: FlightMode, vehicle: Vehicle) -> int:
+    """MAV_MODE_PROPERTY bits of a mode, as things stand."""
+    bits = 0
+    if mode in _ADVANCED:
+        bits |= dialect.MAV_MODE_PROPERTY_ADVANCED
+    if mode in _BY_ITSELF or mode not in vehicle.enterable_modes:
+        bits |= dialect.MAV_MODE_PROPERTY_NOT_USER_SELECTABLE
+    if mode in _AUTOMATIC:
+        bits |= dialect.MAV_MODE_PROPERTY_AUTO_MODE
+    return bits
+
+
+def available(vehicle: Vehicle, flavour: Flavour) -> list[dialect.MAVLink_message]:
+    """AVAILABLE_MODES of every mode."""
+    listed = flavour.mode_names
+    return [
+        dialect.MAVLink_available_modes_message(
+            len(listed),
+            index,
+            STANDARD_MODES.get(mode, dialect.MAV_STANDARD_MODE_NON_STANDARD),
+            flavour.custom_mode(mode),
+            properties(mode, vehicle),
+            name.encode(),
+        )
+        for index, (mode, name) in enumerate(listed.items(), 1)
+    ]
+
+
+def current_mode(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message:
+    """CURRENT_MODE. The intended mode is the one last asked for by a message that names modes; 0 before that."""
+    mode, intended, flavour = vehicle.mode, vehicle.intended, times.flavour
+    return dialect.MAVLink_current_mode_message(
+        STANDARD_MODES.get(mode, dialect.MAV_STANDARD_MODE_NON_STANDARD),
+        flavour.custom_mode(mode),
+        0 if intended is None else flavour.custom_mode(intended),
+    )
+
+
+class ModesService(Service):
+    """Tells and sets modes; what they do is the vehicle's business."""
+
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self._offered: frozenset[FlightMode] | None = None
+        self._sequence = 0
+        self._sent: tuple[FlightMode, FlightMode | None] | None = None
+        """Mode and intended mode of the last CURRENT_MODE that announced a change."""
+
+    def requests(self) -> Mapping[int, Request]:
+        return {dialect.MAVLINK_MSG_ID_AVAILABLE_MODES: self._available}
+
+    def actions(self) -> Mapping[int, Action]:
+        return {
+            dialect.MAV_CMD_DO_SET_STANDARD_MODE: Action(
+                self._set_standard,
+                location=False,
+                altitude=Altitude.UNUSED,
+                effect=effect_of_mode,
+                mode=lambda command: mode_of_standard(command.params[0]),
+            )
+        }
+
+    def streams(self) -> Mapping[int, Stream]:
+        return {
+            # Both leave at each change, and stations of before 2024, whose dialect lacks them, count them as lost.
+            dialect.MAVLINK_MSG_ID_CURRENT_MODE: Stream(current_mode, every=5.0, flavoured=True),
+            dialect.MAVLINK_MSG_ID_AVAILABLE_MODES_MONITOR: Stream(self._monitor, every=10.0),
+        }
+
+    def link_up(self) -> None:
+        self._offered = self.host.vehicle.enterable_modes
+        self._sent = None
+
+    def state_changed(self) -> None:
+        self._announce()
+
+    def _announce(self) -> None:
+        """CURRENT_MODE once per change; the stream repeats it, rarely."""
+        vehicle, times = self.host.vehicle, self.host.times()
+        state = vehicle.mode, vehicle.intended
+        if state != self._sent:
+            self._sent = state
+            self.host.send_by_flavour(lambda flavour: current_mode(vehicle, times.for_flavour(flavour)))
+
+    def tick(self, now: float) -> None:
+        self._announce()
+        offered = self.host.vehicle.enterable_modes
+        if offered != self._offered:
+            self._offered = offered
+            self._sequence = (self._sequence + 1) % 256
+            self.host.send(self._monitor(self.host.vehicle, self.host.times()))
+
+    def _monitor(self, vehicle: Vehicle, times: Times) -> dialect.MAVLink_message:
+        return dialect.MAVLink_available_modes_monitor_message(self._sequence)
+
+    def _available(self, inbound: Inbound, command: Command) -> Answer:
+        """param2: which one, counted from 1; 0 or unset: all."""
+        modes = available(self.host.vehicle, flavour_of(inbound.channel))
+        index = command.params[1]
+        if math.isnan(index) or index == 0:
+            return modes
+        if index not in range(1, len(modes) + 1):
+            return dialect.MAV_RESULT_DENIED
+        return modes[int(index) - 1]
+
+    async def _set_standard(self, command: Command) -> None:
+        """MAV_CMD_DO_SET_STANDARD_MODE: param1 MAV_STANDARD_MODE."""
+        await change_mode(self.host.vehicle, command.mode, command.right)

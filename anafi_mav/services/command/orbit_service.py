@@ -1,0 +1,282 @@
+"""Orbits: MAV_CMD_DO_ORBIT flown by the gateway's loops, and ORBIT_EXECUTION_STATUS while it lasts.
+
+An ANAFI has no orbit of its own: its point of interest turns the nose, the pilot flies the circle. So the sticks are
+held from here, and whatever ends the gateway ends them. Conformance A4, B1 and items 78, 79.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+from anafi_mav import geo, units
+from anafi_mav.drone import events
+from anafi_mav.drone.piloting.moves import Move, MoveEnd
+from anafi_mav.errors import LinkLost
+from anafi_mav.mavlink import dialect
+from anafi_mav.services.command_targets import height, place
+from anafi_mav.services.commands import Action, Altitude, Command, Effect
+from anafi_mav.services.service import Host, Service
+from anafi_mav.services.stream import Stream, Times
+from anafi_mav.vehicle.base.bounds import SLOWEST, check_height, check_on_earth, check_place
+from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.place import Place
+from anafi_mav.vehicle.base.refusal import Refused
+from anafi_mav.vehicle.base.roll_sign import ROLL_INVERTED
+from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.vehicle.base.subscriptions import Subscriptions
+from anafi_mav.vehicle.base.velocity_loop import Controller, tilt_limit
+from anafi_mav.vehicle.circle import (
+    DEFAULT_RADIUS,
+    DEFAULT_SPEED,
+    LARGEST,
+    ON_IT,
+    SMALLEST,
+    Circle,
+    Facing,
+    Lap,
+    entry,
+    fastest,
+    heading_at,
+    outline,
+)
+from anafi_mav.vehicle.guided_flight import Goto
+from anafi_mav.vehicle.vehicle import Vehicle
+
+AS_IT_IS = 5.0
+"""ORBIT_YAW_BEHAVIOUR_UNCHANGED; QGroundControl always sends it."""
+
+BY_STICKS = 4.0
+"""ORBIT_YAW_BEHAVIOUR_RC_CONTROLLED: nobody's sticks are heard during an orbit, so the nose stays free."""
+
+
+class OrbitService(Service):
+    """Circles; the `Helm` of the vehicle while it does."""
+
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self._lap: Lap | None = None
+        self._approaching: asyncio.Task[None] | None = None
+        self._controller: Controller | None = None
+        self._cruise: float | None = None
+        """The vehicle's cruise speed when the orbit's was last decided: a change of it changes the orbit's."""
+        host.vehicle.helms = (*host.vehicle.helms, self)
+
+    @property
+    def circle(self) -> Circle | None:
+        """What is being flown, or flown to; None when nothing is."""
+        return None if self._lap is None else self._lap.circle
+
+    def actions(self) -> Mapping[int, Action]:
+        return {
+            dialect.MAV_CMD_DO_ORBIT: Action(self._orbit, location=True, altitude=Altitude.AMSL, effect=Effect.CHANGE)
+        }
+
+    def streams(self) -> Mapping[int, Stream]:
+        return {dialect.MAVLINK_MSG_ID_ORBIT_EXECUTION_STATUS: Stream(self._status, every=0.8)}
+
+    # Helm.
+
+    def end(self) -> list[asyncio.Task[None]]:
+        """Something else flies now."""
+        lap, self._lap, self._controller = self._lap, None, None
+        approaching, self._approaching = self._approaching, None
+        if lap is None:
+            return []
+        self.host.vehicle.forget_mode()
+        with contextlib.suppress(LinkLost):
+            self.host.drone.piloting.pilot(None)
+        if approaching is None or approaching is asyncio.current_task():
+            return []
+        approaching.cancel()
+        return [approaching]
+
+    def link_down(self) -> None:
+        self._lap = self._controller = None
+        if self._approaching is not None:
+            self._approaching.cancel()
+            self._approaching = None
+
+    # The command.
+
+    async def _orbit(self, command: Command) -> None:
+        """MAV_CMD_DO_ORBIT: param1 radius in m, + clockwise; param2 m/s; param3 yaw behaviour; param4 rad to fly.
+
+        The centre is where the drone is unless it is set, z is AMSL in every frame but ArduPilot's clients'. Accepted
+        when the drone is on its way to the circle, or on it.
+        """
+        vehicle = self.host.vehicle
+        circle = self._described(command)
+        here = vehicle.place
+        if not vehicle.in_air:
+            raise Refused("Orbit refused: the drone is not in the air")
+        if (descent := vehicle.descent) is not None:
+            raise Refused(f"Orbit refused: {descent}")
+        if here is None:
+            raise Refused("Orbit refused: no GPS fix")
+        if vehicle.drone.controller.pilot_acquired_control:
+            raise Refused("Orbit refused: the pilot at the Skycontroller flies")
+        if vehicle.sticks_follow_camera:
+            raise Refused("Orbit refused: the drone's piloting style makes its sticks relative to the camera")
+        if vehicle.roll.inverted:
+            raise Refused(f"Orbit refused: {ROLL_INVERTED}")
+        start = entry(circle, here)
+        for point in outline(circle, here):
+            check_place(vehicle, point)
+        circle, self._cruise = self._held_back(circle), vehicle.cruise_speed
+        bearing = _bearing(circle.centre, start)
+        off = abs(geo.distance(*circle.centre.point, *here.point) - circle.radius)
+        if off > ON_IT or abs((vehicle.drone.piloting.state.altitude or 0.0) - circle.height) > ON_IT:
+            await vehicle.guided.go(Goto(start, circle.height, heading_at(circle, bearing), None, FlightMode.HOLD))
+            move = vehicle.drone.piloting.move
+            self._lap = Lap(circle)
+            vehicle.select(FlightMode.ORBIT, self)
+            if move is not None:
+                self._approaching = self.host.spawn(self._approach(move, self._lap))
+                return
+        else:
+            await vehicle.take_over()
+            await vehicle.drone.piloting.cancel_return_home()
+            if not vehicle.in_air or vehicle.returning:
+                raise Refused("Orbit refused: the drone does something else now")
+            vehicle.drone.piloting.hover()  # ends a move of ours, which would ignore sticks
+            self._lap = Lap(circle)
+            vehicle.select(FlightMode.ORBIT, self)
+        self._begin()
+
+    def _described(self, command: Command) -> Circle:
+        vehicle, piloting = self.host.vehicle, self.host.drone.piloting.state
+        radius, speed, facing, angle = command.params
+        running = self.circle
+        where = place(command) or (None if running is None else running.centre) or vehicle.place
+        if where is None:
+            raise Refused("Orbit refused: it has no centre, and no GPS fix")
+        check_on_earth(where, "Orbit")
+        if math.isnan(radius):
+            radius = DEFAULT_RADIUS if running is None else running.signed_radius
+        if not SMALLEST <= abs(radius) <= LARGEST:
+            raise Refused(f"Orbit refused: its radius is {SMALLEST:g} to {LARGEST:g} m", lasting=True)
+        if math.isnan(speed):
+            speed = DEFAULT_SPEED if running is None else running.speed
+        if not SLOWEST <= speed <= 100.0:
+            raise Refused("Orbit refused: param2 is a speed in m/s", lasting=True)
+        if math.isnan(angle) or angle == 0.0:
+            angle = math.inf
+        if angle < 0.0:
+            raise Refused("Orbit refused: param4 is an angle in rad to fly", lasting=True)
+        ato = height(vehicle, command)
+        if ato is None:
+            ato = piloting.altitude if running is None else running.height
+        if ato is None:
+            raise Refused("Orbit refused: the drone's height is not known")
+        check_height(vehicle, ato)
+        heading = 0.0 if piloting.attitude is None else piloting.attitude.yaw
+        return Circle(
+            where,
+            abs(radius),
+            1 if radius > 0.0 else -1,
+            speed,
+            ato,
+            _facing(facing),
+            heading,
+            None if math.isinf(angle) else angle,
+        )
+
+    def _held_back(self, circle: Circle) -> Circle:
+        """The circle at a speed that the drone's tilt leaves room for; a text tells when that is another one."""
+        limits = self.host.drone.piloting.limits
+        if limits is None:
+            raise Refused("Orbit refused: the drone has not reported what full tilt and speed are")
+        tilt = tilt_limit(limits, self.host.vehicle.offboard.motion) * units.DEG_PER_RAD
+        most = fastest(circle.radius, tilt)
+        if circle.speed <= most:
+            return circle
+        name = "MaxTilt" if tilt >= limits.tilt_deg else "unverified roll"
+        text = f"Orbit at {most:.1f} m/s, not {circle.speed:.1f}: {name}, {tilt:.0f} deg"
+        self.host.text(Severity.NOTICE, text)
+        return replace(circle, speed=most)
+
+    async def _approach(self, move: Move, lap: Lap) -> None:
+        """Circle when the move there has ended well."""
+        end = await move.result()
+        if self._lap is not lap:
+            return
+        self._approaching = None
+        if end is MoveEnd.DONE:
+            self._begin()
+        else:
+            self.host.text(Severity.WARNING, f"Orbit given up: the move to it was {end.value}")
+            self.host.vehicle.select(FlightMode.HOLD)
+
+    def _begin(self) -> None:
+        self._controller = Controller(self.host.vehicle.offboard.motion)
+        self._fly(self.host.clock.monotonic())
+
+    # Flying.
+
+    def subscriptions(self) -> Subscriptions:
+        return dict.fromkeys((events.SpeedChanged, events.AttitudeChanged), lambda message, now: self._fly(now))
+
+    def _fly(self, now: float) -> None:
+        vehicle, lap, controller = self.host.vehicle, self._lap, self._controller
+        if lap is None or controller is None:
+            return
+        if vehicle.cruise_speed != self._cruise:
+            self._cruise = vehicle.cruise_speed
+            lap.circle = self._held_back(replace(lap.circle, speed=vehicle.cruise_speed or DEFAULT_SPEED))
+        limits = vehicle.drone.piloting.limits
+        demand = None if vehicle.place is None else lap.demand(vehicle.offboard.motion)
+        sticks = None if demand is None or limits is None else controller.sticks(demand, limits, now)
+        if vehicle.drone.controller.pilot_acquired_control:
+            self._give_up("the pilot at the Skycontroller flies", Severity.WARNING)
+        elif vehicle.sticks_follow_camera:
+            self._give_up("the drone's sticks have become relative to the camera", Severity.WARNING)
+        elif vehicle.roll.inverted:
+            self._give_up(ROLL_INVERTED, Severity.WARNING)
+        elif sticks is None:
+            self._give_up("nobody knows where the drone is", Severity.WARNING)
+        elif lap.done:
+            self._give_up("it has been flown", Severity.INFO)
+        else:
+            vehicle.drone.piloting.pilot(sticks)
+
+    def _give_up(self, why: str, severity: Severity) -> None:
+        self.host.vehicle.select(FlightMode.HOLD)
+        with contextlib.suppress(LinkLost):
+            self.host.drone.piloting.hover()
+        self.host.text(severity, f"Orbit ended: {why}")
+
+    def _status(self, vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
+        """ORBIT_EXECUTION_STATUS: while it lasts, the way to the circle included."""
+        circle = self.circle
+        amsl = None if circle is None else vehicle.height.amsl(circle.height)
+        if circle is None or amsl is None:
+            return None
+        return dialect.MAVLink_orbit_execution_status_message(
+            times.boot_us,
+            circle.signed_radius,
+            dialect.MAV_FRAME_GLOBAL,
+            units.deg_e7(circle.centre.latitude),
+            units.deg_e7(circle.centre.longitude),
+            amsl,
+        )
+
+
+def _facing(behaviour: float) -> Facing:
+    if math.isnan(behaviour) or behaviour == AS_IT_IS:
+        return Facing.CENTRE
+    if behaviour == BY_STICKS:
+        return Facing.FREE
+    try:
+        return Facing(behaviour)
+    except ValueError:
+        raise Refused("Orbit refused: param3 is a yaw behaviour from 0 to 5", lasting=True) from None
+
+
+def _bearing(centre: Place, place: Place) -> float:
+    """rad, clockwise from north, of a place seen from a centre."""
+    north, east = geo.offset(*centre.point, *place.point)
+    return math.atan2(east, north)

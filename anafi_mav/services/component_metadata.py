@@ -1,0 +1,52 @@
+"""Component metadata: files with the meaning of parameters and events, loaded over MAVLink FTP. No I/O.
+
+general.json names the others with the CRC of each, so that a client that has them in its cache does not load them again
+(MAVLink component_metadata.md; schemas in mavlink/mavlink component_metadata).
+"""
+
+from __future__ import annotations
+
+import json
+import lzma
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from anafi_mav.drone import Identity
+from anafi_mav.services.checksum import crc32
+
+GENERAL = "/general.json"
+COMPRESSED = ".xz"
+
+
+def to_json(document: Mapping[str, Any]) -> bytes:
+    """The document as small as JSON can be."""
+    return json.dumps(document, separators=(",", ":"), allow_nan=False).encode()
+
+
+def compress(content: bytes) -> bytes:
+    """The content as an .xz file. Small decoders, QGroundControl's and MAVSDK's among them, know this checksum only."""
+    return lzma.compress(content, check=lzma.CHECK_CRC32)
+
+
+def general_file(identity: Identity, others: Mapping[str, tuple[int, bytes]]) -> dict[str, Any]:
+    """general.json: who this is, and where the other files are. `others`: path -> (COMP_METADATA_TYPE, content)."""
+    general: dict[str, Any] = {"version": 1, "vendorName": "Parrot", "modelName": identity.model.title}
+    for key, text in (("firmwareVersion", identity.firmware), ("hardwareVersion", identity.hardware)):
+        if (number := plain_version(text)) is not None:
+            general[key] = number
+    general["metadataTypes"] = [
+        {"type": kind, "uri": uri(path), "fileCrc": crc32(content)} for path, (kind, content) in others.items()
+    ]
+    return general
+
+
+def plain_version(text: str | None) -> str | None:
+    """ "1.8.2-rc4" as "1.8.2", which is what the schema has room for; None when there are no three numbers."""
+    found = re.match(r"\d+\.\d+\.\d+(\.\d+)?", text or "")
+    return None if found is None else found[0]
+
+
+def uri(path: str) -> str:
+    """Where a client finds a file of this component (MAVLink ftp.md §mavlink-ftp-url-scheme)."""
+    return f"mftp://{path}"

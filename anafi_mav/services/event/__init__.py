@@ -1,0 +1,1 @@
+"""The event protocol: the table of events, and their sequence for each client."""

@@ -1,0 +1,160 @@
+"""The EVENT interface without I/O: the sequence of events with those that can be had again, and the health report.
+
+Protocol: MAVLink events.md, mavlink/libevents; conformance C12.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from anafi_mav.drone.events import BlockerKind, FlyingState, TakeoffChecklistType
+from anafi_mav.mavlink import dialect
+from anafi_mav.services.event import event_table as table
+from anafi_mav.services.event.event_table import ALL_MODES, Event, Health, Level, mode_bits
+from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.vehicle import Vehicle
+
+KEPT = 128
+"""Events that can be had again: a dozen reports of the health checks."""
+
+MAX_REQUEST = 64
+"""Events that one request is answered with; a client that missed more asks again."""
+
+NEED_POSITION = frozenset({FlightMode.RETURN, FlightMode.MISSION, FlightMode.FOLLOW, FlightMode.ORBIT})
+"""Modes that are nothing without a GPS fix."""
+
+
+class EventLog:
+    """The events of one component, numbered."""
+
+    def __init__(self) -> None:
+        self.sequence = 0
+        """Of the newest event; the first is 1."""
+        self._kept: deque[dialect.MAVLink_event_message] = deque(maxlen=KEPT)
+
+    def add(self, event: Event, arguments: bytes, boot_ms: int) -> dialect.MAVLink_message:
+        """A new event: the message that tells everybody."""
+        self.sequence = (self.sequence + 1) & 0xFFFF
+        message = dialect.MAVLink_event_message(
+            0, 0, event.id, boot_ms, self.sequence, event.log_levels, list(arguments)
+        )
+        self._kept.append(message)
+        return message
+
+    def again(self, first: int, last: int, sysid: int, compid: int) -> Iterator[dialect.MAVLink_message]:
+        """The events from first to last, which may lie beyond the wrap; an error for each that is not kept."""
+        kept = {message.sequence: message for message in self._kept}
+        oldest = self._kept[0].sequence if self._kept else self.sequence
+        for number in range(min((last - first & 0xFFFF) + 1, MAX_REQUEST)):
+            sequence = first + number & 0xFFFF
+            message = kept.get(sequence)
+            yield message or dialect.MAVLink_response_event_error_message(
+                sysid, compid, sequence, oldest, dialect.MAV_EVENT_ERROR_REASON_UNAVAILABLE
+            )
+
+
+@dataclass(frozen=True)
+class Report:
+    """What keeps the vehicle on the ground, and how its parts are: events in the order they are to be sent."""
+
+    events: tuple[tuple[Event, bytes], ...]
+
+
+_PART_OF_CHECK = {
+    TakeoffChecklistType.GYRO: Health.SENSORS,
+    TakeoffChecklistType.MAGNETO: Health.MAGNETOMETER,
+    TakeoffChecklistType.BARO: Health.SENSORS,
+    TakeoffChecklistType.GPS: Health.GPS,
+    TakeoffChecklistType.ULTRASOUND: Health.SENSORS,
+    TakeoffChecklistType.VCAM: Health.SENSORS,
+    TakeoffChecklistType.VERTICAL_TOF: Health.SENSORS,
+    TakeoffChecklistType.MAGNETO_CALIBRATION: Health.MAGNETOMETER,
+    TakeoffChecklistType.MOTOR_DOWN: Health.MOTORS,
+    TakeoffChecklistType.NO_SMARTBATTERY: Health.BATTERY,
+    TakeoffChecklistType.TAKEOFF_FORBIDDEN_BY_BATTERY: Health.BATTERY,
+    TakeoffChecklistType.PITOT: Health.SENSORS,
+}
+
+_EVENTS = {
+    BlockerKind.CHECK: (table.CHECKLIST, Health.SYSTEM),
+    BlockerKind.MAGNETOMETER: (table.MAGNETOMETER, Health.MAGNETOMETER),
+    BlockerKind.CALIBRATING: (table.CALIBRATING, Health.MAGNETOMETER),
+    BlockerKind.SENSOR: (table.SENSOR, Health.SENSORS),
+    BlockerKind.BATTERY: (table.BATTERY, Health.BATTERY),
+    BlockerKind.ALERT: (table.ALERT, Health.SYSTEM),
+    BlockerKind.MOTOR: (table.MOTOR, Health.MOTORS),
+}
+
+
+def part_of(check: TakeoffChecklistType) -> Health:
+    """The part that a line of the checklist is about."""
+    if check.name.startswith("BATTERY_"):
+        return Health.BATTERY
+    return _PART_OF_CHECK.get(check, Health.SYSTEM)
+
+
+def _checks(vehicle: Vehicle) -> Iterator[tuple[Event, Health, int, tuple[int, ...]]]:
+    """What did not pass: (event, part, modes it concerns, its value if it has one)."""
+    if vehicle.flying_state is None:
+        yield table.SILENT, Health.SYSTEM, ALL_MODES, ()
+    if vehicle.flying_state == FlyingState.EMERGENCY:
+        yield table.EMERGENCY, Health.SYSTEM, ALL_MODES, ()
+    for blocker in vehicle.drone.blockers():
+        event, part = _EVENTS[blocker.kind]
+        if isinstance(blocker.value, TakeoffChecklistType):
+            part = part_of(blocker.value)
+            if blocker.value == TakeoffChecklistType.MAGNETO_CALIBRATION:
+                event = table.MAGNETOMETER  # says what to do
+        told = len(event.arguments) > len(table.CHECK_ARGUMENTS) and blocker.value is not None
+        # A value that is newer than our tables may not fit into a byte; 255 reads as unknown, too.
+        yield event, part, ALL_MODES, (min(max(int(blocker.value or 0), 0), 255),) if told else ()
+    if vehicle.fence_problem is not None:
+        yield table.FENCE, Health.SYSTEM, ALL_MODES, ()
+    if vehicle.place is None:
+        yield table.NO_FIX, Health.GPS, mode_bits(NEED_POSITION), ()
+
+
+def _present(vehicle: Vehicle) -> Health:
+    """The parts that the drone has said something about."""
+    drone = vehicle.drone
+    present = Health.SYSTEM
+    if drone.gps.state.fixed is not None:
+        present |= Health.GPS
+    if drone.battery.state.percent is not None:
+        present |= Health.BATTERY
+    if drone.calibration.state.magneto_required is not None:
+        present |= Health.MAGNETOMETER
+    if drone.alerts.state.motor_error is not None:
+        present |= Health.MOTORS
+    if drone.calibration.state.sensors:
+        present |= Health.SENSORS
+    return present
+
+
+def report(vehicle: Vehicle) -> Report:
+    """How things stand. The checks are `Vehicle.prearm_problems`, part by part; arming obeys the same."""
+    found = list(_checks(vehicle))
+    if vehicle.prearm_problems() and all(event.level != Level.ERROR for event, *_ in found):
+        found.append((table.OTHER, Health.SYSTEM, ALL_MODES, ()))  # what is not in the table keeps it down all the same
+    errors = warnings = Health(0)
+    for event, part, _, _ in found:
+        if event.level == Level.ERROR:
+            errors |= part
+        else:
+            warnings |= part
+    # Of an armed vehicle whose mode is not among them QGroundControl shows that it cannot fly. An orbit is begun by a
+    # command, and so is never among those that a client may choose.
+    can_run = mode_bits(vehicle.enterable_modes | {vehicle.mode, FlightMode.ORBIT})
+    if vehicle.place is None:
+        can_run &= ~mode_bits(NEED_POSITION)
+    can_arm = 0 if errors else can_run
+    checks = [(event, event.pack(modes, part.index, *value)) for event, part, modes, value in found]
+    return Report(
+        (
+            (table.ARMING_SUMMARY, table.ARMING_SUMMARY.pack(0, errors, warnings, can_arm, can_run)),
+            *checks,
+            (table.HEALTH_SUMMARY, table.HEALTH_SUMMARY.pack(0, _present(vehicle), errors, warnings)),
+        )
+    )

@@ -1,0 +1,1 @@
+"""MAVLink FTP: the server, its files, and the empty flight logs."""

@@ -1,0 +1,195 @@
+"""The vehicle's files: MAVLink FTP, and the messages that tell where the metadata among them are.
+
+The protocol is `ftp`; the files belong to the services that make them, but for general.json, which lists them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterator, Mapping
+from functools import partial
+
+from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.channel import Channel
+from anafi_mav.mavlink.node import Inbound
+from anafi_mav.services import component_metadata
+from anafi_mav.services.capabilities import capability_bits
+from anafi_mav.services.checksum import crc32
+from anafi_mav.services.commands import Command
+from anafi_mav.services.component_metadata import COMPRESSED, GENERAL
+from anafi_mav.services.files import FileTree, Query, ServedFile, absolute
+from anafi_mav.services.flavours import FLAVOURS, Flavour, flavour_of
+from anafi_mav.services.ftp.ftp import FtpServer
+from anafi_mav.services.paced_sender import Trickle
+from anafi_mav.services.service import Host, MessageHandler, Request, Service, client_of
+
+EXPIRE_EVERY = 1.0
+"""s between looks for sessions that nobody uses."""
+
+
+class FtpService(Service):
+    """Serves the files of all services of the system; those of plans can be written."""
+
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self._server = FtpServer()
+        self._trickle = Trickle(host)
+        self._next_look = 0.0
+        self._files: Mapping[str, ServedFile] = {}
+        self._trees: dict[str, FileTree] = {}
+        """By name of the flavour."""
+        self._made: dict[tuple[str, str], bytes] = {}
+        """Metadata by flavour and path: the same for as long as the drone is connected."""
+
+    def take_tables(self, files: Mapping[str, ServedFile]) -> None:
+        """The files of all services, by path."""
+        self._files = files
+        for flavour in FLAVOURS.values():
+            makers = {
+                path: partial(self._content, path, flavour)
+                for path, file in files.items()
+                if flavour.packed_files or not file.packed
+            }
+            lasting = [path for path, file in files.items() if file.metadata is not None]
+            makers |= {path + COMPRESSED: partial(self._content, path + COMPRESSED, flavour) for path in lasting}
+            makers |= {path: partial(self._general, path, flavour) for path in (GENERAL, GENERAL + COMPRESSED)}
+            self._trees[flavour.name] = FileTree(makers)
+
+    def capabilities(self) -> int:
+        return dialect.MAV_PROTOCOL_CAPABILITY_FTP
+
+    def messages(self) -> Mapping[int, MessageHandler]:
+        return {dialect.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL: self._receive}
+
+    def requests(self) -> Mapping[int, Request]:
+        return {
+            dialect.MAVLINK_MSG_ID_COMPONENT_METADATA: self._component_metadata,
+            dialect.MAVLINK_MSG_ID_COMPONENT_INFORMATION: self._component_information,
+            dialect.MAVLINK_MSG_ID_COMPONENT_INFORMATION_BASIC: self._component_basic,
+        }
+
+    def link_up(self) -> None:
+        self._made.clear()
+
+    def link_down(self) -> None:
+        self._trickle.clear()
+
+    def tick(self, now: float) -> None:
+        if now >= self._next_look:
+            self._next_look = now + EXPIRE_EVERY
+            self._server.expire(now)
+
+    def channel_closed(self, channel: Channel) -> None:
+        self._trickle.closed(channel)
+        self._server.forget(lambda who: isinstance(who, tuple) and who[0] is channel)
+
+    # FTP.
+
+    def _receive(self, inbound: Inbound) -> None:
+        who = client_of(inbound)
+        files = _ClientFiles(self._trees[flavour_of(inbound.channel).name], self._files, inbound)
+        answer = self._server.receive(who, bytes(inbound.message.payload), files, inbound.now)
+        if answer is None:
+            return
+        self.host.send(_message(answer, inbound), inbound.channel)
+        if self._server.bursting(who):
+            self._trickle.start(inbound.channel, who, self._burst(who, inbound))
+
+    def _burst(self, who: Hashable, inbound: Inbound) -> Iterator[dialect.MAVLink_message]:
+        """What is still to come of a burst."""
+        while (part := self._server.burst(who)) is not None:
+            yield _message(part, inbound)
+
+    # Metadata.
+
+    def _content(self, path: str, flavour: Flavour, query: Query) -> bytes | None:
+        """A file's content; metadata are made once."""
+        if path.endswith(COMPRESSED):
+            return self._once(path, flavour, lambda: _compressed(self._content(path[: -len(COMPRESSED)], flavour, {})))
+        file = self._files[path]
+        if file.metadata is None:
+            return file.make(flavour, query)
+        return self._once(path, flavour, lambda: file.make(flavour, {}))
+
+    def _general(self, path: str, flavour: Flavour, query: Query) -> bytes | None:
+        if path.endswith(COMPRESSED):
+            return self._once(path, flavour, lambda: _compressed(self._general(GENERAL, flavour, {})))
+
+        def make() -> bytes:
+            others = {}
+            for plain, file in self._files.items():
+                content = self._content(plain + COMPRESSED, flavour, {}) if file.metadata is not None else None
+                if content is not None and file.metadata is not None:
+                    others[plain + COMPRESSED] = (file.metadata, content)
+            return component_metadata.to_json(component_metadata.general_file(self.host.drone.identity, others))
+
+        return self._once(path, flavour, make)
+
+    def _once(self, path: str, flavour: Flavour, make: Callable[[], bytes | None]) -> bytes | None:
+        key = (flavour.name, path)
+        if key not in self._made:
+            content = make()
+            if content is None:
+                return None
+            self._made[key] = content
+        return self._made[key]
+
+    def _where(self, inbound: Inbound) -> tuple[bytes, int]:
+        """URI and CRC of the general metadata file."""
+        content = self._general(GENERAL + COMPRESSED, flavour_of(inbound.channel), {})
+        assert content is not None
+        return component_metadata.uri(GENERAL + COMPRESSED).encode(), crc32(content)
+
+    def _component_metadata(self, inbound: Inbound, command: Command) -> dialect.MAVLink_message:
+        uri, crc = self._where(inbound)
+        return dialect.MAVLink_component_metadata_message(self.host.times().boot_ms, crc, uri)
+
+    def _component_information(self, inbound: Inbound, command: Command) -> dialect.MAVLink_message:
+        """Its predecessor, for clients of before."""
+        uri, crc = self._where(inbound)
+        return dialect.MAVLink_component_information_message(self.host.times().boot_ms, crc, uri, 0, b"")
+
+    def _component_basic(self, inbound: Inbound, command: Command) -> dialect.MAVLink_message:
+        """COMPONENT_INFORMATION_BASIC of the autopilot: who made the drone."""
+        identity = self.host.drone.identity
+        return dialect.MAVLink_component_information_basic_message(
+            self.host.times().boot_ms,
+            capability_bits(self.host.capabilities, flavour_of(inbound.channel)),
+            0,
+            b"Parrot",
+            identity.model.title.encode()[:31],
+            (identity.firmware or "").encode()[:23],
+            (identity.hardware or "").encode()[:23],
+            identity.serial.encode()[:31],
+        )
+
+
+class _ClientFiles:
+    """The files of one client's flavour, and the client, for what it writes."""
+
+    def __init__(self, tree: FileTree, files: Mapping[str, ServedFile], inbound: Inbound) -> None:
+        self.read = tree.read
+        self.list = tree.list
+        self._tree = tree
+        self._files = files
+        self._inbound = inbound
+
+    def room(self, path: str) -> int | None:
+        file = self._writable(path)
+        return None if file is None else file.room
+
+    def write(self, path: str, content: bytes) -> bool:
+        file = self._writable(path)
+        return file is not None and file.write is not None and file.write(self._inbound, content)
+
+    def _writable(self, path: str) -> ServedFile | None:
+        file = self._files.get(absolute(path) or "") if self._tree.has(path) else None
+        return None if file is None or file.write is None else file
+
+
+def _compressed(content: bytes | None) -> bytes | None:
+    return None if content is None else component_metadata.compress(content)
+
+
+def _message(payload: bytes, inbound: Inbound) -> dialect.MAVLink_message:
+    """FILE_TRANSFER_PROTOCOL to whoever asked."""
+    return dialect.MAVLink_file_transfer_protocol_message(0, inbound.sysid, inbound.compid, list(payload))

@@ -1,0 +1,1 @@
+"""What a ground station expects of any vehicle: identity, banner, time, shell, tunes."""

@@ -1,0 +1,110 @@
+"""Gateway, drone and firmware as texts: to each client once after its first message, after a reconnection, on request.
+
+Mission Planner takes the firmware from a text that begins like ArduCopter's (conformance D3, F 149).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping
+
+from anafi_mav import __version__
+from anafi_mav.drone import Drone
+from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.channel import Channel
+from anafi_mav.mavlink.node import Inbound
+from anafi_mav.services.commands import Command
+from anafi_mav.services.flavours import Flavour, flavour_of
+from anafi_mav.services.service import Host, Query, Service, client_of
+from anafi_mav.vehicle.base.severity import Severity
+
+GONE = 30.0
+"""s of silence after which a client that speaks again is a new one: a ground station that was restarted."""
+
+GREET_AFTER = 1.5
+"""s from a client's first message to its banner. QGroundControl makes its vehicle of the first heartbeat, and only then
+shows texts."""
+
+MAX_CLIENTS = 64
+"""Clients that are remembered; there are a handful."""
+
+_NO_CLIENTS = (dialect.MAV_TYPE_CAMERA, dialect.MAV_TYPE_GIMBAL, dialect.MAV_TYPE_ADSB)
+
+
+PILOT_IN_CONTROL = (
+    "Skycontroller in control until a client flies",
+    "Until then station loss and fence only warn",
+)
+"""First texts behind a Skycontroller: what a client must not rely on."""
+
+
+def banner(drone: Drone, flavour: Flavour) -> list[str]:
+    """The texts: the gateway, and the drone with its firmware."""
+    identity = drone.identity
+    gateway = f"anafi-mav {__version__}"
+    return [
+        f"{flavour.title} ({gateway})" if flavour.title else gateway,
+        f"{identity.model.title} {identity.serial} firmware {identity.firmware}",
+    ]
+
+
+class BannerService(Service):
+    """Sends the banner to each client, once, and some time after its first message: a station that has just found a
+    vehicle does not show texts yet."""
+
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self._heard: dict[Hashable, tuple[float, Channel]] = {}
+        """Client -> when its last message arrived, and where."""
+        self._due: dict[Channel, float] = {}
+        """When a channel is to be greeted."""
+
+    def queries(self) -> Mapping[int, Query]:
+        return {dialect.MAV_CMD_DO_SEND_BANNER: self._banner}
+
+    def link_up(self) -> None:
+        now = self.host.clock.monotonic()
+        self._due = {channel: now + GREET_AFTER for heard, channel in self._heard.values() if now - heard <= GONE}
+
+    def channel_closed(self, channel: Channel) -> None:
+        self._due.pop(channel, None)
+        self._heard = {client: known for client, known in self._heard.items() if known[1] is not channel}
+
+    def received(self, inbound: Inbound) -> None:
+        self._note(inbound)
+
+    def heartbeat(self, inbound: Inbound) -> None:
+        beat = inbound.message
+        if beat.autopilot != dialect.MAV_AUTOPILOT_INVALID or beat.type in _NO_CLIENTS:
+            return  # another vehicle, or a part of one
+        self._note(inbound)
+
+    def _note(self, inbound: Inbound) -> None:
+        client = client_of(inbound)
+        last = self._heard.pop(client, None)
+        self._heard[client] = inbound.now, inbound.channel
+        if len(self._heard) > MAX_CLIENTS:
+            del self._heard[next(iter(self._heard))]
+        if last is None or inbound.now - last[0] > GONE:
+            self._due.setdefault(inbound.channel, inbound.now + GREET_AFTER)
+
+    def tick(self, now: float) -> None:
+        if not self._due:
+            return
+        listening = self.host.channels  # one that pays for each byte is greeted when it takes telemetry again
+        for channel in [channel for channel, at in self._due.items() if now >= at and channel in listening]:
+            del self._due[channel]
+            self._greet(channel)
+
+    def _greet(self, channel: Channel) -> None:
+        if self.host.drone.controller.present:
+            for text in PILOT_IN_CONTROL:
+                self.host.text(Severity.WARNING, text, channel)
+        for text in self.host.vehicle.standing_warnings:
+            self.host.text(Severity.WARNING, text, channel)
+        for text in banner(self.host.drone, flavour_of(channel)):
+            self.host.text(Severity.INFO, text, channel)
+
+    def _banner(self, inbound: Inbound, command: Command) -> int:
+        self._due.pop(inbound.channel, None)
+        self._greet(inbound.channel)
+        return dialect.MAV_RESULT_ACCEPTED

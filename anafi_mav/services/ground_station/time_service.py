@@ -1,0 +1,41 @@
+"""Clocks and round trips: PING, TIMESYNC, SYSTEM_TIME (MAVLink ping.md, timesync.md; conformance C11)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.node import Inbound
+from anafi_mav.services.service import MessageHandler, Service
+from anafi_mav.services.stream import Stream, Times
+from anafi_mav.vehicle.vehicle import Vehicle
+
+
+class TimeService(Service):
+    """Answers whoever measures. One clock is in all our messages: the gateway's, from its start on."""
+
+    def messages(self) -> Mapping[int, MessageHandler]:
+        return {dialect.MAVLINK_MSG_ID_PING: self._ping, dialect.MAVLINK_MSG_ID_TIMESYNC: self._timesync}
+
+    def streams(self) -> Mapping[int, Stream]:
+        return {dialect.MAVLINK_MSG_ID_SYSTEM_TIME: Stream(self._system_time, every=1.0)}
+
+    def _system_time(self, vehicle: Vehicle, times: Times) -> dialect.MAVLink_message:
+        """SYSTEM_TIME: the machine's clock, which the drone's was set by when it connected, beside our own."""
+        return dialect.MAVLink_system_time_message(round(self.host.clock.time() * 1e6), times.boot_ms)
+
+    def _ping(self, inbound: Inbound) -> None:
+        ping = inbound.message
+        if ping.target_system == 0 and ping.target_component == 0:  # otherwise it is somebody's answer
+            self.host.send(
+                dialect.MAVLink_ping_message(ping.time_usec, ping.seq, inbound.sysid, inbound.compid), inbound.channel
+            )
+
+    def _timesync(self, inbound: Inbound) -> None:
+        if inbound.message.tc1 == 0:
+            self.host.send(
+                dialect.MAVLink_timesync_message(
+                    self.host.times().boot_ns, inbound.message.ts1, inbound.sysid, inbound.compid
+                ),
+                inbound.channel,
+            )

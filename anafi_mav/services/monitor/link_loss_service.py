@@ -1,0 +1,68 @@
+"""Carries out what is to be done when no ground station is heard any more: see `link_loss`."""
+
+from __future__ import annotations
+
+import math
+
+from anafi_mav.errors import AnafiMavError
+from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.node import Inbound
+from anafi_mav.mavlink.stall import STALL
+from anafi_mav.services.service import Host, Service
+from anafi_mav.vehicle.base.link_loss import GcsWatch, LossAction
+from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.vehicle.vehicle import Landed
+
+
+class LinkLossService(Service):
+    """Watches the heartbeats of ground stations, on whatever channel they come."""
+
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self._watch = GcsWatch()
+        self._ticked = math.inf
+        """When it was looked at last; infinite before the first look of a connection."""
+
+    def link_up(self) -> None:
+        self._watch.restart(self.host.clock.monotonic())
+        self._ticked = math.inf
+
+    def tick(self, now: float) -> None:
+        if (gap := now - self._ticked) >= STALL:
+            self._watch.stalled(gap)  # what arrived meanwhile was not read: no silence of theirs
+        self._ticked = now
+        policy = self.host.vehicle.gcs_loss
+        if policy.action is not LossAction.NOTHING and self._watch.expire(now, policy.after):
+            self._lost()
+
+    def heartbeat(self, inbound: Inbound) -> None:
+        if inbound.message.type == dialect.MAV_TYPE_GCS and self._watch.heard(inbound.now):
+            self.host.text(Severity.NOTICE, "Ground station is back")
+
+    def _lost(self) -> None:
+        vehicle, policy, controller = self.host.vehicle, self.host.vehicle.gcs_loss, self.host.drone.controller
+        silence = f"No ground station for {policy.after:g} s"
+        if vehicle.landed not in (Landed.IN_AIR, Landed.TAKEOFF):
+            self.host.text(Severity.WARNING, silence)
+        elif vehicle.mode is FlightMode.RETURN:
+            self.host.text(Severity.WARNING, f"{silence}: the drone is returning")
+        elif controller.pilot_has_source or controller.pilot_acquired_control:
+            self.host.text(Severity.WARNING, f"{silence}: pilot in control")
+        else:
+            self.host.text(Severity.CRITICAL, f"{silence}: {policy.action.name.lower()}")
+            self.host.run_action(LinkLossService, self._act(policy.action))
+
+    async def _act(self, action: LossAction) -> None:
+        vehicle = self.host.vehicle
+        try:
+            if action is LossAction.HOLD:
+                await vehicle.hold()
+            elif action is LossAction.LAND:
+                await vehicle.land()
+            else:
+                await vehicle.return_home()
+        except AnafiMavError as error:
+            self.host.text(Severity.CRITICAL, f"Not done: {error}")
+            if action is LossAction.RETURN:  # without a way home, what is left is not to fly on
+                await self._act(LossAction.HOLD)

@@ -1,0 +1,86 @@
+"""Keeps what is known of the sign of a drone's roll, by its serial number and firmware, and reports it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from anafi_mav.drone import events
+from anafi_mav.drone.piloting.state import Attitude, Velocity
+from anafi_mav.services.service import Service
+from anafi_mav.vehicle.base.roll_sign import INVERTED, Sign
+from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.vehicle.base.subscriptions import Subscriptions
+
+KEY = "roll_sign"
+"""Name of the record in the drone's file."""
+
+VERIFIED = "Roll sign verified"
+
+
+def written(firmware: str, sign: Sign) -> Mapping[str, Any]:
+    """Make the record of a verdict, as plain JSON values."""
+    return {"firmware": firmware, "inverted": sign is Sign.LEFT}
+
+
+def read(kept: Any, firmware: str | None) -> Sign:
+    """Return the verdict that a record holds for a firmware; UNKNOWN when it is of another, or no record."""
+    if not isinstance(kept, dict) or not firmware or kept.get("firmware") != firmware:
+        return Sign.UNKNOWN
+    inverted = kept.get("inverted")
+    if not isinstance(inverted, bool):
+        return Sign.UNKNOWN
+    return Sign.LEFT if inverted else Sign.RIGHT
+
+
+class RollSignService(Service):
+    """Watches how the drone moves until the sign of its roll is known."""
+
+    def link_up(self) -> None:
+        check = self.host.vehicle.roll
+        check.recall(read(self.host.memory.settings.get(KEY), self.host.drone.identity.firmware))
+        if check.inverted:
+            self.host.text(Severity.WARNING, INVERTED)
+
+    def subscriptions(self) -> Subscriptions:
+        return {
+            events.AttitudeChanged: self._on_attitude,
+            events.SpeedChanged: self._on_speed,
+            events.FlyingStateChanged: self._on_flying_state,
+        }
+
+    def _motion(self) -> tuple[Attitude, Velocity] | None:
+        """Return how the drone flies; None when that is unknown or it does not fly, and earlier motion is discarded."""
+        vehicle, state = self.host.vehicle, self.host.drone.piloting.state
+        if not vehicle.in_air or state.attitude is None or state.velocity is None:
+            vehicle.roll.forget_motion()
+            return None
+        return state.attitude, state.velocity
+
+    def _on_flying_state(self, message: events.FlyingStateChanged, now: float) -> None:
+        self._motion()
+
+    def _on_attitude(self, message: events.AttitudeChanged, now: float) -> None:
+        if (motion := self._motion()) is not None:
+            attitude, _ = motion
+            self.host.vehicle.roll.on_attitude(attitude.roll, attitude.yaw)
+
+    def _on_speed(self, message: events.SpeedChanged, now: float) -> None:
+        if (motion := self._motion()) is not None:
+            _, velocity = motion
+            if self.host.vehicle.roll.on_velocity(velocity.north, velocity.east, now):
+                self._report()
+
+    def _report(self) -> None:
+        sign, firmware = self.host.vehicle.roll.sign, self.host.drone.identity.firmware
+        if sign is Sign.LEFT:
+            self.host.text(Severity.CRITICAL, INVERTED)
+        else:
+            self.host.text(Severity.INFO, VERIFIED)
+        if firmware:
+            self.host.memory.settings[KEY] = written(firmware, sign)
+            self.host.spawn(self._save())
+
+    async def _save(self) -> None:
+        if (problem := await self.host.memory.save()) is not None:
+            self.host.warn_throttled(problem)

@@ -1,0 +1,35 @@
+"""Keeps the take-off point of the present flight, so that a restart of the gateway in the air loses no height.
+
+The file of a drone is found by its serial number, and the record in it counts for the flight that it names.
+"""
+
+from __future__ import annotations
+
+from anafi_mav.drone import events
+from anafi_mav.services.service import Service
+from anafi_mav.vehicle.base.subscriptions import Subscriptions
+
+KEY = "takeoff"
+"""Name of the record in the drone's file."""
+
+
+class TakeoffPointService(Service):
+    """Writes the take-off point of each flight once, or when more of it becomes known."""
+
+    def subscriptions(self) -> Subscriptions:
+        kinds = (events.FlightId, events.GpsLocationChanged, events.TakeoffLocation, events.FlyingStateChanged)
+        return dict.fromkeys(kinds, lambda message, now: self._keep())
+
+    def link_up(self) -> None:
+        self._keep()
+
+    def _keep(self) -> None:
+        record, settings = self.host.vehicle.takeoff_record, self.host.memory.settings
+        if record is None or settings.get(KEY) == (written := record.written):
+            return
+        settings[KEY] = written
+        self.host.spawn(self._save())
+
+    async def _save(self) -> None:
+        if (problem := await self.host.memory.save()) is not None:
+            self.host.warn_throttled(problem)

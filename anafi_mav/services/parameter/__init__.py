@@ -1,0 +1,1 @@
+"""The parameter protocol: the tables of parameters, their encoding and their description."""

@@ -1,0 +1,420 @@
+"""The parameter protocol: lists, reads and writes, and a word to everybody whenever a value has changed.
+
+Which parameters there are is in `parameter_table*`; a channel sees the native ones and the twins of its flavour. The
+list of a flavour is made when the drone first connects and stays the same for as long as the vehicle exists. Rules:
+MAVLink parameter.md, conformance A5, C4, R12, R13.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import struct
+from collections import deque
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+from anafi_mav.drone.events import Message
+from anafi_mav.errors import AnafiMavError
+from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.channel import Channel
+from anafi_mav.mavlink.node import Inbound
+from anafi_mav.services.component_metadata import to_json
+from anafi_mav.services.files import Query, ServedFile
+from anafi_mav.services.flavours import FLAVOURS, Flavour, flavour_of
+from anafi_mav.services.paced_sender import Trickle
+from anafi_mav.services.parameter.parameter import Parameter
+from anafi_mav.services.parameter.parameter_codec import (
+    HASH_NAME,
+    NO_INDEX,
+    Kind,
+    carried,
+    hash_check,
+    name_of,
+    packed_file,
+    param_value,
+)
+from anafi_mav.services.parameter.parameter_metadata import parameter_file
+from anafi_mav.services.parameter.parameter_table import NATIVE
+from anafi_mav.services.parameter.parameter_table_ardupilot import ARDUPILOT_NAMES
+from anafi_mav.services.parameter.parameter_table_fence import FENCE_NATIVE
+from anafi_mav.services.parameter.parameter_table_follow import FOLLOW_NATIVE
+from anafi_mav.services.parameter.parameter_table_px4 import PX4_NAMES
+from anafi_mav.services.service import Host, MessageHandler, Service, client_of
+from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.vehicle.base.subscriptions import Subscriptions
+
+MAX_WRITES = 8
+"""Writes under way at once. A drone answers one within tens of milliseconds; several clients load their files."""
+
+MAX_PACKED = 8
+"""Different parts of param.pck that are kept: clients ask for the whole, or for a few."""
+
+KEY = "parameters"
+"""In the drone's memory: those of the gateway's own settings that are kept, by native name."""
+
+REFUSAL_EVERY = 0.5
+"""s between texts to one channel about writes that were refused: one for a user who changes a value, a few for a
+program that loads a whole file."""
+
+MAX_WAITING = 512
+"""Writes that wait for their turn: a whole list, from two clients. What comes beyond that comes again (1 s later)."""
+
+
+NATIVE_NAMES: tuple[Parameter, ...] = (*NATIVE, *FENCE_NATIVE, *FOLLOW_NATIVE)
+"""What every client sees, whatever its flavour."""
+
+NAME_TABLES: dict[str, tuple[Parameter, ...]] = {"px4": PX4_NAMES, "ardupilot": ARDUPILOT_NAMES}
+"""By `Flavour.parameter_names`."""
+
+KEPT = tuple(parameter for parameter in NATIVE_NAMES if parameter.put is not None)
+
+
+def parameters_of(flavour: Flavour) -> tuple[Parameter, ...]:
+    """All that clients of a flavour can be shown, sorted by name; which of them a drone has is another matter."""
+    return tuple(sorted((*NATIVE_NAMES, *NAME_TABLES[flavour.parameter_names]), key=lambda parameter: parameter.name))
+
+
+class ParameterList:
+    """The parameters of one vehicle as one flavour lists them."""
+
+    def __init__(self, host: Host, flavour: Flavour) -> None:
+        self._host = host
+        self._flavour = flavour
+        self.parameters = [one for one in parameters_of(flavour) if one.present(host.drone)]
+        self.index = {parameter.name: index for index, parameter in enumerate(self.parameters)}
+        self._told: list[bytes] = [self._raw(parameter) for parameter in self.parameters]
+        """The value of each as everybody was told it last."""
+        self.changes = [0] * len(self.parameters)
+        """How often everybody was told of each."""
+        self.version = 0
+        """How often any of them has changed."""
+
+    def __len__(self) -> int:
+        return len(self.parameters)
+
+    def message(self, index: int) -> dialect.MAVLink_message:
+        """PARAM_VALUE of one."""
+        parameter = self.parameters[index]
+        return param_value(
+            parameter.name,
+            parameter.value(self._host),
+            parameter.kind,
+            count=len(self),
+            index=index,
+            bytewise=self._flavour.bytewise,
+        )
+
+    def values(self) -> list[tuple[str, float, Kind]]:
+        """Name, value and type of all, in their order."""
+        return [(one.name, one.value(self._host), one.kind) for one in self.parameters]
+
+    def hash_message(self) -> dialect.MAVLink_message:
+        """PARAM_VALUE of the hash over all that do not change by themselves."""
+        lasting = [(one.name, one.value(self._host), one.kind) for one in self.parameters if not one.volatile]
+        return param_value(HASH_NAME, hash_check(lasting), Kind.UINT32, count=len(self), index=NO_INDEX, bytewise=True)
+
+    def changed(self, candidates: Iterable[int]) -> list[int]:
+        """Those of these that have another value than everybody was told; from now on they count as told."""
+        found = []
+        for index in candidates:
+            raw = self._raw(self.parameters[index])
+            if raw != self._told[index]:
+                self._told[index] = raw
+                self.changes[index] += 1
+                self.version += 1
+                found.append(index)
+        return found
+
+    def _raw(self, parameter: Parameter) -> bytes:
+        """Bytes, so that NaN is equal to NaN."""
+        return struct.pack("<d", parameter.value(self._host))
+
+
+class ParameterService(Service):
+    """PARAM_REQUEST_LIST, PARAM_REQUEST_READ and PARAM_SET of one vehicle, on component 1."""
+
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self._lists: dict[str, ParameterList] = {}
+        """By name of the flavour; empty until the drone has connected for the first time."""
+        self._by_news: dict[type[Message], dict[str, list[int]]] = {}
+        self._polled: dict[str, list[int]] = {}
+        """By name of the flavour: places of the gateway's own settings."""
+        self._own: list[Parameter] = []
+        """The gateway's own settings, each once."""
+        self._seen = b""
+        """Their values at the last look."""
+        self._trickle = Trickle(host)
+        self._refused_at: dict[Channel, float] = {}
+        """When a text was last sent about a refused write."""
+        self._waiting: deque[tuple[Inbound, Parameter, float]] = deque()
+        self._writers: set[asyncio.Task[None]] = set()
+        self._kept_of: str | None = None
+        """Serial number of the drone whose settings these are."""
+        self._locks: dict[str, asyncio.Lock] = {}
+        """One for each value, by its native name: two writes of it are carried out in their order."""
+        self._storing = asyncio.Lock()
+        """Held while changed settings are stored, until every client has been notified of them."""
+        self._packed_files: dict[str, tuple[int, dict[str, bytes]]] = {}
+        """By name of the flavour: param.pck by its query, and how often the values had changed when it was made."""
+
+    def messages(self) -> Mapping[int, MessageHandler]:
+        return {
+            dialect.MAVLINK_MSG_ID_PARAM_REQUEST_LIST: self._request_list,
+            dialect.MAVLINK_MSG_ID_PARAM_REQUEST_READ: self._request_read,
+            dialect.MAVLINK_MSG_ID_PARAM_SET: self._set,
+        }
+
+    def files(self) -> Mapping[str, ServedFile]:
+        return {
+            "/parameter.json": ServedFile(self._described, metadata=dialect.COMP_METADATA_TYPE_PARAMETER),
+            "/@PARAM/param.pck": ServedFile(self._packed, packed=True),
+        }
+
+    def list_of(self, flavour: Flavour) -> ParameterList:
+        """The parameters that clients of a flavour see. Once the drone has connected."""
+        return self._lists[flavour.name]
+
+    def link_up(self) -> None:
+        self._restore()
+        if not self._lists:
+            self._lists = {flavour.name: ParameterList(self.host, flavour) for flavour in FLAVOURS.values()}
+            for name, listed in self._lists.items():
+                self._polled[name] = [index for index, one in enumerate(listed.parameters) if one.polled]
+                own = (one for one in listed.parameters if one.polled and not one.derived)
+                self._own += [one for one in own if one not in self._own]
+                for index, parameter in enumerate(listed.parameters):
+                    for event in parameter.news:
+                        self._by_news.setdefault(event, {}).setdefault(name, []).append(index)
+        for name, listed in self._lists.items():
+            self._tell(name, listed.changed(range(len(listed))))
+
+    def link_down(self) -> None:
+        self._trickle.clear()
+        self._waiting.clear()  # the writers end with the host's tasks
+
+    def channel_closed(self, channel: Channel) -> None:
+        self._trickle.closed(channel)
+        self._refused_at.pop(channel, None)
+
+    def subscriptions(self) -> Subscriptions:
+        return dict.fromkeys(self._by_news, self._on_value)
+
+    def _on_value(self, message: Message, now: float) -> None:
+        for name, indices in self._by_news.get(type(message), {}).items():
+            self._tell(name, self._lists[name].changed(indices))
+
+    def tick(self, now: float) -> None:
+        if not self._storing.locked() and self._own_values() != self._seen:
+            self.host.spawn(self._settle())
+
+    # What outlives the gateway.
+
+    def _restore(self) -> None:
+        """What is remembered of this drone; the defaults for what is not, or makes no sense any more."""
+        serial = self.host.drone.identity.serial
+        if serial == self._kept_of:
+            return
+        self._kept_of = serial
+        found = self.host.memory.settings.get(KEY)
+        kept = found if isinstance(found, dict) else {}
+        for parameter in KEPT:
+            assert parameter.put is not None
+            assert parameter.default is not None
+            value = kept.get(parameter.name)
+            if not isinstance(value, int | float) or not parameter.accepts(self.host, value):
+                value = parameter.default
+            parameter.put(self.host, value)
+
+    async def _keep(self) -> None:
+        """Store the gateway's own settings, so that they hold when it comes back."""
+        now = {one.name: one.value(self.host) for one in KEPT}
+        settings = self.host.memory.settings
+        if now != settings.get(KEY, {one.name: one.default for one in KEPT}):
+            settings[KEY] = now
+            if (problem := await self.host.memory.save()) is not None:
+                self.host.warn_throttled(problem)
+
+    # Files.
+
+    def _described(self, flavour: Flavour, query: Query) -> bytes:
+        return to_json(parameter_file(self._lists[flavour.name].parameters, self.host))
+
+    def _packed(self, flavour: Flavour, query: Query) -> bytes | None:
+        """ArduPilot's file of all values, or of `count` from `start` on. PX4's clients do not look for it, and MAVProxy
+        takes its integers for floats."""
+        if query.keys() - {"start", "count", "withdefaults"}:
+            return None
+        numbers = {name: text for name, text in query.items() if text.isascii() and text.isdigit() and len(text) < 6}
+        if numbers.keys() != query.keys():
+            return None
+        listed = self._lists[flavour.name]
+        version, made = self._packed_files.get(flavour.name, (-1, {}))
+        if version != listed.version:
+            made = {}
+            self._packed_files[flavour.name] = (listed.version, made)
+        key = f"{numbers.get('start', '')}+{numbers.get('count', '')}"
+        if key not in made:
+            if len(made) >= MAX_PACKED:
+                made.clear()
+            count = int(numbers.get("count", "0")) or None
+            made[key] = packed_file(listed.values(), int(numbers.get("start", "0")), count)
+        return made[key]
+
+    # Reading.
+
+    def _request_list(self, inbound: Inbound) -> None:
+        """The list leaves bit by bit, before it the hash: who has it all in his cache stops us with it."""
+        flavour = flavour_of(inbound.channel)
+        listed = self._lists[flavour.name]
+
+        def messages() -> Iterator[dialect.MAVLink_message]:
+            if flavour.bytewise:
+                yield listed.hash_message()
+            for index in range(len(listed)):
+                yield listed.message(index)
+
+        self._trickle.start(inbound.channel, client_of(inbound), messages())
+
+    def _request_read(self, inbound: Inbound) -> None:
+        if self._storing.locked():  # a value that is read has to be one that is stored
+            self.host.spawn(self._read_when_stored(inbound))
+        else:
+            self._read(inbound)
+
+    async def _read_when_stored(self, inbound: Inbound) -> None:
+        async with self._storing:
+            self._read(inbound)
+
+    def _read(self, inbound: Inbound) -> None:
+        message = inbound.message
+        flavour = flavour_of(inbound.channel)
+        listed = self._lists[flavour.name]
+        name = name_of(message.param_id)
+        index = message.param_index if message.param_index >= 0 else listed.index.get(name, -1)
+        if message.param_index < 0 and name == HASH_NAME and flavour.bytewise:
+            self.host.send(listed.hash_message(), inbound.channel)
+        elif 0 <= index < len(listed):
+            self.host.send(listed.message(index), inbound.channel)
+        else:
+            self._error(inbound, dialect.MAV_PARAM_ERROR_DOES_NOT_EXIST)
+
+    # Writing.
+
+    def _set(self, inbound: Inbound) -> None:
+        message = inbound.message
+        flavour = flavour_of(inbound.channel)
+        name = name_of(message.param_id)
+        if name == HASH_NAME and flavour.bytewise:
+            self._trickle.stop(inbound.channel, client_of(inbound))
+            return
+        listed = self._lists[flavour.name]
+        index = listed.index.get(name)
+        if index is None:
+            self._error(inbound, dialect.MAV_PARAM_ERROR_DOES_NOT_EXIST)
+            return
+        parameter = listed.parameters[index]
+        # ArduPilot's clients do not know the types: ArduPilot itself looks at the name alone.
+        if flavour.bytewise and message.param_type != parameter.kind.mav:
+            self._refuse(inbound, dialect.MAV_PARAM_ERROR_TYPE_MISMATCH, "wrong type")
+            return
+        value = carried(message.param_value, parameter.kind, bytewise=flavour.bytewise)
+        if parameter.write is None:
+            if value == parameter.value(self.host):
+                self._answer(inbound)
+            else:
+                self._refuse(inbound, dialect.MAV_PARAM_ERROR_READ_ONLY, "read only")
+            return
+        if not parameter.accepts(self.host, value):
+            self._refuse(inbound, dialect.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, "out of range")
+            return
+        self._queue(inbound, parameter, value)
+
+    def _queue(self, inbound: Inbound, parameter: Parameter, value: float) -> None:
+        """Write when it is its turn. What a client says again while it still waits takes the old one's place."""
+        client = client_of(inbound)
+        for place, (waiting, other, _) in enumerate(self._waiting):
+            if other is parameter and client_of(waiting) == client:
+                self._waiting[place] = (inbound, parameter, value)
+                return
+        if len(self._waiting) < MAX_WAITING:
+            self._waiting.append((inbound, parameter, value))
+        if len(self._writers) < MAX_WRITES:
+            writer = self.host.spawn(self._work())
+            self._writers.add(writer)
+            writer.add_done_callback(self._writers.discard)
+
+    async def _work(self) -> None:
+        """Carry out writes for as long as there are any."""
+        while self._waiting:
+            await self._write(*self._waiting.popleft())
+
+    async def _write(self, inbound: Inbound, parameter: Parameter, value: float) -> None:
+        assert parameter.write is not None
+        listed = self._lists[flavour_of(inbound.channel).name]
+        index = listed.index[parameter.name]
+        before = listed.changes[index]
+        lock = self._locks.setdefault(parameter.native or parameter.name, asyncio.Lock())
+        async with lock:
+            try:
+                await parameter.write(self.host, value)
+            except AnafiMavError as error:
+                self.host.text(Severity.WARNING, f"{parameter.name} not set: {error}")
+        await self._settle()
+        if listed.changes[index] == before:  # otherwise every client was notified, this one too
+            self._answer(inbound)
+
+    # Telling.
+
+    def _own_values(self) -> bytes:
+        """Bytes, so that NaN is equal to NaN."""
+        return struct.pack(f"<{len(self._own)}d", *(one.read(self.host) for one in self._own))
+
+    async def _settle(self) -> None:
+        """Store the gateway's own settings that have changed, then notify every client of them.
+
+        In this order: what a client has read back must hold also when the gateway is killed in the next instant.
+        """
+        async with self._storing:
+            while (now := self._own_values()) != self._seen:
+                self._seen = now
+                await self._keep()  # meanwhile at most as many change as there are writers: each waits for us
+            for name, indices in self._polled.items():
+                self._tell(name, self._lists[name].changed(indices))
+
+    def _tell(self, name: str, indices: list[int]) -> None:
+        """PARAM_VALUE of these to every channel of a flavour."""
+        if not indices:
+            return
+        channels = [channel for channel in self.host.channels if flavour_of(channel).name == name]
+        if channels:
+            for index in indices:
+                self.host.send(self._lists[name].message(index), channels)
+
+    def _answer(self, inbound: Inbound) -> None:
+        """The value that holds now, to the one who asked."""
+        listed = self._lists[flavour_of(inbound.channel).name]
+        self.host.send(listed.message(listed.index[name_of(inbound.message.param_id)]), inbound.channel)
+
+    def _refuse(self, inbound: Inbound, error: int, why: str) -> None:
+        """PARAM_ERROR, which QGroundControl 4 does not know, the value that holds, and a text to the sender."""
+        self._error(inbound, error)
+        self._answer(inbound)
+        now = self.host.clock.monotonic()
+        if now - self._refused_at.get(inbound.channel, -math.inf) >= REFUSAL_EVERY:
+            self._refused_at[inbound.channel] = now
+            self.host.text(Severity.WARNING, f"{name_of(inbound.message.param_id)} not set: {why}", inbound.channel)
+
+    def _error(self, inbound: Inbound, error: int) -> None:
+        message: Any = inbound.message
+        self.host.send(
+            dialect.MAVLink_param_error_message(
+                inbound.sysid,
+                inbound.compid,
+                name_of(message.param_id).encode(),
+                getattr(message, "param_index", -1),
+                error,
+            ),
+            inbound.channel,
+        )

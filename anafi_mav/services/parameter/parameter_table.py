@@ -1,0 +1,627 @@
+"""The native parameters `ANF_*`: what every client sees, whatever autopilot it is shown.
+
+Settings of the drone are written through it and read as it told them last; their ranges are the drone's own. Sources:
+ardrone3.xml, rth.xml, precise_home.xml, gimbal.xml, obstacle_avoidance.xml, and which of them the anafi_ros paper uses.
+Camera settings are no parameters: they travel by the camera's own protocol.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+from anafi_mav.drone import MODELS, Drone, Range, events
+from anafi_mav.drone.events import Axis, PreciseHomeMode, RthEndingBehavior, RthHomeType
+from anafi_mav.drone.events import ObstacleAvoidanceMode as AvoidanceMode
+from anafi_mav.services.parameter.parameter import Limits, Parameter, bounds, current, number, own
+from anafi_mav.services.parameter.parameter_codec import Kind
+from anafi_mav.services.service import Host
+from anafi_mav.vehicle.base.bounds import LOWEST
+from anafi_mav.vehicle.base.link_loss import LossAction
+from anafi_mav.vehicle.joystick_override import Override
+from anafi_mav.vehicle.offboard.stream import GUIDED_TIMEOUT, LONGEST_TIMEOUT, SHORTEST_TIMEOUT
+from anafi_mav.vehicle.return_end import LONGEST_WAIT, SHORTEST_WAIT, EndOfReturn
+
+OFF_ON = {0: "Off", 1: "On"}
+
+
+def _range(
+    name: str,
+    short: str,
+    setting: Callable[[Drone], Range | None],
+    verb: Callable[[Drone], Callable[[float], Awaitable[Any]]],
+    news: Any,
+    *,
+    unit: str,
+    step: float,
+    decimals: int = 0,
+    group: str,
+    long: str = "",
+    models: str = "all",
+) -> Parameter:
+    """A setting that the drone reports with its range."""
+    return Parameter(
+        name,
+        Kind.REAL32,
+        short,
+        read=lambda host: current(setting(host.drone)),
+        write=lambda host, value: verb(host.drone)(value),
+        limits=lambda host: bounds(setting(host.drone)),
+        news=(news,),
+        present=lambda drone: setting(drone) is not None,
+        unit=unit,
+        step=step,
+        decimals=decimals,
+        group=group,
+        long=long,
+        source=news.NAME,
+        models=models,
+    )
+
+
+def _switch(
+    name: str,
+    short: str,
+    state: Callable[[Drone], bool | None],
+    verb: Callable[[Drone], Callable[[bool], Awaitable[Any]]],
+    news: Any,
+    *,
+    group: str,
+    long: str = "",
+    models: str = "all",
+) -> Parameter:
+    """A setting of the drone's that is on or off."""
+    return Parameter(
+        name,
+        Kind.INT32,
+        short,
+        read=lambda host: number(state(host.drone)),
+        write=lambda host, value: verb(host.drone)(value == 1),
+        values=OFF_ON,
+        news=(news,),
+        present=lambda drone: state(drone) is not None,
+        group=group,
+        long=long,
+        source=news.NAME,
+        models=models,
+    )
+
+
+FLIGHT, HOME, GIMBAL, GATEWAY = "ANAFI flight", "ANAFI home", "ANAFI gimbal", "Gateway"
+
+MAX_TILT = _range(
+    "ANF_MAX_TILT",
+    "Maximum tilt",
+    lambda drone: drone.piloting.state.max_tilt,
+    lambda drone: drone.piloting.set_max_tilt,
+    events.MaxTiltChanged,
+    unit="deg",
+    step=1.0,
+    group=FLIGHT,
+    long="What full deflection of the sticks means, and how far setpoints may tilt the drone.",
+)
+TILT_RATE = _range(
+    "ANF_TILT_RATE",
+    "Maximum rate of roll and pitch",
+    lambda drone: drone.piloting.state.max_tilt_speed,
+    lambda drone: drone.piloting.set_max_tilt_speed,
+    events.MaxPitchRollRotationSpeedChanged,
+    unit="deg/s",
+    step=1.0,
+    group=FLIGHT,
+)
+YAW_RATE = _range(
+    "ANF_YAW_RATE",
+    "Maximum yaw rate",
+    lambda drone: drone.piloting.state.max_rotation_speed,
+    lambda drone: drone.piloting.set_max_rotation_speed,
+    events.MaxRotationSpeedChanged,
+    unit="deg/s",
+    step=1.0,
+    group=FLIGHT,
+)
+VERTICAL_SPEED = _range(
+    "ANF_VERT_SPEED",
+    "Maximum vertical speed",
+    lambda drone: drone.piloting.state.max_vertical_speed,
+    lambda drone: drone.piloting.set_max_vertical_speed,
+    events.MaxVerticalSpeedChanged,
+    unit="m/s",
+    step=0.1,
+    decimals=1,
+    group=FLIGHT,
+)
+HORIZONTAL_SPEED = _range(
+    "ANF_HORI_SPEED",
+    "Maximum horizontal speed",
+    lambda drone: drone.piloting.state.max_horizontal_speed,
+    lambda drone: drone.piloting.set_max_horizontal_speed,
+    events.MaxHorizontalSpeedChanged,
+    unit="m/s",
+    step=0.1,
+    decimals=1,
+    group=FLIGHT,
+    long="Firmware of later generations only; elsewhere a speed is said with each move (ANF_CRUISE_SPEED).",
+    models="none of these",
+)
+MAX_ALTITUDE = _range(
+    "ANF_MAX_ALT",
+    "Ceiling above take-off",
+    lambda drone: drone.piloting.state.max_altitude,
+    lambda drone: drone.piloting.set_max_altitude,
+    events.MaxAltitudeChanged,
+    unit="m",
+    step=1.0,
+    decimals=1,
+    group=FLIGHT,
+    long="The drone itself keeps below it, whatever it is told.",
+)
+MAX_DISTANCE = _range(
+    "ANF_MAX_DIST",
+    "Radius of the drone's own geofence",
+    lambda drone: drone.piloting.state.max_distance,
+    lambda drone: drone.piloting.set_max_distance,
+    events.MaxDistanceChanged,
+    unit="m",
+    step=10.0,
+    group=FLIGHT,
+    long="Kept to while ANF_GEOFENCE is on.",
+)
+GEOFENCE = _switch(
+    "ANF_GEOFENCE",
+    "The drone stays within ANF_MAX_DIST",
+    lambda drone: drone.piloting.state.geofence,
+    lambda drone: drone.piloting.set_geofence,
+    events.NoFlyOverMaxDistanceChanged,
+    group=FLIGHT,
+)
+BANKED_TURN = _switch(
+    "ANF_BANKED_TURN",
+    "The drone leans into a turn",
+    lambda drone: drone.piloting.state.banked_turn,
+    lambda drone: drone.piloting.set_banked_turn,
+    events.BankedTurnChanged,
+    group=FLIGHT,
+)
+
+
+def _avoidance(drone: Drone) -> bool | None:
+    avoidance = drone.piloting.state.avoidance
+    return None if avoidance is None else avoidance.mode == AvoidanceMode.STANDARD
+
+
+AVOIDANCE = _switch(
+    "ANF_OBS_AVOID",
+    "The drone flies around obstacles",
+    _avoidance,
+    lambda drone: drone.piloting.set_obstacle_avoidance,
+    events.ObstacleAvoidanceStatus,
+    group=FLIGHT,
+    long="Whether it shall. Whether it can at this moment depends on light and lens.",
+    models="ai",
+)
+RETURN_ALTITUDE = _range(
+    "ANF_RTH_ALT",
+    "Height that a return climbs to first",
+    lambda drone: drone.home.state.min_altitude,
+    lambda drone: drone.home.set_min_altitude,
+    events.ReturnMinAltitude,
+    unit="m",
+    step=1.0,
+    decimals=1,
+    group=HOME,
+)
+RETURN_END_ALTITUDE = _range(
+    "ANF_RTH_END_ALT",
+    "Height at which a return ends that ends in hovering",
+    lambda drone: drone.home.state.ending_altitude,
+    lambda drone: drone.home.set_ending_altitude,
+    events.ReturnEndingAltitude,
+    unit="m",
+    step=1.0,
+    decimals=1,
+    group=HOME,
+)
+RETURN_ENDING = Parameter(
+    "ANF_RTH_END",
+    Kind.INT32,
+    "End of the drone's own returns",
+    read=lambda host: number(host.drone.home.state.ending),
+    write=lambda host, value: host.drone.home.set_ending(RthEndingBehavior(int(value))),
+    values={int(RthEndingBehavior.LANDING): "Landing", int(RthEndingBehavior.HOVERING): "Hovering"},
+    news=(events.ReturnEnding,),
+    present=lambda drone: drone.home.state.ending is not None,
+    group=HOME,
+    source=events.ReturnEnding.NAME,
+    long="Those that it begins by itself, and any when gateway or link dies on the way. Landing: any return lands.",
+)
+
+
+def _delay_limits(host: Host) -> Limits | None:
+    found = host.drone.home.state.delay_range_s
+    return None if found is None else (float(found[0]), float(found[1]))
+
+
+RETURN_DELAY = Parameter(
+    "ANF_RTH_DELAY",
+    Kind.INT32,
+    "Time from the loss of the drone's link to its return",
+    read=lambda host: number(host.drone.home.state.delay_s),
+    write=lambda host, value: host.drone.home.set_delay(int(value)),
+    limits=_delay_limits,
+    news=(events.ReturnDelay,),
+    present=lambda drone: drone.home.state.delay_s is not None,
+    unit="s",
+    step=1.0,
+    group=HOME,
+    long="The link between gateway and drone, or Skycontroller and drone. For ground stations see ANF_GCS_LOSS.",
+    source=events.ReturnDelay.NAME,
+)
+RETURN_BY_ITSELF = _switch(
+    "ANF_RTH_AUTO",
+    "The drone returns when its battery just suffices for it",
+    lambda drone: drone.home.state.by_itself,
+    lambda drone: drone.home.set_by_itself,
+    events.ReturnAutoTriggerMode,
+    group=HOME,
+)
+
+
+def _precise(drone: Drone) -> bool | None:
+    mode = drone.home.state.precise_mode
+    return None if mode is None else mode == PreciseHomeMode.STANDARD
+
+
+MISSION_RETURN = _switch(
+    "ANF_MIS_RTH",
+    "A lost link ends a mission with a return home",
+    lambda drone: drone.flight_plan.state.returns_on_disconnect,
+    lambda drone: drone.flight_plan.set_returns_on_disconnect,
+    events.ReturnHomeOnDisconnectChanged,
+    group=HOME,
+    long="Off: the drone flies the file that it has to its end. So it does when the gateway dies.",
+)
+PRECISE_HOME = _switch(
+    "ANF_RTH_PRECISE",
+    "A return looks for the picture of the take-off place",
+    _precise,
+    lambda drone: drone.home.set_precise,
+    events.PreciseHomeModeChanged,
+    group=HOME,
+)
+HOME_TYPE = Parameter(
+    "ANF_HOME_TYPE",
+    Kind.INT32,
+    "Where home shall be",
+    read=lambda host: number(host.drone.home.state.preferred_type),
+    write=lambda host, value: host.drone.home.set_preferred_type(RthHomeType(int(value))),
+    values={
+        int(RthHomeType.TAKEOFF): "Take-off",
+        int(RthHomeType.FOLLOWEE): "Followed target",
+        int(RthHomeType.CUSTOM): "A place of your own",
+        int(RthHomeType.PILOT): "Pilot",
+    },
+    news=(events.PreferredHomeType,),
+    present=lambda drone: drone.home.state.preferred_type is not None,
+    group=HOME,
+    long="The drone uses it when it knows such a place, the take-off point otherwise. Not every model knows all kinds.",
+    source=events.PreferredHomeType.NAME,
+)
+
+
+def _gimbal_speed(drone: Drone) -> Range | None:
+    """The main gimbal's; the drone has one number for all axes, and pitch is an axis of every model."""
+    return drone.gimbal[0].max_speed.get(Axis.PITCH)
+
+
+GIMBAL_SPEED = _range(
+    "ANF_GMB_SPEED",
+    "Maximum speed of the gimbal",
+    _gimbal_speed,
+    lambda drone: drone.gimbal.set_max_speed,
+    events.GimbalMaxSpeed,
+    unit="deg/s",
+    step=1.0,
+    group=GIMBAL,
+)
+MODEL = Parameter(
+    "ANF_MODEL",
+    Kind.INT32,
+    "Model of the drone",
+    read=lambda host: float(host.drone.identity.model.id),
+    values={model.id: model.title for model in MODELS.values()},
+    group=FLIGHT,
+    source="discovery",
+)
+
+
+# The gateway's own.
+
+
+def _put_takeoff_height(host: Host, value: float) -> None:
+    host.vehicle.takeoff.height = value
+
+
+def _takeoff_limits(host: Host) -> Limits:
+    ceiling = host.drone.piloting.state.max_altitude
+    return LOWEST, math.inf if ceiling is None else ceiling.current
+
+
+TAKEOFF_HEIGHT = Parameter(
+    "ANF_TKOFF_ALT",
+    Kind.REAL32,
+    "Height of a take-off that names none",
+    read=lambda host: host.vehicle.takeoff.height,
+    write=own(_put_takeoff_height),
+    put=_put_takeoff_height,
+    limits=_takeoff_limits,
+    polled=True,
+    unit="m",
+    step=0.5,
+    decimals=1,
+    group=GATEWAY,
+    default=2.5,
+    source="gateway; up to ANF_MAX_ALT",
+)
+
+
+async def _set_hand_launch(host: Host, value: float) -> None:
+    host.vehicle.takeoff.hand_launch = value == 1
+
+
+HAND_LAUNCH = Parameter(
+    "ANF_HAND_LAUNCH",
+    Kind.INT32,
+    "Arming starts the motors",
+    read=lambda host: number(host.vehicle.takeoff.hand_launch),
+    write=_set_hand_launch,
+    values=OFF_ON,
+    polled=True,
+    group=GATEWAY,
+    long="Off: an ANAFI has no armed state, nothing turns until a take-off. On: arming starts the motors, which idle "
+    "until the drone leaves the hand.",
+    default=0.0,
+    source="gateway",
+)
+
+MAX_CRUISE_SPEED = 15.0
+"""m/s: the fastest that anafi_ros allows (its max_horizontal_speed); no model tells its own limit."""
+
+
+async def _set_cruise_speed(host: Host, value: float) -> None:
+    host.vehicle.cruise_speed = value or None
+    await _go_on(host)
+
+
+async def _set_climb_speed(host: Host, value: float) -> None:
+    host.vehicle.climb_speed = value or None
+    await _go_on(host)
+
+
+async def _go_on(host: Host) -> None:
+    """A move under way changes its speed, as it does for MAV_CMD_DO_CHANGE_SPEED."""
+    if (goto := host.vehicle.guided.goto) is not None:
+        await host.vehicle.guided.go(goto)
+
+
+def _climb_limits(host: Host) -> Limits | None:
+    setting = host.drone.piloting.state.max_vertical_speed
+    return None if setting is None else (0.0, setting.max)
+
+
+CRUISE_SPEED = Parameter(
+    "ANF_CRUISE_SPEED",
+    Kind.REAL32,
+    "Speed over ground that moves keep to",
+    read=lambda host: host.vehicle.cruise_speed or 0.0,
+    write=_set_cruise_speed,
+    limits=lambda host: (0.0, MAX_CRUISE_SPEED),
+    polled=True,
+    unit="m/s",
+    step=0.1,
+    decimals=1,
+    group=GATEWAY,
+    long="0: the drone's own. MAV_CMD_DO_CHANGE_SPEED sets the same.",
+    default=0.0,
+    source="gateway",
+)
+CLIMB_SPEED = Parameter(
+    "ANF_CLIMB_SPEED",
+    Kind.REAL32,
+    "Vertical speed that moves keep to",
+    read=lambda host: host.vehicle.climb_speed or 0.0,
+    write=_set_climb_speed,
+    limits=_climb_limits,
+    polled=True,
+    unit="m/s",
+    step=0.1,
+    decimals=1,
+    group=GATEWAY,
+    long="0: the drone's own. MAV_CMD_DO_CHANGE_SPEED sets the same.",
+    default=0.0,
+    source="gateway; up to the most that ANF_VERT_SPEED can be",
+)
+
+
+def _put_loss_action(host: Host, value: float) -> None:
+    host.vehicle.gcs_loss.action = LossAction(int(value))
+
+
+def _put_loss_time(host: Host, value: float) -> None:
+    host.vehicle.gcs_loss.after = value
+
+
+GCS_LOSS = Parameter(
+    "ANF_GCS_LOSS",
+    Kind.INT32,
+    "What to do in the air when no ground station is heard any more",
+    read=lambda host: float(host.vehicle.gcs_loss.action),
+    write=own(_put_loss_action),
+    put=_put_loss_action,
+    values={action.value: action.name.capitalize() for action in LossAction},
+    polled=True,
+    group=GATEWAY,
+    long="Once a ground station has been heard. Behind a Skycontroller, while nothing of ours flies the drone, a text "
+    "is all, even if its pilot does not hold it. When the drone's link was lost and is back, the time restarts.",
+    default=float(LossAction.NOTHING),
+    source="gateway",
+)
+GCS_LOSS_TIME = Parameter(
+    "ANF_GCS_LOSS_T",
+    Kind.REAL32,
+    "Silence of all ground stations that counts as their loss",
+    read=lambda host: host.vehicle.gcs_loss.after,
+    write=own(_put_loss_time),
+    put=_put_loss_time,
+    limits=lambda host: (2.0, 300.0),
+    polled=True,
+    unit="s",
+    step=1.0,
+    decimals=1,
+    group=GATEWAY,
+    default=10.0,
+    source="gateway",
+)
+
+
+def put_end_of_return(host: Host, value: float) -> None:
+    """Set what a commanded return ends in."""
+    host.vehicle.return_end.ending = EndOfReturn(int(value))
+
+
+def put_return_wait(host: Host, value: float) -> None:
+    """Set the wait above home, s."""
+    host.vehicle.return_end.wait = value
+
+
+RETURN_LANDING = Parameter(
+    "ANF_RTL_END",
+    Kind.INT32,
+    "End of a return that a client or the gateway commanded",
+    read=lambda host: float(host.vehicle.return_end.ending),
+    write=own(put_end_of_return),
+    put=put_end_of_return,
+    values={int(EndOfReturn.LAND): "Land", int(EndOfReturn.HOVER): "Hover"},
+    polled=True,
+    group=GATEWAY,
+    long="The gateway lands the drone above a home that is certain, else it hovers and a text gives the reason. "
+    "Nothing is written on the drone: ANF_RTH_END stays its own.",
+    default=float(EndOfReturn.LAND),
+    source="gateway",
+)
+RETURN_WAIT = Parameter(
+    "ANF_RTL_WAIT",
+    Kind.REAL32,
+    "Wait above home before the landing of ANF_RTL_END",
+    read=lambda host: host.vehicle.return_end.wait,
+    write=own(put_return_wait),
+    put=put_return_wait,
+    limits=lambda host: (0.0, LONGEST_WAIT),
+    polled=True,
+    unit="s",
+    step=1.0,
+    decimals=1,
+    group=GATEWAY,
+    long=f"At least {SHORTEST_WAIT:g} s, also where this is less.",
+    default=SHORTEST_WAIT,
+    source="gateway",
+)
+
+
+def _put_guided_time(host: Host, value: float) -> None:
+    host.vehicle.offboard.guided_timeout = value
+
+
+GUIDED_TIME = Parameter(
+    "ANF_GUIDED_T",
+    Kind.REAL32,
+    "Silence after which a velocity of ArduPilot's Guided ends in a hover",
+    read=lambda host: host.vehicle.offboard.guided_timeout,
+    write=own(_put_guided_time),
+    put=_put_guided_time,
+    limits=lambda host: (SHORTEST_TIMEOUT, LONGEST_TIMEOUT),
+    polled=True,
+    unit="s",
+    step=0.1,
+    decimals=1,
+    group=GATEWAY,
+    long="Velocities and yaw rates alone; attitudes and accelerations last 0.5 s, as all does in PX4's Offboard.",
+    default=GUIDED_TIMEOUT,
+    source="gateway",
+)
+
+
+def _put_override(host: Host, value: float) -> None:
+    host.vehicle.manual.override.sources = Override(int(value))
+
+
+def _put_override_stick(host: Host, value: float) -> None:
+    host.vehicle.manual.override.threshold = value / 100.0
+
+
+RC_OVERRIDE = Parameter(
+    "ANF_RC_OVERRIDE",
+    Kind.INT32,
+    "What a joystick of PX4's clients takes the drone over from",
+    read=lambda host: float(host.vehicle.manual.override.sources),
+    write=own(_put_override),
+    put=_put_override,
+    values={0: "Nothing", 1: "Goto, mission, follow, orbit, return, landing", 2: "Offboard", 3: "All of these"},
+    polled=True,
+    group=GATEWAY,
+    long="A stick that leaves the middle after half a second there selects Position. The throttle alone does not. "
+    "Returns and landings only if a client commanded them. ArduPilot's clients have none, as in ArduCopter.",
+    default=float(Override.AUTO),
+    source="gateway",
+)
+RC_OVERRIDE_STICK = Parameter(
+    "ANF_RC_STICK_OV",
+    Kind.REAL32,
+    "Deflection from which a joystick takes over",
+    read=lambda host: host.vehicle.manual.override.threshold * 100.0,
+    write=own(_put_override_stick),
+    put=_put_override_stick,
+    limits=lambda host: (10.0, 80.0),
+    polled=True,
+    unit="%",
+    step=1.0,
+    decimals=0,
+    group=GATEWAY,
+    default=30.0,
+    source="gateway",
+)
+
+NATIVE: tuple[Parameter, ...] = (
+    MAX_TILT,
+    TILT_RATE,
+    YAW_RATE,
+    VERTICAL_SPEED,
+    HORIZONTAL_SPEED,
+    MAX_ALTITUDE,
+    MAX_DISTANCE,
+    GEOFENCE,
+    BANKED_TURN,
+    AVOIDANCE,
+    RETURN_ALTITUDE,
+    RETURN_END_ALTITUDE,
+    RETURN_ENDING,
+    RETURN_DELAY,
+    RETURN_BY_ITSELF,
+    MISSION_RETURN,
+    PRECISE_HOME,
+    HOME_TYPE,
+    GIMBAL_SPEED,
+    MODEL,
+    TAKEOFF_HEIGHT,
+    HAND_LAUNCH,
+    CRUISE_SPEED,
+    CLIMB_SPEED,
+    GCS_LOSS,
+    GCS_LOSS_TIME,
+    RETURN_LANDING,
+    RETURN_WAIT,
+    GUIDED_TIME,
+    RC_OVERRIDE,
+    RC_OVERRIDE_STICK,
+)

@@ -1,0 +1,215 @@
+"""What ArduPilot's clients know by ArduCopter's names: twins of the native parameters, and facts they want to see.
+
+Names, types and units are ArduCopter 4.5's (centimetres and centidegrees where it has them). QGroundControl's setup
+pages, Mission Planner and MAVProxy look for these (conformance E3). As with PX4's names, none is inert: what cannot be
+followed cannot be written, what an ANAFI does not report reads -1.
+"""
+
+from __future__ import annotations
+
+import math
+
+from anafi_mav.drone import events
+from anafi_mav.services.parameter.parameter import Limits, Parameter, current, fact, mapped, number, twin
+from anafi_mav.services.parameter.parameter_codec import Kind
+from anafi_mav.services.parameter.parameter_table import (
+    CLIMB_SPEED,
+    CRUISE_SPEED,
+    GCS_LOSS,
+    GCS_LOSS_TIME,
+    GUIDED_TIME,
+    MAX_ALTITUDE,
+    MAX_DISTANCE,
+    MAX_TILT,
+    RETURN_ALTITUDE,
+    RETURN_BY_ITSELF,
+    RETURN_END_ALTITUDE,
+    RETURN_LANDING,
+    RETURN_WAIT,
+    TILT_RATE,
+    VERTICAL_SPEED,
+    YAW_RATE,
+    put_end_of_return,
+)
+from anafi_mav.services.parameter.parameter_table_fence import FENCE_ARDUPILOT
+from anafi_mav.services.parameter.parameter_table_setup import SETUP_ARDUPILOT
+from anafi_mav.services.service import Host
+from anafi_mav.vehicle.base.link_loss import LossAction
+from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.vehicle.return_end import EndOfReturn
+from anafi_mav.vehicle.takeoff import AUTO_DISARM
+
+FACTS = "ArduPilot facts"
+
+UNTOLD = "An ANAFI does not report it."
+
+DRONE_WARNS = "0: ArduPilot's word for no threshold. The drone warns of a low battery by levels of its own."
+
+CM = 100.0
+"""cm in a m, centidegrees in a degree."""
+
+
+def _final_altitude(host: Host) -> float:
+    if host.vehicle.return_end.ending is EndOfReturn.LAND:
+        return 0.0
+    return current(host.drone.home.state.ending_altitude) * CM
+
+
+def _final_limits(host: Host) -> Limits | None:
+    setting = host.drone.home.state.ending_altitude
+    return None if setting is None else (0.0, setting.max * CM)
+
+
+async def _set_final_altitude(host: Host, value: float) -> None:
+    """Above 0 a return hovers at ANF_RTH_END_ALT, which is the drone's, whatever the number: a text says so."""
+    put_end_of_return(host, EndOfReturn.LAND if value == 0.0 else EndOfReturn.HOVER)
+    height = _final_altitude(host)
+    if math.isfinite(height) and abs(value - height) >= 1.0:
+        host.text(Severity.NOTICE, f"RTL_ALT_FINAL: hovers at {height / CM:.0f} m (ANF_RTH_END_ALT)")
+
+
+FINAL_ALTITUDE = Parameter(
+    "RTL_ALT_FINAL",
+    Kind.INT16,
+    "Height at which a commanded return ends, 0: it lands",
+    read=_final_altitude,
+    write=_set_final_altitude,
+    limits=_final_limits,
+    news=(events.ReturnEndingAltitude,),
+    polled=True,
+    derived=True,
+    present=RETURN_END_ALTITUDE.present,
+    unit="cm",
+    step=CM,
+    decimals=0,
+    group=RETURN_LANDING.group,
+    native=RETURN_LANDING.name,
+    source=RETURN_LANDING.source,
+)
+
+TWINS: tuple[Parameter, ...] = (
+    twin(MAX_TILT, "ANGLE_MAX", Kind.INT16, scale=CM, unit="centi-degrees"),
+    twin(TILT_RATE, "ATC_RATE_R_MAX"),
+    twin(TILT_RATE, "ATC_RATE_P_MAX"),
+    twin(YAW_RATE, "PILOT_Y_RATE"),
+    twin(VERTICAL_SPEED, "PILOT_SPEED_UP", Kind.INT16, scale=CM, unit="cm/s", decimals=0),
+    twin(VERTICAL_SPEED, "PILOT_SPEED_DN", Kind.INT16, scale=CM, unit="cm/s", decimals=0),
+    twin(CRUISE_SPEED, "WPNAV_SPEED", scale=CM, unit="cm/s", decimals=0),
+    twin(CLIMB_SPEED, "WPNAV_SPEED_UP", scale=CM, unit="cm/s", decimals=0),
+    twin(CLIMB_SPEED, "WPNAV_SPEED_DN", scale=CM, unit="cm/s", decimals=0),
+    twin(MAX_ALTITUDE, "FENCE_ALT_MAX"),
+    twin(MAX_DISTANCE, "FENCE_RADIUS"),
+    twin(RETURN_ALTITUDE, "RTL_ALT", Kind.INT32, scale=CM, unit="cm", decimals=0),
+    FINAL_ALTITUDE,
+    twin(RETURN_WAIT, "RTL_LOIT_TIME", Kind.INT32, scale=1000.0, unit="ms", decimals=0),
+    mapped(
+        RETURN_BY_ITSELF,
+        "BATT_FS_LOW_ACT",
+        Kind.INT8,
+        {0: "None", 2: "RTL"},
+        {0: 0, 2: 1},
+    ),
+    mapped(
+        GCS_LOSS,
+        "FS_GCS_ENABLE",
+        Kind.INT8,
+        {0: "Disabled", 1: "RTL", 5: "Land", 7: "Brake"},
+        {0: LossAction.NOTHING, 1: LossAction.RETURN, 5: LossAction.LAND, 7: LossAction.HOLD},
+    ),
+    twin(GCS_LOSS_TIME, "FS_GCS_TIMEOUT"),
+    twin(GUIDED_TIME, "GUID_TIMEOUT"),
+)
+
+
+def _fact(name: str, value: float, short: str, kind: Kind = Kind.INT8, **more: object) -> Parameter:
+    return fact(name, value, short, kind, group=FACTS, source="fact", **more)
+
+
+def _untold(name: str, short: str, kind: Kind = Kind.REAL32, **more: object) -> Parameter:
+    return _fact(name, math.nan, short, kind, long=UNTOLD, **more)
+
+
+def _compass_offset(host: Host) -> float:
+    return 0.0 if host.drone.calibration.state.magneto_required else math.nan
+
+
+_CHANNELS = {"ROLL": 1, "PITCH": 2, "THROTTLE": 3, "YAW": 4}
+"""Where RC_CHANNELS_OVERRIDE has what."""
+
+FACTS_ARDUPILOT: tuple[Parameter, ...] = (
+    Parameter("SYSID_THISMAV", Kind.INT16, "System id", lambda host: float(host.sysid), group=FACTS, source="fleet"),
+    _fact("FRAME_CLASS", 1, "Frame: a quadrotor"),
+    _fact("FRAME_TYPE", 1, "Frame: X"),
+    _fact("ARMING_CHECK", 1, "Checks before arming: all", Kind.INT32),
+    _fact("DISARM_DELAY", AUTO_DISARM, "Disarms when no take-off follows", unit="s"),
+    _untold("FENCE_MARGIN", "Distance to the fence that it keeps", unit="m"),
+    _fact("FS_THR_ENABLE", 7, "Sticks lost: brake", values={7: "Brake"}),
+    _fact("FS_THR_VALUE", -1, "Throttle that means loss: none", Kind.INT16),
+    _fact("BATT_MONITOR", 7, "The battery is watched: it tells its charge itself"),
+    Parameter(
+        "BATT_CAPACITY",
+        Kind.INT32,
+        "Charge of the full battery",
+        lambda host: number(host.drone.battery.state.full_charge_mah),
+        news=(events.BatteryCapacity,),
+        unit="mAh",
+        group=FACTS,
+        source=events.BatteryCapacity.NAME,
+    ),
+    _fact("BATT_FS_CRT_ACT", 1, "Battery almost empty: the drone lands", values={1: "Land"}),
+    *(
+        _fact(f"BATT_{level}_{unit}", 0.0, "Threshold: none", Kind.REAL32, unit=name, long=DRONE_WARNS)
+        for level in ("LOW", "CRT")
+        for unit, name in (("VOLT", "V"), ("MAH", "mAh"))
+    ),
+    _untold("LAND_SPEED", "Speed of a landing", Kind.INT16, unit="cm/s"),
+    _fact("COMPASS_DEV_ID", 1, "Compass: the drone has one", Kind.INT32),
+    _fact("COMPASS_DEV_ID2", 0, "Second compass: none", Kind.INT32),
+    _fact("COMPASS_DEV_ID3", 0, "Third compass: none", Kind.INT32),
+    _fact("COMPASS_USE", 1, "The compass is used"),
+    _fact("COMPASS_USE2", 0, "Second compass: none"),
+    _fact("COMPASS_USE3", 0, "Third compass: none"),
+    *(
+        Parameter(
+            f"COMPASS_OFS_{axis}",
+            Kind.REAL32,
+            "Compass offset: 0 while the drone demands a calibration",
+            _compass_offset,
+            news=(events.MagnetoCalibrationRequiredState,),
+            group=FACTS,
+            long=UNTOLD,
+            source=events.MagnetoCalibrationRequiredState.NAME,
+        )
+        for axis in "XYZ"
+    ),
+    *(
+        _fact(f"COMPASS_OFS{number}_{axis}", 0.0, "Compass offset: no such compass", Kind.REAL32)
+        for number in (2, 3)
+        for axis in "XYZ"
+    ),
+    *(_untold(f"INS_ACCOFFS_{axis}", "Accelerometer offset") for axis in "XYZ"),
+    *(_fact(f"RCMAP_{axis}", channel, "Channel of RC_CHANNELS_OVERRIDE") for axis, channel in _CHANNELS.items()),
+    *(
+        _fact(f"RC{channel}_{what}", value, "Of RC_CHANNELS_OVERRIDE", Kind.INT16, unit="PWM")
+        for channel in _CHANNELS.values()
+        for what, value in (("MIN", 1000), ("TRIM", 1500), ("MAX", 2000))
+    ),
+    *(_fact(f"RC{channel}_REVERSED", 0, "Channel reversed: no") for channel in _CHANNELS.values()),
+    _fact("FLTMODE_CH", 0, "Mode switch: none"),
+    *(_fact(f"FLTMODE{slot}", 5, "Mode switch: none; sticks fly Loiter") for slot in range(1, 7)),
+    _fact("SIMPLE", 0, "Simple mode: none"),
+    _fact("SUPER_SIMPLE", 0, "Super simple mode: none"),
+    Parameter(
+        "STAT_FLTTIME",
+        Kind.INT32,
+        "Total flight time",
+        lambda host: number(host.drone.product.state.total_flight_s),
+        news=(events.MotorFlightsStatusChanged,),
+        volatile=True,
+        unit="s",
+        group=FACTS,
+        source=events.MotorFlightsStatusChanged.NAME,
+    ),
+)
+
+ARDUPILOT_NAMES: tuple[Parameter, ...] = (*TWINS, *FENCE_ARDUPILOT, *FACTS_ARDUPILOT, *SETUP_ARDUPILOT)

@@ -1,0 +1,89 @@
+"""The list of fence items that clients send: which of them are good, and a fence in words. No I/O."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from anafi_mav.mavlink import dialect
+from anafi_mav.plans.zones import Circle, Polygon
+from anafi_mav.services.flavours import PX4, Flavour
+from anafi_mav.services.plan.plan_transfer import PlanKind
+from anafi_mav.vehicle.fence.fence import CIRCLES, HOME_CIRCLE, POLYGONS, fence_of, group_of, inclusion_word
+from anafi_mav.vehicle.fence.plan_items import Fault, PlanItem, place_fault
+
+SMALLEST_AREA = 1.0
+"""m². A polygon that encloses less is a line or a point: a slip, and nobody can be in it."""
+
+_RETURN_POINT = dialect.MAV_CMD_NAV_FENCE_RETURN_POINT
+
+
+def _is_void(item: PlanItem) -> bool:
+    """True for a circle of radius 0, in which no vehicle can be. Fence editors send it for a circle not yet drawn."""
+    return (item.command in CIRCLES or item.command == HOME_CIRCLE) and item.params[0] == 0.0
+
+
+class FenceKind(PlanKind):
+    """The list of fence items."""
+
+    mission_type = dialect.MAV_MISSION_TYPE_FENCE
+    name = "fence"
+
+    def check_item(self, item: PlanItem) -> Fault | None:
+        first, second = item.params[:2]
+        if item.command in POLYGONS:
+            if not (math.isfinite(first) and first == int(first) and 3 <= first <= self.capacity):
+                return Fault(dialect.MAV_MISSION_INVALID_PARAM1, f"{first:g} is no number of corners")
+        elif item.command in CIRCLES or item.command == HOME_CIRCLE:
+            if not (math.isfinite(first) and first >= 0.0):  # `taken` leaves one of 0 out
+                return Fault(dialect.MAV_MISSION_INVALID_PARAM1, f"{first:g} is no radius")
+        elif item.command != _RETURN_POINT:
+            return Fault(dialect.MAV_MISSION_UNSUPPORTED, f"command {item.command} is no part of a fence")
+        if not (math.isnan(second) or (math.isfinite(second) and second == int(second))):
+            return Fault(dialect.MAV_MISSION_INVALID_PARAM2, f"{second:g} is no inclusion group")
+        return None if item.command == HOME_CIRCLE or _is_void(item) else place_fault(item)
+
+    def taken(self, items: Sequence[PlanItem], flavour: Flavour) -> Sequence[PlanItem]:
+        return [item for item in items if not _is_void(item)]
+
+    def remarks(self, items: Sequence[PlanItem]) -> Sequence[str]:
+        return [f"Fence circle {number} ignored: radius 0" for number, item in enumerate(items) if _is_void(item)]
+
+    def check_plan(self, items: Sequence[PlanItem], flavour: Flavour = PX4) -> Fault | None:
+        number = 0
+        return_points = 0
+        while number < len(items):
+            item = items[number]
+            corners = int(item.params[0]) if item.command in POLYGONS else 1
+            same = items[number : number + corners]
+            # Only an inclusion polygon has a group (MAVLink common.xml).
+            keys = {(one.command, one.params[0], group_of(one) if POLYGONS.get(one.command) else 0) for one in same}
+            if item.command in POLYGONS and (len(same) < corners or len(keys) > 1):
+                reason = f"the polygon that begins with item {number} has not its {corners} corners"
+                return Fault(dialect.MAV_MISSION_INVALID_PARAM1, reason)
+            return_points += item.command == _RETURN_POINT
+            number += corners
+        if return_points > 1:
+            return Fault(dialect.MAV_MISSION_INVALID, "it has more than one return point")
+        for zone in fence_of(items).zones:
+            if isinstance(zone, Polygon) and zone.area < SMALLEST_AREA:
+                return Fault(dialect.MAV_MISSION_INVALID, f"the {zone.name} encloses nothing, or crosses itself")
+        return None
+
+
+def summary(items: Sequence[PlanItem]) -> str:
+    """A fence in a line, for people; what it asks for that is not done is told."""
+    zones = fence_of(items).zones
+    words = []
+    for inclusion in (True, False):
+        for kind, word in ((Polygon, "polygon"), (Circle, "circle")):
+            count = sum(isinstance(zone, kind) and zone.inclusion is inclusion for zone in zones)
+            if count:
+                words.append(f"{count} {inclusion_word(inclusion)} {word}{'s' if count > 1 else ''}")
+    line = ", ".join(words) or "no zones"
+    groups = [zone.group for zone in zones if zone.inclusion]
+    if len(groups) > len(set(groups)):
+        line += "; inside is what all inclusion zones of one group have in common"
+    if any(item.command == _RETURN_POINT for item in items):
+        line += "; the return point is kept and not used"
+    return line

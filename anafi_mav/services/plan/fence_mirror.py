@@ -1,0 +1,150 @@
+"""A circle that is handed to the drone as its own geofence: so it holds without the gateway, too.
+
+An ANAFI knows one fence: not farther from its centre than MaxDistance, while NoFlyOverMaxDistance is on. The centre is
+the controller's GPS, or else the take-off point. The radius is set while a client's fence says the same, and the one
+from before is set again when that fence is gone or disabled or when the centre moves away from it, unless another
+controller has changed it meanwhile. Zones that the drone cannot express are the gateway's to watch; so is this one.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from anafi_mav import geo
+from anafi_mav.drone import Range
+from anafi_mav.errors import AnafiMavError
+from anafi_mav.plans.zones import Circle
+from anafi_mav.services.service import Host
+from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.vehicle.fence.fence_watch import Reaction
+
+NEAR, FAR = 5.0, 10.0
+"""m between the drone's centre and the middle of a circle that count as the same place. While the drone stands its
+centre is a reading of GPS that wanders by some metres, and FAR ends what NEAR began; later NEAR counts alone."""
+
+SETTLED = 30.0
+"""s that a centre has to be near again before the circle is handed over once more: a pilot who walks has GPS, too."""
+
+SAME = 0.5
+"""m by which the drone's radius may differ from the one that was set."""
+
+RETRY = 30.0
+"""s until what the drone did not accept is tried again."""
+
+KEY = "fence_mirror"
+"""In the drone's memory: what was set, and what had been set before."""
+
+
+class FenceMirror:
+    """The drone's own geofence as far as the uploaded fence goes."""
+
+    def __init__(self, host: Host) -> None:
+        self._host = host
+        self._task: asyncio.Task[None] | None = None
+        self._failed: tuple[float | None, float] | None = None
+        """What was wanted when it failed, and when."""
+        self._moved_at = -math.inf
+        """When the centre was last seen elsewhere while the circle was the drone's."""
+
+    def link_down(self) -> None:
+        self._task = self._failed = None
+        self._moved_at = -math.inf
+
+    def update(self, now: float) -> None:
+        """See whether the drone's geofence has to change."""
+        if self._task is not None and not self._task.done():
+            return
+        known, wanted, away = self.wanted()
+        mirrored = self._remembered()
+        present = None if mirrored is None else mirrored["radius"]
+        if not known or wanted == present:
+            return
+        if self._failed is not None and self._failed[0] == wanted and now - self._failed[1] < RETRY:
+            return
+        if wanted is not None and now - self._moved_at < SETTLED:
+            return
+        if away is not None:
+            self._moved_at = now
+            self._host.text(Severity.WARNING, f"Drone's fence circle ends: centre is {away:.0f} m off")
+        self._task = self._host.spawn(self._change(wanted, mirrored, now))
+
+    def wanted(self) -> tuple[bool, float | None, float | None]:
+        """(known, radius, away): the radius that says what the fence says, None for none. Not known: leave all as it
+        is. `away` is how far the drone's centre is from the circle's (m), when that is why there is none."""
+        vehicle = self._host.vehicle
+        watch, state = vehicle.fence, self._host.drone.piloting.state
+        zones = [zone for zone in watch.zones.zones if zone.inclusion]
+        circle = zones[0] if len(zones) == 1 else None
+        if not isinstance(circle, Circle) or watch.action is Reaction.NONE:
+            return True, None, None
+        setting = state.max_distance
+        if setting is None or state.geofence is None or not setting.min <= circle.radius <= setting.max:
+            return True, None, None
+        middle = vehicle.home.point if circle.centre is None and vehicle.home is not None else circle.centre
+        centre = vehicle.geofence_centre
+        if centre is None or middle is None:
+            return False, None, None
+        away = geo.distance(*centre.point, *middle)
+        wanders = vehicle.on_ground and centre == vehicle.place
+        limit = FAR if wanders and self._remembered() is not None else NEAR
+        return (True, circle.radius, None) if away <= limit else (True, None, away)
+
+    async def _change(self, radius: float | None, mirrored: Mapping[str, Any] | None, now: float) -> None:
+        try:
+            if radius is None:
+                assert mirrored is not None
+                await self._restore(mirrored)
+            else:
+                await self._set(radius, mirrored)
+            self._failed = None
+        except AnafiMavError as error:
+            self._failed = radius, now
+            self._host.text(Severity.WARNING, f"The drone's own geofence could not be changed: {error}")
+
+    async def _set(self, radius: float, mirrored: Mapping[str, Any] | None) -> None:
+        piloting = self._host.drone.piloting
+        setting = piloting.state.max_distance
+        assert setting is not None
+        before = mirrored or {"distance": setting.current, "geofence": bool(piloting.state.geofence)}
+        # Remembered first: should the gateway end in between, the next one knows what to put back.
+        await self._remember({"radius": radius, "distance": before["distance"], "geofence": before["geofence"]})
+        confirmed = await piloting.set_max_distance(radius)
+        await piloting.set_geofence(True)
+        self._host.text(Severity.NOTICE, f"Fence: the drone keeps to {confirmed:g} m around its centre by itself, too")
+
+    async def _restore(self, mirrored: Mapping[str, Any]) -> None:
+        piloting = self._host.drone.piloting
+        state = piloting.state
+        setting: Range | None = state.max_distance
+        ours = setting is not None and abs(setting.current - mirrored["radius"]) < SAME and state.geofence
+        if ours:
+            if not mirrored["geofence"]:
+                await piloting.set_geofence(False)
+            await piloting.set_max_distance(mirrored["distance"])
+            word = "on" if mirrored["geofence"] else "off"
+            text = f"The drone's own geofence is what it was: {mirrored['distance']:g} m, {word}"
+        else:
+            text = "The drone's own geofence stays as it is: somebody has changed it"
+        await self._remember(None)
+        self._host.text(Severity.NOTICE, text)
+
+    def _remembered(self) -> Mapping[str, Any] | None:
+        entry = self._host.memory.settings.get(KEY)
+        if not isinstance(entry, dict):
+            return None
+        numbers = (entry.get("radius"), entry.get("distance"))
+        if not all(isinstance(number, int | float) and math.isfinite(number) for number in numbers):
+            return None
+        return entry if isinstance(entry.get("geofence"), bool) else None
+
+    async def _remember(self, entry: dict[str, Any] | None) -> None:
+        settings = self._host.memory.settings
+        if entry is None:
+            settings.pop(KEY, None)
+        else:
+            settings[KEY] = entry
+        if (problem := await self._host.memory.save()) is not None:
+            self._host.warn_throttled(problem)

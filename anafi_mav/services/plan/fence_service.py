@@ -1,0 +1,226 @@
+"""The fence enforced: watches where the drone is, acts at the boundary, tells everybody (MAVLink FENCE_STATUS).
+
+What is to be done is `fence_watch`'s to say; which zones there are, a client's upload (`plan_service`). Settings are
+parameters (`parameter_table_fence`).
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from anafi_mav.drone import events
+from anafi_mav.drone.events import PlayingState
+from anafi_mav.errors import AnafiMavError
+from anafi_mav.mavlink import dialect
+from anafi_mav.services.commands import Action, Altitude, Command, Effect
+from anafi_mav.services.plan.fence_mirror import FenceMirror
+from anafi_mav.services.service import Host, Service
+from anafi_mav.services.stream import Stream, Times
+from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.refusal import Refused
+from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.vehicle.base.subscriptions import Subscriptions
+from anafi_mav.vehicle.fence.fence_watch import CEILING, EVERYTHING, FLOOR, FenceWatch, Reaction, Sight, State
+from anafi_mav.vehicle.vehicle import Vehicle
+
+LOOK_EVERY = 0.5
+"""s between looks while the drone tells nothing new."""
+
+LOOK_SOONEST = 0.1
+"""s between looks for the sake of a new speed alone. An ANAFI tells it every 0.2 s."""
+
+MIRROR_EVERY = 1.0
+"""s between looks whether the drone's own geofence has to change."""
+
+DISABLE, ENABLE, DISABLE_FLOOR = 0.0, 1.0, 2.0
+"""param1 of MAV_CMD_DO_FENCE_ENABLE."""
+
+
+class FenceService(Service):
+    """Where the drone may be."""
+
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self._mirror = FenceMirror(host)
+        self._located = -math.inf
+        """When the drone last told its place."""
+        self._looked = self._mirrored = -math.inf
+        self._breach_ms = 0
+        self._told: tuple[Any, ...] | None = None
+        """What the newest FENCE_STATUS said."""
+
+    @property
+    def _watch(self) -> FenceWatch:
+        return self.host.vehicle.fence
+
+    def actions(self) -> Mapping[int, Action]:
+        # Not a query: who was refused a place before may ask for it again at once.
+        return {
+            dialect.MAV_CMD_DO_FENCE_ENABLE: Action(
+                self._enable, location=False, altitude=Altitude.UNUSED, effect=Effect.CHANGE
+            )
+        }
+
+    def streams(self) -> Mapping[int, Stream]:
+        return {dialect.MAVLINK_MSG_ID_FENCE_STATUS: Stream(self._status, every=1.0, on_change=True)}
+
+    def link_up(self) -> None:
+        self._located = -math.inf if self.host.vehicle.place is None else self.host.clock.monotonic()
+
+    def link_down(self) -> None:
+        self._watch.link_down()
+        self._mirror.link_down()
+        self._located = self._looked = self._mirrored = -math.inf
+
+    def subscriptions(self) -> Subscriptions:
+        return {
+            events.GpsLocationChanged: self._on_location,
+            events.SpeedChanged: self._on_speed,
+            events.FlyingStateChanged: lambda message, now: self._look(self.host.clock.monotonic()),
+        }
+
+    def _on_location(self, message: events.GpsLocationChanged, now: float) -> None:
+        self._located = self.host.clock.monotonic()
+        self._look(self._located)
+
+    def _on_speed(self, message: events.SpeedChanged, now: float) -> None:
+        if now - self._looked >= LOOK_SOONEST:
+            self._look(self.host.clock.monotonic())
+
+    def tick(self, now: float) -> None:
+        if now - self._looked >= LOOK_EVERY:
+            self._look(now)
+        if now - self._mirrored >= MIRROR_EVERY:
+            self._mirrored = now
+            self._mirror.update(now)
+
+    # Watching.
+
+    def _sight(self, now: float) -> Sight:
+        vehicle, drone = self.host.vehicle, self.host.drone
+        state, place, home = drone.piloting.state, vehicle.place, vehicle.home
+        velocity = (0.0, 0.0) if state.velocity is None else (state.velocity.north, state.velocity.east)
+        # A move, a plan and a setpoint's position end at a place that was judged before; an orbit turns.
+        goal = vehicle.offboard.goal
+        own_way = (
+            drone.piloting.move is not None
+            or (goal is not None and goal.place is not None)
+            or vehicle.mode in (FlightMode.MISSION, FlightMode.ORBIT)
+        )
+        return Sight(
+            None if place is None else place.point,
+            now - self._located,
+            velocity,
+            state.altitude,
+            None if state.max_altitude is None else state.max_altitude.current,
+            None if home is None else home.point,
+            airborne=not vehicle.on_ground and vehicle.flying_state is not None,
+            flying=vehicle.in_air and vehicle.mode is not FlightMode.RETURN,
+            steering=not own_way and state.plan != PlayingState.PLAYING,
+            orders=vehicle.orders,
+        )
+
+    def _look(self, now: float) -> None:
+        self._looked = now
+        watch, before = self._watch, self._watch.state
+        blind, breaches = watch.blind, watch.breaches
+        action = watch.look(self._sight(now), now)
+        if watch.blind and not blind:
+            self.host.text(Severity.WARNING, "Fence not watched: the drone does not know where it is")
+        if watch.breaches != breaches:
+            self._breach_ms = self.host.times().boot_ms
+        if action is not None:
+            self._begin(action)
+        elif before is State.OUTSIDE and watch.state is not State.OUTSIDE:
+            self.host.text(Severity.NOTICE, "Inside the fence again")
+        self._tell()
+
+    def _begin(self, action: Reaction) -> None:
+        verdict = self._watch.verdict
+        assert verdict is not None
+        head = "Fence ahead" if verdict.ahead else "Fence breach"
+        controller = self.host.drone.controller
+        if action is Reaction.WARN:
+            self.host.text(Severity.WARNING, f"{head}: {verdict.text}")
+        elif controller.pilot_has_source or controller.pilot_acquired_control:
+            # A person flies, or can at once: nothing of ours acts against him.
+            self.host.text(Severity.CRITICAL, f"{head}: {verdict.text}: pilot in control")
+            self._watch.done(self.host.vehicle.orders)
+        else:
+            self.host.text(Severity.CRITICAL, f"{head}: {verdict.text}: {action.value}")
+            self.host.run_action(FenceService, self._carry_out(action))  # in its turn: what is newer replaces it
+
+    async def _carry_out(self, action: Reaction) -> None:
+        vehicle = self.host.vehicle
+        try:
+            match action:
+                case Reaction.RETURN:
+                    await self._return_or_hold()
+                case Reaction.LAND:
+                    await vehicle.land()
+                case Reaction.TERMINATE:
+                    await vehicle.terminate()
+                case _:
+                    await vehicle.hold()
+        except AnafiMavError as error:
+            self.host.text(Severity.ERROR, f"Fence: {action.value} failed: {error}")
+            self._watch.failed(self.host.clock.monotonic())
+        except asyncio.CancelledError:
+            self._watch.failed(self.host.clock.monotonic())
+            raise
+        else:
+            self._watch.done(vehicle.orders)
+
+    async def _return_or_hold(self) -> None:
+        try:
+            await self.host.vehicle.return_home()
+        except AnafiMavError as error:
+            self.host.text(Severity.ERROR, f"Fence: no return: {error}: hold")
+            await self.host.vehicle.hold()
+
+    # Telling.
+
+    def _status(self, vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
+        """FENCE_STATUS, while there is a fence in force or one was breached."""
+        watch = self._watch
+        if not watch.in_force and watch.breaches == 0:
+            return None
+        return dialect.MAVLink_fence_status_message(
+            int(watch.state is State.OUTSIDE),
+            min(watch.breaches, 0xFFFF),
+            watch.breach.value,
+            self._breach_ms,
+            dialect.FENCE_MITIGATE_NONE,
+        )
+
+    def _tell(self) -> None:
+        """Everybody hears of a breach at once."""
+        watch = self._watch
+        now = (watch.state is State.OUTSIDE, watch.breaches)
+        if now != self._told:
+            first, self._told = self._told is None, now
+            message = self._status(self.host.vehicle, self.host.times())
+            if message is not None and not first:
+                self.host.send(message)
+
+    # Commands.
+
+    async def _enable(self, command: Command) -> None:
+        """MAV_CMD_DO_FENCE_ENABLE: param1 0 disable, 1 enable, 2 disable the floor; param2 FENCE_TYPE bits, 0 all."""
+        what, types = command.params[:2]
+        watch = self._watch
+        wanted = EVERYTHING if math.isnan(types) or types == 0.0 else types
+        if what == DISABLE_FLOOR:
+            wanted = FLOOR
+        if what not in (DISABLE, ENABLE, DISABLE_FLOOR) or wanted not in range(1, EVERYTHING + 1):
+            raise Refused("Fence: param1 is 0, 1 or 2, param2 bits of FENCE_TYPE", lasting=True)
+        if what != ENABLE and wanted == CEILING:
+            raise Refused("Fence: the drone always keeps to its ceiling; set another one instead", lasting=True)
+        if what == ENABLE:
+            watch.enable(int(wanted))
+        else:
+            watch.disable(int(wanted))
+        self._look(self.host.clock.monotonic())

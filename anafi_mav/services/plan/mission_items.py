@@ -1,0 +1,72 @@
+"""Items of a plan as MAVLink carries them, and back: between `plans.plan.Item` and `PlanItem`.
+
+A message has single precision and no word for "not set" but NaN, and INT32_MAX in x and y; places are kept to 1e-7
+degree, about a centimetre. What comes back from the wire is the shortest decimal number that means the same, so that
+a speed of 0.3 m/s is 0.3 again.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from anafi_mav.plans.plan import Item
+from anafi_mav.vehicle.fence.plan_items import DEGREES, UNSET, PlanItem, has_place
+
+LARGEST = float(np.finfo(np.float32).max)
+
+EXACT = 2.0**24
+"""Whole numbers below it are the same in single precision."""
+
+
+def to_wire(item: Item) -> PlanItem:
+    """An item as it travels. Raises `ValueError` for a number that MISSION_ITEM_INT cannot carry."""
+    one, two, three, four, five, six, seven = item.params
+    placed = has_place(item.command, item.frame)
+    params = _single(one), _single(two), _single(three), _single(four)
+    return PlanItem(
+        item.command,
+        item.frame,
+        params,
+        _integer(five, placed),
+        _integer(six, placed),
+        _single(seven),
+        int(item.autocontinue),
+    )
+
+
+def from_wire(item: PlanItem) -> Item:
+    """The item that travelled."""
+    scale = DEGREES if item.has_place else 1.0
+    one, two, three, four = (_shortest(value) for value in item.params)
+    five, six = (None if value == UNSET else value / scale for value in (item.x, item.y))
+    return Item(item.command, item.frame, (one, two, three, four, five, six, _shortest(item.z)), item.autocontinue != 0)
+
+
+def as_carried(item: Item) -> Item:
+    """What is left of an item when it has been a message. Raises `ValueError`."""
+    return from_wire(to_wire(item))
+
+
+def _single(value: float | None) -> float:
+    if value is None:
+        return math.nan
+    if abs(value) > LARGEST:
+        raise ValueError(f"{value:g} is too large a number for MAVLink")
+    return float(np.float32(value))
+
+
+def _integer(value: float | None, placed: bool) -> int:
+    if value is None:
+        return UNSET
+    whole = round(value * DEGREES if placed else value)
+    if not abs(whole) < UNSET:
+        raise ValueError(f"{value:g} is too large a number for MAVLink")
+    return whole
+
+
+def _shortest(value: float) -> float | None:
+    if value.is_integer() and abs(value) < EXACT:
+        return value
+    return None if math.isnan(value) else float(str(np.float32(value)))

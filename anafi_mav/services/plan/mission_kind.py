@@ -1,0 +1,158 @@
+"""Missions as the transfer machine sees them: what is taken, and how each flavour's clients count their items. No I/O.
+
+A mission is kept verbatim, in one numbering: the first real item is 0. ArduPilot's clients count home as item 0, so
+their lists, the targets of their jumps and whatever names an item to them are one further (MAVLink mission.md).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import msgspec
+
+from anafi_mav.mavlink import dialect
+from anafi_mav.plans.formats.parrot import Version
+from anafi_mav.plans.plan import Item, Loss
+from anafi_mav.plans.translation.translate import FaultKind, Report, examine
+from anafi_mav.services.flavours import PX4, Flavour
+from anafi_mav.services.plan.mission_items import from_wire
+from anafi_mav.services.plan.plan_transfer import PlanKind
+from anafi_mav.vehicle.fence.plan_items import Fault, PlanItem
+
+_HEADED = frozenset(
+    {
+        dialect.MAV_CMD_NAV_WAYPOINT,
+        dialect.MAV_CMD_NAV_LOITER_UNLIM,
+        dialect.MAV_CMD_NAV_LOITER_TIME,
+        dialect.MAV_CMD_NAV_LAND,
+        dialect.MAV_CMD_NAV_TAKEOFF,
+    }
+)
+"""Items whose param4 is a heading, which ArduPilot's clients leave at 0 without meaning north."""
+
+
+_RESULTS = {
+    FaultKind.COMMAND: dialect.MAV_MISSION_UNSUPPORTED,
+    FaultKind.FRAME: dialect.MAV_MISSION_UNSUPPORTED_FRAME,
+    FaultKind.PLAN: dialect.MAV_MISSION_INVALID,
+}
+
+_NOTHING = Report((), (), ())
+
+
+FIRST_LABEL = 1
+"""The number of our item 0 in texts. On a station's map item 0 is home, whether or not it is sent to the vehicle
+(QGroundControl FirmwarePlugin::sendHomePositionToVehicle): seq + 1 for PX4's clients, seq for ArduPilot's."""
+
+
+def offset(flavour: Flavour) -> int:
+    """Return the seq of our item 0 in messages to clients of this flavour."""
+    return 1 if flavour.zero_home else 0
+
+
+def _with_param(item: PlanItem, number: int, value: float) -> PlanItem:
+    params = list(item.params)
+    params[number - 1] = value
+    one, two, three, four = params
+    return msgspec.structs.replace(item, params=(one, two, three, four))
+
+
+def _shifted(item: PlanItem, by: int) -> PlanItem:
+    """An item in a list that counts `by` more before it."""
+    if item.command != dialect.MAV_CMD_DO_JUMP or not math.isfinite(item.params[0]):
+        return item
+    return _with_param(item, 1, item.params[0] + by)
+
+
+@dataclass(frozen=True)
+class Examined:
+    """A mission, and what it is to the drone."""
+
+    items: Sequence[PlanItem]
+    neutral: tuple[Item, ...]
+    report: Report
+
+    def words(self, first: int) -> str:
+        """For people who call the first item `first`: what of it is flown, and how."""
+        if not self.items:
+            return "No mission"
+        report = self.report
+        words = f"Mission: {len(self.items)} items"
+        if report.stepped:
+            words += (
+                f"; some are flown by the gateway, {_some(report.stepped, first)}. Without it what follows is not flown"
+            )
+        if report.approximations:
+            words += f"; not exactly as it says: {_some(report.approximations, first)}"
+        return words
+
+
+def _some(losses: Sequence[Loss], first: int) -> str:
+    loss = losses[0]
+    where = "" if loss.item is None else f"item {loss.item + first}: "
+    more = f" and {len(losses) - 1} more" if len(losses) > 1 else ""
+    return f"{where}{loss.what}{more}"
+
+
+class MissionKind(PlanKind):
+    """The list of mission items. `home` makes ArduPilot's item 0, `version` is of the file that the drone flies."""
+
+    mission_type = dialect.MAV_MISSION_TYPE_MISSION
+    name = "mission"
+
+    def __init__(self, home: Callable[[], PlanItem], version: Callable[[], Version]) -> None:
+        self._home = home
+        self._version = version
+        self._known = Examined((), (), _NOTHING)
+
+    def examine(self, items: Sequence[PlanItem], flavour: Flavour = PX4) -> Fault | None:
+        """What is wrong with good items together; a reason numbers them as clients of this flavour do.
+
+        This is no `check_plan`: 5 000 items take half a second, which is for a thread.
+        """
+        report = self.examined(items).report
+        if not report.faults:
+            return None
+        fault = report.faults[0]
+        result = _RESULTS.get(fault.kind)
+        if result is None:
+            result = dialect.MAV_MISSION_INVALID_PARAM1 - 1 + (fault.param or 1)
+        return Fault(result, f"item {fault.item + FIRST_LABEL}: {fault.reason}")
+
+    def examined(self, items: Sequence[PlanItem]) -> Examined:
+        """A mission, and what it is to the drone; the last one is known, whichever thread asked."""
+        known = self._known
+        if known.items is not items:
+            neutral = tuple(map(from_wire, items))
+            known = Examined(items, neutral, examine(neutral, self._version()) if items else _NOTHING)
+            self._known = known
+        return known
+
+    def shown(self, items: Sequence[PlanItem], flavour: Flavour) -> Sequence[PlanItem]:
+        if not items or not flavour.zero_home:
+            return items
+        return (self._home(), *(_shifted(_with_zero(item), 1) for item in items))
+
+    def taken(self, items: Sequence[PlanItem], flavour: Flavour) -> Sequence[PlanItem]:
+        if flavour.always_continues:
+            items = [msgspec.structs.replace(item, autocontinue=1) for item in items]
+        if not flavour.zero_home:
+            return items
+        return [_shifted(_without_zero(item), -1) for item in items[1:]]
+
+    def label(self, seq: int, flavour: Flavour) -> int:
+        return seq - offset(flavour) + FIRST_LABEL
+
+    def always_shown(self, seq: int, flavour: Flavour) -> PlanItem | None:
+        """dronekit reads home as item 0, and waits for it when there is nothing else; ArduCopter always has it."""
+        return self._home() if flavour.zero_home and seq == 0 else None
+
+
+def _without_zero(item: PlanItem) -> PlanItem:
+    return _with_param(item, 4, math.nan) if item.command in _HEADED and item.params[3] == 0.0 else item
+
+
+def _with_zero(item: PlanItem) -> PlanItem:
+    return _with_param(item, 4, 0.0) if item.command in _HEADED and math.isnan(item.params[3]) else item

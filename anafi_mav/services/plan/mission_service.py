@@ -1,0 +1,216 @@
+"""Missions as clients order and follow them: mode and commands, MISSION_CURRENT, MISSION_ITEM_REACHED.
+
+The list itself is `plan_service`'s, how it is flown `mission_flight`'s. Conformance A4, B2, C5 and items 49, 72 to 74,
+122. Commands: MAVLink common.xml MAV_CMD_MISSION_START, MAV_CMD_DO_SET_MISSION_CURRENT.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Hashable, Mapping
+
+from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.channel import Channel
+from anafi_mav.mavlink.node import Inbound
+from anafi_mav.services.commands import Action, Altitude, Command, Effect, effect_of_mode
+from anafi_mav.services.flavours import Flavour, flavour_of
+from anafi_mav.services.plan.mission_kind import FIRST_LABEL, offset
+from anafi_mav.services.service import Host, MessageHandler, Service, client_of
+from anafi_mav.services.stream import Stream, Times
+from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.refusal import Refused
+from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.vehicle.base.subscriptions import Subscriptions
+from anafi_mav.vehicle.mission.progress import MAVLINK_STATES, State
+from anafi_mav.vehicle.mission.record import Record
+from anafi_mav.vehicle.vehicle import Vehicle
+
+NO_TOTAL = 0xFFFF
+"""`total` of a MISSION_CURRENT where there is no mission (common.xml)."""
+
+KEEP = -1.0
+"""The item of a MAV_CMD_DO_SET_MISSION_CURRENT that changes none."""
+
+SAVE_EVERY = 5.0
+"""s between two writings of how far a mission is: enough to know the drone's plan again, easy on a memory card."""
+
+IN_MISSION_MODE, NOT_IN_MISSION_MODE = 1, 2
+"""`mission_mode` of MISSION_CURRENT (common.xml)."""
+
+RECORD = "mission"
+"""What the record is called in the drone's file."""
+
+
+class MissionService(Service):
+    """The mission of one system."""
+
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self._flight = host.vehicle.mission
+        self._flight.news = self._tell
+        self._flight.reached = self._tell_reached
+        self._flight.say = self._say
+        self._flight.first_number = lambda client: FIRST_LABEL
+        self._flight.spawn = host.spawn
+        self._flight.keeper.write = self._remember
+        self._saved = -math.inf
+        self._unsaved = False
+        self._sent: Mapping[bool, tuple[int, ...]] = {}
+        """What `_fields` was when MISSION_CURRENT last announced a change; empty: the next one leaves anyway."""
+        self._sent_item: int | None = None
+
+    def messages(self) -> Mapping[int, MessageHandler]:
+        return {dialect.MAVLINK_MSG_ID_MISSION_SET_CURRENT: self._set_current}
+
+    def actions(self) -> Mapping[int, Action]:
+        return {
+            dialect.MAV_CMD_MISSION_START: Action(
+                self._start,
+                location=False,
+                altitude=Altitude.UNUSED,
+                effect=effect_of_mode,
+                mode=lambda command: FlightMode.MISSION,
+            ),
+            dialect.MAV_CMD_DO_SET_MISSION_CURRENT: Action(
+                self._choose, location=False, altitude=Altitude.UNUSED, effect=Effect.CHANGE
+            ),
+        }
+
+    def streams(self) -> Mapping[int, Stream]:
+        return {dialect.MAVLINK_MSG_ID_MISSION_CURRENT: Stream(self._current, every=1.0, flavoured=True)}
+
+    def link_up(self) -> None:
+        memory = self.host.memory
+        kept = memory.settings.get(RECORD)
+        record = Record.read(kept, self._flight.progress.items)
+        if kept is not None and record is None:
+            self.host.text(Severity.WARNING, f"flown mission in {memory.path}: ignored, it is not of the mission there")
+        self._flight.link_up(record)
+
+    def link_down(self) -> None:
+        self._sent_item = None
+        self._flight.link_down()  # before anybody is told that something has ended: the drone may fly on
+
+    def subscriptions(self) -> Subscriptions:
+        return self._flight.subscriptions()
+
+    def state_changed(self) -> None:
+        self._flight.on_vehicle()
+        self._tell()
+
+    def tick(self, now: float) -> None:
+        if self._unsaved and now - self._saved >= SAVE_EVERY:
+            self._unsaved, self._saved = False, now
+            self.host.spawn(self._save())
+
+    # Orders.
+
+    async def _start(self, command: Command) -> None:
+        """MAV_CMD_MISSION_START: the mission begins or goes on, as by its mode. Only the whole of it."""
+        if any(value not in (0.0, KEEP) and not math.isnan(value) for value in command.params[:2]):
+            raise Refused("Mission refused: a part of it cannot be started, set the current item first", lasting=True)
+        await self.host.vehicle.set_mode(FlightMode.MISSION, command.right)
+
+    async def _choose(self, command: Command) -> None:
+        """MAV_CMD_DO_SET_MISSION_CURRENT: param1 the item, -1 none; param2 1 begins anew after the end."""
+        item, anew = command.params[:2]
+        flight = self._flight
+        await flight.storing.over()
+        self._sent = {}
+        if not flight.there:
+            raise Refused("Current item refused: there is no mission", lasting=True)
+        if math.isinf(item) or (not math.isnan(item) and item != int(item)):
+            raise Refused("Current item refused: param1 is the number of an item", lasting=True)
+        if math.isnan(item) or item == KEEP:
+            if anew == 1.0:
+                await flight.choose(command.client, 0)
+            return
+        await flight.choose(command.client, _ours(int(item), command.client))
+
+    def _set_current(self, inbound: Inbound) -> None:
+        """MISSION_SET_CURRENT: MISSION_CURRENT answers it, or a text."""
+        client = client_of(inbound)
+        self._sent = {}
+        self.host.run_action(client, self._flight.choose(client, _ours(inbound.message.seq, client)))
+
+    # What is told.
+
+    def _current(self, vehicle: Vehicle, times: Times) -> dialect.MAVLink_message:
+        return dialect.MAVLink_mission_current_message(*_fields(vehicle)[times.flavour.zero_home])
+
+    def _tell(self) -> None:
+        """Send MISSION_CURRENT to the clients for whom a field has changed; then, for a new item, a HEARTBEAT.
+
+        QGroundControl takes an item for flown to when a HEARTBEAT in mode Mission follows it
+        (MissionManager::_handleHeartbeat). Without one it offers to resume a mission that is complete.
+        """
+        vehicle = self.host.vehicle
+        fields, before = _fields(vehicle), self._sent
+        if fields == before:
+            return
+        self._sent = fields
+
+        def changed(flavour: Flavour) -> dialect.MAVLink_message | None:
+            its = fields[flavour.zero_home]
+            return None if its == before.get(flavour.zero_home) else dialect.MAVLink_mission_current_message(*its)
+
+        self.host.send_by_flavour(changed)
+        current = vehicle.mission.progress.current
+        if vehicle.mode is FlightMode.MISSION and current != self._sent_item:
+            self.host.send_heartbeat()
+        self._sent_item = current
+
+    def _tell_reached(self, item: int) -> None:
+        self.host.send_by_flavour(lambda flavour: dialect.MAVLink_mission_item_reached_message(item + offset(flavour)))
+
+    def _say(self, severity: Severity, text: Callable[[int], str]) -> None:
+        """A text to all, with the items' numbers as maps show them."""
+        self.host.text(severity, text(FIRST_LABEL))
+
+    # What outlives the gateway.
+
+    def _remember(self, record: Record | None) -> None:
+        settings = self.host.memory.settings
+        if record is None:
+            if settings.pop(RECORD, None) is None:
+                return
+        else:
+            settings[RECORD] = record.written
+        self._unsaved = True
+        if not self._flight.flying:  # the gateway may be about to end
+            self._saved = -math.inf
+            self.tick(self.host.clock.monotonic())
+
+    async def _save(self) -> None:
+        if (problem := await self.host.memory.save()) is not None:
+            self.host.warn_throttled(problem)
+
+
+def _fields(vehicle: Vehicle) -> Mapping[bool, tuple[int, ...]]:
+    """Return the fields of MISSION_CURRENT by `Flavour.zero_home` of its receivers."""
+    progress, ids = vehicle.mission.progress, vehicle.plan_ids
+    there = progress.state is not State.NONE
+    mode = IN_MISSION_MODE if vehicle.mode is FlightMode.MISSION else NOT_IN_MISSION_MODE
+    same = (
+        len(progress.items) if there else NO_TOTAL,
+        MAVLINK_STATES[progress.state],
+        mode if there else 0,
+        ids.get(dialect.MAV_MISSION_TYPE_MISSION, 0),
+        ids.get(dialect.MAV_MISSION_TYPE_FENCE, 0),
+        ids.get(dialect.MAV_MISSION_TYPE_RALLY, 0),
+    )
+    # ArduPilot is at home, its item 0, until the mission begins or a client sets another one.
+    behind_home = progress.current + 1 if there and not progress.is_untouched else 0
+    return {False: (progress.current if there else 0, *same), True: (behind_home, *same)}
+
+
+def _first_number(client: Hashable) -> int:
+    """What a client calls the first item."""
+    channel = client[0] if isinstance(client, tuple) else None
+    return offset(flavour_of(channel)) if isinstance(channel, Channel) else 0
+
+
+def _ours(number: int, client: Hashable) -> int:
+    """An item by the number that a client gives it; ArduPilot's home, which it begins with, is the first."""
+    first = _first_number(client)
+    return max(number - first, 0) if number >= 0 else number

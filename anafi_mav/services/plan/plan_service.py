@@ -1,0 +1,246 @@
+"""The mission protocol on the wire: a desk of transfers (`plan_desk`, without I/O), its clock, its channels, its file.
+
+A plan is stored before its upload is acknowledged, and is what the vehicle goes by from then on: `Vehicle.fence` and
+`Vehicle.rally` take theirs.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
+from functools import partial
+
+from anafi_mav import units
+from anafi_mav.clock import Alarm
+from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.channel import Channel
+from anafi_mav.mavlink.node import Inbound
+from anafi_mav.plans.formats.parrot import Version
+from anafi_mav.services.command.guided_service import fly_item, is_guided_item
+from anafi_mav.services.files import Query, ServedFile
+from anafi_mav.services.flavours import PX4, Flavour, flavour_of
+from anafi_mav.services.memory import NOT_KEPT
+from anafi_mav.services.plan import plan_files
+from anafi_mav.services.plan.fence_kind import FenceKind, summary
+from anafi_mav.services.plan.mission_kind import MissionKind
+from anafi_mav.services.plan.plan_protocol import MESSAGES, PlanDesk
+from anafi_mav.services.plan.plan_transfer import Changed, Commit, Effect, Peer, PlanKind, Reply, Say
+from anafi_mav.services.plan.rally_kind import RallyKind
+from anafi_mav.services.service import Host, MessageHandler, Service, client_of
+from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.vehicle.fence.plan_items import MAX_ITEMS, Fault, PlanItem
+from anafi_mav.vehicle.fence.rally import Return
+
+logger = logging.getLogger(__name__)
+
+_ITEMS = (dialect.MAVLINK_MSG_ID_MISSION_ITEM, dialect.MAVLINK_MSG_ID_MISSION_ITEM_INT)
+
+
+class _ChannelPeer(Peer, frozen=True):
+    """A client and the way to it."""
+
+    channel: Channel
+
+
+class PlanService(Service):
+    """Missions, fences and rally points: up, down and away."""
+
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self._mission = MissionKind(self._home_item, self._version)
+        self._desk = PlanDesk([self._mission, FenceKind(), RallyKind()])
+        self._alarm = Alarm(self._expire)
+        self._due = 0.0
+        """When the timer ends."""
+
+    def capabilities(self) -> int:
+        return (
+            dialect.MAV_PROTOCOL_CAPABILITY_MISSION_INT
+            | dialect.MAV_PROTOCOL_CAPABILITY_MISSION_FLOAT  # MISSION_ITEM and MISSION_REQUEST are accepted too
+            | dialect.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
+            | dialect.MAV_PROTOCOL_CAPABILITY_MISSION_RALLY
+        )
+
+    def messages(self) -> Mapping[int, MessageHandler]:
+        return dict.fromkeys(MESSAGES, self._receive)
+
+    def files(self) -> Mapping[str, ServedFile]:
+        return {
+            path: ServedFile(
+                partial(self._packed, kind),
+                packed=True,
+                write=partial(self._written, kind),
+                room=plan_files.size_of(MAX_ITEMS),
+            )
+            for kind, path in plan_files.PATHS.items()
+        }
+
+    def _packed(self, kind: int, flavour: Flavour, query: Query) -> bytes:
+        transfer = self._desk.transfers[kind]
+        return plan_files.pack_plan(transfer.kind.shown(transfer.items, flavour), kind)
+
+    def _written(self, kind: int, inbound: Inbound, content: bytes) -> bool:
+        """A client has written the file of a list. What is wrong with it is a text; the list then stays."""
+        transfer = self._desk.transfers[kind]
+        items = plan_files.unpack_plan(content, kind)
+        if isinstance(items, Fault):
+            outcome: list[Effect] | Fault = items
+        else:
+            outcome = transfer.replace(items, self._peer(inbound), self.host.clock.monotonic())
+        if isinstance(outcome, Fault):
+            self.host.warn_throttled(f"{transfer.kind.name.capitalize()} refused: {outcome.reason}")
+            return False
+        self._perform(outcome)
+        return True
+
+    def _peer(self, inbound: Inbound) -> _ChannelPeer:
+        return _ChannelPeer(
+            client_of(inbound), inbound.sysid, inbound.compid, flavour_of(inbound.channel), inbound.channel
+        )
+
+    def link_up(self) -> None:
+        memory = self.host.memory
+        for kind, transfer in self._desk.transfers.items():
+            items = memory.plans.get(kind, ())
+            wrong = self._wrong(transfer.kind, items)
+            if wrong is not None:
+                self.host.text(Severity.WARNING, f"{transfer.kind.name} in {memory.path}: ignored, {wrong}")
+            transfer.put(() if wrong is not None else items)
+            self._take(kind)
+
+    def _wrong(self, kind: PlanKind, items: Sequence[PlanItem]) -> str | None:
+        """Why a plan that was kept is not taken."""
+        for number, item in enumerate(items):
+            if (fault := kind.check_item(item)) is not None:
+                return f"item {kind.label(number, PX4)}: {fault.reason}"
+        fault = self._mission.examine(items) if kind is self._mission else kind.check_plan(items)
+        return None if fault is None else fault.reason
+
+    def link_down(self) -> None:
+        self._desk.reset()
+        self._set_timer()
+
+    def channel_closed(self, channel: Channel) -> None:
+        self._desk.leave(lambda client: isinstance(client, tuple) and client[0] is channel)
+        self._set_timer()
+
+    # What arrives.
+
+    def _receive(self, inbound: Inbound) -> None:
+        message = inbound.message
+        if message.get_msgId() in _ITEMS and is_guided_item(message):
+            fly_item(self.host, inbound)
+            return
+        self._perform(self._desk.receive(message, self._peer(inbound), self.host.clock.monotonic()))
+
+    def _perform(self, effects: Sequence[Effect]) -> None:
+        for effect in effects:
+            match effect:
+                case Reply():
+                    self._reply(effect)
+                case Commit():
+                    self.host.spawn(self._store(effect))
+                case Changed():
+                    self._changed(effect.mission_type)
+                case Say():
+                    if effect.severity <= Severity.WARNING:
+                        self.host.warn_throttled(effect.text)
+                    else:
+                        self.host.text(effect.severity, effect.text)
+        self._set_timer()
+
+    def _reply(self, reply: Reply) -> None:
+        assert isinstance(reply.peer, _ChannelPeer)
+        self.host.send(reply.message, reply.peer.channel)
+
+    async def _store(self, commit: Commit) -> None:
+        concerned = self._mission.mission_type in commit.plans
+        with self.host.vehicle.mission.storing.going_on() if concerned else nullcontext():
+            try:
+                fault = await self._put(commit)
+            except Exception:
+                # Whatever went wrong, clients must not wait for ever for what comes after it.
+                logger.exception("%s: a plan could not be stored", self.host.drone.name)
+                fault = Fault(dialect.MAV_MISSION_ERROR, "the gateway failed to store it")
+            if fault is not None:
+                transfer = self._desk.transfers.get(commit.mission_type)
+                what = "Plans" if transfer is None else transfer.kind.name.capitalize()
+                self.host.warn_throttled(f"{what} refused: {fault.reason}")
+            self._perform(self._desk.stored(commit, self.host.clock.monotonic(), fault))
+
+    async def _put(self, commit: Commit) -> Fault | None:
+        """Keep plans; what is wrong with the mission, if anything is."""
+        mission = commit.plans.get(self._mission.mission_type)
+        if mission:
+            fault = await asyncio.to_thread(self._mission.examine, mission, commit.peer.flavour)
+            if fault is not None:
+                return fault
+        for kind, items in commit.plans.items():
+            self.host.memory.put(kind, items)
+        problem = await self.host.memory.save()
+        if problem is not None:
+            logger.warning("%s: %s", self.host.drone.name, problem)
+            assert isinstance(commit.peer, _ChannelPeer)
+            self.host.text(Severity.WARNING, NOT_KEPT, commit.peer.channel)
+        return None
+
+    def _set_timer(self) -> None:
+        """Come back when something is to be said again.
+
+        A timer that ends too early is let run, for the deadline goes on with each item of an upload; it looks again.
+        """
+        deadline = self._desk.deadline()
+        if self._alarm.is_set and deadline is not None and self._due <= deadline:
+            return
+        self._alarm.cancel()
+        if deadline is not None:
+            self._alarm.set_in(max(deadline - self.host.clock.monotonic(), 0.0))
+            self._due = deadline
+
+    def _expire(self) -> None:
+        self._perform(self._desk.expire(self.host.clock.monotonic()))
+
+    # What missions need.
+
+    def _home_item(self) -> PlanItem:
+        """Home as an item; all zeros while it is not known."""
+        vehicle = self.host.vehicle
+        home = vehicle.home
+        x, y = (0, 0) if home is None else map(units.deg_e7, home.point)
+        z = vehicle.height.amsl(0.0)
+        return PlanItem(
+            dialect.MAV_CMD_NAV_WAYPOINT, dialect.MAV_FRAME_GLOBAL, (0.0, 0.0, 0.0, 0.0), x, y, 0.0 if z is None else z
+        )
+
+    def _version(self) -> Version:
+        return 1 if self.host.drone.flight_plan.version == 1 else 2
+
+    # Plans in force.
+
+    def _changed(self, kind: int) -> None:
+        """A plan was uploaded: the vehicle goes by it, everybody is told."""
+        mission = self.host.vehicle.mission
+        if kind == MissionKind.mission_type and self._desk.transfers[kind].opaque_id == mission.identity:
+            mission.taken_again()
+        self._take(kind)
+        self.host.vehicle.mission.news()
+
+    def _take(self, kind: int) -> None:
+        vehicle, transfer = self.host.vehicle, self._desk.transfers[kind]
+        items, identity = transfer.items, transfer.opaque_id
+        vehicle.plan_ids[kind] = identity
+        if kind == MissionKind.mission_type:
+            if identity != vehicle.mission.identity:
+                examined = self._mission.examined(items)
+                vehicle.mission.say(Severity.INFO, examined.words)
+                vehicle.mission.take(examined.neutral, identity)
+        elif kind == FenceKind.mission_type:
+            if items != vehicle.fence.items:
+                self.host.text(Severity.INFO, f"Fence: {summary(items)}" if items else "No fence")
+            vehicle.fence.take(items)
+        elif kind == RallyKind.mission_type:
+            if items and vehicle.rally.purpose is Return.HOME and items != vehicle.rally.items:
+                self.host.text(Severity.INFO, f"Rally points not used: RTL_TYPE is home ({len(items)})")
+            vehicle.rally.take(items)

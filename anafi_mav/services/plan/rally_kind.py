@@ -1,0 +1,21 @@
+"""The list of rally points that clients send: which of its items are good. No I/O."""
+
+from __future__ import annotations
+
+from anafi_mav.mavlink import dialect
+from anafi_mav.services.plan.plan_transfer import PlanKind
+from anafi_mav.vehicle.fence.plan_items import Fault, PlanItem, place_fault
+
+
+class RallyKind(PlanKind):
+    """The list of rally points."""
+
+    mission_type = dialect.MAV_MISSION_TYPE_RALLY
+    name = "rally points"
+
+    def check_item(self, item: PlanItem) -> Fault | None:
+        if item.command != dialect.MAV_CMD_NAV_RALLY_POINT:
+            return Fault(dialect.MAV_MISSION_UNSUPPORTED, f"command {item.command} is no rally point")
+        if not abs(item.z) <= 10_000.0:
+            return Fault(dialect.MAV_MISSION_INVALID_PARAM7, f"{item.z:g} m is no height")
+        return place_fault(item)

@@ -1,0 +1,173 @@
+"""Rally points in use: while the drone flies, the chosen one is its custom home, so that a return needs no gateway.
+
+Only where RTL_TYPE says so. What the drone preferred before comes back when it has landed, and when the rally points
+are gone. A custom home that somebody else chose is left alone.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+
+from anafi_mav.drone import Position
+from anafi_mav.drone.events import RthHomeType
+from anafi_mav.errors import AnafiMavError
+from anafi_mav.services.service import Host, Service
+from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.vehicle.fence.rally import RallyPoint, RallyPoints, Return
+
+LOOK_EVERY = 1.0
+"""s between two choices: the drone's place comes as often."""
+
+REJECTED_FOR = 30.0
+"""s for which a point that the drone did not accept is not proposed again: it may be too far away only for now."""
+
+SAME_PLACE = 1e-6
+"""deg, 0.1 m: what a drone repeats of a place that it was given is closer to it than that."""
+
+MIRROR = "rally_home"
+"""In the drone's memory: the home type that the drone preferred before a rally point became its home."""
+
+
+class RallyService(Service):
+    """Where a return ends, as far as rally points decide it."""
+
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self._looked = -math.inf
+        self._task: asyncio.Task[None] | None = None
+        self._chosen: RallyPoint | None = None
+        """The drone's custom home by our doing."""
+        self._given: Position | None = None
+        """Where the drone's custom home was when we last gave it one: another place is somebody's choice since."""
+        self._rejected: dict[RallyPoint, float] = {}
+        """Until when they are not proposed again."""
+
+    @property
+    def _rally(self) -> RallyPoints:
+        return self.host.vehicle.rally
+
+    def link_up(self) -> None:
+        self._chosen, self._given = None, self.host.drone.home.state.custom_location
+
+    def link_down(self) -> None:
+        self._task = self._chosen = self._given = None
+        self._rejected.clear()
+        self._looked = -math.inf
+
+    def tick(self, now: float) -> None:
+        if now - self._looked < LOOK_EVERY:
+            return
+        self._looked = now
+        if self._task is not None and not self._task.done():
+            return
+        vehicle = self.host.vehicle
+        if self._taken_over():
+            self._task = self.host.spawn(self._leave())
+            return
+        if vehicle.mode is FlightMode.RETURN or not (vehicle.in_air or vehicle.on_ground):
+            return  # a return under way, or a landing, keeps its end
+        chosen = self._choose(now) if vehicle.in_air else None
+        if chosen is not None:
+            if chosen != self._chosen and self._may_choose():
+                self._task = self.host.spawn(self._use(chosen, now))
+        elif self._before() is not None:
+            self._task = self.host.spawn(self._leave())
+
+    def _choose(self, now: float) -> RallyPoint | None:
+        vehicle = self.host.vehicle
+        if self._rally.purpose is Return.HOME or not self._rally.items or vehicle.place is None:
+            return None
+        takeoff = self.host.drone.home.state.takeoff_location
+        home = None if takeoff is None else (takeoff.latitude, takeoff.longitude)
+        self._rejected = {point: until for point, until in self._rejected.items() if now < until}
+        zones = vehicle.fence.zones
+
+        def usable(point: RallyPoint) -> bool:
+            inside = zones.margin((point.latitude, point.longitude), home).metres >= 0.0
+            return inside and point not in self._rejected
+
+        return self._rally.choose(vehicle.place.point, home, vehicle.height.takeoff_amsl, self._chosen, usable)
+
+    def _may_choose(self) -> bool:
+        """The drone can have a custom home, and has none that somebody else chose."""
+        state = self.host.drone.home.state
+        if state.preferred_type is None or state.types is None or RthHomeType.CUSTOM not in state.types:
+            return False
+        if state.preferred_type == RthHomeType.CUSTOM and self._before() is None:
+            self.host.warn_throttled("Rally points not used: the drone returns to the home that was set")
+            return False
+        return True
+
+    def _taken_over(self) -> bool:
+        """Somebody else has chosen a custom home since we did."""
+        state, given = self.host.drone.home.state, self._given
+        chosen = state.custom_location
+        if self._before() is None or state.preferred_type != RthHomeType.CUSTOM or chosen is None:
+            return False
+        return (
+            given is None
+            or max(abs(chosen.latitude - given.latitude), abs(chosen.longitude - given.longitude)) > SAME_PLACE
+        )
+
+    async def _use(self, point: RallyPoint, now: float) -> None:
+        home = self.host.drone.home
+        async with self.host.vehicle.home_choice:
+            if self._taken_over() or not self._may_choose():
+                return  # while we waited; the next look makes something of it
+            try:
+                if self._before() is None:
+                    assert home.state.preferred_type is not None
+                    self._given = home.state.custom_location
+                    await self._remember(home.state.preferred_type.name)
+                await home.set_preferred_type(RthHomeType.CUSTOM)
+                self._given = await home.set_custom_location(point.latitude, point.longitude, point.ato)
+            except AnafiMavError as error:
+                self._rejected[point] = now + REJECTED_FOR
+                self._chosen = None
+                self.host.text(Severity.WARNING, f"Rally point {point.number} not used: {error}")
+                # Not at the next tick: a return in between would go to the custom home of some other day.
+                await self._restore()
+            else:
+                self._chosen = point
+                self.host.vehicle.return_end.set_home(self._given, f"rally point {point.number}")
+                self.host.text(Severity.NOTICE, f"Returns end at rally point {point.number}")
+
+    async def _leave(self) -> None:
+        async with self.host.vehicle.home_choice:
+            await self._restore()
+
+    async def _restore(self) -> None:
+        """What the drone preferred before us counts again; a home that somebody has chosen since stays his."""
+        home, before = self.host.drone.home, self._before()
+        if before is None:
+            return
+        self._chosen = None
+        taken_over = self._taken_over()
+        try:
+            if home.state.preferred_type == RthHomeType.CUSTOM and not taken_over:
+                await home.set_preferred_type(before)
+        except AnafiMavError as error:
+            self.host.warn_throttled(f"The drone's home type could not be put back: {error}")
+            return
+        await self._remember(None)
+        if not (taken_over or self.host.vehicle.on_ground):
+            self.host.text(Severity.NOTICE, "Returns end at home")
+
+    def _before(self) -> RthHomeType | None:
+        """What the drone preferred before we changed it; None: we have not."""
+        name = self.host.memory.settings.get(MIRROR)
+        return RthHomeType.__members__.get(name) if isinstance(name, str) else None
+
+    async def _remember(self, name: str | None) -> None:
+        settings = self.host.memory.settings
+        if name is None:
+            settings.pop(MIRROR, None)
+        else:
+            settings[MIRROR] = name
+        await self._save()
+
+    async def _save(self) -> None:
+        if (problem := await self.host.memory.save()) is not None:
+            self.host.warn_throttled(problem)

@@ -1,0 +1,1 @@
+"""Setpoints and sticks of clients: offboard, manual control, and the target to follow."""

@@ -1,0 +1,62 @@
+"""Setpoints of programs as they arrive, and what of them is being flown, told back (MAVLink offboard.md, C16).
+
+What the messages mean is in `setpoint_messages`, how they are flown in `vehicle.offboard.flight`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.node import Inbound
+from anafi_mav.services.flavours import flavour_of
+from anafi_mav.services.service import Host, MessageHandler, Service, client_of
+from anafi_mav.services.setpoint.offboard_echo import STREAMS
+from anafi_mav.services.setpoint.setpoint_messages import attitude_setpoint, global_setpoint, local_setpoint
+from anafi_mav.services.stream import Stream
+from anafi_mav.vehicle.base.subscriptions import Subscriptions
+from anafi_mav.vehicle.offboard.setpoints import Setpoint
+
+
+class OffboardService(Service):
+    """SET_ATTITUDE_TARGET, SET_POSITION_TARGET_LOCAL_NED, SET_POSITION_TARGET_GLOBAL_INT and their echoes."""
+
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self._flight = host.vehicle.offboard
+        self._flight.warn_throttled = host.warn_throttled
+        self._flight.run_action = host.run_action
+
+    def capabilities(self) -> int:
+        return (
+            dialect.MAV_PROTOCOL_CAPABILITY_SET_ATTITUDE_TARGET
+            | dialect.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
+            | dialect.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
+        )
+
+    def messages(self) -> Mapping[int, MessageHandler]:
+        return {
+            dialect.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET: self._takes(attitude_setpoint),
+            dialect.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED: self._takes(local_setpoint),
+            dialect.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT: self._takes(global_setpoint),
+        }
+
+    def streams(self) -> Mapping[int, Stream]:
+        return STREAMS
+
+    def subscriptions(self) -> Subscriptions:
+        return self._flight.subscriptions()
+
+    def _takes(self, read: Callable[[Any], Setpoint | str]) -> MessageHandler:
+        def take(inbound: Inbound) -> None:
+            setpoint = read(inbound.message)
+            if isinstance(setpoint, str):
+                objection: str | None = setpoint
+            else:
+                guided = flavour_of(inbound.channel).guided_setpoints
+                objection = self._flight.receive(client_of(inbound), setpoint, guided=guided)
+            if objection is not None:
+                self.host.warn_throttled(f"Setpoint refused: {objection}")
+
+        return take

@@ -1,0 +1,164 @@
+"""Reads setpoints from SET_ATTITUDE_TARGET and SET_POSITION_TARGET_*: units, frames, limits. No I/O.
+
+SET_ATTITUDE_TARGET becomes the stick vector u = [vz, roll, pitch, yaw rate] of the anafi_ros paper, the only thing
+ARSDK has:
+
+- roll and pitch of the quaternion: tilt, limited by the drone's own MaxTilt;
+- yaw of the quaternion: held by a proportional loop on the yaw rate; a body yaw rate that is not ignored is added
+  as feed-forward;
+- thrust: 0.5 holds height, 0 and 1 are full descent and climb, in between linear; ignored or NaN is 0.5.
+
+SET_POSITION_TARGET_LOCAL_NED and _GLOBAL_INT become a `MotionSetpoint`; every axis may name a position, a velocity and
+an acceleration, or nothing, which holds it still. What counts from where (MAVLink MAV_FRAME):
+
+| frame | axes | positions count from | yaw |
+|---|---|---|---|
+| 1 LOCAL_NED | north, east, down | where the drone took off | from north |
+| 7 LOCAL_OFFSET_NED | north, east, down | where the drone is | from north |
+| 8 BODY_NED, 9 BODY_OFFSET_NED, 12 BODY_FRD | front, right, down | where the drone is | from the heading |
+| 5 GLOBAL_INT | north, east, down | the earth; height above mean sea level | from north |
+| 6 GLOBAL_RELATIVE_ALT_INT | north, east, down | the earth; height above take-off | from north |
+
+Front and right are those of the heading, whatever the tilt.
+
+DEVIATION: MAV_FRAME lets positions in frame 8 count from the local origin. They count from the drone here, as in the
+other frames of its body: of the two misunderstandings that is the one that moves the drone a little.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from anafi_mav import units
+from anafi_mav.mavlink import dialect
+from anafi_mav.vehicle.offboard.setpoints import NOTHING, AttitudeSetpoint, MotionSetpoint, Origin, Vector
+
+UNIT_TOLERANCE = 0.1
+"""How far a quaternion's length may be from 1: single precision and sloppy sums, not garbage."""
+
+THRUST_TOLERANCE = 1e-3
+"""How far thrust may be outside of 0..1: rounding, not another unit."""
+
+MOST_SPEED = 20.0
+"""m/s beyond which a velocity is a mistake (cm/s, most likely): the fastest of the family flies 16 m/s."""
+
+MOST_ACCELERATION = 20.0
+"""m/s2 likewise: full tilt gives 8.2 m/s2."""
+
+MOST_TURN = 10.0
+"""rad/s likewise: an ANAFI turns with 3.5 rad/s at most."""
+
+FARTHEST = 1e6
+"""m beyond which a coordinate is a mistake."""
+
+
+def attitude_setpoint(message: dialect.MAVLink_set_attitude_target_message) -> AttitudeSetpoint | str:
+    """The setpoint in a message, or one sentence on why it cannot be flown."""
+    mask = message.type_mask
+    if mask & dialect.ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE:
+        return "body rates alone cannot be flown: an ANAFI takes angles"
+    try:
+        roll, pitch, yaw = units.euler_from_quaternion(*message.q)
+    except ValueError:
+        return "the attitude quaternion is no rotation"
+    if not abs(math.hypot(*message.q) - 1.0) <= UNIT_TOLERANCE:
+        return "the attitude quaternion is not of length 1"
+    if abs(roll) > math.pi / 2:
+        return "the attitude quaternion is upside down"
+    yaw_rate = 0.0
+    if not mask & dialect.ATTITUDE_TARGET_TYPEMASK_BODY_YAW_RATE_IGNORE and math.isfinite(message.body_yaw_rate):
+        yaw_rate = message.body_yaw_rate
+    thrust = 0.5
+    if not mask & dialect.ATTITUDE_TARGET_TYPEMASK_THROTTLE_IGNORE and math.isfinite(message.thrust):
+        if not -THRUST_TOLERANCE <= message.thrust <= 1.0 + THRUST_TOLERANCE:
+            return "thrust is not between 0 and 1"
+        thrust = units.clip(message.thrust, 0.0, 1.0)
+    return AttitudeSetpoint(roll, pitch, yaw, yaw_rate, 2.0 * thrust - 1.0)
+
+
+_LOCAL_FRAMES: dict[int, tuple[Origin, bool]] = {
+    dialect.MAV_FRAME_LOCAL_NED: (Origin.LOCAL, False),
+    dialect.MAV_FRAME_LOCAL_OFFSET_NED: (Origin.VEHICLE, False),
+    dialect.MAV_FRAME_BODY_NED: (Origin.VEHICLE, True),
+    dialect.MAV_FRAME_BODY_OFFSET_NED: (Origin.VEHICLE, True),
+    dialect.MAV_FRAME_BODY_FRD: (Origin.VEHICLE, True),
+}
+
+
+_GLOBAL_FRAMES: dict[int, Origin] = {
+    dialect.MAV_FRAME_GLOBAL_INT: Origin.SEA,
+    dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT: Origin.TAKEOFF,
+}
+
+
+_TERRAIN_FRAMES = (dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT, dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT)
+
+
+def local_setpoint(message: dialect.MAVLink_set_position_target_local_ned_message) -> MotionSetpoint | str:
+    """The setpoint of a SET_POSITION_TARGET_LOCAL_NED, or one sentence on why it cannot be flown."""
+    frame = _LOCAL_FRAMES.get(message.coordinate_frame)
+    if frame is None:
+        return _no_frame(message.coordinate_frame)
+    return _motion(message, *frame, (message.x, message.y, message.z))
+
+
+def global_setpoint(message: dialect.MAVLink_set_position_target_global_int_message) -> MotionSetpoint | str:
+    """The setpoint of a SET_POSITION_TARGET_GLOBAL_INT, or one sentence on why it cannot be flown."""
+    origin = _GLOBAL_FRAMES.get(message.coordinate_frame)
+    if origin is None:
+        return _no_frame(message.coordinate_frame)
+    place = (message.lat_int / 1e7, message.lon_int / 1e7, message.alt)
+    setpoint = _motion(message, origin, False, place)
+    if isinstance(setpoint, MotionSetpoint) and (setpoint.position[0] is None) != (setpoint.position[1] is None):
+        return "latitude and longitude belong together"
+    return setpoint
+
+
+def _no_frame(frame: int) -> str:
+    if frame in _TERRAIN_FRAMES:
+        return f"heights above terrain (frame {frame}) cannot be flown, an ANAFI has no map of it"
+    return f"frame {frame} is not supported"
+
+
+def _motion(
+    message: dialect.MAVLink_set_position_target_local_ned_message
+    | dialect.MAVLink_set_position_target_global_int_message,
+    origin: Origin,
+    body: bool,
+    coordinates: tuple[float, float, float],
+) -> MotionSetpoint | str:
+    mask = message.type_mask
+    position = _wanted(coordinates, mask, dialect.POSITION_TARGET_TYPEMASK_X_IGNORE)
+    velocity = _wanted((message.vx, message.vy, message.vz), mask, dialect.POSITION_TARGET_TYPEMASK_VX_IGNORE)
+    acceleration = _wanted((message.afx, message.afy, message.afz), mask, dialect.POSITION_TARGET_TYPEMASK_AX_IGNORE)
+    yaw = None if mask & dialect.POSITION_TARGET_TYPEMASK_YAW_IGNORE else message.yaw
+    yaw_rate = None if mask & dialect.POSITION_TARGET_TYPEMASK_YAW_RATE_IGNORE else message.yaw_rate
+    asked = (*position, *velocity, *acceleration, yaw, yaw_rate)
+    if all(value is None for value in asked):
+        return "it asks for nothing"
+    if not all(value is None or math.isfinite(value) for value in asked):
+        return "not all of its values are numbers"
+    if acceleration != NOTHING and mask & dialect.POSITION_TARGET_TYPEMASK_FORCE_SET:
+        return "forces cannot be flown, an acceleration can"
+    if _size(position) > FARTHEST:
+        return "that is no place on earth"
+    if _size(velocity) > MOST_SPEED:
+        return f"no ANAFI flies {_size(velocity):.0f} m/s"
+    if _size(acceleration) > MOST_ACCELERATION:
+        return f"no ANAFI accelerates by {_size(acceleration):.0f} m/s2"
+    if abs(yaw_rate or 0.0) > MOST_TURN:
+        return f"no ANAFI turns by {abs(yaw_rate or 0.0):.0f} rad/s"
+    if yaw is not None:
+        yaw = units.wrap_pi(yaw)
+    return MotionSetpoint(origin, body, position, velocity, acceleration, yaw, yaw_rate)
+
+
+def _wanted(values: tuple[float, float, float], mask: int, first: int) -> Vector:
+    """The values of three axes that are not ignored; `first` is the mask's bit of x, y and z have the next two."""
+    x, y, z = (None if mask & first << i else value for i, value in enumerate(values))
+    return x, y, z
+
+
+def _size(values: Sequence[float | None]) -> float:
+    return max(abs(value) for value in values if value is not None) if any(v is not None for v in values) else 0.0

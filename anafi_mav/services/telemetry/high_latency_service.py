@@ -1,0 +1,162 @@
+"""HIGH_LATENCY2 for links on which every byte costs (MAVLink high_latency.md; conformance C14).
+
+MAV_CMD_CONTROL_HIGH_LATENCY holds for the channel that it comes by: no heartbeat, no stream and no text goes there any
+more, but HIGH_LATENCY2 every five seconds, and answers to commands, until the same command ends it or the channel
+closes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from anafi_mav import units
+from anafi_mav.drone import events
+from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.channel import Channel
+from anafi_mav.mavlink.node import Inbound
+from anafi_mav.services.commands import Command
+from anafi_mav.services.flavours import Flavour
+from anafi_mav.services.service import Host, Query, Service
+from anafi_mav.services.stream import Stream, Times
+from anafi_mav.services.telemetry.telemetry_flight import amsl, target
+from anafi_mav.services.telemetry.telemetry_status import percent, sensor_bits
+from anafi_mav.vehicle.base.subscriptions import Subscriptions
+from anafi_mav.vehicle.vehicle import Vehicle
+
+EVERY = 5.0
+"""s between two HIGH_LATENCY2 (high_latency.md)."""
+
+UNKNOWN_U8, UNKNOWN_U16 = 0xFF, 0xFFFF
+
+_FAILURES: Mapping[int, int] = {
+    dialect.MAV_SYS_STATUS_SENSOR_GPS: dialect.HL_FAILURE_FLAG_GPS,
+    dialect.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE: dialect.HL_FAILURE_FLAG_ABSOLUTE_PRESSURE,
+    dialect.MAV_SYS_STATUS_SENSOR_3D_ACCEL: dialect.HL_FAILURE_FLAG_3D_ACCEL,
+    dialect.MAV_SYS_STATUS_SENSOR_3D_GYRO: dialect.HL_FAILURE_FLAG_3D_GYRO,
+    dialect.MAV_SYS_STATUS_SENSOR_3D_MAG: dialect.HL_FAILURE_FLAG_3D_MAG,
+    dialect.MAV_SYS_STATUS_SENSOR_BATTERY: dialect.HL_FAILURE_FLAG_BATTERY,
+    dialect.MAV_SYS_STATUS_SENSOR_RC_RECEIVER: dialect.HL_FAILURE_FLAG_RC_RECEIVER,
+    dialect.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS: dialect.HL_FAILURE_FLAG_ENGINE,
+    dialect.MAV_SYS_STATUS_GEOFENCE: dialect.HL_FAILURE_FLAG_GEOFENCE,
+}
+
+
+def failures(vehicle: Vehicle) -> int:
+    """HL_FAILURE_FLAG of what is enabled and not healthy."""
+    _, enabled, healthy = sensor_bits(vehicle)
+    return sum(flag for bit, flag in _FAILURES.items() if enabled & bit and not healthy & bit)
+
+
+def _half_degrees(radians: float) -> int:
+    return round(units.wrap_360(radians * units.DEG_PER_RAD) / 2.0) % 180
+
+
+def _mode(vehicle: Vehicle, flavour: Flavour) -> int:
+    """The 16 bits that there are for custom_mode: of a packed number the upper half (px4_custom_mode.h)."""
+    number = flavour.custom_mode(vehicle.mode)
+    return number >> 16 if flavour.packed_modes else number
+
+
+def _base_mode(vehicle: Vehicle) -> int:
+    """HEARTBEAT.base_mode as a signed byte."""
+    base = dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+    if vehicle.armed:
+        base |= dialect.MAV_MODE_FLAG_SAFETY_ARMED
+    return int(base - 256 if base > 127 else base)
+
+
+def high_latency(vehicle: Vehicle, times: Times, climb: float) -> dialect.MAVLink_message | None:
+    """HIGH_LATENCY2; `climb` is the fastest climb or descent since the last one (m/s). None before a first GPS fix.
+
+    Where nothing is flown to, the target is where the drone is. Throttle, airspeed and wind are not told and have no
+    "unknown": 0.
+    """
+    place, state, height = vehicle.place, vehicle.drone.piloting.state, amsl(vehicle)
+    if place is None or height is None or state.attitude is None or state.velocity is None:
+        return None
+    gps = vehicle.drone.gps.state
+    horizontal = [a for a in (gps.latitude_accuracy, gps.longitude_accuracy) if a is not None]
+    heading = _half_degrees(state.attitude.yaw)
+    goal = target(vehicle)
+    goal_height = None if goal is None else vehicle.height.amsl(goal.altitude)
+    return dialect.MAVLink_high_latency2_message(
+        timestamp=times.boot_ms,
+        type=dialect.MAV_TYPE_QUADROTOR,
+        autopilot=times.flavour.autopilot,
+        custom_mode=_mode(vehicle, times.flavour),
+        latitude=units.deg_e7(place.latitude),
+        longitude=units.deg_e7(place.longitude),
+        altitude=units.saturate(height, 16),
+        target_altitude=units.saturate(height if goal_height is None else goal_height, 16),
+        heading=heading,
+        target_heading=heading if goal is None else _half_degrees(math.radians(goal.bearing)),
+        target_distance=0 if goal is None else units.saturate(goal.distance / 10.0, 16, signed=False),
+        throttle=0,
+        airspeed=0,
+        airspeed_sp=0,
+        groundspeed=units.saturate(math.hypot(state.velocity.north, state.velocity.east) * 5.0, 8, signed=False),
+        windspeed=0,
+        wind_heading=0,
+        eph=UNKNOWN_U8 if not horizontal else min(max(horizontal) * 10, UNKNOWN_U8 - 1),
+        epv=UNKNOWN_U8 if gps.altitude_accuracy is None else min(gps.altitude_accuracy * 10, UNKNOWN_U8 - 1),
+        temperature_air=0,
+        climb_rate=units.saturate(climb * 10.0, 8),
+        battery=percent(vehicle.drone.battery.state.percent),
+        wp_num=UNKNOWN_U16,
+        failure_flags=failures(vehicle),
+        custom0=_base_mode(vehicle) if times.flavour.base_mode_in_custom0 else 0,
+        custom1=0,
+        custom2=0,
+    )
+
+
+class HighLatencyService(Service):
+    """Which channels are expensive, and the one message that they get."""
+
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self._next: dict[Channel, float] = {}
+        """When the next HIGH_LATENCY2 is due, for each expensive channel."""
+        self._climb = 0.0
+        """Fastest climb or descent since the last message, m/s."""
+
+    def queries(self) -> Mapping[int, Query]:
+        return {dialect.MAV_CMD_CONTROL_HIGH_LATENCY: self._control}
+
+    def streams(self) -> Mapping[int, Stream]:
+        return {dialect.MAVLINK_MSG_ID_HIGH_LATENCY2: Stream(self._build, flavoured=True)}
+
+    def subscriptions(self) -> Subscriptions:
+        return {events.SpeedChanged: self._on_speed}
+
+    def _on_speed(self, message: events.SpeedChanged, now: float) -> None:
+        if self._next and math.isfinite(message.speedZ):
+            self._climb = max(self._climb, abs(message.speedZ))
+
+    def tick(self, now: float) -> None:
+        due = [channel for channel, at in self._next.items() if now >= at]
+        if not due:
+            return
+        for channel in due:
+            self._next[channel] = now + EVERY
+        times, vehicle = self.host.times(), self.host.vehicle
+        self.host.send_by_flavour(lambda flavour: self._build(vehicle, times.for_flavour(flavour)), due)
+        self._climb = 0.0
+
+    def channel_closed(self, channel: Channel) -> None:
+        self._next.pop(channel, None)
+
+    def _build(self, vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
+        return high_latency(vehicle, times, self._climb)
+
+    def _control(self, inbound: Inbound, command: Command) -> int:
+        wanted = command.params[0]
+        if wanted not in (0.0, 1.0):
+            return dialect.MAV_RESULT_DENIED
+        self.host.set_muted(inbound.channel, muted=wanted == 1.0)
+        if wanted == 0.0:
+            self._next.pop(inbound.channel, None)
+        else:
+            self._next.setdefault(inbound.channel, self.host.clock.monotonic())
+        return dialect.MAV_RESULT_ACCEPTED

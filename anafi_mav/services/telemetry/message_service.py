@@ -1,0 +1,246 @@
+"""Messages on request and at intervals: MAV_CMD_REQUEST_MESSAGE and its older cousins, the streams of all services.
+
+Rules: conformance R7, R8, B1, C3.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import math
+from collections.abc import Mapping, Sequence
+
+from anafi_mav.drone.events import Message
+from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.channel import Channel
+from anafi_mav.mavlink.node import Inbound
+from anafi_mav.mavlink.streams import Streams
+from anafi_mav.services.commands import Command
+from anafi_mav.services.flavours import flavour_of
+from anafi_mav.services.service import Answer, Host, MessageHandler, Query, Request, Service
+from anafi_mav.services.stream import Stream, Times
+from anafi_mav.services.telemetry import data_streams
+from anafi_mav.services.telemetry.update_tracker import News
+from anafi_mav.vehicle.base.subscriptions import Subscriptions
+
+logger = logging.getLogger(__name__)
+
+LEGACY_REQUESTS = {
+    dialect.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
+    dialect.MAV_CMD_REQUEST_PROTOCOL_VERSION: dialect.MAVLINK_MSG_ID_PROTOCOL_VERSION,
+    dialect.MAV_CMD_GET_HOME_POSITION: dialect.MAVLINK_MSG_ID_HOME_POSITION,
+}
+"""Commands of before REQUEST_MESSAGE, and the message each asks for. MAVSDK falls back on them, MAVProxy knows no
+other."""
+
+LOG_EVERY = 5.0
+"""s before it is logged again that a message cannot be made."""
+
+FASTEST = 0.1
+"""s between looks at messages that are repeated without news: a shorter interval is no shorter for them."""
+
+LONGEST = 2**31 - 1
+"""us. An interval is told as an INT32; one that is longer is as long as that can say."""
+
+
+class MessageService(Service):
+    """What leaves by itself, and what leaves because somebody asked.
+
+    What is new is gathered until the end of the loop's turn (see `news`).
+    """
+
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self._intervals: Streams[Channel] = Streams({})
+        self._table: Mapping[int, Stream] = {}
+        self._requests: Mapping[int, Request] = {}
+        self._news = News()
+        self._events: set[type[Message]] = set()
+        """Those that are news for some message."""
+        self._repeated: tuple[int, ...] = ()
+        self._on_change: list[int] = []
+        self._linked_at = 0.0
+        self._stamped: dict[int, float] = {}
+        """The time (s, monotonic) in the last message of each kind: it never goes back."""
+        self._failed: dict[int, float] = {}
+        """When it was last logged that a message cannot be made."""
+
+    def take_tables(self, streams: Mapping[int, Stream], requests: Mapping[int, Request]) -> None:
+        """What all services of the system send by themselves, and what they can be asked for."""
+        self._table, self._requests = streams, requests
+        defaults = {id: stream.every for id, stream in streams.items() if stream.every is not None}
+        self._intervals = Streams(defaults, without=lambda channel: flavour_of(channel).unstreamed)
+        for id, stream in streams.items():
+            self._news.register(id, (id,))
+            for event in stream.updates:
+                self._news.register(event, (id,))
+                self._events.add(event)
+            if stream.on_change:
+                self._on_change.append(id)
+        self._repeated = tuple(id for id, stream in streams.items() if stream.is_repeated)
+
+    def queries(self) -> Mapping[int, Query]:
+        return {
+            dialect.MAV_CMD_REQUEST_MESSAGE: lambda inbound, command: self._request(
+                inbound, command.params[0], command
+            ),
+            dialect.MAV_CMD_SET_MESSAGE_INTERVAL: self._set_interval,
+            dialect.MAV_CMD_GET_MESSAGE_INTERVAL: self._get_interval,
+            **{old: self._legacy(id) for old, id in LEGACY_REQUESTS.items()},
+        }
+
+    def messages(self) -> Mapping[int, MessageHandler]:
+        return {dialect.MAVLINK_MSG_ID_REQUEST_DATA_STREAM: self._data_stream}
+
+    def requests(self) -> Mapping[int, Request]:
+        return {
+            dialect.MAVLINK_MSG_ID_MESSAGE_INTERVAL: lambda inbound, command: self._interval(inbound, command.params[1])
+        }
+
+    def link_up(self) -> None:
+        self._linked_at = self.host.clock.monotonic()
+        self._news.reset(self._linked_at)
+
+    def link_down(self) -> None:
+        self._news.reset(self.host.clock.monotonic())
+
+    def subscriptions(self) -> Subscriptions:
+        return dict.fromkeys(self._events, self._on_update)
+
+    def _on_update(self, message: Message, now: float) -> None:
+        if self._news.note(type(message), now):
+            asyncio.get_running_loop().call_soon(self._tell_news)
+
+    def mark_updated(self, id: int, at: float) -> None:
+        """Send this message at the end of the event-loop iteration."""
+        if self._news.note(id, at):
+            asyncio.get_running_loop().call_soon(self._tell_news)
+
+    def is_streamed(self, id: int) -> bool:
+        """Return True when this message is streamed on some channel."""
+        return any(self._intervals.interval(channel, id) is not None for channel in self.host.channels)
+
+    def tick(self, now: float) -> None:
+        self._news.pass_time(now)
+        for id, due in self._intervals.due_on(self.host.channels, self._repeated, now):
+            self._leave(id, due, self._times(id))
+
+    def state_changed(self) -> None:
+        """They leave at once."""
+        for id in self._on_change:
+            self._leave(id, self.host.channels, self._times(id))
+
+    # Streams.
+
+    def _tell_news(self) -> None:
+        ids, at = self._news.take()
+        due = self._intervals.due_on(self.host.channels, ids, at)
+        for id, channels in due:
+            self._leave(id, channels, self._stamp(id, at))
+
+    def _times(self, id: int) -> Times:
+        """When the newest of the fields of a message was true. A state that has not changed is true now."""
+        if self._table[id].is_repeated:
+            return self._stamp(id, self.host.clock.monotonic())
+        return self._stamp(id, self._news.at(id) or self._linked_at)
+
+    def _stamp(self, id: int, at: float) -> Times:
+        """The time for a message of this kind; an event that was handled late does not put it back."""
+        at = self._stamped[id] = max(at, self._stamped.get(id, at))
+        return self.host.times(at)
+
+    def _leave(self, id: int, to: Sequence[Channel], times: Times) -> None:
+        stream = self._table[id]
+        try:
+            if stream.flavoured:
+                vehicle = self.host.vehicle
+                self.host.send_by_flavour(lambda flavour: stream.build(vehicle, times.for_flavour(flavour)), to)
+            elif (message := stream.build(self.host.vehicle, times)) is not None:
+                self.host.send(message, to)
+        except Exception as error:
+            # A value of the drone's that nobody foresaw. The other messages, and the heartbeat, go on without it.
+            now = self.host.clock.monotonic()
+            if now - self._failed.get(id, -math.inf) >= LOG_EVERY:
+                self._failed[id] = now
+                logger.error("%s: message %d cannot be made: %r", self.host.drone.name, id, error)
+
+    def _data_stream(self, inbound: Inbound) -> None:
+        """REQUEST_DATA_STREAM, from clients of flavours with `data_streams`."""
+        if not flavour_of(inbound.channel).data_streams:
+            return
+        request = inbound.message
+        rate = request.req_message_rate if request.start_stop else 0
+        for id in data_streams.members(request.req_stream_id):
+            if id in self._table:
+                self._ask(inbound.channel, id, 1.0 / rate if rate else None)
+
+    def _ask(self, channel: Channel, id: int, interval: float | None) -> None:
+        if interval is not None and self._table[id].is_repeated:
+            interval = max(interval, FASTEST)
+        self._intervals.set(channel, id, interval)
+
+    # Requests: answered at once, every time.
+
+    def _request(self, inbound: Inbound, id: float, command: Command) -> int:
+        answer = self._answer(inbound, id, command)
+        if isinstance(answer, int):
+            return answer
+        for message in [answer] if isinstance(answer, dialect.MAVLink_message) else answer:
+            self.host.send(message, inbound.channel)
+        return dialect.MAV_RESULT_ACCEPTED
+
+    def _answer(self, inbound: Inbound, id: float, command: Command) -> Answer:
+        """The message that a client asks for, or the MAV_RESULT that says why not."""
+        if not math.isfinite(id):
+            return dialect.MAV_RESULT_UNSUPPORTED
+        if (request := self._requests.get(int(id))) is not None and id == int(id):
+            return request(inbound, command)
+        stream = self._table.get(int(id)) if id == int(id) else None
+        if stream is None:
+            return dialect.MAV_RESULT_UNSUPPORTED
+        times = self._times(int(id)).for_flavour(flavour_of(inbound.channel))
+        message = stream.build(self.host.vehicle, times)
+        return dialect.MAV_RESULT_TEMPORARILY_REJECTED if message is None else message
+
+    def _legacy(self, id: int) -> Query:
+        return lambda inbound, command: self._request(inbound, id, command)
+
+    def _set_interval(self, inbound: Inbound, command: Command) -> int:
+        id, interval = command.params[0], command.params[1]
+        if id not in self._table:
+            return dialect.MAV_RESULT_UNSUPPORTED
+        if math.isnan(interval) or interval == 0:
+            self._intervals.reset(inbound.channel, int(id))
+        elif interval == -1:
+            self._ask(inbound.channel, int(id), None)
+        elif interval > 0 and math.isfinite(interval):
+            self._ask(inbound.channel, int(id), min(interval, LONGEST) / 1e6)
+        else:
+            return dialect.MAV_RESULT_DENIED
+        return dialect.MAV_RESULT_ACCEPTED
+
+    def _get_interval(self, inbound: Inbound, command: Command) -> int:
+        answer = self._interval(inbound, command.params[0])
+        if isinstance(answer, int):
+            return answer
+        self.host.send(answer, inbound.channel)
+        return dialect.MAV_RESULT_ACCEPTED
+
+    def _interval(self, inbound: Inbound, id: float) -> dialect.MAVLink_message | int:
+        """MESSAGE_INTERVAL: what leaves on this channel, which is no more than was asked for and no more than there is.
+
+        0 for what we do not send at all, as common.xml wants it.
+        """
+        if not 0 <= id <= 0xFFFF or id != int(id):
+            return dialect.MAV_RESULT_DENIED
+        microseconds = 0
+        if int(id) in self._table:
+            asked = self._intervals.interval(inbound.channel, int(id))
+            microseconds = -1 if asked is None else min(round(max(asked, self._source(int(id))) * 1e6), LONGEST)
+        return dialect.MAVLink_message_interval_message(int(id), microseconds)
+
+    def _source(self, id: int) -> float:
+        """The mean time (s) between two pieces of news for this message, as far as is known; 0: not by news alone."""
+        if self._table[id].is_repeated:
+            return 0.0
+        return self._news.interval(id, self.host.clock.monotonic()) or 0.0

@@ -1,0 +1,92 @@
+"""How good the links are: the drone's radio, the client's channel, the machine that the gateway runs on.
+
+The drone tells a quality from 1 (a disconnection is highly probable) to 5 (very good), and the strength of the signal
+in dBm. MAVLink's fields have the scale of the device, and each family of clients reads another one into them.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+
+from anafi_mav import units
+from anafi_mav.drone.status.link import Link
+from anafi_mav.mavlink import dialect
+from anafi_mav.services.stream import Stream, Times
+from anafi_mav.vehicle.vehicle import Vehicle
+
+UNKNOWN_U8 = 255
+UNUSED_CHANNEL = 0xFFFF
+
+BEST_QUALITY = 5
+
+
+def rc_channels(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
+    """RC_CHANNELS for its rssi: the quality of the drone's radio, behind a Skycontroller. An ANAFI has no channels to
+    show, and without sticks there is no radio of theirs: unknown."""
+    quality = vehicle.drone.link.state.quality if vehicle.drone.controller.present else None
+    rssi = UNKNOWN_U8 if quality is None else round(times.flavour.rssi_full * quality / BEST_QUALITY)
+    channels = {f"chan{number}_raw": UNUSED_CHANNEL for number in range(1, 19)}
+    return dialect.MAVLink_rc_channels_message(time_boot_ms=times.boot_ms, chancount=0, rssi=rssi, **channels)
+
+
+def _signal(dbm: int, times: Times) -> int:
+    """RADIO_STATUS.rssi of a signal strength, in the scale that the client reads."""
+    if times.flavour.sik_radio:
+        return units.saturate(units.clip(1.9 * (dbm + 127.0), 0.0, 254.0), 8, signed=False)
+    return int(units.clip(dbm, -128, -2)) & 0xFF  # -1 would be MAVLink's "unknown"
+
+
+def radio_status(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
+    """RADIO_STATUS: what the drone receives. What its controller receives, noise and errors are not reported.
+
+    MAVLink's unknown is 255, which QGroundControl shows as -1 dBm, as if a strong signal had been measured. Its clients
+    get 0: no signal is 0 dBm, and it is what QGroundControl shows before a radio has reported. There is no buffer on
+    the way that clients could overfill, hence 100 % free.
+    """
+    dbm = vehicle.drone.link.state.rssi_dbm
+    if dbm is None or dbm >= 0:
+        return None
+    unknown = UNKNOWN_U8 if times.flavour.sik_radio else 0
+    return dialect.MAVLink_radio_status_message(_signal(dbm, times), unknown, 100, unknown, unknown, 0, 0)
+
+
+def onboard_computer_status(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
+    """ONBOARD_COMPUTER_STATUS of the machine that the gateway runs on, as far as every system tells it."""
+    unknown_i8, unknown_i16, unknown_u32 = 127, 0x7FFF, 0xFFFFFFFF
+    total = used = unknown_u32
+    if "SC_AVPHYS_PAGES" in os.sysconf_names:
+        page = os.sysconf("SC_PAGE_SIZE")
+        total = os.sysconf("SC_PHYS_PAGES") * page >> 20
+        used = total - (os.sysconf("SC_AVPHYS_PAGES") * page >> 20)
+    return dialect.MAVLink_onboard_computer_status_message(
+        times.boot_us,
+        times.boot_ms,
+        0,
+        [UNKNOWN_U8] * 8,
+        [UNKNOWN_U8] * 10,
+        [UNKNOWN_U8] * 4,
+        [UNKNOWN_U8] * 10,
+        unknown_i8,
+        [unknown_i8] * 8,
+        [unknown_i16] * 4,
+        used,
+        total,
+        [unknown_u32] * 4,
+        [unknown_u32] * 4,
+        [unknown_u32] * 4,
+        [unknown_u32] * 6,
+        [unknown_u32] * 6,
+        [unknown_u32] * 6,
+        [unknown_u32] * 6,
+        [unknown_u32] * 6,
+    )
+
+
+_UPDATES = tuple(Link.REDUCERS)
+
+STREAMS: Mapping[int, Stream] = {
+    dialect.MAVLINK_MSG_ID_RC_CHANNELS: Stream(rc_channels, _UPDATES, every=1.0, repeated=True, flavoured=True),
+    dialect.MAVLINK_MSG_ID_RADIO_STATUS: Stream(radio_status, _UPDATES, every=1.0, repeated=True, flavoured=True),
+    dialect.MAVLINK_MSG_ID_ONBOARD_COMPUTER_STATUS: Stream(onboard_computer_status),
+}

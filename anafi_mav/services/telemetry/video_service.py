@@ -1,0 +1,136 @@
+"""What is told in the live video only: exposure, gains, white balance, fields of view, goodput.
+
+The video costs the radio some Mbit/s, so it runs while a client has a stream of ANAFI_CAMERA_EXPOSURE and not longer.
+When it runs for another reason, e.g. because somebody looks at it, what it says is told all the same.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Callable, Mapping
+
+from anafi_mav import units
+from anafi_mav.drone.payload.camera import Camera
+from anafi_mav.drone.status.link import Link, LinkState
+from anafi_mav.drone.video.video import VideoFrame
+from anafi_mav.errors import AnafiMavError
+from anafi_mav.mavlink import dialect
+from anafi_mav.services.service import Host, Service
+from anafi_mav.services.stream import Stream, Times
+from anafi_mav.vehicle.vehicle import Vehicle
+
+NAN = math.nan
+UNKNOWN_U8, UNKNOWN_I16, UNKNOWN_U32 = 0xFF, 0x7FFF, 0xFFFFFFFF
+
+RETRY = 10.0
+"""s until a video that did not come is tried again."""
+
+
+def _number(value: float | None, factor: float = 1.0) -> float:
+    return NAN if value is None else value * factor
+
+
+def camera_exposure(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
+    """ANAFI_CAMERA_EXPOSURE of the main camera: by the newest picture, without pictures by the camera's state."""
+    camera, frame = vehicle.drone.camera[0], vehicle.drone.video.state.frame
+    if camera.mode is None:
+        return None
+    if frame is None:
+        light = (_number(camera.shutter_s), _number(camera.iso), NAN, NAN)
+        view = (_number(camera.hfov_deg), NAN)
+    else:
+        said = frame.metadata
+        light = (
+            _number(said.exposure_time, 1e-3),
+            _number(said.iso_gain),
+            _number(said.awb_r_gain),
+            _number(said.awb_b_gain),
+        )
+        view = (_number(said.hfov, units.DEG_PER_RAD), _number(said.vfov, units.DEG_PER_RAD))
+    return dialect.MAVLink_anafi_camera_exposure_message(
+        times.boot_ms,
+        *light,
+        _number(camera.ev),
+        _number(camera.zoom),
+        *view,
+        0,
+        dialect.ANAFI_EXPOSURE_SOURCE_STEPS if frame is None else dialect.ANAFI_EXPOSURE_SOURCE_FRAME,
+    )
+
+
+def _link_flags(state: LinkState) -> int:
+    if state.perturbed is None:
+        return 0
+    return int(
+        dialect.ANAFI_LINK_FLAGS_TOLD
+        | (dialect.ANAFI_LINK_FLAGS_4G_INTERFERENCE if state.interference_4g else 0)
+        | (dialect.ANAFI_LINK_FLAGS_PERTURBED if state.perturbed else 0)
+    )
+
+
+def link(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
+    """ANAFI_LINK. The drone's events come first: the video tells the same, and goodput besides."""
+    state, frame = vehicle.drone.link.state, vehicle.drone.video.state.frame
+    wifi = None if frame is None else frame.metadata.wifi
+    starfish = None if frame is None else frame.metadata.starfish
+    quality, rssi = state.quality, state.rssi_dbm
+    if quality is None:
+        quality = wifi.quality if wifi is not None else starfish.quality if starfish is not None else None
+    if rssi is None and wifi is not None:
+        rssi = wifi.rssi
+    return dialect.MAVLink_anafi_link_message(
+        times.boot_ms,
+        UNKNOWN_U32 if wifi is None else wifi.goodput * 1000,
+        UNKNOWN_I16 if rssi is None else rssi,
+        UNKNOWN_U8 if quality is None else min(quality, 5),
+        _link_flags(state),
+    )
+
+
+class VideoTelemetryService(Service):
+    """Watches the video for as long as a client wants to know what only it says."""
+
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self._undo: Callable[[], None] | None = None
+        self._watch: asyncio.Task[None] | None = None
+        self._retry_at = 0.0
+
+    def streams(self) -> Mapping[int, Stream]:
+        return {
+            dialect.MAVLINK_MSG_ID_ANAFI_CAMERA_EXPOSURE: Stream(
+                camera_exposure, tuple(Camera.REDUCERS), repeated=True
+            ),
+            dialect.MAVLINK_MSG_ID_ANAFI_LINK: Stream(link, tuple(Link.REDUCERS), repeated=True),
+        }
+
+    def link_up(self) -> None:
+        self._undo = self.host.drone.video.subscribe(self._frame)
+
+    def link_down(self) -> None:
+        if self._undo is not None:
+            self._undo()
+            self._undo = None
+        self._watch = None  # cancelled with all that the host has spawned
+        self._retry_at = 0.0
+
+    def tick(self, now: float) -> None:
+        wanted = self.host.is_streamed(dialect.MAVLINK_MSG_ID_ANAFI_CAMERA_EXPOSURE)
+        if self._watch is not None and (self._watch.done() or not wanted):
+            self._watch.cancel()
+            self._watch = None
+        if wanted and self._watch is None and now >= self._retry_at:
+            self._retry_at = now + RETRY
+            self._watch = self.host.spawn(self._stay())
+
+    async def _stay(self) -> None:
+        try:
+            async with self.host.drone.video.watching():
+                await asyncio.Event().wait()  # until it is cancelled
+        except AnafiMavError as error:
+            self.host.warn_throttled(f"No video to read the exposure from: {error}")
+
+    def _frame(self, frame: VideoFrame) -> None:
+        self.host.mark_updated(dialect.MAVLINK_MSG_ID_ANAFI_CAMERA_EXPOSURE, frame.arrived)
+        self.host.mark_updated(dialect.MAVLINK_MSG_ID_ANAFI_LINK, frame.arrived)

@@ -1,0 +1,1 @@
+"""The simulated world: models, motion, wind, the radio link, and the faults injected into them."""

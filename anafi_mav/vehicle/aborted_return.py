@@ -1,0 +1,70 @@
+"""What clients are notified of after one of them has ended a return that the drone began: at once, and again and again.
+
+The drone does not return a second time for the same reason, so its reason is repeated to the pilot.
+"""
+
+from __future__ import annotations
+
+import math
+
+from anafi_mav.drone.events import HomeReachability, ReturnReason, WarningLevel
+from anafi_mav.drone.status.alerts import spoken
+from anafi_mav.vehicle.base.aircraft import Aircraft
+from anafi_mav.vehicle.base.flying import LANDING
+from anafi_mav.vehicle.base.severity import Severity
+
+REPEAT_EVERY = 15.0
+"""s between two reminders."""
+
+_BATTERY = (
+    ReturnReason.LOW_BATTERY,
+    ReturnReason.BATTERY_LOST_COMM,
+    ReturnReason.BATTERY_TOO_HOT,
+)
+"""Reasons that last until the drone stands: the battery does not recover in the air."""
+
+_SHORT = {ReturnReason.LANDING_ZONE_NOT_FOUND: "no landing zone"}
+
+_LAND_NOW = {
+    HomeReachability.CRITICAL: "Home hardly reachable: land now",
+    HomeReachability.NOT_REACHABLE: "Home not reachable: land now",
+}
+
+
+class AbortedReturn:
+    """One return of the drone's own that a client has ended."""
+
+    def __init__(self, system: int, reason: ReturnReason | None) -> None:
+        self._system = system
+        self._reason = reason
+        self._next = -math.inf
+
+    def lasts(self, vehicle: Aircraft) -> bool:
+        """True while the drone still has the reason for which it wanted to return."""
+        if vehicle.on_ground:
+            return False
+        if self._reason == ReturnReason.ICING:
+            return vehicle.drone.alerts.state.icing not in (None, WarningLevel.OK)
+        return self._reason in _BATTERY
+
+    def due(self, vehicle: Aircraft, now: float) -> bool:
+        """True when a reminder is due. While the drone returns or lands after all, none is."""
+        return now >= self._next and not vehicle.returning and vehicle.flying_state not in LANDING
+
+    def report(self, vehicle: Aircraft, now: float) -> None:
+        """Notify every client."""
+        self._next = now + REPEAT_EVERY
+        for text in self.texts(vehicle):
+            vehicle.text(Severity.CRITICAL, text)
+
+    def texts(self, vehicle: Aircraft) -> list[str]:
+        """The texts, as things stand."""
+        reason = "unknown" if self._reason is None else _SHORT.get(self._reason, spoken(self._reason))
+        texts = [f"Return aborted by system {self._system}: {reason}"]
+        if self._reason in _BATTERY:
+            percent = vehicle.drone.battery.state.percent
+            texts.append(f"No automatic return: battery {'?' if percent is None else percent} %")
+        reach = vehicle.drone.home.state.reachability
+        if reach in _LAND_NOW:
+            texts.append(_LAND_NOW[reach])
+        return texts

@@ -1,0 +1,1 @@
+"""What all flight tasks stand on: the aircraft, modes, heights, bounds, and the velocity loop."""

@@ -1,0 +1,191 @@
+"""The drone as those see it who fly it: what it does, where it is, what it was last told. No flavour, no message.
+
+They build on this floor. `Vehicle` stands above them: it is an `Aircraft` and knows all who can fly it, while none of
+them needs to know the others.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Hashable
+
+from anafi_mav.drone import Drone
+from anafi_mav.drone.events import FlyingState, PilotingStyleStyle
+from anafi_mav.vehicle.base.flying import AIRBORNE, ON_GROUND
+from anafi_mav.vehicle.base.height import HeightReference
+from anafi_mav.vehicle.base.helm import Helm
+from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.place import Place, point_of
+from anafi_mav.vehicle.base.right import Right
+from anafi_mav.vehicle.base.roll_sign import RollCheck
+from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.vehicle.fence.fence_watch import FenceWatch, OutsideFence
+
+STOP_WAIT = 0.5
+"""s that a command that stops something waits for what it replaces. What has not ended by then can send nothing."""
+
+
+class Aircraft(ABC):
+    """One drone that can be flown. All methods run on the event loop's thread."""
+
+    def __init__(self, drone: Drone, *, text: Callable[[Severity, str], None], changed: Callable[[], None]) -> None:
+        self.drone = drone
+        self.height = HeightReference()
+        self.roll = RollCheck()
+        """Verifies the sign of the roll that the drone reports, for the loops over velocity."""
+        self.cruise_speed: float | None = None
+        """m/s over ground that moves keep to; None: the drone's own (MAV_CMD_DO_CHANGE_SPEED)."""
+        self.climb_speed: float | None = None
+        """m/s up and down that moves keep to; None: the drone's own."""
+        self.origin: Place | None = None
+        """Origin of the local frame: where the drone last took off, or first stood with a fix."""
+        self.fence = FenceWatch()
+        self.home_choice = asyncio.Lock()
+        """Held by who chooses the drone's home, which is a type and a place: two choices at once would mix."""
+        self.text = text
+        self.changed = changed
+        """Says that mode, armed state or health may be others now."""
+        self.helms: tuple[Helm, ...] = ()
+        """Who can fly the drone for as long as somebody keeps telling them how; one of them at a time."""
+        self.mode_client: Hashable = None
+        """Client that chose the selected mode by name or number; None for modes that something else led to."""
+        self.paused = False
+        """A client has paused: setpoints of every client are ignored until a command or another mode ends it."""
+        self._selected = FlightMode.HOLD
+
+    # What it is.
+
+    @property
+    def flying_state(self) -> FlyingState | None:
+        """Parrot's word for it; None until reported."""
+        return self.drone.piloting.state.flying
+
+    @property
+    def on_ground(self) -> bool:
+        return self.flying_state in ON_GROUND
+
+    @property
+    def in_air(self) -> bool:
+        """Flying, and not on its way down or up by itself."""
+        return self.flying_state in AIRBORNE
+
+    @property
+    @abstractmethod
+    def armed(self) -> bool:
+        """Motors may turn: the drone is off the ground, or arming was accepted and has not lapsed."""
+
+    @property
+    def returning(self) -> bool:
+        """The drone flies home, whoever began it."""
+        return self.drone.home.state.returning and not self.on_ground
+
+    @property
+    def returning_by_itself(self) -> bool:
+        """Nobody asked for this return: battery, lost link, ... It is not ours to stop."""
+        return self.drone.home.state.returning_by_itself and not self.on_ground
+
+    @property
+    @abstractmethod
+    def descent(self) -> str | None:
+        """The reason to refuse what may not end a landing or return: the drone does either, or was commanded to."""
+
+    @property
+    @abstractmethod
+    def mode(self) -> FlightMode:
+        """What the drone does now."""
+
+    @property
+    def selected(self) -> FlightMode:
+        """What was chosen to be done; `mode` tells what the drone makes of it."""
+        return self._selected
+
+    @property
+    def place(self) -> Place | None:
+        """Where the drone is by its newest GPS location; None without a fix."""
+        gps = self.drone.gps.state
+        if not gps.fixed or gps.location is None:
+            return None
+        return Place(gps.location.latitude, gps.location.longitude)
+
+    @property
+    def home(self) -> Place | None:
+        """Where a return ends: what the drone reports, before its first take-off where it stands."""
+        home = self.drone.home.state.location
+        if home is not None:
+            return Place(home.latitude, home.longitude)
+        return self.place if self.on_ground else None
+
+    @property
+    def geofence_centre(self) -> Place | None:
+        """Middle of the drone's own geofence: a controller's GPS, else the take-off point (ardrone3.xml 1-2-4).
+
+        On the ground without such a controller it is where the drone stands: the drone still reports its last flight's.
+        """
+        reported, takeoff = self.drone.piloting.state.geofence_centre, self.drone.home.state.takeoff_location
+        if self.on_ground and self.drone.controller.state.position is None:
+            return self.place
+        if reported is not None:
+            return Place(*reported)
+        return self.origin if takeoff is None else Place(takeoff.latitude, takeoff.longitude)
+
+    @property
+    def sticks_follow_camera(self) -> bool:
+        """What sticks mean depends on where the camera looks (piloting_style.xml): no loop closes over that."""
+        return self.drone.piloting.state.style == PilotingStyleStyle.CAMERA_OPERATED
+
+    def prearm_problems(self) -> list[str]:
+        """Why the drone would not take off, in sentences; empty when it would."""
+        problems: list[str] = []
+        if self.flying_state is None:
+            problems.append("the drone has not said whether it flies")
+        if self.flying_state == FlyingState.EMERGENCY:
+            problems.append("emergency stop")
+        problems += self.drone.takeoff_blockers()
+        if (problem := self.fence_problem) is not None:
+            problems.append(problem)
+        return problems
+
+    @property
+    def fence_problem(self) -> str | None:
+        """Why the fence keeps the drone on the ground, in a sentence; None when it does not."""
+        if self.on_ground:
+            try:
+                self.fence.check_place(point_of(self.place), point_of(self.home))
+            except OutsideFence as error:
+                return str(error)
+        return None
+
+    # What everybody who flies it needs. Each verb returns when the drone confirmed, or raises.
+
+    @abstractmethod
+    async def take_over(self, limit: float | None = None) -> None:
+        """Replace whatever was going on, and wait for its end: `limit` s at most.
+
+        From now on what is replaced sends nothing but what stops something, and after the wait nothing at all. Without
+        the wait a move that is given up could cancel the one that follows it. Raises `Refused` while the motors are
+        being cut.
+        """
+
+    @abstractmethod
+    async def hold(self, mode: FlightMode = FlightMode.HOLD, by: Right | None = None) -> None:
+        """Stop and hover, in mode Hold, Guided or Position. A landing or return goes on unless `by` ends it."""
+
+    @abstractmethod
+    async def terminate(self) -> None:
+        """Cut the motors, if the configuration allows it at all."""
+
+    def select(self, mode: FlightMode, helm: Helm | None = None) -> None:
+        """This is what the vehicle does from now on. Whoever flew it by setpoints or sticks ends, but for `helm`."""
+        self.end_helms(helm)
+        self._selected, self.mode_client = mode, None
+        self.paused = False
+        self.changed()
+
+    def forget_mode(self) -> None:
+        """What was chosen is over: until something else is, the vehicle holds."""
+        self._selected, self.mode_client = FlightMode.HOLD, None
+
+    def end_helms(self, helm: Helm | None = None) -> list[asyncio.Task[None]]:
+        """Nobody flies by setpoints or sticks any more, but for `helm`; tasks that are about to end."""
+        return [task for one in self.helms if one is not helm for task in one.end()]

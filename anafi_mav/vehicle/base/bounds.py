@@ -1,0 +1,110 @@
+"""Where a vehicle may be sent: the checks of heights, places and speeds that every order passes before it is flown.
+
+What is out of bounds is refused, never clamped: by the numbers themselves, by the drone's own limits, by the fence.
+"""
+
+from __future__ import annotations
+
+import math
+
+from anafi_mav import geo
+from anafi_mav.vehicle.base.aircraft import Aircraft
+from anafi_mav.vehicle.base.height import ESTIMATE_FLOOR
+from anafi_mav.vehicle.base.place import Place, point_of
+from anafi_mav.vehicle.base.refusal import Refused
+from anafi_mav.vehicle.fence.fence_watch import OutsideFence
+
+SLOWEST, FASTEST = 0.1, 100.0
+"""m/s. A speed beyond these is a number in the wrong place, or in another unit. Within them the drone limits itself."""
+
+NOWHERE = 1e-5
+"""deg. A place that is so near to 0/0 is no place but numbers that were not set, or integers in the place of floats."""
+
+LOWEST = 1.0
+"""m above take-off: where an ANAFI hovers by itself after take-off. Lower targets are refused, never clamped, unless
+the drone is as low already (`lowest_height`)."""
+
+FARTHEST = 4000.0
+"""m from the drone's centre. No setting of an ANAFI reaches farther (maximum of its MaxDistance); a place beyond is a
+mistake, also while the drone's own geofence is off."""
+
+
+def lowest_height(vehicle: Aircraft) -> float:
+    """Return the lowest height (m above take-off) of a target.
+
+    Over a slope that falls away, sticks, velocities and missions lead below the take-off point; there the drone may be
+    sent anywhere that is not lower than it flies. A lower target is refused: of the ground there nothing is known, and
+    the height above ground that the drone reports may be an old one.
+    """
+    altitude = vehicle.drone.piloting.state.altitude
+    return LOWEST if altitude is None or not vehicle.in_air else min(LOWEST, altitude)
+
+
+class TooLow(Refused):
+    """A target below `lowest_height`. A drone that has not taken off yet is lifted above it anyway."""
+
+
+def check_height(vehicle: Aircraft, ato: float) -> None:
+    """Raise `Refused` unless a target height (m above take-off) is one the drone may go to."""
+    ceiling = vehicle.drone.piloting.state.max_altitude
+    if not math.isfinite(ato):
+        raise Refused("Refused: the height is not a number", lasting=True)
+    if ato < (lowest := lowest_height(vehicle)):
+        raise TooLow(f"Refused: {ato:.1f} m above take-off is below {lowest:.1f} m", lasting=True)
+    if ceiling is not None and ato > ceiling.current:
+        raise Refused(
+            f"Refused: {ato:.1f} m above take-off is above the drone's ceiling of {ceiling.current:g} m",
+            lasting=True,
+        )
+    try:
+        vehicle.fence.check_height(ato)
+    except OutsideFence as error:
+        raise Refused(f"Refused: {error}", lasting=True) from error
+
+
+def amsl_to_ato(vehicle: Aircraft, amsl: float) -> float:
+    """Height above take-off (m) of an AMSL height; raises `Refused` when no bridge is known."""
+    ato = vehicle.height.ato(amsl)
+    if ato is None:
+        raise Refused("Refused: AMSL unknown: no GPS fix")
+    return ato
+
+
+def check_estimate(vehicle: Aircraft, ato: float) -> None:
+    """Raise `Refused` for an AMSL target that may be the ground because the bridge to AMSL is an estimate."""
+    if vehicle.height.estimated and ato < ESTIMATE_FLOOR:
+        raise Refused(f"Refused: estimated AMSL: {ato:.0f} m < {ESTIMATE_FLOOR:g} m")
+
+
+def check_on_earth(place: Place, what: str) -> None:
+    """Raise `Refused` unless this is a place."""
+    if not (abs(place.latitude) <= 90.0 and abs(place.longitude) <= 180.0):
+        raise Refused(f"{what} refused: that is no place on earth", lasting=True)
+    if abs(place.latitude) < NOWHERE and abs(place.longitude) < NOWHERE:
+        raise Refused(f"{what} refused: latitude and longitude are both 0", lasting=True)
+
+
+def check_place(vehicle: Aircraft, place: Place, *, start: Place | None = None) -> None:
+    """Raise `Refused` unless the drone may fly there, and the straight way from `start` if that is given."""
+    check_on_earth(place, "Goto")
+    centre, home = vehicle.geofence_centre, vehicle.home
+    around = centre or vehicle.place
+    if around is not None:
+        distance = geo.distance(around.latitude, around.longitude, place.latitude, place.longitude)
+        if distance > FARTHEST:
+            raise Refused(f"Goto refused: {distance:.0f} m away, limit {FARTHEST:g} m", lasting=True)
+        if centre is not None:
+            _check_geofence(vehicle, distance)
+    try:
+        vehicle.fence.check_place(point_of(place), point_of(home), point_of(start))
+    except OutsideFence as error:
+        raise Refused(f"Goto refused: {error}", lasting=error.lasting) from error
+
+
+def _check_geofence(vehicle: Aircraft, distance: float) -> None:
+    """Raise `Refused` for a place so far (m) from the geofence's centre when the drone's own geofence ends before."""
+    state = vehicle.drone.piloting.state
+    if state.geofence and state.max_distance is not None and distance > state.max_distance.current:
+        raise Refused(
+            f"Goto refused: {distance:.0f} m off fence centre > {state.max_distance.current:g} m", lasting=True
+        )

@@ -1,0 +1,142 @@
+"""Circling a place: what the loops of `offboard_control` are asked for, from where the drone is. No I/O.
+
+A position on the circle abreast of the drone corrects the radius, the velocity along the circle goes with it as a
+feed-forward, and the acceleration that a circle takes points to its centre.
+
+Angles are bearings from the centre, clockwise from north (rad); a radius is positive, the direction is a sign of its
+own: +1 clockwise seen from above, as a positive radius of MAV_CMD_DO_ORBIT (MAVLink common.xml).
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass
+
+from anafi_mav import geo, units
+from anafi_mav.vehicle.base.place import Place
+from anafi_mav.vehicle.base.velocity_loop import Axis, Demand, G, Motion
+
+SMALLEST = 2.0
+"""m of radius. On a smaller circle GPS does not know which side of it the drone is on."""
+
+LARGEST = 5000.0
+"""m of radius: more is a number in the wrong place."""
+
+SHARE_OF_TILT = 0.5
+"""Of the push that full tilt gives, for the circle itself. The rest is for drag, wind and corrections."""
+
+DEFAULT_RADIUS = 10.0
+"""m, clockwise, when nobody says."""
+
+DEFAULT_SPEED = 3.0
+"""m/s along the circle when nobody says."""
+
+LOOKS = 16
+"""Points of a circle that have to be where the drone may fly. Between two it is 2 % of the radius further out."""
+
+ON_IT = 5.0
+"""m from the circle within which the drone begins to circle; from further away it flies there first."""
+
+
+class Facing(enum.Enum):
+    """Where the nose points. Values of ORBIT_YAW_BEHAVIOUR; 5, "as it is", is the first."""
+
+    CENTRE = 0
+    KEEP = 1
+    FREE = 2
+    TANGENT = 3
+
+
+@dataclass(frozen=True)
+class Circle:
+    """An orbit, as it is flown."""
+
+    centre: Place
+    radius: float
+    """m."""
+    direction: int
+    """+1 clockwise, -1 counter-clockwise."""
+    speed: float
+    """m/s along it."""
+    height: float
+    """m above take-off."""
+    facing: Facing = Facing.CENTRE
+    heading: float = 0.0
+    """rad from north, for `Facing.KEEP`."""
+    angle: float | None = None
+    """rad to fly along it; None: until something else is asked for."""
+
+    @property
+    def signed_radius(self) -> float:
+        """m, + clockwise: as MAVLink writes both in one."""
+        return self.radius * self.direction
+
+
+def fastest(radius: float, tilt_deg: float) -> float:
+    """m/s along a circle that full tilt leaves room for."""
+    return math.sqrt(SHARE_OF_TILT * G * math.tan(tilt_deg * units.RAD_PER_DEG) * radius)
+
+
+def entry(circle: Circle, here: Place) -> Place:
+    """The point of the circle that is nearest to a place; north of the centre from the centre itself."""
+    north, east = geo.offset(*circle.centre.point, *here.point)
+    distance = math.hypot(north, east)
+    north, east = (1.0, 0.0) if distance < 1e-3 else (north / distance, east / distance)
+    return Place(*geo.destination(*circle.centre.point, north * circle.radius, east * circle.radius))
+
+
+def outline(circle: Circle, here: Place) -> list[Place]:
+    """Points of the circle to look at before it is flown, where it is entered from `here` first."""
+    corners = (2.0 * math.pi * n / LOOKS for n in range(LOOKS))
+    centre, radius = circle.centre.point, circle.radius
+    return [
+        entry(circle, here),
+        *(Place(*geo.destination(*centre, math.cos(a) * radius, math.sin(a) * radius)) for a in corners),
+    ]
+
+
+def heading_at(circle: Circle, bearing: float) -> float | None:
+    """rad from north that the nose is to point to, at a bearing from the centre; None: it may point anywhere."""
+    if circle.facing is Facing.CENTRE:
+        return units.wrap_pi(bearing + math.pi)
+    if circle.facing is Facing.TANGENT:
+        return units.wrap_pi(bearing + circle.direction * math.pi / 2.0)
+    return circle.heading if circle.facing is Facing.KEEP else None
+
+
+class Lap:
+    """One drone on one circle: how far it has come."""
+
+    def __init__(self, circle: Circle) -> None:
+        self.circle = circle
+        self.flown = 0.0
+        """rad along it, backwards counted negative."""
+        self._bearing: float | None = None
+
+    @property
+    def done(self) -> bool:
+        return self.circle.angle is not None and self.flown >= self.circle.angle
+
+    def demand(self, motion: Motion) -> Demand | None:
+        """What the sticks are to achieve now; None while nobody knows where the drone is."""
+        circle = self.circle
+        if motion.reference is None:
+            return None
+        north, east = geo.offset(*motion.reference, *circle.centre.point)
+        away_north, away_east = motion.north - north, motion.east - east
+        bearing = math.atan2(away_east, away_north)
+        if self._bearing is not None:
+            self.flown += circle.direction * units.wrap_pi(bearing - self._bearing)
+        self._bearing = bearing
+        cos, sin = math.cos(bearing), math.sin(bearing)
+        along = circle.direction * circle.speed
+        inwards = circle.speed**2 / circle.radius
+        turning = circle.facing in (Facing.CENTRE, Facing.TANGENT)
+        return Demand(
+            x=Axis(velocity=-sin * along, acceleration=-cos * inwards, position=north + cos * circle.radius),
+            y=Axis(velocity=cos * along, acceleration=-sin * inwards, position=east + sin * circle.radius),
+            height=circle.height,
+            yaw=heading_at(circle, bearing),
+            yaw_rate=along / circle.radius if turning else None,
+        )

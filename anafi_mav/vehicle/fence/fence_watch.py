@@ -1,0 +1,429 @@
+"""The fence in force, and what is to be done when the vehicle leaves it or is about to. No I/O.
+
+    watch.look(sight, now) -> the action to carry out now, or None
+
+An action is carried out once for each time that the vehicle comes to a boundary; who takes it over then is let fly
+back. Zones, floor and ceiling are boundaries of their own: beyond one of them the others hold. A vehicle that returns
+or lands, whoever told it to, is warned about and nothing more.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import msgspec
+
+from anafi_mav import geo, mav_enums
+from anafi_mav.errors import AnafiMavError
+from anafi_mav.plans.zones import Circle, Fence, LatLon, Margin
+from anafi_mav.vehicle.fence.fence import fence_of
+from anafi_mav.vehicle.fence.plan_items import PlanItem
+
+REACTION = 0.6
+"""s from a motion to the drone's answer to what we make of it: telemetry comes five times a second, a stick takes 0.1 s
+to be obeyed, and radio takes the rest."""
+
+BRAKING = 2.5
+"""m/s², what a drone brakes with at least: 15° of tilt."""
+
+BACK_INSIDE = 2.0
+"""m inside the boundary from where the vehicle counts as back: two readings of GPS differ by a metre."""
+
+STALE = 3.0
+"""s after which a position is not known any more: it comes once a second."""
+
+HIGHEST_FLOOR = 1000.0
+"""m above take-off."""
+
+SLACK = 1.0
+"""m beyond floor or ceiling that are no breach yet: the barometer drifts, and climbs overshoot."""
+
+CALM = 2.0
+"""s without danger until a vehicle that left, or was about to, is inside again. Where it is between two positions is an
+estimate, which each position corrects; and what a busy machine reads late looks like a way back."""
+
+RETRY = 2.0
+"""s until an action that was not carried out is tried again."""
+
+
+class Reaction(enum.Enum):
+    """What happens at the boundary."""
+
+    NONE = "nothing"
+    WARN = "warning"
+    HOLD = "hold"
+    RETURN = "return"
+    LAND = "landing"
+    TERMINATE = "motor cut"
+
+
+PX4_ACTIONS = {
+    0: Reaction.NONE,
+    1: Reaction.WARN,
+    2: Reaction.HOLD,
+    3: Reaction.RETURN,
+    4: Reaction.TERMINATE,
+    5: Reaction.LAND,
+}
+"""GF_ACTION (PX4-Autopilot src/modules/navigator/geofence_params.c)."""
+
+ARDUPILOT_ACTIONS = {
+    0: Reaction.WARN,
+    1: Reaction.RETURN,
+    2: Reaction.LAND,
+    3: Reaction.RETURN,
+    4: Reaction.HOLD,
+    5: Reaction.RETURN,
+}
+"""FENCE_ACTION of ArduCopter: report only, RTL, land, SmartRTL, brake, SmartRTL (ardupilot AC_Fence.h). A motor cut has
+no number there."""
+
+NO_NUMBER = -1
+"""FENCE_ACTION while the action is one that ArduPilot has no number for."""
+
+
+class Breach(enum.Enum):
+    """Which boundary (MAVLink FENCE_BREACH)."""
+
+    NONE = mav_enums.FENCE_BREACH_NONE
+    FLOOR = mav_enums.FENCE_BREACH_MINALT
+    CEILING = mav_enums.FENCE_BREACH_MAXALT
+    BOUNDARY = mav_enums.FENCE_BREACH_BOUNDARY
+
+
+CEILING, HOME_CIRCLE, ZONES, FLOOR = (
+    mav_enums.FENCE_TYPE_ALT_MAX,
+    mav_enums.FENCE_TYPE_CIRCLE,
+    mav_enums.FENCE_TYPE_POLYGON,
+    mav_enums.FENCE_TYPE_ALT_MIN,
+)
+"""Kinds of boundaries (MAVLink FENCE_TYPE): the drone's own ceiling, a circle around home, uploaded zones, a floor."""
+
+EVERYTHING = CEILING | HOME_CIRCLE | ZONES | FLOOR
+
+
+class State(enum.Enum):
+    INSIDE = "inside"
+    LEAVING = "about to leave"
+    OUTSIDE = "outside"
+
+
+class Event(enum.Enum):
+    SAFE = "well inside, and not about to leave"
+    AHEAD = "too fast to stop before the boundary"
+    BREACH = "beyond the boundary"
+
+
+TRANSITIONS: dict[State, dict[Event, State]] = {
+    State.INSIDE: {Event.AHEAD: State.LEAVING, Event.BREACH: State.OUTSIDE},
+    State.LEAVING: {Event.AHEAD: State.LEAVING, Event.BREACH: State.OUTSIDE, Event.SAFE: State.INSIDE},
+    State.OUTSIDE: {Event.SAFE: State.INSIDE},
+}
+"""Of zones, floor and ceiling, each for itself. What is not here changes nothing: outside, the vehicle is let fly
+however it will until it is back."""
+
+
+class OutsideFence(AnafiMavError):
+    """A place, a height or the way to a place is not inside the fence. The text is a clause: "it is 12 m beyond …"."""
+
+    def __init__(self, reason: str, *, lasting: bool = True) -> None:
+        super().__init__(reason)
+        self.lasting = lasting
+        """It will still be so when somebody asks again."""
+
+
+class Sight(msgspec.Struct, frozen=True):
+    """What the vehicle is seen to do."""
+
+    place: LatLon | None
+    """By the newest position, however old; None without a GPS fix."""
+    age: float
+    """Of that position, s."""
+    velocity: tuple[float, float]
+    """North, east, m/s."""
+    ato: float | None
+    """m above the take-off point."""
+    ceiling: float | None
+    """m above the take-off point; the drone's own, which it keeps to by itself."""
+    home: LatLon | None
+    airborne: bool
+    """Off the ground."""
+    flying: bool
+    """And neither taking off nor landing nor returning: whatever it does may be stopped."""
+    steering: bool
+    """Somebody flies it by sticks or setpoints, so that it goes on as it goes. A move stops where it was told to."""
+    orders: int
+    """Counts who took the vehicle over: an action of ours that is still the newest order need not be given again."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a look found out, other than that all is well."""
+
+    breach: Breach
+    text: str
+    """A clause: "3 m beyond the inclusion polygon of items 0 to 4"."""
+    ahead: bool = False
+    """It is not beyond yet."""
+
+
+Finding = tuple[Event | None, Verdict | None]
+"""What there is to see of a boundary; no event when nothing can be said."""
+
+SAFE: Finding = (Event.SAFE, None)
+
+
+class _Side:
+    """Where the vehicle is in relation to one kind of boundary, and what was done about it."""
+
+    def __init__(self) -> None:
+        self.state = State.INSIDE
+        self.verdict: Verdict | None = None
+        """Why the state is what it is; None when all is well."""
+        self.orders: int | None = None
+        """The vehicle's count of orders when our action was carried out."""
+        self.retry_at: float | None = None
+        """When an action that failed is tried again."""
+        self._calm_since: float | None = None
+        """Since when nothing ahead was seen."""
+
+    def see(self, event: Event | None, verdict: Verdict | None, now: float) -> State:
+        """Something is seen, or nothing can be; returns the state before."""
+        before = self.state
+        if event is not Event.SAFE:
+            self._calm_since = None
+        elif before is not State.INSIDE:
+            if self._calm_since is None:
+                self._calm_since = now
+            if now - self._calm_since < CALM:
+                return before
+        if event is None:
+            return before
+        self.state, self.verdict = TRANSITIONS[before].get(event, before), verdict
+        if verdict is None:
+            self.orders = self.retry_at = None
+        return before
+
+
+class FenceWatch:
+    """The fence of one vehicle: its zones, its settings, and where the vehicle is in relation to it."""
+
+    def __init__(self) -> None:
+        self.action = Reaction.HOLD
+        """PX4's default."""
+        self.types = EVERYTHING
+        """Kinds of boundaries that are enabled."""
+        self.predict = True
+        """Act when the vehicle is too fast to stop before the boundary, not only when it is beyond."""
+        self.floor = 0.0
+        """m above the take-off point; counts once the vehicle has been above it. 0: there is none."""
+        self.items: tuple[PlanItem, ...] = ()
+        self.fence = Fence()
+        self.verdict: Verdict | None = None
+        """What the action is about that `look` returned; without one, why the state is what it is."""
+        self.breach = Breach.NONE
+        """The last one."""
+        self.breaches = 0
+        self.breached_at = 0.0
+        """By the clock that `look` is given."""
+        self.blind = False
+        """In the air with a fence and without knowing where."""
+        self._above_floor = False
+        self._sides = _sides()
+        """In the order in which they are looked at: an action at the zones says most."""
+        self._acting: _Side | None = None
+        """For whose sake an action is being carried out."""
+
+    # Settings.
+
+    def take(self, items: Sequence[PlanItem]) -> None:
+        """Another fence is in force."""
+        self.items, self.fence = tuple(items), fence_of(items)
+        self._sides, self.verdict = _sides(), None
+
+    def enable(self, types: int = EVERYTHING) -> None:
+        """Enable some kinds of boundaries."""
+        self.types |= types & EVERYTHING
+
+    def disable(self, types: int = EVERYTHING) -> None:
+        """Disable some kinds of boundaries."""
+        self.types &= ~types
+
+    @property
+    def enabled(self) -> bool:
+        """Some kind of boundary is enabled, besides the ceiling: the drone keeps to that one whatever is enabled."""
+        return bool(self.types & ~CEILING)
+
+    @property
+    def present(self) -> bool:
+        """There is a boundary of ours that could be enabled."""
+        return bool(self.fence.zones) or self.floor > 0.0
+
+    @property
+    def in_force(self) -> bool:
+        """There is a boundary of ours, and it is enabled."""
+        return bool(self.zones.zones) or self._has_floor
+
+    @property
+    def state(self) -> State:
+        """The worst of zones, floor and ceiling."""
+        states = {side.state for side in self._sides.values()}
+        return next(state for state in (State.OUTSIDE, State.LEAVING, State.INSIDE) if state in states)
+
+    @property
+    def healthy(self) -> bool:
+        """Not breached, and known not to be."""
+        return self.state is not State.OUTSIDE and not self.blind
+
+    @property
+    def zones(self) -> Fence:
+        """Those that are enabled."""
+        if self.types & HOME_CIRCLE and self.types & ZONES:
+            return self.fence
+        return Fence(
+            zone
+            for zone in self.fence.zones
+            if self.types & (HOME_CIRCLE if isinstance(zone, Circle) and zone.centre is None else ZONES)
+        )
+
+    @property
+    def _has_floor(self) -> bool:
+        return bool(self.types & FLOOR) and self.floor > 0.0
+
+    # Asking before.
+
+    def check_height(self, ato: float) -> None:
+        """Raise `OutsideFence` for a height (m above take-off) below the floor."""
+        if self._has_floor and self.action is not Reaction.NONE and ato < self.floor:
+            raise OutsideFence(f"{ato:.1f} m above take-off is below the fence's floor of {self.floor:g} m")
+
+    def check_place(self, place: LatLon | None, home: LatLon | None, start: LatLon | None = None) -> None:
+        """Raise `OutsideFence` unless a place is inside, and the straight way to it from `start`.
+
+        From outside every way is good that ends inside. Of no place nothing can be said, so it is not inside either.
+        """
+        zones = self.zones
+        if not zones.zones or self.action is Reaction.NONE:
+            return
+        if place is None:
+            raise OutsideFence("there is a fence and no GPS fix; disable the fence to fly without", lasting=False)
+        margin = zones.margin(place, home)
+        if margin.metres < 0.0:
+            raise OutsideFence(f"it is {_beyond(margin)}")
+        if start is not None and zones.margin(start, home).metres >= 0.0:
+            way = zones.leaves(start, place, home)
+            if way is not None:
+                raise OutsideFence(f"the way there leaves the fence at the {way.zone}")
+
+    # Watching.
+
+    def look(self, sight: Sight, now: float) -> Reaction | None:
+        """The vehicle was seen; what is to be done about it now. `done` or `failed` is to be told how that went."""
+        zones = self.zones
+        if not sight.airborne:
+            self._above_floor = False
+        elif sight.ato is not None and sight.ato >= self.floor:
+            self._above_floor = True
+        self.blind = bool(zones.zones) and sight.airborne and (sight.place is None or sight.age > STALE)
+        for breach, side in self._sides.items():
+            event, verdict = self._judge(breach, zones, sight)
+            before = side.see(event, verdict, now)
+            if side.state is State.OUTSIDE and before is not State.OUTSIDE:
+                self.breach, self.breached_at = breach, now
+                self.breaches += 1
+            action = None if verdict is None else self._answer(side, before, verdict, sight, now)
+            if action is not None:
+                self.verdict = verdict
+                return action  # the next look sees to the other boundaries
+        self.verdict = next((side.verdict for side in self._sides.values() if side.verdict is not None), None)
+        return None
+
+    def _answer(self, side: _Side, before: State, verdict: Verdict, sight: Sight, now: float) -> Reaction | None:
+        """What is to be done about what is seen of one boundary."""
+        if self.action is Reaction.NONE:
+            return None
+        if self._acting is not None:
+            # What is under way serves all boundaries, but one that is crossed meanwhile is told of.
+            crossed = side.state is State.OUTSIDE and before is not State.OUTSIDE
+            return Reaction.WARN if crossed and side is not self._acting else None
+        if side.retry_at is not None:
+            return self._act(side, verdict, sight) if now >= side.retry_at else None
+        if before is State.OUTSIDE:
+            return None
+        if before is State.LEAVING and side.orders == sight.orders:
+            # It brakes already; should it not come to rest in time, nothing better can be done.
+            return Reaction.WARN if side.state is State.OUTSIDE else None
+        return self._act(side, verdict, sight)
+
+    def _act(self, side: _Side, verdict: Verdict, sight: Sight) -> Reaction:
+        side.retry_at = None
+        if not sight.flying or verdict.breach is Breach.CEILING or self.action is Reaction.WARN:
+            side.orders = sight.orders
+            return Reaction.WARN
+        self._acting = side
+        return self.action
+
+    def done(self, orders: int) -> None:
+        """The action was carried out; `orders` is the vehicle's count after it."""
+        self._acting = None
+        for side in self._sides.values():
+            side.orders, side.retry_at = orders, None
+
+    def failed(self, now: float) -> None:
+        """The action was not carried out: it is tried again, unless the vehicle comes back inside before."""
+        self._acting = None
+        for side in self._sides.values():
+            if side.state is not State.INSIDE:
+                side.retry_at = now + RETRY
+
+    def link_down(self) -> None:
+        """Nothing is known any more of what the vehicle does. The fence and its settings stay."""
+        self._sides, self._acting, self.verdict = _sides(), None, None
+        self.blind = self._above_floor = False
+
+    def _judge(self, breach: Breach, zones: Fence, sight: Sight) -> Finding:
+        """What there is to see of one kind of boundary."""
+        if not sight.airborne:
+            return SAFE
+        if breach is Breach.BOUNDARY:
+            return self._judge_zones(zones, sight)
+        if sight.ato is None or not sight.flying:
+            return SAFE
+        if breach is Breach.FLOOR:
+            below = self.floor - sight.ato
+            if self._has_floor and self._above_floor and below > SLACK:
+                return Event.BREACH, Verdict(breach, f"{below:.0f} m below the floor of {self.floor:g} m")
+        elif self.types & CEILING and sight.ceiling is not None:
+            above = sight.ato - sight.ceiling
+            if above > SLACK:
+                return Event.BREACH, Verdict(breach, f"{above:.0f} m above the drone's ceiling of {sight.ceiling:g} m")
+        return SAFE
+
+    def _judge_zones(self, zones: Fence, sight: Sight) -> Finding:
+        if not zones.zones:
+            return SAFE
+        if sight.place is None or sight.age > STALE:
+            return None, None
+        north, east = sight.velocity
+        here = geo.destination(*sight.place, north * sight.age, east * sight.age)
+        margin = zones.margin(here, sight.home)
+        if margin.metres < 0.0:
+            return Event.BREACH, Verdict(Breach.BOUNDARY, _beyond(margin))
+        speed = math.hypot(north, east)
+        if self.predict and sight.steering and sight.flying and speed > 0.0:
+            stopping = REACTION + speed / (2.0 * BRAKING)
+            way = zones.leaves(here, geo.destination(*here, north * stopping, east * stopping), sight.home)
+            if way is not None:
+                return Event.AHEAD, Verdict(Breach.BOUNDARY, f"too fast to stop before the {way.zone}", ahead=True)
+        return SAFE if margin.metres >= BACK_INSIDE else (None, None)
+
+
+def _sides() -> dict[Breach, _Side]:
+    return {breach: _Side() for breach in (Breach.BOUNDARY, Breach.FLOOR, Breach.CEILING)}
+
+
+def _beyond(margin: Margin) -> str:
+    return f"{-margin.metres:.0f} m beyond the {margin.zone}"

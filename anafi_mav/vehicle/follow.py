@@ -1,0 +1,222 @@
+"""Following a target: where it is, where the drone belongs, and who says so. No I/O; time is handed in.
+
+Parrot's own follow me (feature follow_me) looks for its target in the picture of a controller that shows it, which a
+MAVLink client cannot do. So the gateway follows: FOLLOW_TARGET says where the target is, the geometry is PX4's
+(parameters FLW_TGT_*), and the drone is flown there by the loop of `offboard_control`, nose to the target.
+
+Between two messages the target goes on as it did, for `FORESIGHT` at most. Its course is that of its motion; while it
+stands the last one counts, and before the first one the drone keeps to the side of the target that it is on.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass
+
+from anafi_mav import units
+from anafi_mav.vehicle.base.velocity_loop import Axis, Demand
+
+SILENCE = 2.5
+"""s without a word of the target until the drone hovers: MAVSDK sends one a second, and one may be lost."""
+
+PATIENCE = 10.0
+"""s that a drone in mode Follow waits for its target to appear."""
+
+FORESIGHT = 1.5
+"""s that the target is believed to go on as it did."""
+
+MOVING = 0.5
+"""m/s from which the target's motion has a course."""
+
+REACH = 500.0
+"""m beyond which a target is not followed: a mistake, most likely, and too far to look at in any case."""
+
+FASTEST = 20.0
+"""m/s likewise."""
+
+BASELINE = 0.5
+"""s between two positions that a velocity is read off: two that come at once would make a rocket of a walker."""
+
+SLUGGISH = 0.1
+"""The least share of a new position that is believed, however calm the target is to be."""
+
+
+class AltitudeMode(enum.IntEnum):
+    """What the height of the drone counts from (FLW_TGT_ALT_M)."""
+
+    TAKEOFF = 0
+    TERRAIN = 1
+    TARGET = 2
+
+
+@dataclass
+class FollowSettings:
+    """Where the drone belongs, in PX4's terms and with its defaults."""
+
+    height: float = 8.0
+    """m above what `altitude_mode` says (FLW_TGT_HT)."""
+    distance: float = 8.0
+    """m over ground (FLW_TGT_DST)."""
+    angle: float = 180.0
+    """deg clockwise from the target's course: 0 ahead of it, 90 to its right, 180 behind it (FLW_TGT_FA)."""
+    responsiveness: float = 0.1
+    """0..1: low follows every move of the target, high smoothes them (FLW_TGT_RS)."""
+    altitude_mode: AltitudeMode = AltitudeMode.TAKEOFF
+    """FLW_TGT_ALT_M."""
+    tangential_speed: float = 5.0
+    """m/s at most around the target when its course changes (FLW_TGT_MAX_VEL)."""
+
+
+class State(enum.Enum):
+    """Where following stands."""
+
+    OFF = "another mode flies"
+    WAITING = "hovers until a target appears"
+    FOLLOWING = "a target leads"
+
+
+class Event(enum.Enum):
+    """What can happen to it."""
+
+    ENGAGE = "mode Follow asked for"
+    TARGET = "the target told where it is"
+    SILENCE = "the target has said nothing for too long"
+    END = "something else flies"
+
+
+TRANSITIONS: dict[State, dict[Event, State]] = {
+    State.OFF: {Event.ENGAGE: State.WAITING, Event.TARGET: State.OFF, Event.END: State.OFF},
+    State.WAITING: {
+        Event.ENGAGE: State.WAITING,
+        Event.TARGET: State.FOLLOWING,
+        Event.SILENCE: State.OFF,
+        Event.END: State.OFF,
+    },
+    State.FOLLOWING: {
+        Event.ENGAGE: State.WAITING,
+        Event.TARGET: State.FOLLOWING,
+        Event.SILENCE: State.OFF,
+        Event.END: State.OFF,
+    },
+}
+"""The pair that is missing cannot happen: nobody waits for a target while another mode flies."""
+
+
+@dataclass(frozen=True)
+class Sighting:
+    """What one FOLLOW_TARGET says."""
+
+    latitude: float
+    longitude: float
+    altitude: float | None
+    """m above mean sea level."""
+    velocity: tuple[float, float] | None
+    """m/s north and east; None: not told."""
+
+
+class Follower:
+    """The target of one vehicle, in metres north and east as `Motion` counts them."""
+
+    def __init__(self, settings: FollowSettings) -> None:
+        self.settings = settings
+        self.altitude: float | None = None
+        """m above mean sea level, as last told."""
+        self._place: tuple[float, float] | None = None
+        self._velocity = (0.0, 0.0)
+        self._at = self._heard_at = -math.inf
+        self._raw = self._mark = (0.0, 0.0)
+        """The newest position as it was told, and the one that the velocity is read off against."""
+        self._raw_at = self._mark_at = -math.inf
+        self._side: float | None = None
+        """Direction (rad from north) from the target to where the drone belongs."""
+        self._course: float | None = None
+        self._aimed_at = -math.inf
+
+    @property
+    def known(self) -> bool:
+        """A target has appeared."""
+        return self._place is not None
+
+    @property
+    def speed(self) -> float:
+        """m/s."""
+        return math.hypot(*self._velocity)
+
+    def see(
+        self, north: float, east: float, altitude: float | None, velocity: tuple[float, float] | None, now: float
+    ) -> None:
+        """The target is there. Without a velocity its motion is read off its positions."""
+        believed = max(SLUGGISH, 1.0 - self.settings.responsiveness)
+        expected = self.target(now)
+        heard_of, self.altitude = self._heard_at, altitude
+        self._heard_at = now
+        if self._place is None or expected is None or now - heard_of > SILENCE:
+            self._begin(north, east, velocity or (0.0, 0.0), now)
+        elif velocity is None and (north, east) == self._raw:
+            # MAVSDK says the last position again, right before the next one. Said for longer, the target stands.
+            if now - self._raw_at > FORESIGHT:
+                self._begin(north, east, (0.0, 0.0), now)
+        else:
+            self._raw, self._raw_at = (north, east), now
+            if velocity is None:
+                velocity = self._read_off(north, east, now)
+            if velocity is not None:
+                self._velocity = (
+                    self._velocity[0] + believed * (velocity[0] - self._velocity[0]),
+                    self._velocity[1] + believed * (velocity[1] - self._velocity[1]),
+                )
+            self._place = (
+                expected[0] + believed * (north - expected[0]),
+                expected[1] + believed * (east - expected[1]),
+            )
+            self._at = now
+        if self.speed >= MOVING:
+            self._course = math.atan2(self._velocity[1], self._velocity[0])
+
+    def _begin(self, north: float, east: float, velocity: tuple[float, float], now: float) -> None:
+        """What was known before counts for nothing."""
+        self._place = self._raw = self._mark = (north, east)
+        self._velocity = velocity
+        self._at = self._raw_at = self._mark_at = now
+
+    def _read_off(self, north: float, east: float, now: float) -> tuple[float, float] | None:
+        """The velocity (m/s) since the last mark; None while that is too young to tell."""
+        elapsed = now - self._mark_at
+        if elapsed < BASELINE:
+            return None
+        velocity = (north - self._mark[0]) / elapsed, (east - self._mark[1]) / elapsed
+        self._mark, self._mark_at = (north, east), now
+        share = min(1.0, FASTEST / max(math.hypot(*velocity), FASTEST))
+        return velocity[0] * share, velocity[1] * share
+
+    def target(self, now: float) -> tuple[float, float] | None:
+        """Where the target is believed to be (north, east); None before it has appeared."""
+        if self._place is None:
+            return None
+        ahead = min(max(now - self._at, 0.0), FORESIGHT)
+        return self._place[0] + self._velocity[0] * ahead, self._place[1] + self._velocity[1] * ahead
+
+    def aim(self, north: float, east: float, height: float, now: float) -> Demand | None:
+        """Where a drone that is at (north, east) belongs, `height` m above take-off; None without a target."""
+        target = self.target(now)
+        if target is None:
+            return None
+        settings = self.settings
+        bearing = math.atan2(east - target[1], north - target[0])
+        if self._side is None:
+            self._side = bearing
+        wanted = self._side
+        if self._course is not None:
+            wanted = self._course + settings.angle * units.RAD_PER_DEG
+        elapsed = min(max(now - self._aimed_at, 0.0), 1.0)
+        most = settings.tangential_speed / max(settings.distance, 1.0) * elapsed
+        self._side = units.wrap_pi(self._side + units.clip(units.wrap_pi(wanted - self._side), -most, most))
+        self._aimed_at = now
+        moves = now - self._at < FORESIGHT
+        return Demand(
+            x=Axis(self._velocity[0] if moves else 0.0, None, target[0] + settings.distance * math.cos(self._side)),
+            y=Axis(self._velocity[1] if moves else 0.0, None, target[1] + settings.distance * math.sin(self._side)),
+            height=height,
+            yaw=units.wrap_pi(bearing + math.pi),
+        )

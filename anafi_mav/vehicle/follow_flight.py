@@ -1,0 +1,215 @@
+"""Flies the drone after a target: the shell around the core `follow`.
+
+It closes on the drone's own speed, as velocities of a program do. When the target falls silent the drone hovers, in
+mode Hold.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import Callable, Hashable
+
+from anafi_mav import geo
+from anafi_mav.clock import Alarm, Clock
+from anafi_mav.drone import PilotingCommand, events
+from anafi_mav.errors import LinkLost
+from anafi_mav.vehicle.base.aircraft import Aircraft
+from anafi_mav.vehicle.base.bounds import LOWEST, amsl_to_ato, check_estimate, check_height, check_on_earth, check_place
+from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.place import Place
+from anafi_mav.vehicle.base.refusal import Refused
+from anafi_mav.vehicle.base.roll_sign import ROLL_INVERTED
+from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.vehicle.base.subscriptions import Subscriptions
+from anafi_mav.vehicle.base.velocity_loop import Controller, Motion
+from anafi_mav.vehicle.follow import (
+    PATIENCE,
+    REACH,
+    SILENCE,
+    TRANSITIONS,
+    AltitudeMode,
+    Event,
+    Follower,
+    FollowSettings,
+    Sighting,
+    State,
+)
+
+
+class FollowFlight:
+    """Mode Follow of one vehicle."""
+
+    def __init__(self, vehicle: Aircraft, motion: Callable[[], Motion], clock: Clock) -> None:
+        self.settings = FollowSettings()
+        self.state = State.OFF
+        self.warn_throttled: Callable[[str], None] = lambda text: vehicle.text(Severity.WARNING, text)
+        self._vehicle = vehicle
+        self._motion = motion
+        self._clock = clock
+        self._leader: Hashable = None
+        self._heard_at = 0.0
+        self._silence = Alarm(self._expired)
+        self._follower = Follower(self.settings)
+        self._controller = Controller(self._motion())
+        self._kept_height: float | None = None
+        """m above take-off, kept while the target asks for a height that is too low."""
+
+    @property
+    def engaged(self) -> bool:
+        """The drone follows, or waits for its target."""
+        return self.state is not State.OFF
+
+    async def engage(self) -> None:
+        """Mode Follow begins; returns when the drone hovers and waits for its target, or raises `Refused`."""
+        vehicle = self._vehicle
+        if not vehicle.in_air:
+            raise Refused("Follow refused: take off first")
+        if (descent := vehicle.descent) is not None:
+            raise Refused(f"Follow refused: {descent}")
+        if vehicle.place is None:
+            raise Refused("Follow refused: no GPS fix")
+        if vehicle.drone.controller.pilot_acquired_control:
+            raise Refused("Follow refused: the pilot at the Skycontroller flies")
+        if vehicle.drone.piloting.limits is None:
+            raise Refused("Follow refused: the drone has not reported what full tilt and speed are")
+        if vehicle.sticks_follow_camera:
+            raise Refused("Follow refused: the drone's piloting style makes its sticks relative to the camera")
+        if vehicle.roll.inverted:
+            raise Refused(f"Follow refused: {ROLL_INVERTED}")
+        await vehicle.take_over()
+        await vehicle.drone.piloting.cancel_return_home()
+        if not vehicle.in_air or vehicle.returning:
+            raise Refused("Follow refused: the drone does something else now")
+        vehicle.drone.piloting.hover()
+        vehicle.select(FlightMode.FOLLOW, self)
+        self.state = TRANSITIONS[self.state][Event.ENGAGE]
+        self._leader = None
+        self._follower = Follower(self.settings)
+        self._kept_height = None
+        self._controller = Controller(self._motion())
+        self._heard_at = self._clock.monotonic()
+        self._watch(PATIENCE)
+
+    def receive(self, sender: Hashable, seen: Sighting) -> None:
+        """Somebody tells where a target is. The first one to do so in mode Follow leads until the mode ends."""
+        if self.state is State.OFF or (self.state is State.FOLLOWING and sender != self._leader):
+            return
+        if reason := self._objection(seen):
+            self.warn_throttled(f"Target ignored: {reason}")
+            return
+        reference = self._motion().reference
+        if reference is None:
+            return
+        now = self._clock.monotonic()
+        north, east = geo.offset(*reference, seen.latitude, seen.longitude)
+        self._follower.see(north, east, seen.altitude, seen.velocity, now)
+        self.state, self._leader, self._heard_at = TRANSITIONS[self.state][Event.TARGET], sender, now
+        self._watch(SILENCE)
+        self._fly(now)
+
+    def _objection(self, seen: Sighting) -> str | None:
+        here = self._vehicle.place
+        if here is None:
+            return "the drone has no GPS fix"
+        try:
+            check_on_earth(Place(seen.latitude, seen.longitude), "Target")
+        except Refused as refusal:
+            return refusal.reason.partition("efused: ")[2]
+        distance = geo.distance(here.latitude, here.longitude, seen.latitude, seen.longitude)
+        return f"it is {distance:.0f} m away" if distance > REACH else None
+
+    def end(self) -> list[asyncio.Task[None]]:
+        """Something else flies now."""
+        if self.state is not State.OFF:
+            self.state = TRANSITIONS[self.state][Event.END]
+            self._silence.cancel()
+            self._vehicle.forget_mode()
+            with contextlib.suppress(LinkLost):
+                self._vehicle.drone.piloting.pilot(None)
+        return []
+
+    def link_down(self) -> None:
+        """The drone is gone, and follows nobody."""
+        self._silence.cancel()
+        self.state = State.OFF
+
+    def subscriptions(self) -> Subscriptions:
+        """Return the handlers of what reports how the drone moves: the loop closes on it."""
+        return {events.SpeedChanged: self._on_speed}
+
+    def _on_speed(self, message: events.SpeedChanged, now: float) -> None:
+        if self.state is State.FOLLOWING:
+            self._fly(now)
+
+    def _fly(self, now: float) -> None:
+        vehicle = self._vehicle
+        limits = vehicle.drone.piloting.limits
+        if limits is None:
+            return
+        reason = None
+        if vehicle.drone.controller.pilot_acquired_control:
+            reason = "the pilot at the Skycontroller flies"
+        elif vehicle.sticks_follow_camera:
+            reason = "the drone's sticks have become relative to the camera"
+        elif vehicle.roll.inverted:
+            reason = ROLL_INVERTED
+        if reason is not None:
+            self.end()
+            vehicle.select(FlightMode.HOLD)
+            vehicle.text(Severity.WARNING, f"Follow ended: {reason}")
+            return
+        sticks = PilotingCommand()
+        try:
+            motion = self._motion()
+            wanted = self._follower.aim(motion.north, motion.east, self._height(), now)
+            if wanted is not None and vehicle.place is not None and motion.reference is not None:
+                place = Place(*geo.destination(*motion.reference, wanted.x.position or 0.0, wanted.y.position or 0.0))
+                check_place(vehicle, place)
+                sticks = self._controller.sticks(wanted, limits, now) or sticks
+        except Refused as refusal:
+            self.warn_throttled(f"Target not followed: {refusal.reason.partition('efused: ')[2] or refusal.reason}")
+        vehicle.drone.piloting.pilot(sticks)
+
+    def _height(self) -> float:
+        """Return the height (m above take-off) to fly at; raises `Refused` when that is not known or not allowed.
+
+        A target that asks for less than `LOWEST` is followed at the height that the drone had then: programs send an
+        altitude of 0 for one that they do not know.
+        """
+        settings, state = self.settings, self._vehicle.drone.piloting.state
+        height = settings.height
+        if settings.altitude_mode is AltitudeMode.TERRAIN:
+            if state.altitude is None or state.height is None:
+                raise Refused("Refused: the drone does not tell how high it is above ground")
+            height += state.altitude - state.height
+        elif settings.altitude_mode is AltitudeMode.TARGET:
+            if self._follower.altitude is None:
+                raise Refused("Refused: the target does not tell its altitude")
+            height += amsl_to_ato(self._vehicle, self._follower.altitude)
+        if height < LOWEST:
+            if self._kept_height is None:
+                self._kept_height = state.altitude
+            if self._kept_height is None:
+                raise Refused("Refused: the drone's height is not known")
+            self.warn_throttled(f"Follow height kept: target asks for {height:.0f} m")
+            return self._kept_height
+        self._kept_height = None
+        if settings.altitude_mode is AltitudeMode.TARGET:
+            check_estimate(self._vehicle, height)
+        check_height(self._vehicle, height)
+        return height
+
+    def _expired(self) -> None:
+        if self.state is State.OFF:
+            return
+        was, self.state = self.state, TRANSITIONS[self.state][Event.SILENCE]
+        self._vehicle.drone.piloting.hover()
+        self._vehicle.select(FlightMode.HOLD)
+        why = "its target fell silent" if was is State.FOLLOWING else "no target appeared"
+        self._vehicle.text(Severity.WARNING, f"Follow ended: {why}")
+
+    def _watch(self, patience: float) -> None:
+        """Come back when the target has said nothing for so long."""
+        delay = max(self._heard_at + patience - self._clock.monotonic(), 0.0)
+        self._silence.set_in(delay)

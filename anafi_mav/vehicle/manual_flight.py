@@ -1,0 +1,208 @@
+"""Flight by the sticks of ground stations.
+
+They fly the drone in mode Position (Loiter in ArduPilot's words) and in no other: a joystick that lies on the table is
+streamed all the time, and a goto or a mission is not ended by it. A stick of PX4's clients that leaves the middle takes
+over and selects that mode (`joystick_override`). A stick asks for a share of the drone's own MaxTilt,
+MaxVerticalSpeed and MaxRotationSpeed (arsdk 2.2). `services.setpoint.stick_messages` reads them from messages.
+
+`SILENCE` after the last word of whoever flies the sticks are centred.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import enum
+import math
+from collections.abc import Callable, Coroutine, Hashable
+from dataclasses import dataclass, replace
+from typing import Any
+
+from anafi_mav.clock import Alarm, Clock
+from anafi_mav.drone import PilotingCommand
+from anafi_mav.errors import LinkLost
+from anafi_mav.vehicle.base.aircraft import Aircraft
+from anafi_mav.vehicle.base.clients import system_of
+from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.right import Extent, Right
+from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.vehicle.base.silence import SILENCE
+from anafi_mav.vehicle.joystick_override import JoystickOverride, Override
+
+MEANT = 0.2
+"""Share of the way from which a stick that does nothing is worth a word."""
+
+GESTURE = 0.95
+"""Share of the way from which a stick is at its end: throttle down and yaw right arm an ArduPilot and a PX4."""
+
+
+class State(enum.Enum):
+    """Where the sticks stand."""
+
+    IDLE = "centred, or nobody holds them"
+    HELD = "somebody holds them away from the middle"
+
+
+class Event(enum.Enum):
+    """What can happen to them."""
+
+    CENTRED = "who holds them has let go, or somebody else's are centred"
+    DEFLECTED = "somebody moves them"
+    SILENCE = "who holds them has said nothing for too long"
+    END = "something else flies"
+
+
+TRANSITIONS: dict[State, dict[Event, State]] = {
+    State.IDLE: {Event.CENTRED: State.IDLE, Event.DEFLECTED: State.HELD, Event.END: State.IDLE},
+    State.HELD: {
+        Event.CENTRED: State.IDLE,
+        Event.DEFLECTED: State.HELD,
+        Event.SILENCE: State.IDLE,
+        Event.END: State.IDLE,
+    },
+}
+"""The pair that is missing cannot happen: the silence of centred sticks is not noticed."""
+
+
+@dataclass(frozen=True)
+class Sticks:
+    """Where they are: shares of the way, -1..1."""
+
+    forward: float = 0.0
+    right: float = 0.0
+    turn: float = 0.0
+    """Clockwise +."""
+    climb: float = 0.0
+
+    @property
+    def centred(self) -> bool:
+        return not any((self.forward, self.right, self.turn, self.climb))
+
+
+class ManualFlight:
+    """The sticks of ground stations on one vehicle, and the drone flown by those who move them."""
+
+    def __init__(self, vehicle: Aircraft, clock: Clock, overridable: Callable[[], Override]) -> None:
+        """`overridable` returns what flies the drone now, as far as a joystick may take over from it."""
+        self.run_action: Callable[[Hashable, Coroutine[Any, Any, None]], asyncio.Task[None]]
+        """Runs an action of a client, in its turn among the commands; set by the service."""
+        self.override = JoystickOverride()
+        self._overridable = overridable
+        self._overriding = False
+        self.warn_throttled: Callable[[str], None] = lambda text: vehicle.text(Severity.WARNING, text)
+        self.state = State.IDLE
+        self._vehicle = vehicle
+        self._clock = clock
+        self._pilot: Hashable = None
+        self._said = -math.inf
+        self._silence = Alarm(self._expired)
+
+    def receive(self, sender: Hashable, sticks: Sticks, *, overrides: bool = False) -> None:
+        """Take a client's stick positions. With `overrides` they may take the drone over from what flies it."""
+        vehicle = self._vehicle
+        if overrides and self._takes_over(sender, sticks):
+            self._overriding = True
+            self.run_action(sender, self._override(sender, sticks)).add_done_callback(self._overridden)
+        if self._overriding:
+            return
+        sticks = replace(sticks, climb=self.override.climb(sender, sticks.climb))
+        if self.state is State.HELD and sender != self._pilot:
+            if not sticks.centred:
+                self.warn_throttled("Sticks ignored: somebody else's are in use")
+            return
+        if sticks.centred:
+            self._let_go(Event.CENTRED)
+            return
+        if not self._may_fly(sticks):
+            self._let_go(Event.END)
+            return
+        limits = vehicle.drone.piloting.limits
+        if limits is None:
+            return
+        self.state, self._pilot = TRANSITIONS[self.state][Event.DEFLECTED], sender
+        self._said = self._clock.monotonic()
+        if not self._silence.is_set:
+            self._watch()
+        vehicle.drone.piloting.pilot(
+            PilotingCommand(
+                roll_deg=sticks.right * limits.tilt_deg,
+                pitch_deg=-sticks.forward * limits.tilt_deg,
+                yaw_rate_dps=sticks.turn * limits.yaw_rate_dps,
+                climb_mps=sticks.climb * limits.climb_mps,
+            )
+        )
+
+    def _takes_over(self, sender: Hashable, sticks: Sticks) -> bool:
+        """True at the moment at which this client's joystick takes the drone over."""
+        largest = max(abs(sticks.forward), abs(sticks.right), abs(sticks.turn))
+        if not self.override.moved(sender, largest, self._clock.monotonic()) or self._overriding:
+            return False
+        if self._vehicle.drone.controller.pilot_acquired_control:
+            return False
+        return bool(self._overridable() & self.override.sources)
+
+    async def _override(self, sender: Hashable, sticks: Sticks) -> None:
+        """Stop what flies, in mode Position, and let the joystick fly. Raises as `Vehicle.hold`."""
+        await self._vehicle.hold(FlightMode.POSITION, Right(sender, Extent.COMMANDED))
+        self.override.take_over(sender, sticks.climb)
+        self._vehicle.text(Severity.WARNING, f"Joystick override by system {system_of(sender) or 0}: Position")
+
+    def _overridden(self, task: asyncio.Task[None]) -> None:
+        """Sticks count again: the drone was taken over, or another action came in between."""
+        self._overriding = False
+
+    def silent(self, sender: Hashable) -> None:
+        """Somebody's sticks are gone."""
+        if sender == self._pilot:
+            self._let_go(Event.CENTRED)
+
+    def _may_fly(self, sticks: Sticks) -> bool:
+        """In mode Position they do. What they cannot do is said to whoever means it: a throttle may rest at its end."""
+        vehicle, mode = self._vehicle, self._vehicle.mode
+        meant = max(abs(sticks.forward), abs(sticks.right), abs(sticks.turn)) >= MEANT
+        reason = None
+        if vehicle.on_ground:
+            if sticks.climb <= -GESTURE and sticks.turn >= GESTURE:
+                reason = "they do not arm, a command does"
+        elif mode is not FlightMode.POSITION:
+            reason = f"they fly the drone in mode Position, this is {mode.value}" if meant else None
+        elif vehicle.drone.controller.pilot_acquired_control:
+            reason = "the pilot at the Skycontroller flies"
+        else:
+            return True
+        if reason is not None:
+            self.warn_throttled(f"Sticks ignored: {reason}")
+        return False
+
+    def end(self) -> list[asyncio.Task[None]]:
+        """Something else flies now."""
+        self._let_go(Event.END)
+        return []
+
+    def link_down(self) -> None:
+        """Nobody holds the sticks of a drone that is gone."""
+        self._silence.cancel()
+        self.override.forget()
+        self._overriding = False
+        self.state, self._pilot, self._said = State.IDLE, None, -math.inf
+
+    def _let_go(self, event: Event) -> None:
+        """Centre the sticks, if somebody held them."""
+        held = self.state is State.HELD
+        self.state, self._pilot = TRANSITIONS[self.state][event], None
+        self._silence.cancel()
+        if held:
+            with contextlib.suppress(LinkLost):
+                self._vehicle.drone.piloting.pilot(None)
+
+    def _expired(self) -> None:
+        if self._clock.monotonic() - self._said < SILENCE:
+            self._watch()
+        elif self.state is State.HELD:
+            self._let_go(Event.SILENCE)
+            self._vehicle.text(Severity.WARNING, "Sticks silent: hovering")
+
+    def _watch(self) -> None:
+        """Come back when they have been silent for too long."""
+        delay = max(self._said + SILENCE - self._clock.monotonic(), 0.0)
+        self._silence.set_in(delay)

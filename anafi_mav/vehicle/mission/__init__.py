@@ -1,0 +1,1 @@
+"""Flight of a mission: its parts, the drone's files, progress, and the record for a restart."""

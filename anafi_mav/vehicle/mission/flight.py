@@ -1,0 +1,553 @@
+"""Flies a mission: the shell around the cores `mission_progress` and `plans.translate`.
+
+What the drone can fly by itself it flies from a file (`Leg`); what it cannot, the gateway flies between two files
+(`Step`). The drone says which line it has executed, and nothing else counts. Whatever takes the drone over stops the
+mission, and nothing but a client's word lets it go on.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import Callable, Coroutine, Hashable, Sequence
+from typing import Any
+
+from anafi_mav.drone import events
+from anafi_mav.drone.events import FlyingState, PlayingState
+from anafi_mav.errors import AnafiMavError, CommandRejected, LinkLost
+from anafi_mav.plans.plan import Item
+from anafi_mav.plans.translation.translate import Leg
+from anafi_mav.vehicle.base.aircraft import Aircraft
+from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.refusal import Refused
+from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.vehicle.base.subscriptions import Subscriptions
+from anafi_mav.vehicle.mission.course import Course
+from anafi_mav.vehicle.mission.files import FilesOnDrone
+from anafi_mav.vehicle.mission.path import WayPoint, check_path, lay_out, way_points
+from anafi_mav.vehicle.mission.progress import ENDINGS, Progress, State
+from anafi_mav.vehicle.mission.record import Keeper, Record
+from anafi_mav.vehicle.mission.steps import fly_step
+from anafi_mav.vehicle.mission.texts import beginning, refusal
+from anafi_mav.vehicle.mission.waits import ArmWait, EndWatch, StoreWait
+
+_LANDING = (FlyingState.LANDING, FlyingState.EMERGENCY_LANDING)
+
+
+class MissionFlight:
+    """The mission of one vehicle; its `Helm` while it is flown."""
+
+    def __init__(self, vehicle: Aircraft) -> None:
+        self.progress = Progress()
+        self.identity = 0
+        """The opaque id of the mission."""
+        self.news: Callable[[], None] = lambda: None
+        """Says that MISSION_CURRENT has changed."""
+        self.reached: Callable[[int], None] = lambda item: None
+        """Says that an item is done."""
+        self.say: Callable[[Severity, Callable[[int], str]], None] = lambda severity, text: None
+        """A text to everybody; it is made from what they call item 0."""
+        self.first_number: Callable[[Hashable], int] = lambda client: 0
+        """What a client calls item 0."""
+        self.spawn: Callable[[Coroutine[Any, Any, None]], asyncio.Task[None]] | None = None
+        """Runs something until the link goes down."""
+        self.keeper = Keeper()
+        """Remembers what is needed to know the drone's plan again."""
+        self._vehicle = vehicle
+        self._course = Course()
+        self._uid = ""
+        """Of the file that the drone flies, or flew last."""
+        self._left: tuple[Leg, int, dict[int, int]] | None = None
+        """The drone has it paused, and the mission is to begin elsewhere next: file, last line, jumps."""
+        self._starting: tuple[Leg, int] | None = None
+        """What the drone is asked to begin, and after which line; None also when that is not wanted any more."""
+        self._taken_meanwhile = False
+        """While it was asked, the same mission was uploaded again."""
+        self._files = FilesOnDrone(vehicle.drone.flight_plan)
+        self.storing = StoreWait()
+        self._arming = ArmWait(self._lapsed)
+        self._beginning = False
+        """Taken over by ourselves."""
+        self._running: asyncio.Task[None] | None = None
+        """What the gateway does between two files."""
+        self._end_watch = EndWatch(vehicle, self.progress, self._ended)
+
+    # What clients ask for.
+
+    def take(self, items: Sequence[Item], identity: int) -> None:
+        """Another mission was uploaded, or none any more. One that is flown is stopped: it is not the mission now."""
+        if identity == self.identity:
+            return
+        known, self.identity = self.identity != 0, identity
+        why = "another mission was uploaded" if items else "it was cleared"
+        flown, starting, self._starting = self.flying, self._starting is not None, None
+        if flown:
+            self._stop(why)
+        elif starting and self._running is not None:  # what it began for was answered long ago
+            self._vehicle.text(Severity.WARNING, f"Mission not begun: {why}")
+        if flown or starting:
+            self._suspend(starting=starting)
+            self._vehicle.select(FlightMode.HOLD)
+        self.progress.take(items)
+        self._left, self._course = None, Course()
+        self._drop_pending()
+        if known:  # else it has just been read, and what was kept of it has not been looked at
+            self.keeper.forget()
+
+    def taken_again(self) -> None:
+        """The same mission was uploaded once more. One that is flown goes on undisturbed; else it is a new one."""
+        starting, current = self._starting, self.progress.current
+        if starting is not None:
+            leg, line = starting
+            current, self._taken_meanwhile = leg.origins[line + 1], True
+        if starting is not None or self.progress.state is State.ACTIVE:
+            self.say(Severity.INFO, lambda first: f"Mission: the same again, it goes on at item {current + first}")
+            return
+        self._anew()
+
+    def _anew(self) -> None:
+        """Nothing of it has been flown, but for a file that the drone has paused."""
+        self._leave()
+        self.progress.take(self.progress.items)
+        self.keeper.forget()
+
+    def _leave(self) -> None:
+        """It begins elsewhere next; somebody else may still let the drone go on with what it has."""
+        progress = self.progress
+        if progress.state is State.PAUSED and progress.leg is not None:
+            self._left = progress.leg, progress.line, dict(progress.jumps)
+
+    async def engage(self, client: Hashable, item: int | None = None) -> None:
+        """Mode Mission begins, or goes on where it was stopped, or at an item; returns when the drone flies it.
+
+        On the ground and disarmed it waits until this client arms. Raises `Refused`, or what the drone refused.
+        """
+        await self.storing.over()
+        progress, vehicle = self.progress, self._vehicle
+        if progress.state is State.NONE:
+            raise Refused("Mission refused: there is no mission")
+        if progress.state is State.ACTIVE and item is None:
+            return  # it is flown, and goes on without a jolt
+        self._require_freedom()
+        if vehicle.armed:
+            chosen = item is not None
+            await self._begin(progress.first if item is None else item, self.first_number(client), anew=chosen)
+            return
+        if problems := vehicle.prearm_problems():
+            raise Refused("PreArm: " + "; ".join(problems))
+        await vehicle.take_over()
+        vehicle.select(FlightMode.MISSION, self)
+        self._arming.begin(client)
+
+    async def choose(self, client: Hashable, item: int) -> None:
+        """Make an item the current one; a mission that is flown goes on there."""
+        await self.storing.over()
+        if self.progress.state is State.NONE:
+            raise Refused("Current item refused: there is no mission")
+        if not 0 <= item < len(self.progress.items):
+            number = item + self.first_number(client)
+            raise Refused(f"Current item refused: there is no item {number}", lasting=True)
+        if self.progress.state is State.ACTIVE:
+            await self.engage(client, item)
+        else:
+            self._leave()
+            self.progress.choose(item)
+            self._keep()
+            self.news()
+
+    def armed(self, client: Hashable) -> None:
+        """A client has armed: what waited for that begins."""
+        if self._arming.ends_with(client):
+            self._run(self._begin_and_report(self.first_number(client)))
+
+    @property
+    def there(self) -> bool:
+        """There is a mission."""
+        return self.progress.state is not State.NONE
+
+    @property
+    def flying(self) -> bool:
+        """It is flown."""
+        return self.progress.state is State.ACTIVE
+
+    @property
+    def paused(self) -> bool:
+        """It was begun and stopped."""
+        return self.progress.state is State.PAUSED
+
+    @property
+    def ending(self) -> bool:
+        """A landing or a return that begins now is the plan's own."""
+        return self.progress.ending
+
+    @property
+    def returns(self) -> bool:
+        """A return that begins now is that of the mission's last item, done already or about to be."""
+        drone = self._vehicle.drone
+        by_plan = drone.home.state.reason == events.ReturnReason.FLIGHTPLAN and drone.flight_plan.state.uid == self._uid
+        return self.progress.ending or (by_plan and self.progress.returned)
+
+    # The beginning.
+
+    def _require_freedom(self) -> None:
+        vehicle = self._vehicle
+        if vehicle.flying_state in _LANDING:
+            raise Refused("Mission refused: the drone is landing")
+        if vehicle.returning_by_itself:
+            raise Refused("Mission refused: the drone returns home by itself")
+        if vehicle.drone.controller.pilot_acquired_control:
+            raise Refused("Mission refused: the pilot at the Skycontroller flies")
+        if not vehicle.in_air and not vehicle.on_ground:
+            raise Refused("Mission refused: the drone is neither on the ground nor flying yet")
+
+    def _resumes(self, item: int) -> bool:
+        """The drone hovers, with the rest of what is to be flown in its memory."""
+        progress, plan = self.progress, self._vehicle.drone.flight_plan.state
+        paused = plan.playing == PlayingState.PAUSED and plan.uid == self._uid
+        whole = progress.leg is not None and self._course.later is None
+        same = progress.state is State.PAUSED and item == progress.current
+        return same and whole and paused and self._vehicle.in_air
+
+    async def _begin(self, item: int, number: int, *, anew: bool = False, waited: bool = False) -> None:
+        """Fly from an item on. Nothing is disturbed before all is known to be good. `number` is of the first item.
+
+        `anew`: loops have all their turns before them, else those that were not flown when it was stopped.
+        `waited`: the drone was taken over when the mode was chosen, and has stood since.
+        """
+        vehicle, progress, plan = self._vehicle, self.progress, self._vehicle.drone.flight_plan
+        items, resumes, uid = progress.items, self._resumes(item), self._uid
+        jumps = {} if anew else progress.jumps
+        if resumes:
+            course, line = self._course, progress.line
+        else:
+            course, line = Course(*await lay_out(vehicle, items, item, number, jumps)), -1
+        await check_path(vehicle, course.parts, line, number)
+        head = course.parts[0]
+        if not resumes and isinstance(head, Leg):
+            if plan.state.playing == PlayingState.PAUSED:
+                await plan.stop()  # some firmware may take no file while another one is paused (GroundSDK stops first)
+            head, uid, line = await self._files.beginning_with(head, items)
+            course.parts[0] = head
+        self._beginning = True
+        try:
+            if not waited:
+                await vehicle.take_over()
+            if vehicle.in_air:
+                await vehicle.drone.piloting.stop()
+                await vehicle.drone.piloting.cancel_return_home()
+            if not resumes and plan.state.playing not in (None, PlayingState.STOPPED):
+                await plan.stop()
+        finally:
+            self._beginning = False
+        self._require_freedom()
+        if progress.items is not items or not vehicle.armed:
+            raise Refused("Mission refused: something else has happened meanwhile")
+        vehicle.select(FlightMode.MISSION, self)
+        self._left, self._course = None, course
+        if not resumes:
+            progress.jumps = {**jumps}
+        try:
+            if isinstance(head, Leg):
+                await self._play(head, uid, line)
+                self._require_same(items)
+            else:
+                progress.fly(head.item)
+                self._run(self._go_on())
+        except BaseException as error:
+            if progress.state is not State.ACTIVE:
+                vehicle.select(FlightMode.HOLD)
+                if self._taken_meanwhile and progress.items is items:
+                    self._anew()
+                    self.news()
+            if isinstance(error, CommandRejected):
+                self._require_same(items)
+            raise
+        self._announce(resumes)
+
+    def _require_same(self, items: Sequence[Item]) -> None:
+        if self.progress.items is not items:
+            raise Refused(f"Mission refused: {'another was uploaded' if self.there else 'it was cleared'} meanwhile")
+
+    async def _play(self, leg: Leg, uid: str, line: int) -> None:
+        """Begin a file, or go on with it; returns when the drone flies it."""
+        plan = self._vehicle.drone.flight_plan
+        goes_on = plan.state.returns_on_disconnect is False if plan.starts_anywhere else None
+        self._uid, self._starting, self._taken_meanwhile = uid, (leg, line), False
+        try:
+            await plan.start(uid, line + 1 if plan.starts_anywhere else 0, continue_on_disconnect=goes_on)
+            if self._starting is not None:
+                self.progress.begin(leg, line)
+        except CommandRejected as error:
+            raise CommandRejected(refusal(plan.state, error)) from error
+        finally:
+            self._starting = None
+        self._keep()
+        self.news()
+
+    async def _begin_and_report(self, number: int) -> None:
+        """The beginning that waited for arming: its command was answered long ago, so failures are texts."""
+        try:
+            await self.storing.over()
+            await self._begin(self.progress.first, number, waited=True)
+        except AnafiMavError as error:
+            self._vehicle.text(Severity.ERROR, str(error))
+
+    def _announce(self, resumes: bool) -> None:
+        """What is flown, and what happens to it without the gateway."""
+        current, stepped = self.progress.current, self._course.stepped
+        returns = self._vehicle.drone.flight_plan.state.returns_on_disconnect
+        self.say(Severity.INFO, lambda first: beginning(current + first, resumes, stepped=stepped, returns=returns))
+
+    # From part to part.
+
+    async def _go_on(self) -> None:
+        """Fly what follows: the steps that come next, and then the file behind them."""
+        progress = self.progress
+        try:
+            while not self._course.over:
+                rest = self._course.rest
+                if not self._course.parts and rest is not None:
+                    self._course = Course(*await lay_out(self._vehicle, progress.items, rest, 0))
+                    await check_path(self._vehicle, self._course.parts, -1, 0)
+                head = self._course.parts[0]
+                if isinstance(head, Leg):
+                    leg, uid, line = await self._files.beginning_with(head, progress.items)
+                    self._course.parts[0] = leg
+                    await self._play(leg, uid, line)
+                    return  # it says itself when it ends
+                progress.fly(head.item)
+                self._keep()
+                self.news()
+                await fly_step(self._vehicle, progress.items[head.item])
+                progress.did(head.done)
+                for item in head.done:
+                    self.reached(item)
+                self._part_over()
+        except AnafiMavError as error:
+            self._break_off(str(error))
+        else:
+            self._finish()
+
+    def _leg_over(self) -> None:
+        """The drone has flown a whole file."""
+        self._part_over()
+        if (following := self._course.later) is not None:
+            self._course.later = None
+            self.progress.current = following
+            self._break_off("after a lost link it does not go on by itself")
+            self.progress.choose(following, anew=False)
+            self._keep()
+            self.news()
+        elif not self._course.over:
+            self._run(self._go_on())
+        else:
+            self._finish()
+
+    def _part_over(self) -> None:
+        """What follows is the current item from now on: paused before it begins, the last one is not flown again."""
+        following = self._course.part_over()
+        if following is not None:
+            self.progress.fly(following)
+            self._keep()
+            self.news()
+
+    def _finish(self) -> None:
+        self._left = None
+        self.progress.finish()
+        self.keeper.forget()
+        self.say(Severity.INFO, lambda first: "Mission complete")
+        self._vehicle.select(FlightMode.HOLD)
+        self.news()
+
+    def _break_off(self, why: str) -> None:
+        """It does not go on, and nobody asked for that."""
+        if self.progress.state is State.ACTIVE:
+            self._stop(why)
+            self._vehicle.select(FlightMode.HOLD)
+
+    def _stop(self, why: str) -> None:
+        progress = self.progress
+        progress.stop()
+        current, severity = progress.current, Severity.WARNING if why else Severity.INFO
+        reason = f": {why}" if why else ""
+        if not self._beginning:
+            self.say(severity, lambda first: f"Mission paused at item {current + first}{reason}")
+        self._end_watch.end()
+        self._keep()
+        self.news()
+
+    def _run(self, work: Coroutine[Any, Any, None]) -> None:
+        assert self.spawn is not None, "set by the service, without which nobody asks for a mission"
+        task = self._running = self.spawn(work)
+
+        def done(ended: asyncio.Task[None]) -> None:
+            if self._running is ended:
+                self._running = None
+
+        task.add_done_callback(done)
+
+    # What the drone reports.
+
+    def subscriptions(self) -> Subscriptions:
+        """Return the handlers of what reports how far the drone's plan is."""
+        return {
+            events.MavlinkFilePlayingStateChanged: self._on_playing,
+            events.MissionItemExecuted: lambda message, now: self._executed(message.idx),
+            events.WaypointSkipped: self._on_skipped,
+        }
+
+    def _on_skipped(self, message: events.WaypointSkipped, now: float) -> None:
+        item = self.progress.skip(message.item)
+        if item is not None:
+            self.say(Severity.WARNING, lambda first: f"Mission: item {item + first} was out of reach")
+
+    def _on_playing(self, message: events.MavlinkFilePlayingStateChanged, now: float) -> None:
+        progress = self.progress
+        if message.state == PlayingState.PLAYING:
+            self._end_watch.end()
+            if self._starting is not None:
+                (leg, line), self._starting = self._starting, None
+                progress.begin(leg, line)
+                self.news()
+            elif message.filepath != self._uid:
+                if progress.state is State.ACTIVE:
+                    self._break_off("the drone flies another plan")
+                else:
+                    self._vehicle.text(Severity.NOTICE, "The drone flies a plan that is not of this mission")
+            elif progress.state is not State.ACTIVE:
+                # Not by us, but it flies, and who looks at the mission has to see that.
+                self._leave()
+                if self._left is None:
+                    self._vehicle.text(Severity.NOTICE, "The drone flies a plan that is not of this mission")
+                    return
+                self._vehicle.select(FlightMode.MISSION, self)
+                (leg, line, jumps), self._left = self._left, None
+                progress.begin(leg, line)
+                progress.jumps = jumps
+                self.say(Severity.NOTICE, lambda first: "Mission goes on: somebody else has continued it")
+                self.news()
+        elif self._starting is None and progress.state is State.ACTIVE and progress.leg is not None:
+            if progress.leg_done:
+                self._leg_over()
+            elif progress.ending and progress.at_last_line and message.state == PlayingState.STOPPED:
+                self._end_watch.begin()
+            elif self._vehicle.drone.controller.pilot_acquired_control:
+                self._break_off("the pilot at the Skycontroller flies")
+            elif message.state == PlayingState.STOPPED and (last := self._last_way_point(progress.leg)) is not None:
+                self._end_watch.begin(last)
+            else:
+                self._break_off("the drone has stopped it")
+
+    def _last_way_point(self, leg: Leg) -> WayPoint | None:
+        """Return the way point that a file ends at; None while others are left, or when it lands or returns."""
+        progress = self.progress
+        points, left = [*way_points(leg)], [*way_points(leg, progress.line)]
+        if progress.items[leg.origins[-1]].command in ENDINGS or len(left) > 1 or not points:
+            return None
+        return points[-1]
+
+    def _executed(self, line: int) -> None:
+        done = self.progress.executed(line)
+        for item in done:
+            self.reached(item)
+        if done:
+            self._keep()
+        self.news()
+        if self._end_watch.running and self.progress.leg_done:  # it has said so late
+            self._end_watch.end()
+            self._leg_over()
+
+    def on_vehicle(self) -> None:
+        """Landing, return or flying state have changed."""
+        self._end_watch.look()
+
+    def _ended(self, begun: bool) -> None:
+        """The drone has stopped its plan without reporting its last line; `begun`: it has been flown all the same."""
+        if begun:
+            if (leg := self.progress.leg) is not None:
+                self._executed(len(leg.origins) - 1)
+            self._leg_over()
+        else:
+            self._break_off("the drone has stopped it")
+
+    # Helm.
+
+    def end(self) -> list[asyncio.Task[None]]:
+        """Something else flies now: the mission is paused."""
+        self._drop_pending()
+        ended = []
+        if self._running is not None and self._running is not asyncio.current_task():
+            self._running.cancel()
+            ended.append(self._running)
+            self._running = None
+        if self.progress.state is State.ACTIVE:
+            self._stop("")
+            self._suspend()
+        return ended
+
+    def _suspend(self, *, starting: bool = False) -> None:
+        """The drone is not to fly its file any more. A landing or a return of its own is not disturbed.
+
+        `starting`: it has been asked to begin it and has not said that it does, so no landing or return is that file's.
+        """
+        vehicle = self._vehicle
+        if starting or (vehicle.flying_state not in _LANDING and not vehicle.returning):
+            with contextlib.suppress(LinkLost):
+                vehicle.drone.flight_plan.suspend()
+
+    def _lapsed(self) -> None:
+        self._vehicle.select(FlightMode.HOLD)
+        self._vehicle.text(Severity.WARNING, "Mission not begun: nobody armed")
+
+    def _drop_pending(self) -> None:
+        """What waits to be armed will not begin: the mode must not say that it does."""
+        if self._arming.end():
+            self._vehicle.forget_mode()
+
+    # The link.
+
+    def link_down(self) -> None:
+        """The drone may fly on with the file that it has. What the gateway flies itself ends here."""
+        self._arming.end()
+        self._end_watch.end()
+        self._starting, self._running = None, None
+        self._course.end_with_this_part()
+        if self.progress.state is State.ACTIVE:
+            self.progress.stop()
+
+    def link_up(self, record: Record | None) -> None:
+        """The drone is back, or it is another gateway's: is it our mission that it flies?"""
+        progress, plan = self.progress, self._vehicle.drone.flight_plan.state
+        if progress.leg is None and record is not None and record.mission == self.identity:
+            leg, plays = record.leg, plan.uid == record.uid
+            if not (plays or self._vehicle.in_air):
+                return
+            self._uid, self._course = record.uid, Course([leg], later=record.next)
+            self.keeper.found(record)
+            progress.begin(leg, record.line)
+            progress.jumps = dict(record.jumps)
+            progress.stop()
+        if progress.state is not State.PAUSED or progress.leg is None:
+            return
+        plays = plan.uid == self._uid and plan.playing == PlayingState.PLAYING
+        later = self._course.later
+        if progress.leg_done and later is not None:
+            progress.current = later
+        current = progress.current
+        if plays:
+            progress.begin(progress.leg, progress.line)
+            self._vehicle.select(FlightMode.MISSION, self)
+            how = "the drone flies it"
+            self.say(Severity.NOTICE, lambda first: f"Mission: {how}, at item {current + first} or a later one")
+        elif progress.leg_done and later is None:
+            progress.begin(progress.leg, progress.line)
+            progress.finish()
+            self.keeper.forget()
+            self.say(Severity.INFO, lambda first: "Mission complete")
+        else:
+            how = "the drone flies it no more"
+            self.say(Severity.NOTICE, lambda first: f"Mission: {how}, paused at item {current + first}")
+        self.news()
+
+    def _keep(self) -> None:
+        self.keeper.keep(self.identity, self._uid, self.progress, self._course.following)

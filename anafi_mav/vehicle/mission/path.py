@@ -1,0 +1,143 @@
+"""From a mission to the files that are flown from where the drone is, and whether it may fly where they lead.
+
+What is judged is what is flown: the lines of the files.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from anafi_mav import mav_enums
+from anafi_mav.errors import PlanError
+from anafi_mav.plans.plan import Item
+from anafi_mav.plans.translation.translate import Cursor, Leg, Start, Step, translate
+from anafi_mav.units import DEG_PER_RAD
+from anafi_mav.vehicle.base.aircraft import Aircraft
+from anafi_mav.vehicle.base.bounds import check_estimate, check_place
+from anafi_mav.vehicle.base.height import ESTIMATE_FLOOR
+from anafi_mav.vehicle.base.place import Place
+from anafi_mav.vehicle.base.refusal import Refused
+from anafi_mav.vehicle.fence.fence_watch import OutsideFence
+
+BREATH = 20
+"""Way points after which others get their turn: a large polygon takes a while."""
+
+ACCEPTANCE = 5.0
+"""m around a way point that names no radius (Parrot's flight plan page)."""
+
+_AMSL_FRAMES = (mav_enums.MAV_FRAME_GLOBAL, mav_enums.MAV_FRAME_GLOBAL_INT)
+
+_COMMAND, _RADIUS, _LATITUDE, _LONGITUDE, _HEIGHT = 3, 5, 8, 9, 10
+"""Columns of a line (arsdk.md §3.3, Parrot's flight plan page)."""
+
+
+@dataclass(frozen=True)
+class WayPoint:
+    """One that a file leads to."""
+
+    item: int
+    """Of the mission."""
+    place: Place
+    ato: float
+    """m above the take-off point."""
+    radius: float
+    """m around it that count as reached."""
+
+
+def _start(vehicle: Aircraft) -> Start:
+    """Where the flight begins."""
+    state, place, amsl = vehicle.drone.piloting.state, vehicle.place, vehicle.height.ato(0.0)
+    if place is None:
+        raise Refused("Mission refused: no GPS fix")
+    if vehicle.in_air and state.altitude is None:
+        raise Refused("Mission refused: the drone's height is not known")
+    return Start(
+        place.latitude,
+        place.longitude,
+        (state.altitude or 0.0) if vehicle.in_air else 0.0,
+        flying=vehicle.in_air,
+        takeoff_amsl=None if amsl is None else -amsl,
+        heading=0.0 if state.attitude is None else state.attitude.yaw * DEG_PER_RAD % 360.0,
+    )
+
+
+async def lay_out(
+    vehicle: Aircraft, items: Sequence[Item], first: int | Cursor, number: int, jumps: Mapping[int, int] | None = None
+) -> tuple[list[Leg | Step], Cursor | None]:
+    """What is flown from an item on, from where the drone is, and how it goes on after that. Raises `Refused`.
+
+    `number` is what the first item is called, `jumps` how often which jump was taken before. In a thread: 5 000 items
+    take half a second.
+    """
+    start, version = _start(vehicle), vehicle.drone.flight_plan.version
+    try:
+        flight = await asyncio.to_thread(translate, items, 1 if version == 1 else 2, start, first, {**(jumps or {})})
+    except PlanError as error:
+        where = "" if error.item is None else f"item {error.item + number}: "
+        raise Refused(f"Mission refused: {where}{error.problem}") from error
+    if not flight.parts:
+        raise Refused("Mission refused: nothing of it is left to fly")
+    _check_estimates(vehicle, items, flight.parts, number)
+    return [*flight.parts], flight.rest
+
+
+def _check_estimates(vehicle: Aircraft, items: Sequence[Item], parts: Sequence[Leg | Step], number: int) -> None:
+    """Raise `Refused` when the bridge to AMSL is an estimate and an item's AMSL height may be the ground."""
+    if not vehicle.height.estimated:
+        return
+    for part in parts:
+        for point in way_points(part) if isinstance(part, Leg) else ():
+            if items[point.item].frame in _AMSL_FRAMES:
+                try:
+                    check_estimate(vehicle, point.ato)
+                except Refused as error:
+                    reason = f"estimated AMSL < {ESTIMATE_FLOOR:g} m"
+                    raise Refused(f"Mission refused: item {point.item + number}: {reason}") from error
+
+
+def lines_of(leg: Leg) -> list[str]:
+    """The lines of a file without its first and without their numbers."""
+    return [line.split("\t", 1)[-1] for line in leg.content.decode().splitlines()[1:]]
+
+
+def way_points(leg: Leg, after: int = -1) -> Iterator[WayPoint]:
+    """Where the lines after one of them lead to. All heights are above take-off: the translation writes no others."""
+    lines = leg.content.decode().splitlines()[1:]
+    for line, item in zip(lines[after + 1 :], leg.origins[after + 1 :], strict=False):
+        columns = line.split("\t")
+        if int(columns[_COMMAND]) == mav_enums.MAV_CMD_NAV_WAYPOINT:
+            place = Place(float(columns[_LATITUDE]), float(columns[_LONGITUDE]))
+            radius = float(columns[_RADIUS])
+            yield WayPoint(item, place, float(columns[_HEIGHT]), radius if radius > 0.0 else ACCEPTANCE)
+
+
+async def check_path(vehicle: Aircraft, parts: Sequence[Leg | Step], after: int, number: int) -> None:
+    """Raise `Refused` when a way point, or the straight way to it, is where the drone may not be.
+
+    `after` is the line of the first file after which it is flown, `number` what the first item is called.
+    """
+    where, seen = vehicle.place, 0
+    for part in parts:
+        if isinstance(part, Leg):
+            for point in way_points(part, after):
+                _check(vehicle, where, point, number)
+                where, seen = point.place, seen + 1
+                if seen % BREATH == 0:
+                    await asyncio.sleep(0)
+        after = -1
+
+
+def _check(vehicle: Aircraft, start: Place | None, point: WayPoint, number: int) -> None:
+    ceiling = vehicle.drone.piloting.state.max_altitude
+    try:
+        check_place(vehicle, point.place, start=start)
+        if ceiling is not None and point.ato > ceiling.current:
+            raise Refused(
+                f"{point.ato:.1f} m above take-off is above the drone's ceiling of {ceiling.current:g} m", lasting=True
+            )
+        vehicle.fence.check_height(point.ato)
+    except (Refused, OutsideFence) as error:
+        reason = str(error).removeprefix("Goto refused: ")
+        raise Refused(f"Mission refused: item {point.item + number}: {reason}", lasting=True) from error

@@ -1,0 +1,170 @@
+"""What a mission waits for without being flown: that it is stored, that somebody arms, and what a drone does that has
+stopped its plan."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Callable, Hashable, Iterator
+from contextlib import contextmanager
+
+from anafi_mav import geo
+from anafi_mav.clock import Alarm
+from anafi_mav.drone.events import AlertState, FlyingState, ForcedLandingReason, PlayError
+from anafi_mav.vehicle.base.aircraft import Aircraft
+from anafi_mav.vehicle.base.refusal import Refused
+from anafi_mav.vehicle.mission.path import WayPoint
+from anafi_mav.vehicle.mission.progress import Progress
+
+ARM_WAIT = 10.0
+"""s that a mission waits for somebody to arm: QGroundControl chooses the mode first and arms when it is shown."""
+
+END_WAIT = 2.0
+"""s within which a drone whose plan has ended has reported the last line, or begun its landing or return."""
+
+GPS_MARGIN = 2.0
+"""m beyond the radius of a way point at which a drone that has stopped there may report itself."""
+
+STORE_WAIT = 5.0
+"""s that an order waits for a mission to be stored, which takes a thread some milliseconds and a disk its time."""
+
+
+class StoreWait:
+    """A mission has come and is being stored: what its client orders meanwhile is meant for it, not for the old one.
+
+    Clients like dronekit do not wait for the acknowledgement of their last item.
+    """
+
+    def __init__(self) -> None:
+        self._stored: asyncio.Event | None = None
+
+    @contextmanager
+    def going_on(self) -> Iterator[None]:
+        """For as long as a mission is being stored, and until it is the one of the vehicle."""
+        stored = self._stored = asyncio.Event()
+        try:
+            yield
+        finally:
+            stored.set()
+            if self._stored is stored:
+                self._stored = None
+
+    async def over(self) -> None:
+        """Return when no mission is being stored: at once if that is so. Raises `Refused` when it takes too long."""
+        while self._stored is not None:
+            try:
+                await asyncio.wait_for(self._stored.wait(), STORE_WAIT)
+            except asyncio.TimeoutError:
+                raise Refused("Mission refused: it is still being stored") from None
+
+
+class ArmWait:
+    """A client has chosen the mission on the ground, and is to arm now."""
+
+    def __init__(self, lapsed: Callable[[], None]) -> None:
+        """`lapsed` is called when it did not."""
+        self._lapsed = lapsed
+        self._client: Hashable = None
+        self._alarm = Alarm(self._lapse)
+
+    def begin(self, client: Hashable) -> None:
+        """It has been chosen; whoever was waited for before is not any more."""
+        self.end()
+        self._client = client
+        self._alarm.set_in(ARM_WAIT)
+
+    def ends_with(self, client: Hashable) -> bool:
+        """This client has armed: was it waited for? If so that is over."""
+        return self._client == client and self.end()
+
+    def end(self) -> bool:
+        """Wait no more; whether anybody was waited for."""
+        waited, self._client = self._alarm.is_set, None
+        self._alarm.cancel()
+        return waited
+
+    def _lapse(self) -> None:
+        self.end()
+        self._lapsed()
+
+
+class EndWatch:
+    """Decides whether a plan that the drone has stopped without reporting its last line is complete.
+
+    Parrot does not document whether the last MissionItemExecuted precedes the state stopped. A last line that lands or
+    returns is done when the drone has begun that; one of another cause is not the mission's. Any other last line is
+    done when the drone is at the last way point and nothing is wrong. The report itself may also be late.
+    """
+
+    def __init__(self, vehicle: Aircraft, progress: Progress, ended: Callable[[bool], None]) -> None:
+        """`ended` is called with whether it has."""
+        self._vehicle = vehicle
+        self._progress = progress
+        self._ended = ended
+        self._target: WayPoint | None = None
+        self._alarm = Alarm(self._late)
+        self._running = False
+
+    @property
+    def running(self) -> bool:
+        """It is watched."""
+        return self._running
+
+    def begin(self, target: WayPoint | None = None) -> None:
+        """The drone has stopped its plan before the last line. `target`: the last way point of a plan that ends there,
+        None when the last line lands or returns."""
+        self.end()
+        self._target = target
+        self._running = True
+        self._alarm.set_in(END_WAIT)
+        self.look()
+
+    def _late(self) -> None:
+        self.look(last=True)
+
+    def look(self, *, last: bool = False) -> None:
+        """Landing, return or flying state may have changed."""
+        if not self._running:
+            return
+        target = self._target
+        if target is None:
+            begun = self._progress.at_last_line and self._lands_or_returns
+            if begun or last:
+                self.end()
+                self._ended(begun)
+        elif last or self._is_in_trouble:
+            self.end()
+            self._ended(not self._is_in_trouble and self._is_at(target))
+
+    def end(self) -> None:
+        """Watch no more."""
+        self._running = False
+        self._alarm.cancel()
+
+    @property
+    def _is_in_trouble(self) -> bool:
+        """True when the drone may have stopped for another reason than the plan's end."""
+        vehicle, alerts = self._vehicle, self._vehicle.drone.alerts.state
+        return (
+            not vehicle.in_air
+            or vehicle.drone.home.state.returning
+            or vehicle.drone.controller.pilot_acquired_control
+            or alerts.alert not in (None, AlertState.NONE)
+            or alerts.forced_landing not in (None, ForcedLandingReason.NONE)
+            or vehicle.drone.flight_plan.state.error not in (None, PlayError.NONE)
+        )
+
+    def _is_at(self, target: WayPoint) -> bool:
+        place, ato = self._vehicle.place, self._vehicle.drone.piloting.state.altitude
+        if place is None or ato is None:
+            return False
+        away = math.hypot(geo.distance(*place.point, *target.place.point), ato - target.ato)
+        return away <= target.radius + GPS_MARGIN
+
+    @property
+    def _lands_or_returns(self) -> bool:
+        vehicle = self._vehicle
+        if vehicle.drone.alerts.state.forced_landing not in (None, ForcedLandingReason.NONE):
+            return False
+        down = vehicle.flying_state in (FlyingState.LANDING, FlyingState.LANDED)
+        return down or (vehicle.returning and not vehicle.returning_by_itself)

@@ -1,0 +1,158 @@
+"""Positions that the drone flies to by itself, one after the other: moveTo for places, moveBy for offsets.
+
+The newest goal wins. One that is repeated is not begun again, for a moveTo that is restarted all the time never gets
+anywhere; one that changes faster than `MOVE_EVERY` is followed in steps.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import math
+from collections.abc import Callable
+from typing import TypeAlias
+
+from anafi_mav import units
+from anafi_mav.drone import MoveEnd
+from anafi_mav.errors import AnafiMavError, CommandRejected, LinkLost
+from anafi_mav.vehicle.base.aircraft import Aircraft
+from anafi_mav.vehicle.offboard.goals import Goal
+
+MOVE_EVERY = 0.2
+"""s between two moves: a program may change its target with every setpoint, but each move has to be acknowledged by
+the drone, and one that begins while the last one has hardly been heard helps nobody."""
+
+RETRY = 2.0
+"""s until a moveTo that the drone refused or gave up is tried again, if it is still asked for. A moveBy never is: it
+may have flown a part of its way."""
+
+
+_Wanted: TypeAlias = "tuple[Goal, float | None]"
+"""Where to, and the heading there (rad from north); None keeps what is."""
+
+
+class OffboardMoves:
+    """The moves of one session of setpoints."""
+
+    def __init__(self, vehicle: Aircraft, warn_throttled: Callable[[str], None]) -> None:
+        self._vehicle = vehicle
+        self._warn_throttled = warn_throttled
+        self._wanted: _Wanted | None = None
+        """What is asked for and has not been begun."""
+        self._begun: _Wanted | None = None
+        self._retry_at = math.inf
+        self._starter: asyncio.Task[None] | None = None
+        self._relative: set[asyncio.Task[None]] = set()
+        """Wait for the end of a moveBy each; all but the newest are about to hear of it."""
+
+    @property
+    def active(self) -> bool:
+        """Something has been begun and not been stopped; it may have arrived."""
+        return self._begun is not None
+
+    def go(self, goal: Goal, yaw: float | None, now: float, *, asked: bool) -> None:
+        """Fly to a goal, and turn to a heading (rad from north) on the way; None keeps what is.
+
+        `asked`: somebody still says so, again and again. What was said once is tried once.
+        """
+        wanted = (goal, yaw)
+        if wanted == self._begun and (not asked or now < self._retry_at):
+            return
+        self._begun = self._wanted = wanted
+        self._retry_at = math.inf
+        if self._starter is None or self._starter.done():
+            self._starter = asyncio.get_running_loop().create_task(self._start())
+
+    def stop(self) -> list[asyncio.Task[None]]:
+        """End what has been begun: the drone hovers, unless it lands or returns. Tasks that are about to end."""
+        if self._begun is not None and self._vehicle.drone.piloting.sticks_blocked is None:
+            # Before the waiting ends: a relative move whose waiting is given up would be ended a second time.
+            with contextlib.suppress(LinkLost):
+                self._vehicle.drone.piloting.hover()
+        return self.forget()
+
+    def forget(self) -> list[asyncio.Task[None]]:
+        """Begin nothing more, and wait for nothing. Returns tasks that are about to end."""
+        self._wanted = self._begun = None
+        self._retry_at = math.inf
+        tasks = [task for task in (self._starter, *self._relative) if task is not None and not task.done()]
+        for task in tasks:
+            task.cancel()
+        self._starter = None
+        return tasks
+
+    async def _start(self) -> None:
+        while (wanted := self._wanted) is not None:
+            self._wanted = None
+            try:
+                await self._move(wanted)
+            except AnafiMavError as error:
+                self._failed(wanted, str(error), again=True)
+            await asyncio.sleep(MOVE_EVERY)
+
+    async def _move(self, wanted: _Wanted) -> None:
+        goal, yaw = wanted
+        piloting, vehicle = self._vehicle.drone.piloting, self._vehicle
+        present = piloting.state.altitude
+        if goal.offset is not None:
+            front, right, down = goal.offset
+            self._by(wanted, front, right, down, yaw)
+            return
+        if goal.place is None:
+            if present is None or goal.height is None:
+                raise CommandRejected("the drone's height is not known")
+            self._by(wanted, 0.0, 0.0, present - goal.height, yaw)
+            return
+        height = present if goal.height is None else goal.height
+        if height is None:
+            raise CommandRejected("the drone's height is not known")
+        move = await piloting.move_to(
+            goal.place.latitude,
+            goal.place.longitude,
+            height,
+            heading_deg=None if yaw is None else units.wrap_360(yaw * units.DEG_PER_RAD),
+            horizontal_speed=vehicle.cruise_speed,
+            vertical_speed=vehicle.climb_speed,
+        )
+        move.ended.add_done_callback(lambda ended: self._ended(wanted, ended.result()))
+
+    def _by(self, wanted: _Wanted, front: float, right: float, down: float, yaw: float | None) -> None:
+        piloting = self._vehicle.drone.piloting
+        turn = 0.0
+        if yaw is not None and (attitude := piloting.state.attitude) is not None:
+            turn = units.wrap_pi(yaw - attitude.yaw)
+        if piloting.move is not None:
+            piloting.hover()  # a moveBy replaces a moveBy, of a moveTo nobody says so
+        task = asyncio.get_running_loop().create_task(self._relative_move(wanted, front, right, down, turn))
+        self._relative.add(task)
+        task.add_done_callback(self._relative.discard)
+
+    async def _relative_move(self, wanted: _Wanted, front: float, right: float, down: float, turn: float) -> None:
+        try:
+            await self._vehicle.drone.piloting.move_by(front, right, down, turn)
+        except LinkLost:
+            return
+        except AnafiMavError as error:
+            self._failed(wanted, str(error), again=False)
+
+    def _ended(self, wanted: _Wanted, how: MoveEnd) -> None:
+        if how is MoveEnd.ERROR:
+            self._failed(wanted, "the drone gave the move up", again=True)
+        elif how is MoveEnd.CANCELED and self._is_news_of(wanted):
+            self._warn_throttled("Setpoint not flown: somebody else ended the move")
+
+    def _is_news_of(self, wanted: _Wanted) -> bool:
+        """Of a move that was replaced or stopped there is nothing to say."""
+        return self._begun == wanted and self._wanted is None
+
+    def _failed(self, wanted: _Wanted, why: str, *, again: bool) -> None:
+        """The drone did not make a move."""
+        if not self._is_news_of(wanted):
+            return
+        if again:
+            self._retry_at = asyncio.get_running_loop().time() + RETRY
+        self._warn_throttled(f"Setpoint not flown: {why}")
+        # One that was refused leaves an older one alone, which nobody asks for any more.
+        if self._vehicle.drone.piloting.sticks_blocked is None:
+            with contextlib.suppress(LinkLost):
+                self._vehicle.drone.piloting.hover()

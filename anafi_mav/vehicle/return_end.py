@@ -1,0 +1,410 @@
+"""The end of a return that a client or the gateway commanded: a landing at home, or a hover and a text with the reason.
+
+The drone ends its returns as its own setting says (ANF_RTH_END; hovering, from the factory) and the gateway does not
+write that setting: it is also the end of returns that the drone begins by itself. PX4 and ArduCopter land by default.
+So the gateway commands the landing, once the drone has reported that the return is finished, and only where it is
+certain enough of the place: see `objection`.
+
+A commanded return is one `Attempt`. Any newer command, the ground and the loss of the link end it, and with it
+everything that would still have been sent for it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import enum
+import logging
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+from functools import partial
+
+from anafi_mav import geo
+from anafi_mav.clock import Alarm
+from anafi_mav.drone import Position
+from anafi_mav.drone.events import (
+    FlyingState,
+    PoiStatus,
+    PreciseHomeState,
+    ReturnReason,
+    RthEndingBehavior,
+    RthHomeType,
+    RthState,
+)
+from anafi_mav.errors import AnafiMavError, LinkLost
+from anafi_mav.vehicle.base.aircraft import Aircraft
+from anafi_mav.vehicle.base.flying import LANDING
+from anafi_mav.vehicle.base.place import Place
+from anafi_mav.vehicle.base.severity import Severity
+
+logger = logging.getLogger(__name__)
+
+NEAR_HOME = 5.0
+"""m over ground from home within which the gateway lands."""
+
+SHORTEST_WAIT = 5.0
+"""s above home before a landing, at least: a person reads the text and can still send Hold."""
+
+LONGEST_WAIT = 60.0
+"""s above home that a client can ask for (ArduCopter's largest RTL_LOIT_TIME)."""
+
+UNREPORTED = 10.0
+"""s of hovering at home after which a drone that reports no end of its return is asked for its states."""
+
+ANSWER = 3.0
+"""s for its answer; then the return counts as ended without a report."""
+
+SAME_PLACE = 1e-6
+"""deg, 0.1 m: a place that the drone repeats is closer to the one that it was given."""
+
+
+class EndOfReturn(enum.IntEnum):
+    """The end of a commanded return; the numbers of ANF_RTL_END."""
+
+    LAND = 0
+    HOVER = 1
+
+
+class _Phase(enum.Enum):
+    COMMANDED = "the drone has not reported a return yet"
+    RETURNING = "the drone returns"
+    WAITING = "the drone hovers at home, the gateway is about to land it"
+    LANDING = "the landing is commanded, or the drone begins it by its own setting"
+
+
+@dataclass
+class Attempt:
+    """One commanded return, until it has landed, hovers for good, or is replaced."""
+
+    phase: _Phase
+    task: asyncio.Task[None] | None = None
+    """The wait above home and the landing."""
+    doubt: Alarm | None = None
+    """Runs while the drone hovers at home and reports no end."""
+    asked: bool = False
+    """It has been asked for its states since."""
+
+    def stop(self) -> list[asyncio.Task[None]]:
+        """Nothing more is sent for it. Returns the task that is about to end."""
+        if self.doubt is not None:
+            self.doubt.cancel()
+        task, self.task = self.task, None
+        if task is None or task is asyncio.current_task():
+            return []
+        task.cancel()
+        return [task]
+
+
+@dataclass(frozen=True)
+class _GivenHome:
+    """A home that a client chose through this gateway, or a rally point."""
+
+    place: Position
+    label: str
+    flight_id: str | None
+    """Of the flight in which it was chosen; None where the drone reports none."""
+
+
+class ReturnEnd:
+    """The end of the returns of one vehicle."""
+
+    def __init__(self, vehicle: Aircraft, land: Callable[[], Awaitable[None]]) -> None:
+        """`land` commands a landing and returns when the drone has reported it."""
+        self.ending = EndOfReturn.LAND
+        """A parameter."""
+        self.wait = SHORTEST_WAIT
+        """s above home before the landing (a parameter); `SHORTEST_WAIT` holds where this is less."""
+        self._vehicle = vehicle
+        self._command_landing = land
+        self._attempt: Attempt | None = None
+        self._given: _GivenHome | None = None
+
+    @property
+    def active(self) -> bool:
+        """A commanded return is on its way, waits above home, or lands."""
+        return self._attempt is not None
+
+    @property
+    def shown(self) -> bool:
+        """The mode is Return though the drone reports none: it waits above home, or lands."""
+        return self._attempt is not None and self._attempt.phase in (_Phase.WAITING, _Phase.LANDING)
+
+    def set_home(self, place: Position, label: str) -> None:
+        """A client has set the drone's custom home, or a rally point has become it."""
+        if not self._vehicle.on_ground:
+            self._given = _GivenHome(place, label, self._vehicle.drone.product.state.flight_id)
+
+    # A return begins and ends.
+
+    def command(self) -> Attempt:
+        """The drone is about to be commanded to return."""
+        self.end()
+        self._attempt = Attempt(_Phase.RETURNING if self._vehicle.returning else _Phase.COMMANDED)
+        return self._attempt
+
+    def fail(self, attempt: Attempt) -> None:
+        """The drone does not return, or a newer command has replaced this one."""
+        if self._attempt is attempt:
+            self._attempt = None
+            attempt.stop()
+
+    def announce(self, attempt: Attempt, system: int | None) -> None:
+        """The commanded return has begun: send every client its end. `system` commanded it; None: the gateway."""
+        if self._attempt is not attempt:
+            return
+        who = "" if system is None else f" by system {system}"
+        self._vehicle.text(Severity.NOTICE, f"Return{who}: {self._prospect}")
+        if self._lands and not self._drone_lands:
+            self._vehicle.text(Severity.INFO, "Link loss on the way: drone hovers at home")
+
+    def end(self) -> list[asyncio.Task[None]]:
+        """Another command, the ground or the loss of the link ends the attempt. Returns tasks that are about to end."""
+        attempt, self._attempt = self._attempt, None
+        if attempt is None:
+            return []
+        if attempt.phase is _Phase.WAITING:
+            self._vehicle.text(Severity.NOTICE, "Landing at home cancelled")
+        return attempt.stop()
+
+    def link_down(self) -> None:
+        """The drone ends a return by its own setting from now on."""
+        attempt, self._attempt = self._attempt, None
+        if attempt is not None:
+            attempt.stop()
+        if self._given is not None and not self._given.flight_id:
+            self._given = None  # the next connection may find another flight
+
+    def on_ground(self) -> None:
+        """The drone has landed; the next flight has other homes."""
+        self._given = None
+        self.end()
+
+    # What the drone reports.
+
+    def on_return_state(self) -> None:
+        """rth.state was reported, once more perhaps."""
+        attempt, home = self._attempt, self._vehicle.drone.home.state
+        if attempt is None:
+            return
+        if home.returning and attempt.phase is not _Phase.LANDING:
+            if attempt.asked:
+                return  # that is its answer
+            attempt.stop()  # it waited above home, and the drone has a reason of its own to return once more
+            attempt.phase = _Phase.RETURNING
+            self._watch_end(attempt)
+        elif not home.returning and attempt.phase is _Phase.RETURNING:
+            attempt.stop()
+            if home.rth == RthState.AVAILABLE and home.reason == ReturnReason.FINISHED:
+                self._arrived(attempt)
+            elif self._vehicle.in_air:
+                self._hover("stopped" if home.reason == ReturnReason.STOPPED else "not finished")
+            else:
+                self._attempt = None
+
+    def on_flying_state(self) -> None:
+        """The drone's flying state has changed."""
+        attempt = self._attempt
+        if attempt is None:
+            return
+        if self._vehicle.flying_state == FlyingState.EMERGENCY_LANDING:
+            self.end()  # by the drone itself, and shown as a landing
+        elif attempt.phase is _Phase.RETURNING:
+            self._watch_end(attempt)
+        elif attempt.phase is _Phase.WAITING and self._vehicle.flying_state in LANDING:
+            attempt.stop()
+            attempt.phase = _Phase.LANDING
+        elif attempt.phase is _Phase.LANDING and attempt.task is None and self._vehicle.in_air:
+            self._attempt = None  # the landing was ended elsewhere
+
+    # The end.
+
+    def _arrived(self, attempt: Attempt) -> None:
+        """The drone has reported the return as finished."""
+        if self._drone_lands:
+            attempt.phase = _Phase.LANDING
+            attempt.task = asyncio.get_running_loop().create_task(self._see_landing(attempt))
+        elif self.ending is EndOfReturn.HOVER:
+            self._hover(None)
+        elif (reason := self.objection(arrived=True)) is not None:
+            self._hover(reason)
+        else:
+            attempt.phase = _Phase.WAITING
+            attempt.task = asyncio.get_running_loop().create_task(self._land(attempt))
+
+    async def _land(self, attempt: Attempt) -> None:
+        """Wait above home, then land. Every condition is judged again before each step."""
+        vehicle = self._vehicle
+        vehicle.changed()
+        if self.wait > SHORTEST_WAIT:
+            vehicle.text(Severity.NOTICE, f"Return ended: landing in {self.wait:.0f} s")
+            await asyncio.sleep(self.wait - SHORTEST_WAIT)
+        if (reason := self._late_objection()) is None:
+            self._announce_landing()
+            before = vehicle.drone.gps.state.location
+            await asyncio.sleep(SHORTEST_WAIT)
+            reason = self._late_objection()
+            if reason is None and vehicle.drone.gps.state.location is before:
+                reason = "old GPS position"
+        if reason is not None:
+            self._hover(reason)
+            return
+        attempt.phase = _Phase.LANDING
+        try:
+            await self._command_landing()
+        except AnafiMavError as error:
+            logger.warning("landing at home: %s", error)
+            vehicle.text(Severity.ERROR, "Landing at home failed, hovering")
+            if self._attempt is attempt:
+                self._attempt = None
+                vehicle.changed()
+        finally:
+            attempt.task = None
+
+    async def _see_landing(self, attempt: Attempt) -> None:
+        """The drone's own setting says that it lands: see to it that it is not shown for longer than it is true."""
+        await asyncio.sleep(SHORTEST_WAIT)
+        attempt.task = None
+        if self._vehicle.flying_state not in LANDING:
+            self._hover("no landing seen")
+
+    def _announce_landing(self) -> None:
+        vehicle, home = self._vehicle, self._vehicle.drone.home.state
+        distance = "" if (metres := _metres(vehicle.place, home.takeoff_location)) is None else f": {metres:.0f} m"
+        tail = distance and f"{distance} from take-off"
+        vehicle.text(Severity.WARNING, f"Landing in {SHORTEST_WAIT:.0f} s, Hold cancels{tail}")
+        precise = home.precise in (PreciseHomeState.AVAILABLE, PreciseHomeState.ACTIVE)
+        vehicle.text(Severity.NOTICE, f"Landing place: {self._label}, {'precise' if precise else 'GPS only'}")
+
+    def _hover(self, reason: str | None) -> None:
+        """The return is over, and the drone stays in the air. `reason`: why it does not land, where it was to."""
+        vehicle, attempt = self._vehicle, self._attempt
+        if attempt is not None:
+            self._attempt = None
+            attempt.stop()
+        altitude = vehicle.drone.piloting.state.altitude
+        at = "at home" if altitude is None else f"at {altitude:.0f} m"
+        severity = Severity.NOTICE if reason is None else Severity.WARNING
+        vehicle.text(severity, f"Return ended, hovering {at}" + ("" if reason is None else f": {reason}"))
+        vehicle.changed()
+
+    def _watch_end(self, attempt: Attempt) -> None:
+        """Notice a drone that hovers at home and reports no end of its return."""
+        if attempt.asked:
+            return
+        if attempt.doubt is not None:
+            attempt.doubt.cancel()
+        under_way = self._vehicle.drone.home.state.rth == RthState.IN_PROGRESS
+        if under_way and self._vehicle.flying_state == FlyingState.HOVERING:
+            attempt.doubt = Alarm(partial(self._unreported, attempt))
+            attempt.doubt.set_in(UNREPORTED)
+
+    def _unreported(self, attempt: Attempt) -> None:
+        metres = _metres(self._vehicle.place, self._vehicle.drone.home.state.location)
+        if attempt is not self._attempt or metres is None or metres > NEAR_HOME:
+            return
+        attempt.asked = True
+        attempt.doubt = Alarm(partial(self._unanswered, attempt))
+        attempt.doubt.set_in(ANSWER)
+        with contextlib.suppress(LinkLost):
+            self._vehicle.drone.home.request_states()
+
+    def _unanswered(self, attempt: Attempt) -> None:
+        if attempt is self._attempt:
+            self._hover("end not reported")
+
+    # Where and how.
+
+    def objection(self, *, arrived: bool = False) -> str | None:
+        """Return why the gateway leaves the drone hovering at home, in a few words; None: it lands.
+
+        `arrived`: also compare the drone's place with home.
+        """
+        vehicle, home = self._vehicle, self._vehicle.drone.home.state
+        if vehicle.drone.controller.present:
+            return "Skycontroller"
+        if home.type == RthHomeType.TAKEOFF:
+            target = home.takeoff_location
+            if target is not None and not home.fixed_before_takeoff:
+                return "home is first fix"
+        elif home.type == RthHomeType.CUSTOM:
+            target = home.custom_location
+            if self._chosen is None:
+                return "home set earlier"
+        else:
+            return _UNCERTAIN_HOMES.get(home.type or RthHomeType.NONE, "home unknown")
+        if target is None or home.location is None:
+            return "home unknown"
+        if not arrived:
+            return None
+        if vehicle.place is None:
+            return "no GPS fix"
+        metres = max(_metres(vehicle.place, target) or 0.0, _metres(vehicle.place, home.location) or 0.0)
+        return f"{metres:.0f} m from home" if metres > NEAR_HOME else None
+
+    def _late_objection(self) -> str | None:
+        """`objection`, and what may have happened while the drone waited above home."""
+        vehicle = self._vehicle
+        if not vehicle.in_air or vehicle.returning:
+            return "not hovering"
+        if vehicle.drone.piloting.state.poi in (PoiStatus.RUNNING, PoiStatus.PENDING):
+            return "ROI active"
+        if self.ending is EndOfReturn.HOVER:
+            return "ANF_RTL_END is 1"
+        return self.objection(arrived=True)
+
+    @property
+    def _chosen(self) -> _GivenHome | None:
+        """The home that was set in this flight, as long as it is the drone's custom home."""
+        given, custom = self._given, self._vehicle.drone.home.state.custom_location
+        if given is None or custom is None or given.flight_id != self._vehicle.drone.product.state.flight_id:
+            return None
+        apart = max(abs(given.place.latitude - custom.latitude), abs(given.place.longitude - custom.longitude))
+        return given if apart < SAME_PLACE else None
+
+    @property
+    def _label(self) -> str:
+        chosen = self._chosen
+        if self._vehicle.drone.home.state.type == RthHomeType.CUSTOM and chosen is not None:
+            return chosen.label
+        return "take-off point"
+
+    @property
+    def alone(self) -> str:
+        """The end of a return without the gateway, as a predicate of the drone."""
+        home = self._vehicle.drone.home.state.location
+        where = "home" if home is None else f"{home.latitude:.5f}, {home.longitude:.5f}"
+        return f"returns to {where} and {'lands' if self._drone_lands else 'hovers'} there (ANF_RTH_END)"
+
+    @property
+    def _drone_lands(self) -> bool:
+        """The drone's own setting says that its returns end in a landing."""
+        return self._vehicle.drone.home.state.ending == RthEndingBehavior.LANDING
+
+    @property
+    def _lands(self) -> bool:
+        return self._drone_lands or (self.ending is EndOfReturn.LAND and self.objection() is None)
+
+    @property
+    def _prospect(self) -> str:
+        """The end of a return that begins now, as the end of a text."""
+        if self._drone_lands:
+            return "lands at home (ANF_RTH_END)"
+        if self.ending is EndOfReturn.HOVER:
+            return "hovers at home"
+        reason = self.objection()
+        return f"lands at {self._label}" if reason is None else f"hovers, {reason}"
+
+
+_UNCERTAIN_HOMES = {
+    RthHomeType.PILOT: "home is the pilot",
+    RthHomeType.FOLLOWEE: "home is followed",
+    RthHomeType.VEHICLE: "home is a vehicle",
+}
+"""Homes that move, or that no client chose in this flight: the drone is left hovering there."""
+
+
+def _metres(place: Place | None, other: Position | None) -> float | None:
+    """The distance over ground, m; None when one of the places is unknown."""
+    if place is None or other is None:
+        return None
+    return geo.distance(*place.point, other.latitude, other.longitude)

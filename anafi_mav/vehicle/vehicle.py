@@ -1,0 +1,768 @@
+"""The flight core: one drone as the vehicle that MAVLink's clients think they fly. No flavour, no message.
+
+It knows what MAVLink has and an ANAFI has not (an armed state, a chosen mode) and keeps it honest: both follow what the
+drone does, and a verb returns when the drone confirmed. Whatever is to fly the drone takes it over here. How it gets
+into the air is `takeoff`, how to a place `guided_flight`; who keeps telling it how to fly is a `Helm`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import enum
+import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+
+from anafi_mav.clock import Clock
+from anafi_mav.drone import Drone
+from anafi_mav.drone.element import Position
+from anafi_mav.drone.events import (
+    AlertLevel,
+    AutoTriggerReason,
+    FlightId,
+    FlyingState,
+    FlyingStateChanged,
+    ForcedLandingReason,
+    GpsLocationChanged,
+    PlayingState,
+    ReturnReason,
+    ReturnStateChanged,
+    RthEndingBehavior,
+    RthHomeType,
+    RthState,
+    TakeoffLocation,
+)
+from anafi_mav.drone.piloting.landing import ALREADY_LANDED
+from anafi_mav.errors import CommandRejected
+from anafi_mav.vehicle.aborted_return import AbortedReturn
+from anafi_mav.vehicle.base.aircraft import STOP_WAIT, Aircraft
+from anafi_mav.vehicle.base.clients import system_of
+from anafi_mav.vehicle.base.flying import AIRBORNE, LANDING, ON_GROUND, TAKING_OFF
+from anafi_mav.vehicle.base.height import ESTIMATE_ERROR, TakeoffRecord
+from anafi_mav.vehicle.base.helm import Helm
+from anafi_mav.vehicle.base.link_loss import LossPolicy
+from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.place import Place
+from anafi_mav.vehicle.base.refusal import Refused
+from anafi_mav.vehicle.base.right import Extent, Right
+from anafi_mav.vehicle.base.roll_sign import INVERTED
+from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.vehicle.base.subscriptions import Subscriptions
+from anafi_mav.vehicle.fence.rally import RallyPoints
+from anafi_mav.vehicle.follow_flight import FollowFlight
+from anafi_mav.vehicle.guided_flight import GuidedFlight
+from anafi_mav.vehicle.hold_rule import APART, HoldRule
+from anafi_mav.vehicle.initiator import Initiator, Initiators
+from anafi_mav.vehicle.joystick_override import Override
+from anafi_mav.vehicle.manual_flight import ManualFlight
+from anafi_mav.vehicle.mission.flight import MissionFlight
+from anafi_mav.vehicle.offboard.flight import OffboardFlight
+from anafi_mav.vehicle.return_end import ReturnEnd
+from anafi_mav.vehicle.takeoff import Takeoff
+
+FORCED = "forced landing"
+LANDS, PILOT_LANDS = "drone is landing", "Skycontroller pilot is landing"
+RETURNS, PILOT_RETURNS = "drone is returning", "Skycontroller pilot is returning"
+RETURNS_BY_ITSELF, MOTOR_DOWN = "drone is returning by itself", "drone returns, motor down"
+NOT_COUNTED = f"again within {APART:g} s"
+UNENDABLE = (FORCED, LANDS, PILOT_LANDS, RETURNS, PILOT_RETURNS, RETURNS_BY_ITSELF, MOTOR_DOWN, NOT_COUNTED)
+"""Why a landing or a return is not ended."""
+
+LANDS_AFTER_RETURN = 2.0
+"""s after a return that the drone ends by landing within which the landing begins."""
+
+POSITION_OLD = 3.0
+"""s without a GPS location, which an ANAFI reports once a second, after which the last one is no position in flight."""
+
+LOCATIONS_MISSED = 3
+"""A drone that reports its location more rarely (a slowed simulator) may miss as many."""
+
+
+ESTIMATED = f"Take-off altitude estimated: GPS only (+-{ESTIMATE_ERROR:g} m)"
+
+GOOD_ACCURACY = 5
+"""m of one standard deviation of GPS altitude that AMSL heights can be used with, without a text."""
+
+_AUTO = (FlightMode.MISSION, FlightMode.FOLLOW, FlightMode.ORBIT, FlightMode.RETURN, FlightMode.LAND)
+"""Modes in which the drone flies without setpoints of a client."""
+
+
+class Landed(enum.Enum):
+    """Where the vehicle is between ground and air."""
+
+    UNKNOWN = 0
+    ON_GROUND = 1
+    IN_AIR = 2
+    TAKEOFF = 3
+    LANDING = 4
+
+
+class Health(enum.Enum):
+    """How the vehicle as a whole is."""
+
+    STANDBY = 3
+    ACTIVE = 4
+    CRITICAL = 5
+    EMERGENCY = 6
+
+
+class Vehicle(Aircraft):
+    """One drone, flown. All methods run on the event loop's thread."""
+
+    def __init__(
+        self,
+        drone: Drone,
+        clock: Clock,
+        *,
+        allow_kill: bool,
+        text: Callable[[Severity, str], None],
+        changed: Callable[[], None],
+        end_others: Callable[[], list[asyncio.Task[None]]],
+    ) -> None:
+        super().__init__(drone, text=text, changed=changed)
+        self.gcs_loss = LossPolicy()
+        """What to do when no ground station is heard any more (a parameter)."""
+        self.rally = RallyPoints()
+        self.orders = 0
+        """Counts who took the vehicle over, and what ended all orders: the ground, the loss of the link."""
+        self.intended: FlightMode | None = None
+        """The mode that a client last asked for by name or number."""
+        self.allow_kill = allow_kill
+        self._clock = clock
+        self._located_at = -math.inf
+        """When the newest GPS location arrived."""
+        self._location_every = 0.0
+        """s between it and the one before."""
+        self._lands_next: tuple[int, float] | None = None
+        """A return has finished that the drone ends by landing: the count of orders then, and until when it is due."""
+        self._end_others = end_others
+        self._initiators = Initiators()
+        self._landing_sent = 0
+        """Landings that were sent and have not been answered."""
+        self.landing_ended_at = -math.inf
+        """When a client last ended a landing."""
+        self._returns_sent = 0
+        """Returns that were sent and have not been answered."""
+        self.holds = HoldRule()
+        """Which Holds of clients count against a return of the drone's own."""
+        self.aborted_return: AbortedReturn | None = None
+        """The return of the drone's own that a client has ended, while that has to be repeated to everybody."""
+        self._terminating = False
+        self._last_flying: FlyingState | None = None
+        self.return_end = ReturnEnd(self, self._land_after_return)
+        self._takeoff_before: Position | None = None
+        """The take-off place that the drone reported when it landed: of the flight that has ended."""
+        self.mission = MissionFlight(self)
+        self.takeoff = Takeoff(self, self.mission.armed)
+        self.guided = GuidedFlight(self)
+        self.offboard = OffboardFlight(self, clock, self.takeoff)
+        self.takeoff.ended = self.offboard.after_takeoff
+        self.manual = ManualFlight(self, clock, lambda: self.overridable)
+        self.follow = FollowFlight(self, lambda: self.offboard.motion, clock)
+        self.plan_ids: dict[int, int] = {}
+        """Opaque ids of the plans that are in force, by MAV_MISSION_TYPE."""
+        self.helms = (self.offboard, self.manual, self.follow, self.mission)
+
+    # What the vehicle is.
+
+    @property
+    def armed(self) -> bool:
+        return self.takeoff.armed or (self.flying_state is not None and not self.on_ground)
+
+    @property
+    def landed(self) -> Landed:
+        state = self.flying_state
+        if state == FlyingState.LANDED:
+            return Landed.ON_GROUND
+        if state in TAKING_OFF:
+            return Landed.TAKEOFF
+        if state in LANDING:
+            return Landed.LANDING
+        return Landed.IN_AIR if state in AIRBORNE else Landed.UNKNOWN
+
+    @property
+    def position_is_old(self) -> bool:
+        """True in flight when GPS locations have stopped although the drone reports a fix."""
+        gps = self.drone.gps.state
+        if not gps.fixed or gps.location is None or self.flying_state is None or self.on_ground:
+            return False
+        patience = max(POSITION_OLD, LOCATIONS_MISSED * self._location_every)
+        return self._clock.monotonic() - self._located_at > patience
+
+    @property
+    def place(self) -> Place | None:
+        """Where the drone is; None without a fix, and in flight while the newest location is old."""
+        return None if self.position_is_old else super().place
+
+    @property
+    def mode(self) -> FlightMode:
+        state = self.flying_state
+        if state == FlyingState.EMERGENCY:
+            return FlightMode.TERMINATED
+        if self.return_end.shown:
+            return FlightMode.RETURN
+        if state in LANDING:
+            return FlightMode.LAND
+        if self.returning or self._is_about_to_land:
+            return FlightMode.RETURN
+        if state in TAKING_OFF or (self.takeoff.climbing and not self.on_ground):
+            return FlightMode.MISSION if self.mission.flying else FlightMode.TAKEOFF
+        if state in AIRBORNE and self.drone.piloting.state.plan == PlayingState.PLAYING:
+            return FlightMode.MISSION
+        return self._selected
+
+    @property
+    def _is_about_to_land(self) -> bool:
+        """Between a return and its landing the drone reports neither; no mode is shown in between."""
+        if self._lands_next is None or not self.in_air:
+            return False
+        orders, until = self._lands_next
+        return orders == self.orders and self._clock.monotonic() < until
+
+    @property
+    def overridable(self) -> Override:
+        """What flies the drone, as far as a joystick may take over from it; whether a landing or return ends, `hold`
+        decides."""
+        mode = self.mode
+        if self.offboard.engaged and mode in (FlightMode.OFFBOARD, FlightMode.GUIDED):
+            return Override.OFFBOARD
+        if mode in _AUTO or (mode in (FlightMode.HOLD, FlightMode.GUIDED) and self.drone.piloting.moving):
+            return Override.AUTO
+        return Override(0)
+
+    @property
+    def health(self) -> Health:
+        state = self.flying_state
+        if state == FlyingState.EMERGENCY:
+            return Health.EMERGENCY
+        forced = self.drone.alerts.state.forced_landing
+        if (
+            state == FlyingState.EMERGENCY_LANDING
+            or forced not in (None, ForcedLandingReason.NONE)
+            or self.drone.battery.state.worst_alert() == AlertLevel.CRITICAL
+        ):
+            return Health.CRITICAL
+        return Health.ACTIVE if self.armed else Health.STANDBY
+
+    @property
+    def enterable_modes(self) -> frozenset[FlightMode]:
+        """Modes that a client may ask for as things stand. Hold, Land and Return are always among them: whether the
+        drone can, it says itself."""
+        modes = {FlightMode.HOLD, FlightMode.GUIDED, FlightMode.POSITION, FlightMode.TAKEOFF}
+        modes |= {FlightMode.LAND, FlightMode.RETURN, FlightMode.OFFBOARD}
+        if self.place is not None:
+            modes.add(FlightMode.FOLLOW)
+        if self.mission.there:
+            modes.add(FlightMode.MISSION)
+        return frozenset(modes)
+
+    # What it can be told to do. Each returns when the drone confirmed, or raises.
+
+    async def terminate(self) -> None:
+        """Cut the motors, at once: what this replaces is not waited for, and sends nothing any more."""
+        if not self.allow_kill:
+            raise Refused(
+                "Motor cut refused: the drone would fall. Set allow_kill: true to permit it",
+                lasting=True,
+                critical=True,
+            )
+        self._require_motors()
+        self._terminating = True
+        try:
+            self.drone.silence(self._replace())
+            await self.drone.piloting.emergency()
+        finally:
+            self._terminating = False
+
+    async def land(self) -> None:
+        """Land here. On the ground there is nothing to do."""
+        self._initiators.land_commanded(self._clock.monotonic())
+        self._landing_sent += 1
+        try:
+            await self.take_over(STOP_WAIT)
+            with self._selected_no_more(None):
+                await self.drone.piloting.land()
+                self.paused = False
+        finally:
+            self._landing_sent -= 1
+
+    async def _land_after_return(self) -> None:
+        """Land at the end of a return that a client commanded; the landing is that client's too."""
+        self._initiators.land_commanded(self._clock.monotonic())
+        self._landing_sent += 1
+        try:
+            await self.drone.piloting.land()
+        finally:
+            self._landing_sent -= 1
+
+    async def return_home(self, by: Right | None = None) -> None:
+        """Fly home by the drone's own return. A landing goes on unless `by` ends it."""
+        if self.on_ground:
+            raise Refused("Return refused: the drone is on the ground")
+        if self.return_end.shown:
+            return  # it waits above home or lands there, and would climb and fly home once more
+        commanded = None if by is None else replace(by, extent=Extent.COMMANDED)
+        if lands := self.landing:
+            self._require_endable("Return", commanded)
+            if self.drone.home.state.rth == RthState.UNAVAILABLE:  # the landing would be ended for nothing
+                raise Refused("Return refused: not available, landing goes on")
+        await self.take_over()
+        if lands or self.landing:
+            with self._selected_no_more(FlightMode.HOLD):
+                if await self.drone.piloting.settle_landing():
+                    self._require_endable("Return", commanded)
+                    await self._end_landing("Return", commanded)
+        self._initiators.return_commanded(self._clock.monotonic())
+        self._returns_sent += 1
+        attempt = self.return_end.command()
+        try:
+            with self._selected_no_more(None):
+                await self.drone.piloting.return_home()
+                self.paused = False
+        except BaseException:
+            self.return_end.fail(attempt)
+            raise
+        finally:
+            self._returns_sent -= 1
+        self.return_end.announce(attempt, None if by is None else system_of(by.client))
+
+    async def hold(self, mode: FlightMode = FlightMode.HOLD, by: Right | None = None, *, pause: bool = False) -> None:
+        """Stop and hover. A landing or return goes on, and this is refused, unless `by` ends it.
+
+        `pause`: setpoints of every client are ignored from now on, see `paused`.
+        """
+        self._require_endable(mode.value, by)
+        own = self.returning_by_itself
+        rising = self.drone.piloting.about_to_fly
+        latched = self.paused and (pause or mode is self.mode)
+        before, orders = self.paused, self.orders
+        self.paused = before or pause
+        try:
+            await self.take_over(STOP_WAIT)
+            if not self.on_ground or rising:
+                with self._selected_no_more(mode):
+                    await self._stop(mode.value, by, own=own)
+        except BaseException:
+            if self.orders <= orders + 1:  # else a newer command has replaced this one, and the latch is its own
+                self.paused = before
+            raise
+        self.select(mode)
+        self.paused = (latched or pause) and (rising or not self.on_ground)
+        if rising:
+            self.text(Severity.WARNING, f"{mode.value}: a take-off may follow, to 1 m")
+
+    async def take_off(self, ato: float | None, by: Right) -> None:
+        """Take off to a height, or end a landing: then the drone hovers where it is."""
+        if not self.landing or self.on_ground:
+            await self.takeoff.begin(ato, by.client)
+            return
+        self._require_endable("Takeoff", by)
+        await self.take_over(STOP_WAIT)
+        with self._selected_no_more(FlightMode.HOLD):
+            if await self.drone.piloting.settle_landing():
+                await self._end_landing("Takeoff", by, take_off=True)
+        if self.on_ground:
+            raise Refused(f"Landing not aborted: {ALREADY_LANDED}")
+        self.select(FlightMode.HOLD)
+
+    async def set_mode(self, mode: FlightMode, by: Right) -> None:
+        """Do what this mode means, for the client that chose it: Offboard flies its setpoints."""
+        self.intended = mode
+        client, commanded = by.client, replace(by, extent=Extent.COMMANDED)
+        match mode:
+            case FlightMode.HOLD | FlightMode.POSITION:
+                await self.hold(mode, by)
+            case FlightMode.GUIDED:
+                await self.hold(mode, commanded)
+                self.mode_client = client
+            case FlightMode.LAND:
+                await self.land()
+            case FlightMode.RETURN:
+                await self.return_home(by)
+            case FlightMode.TAKEOFF:
+                await self.take_off(None, by)
+            case FlightMode.OFFBOARD:
+                if self.descends and not self.offboard.streamed_for(client):
+                    raise Refused("Offboard refused: no setpoints arrive")
+                await self._free("Offboard", commanded)
+                await self.offboard.engage(client)
+                self.mode_client = client
+            case FlightMode.MISSION:
+                if self.mission.there and not self.mission.flying:
+                    await self._free("Mission", commanded)
+                await self.mission.engage(client)
+            case FlightMode.TERMINATED:
+                await self.terminate()
+            case FlightMode.FOLLOW:
+                await self.follow.engage()
+            case FlightMode.ORBIT:
+                raise Refused("Orbit refused: it is begun by a command", lasting=True)
+
+    # Ending a landing or a return.
+
+    @property
+    def landing(self) -> bool:
+        """The drone lands, or has been commanded to and has not answered."""
+        return self.flying_state in LANDING or (self._landing_sent > 0 and not self.on_ground)
+
+    @property
+    def descends(self) -> bool:
+        """The drone lands or returns, or has been commanded to and has not answered."""
+        return self.landing or self.returning or self._returns_sent > 0
+
+    @property
+    def descent(self) -> str | None:
+        return LANDS if self.landing else RETURNS if self.descends else None
+
+    @property
+    def _forced_landing(self) -> bool:
+        """No command ends this landing."""
+        alerts = self.drone.alerts.state
+        forced = alerts.forced_landing not in (None, ForcedLandingReason.NONE) and not alerts.forced_landing_delay_s
+        return self.flying_state == FlyingState.EMERGENCY_LANDING or (forced and self.flying_state in LANDING)
+
+    def _require_endable(self, what: str, by: Right | None) -> None:
+        """Raise `Refused` when the drone lands or returns, and `by` may not end that."""
+        all_of_them = by is not None and by.extent is Extent.ALL
+        if self.landing:
+            initiator = self._initiators.landing or Initiator.CLIENT
+            if self._forced_landing:
+                raise Refused(f"{what} refused: {FORCED}")
+            if initiator is Initiator.PILOT:
+                raise Refused(f"{what} refused: {PILOT_LANDS}")
+            if by is None or (initiator is Initiator.DRONE and not all_of_them):
+                raise Refused(f"{what} refused: {LANDS}")
+        elif self.returning:
+            initiator = self._initiators.returning or Initiator.CLIENT
+            if self.returning_by_itself:
+                self._require_own_endable(what, by if all_of_them else None)
+            elif initiator is Initiator.PILOT:
+                raise Refused(f"{what} refused: {PILOT_RETURNS}")
+            elif by is None:
+                raise Refused(f"{what} refused: {RETURNS}")
+        elif by is None and self._returns_sent > 0:
+            raise Refused(f"{what} refused: {RETURNS}")
+
+    def _require_own_endable(self, what: str, by: Right | None) -> None:
+        if by is None:
+            raise Refused(f"{what} refused: {RETURNS_BY_ITSELF}")
+        if self.drone.home.state.reason == ReturnReason.MOTOR_DOWN:
+            raise Refused(f"{what} refused: {MOTOR_DOWN}")
+        if not by.counted:
+            raise Refused(f"{what} refused: {NOT_COUNTED}")
+
+    async def _free(self, what: str, by: Right) -> None:
+        """End a landing or return that `by` may end; returns when the drone hovers, at once when it does neither."""
+        if self.descends:
+            self._require_endable(what, by)
+            await self.take_over(STOP_WAIT)
+            with self._selected_no_more(FlightMode.HOLD):
+                await self._stop(what, by)
+
+    async def _stop(self, what: str, by: Right | None, *, own: bool = False) -> None:
+        """Hover, and end the landing or return that `by` may end.
+
+        `own`: the drone returned by itself when the command arrived. A return that it begins afterwards goes on.
+        """
+        piloting, home = self.drone.piloting, self.drone.home
+        await self._end_landing(what, by)
+        announced = None if by is None else self._announced_for(by)
+        if own and by is not None and self.returning_by_itself:
+            reason = home.state.reason
+            await piloting.cancel_return_home(even_its_own=True)
+            self._return_aborted(by, reason)
+        await piloting.stop()
+        # One asked for through another controller, or before the link was lost. Raises when it is the drone's own.
+        await piloting.cancel_return_home()
+        if await piloting.settle_landing() or self.landing:  # one that began meanwhile
+            self._require_endable(what, by)
+            await self._end_landing(what, by)
+            await piloting.stop()
+        if announced is not None and by is not None:
+            await self._answer_announced(announced, by)
+
+    def _announced_for(self, by: Right) -> bool | None:
+        """A return is announced and this Hold counts. True: it cancels it, False: it is the first; None otherwise."""
+        trigger = self.drone.home.state.auto_trigger
+        cancellable = trigger not in (None, AutoTriggerReason.NONE, AutoTriggerReason.MOTOR_DOWN)
+        if not cancellable:
+            self.holds.withdraw()
+            return None
+        if self.returning or by.extent is not Extent.ALL or not by.counted:
+            return None
+        return self.holds.answers(by.client, by.at)
+
+    async def _answer_announced(self, cancels: bool, by: Right) -> None:
+        """Cancel the announced return, or notify everybody how a second Hold does."""
+        home = self.drone.home
+        trigger = home.state.auto_trigger
+        if trigger in (None, AutoTriggerReason.NONE) or self.returning:
+            return
+        if not cancels:
+            self.holds.offer(by.client, self._clock.monotonic())
+            self.text(Severity.CRITICAL, f"Returns in {home.state.auto_trigger_delay_s or 0} s: Hold again cancels")
+            return
+        await home.cancel_auto_trigger()
+        if self.returning_by_itself:
+            raise Refused("Return not cancelled: it has begun")
+        self.holds.withdraw()
+        self._return_aborted(by, ReturnReason.LOW_BATTERY)  # the one reason that is announced and can be cancelled
+
+    def _return_aborted(self, by: Right, reason: ReturnReason | None) -> None:
+        """Notify everybody that a client has ended a return of the drone's own, or cancelled it: at once, and again."""
+        self.aborted_return = AbortedReturn(by.system, reason)
+        self.aborted_return.report(self, self._clock.monotonic())
+
+    async def _end_landing(self, what: str, by: Right | None, *, take_off: bool = False) -> None:
+        """End the landing that the drone flies; at once when it flies none."""
+        if self.flying_state not in LANDING:
+            return
+        try:
+            await self.drone.piloting.end_landing(take_off=take_off)
+        except CommandRejected as error:
+            raise Refused(f"Landing not aborted: {error.reason}") from None
+        self.landing_ended_at = self._clock.monotonic()
+        if by is not None:
+            self.text(Severity.NOTICE, f"Landing aborted by system {by.system}: hovering")
+
+    # What the drone reports.
+
+    def subscriptions(self) -> Subscriptions:
+        """Return the handlers of events that change the vehicle's own state. Services are called after them."""
+        return {
+            FlyingStateChanged: lambda message, now: self.on_flying_state(),
+            GpsLocationChanged: lambda message, now: self.on_location(),
+            FlightId: lambda message, now: self.on_position(),
+            TakeoffLocation: lambda message, now: self.on_takeoff_location(),
+            ReturnStateChanged: lambda message, now: self.on_return(),
+        }
+
+    def on_flying_state(self) -> None:
+        """The drone's flying state changed."""
+        state, before = self.flying_state, self._last_flying
+        self._last_flying = state
+        if state == before:
+            return
+        self._note_landing(before)
+        if state in ON_GROUND and before is not None:
+            self.orders += 1
+            self.return_end.on_ground()
+            self.takeoff.came_down()
+            self.end_helms(self._ending_mission)
+            self.takeoff.end_climb()
+            self._selected = FlightMode.HOLD
+            self.paused = False
+        elif state in LANDING:
+            self.end_helms(self._ending_mission)
+            self.takeoff.end_climb()
+        elif state in TAKING_OFF and before in ON_GROUND:
+            self.height.take_off()
+            self._report_accuracy()
+            if (place := self.place) is not None:
+                self.origin = place
+            if self.drone.home.state.takeoff_location != self._takeoff_before:
+                self.on_takeoff_location()  # it was reported before the state
+        if state in ON_GROUND:
+            self._takeoff_before = self.drone.home.state.takeoff_location
+        if not self.on_ground:
+            self.takeoff.left_ground()
+            if before in ON_GROUND:
+                self.offboard.left_ground()
+        self.return_end.on_flying_state()
+        self.changed()
+
+    def on_location(self) -> None:
+        """A new GPS location."""
+        now = self._clock.monotonic()
+        if self._located_at > -math.inf:
+            self._location_every = now - self._located_at
+        self._located_at = now
+        self.on_position()
+
+    def on_position(self) -> None:
+        """A new GPS location, altitude or flight id."""
+        gps, ato = self.drone.gps.state, self.drone.piloting.state.altitude
+        amsl = gps.location.altitude if gps.fixed and gps.location is not None else None
+        if self.flying_state == FlyingState.LANDED:
+            self.height.on_ground(amsl, ato)
+            if self.origin is None:
+                self.origin = self.place
+        elif self.flying_state is not None and self.height.in_flight(self.drone.product.state.flight_id, amsl, ato):
+            self.text(Severity.WARNING, ESTIMATED)
+
+    def _report_accuracy(self) -> None:
+        """Report that AMSL heights of this flight will be wrong by as much as GPS is at its beginning."""
+        gps = self.drone.gps.state
+        if gps.fixed and gps.altitude_accuracy is not None and gps.altitude_accuracy > GOOD_ACCURACY:
+            self.text(Severity.WARNING, f"Take-off altitude inaccurate: GPS +-{gps.altitude_accuracy} m")
+
+    def on_takeoff_location(self) -> None:
+        """Adopt the take-off place that the drone reports for the present flight as origin of the local frame."""
+        location = self.drone.home.state.takeoff_location
+        if location is not None and self.flying_state is not None and not self.on_ground:
+            self.origin = Place(location.latitude, location.longitude)
+
+    def link_up(self, kept: TakeoffRecord | None) -> None:
+        """Begin with a drone that has reported all its states. `kept` is of the last flight that was seen."""
+        self.height.recall(kept)
+        self.on_flying_state()
+        self.on_location()  # the one that it has reported counts for as long as a new one
+        if self.flying_state is not None and not self.on_ground:
+            self.origin = self._origin_in_flight(kept)
+
+    def _origin_in_flight(self, kept: TakeoffRecord | None) -> Place | None:
+        """Return where a drone took off that was found in the air; None when nothing reports it."""
+        home, flight = self.drone.home.state, self.drone.product.state.flight_id
+        if (location := home.takeoff_location) is not None:
+            return Place(location.latitude, location.longitude)
+        if kept is not None and kept.flight_id == flight and kept.latitude is not None and kept.longitude is not None:
+            return Place(kept.latitude, kept.longitude)
+        if home.type == RthHomeType.TAKEOFF and home.location is not None:
+            return Place(home.location.latitude, home.location.longitude)
+        return None
+
+    @property
+    def standing_warnings(self) -> list[str]:
+        """Texts that stay true for a while: a client that connects later gets them with its banner."""
+        warnings = [ESTIMATED] if self.height.estimated and not self.on_ground else []
+        return [*warnings, INVERTED] if self.roll.inverted else warnings
+
+    @property
+    def takeoff_record(self) -> TakeoffRecord | None:
+        """The take-off point of the present flight, to be kept; None on the ground or without a flight id."""
+        height, origin = self.height, self.origin
+        if self.on_ground or not height.flight_id or height.takeoff_amsl is None:
+            return None
+        place = (None, None) if origin is None else origin.point
+        return TakeoffRecord(height.flight_id, height.takeoff_amsl, height.estimated, *place)
+
+    def on_return(self) -> None:
+        """The drone's return began, ended or changed: setpoints and the climb after a take-off never fight it."""
+        self._note_return()
+        home = self.drone.home.state
+        finished = home.rth == RthState.AVAILABLE and home.reason == ReturnReason.FINISHED
+        lands = finished and home.ending == RthEndingBehavior.LANDING
+        self._lands_next = (self.orders, self._clock.monotonic() + LANDS_AFTER_RETURN) if lands else None
+        if self.returning:
+            if self.mission.returns and not (self.returning_by_itself or self.return_end.active):
+                self.return_end.announce(self.return_end.command(), None)  # the mission's last item
+            self.end_helms(self._ending_mission)
+            self.takeoff.end_climb()
+        self.return_end.on_return_state()
+        self.changed()
+
+    def link_down(self) -> None:
+        """The link is lost: nothing that was asked for outlives it."""
+        self.height.link_down()
+        self.orders += 1
+        self.return_end.link_down()
+        self._let_go()
+        self.takeoff.link_down()
+        self._selected = FlightMode.HOLD
+        self.paused = False
+        self.intended = None
+        self._last_flying = None
+        self._located_at, self._location_every = -math.inf, 0.0
+        for helm in self.helms:
+            helm.link_down()
+        self._terminating = False
+
+    @property
+    def alone(self) -> str | None:
+        """The end of a return or landing without the gateway, as a predicate of the drone; None: neither is on."""
+        if self.landing:
+            return "is landing, and goes on landing"
+        return self.return_end.alone if self.descends else None
+
+    async def let_go(self) -> None:
+        """The gateway ends: a landing or a return goes on, everything else is ended, and a flying drone hovers.
+
+        One whose sticks are the Skycontroller pilot's is left to him: nothing of ours flies it.
+        """
+        if self.descends:
+            if not self.landing:
+                self.return_end.end()
+            return
+        await self.take_over()
+        if self.drone.piloting.about_to_fly:
+            await self.drone.piloting.land()
+        if not self.on_ground and not self.drone.controller.pilot_has_source:
+            await self.drone.piloting.stop()
+
+    def _note_landing(self, before: FlyingState | None) -> None:
+        """Keep who began the landing that begins or ends."""
+        initiators, now = self._initiators, self._clock.monotonic()
+        if before is None:
+            self._note_return()
+        if self.flying_state not in LANDING:
+            initiators.on_landing_over(unsent=self._landing_sent == 0)
+        elif initiators.landing is None:
+            initiators.on_landing(
+                now,
+                plan_lands=self.mission.ending,
+                skycontroller=self.drone.controller.present,
+            )
+        if self.on_ground:
+            self.aborted_return = None
+
+    def _note_return(self) -> None:
+        """Keep who began the return that begins or ends."""
+        now, home = self._clock.monotonic(), self.drone.home.state
+        if not self.returning:
+            self._initiators.on_return_over(now)
+            return
+        self._initiators.on_return(
+            now,
+            by_itself=home.returning_by_itself,
+            by_plan=home.reason == ReturnReason.FLIGHTPLAN,
+            skycontroller=self.drone.controller.present,
+        )
+
+    # Machinery.
+
+    @contextmanager
+    def _selected_no_more(self, wanted: FlightMode | None) -> Iterator[None]:
+        """The mode that was chosen is over but for `wanted`, before the drone shows what it is told in the block: a
+        setpoint or stick of that mode that comes meanwhile is not a newer order. On the ground there is none to stop.
+
+        What the drone does not do leaves all as it was.
+        """
+        before, orders = self._selected, self.orders
+        if before is not wanted and not self.on_ground:
+            self.forget_mode()
+        try:
+            yield
+        except BaseException:
+            if self.orders == orders:
+                self._selected = before
+            raise
+
+    @property
+    def _ending_mission(self) -> Helm | None:
+        """The mission, where the landing or return that begins is its own."""
+        return self.mission if self.mission.ending else None
+
+    async def take_over(self, limit: float | None = None) -> None:
+        self._require_motors()
+        ended = self._replace()
+        if ended:
+            _, late = await asyncio.wait(ended, timeout=limit)
+            self.drone.silence(late)
+
+    def _require_motors(self) -> None:
+        if self._terminating:
+            raise Refused("Refused: the motors are being cut")
+
+    def _replace(self) -> list[asyncio.Task[None]]:
+        """End what is under way, which can fly the drone no further; tasks that are about to end."""
+        self.orders += 1
+        ended = [*self._end_others(), *self._let_go()]
+        self.drone.retire(ended)
+        return ended
+
+    def _let_go(self) -> list[asyncio.Task[None]]:
+        """End what this vehicle does by itself; the tasks that are still about to end."""
+        self.takeoff.forget()
+        self.guided.forget_arrival()
+        return [*self.return_end.end(), *self.end_helms(), *self.takeoff.end()]

@@ -1,0 +1,149 @@
+"""A plain RTSP client for the tests of the simulated cameras: requests by hand, pictures as they arrive."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+from anafi_mav.arsdk.video import rtcp, rtsp
+from anafi_mav.arsdk.video.rtp_h264 import Picture, PictureReceiver
+from anafi_mav.arsdk.video.rtsp import MessageReader, Request, Response
+from anafi_mav.arsdk.video.sdp import SessionDescription, parse_description
+
+LIMIT = 10.0
+"""s for anything that is awaited."""
+
+
+class Eye(asyncio.DatagramProtocol):
+    """One stream's two sockets."""
+
+    def __init__(self) -> None:
+        self.pictures: list[Picture] = []
+        self.arrived: list[float] = []
+        self.reports: list[rtcp.Report] = []
+        self.sequences: list[int] = []
+        self._receiver = PictureReceiver()
+        self._more = asyncio.Event()
+        self.ports = (0, 0)
+        self._transports: list[asyncio.DatagramTransport] = []
+
+    async def open(self) -> None:
+        loop = asyncio.get_running_loop()
+        eye = self
+
+        class Reports(asyncio.DatagramProtocol):
+            def datagram_received(self, data: bytes, address: object) -> None:
+                eye.reports += rtcp.decode_reports(data)
+                eye._more.set()
+
+        rtp, _ = await loop.create_datagram_endpoint(lambda: self, local_addr=("127.0.0.1", 0))
+        reports, _ = await loop.create_datagram_endpoint(Reports, local_addr=("127.0.0.1", 0))
+        self._transports = [rtp, reports]
+        self.ports = rtp.get_extra_info("sockname")[1], reports.get_extra_info("sockname")[1]
+
+    def datagram_received(self, data: bytes, address: object) -> None:
+        now = asyncio.get_running_loop().time()
+        self.sequences.append(int.from_bytes(data[2:4], "big"))
+        got = self._receiver.receive(data, now)
+        self.pictures += got
+        self.arrived += [now] * len(got)
+        self._more.set()
+
+    async def look(self, count: int) -> list[Picture]:
+        """Wait until so many pictures more have come, and give them."""
+        begin = len(self.pictures)
+        await self.until(lambda: len(self.pictures) >= begin + count)
+        return self.pictures[begin : begin + count]
+
+    async def first(self, count: int) -> list[Picture]:
+        """The first so many pictures of all."""
+        await self.until(lambda: len(self.pictures) >= count)
+        return self.pictures[:count]
+
+    async def until(self, happened: object) -> None:
+        assert callable(happened)
+
+        async def wait() -> None:
+            while not happened():
+                self._more.clear()
+                await self._more.wait()
+
+        await asyncio.wait_for(wait(), LIMIT)
+
+    def report(self, data: bytes, port: int) -> None:
+        """Send a datagram of RTCP to the server."""
+        self._transports[1].sendto(data, ("127.0.0.1", port))
+
+    def close(self) -> None:
+        for transport in self._transports:
+            transport.close()
+
+
+class Viewer:
+    """One connection to a video server."""
+
+    def __init__(self, port: int, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self.base = f"rtsp://127.0.0.1:{port}/"
+        self.session = ""
+        self.reader = reader
+        self.writer = writer
+        self._messages = MessageReader()
+        self._eyes: list[Eye] = []
+        self._cseq = 0
+
+    async def ask(self, method: str, path: str = "live", **headers: str) -> Response:
+        """A request and its answer; `_` in a header's name is a dash."""
+        self._cseq += 1
+        lines = [("CSeq", str(self._cseq)), *((name.replace("_", "-"), value) for name, value in headers.items())]
+        if self.session and "Session" not in headers:
+            lines.append(("Session", self.session))
+        self.writer.write(rtsp.encode(Request(method, self.base + path, tuple(lines))))
+        response = await self.answer()
+        assert response.cseq == self._cseq
+        return response
+
+    async def answer(self) -> Response:
+        while True:
+            data = await asyncio.wait_for(self.reader.read(4096), LIMIT)
+            assert data, "the server hung up"
+            for event in self._messages.feed(data):
+                assert isinstance(event, Response)
+                return event
+
+    async def describe(self, path: str = "live") -> SessionDescription:
+        response = await self.ask("DESCRIBE", path, Accept="application/sdp")
+        assert response.status == 200
+        description = parse_description(response.body)
+        assert description is not None
+        return description
+
+    async def setup(self, path: str) -> Eye:
+        """Set up a stream, and remember the session."""
+        eye = Eye()
+        await eye.open()
+        self._eyes.append(eye)
+        response = await self.ask("SETUP", path, Transport="RTP/AVP;unicast;client_port={}-{}".format(*eye.ports))
+        assert response.status == 200, response
+        self.session, _ = rtsp.parse_session(response.header("Session") or "")
+        return eye
+
+    async def play(self, path: str = "live", **headers: str) -> Response:
+        response = await self.ask("PLAY", path, **headers)
+        assert response.status == 200, response
+        return response
+
+    def close(self) -> None:
+        for eye in self._eyes:
+            eye.close()
+        self.writer.close()
+
+
+@asynccontextmanager
+async def viewer(port: int) -> AsyncIterator[Viewer]:
+    reader, writer = await asyncio.open_connection("127.0.0.1", port)
+    held = Viewer(port, reader, writer)
+    try:
+        yield held
+    finally:
+        held.close()

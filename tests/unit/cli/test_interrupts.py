@@ -1,0 +1,157 @@
+"""Ctrl-C while a command starts: exit status 130 and not a word, wherever it comes."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import pytest
+from support.product import Process, program
+from support.world import loopback
+
+MISSIONS = Path(__file__).parents[3] / "missions"
+
+DRIVER = r"""
+import os, runpy, signal, sys, tempfile
+
+def interrupted():
+    "Fork here: the child gets SIGINT and goes on as the program would."
+    with tempfile.TemporaryFile() as said:
+        child = os.fork()
+        if child == 0:
+            os.dup2(said.fileno(), 1)
+            os.dup2(said.fileno(), 2)
+            os.kill(os.getpid(), signal.SIGINT)
+            return
+        status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+        said.seek(0)
+        text = said.read().decode(errors="replace")
+        if (status, text) != (130, ""):
+            wrong.append((Finder.seen, status, text[-2000:]))
+
+class Finder:
+    "Sees each import of a module that is not loaded yet."
+    seen, parent = 0, os.getpid()
+    def find_spec(self, name, path=None, target=None):
+        if (name == "anafi_mav.cli" or Finder.seen) and os.getpid() == Finder.parent:
+            if Finder.seen % step == 0:
+                interrupted()
+            Finder.seen += 1
+        return None
+
+wrong, step = [], int(sys.argv[1])
+sys.argv[:] = ["anafi-mav", *sys.argv[2:]]
+sys.meta_path.insert(0, Finder())
+try:
+    runpy.run_module("anafi_mav", run_name="__main__", alter_sys=True)
+except SystemExit as end:
+    if os.getpid() != Finder.parent:
+        os._exit(end.code)
+print(Finder.seen, "imports")
+for one in wrong:
+    print("wrong:", *one)
+os._exit(bool(wrong))
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="it interrupts a copy of the process at each import")
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["run", "-c", "none.yaml"],
+        ["sim", "--count", "0"],
+        ["info", "127.0.0.1"],
+        ["doctor", "127.0.0.1", "--http-port", "0"],
+        ["discover", "--timeout", "0"],
+        ["plan", "show", "none.plan"],
+        ["plan", "upload", "none.plan"],
+    ],
+    ids=" ".join,
+)
+def test_ctrl_c_at_any_import_ends_without_a_word(tmp_path: Path, words: list[str]) -> None:
+    """Every 25th import of each command, some forty of them: a copy of the process gets SIGINT there."""
+    driver = tmp_path / "driver.py"
+    driver.write_text(DRIVER)
+    done = subprocess.run(
+        [sys.executable, str(driver), "25", *words],
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=200,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert int(done.stdout.split()[-2]) > 100, done.stdout
+    assert "Traceback" not in done.stderr
+
+
+@contextlib.asynccontextmanager
+async def silent_device() -> AsyncIterator[tuple[str, asyncio.Event]]:
+    """A device that accepts a connection and says nothing."""
+    address, accepted, held = loopback(), asyncio.Event(), []
+
+    def take(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        held.append(writer)
+        accepted.set()
+
+    server = await asyncio.start_server(take, address, 44445)
+    try:
+        yield address, accepted
+    finally:
+        for writer in held:
+            writer.close()
+        server.close()
+
+
+async def interrupted(p: Process) -> int:
+    p.process.send_signal(signal.SIGINT)
+    return await p.end(10.0)
+
+
+@pytest.mark.parametrize("words", [["info", "ADDRESS", "--take"], ["doctor", "ADDRESS"], ["discover", "ADDRESS"]])
+async def test_ctrl_c_while_a_command_waits_for_a_drone_ends_it(words: list[str]) -> None:
+    async with silent_device() as (address, accepted):
+        words = [address if word == "ADDRESS" else word for word in words]
+        async with program(sys.executable, "-m", "anafi_mav", *words) as p:
+            await asyncio.wait_for(accepted.wait(), 30.0)
+            assert await interrupted(p) == 130
+            assert (p.lines, p.complaints) == ([], [])
+
+
+async def test_ctrl_c_while_an_upload_waits_for_a_vehicle_ends_it() -> None:
+    connected = asyncio.Event()
+    address = loopback()
+    server = await asyncio.start_server(lambda reader, writer: connected.set(), address, 5760)
+    words = ("plan", "upload", str(MISSIONS / "loop.plan"), "--endpoint", f"tcpout://{address}:5760")
+    async with program(sys.executable, "-m", "anafi_mav", *words) as p:
+        await asyncio.wait_for(connected.wait(), 30.0)
+        assert await interrupted(p) == 130
+        assert (p.lines, p.complaints) == ([], [])
+    server.close()
+
+
+async def test_ctrl_c_when_a_simulator_is_ready_ends_it_well() -> None:
+    words = ("sim", "--address", loopback(), "--http-port", "0", "--rtsp-port", "0")
+    async with program(sys.executable, "-m", "anafi_mav", *words) as p:
+        await p.line(lambda line: line.startswith("ready"))
+        assert await interrupted(p) == 0
+        assert p.complaints == []
+
+
+async def test_ctrl_c_that_is_ignored_stays_ignored() -> None:
+    """A shell starts its background jobs so: Ctrl-C is for the job in front."""
+    code = (
+        "import signal, sys; signal.signal(signal.SIGINT, signal.SIG_IGN)\n"
+        "import runpy; sys.argv[:] = ['anafi-mav', *sys.argv[1:]]\n"
+        "runpy.run_module('anafi_mav', run_name='__main__', alter_sys=True)"
+    )
+    async with silent_device() as (address, accepted):
+        async with program(sys.executable, "-c", code, "info", address, "--take") as p:
+            await asyncio.wait_for(accepted.wait(), 30.0)
+            assert await interrupted(p) == 1
+        assert p.complaints == [f"anafi-mav: no answer from {address} within 3 s"]

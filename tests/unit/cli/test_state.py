@@ -1,0 +1,101 @@
+"""`anafi-mav run` and its state folder: one gateway each, and what is said when it cannot be used."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import sys
+from pathlib import Path
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.mav import Client
+from support.product import product, program
+from support.world import loopback
+
+from anafi_mav.state_lock import read_holder, state_folder
+
+MISSIONS = Path(__file__).parents[3] / "missions"
+
+
+def fleet(address: str, drone: str, state: str = "") -> str:
+    return f"""
+        {state}
+        endpoints: ["tcpin://{address}:5760"]
+        drones: [{{name: alpha, sysid: 1, sim: {{address: {drone}}}}}]
+    """
+
+
+async def test_second_gateway_on_a_state_folder_is_refused_with_the_process_id(tmp_path: Path) -> None:
+    (tmp_path / "one").mkdir()
+    (tmp_path / "two").mkdir()
+    drone = loopback()
+    async with product(tmp_path / "one", fleet(loopback(), drone)) as first:
+        holder = read_holder(state_folder(None))
+        assert holder is not None
+        assert holder.pid == first.process.pid
+        (held,) = holder.drones
+        assert (held.name, held.address) == ("alpha", drone)
+        assert held.serial.startswith("PI04")
+        await first.entry("session", "up")  # the log is written a little later than the gateway says ready
+        before = len(first.entries("session"))
+        # The same drone behind other endpoints: what a person starts who believes that the first one has ended.
+        async with product(tmp_path / "two", fleet(loopback(), drone), ready=False) as second:
+            assert await second.end() == 2
+            (complaint,) = second.complaints
+            assert complaint.startswith(f"anafi-mav: {tmp_path / 'two' / 'fleet.yaml'}: state: expected a folder that")
+            assert f"process id {first.process.pid}, alpha at {drone}," in complaint
+            assert "end that gateway, or name another folder" in complaint
+            assert not second.log.exists()  # a simulator begins with its log
+        # With a folder of its own it runs.
+        config = fleet(loopback(), loopback(), f"state: {tmp_path / 'other'}")
+        async with product(tmp_path / "two", config) as third:
+            assert third.lines[-1].startswith("ready")
+        assert len(first.entries("session")) == before
+    assert read_holder(state_folder(None)) is None
+
+
+async def test_unusable_state_folder_is_reported_to_each_upload_and_by_the_exit_status(tmp_path: Path) -> None:
+    (tmp_path / "state").write_text("a file in its place")
+    address = loopback()
+    async with product(tmp_path, fleet(address, loopback(), f"state: {tmp_path / 'state'}")) as p:
+        assert any("state folder cannot be used" in line for line in p.complaints), p
+        for _ in range(2):
+            words = ("plan", "upload", str(MISSIONS / "loop.plan"), "--endpoint", f"tcpout://{address}:5760")
+            async with program(sys.executable, "-m", "anafi_mav", *words) as upload:
+                assert await upload.end() == 1, upload
+                assert "system 1: Plans not kept: state folder cannot be used" in upload.lines
+                assert "mission: 9 items on system 1" in upload.lines
+        p.process.send_signal(signal.SIGTERM)
+        assert await p.end() == 1
+        assert any(line.startswith(f"anafi-mav: not kept: {tmp_path / 'state'}") for line in p.complaints), p
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
+async def test_unreadable_state_folder_is_reported(tmp_path: Path) -> None:
+    (tmp_path / "state").mkdir(mode=0o000)
+    async with product(tmp_path, fleet(loopback(), loopback(), f"state: {tmp_path / 'state'}")) as p:
+        assert any("state folder cannot be used" in line for line in p.complaints), p
+        p.process.send_signal(signal.SIGTERM)
+        assert await p.end() == 1
+
+
+async def test_run_with_every_message_logged_passes_no_escapes_on(tmp_path: Path) -> None:
+    """A client's text, and a parameter's name that no vehicle has, with sequences for the operator's terminal."""
+    address = loopback()
+    async with product(tmp_path, fleet(address, loopback()), "-vv") as p:
+        client = await Client().connect(5760, address)
+        await client.heartbeat(lambda beat: True)
+        client.send(dialect.MAVLink_statustext_message(6, b"\x1b]0;owned\x07 hello\nforged"))
+        client.send(dialect.MAVLink_param_request_read_message(1, 1, b"\x1b[2JX", -1))
+        client.send(dialect.MAVLink_param_request_read_message(1, 1, b"ANF_MODEL", -1))
+        await client.wait("PARAM_VALUE", lambda m: m.param_id == "ANF_MODEL", since=0)
+        await client.close()
+        p.process.send_signal(signal.SIGTERM)
+        assert await p.end() == 0
+    logged = "\n".join(p.complaints)
+    assert "owned" in logged
+    assert not {"\x1b", "\x07"} & set(logged)
+    assert not [line for line in p.complaints if line.startswith("forged")]
+    assert all(re.match(r"\d{4}-\d\d-\d\d [\d:,]+ (DEBUG|INFO|WARNING) [a-z_.]+: ", line) for line in p.complaints)

@@ -1,0 +1,177 @@
+"""Flight plans: uploaded to the simulator and flown there; what the drone lacks is in the error."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+
+import pytest
+from support.flight_plans import V1
+from support.scripted_device import STATES, ScriptedDevice
+from support.simulated import Pair, connected, take_off
+
+from anafi_mav.arsdk.codec.wire import Message
+from anafi_mav.arsdk.messages import common
+from anafi_mav.arsdk.messages import flight_plan as modern
+from anafi_mav.arsdk.messages.common import FlightPlanComponent, MavlinkType, PlayingState
+from anafi_mav.drone import Drone
+from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, NotSupported, RemoteProtocolError
+
+V2 = V1.replace(b"\t3\t93\t2.0\t0.0\t0.0\t0.0\t0.0\t0.0\t0.0", b"\t2\t93\t2.0\t-1\t-1\t-1\tnan\tnan\tnan").replace(
+    b"\t3\t93\t60.0\t0.0\t0.0\t0.0\t0.0\t0.0\t0.0", b"\t2\t93\t60.0\t-1\t-1\t-1\tnan\tnan\tnan"
+)
+
+
+@pytest.fixture(params=["4k", "ai"])
+async def pair(request: pytest.FixtureRequest) -> AsyncIterator[Pair]:
+    async with connected(request.param) as pair:
+        yield pair
+
+
+def plan(drone: Drone) -> bytes:
+    return V1 if drone.flight_plan.version == 1 else V2
+
+
+async def test_a_plan_is_uploaded_flown_paused_and_stopped(pair: Pair) -> None:
+    drone = pair.drone
+    assert drone.flight_plan.version == (2 if drone.identity.model.key == "ai" else 1)
+    assert drone.flight_plan.state.playing == PlayingState.STOPPED
+    assert drone.flight_plan.state.available
+    assert drone.flight_plan.state.unavailable == ()
+    uid = await drone.flight_plan.upload(plan(drone))
+    assert uid in [one.uid for one in await drone.flight_plan.list()]
+    assert (await drone.flight_plan.get(uid))["uid"] == uid
+    with pytest.raises(CommandRejected):
+        await drone.flight_plan.pause()
+    await drone.flight_plan.stop()
+    await drone.flight_plan.start(uid)
+    assert (drone.flight_plan.state.playing, drone.flight_plan.state.uid) == (PlayingState.PLAYING, uid)
+    await drone.expect(common.MissionItemExecuted, lambda m: m.idx == 1, 20.0)
+    assert drone.flight_plan.state.item == 1
+    await drone.flight_plan.pause()
+    told = [drone.flight_plan.state.playing]
+    await drone.flight_plan.start(uid)
+    assert drone.flight_plan.state.item == 1
+    await drone.flight_plan.stop()
+    told.append(drone.flight_plan.state.playing)
+    assert told == [PlayingState.PAUSED, PlayingState.STOPPED]
+    assert await drone.flight_plan.delete(uid)
+    assert not await drone.flight_plan.delete(uid)
+    with pytest.raises(CommandRejected, match="404"):
+        await drone.flight_plan.get(uid)
+
+
+async def test_a_plan_that_is_none(pair: Pair) -> None:
+    drone = pair.drone
+    uid = await drone.flight_plan.upload(b"nonsense")
+    with pytest.raises(CommandRejected, match="mavlink file"):
+        await drone.flight_plan.start(uid)
+    assert drone.flight_plan.state.components[FlightPlanComponent.MAVLINK_FILE] is False
+    with pytest.raises(CommandRejected):
+        await drone.flight_plan.start("unknown")
+    with pytest.raises(CommandRejected):
+        await drone.flight_plan.get("../plans")
+    with pytest.raises(CommandRejected):
+        await drone.flight_plan.upload(b"")
+
+
+async def test_without_gps(pair: Pair) -> None:
+    drone, real = pair
+    uid = await drone.flight_plan.upload(plan(drone))
+    real.faults.gps = False
+    if drone.flight_plan.state.available:
+        await drone.expect(common.AvailabilityStateChanged, lambda m: not m.AvailabilityState)
+    with pytest.raises(CommandRejected, match="gps"):
+        await drone.flight_plan.start(uid)
+
+
+async def test_from_the_middle(pair: Pair) -> None:
+    drone = pair.drone
+    uid = await drone.flight_plan.upload(plan(drone))
+    await take_off(drone)
+    if drone.flight_plan.version == 1:
+        with pytest.raises(NotSupported):
+            await drone.flight_plan.start(uid, item=2)
+        with pytest.raises(NotSupported):
+            await drone.flight_plan.start(uid, continue_on_disconnect=True)
+        return
+    await drone.flight_plan.start(uid, item=2, continue_on_disconnect=True)
+    done = await drone.expect(common.MissionItemExecuted, timeout=20.0)
+    assert done.idx == 2
+    await drone.flight_plan.stop()
+
+
+async def test_return_on_disconnect() -> None:
+    async with connected("4k") as (drone, _):
+        assert await drone.flight_plan.set_returns_on_disconnect(False) in (True, False)
+
+
+# -- a scripted drone: what the simulator never does
+
+
+@pytest.fixture
+def states() -> list[Message]:
+    """What the device tells at the start."""
+    return [
+        *STATES,
+        common.MavlinkFilePlayingStateChanged(PlayingState.STOPPED, "", MavlinkType.FLIGHT_PLAN),
+        common.ComponentStateListChanged(FlightPlanComponent.GPS, 1),
+    ]
+
+
+async def test_a_start_without_an_answer_is_taken_back(device: ScriptedDevice) -> None:
+    drone = device.drone()
+    await drone.connect()
+    with pytest.raises(CommandTimeout):
+        await drone.flight_plan.start("abc", timeout=0.2)
+    await device.until(common.Stop)
+    # Silent, but it had said what it lacks.
+    device.script[common.Start] = lambda _: [
+        common.ComponentStateListChanged(FlightPlanComponent.CALIBRATION, 0),
+        common.ComponentStateListChanged(FlightPlanComponent.CAMERA_AVAILABLE, 0),
+    ]
+    with pytest.raises(CommandRejected, match="calibration, camera available"):
+        await drone.flight_plan.start("abc", timeout=0.2)
+    starting = asyncio.ensure_future(drone.flight_plan.start("abc"))
+    await device.until(common.Start, 3)
+    await drone.close()
+    with pytest.raises(LinkLost):
+        await starting
+
+
+async def test_start_at_of_firmware_that_has_the_older_form_only(device: ScriptedDevice) -> None:
+    drone = device.drone()
+    await drone.connect()
+    heard = asyncio.ensure_future(drone.expect(modern.Capabilities))
+    await asyncio.sleep(0)
+    device.say(modern.Capabilities(1 << modern.SupportedCapabilities.START_AT))
+    await heard
+    device.script[modern.StartAt] = lambda m: [
+        common.MavlinkFilePlayingStateChanged(PlayingState.PLAYING, m.flightplan_id, MavlinkType.FLIGHT_PLAN)
+    ]
+    await drone.flight_plan.start("abc", item=3)
+    assert device.got(modern.StartAt) == [modern.StartAt("abc", "abc", modern.MavlinkType.FLIGHT_PLAN, 3)]
+    # It ended by itself while we asked for a pause.
+    device.script[common.Pause] = lambda m: [
+        common.MavlinkFilePlayingStateChanged(PlayingState.STOPPED, "", MavlinkType.FLIGHT_PLAN)
+    ]
+    with pytest.raises(CommandRejected, match="ended"):
+        await drone.flight_plan.pause()
+    await drone.close()
+
+
+async def test_a_drone_without_flight_plans() -> None:
+    async with ScriptedDevice() as device:
+        drone = device.drone()
+        await drone.connect()
+        with pytest.raises(NotSupported):
+            await drone.flight_plan.upload(V1)
+        await drone.close()
+
+
+async def test_a_name_that_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    async with connected("4k") as (drone, real):
+        for uid in ("", "../x", 5):
+            monkeypatch.setattr(real.firmware.plans, "put", lambda data, date, uid=uid: uid)
+            with pytest.raises(RemoteProtocolError):
+                await drone.flight_plan.upload(V1)

@@ -1,0 +1,224 @@
+"""Media: listed, copied, deleted and told of by the simulator; and a web server that talks nonsense."""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+import json
+from collections.abc import AsyncIterator
+from contextlib import aclosing, asynccontextmanager
+from pathlib import Path
+
+import pytest
+from aiohttp import web
+from support.scripted_device import STATES, ScriptedDevice
+from support.simulated import Pair, connected
+
+from anafi_mav.arsdk.messages import common, mediastore
+from anafi_mav.arsdk.messages.mediastore import MediastoreState
+from anafi_mav.drone import Drone
+from anafi_mav.drone.payload.camera_enums import CameraMode, PhotoFile, PhotoMode
+from anafi_mav.drone.payload.camera_state import PhotoSettings
+from anafi_mav.drone.payload.media import MediaItem, Notification, Resource
+from anafi_mav.drone.rest import Rest
+from anafi_mav.errors import CommandRejected, LinkLost, NotSupported, RemoteProtocolError
+
+
+async def photograph(drone: Drone) -> str:
+    await drone.camera.set_mode(CameraMode.PHOTO)
+    await drone.camera.set_photo(PhotoSettings(mode=PhotoMode.SINGLE, file=PhotoFile.DNG_JPEG))
+    media = await drone.camera.take_photo()
+    assert media
+    return media
+
+
+def names(directory: Path) -> list[str]:
+    return sorted(path.name for path in directory.iterdir())
+
+
+@pytest.fixture
+async def pair() -> AsyncIterator[Pair]:
+    async with connected("4k") as pair:
+        yield pair
+
+
+async def test_a_photo_is_listed_copied_and_deleted(pair: Pair, tmp_path: Path) -> None:
+    drone = pair.drone
+    assert await drone.media.list() == ()
+    id = await photograph(drone)
+    (item,) = await drone.media.list()
+    assert (item.media_id, item.type) == (id, "PHOTO")
+    assert item == await drone.media.get(id)
+    assert {one.format for one in item.resources} == {"JPG", "DNG"}
+    assert item.gps is not None
+    paths = await drone.media.download_media(id, tmp_path)
+    assert sorted(path.name for path in paths) == sorted(one.resource_id for one in item.resources)
+    for path, resource in zip(paths, item.resources, strict=True):
+        content = path.read_bytes()
+        assert len(content) == resource.size
+        assert hashlib.md5(content).hexdigest() == await drone.media.md5(resource)
+    assert names(tmp_path) == sorted(path.name for path in paths)
+    assert (await drone.media.thumbnail(item)).startswith(b"\xff\xd8")
+    await drone.media.delete_resource(item.resources[0].resource_id)
+    assert len((await drone.media.get(id)).resources) == 1
+    await drone.media.delete(id)
+    with pytest.raises(CommandRejected, match="404"):
+        await drone.media.get(id)
+    await photograph(drone)
+    await drone.media.delete_all()
+    assert await drone.media.list() == ()
+    assert (drone.media.state.index, drone.media.state.photos) == (MediastoreState.INDEXED, 0)
+
+
+async def test_the_drone_tells_of_a_new_media(pair: Pair) -> None:
+    drone = pair.drone
+    heard: list[Notification] = []
+    ready = asyncio.Event()
+
+    async def listen() -> None:
+        async with aclosing(drone.media.notifications()) as notifications:
+            ready.set()
+            async for notification in notifications:
+                heard.append(notification)
+                if notification.name == "media_removed":
+                    return
+
+    listening = asyncio.ensure_future(listen())
+    await ready.wait()
+    ids = []
+    # The socket opens while the first are taken: what counts is that it hears one from its beginning to its end.
+    while "media_created" not in {one.name for one in heard}:
+        ids.append(await photograph(drone))
+    created = next(one for one in heard if one.name == "media_created")
+    assert created.media is not None
+    assert created.media.media_id in ids
+    await drone.media.delete(created.media.media_id)
+    await asyncio.wait_for(listening, 5.0)
+
+
+async def test_not_yet_indexed(pair: Pair) -> None:
+    pair.real.firmware.payload.media.state = MediastoreState.INDEXING
+    with pytest.raises(CommandRejected, match="indexed"):
+        await pair.drone.media.list()
+
+
+# -- a web server that talks nonsense
+
+
+@asynccontextmanager
+async def serving(**answers: web.Response) -> AsyncIterator[tuple[Drone, ScriptedDevice]]:
+    """A scripted drone whose web server gives these answers by the last part of the path."""
+
+    async def answer(request: web.Request) -> web.StreamResponse:
+        name = request.path.rpartition("/")[2]
+        found = answers.get(name) or answers.get(f"f{name}")
+        return web.Response(status=404) if found is None else web.Response(body=found.body, status=found.status)
+
+    async def websocket(request: web.Request) -> web.WebSocketResponse:
+        socket = web.WebSocketResponse()
+        await socket.prepare(request)
+        for text in ("nonsense", "[]", '{"data": {}}', '{"name": "media_created", "data": {"media": 5}}'):
+            await socket.send_str(text)
+        await socket.send_bytes(b"\0")
+        await socket.close()
+        return socket
+
+    app = web.Application()
+    app.router.add_get("/api/v1/media/notifications", websocket)
+    app.router.add_route("*", "/{path:.*}", answer)
+    runner = web.AppRunner(app)
+    await runner.setup()
+    site = web.TCPSite(runner, "127.0.0.1", 0)
+    await site.start()
+    async with ScriptedDevice() as device:
+        device.script[common.AllStates] = lambda _: [
+            *STATES,
+            mediastore.State(MediastoreState.INDEXED),
+            mediastore.Counters(1, 2, 3, 4),
+            common.AllStatesChanged(),
+        ]
+        drone = device.drone(http_port=runner.addresses[0][1])
+        await drone.connect()
+        try:
+            yield drone, device
+        finally:
+            await drone.close()
+            await runner.cleanup()
+
+
+def told(value: object) -> web.Response:
+    return web.Response(body=json.dumps(value).encode())
+
+
+async def test_media_that_are_not_readable_are_left_out() -> None:
+    listed = [{"media_id": "1"}, 5, {"media_id": 7, "resources": 3}, {"no": "id"}, {"media_id": "2", "new": [None]}]
+    async with serving(medias=told(listed), f5=told([1])) as (drone, _):
+        assert drone.media.state.videos == 1
+        assert drone.media.state.photo_files == 4
+        assert [item.media_id for item in await drone.media.list()] == ["1", "2"]
+        with pytest.raises(RemoteProtocolError):
+            await drone.media.get("5")
+        for wrong in ("../../etc/passwd", "", "a/b", ".hidden", "x" * 200):
+            with pytest.raises(RemoteProtocolError):
+                await drone.media.get(wrong)
+
+
+@pytest.mark.parametrize("body", [b"{", b"\xff\xfe", b"[" * 100_000, b'"text"', b"null"])
+async def test_answers_that_are_no_list(body: bytes) -> None:
+    async with serving(medias=web.Response(body=body)) as (drone, _):
+        with pytest.raises(RemoteProtocolError):
+            await drone.media.list()
+
+
+async def test_an_answer_without_measure(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("anafi_mav.drone.rest.ANSWER_LIMIT", 1000)
+    async with serving(medias=web.Response(body=b" " * 1001)) as (drone, _):
+        with pytest.raises(RemoteProtocolError, match="1000"):
+            await drone.media.list()
+
+
+async def test_a_copy_that_is_not_what_the_drone_has(tmp_path: Path) -> None:
+    right = hashlib.md5(b"picture").hexdigest()
+    async with serving(file=web.Response(body=b"picture"), short=web.Response(body=b"pict")) as (drone, _):
+        good = Resource("A.JPG", url="/data/file", md5=right.upper())
+        assert (await drone.media.download(good, tmp_path)).read_bytes() == b"picture"
+        with pytest.raises(RemoteProtocolError, match="MD5"):
+            await drone.media.download(Resource("B.JPG", url="/data/short", md5=right), tmp_path)
+        with pytest.raises(CommandRejected, match="404"):
+            await drone.media.download(Resource("C.JPG", url="/data/none", md5=right), tmp_path)
+        for url in ("http://elsewhere/data", "//elsewhere/data", ""):
+            with pytest.raises(RemoteProtocolError):
+                await drone.media.download(Resource("D.JPG", url=url, md5=right), tmp_path)
+        with pytest.raises(RemoteProtocolError):
+            await drone.media.download(Resource("../E.JPG", url="/data/file", md5=right), tmp_path)
+        with pytest.raises(RemoteProtocolError):
+            await drone.media.thumbnail(MediaItem("1"))
+    assert names(tmp_path) == ["A.JPG"]
+
+
+async def test_a_redirection_is_not_followed() -> None:
+    async with serving(medias=web.Response(status=302)) as (drone, _):
+        with pytest.raises(CommandRejected, match="302"):
+            await drone.media.list()
+
+
+async def test_notifications_that_are_not_readable_are_left_out() -> None:
+    async with serving() as (drone, _):
+        heard = [one async for one in drone.media.notifications()]
+        assert [one.name for one in heard] == ["media_created"]
+        assert heard[0].media is None
+
+
+async def test_without_a_web_server_or_a_media_store() -> None:
+    async with ScriptedDevice() as device:
+        drone = device.drone()
+        await drone.connect()
+        with pytest.raises(NotSupported):
+            await drone.media.list()
+        await drone.close()
+        with pytest.raises(LinkLost):
+            await drone.media.list()
+    rest = Rest("127.0.0.1", 1)
+    with pytest.raises(LinkLost):
+        await rest.json("GET", "/")
+    await rest.close()

@@ -1,0 +1,83 @@
+"""The thermal camera: its palette as a list of events, and every verb in the simulator."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+from support.scripted_device import STATES, ScriptedDevice
+from support.simulated import connected
+
+from anafi_mav.arsdk.messages import common, thermal
+from anafi_mav.arsdk.messages.thermal import (
+    PaletteMode,
+    RenderingMode,
+    ShutterTrigger,
+    SpotType,
+    ThermalMode,
+)
+from anafi_mav.arsdk.messages.thermal import Range as Sensitivity
+from anafi_mav.drone.payload.thermal import MAX_COLOURS, Colour, Palette
+from anafi_mav.errors import LocalProtocolError, NotSupported
+
+FIRST, LAST, EMPTY = 1, 2, 4
+RED, BLUE = Colour(1.0, 0.0, 0.0, 1.0), Colour(0.0, 0.0, 1.0, 0.0)
+
+
+async def test_the_palette_is_a_list() -> None:
+    async with ScriptedDevice() as device:
+        device.script[common.AllStates] = lambda _: [
+            *STATES,
+            thermal.Mode(ThermalMode.DISABLED),
+            thermal.PalettePart(0.0, 0.0, 1.0, 0.0, FIRST),
+            thermal.PalettePart(1.0, 0.0, 0.0, 1.0, LAST),
+            common.AllStatesChanged(),
+        ]
+        drone = device.drone()
+        await drone.connect()
+        assert list(drone.thermal.state.colours) == [BLUE, RED]
+        heard = asyncio.ensure_future(drone.expect(thermal.PalettePart, lambda m: m.list_flags == EMPTY))
+        await asyncio.sleep(0)
+        # A peer without measure, then an empty list.
+        device.say(*[thermal.PalettePart(0.0, 0.0, 0.0, 0.0, 0)] * (MAX_COLOURS + 10))
+        full = []
+        drone.subscribe(lambda message, now: full.append(len(drone.thermal.state.colours)))
+        device.say(thermal.PalettePart(0.0, 0.0, 0.0, 0.0, EMPTY))
+        await heard
+        assert max(full) == MAX_COLOURS
+        assert len(drone.thermal.state.colours) == 0
+        await drone.close()
+
+
+@pytest.mark.parametrize("model", ["thermal", "usa"])
+async def test_in_the_simulator(model: str) -> None:
+    async with connected(model) as (drone, _):
+        thermal_camera = drone.thermal
+        assert thermal_camera.state.mode == ThermalMode.DISABLED
+        assert thermal_camera.state.modes == frozenset(ThermalMode)
+        assert await thermal_camera.set_mode(ThermalMode.BLENDED) is ThermalMode.BLENDED
+        assert await thermal_camera.set_rendering(RenderingMode.MONOCHROME, 0.25) == (RenderingMode.MONOCHROME, 0.25)
+        assert await thermal_camera.set_rendering(RenderingMode.THERMAL) == (RenderingMode.THERMAL, 0.25)
+        assert await thermal_camera.set_emissivity(0.5) == 0.5
+        assert await thermal_camera.set_background(300.0) == 300.0
+        assert await thermal_camera.set_sensitivity(Sensitivity.HIGH) is Sensitivity.HIGH
+        assert await thermal_camera.set_shutter(ShutterTrigger.MANUAL) is ShutterTrigger.MANUAL
+        thermal_camera.trigger_shutter()
+        palette = Palette(PaletteMode.SPOT, 280.0, 320.0, spot=SpotType.COLD, spot_threshold=0.25)
+        assert await thermal_camera.set_palette(palette) == palette
+        assert thermal_camera.state.palette == palette
+        assert await thermal_camera.set_colours([BLUE, RED]) == (BLUE, RED)
+        for colours in ([], [RED] * (MAX_COLOURS + 1)):
+            with pytest.raises(LocalProtocolError):
+                await thermal_camera.set_colours(colours)
+        with pytest.raises(LocalProtocolError):
+            await thermal_camera.set_emissivity(float("nan"))
+
+
+async def test_a_drone_without() -> None:
+    async with connected("4k") as (drone, _):
+        assert drone.thermal.state.mode is None
+        with pytest.raises(NotSupported):
+            await drone.thermal.set_mode(ThermalMode.STANDARD)
+        with pytest.raises(NotSupported):
+            drone.thermal.trigger_shutter()

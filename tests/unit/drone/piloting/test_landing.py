@@ -1,0 +1,319 @@
+"""Ending a landing, stopping propellers on the ground, and a Landing that is repeated until it counts."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable
+
+import pytest
+from support.scripted_device import ScriptedDevice
+
+from anafi_mav.arsdk.codec.wire import Message
+from anafi_mav.arsdk.messages import ardrone3
+from anafi_mav.arsdk.messages.ardrone3 import FlyingState
+from anafi_mav.drone import Drone, PilotingCommand
+from anafi_mav.errors import AnafiMavError, CommandRejected
+
+
+def state(flying: FlyingState) -> Message:
+    return ardrone3.FlyingStateChanged(flying)
+
+
+async def reported(drone: Drone, device: ScriptedDevice, flying: FlyingState) -> None:
+    heard = asyncio.ensure_future(drone.expect(ardrone3.FlyingStateChanged, lambda m: m.state == flying))
+    await asyncio.sleep(0)
+    device.say(state(flying))
+    await heard
+
+
+def gaz(device: ScriptedDevice) -> list[tuple[int, int, int, int, int]]:
+    return [(p.flag, p.roll, p.pitch, p.yaw, p.gaz) for p in device.got(ardrone3.PCMD)]
+
+
+UP, LEVEL = (0, 0, 0, 0, 100), (0, 0, 0, 0, 0)
+
+
+async def begun(work: Awaitable[None]) -> asyncio.Future[None]:
+    task = asyncio.ensure_future(work)
+    await asyncio.sleep(0)
+    return task
+
+
+async def test_landing_is_ended_by_gaz_until_another_state_is_reported(drone: Drone, device: ScriptedDevice) -> None:
+    await reported(drone, device, FlyingState.LANDING)
+    ending = await begun(drone.piloting.end_landing())
+    await device.until(ardrone3.PCMD, 4)
+    assert set(gaz(device)) == {UP}
+    assert not ending.done()
+    await reported(drone, device, FlyingState.HOVERING)
+    await ending
+    count = gaz(device).count(UP)
+    await device.until(ardrone3.PCMD, count + 10)
+    assert gaz(device)[count:] == [LEVEL] * (len(gaz(device)) - count)
+    assert device.got(ardrone3.TakeOff) == device.got(ardrone3.SmartTakeOffLand) == []
+
+
+async def test_gaz_against_a_landing_ends_after_a_second_and_is_centred(drone: Drone, device: ScriptedDevice) -> None:
+    """A firmware that ignores it, or reports nothing: no stick outlives the second."""
+    await reported(drone, device, FlyingState.LANDING)
+    with pytest.raises(CommandRejected, match="drone still landing"):
+        await drone.piloting.end_landing(timeout=1.5)
+    await device.until(ardrone3.PCMD, gaz(device).count(UP) + 20)
+    times = [at for at, m in device.received if isinstance(m, ardrone3.PCMD) and m.gaz]
+    assert 10 <= len(times) <= 21
+    assert times[-1] - times[0] <= 1.1
+    assert gaz(device)[-20:] == [LEVEL] * 20
+
+
+async def test_touchdown_ends_the_gaz_and_nothing_starts_the_motors(drone: Drone, device: ScriptedDevice) -> None:
+    await reported(drone, device, FlyingState.LANDING)
+    ending = await begun(drone.piloting.end_landing())
+    await device.until(ardrone3.PCMD, 2)
+    await reported(drone, device, FlyingState.LANDED)
+    with pytest.raises(CommandRejected, match="already landed"):
+        await ending
+    await device.quiet(ardrone3.PCMD)
+    assert device.got(ardrone3.TakeOff) == []
+
+
+@pytest.mark.parametrize("flying", [FlyingState.EMERGENCY_LANDING, FlyingState.EMERGENCY])
+async def test_landing_that_becomes_forced_is_left_alone(
+    drone: Drone, device: ScriptedDevice, flying: FlyingState
+) -> None:
+    await reported(drone, device, FlyingState.LANDING)
+    ending = await begun(drone.piloting.end_landing())
+    await device.until(ardrone3.PCMD, 2)
+    await reported(drone, device, flying)
+    with pytest.raises(CommandRejected):
+        await ending
+    await device.quiet(ardrone3.PCMD)
+
+
+async def test_cancelled_end_of_a_landing_centres_the_sticks(drone: Drone, device: ScriptedDevice) -> None:
+    await reported(drone, device, FlyingState.LANDING)
+    ending = await begun(drone.piloting.end_landing())
+    await device.until(ardrone3.PCMD, 2)
+    ending.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await ending
+    count = gaz(device).count(UP)
+    await device.until(ardrone3.PCMD, count + 5)
+    assert gaz(device)[-5:] == [LEVEL] * 5
+
+
+@pytest.mark.parametrize("modern", [False, True])
+async def test_take_off_command_against_a_landing_is_of_the_model(
+    drone: Drone, device: ScriptedDevice, modern: bool
+) -> None:
+    drone.piloting.is_modern = lambda: modern
+    kind, other = (
+        (ardrone3.SmartTakeOffLand, ardrone3.TakeOff) if modern else (ardrone3.TakeOff, ardrone3.SmartTakeOffLand)
+    )
+    device.script[kind] = lambda _: [state(FlyingState.TAKINGOFF)]
+    await reported(drone, device, FlyingState.LANDING)
+    await drone.piloting.end_landing(take_off=True)
+    assert len(device.got(kind)) == 1
+    assert device.got(other) == []
+    if modern:  # it toggles: no gaz beside it
+        assert UP not in gaz(device)
+
+
+async def test_motors_that_start_after_a_lost_race_are_stopped(drone: Drone, device: ScriptedDevice) -> None:
+    """The TakeOff reached a drone that had just landed, and is executed late."""
+    await reported(drone, device, FlyingState.LANDING)
+    ending = await begun(drone.piloting.end_landing(take_off=True))
+    await device.until(ardrone3.TakeOff)
+    await reported(drone, device, FlyingState.LANDED)
+    with pytest.raises(CommandRejected, match="already landed"):
+        await ending
+    await reported(drone, device, FlyingState.MOTOR_RAMPING)
+    assert (await device.until(ardrone3.UserTakeOff)).state == 0
+    await device.until(ardrone3.Landing, 1)
+    await reported(drone, device, FlyingState.TAKINGOFF)
+    await device.until(ardrone3.Landing, 2)
+
+
+async def test_motors_that_start_are_stopped_when_reported_together_with_touchdown(
+    drone: Drone, device: ScriptedDevice
+) -> None:
+    """A link that was interrupted delivers both states in one event-loop iteration (soak, seed 2168)."""
+    await reported(drone, device, FlyingState.LANDING)
+    ending = await begun(drone.piloting.end_landing(take_off=True))
+    await device.until(ardrone3.TakeOff)
+    device.say(state(FlyingState.LANDED))
+    device.say(state(FlyingState.MOTOR_RAMPING))
+    with pytest.raises(CommandRejected, match="already landed"):
+        await ending
+    assert (await device.until(ardrone3.UserTakeOff)).state == 0
+    await device.until(ardrone3.Landing, 1)
+    await reported(drone, device, FlyingState.TAKINGOFF)
+    await device.until(ardrone3.Landing, 2)
+
+
+async def test_touchdown_after_an_ended_landing_does_not_stop_motors(drone: Drone, device: ScriptedDevice) -> None:
+    await reported(drone, device, FlyingState.LANDING)
+    ending = await begun(drone.piloting.end_landing(take_off=True))
+    await reported(drone, device, FlyingState.HOVERING)
+    await ending
+    await reported(drone, device, FlyingState.LANDED)
+    await reported(drone, device, FlyingState.MOTOR_RAMPING)  # by another controller
+    await device.quiet(ardrone3.Landing)
+    assert device.got(ardrone3.Landing) == []
+
+
+@pytest.mark.parametrize("modern", [False, True])
+async def test_take_off_command_against_a_landing_is_withdrawn_with_it(
+    drone: Drone, device: ScriptedDevice, modern: bool
+) -> None:
+    """A newer command replaces it while the drone receives nothing: it must not arrive later, on the ground."""
+    drone.piloting.is_modern = lambda: modern
+    await reported(drone, device, FlyingState.LANDING)
+    device.session.mute = True
+    ending = await begun(drone.piloting.end_landing(take_off=True))
+    await asyncio.sleep(0.05)
+    ending.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await ending
+    device.session.mute = False
+    await reported(drone, device, FlyingState.LANDED)
+    for _ in range(2):  # longer than an acknowledgement is waited for
+        await device.quiet(ardrone3.TakeOff)
+    assert device.got(ardrone3.TakeOff) == device.got(ardrone3.SmartTakeOffLand) == []
+    await reported(drone, device, FlyingState.MOTOR_RAMPING)  # had it arrived
+    await device.until(ardrone3.Landing)
+
+
+async def test_a_wanted_take_off_after_a_lost_race_is_not_stopped(drone: Drone, device: ScriptedDevice) -> None:
+    await reported(drone, device, FlyingState.LANDING)
+    ending = await begun(drone.piloting.end_landing(take_off=True))
+    await device.until(ardrone3.TakeOff)
+    await reported(drone, device, FlyingState.LANDED)
+    with pytest.raises(CommandRejected):
+        await ending
+    device.script[ardrone3.TakeOff] = lambda _: [state(FlyingState.MOTOR_RAMPING), state(FlyingState.TAKINGOFF)]
+    await drone.piloting.take_off()
+    await device.quiet(ardrone3.Landing)
+    assert device.got(ardrone3.Landing) == []
+
+
+# Landing again.
+
+
+async def test_landing_is_repeated_at_each_state_of_a_drone_that_rises(drone: Drone, device: ScriptedDevice) -> None:
+    await reported(drone, device, FlyingState.MOTOR_RAMPING)
+    landing = await begun(drone.piloting.land())
+    await device.until(ardrone3.Landing, 1)
+    for count, flying in enumerate((FlyingState.TAKINGOFF, FlyingState.HOVERING), 2):
+        await reported(drone, device, flying)
+        await device.until(ardrone3.Landing, count)
+        assert not landing.done()
+    await reported(drone, device, FlyingState.LANDING)
+    await landing
+    await reported(drone, device, FlyingState.FLYING)  # another one's doing
+    await device.quiet(ardrone3.Landing)
+    assert len(device.got(ardrone3.Landing)) == 3
+
+
+async def test_landing_is_not_repeated_after_a_newer_command(drone: Drone, device: ScriptedDevice) -> None:
+    await reported(drone, device, FlyingState.MOTOR_RAMPING)
+    landing = await begun(drone.piloting.land())
+    await device.until(ardrone3.Landing, 1)
+    landing.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await landing
+    await reported(drone, device, FlyingState.TAKINGOFF)
+    await device.quiet(ardrone3.Landing)
+
+
+async def test_land_after_gaz_is_sent_although_landing_is_reported(drone: Drone, device: ScriptedDevice) -> None:
+    """The gaz may have ended the landing, which is reported late: LANDING proves nothing, so Landing is sent again."""
+    await reported(drone, device, FlyingState.LANDING)
+    ending = await begun(drone.piloting.end_landing())
+    await device.until(ardrone3.PCMD, 2)
+    ending.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await ending
+    landing = await begun(drone.piloting.land())
+    await device.until(ardrone3.Landing, 1)
+    await reported(drone, device, FlyingState.FLYING)
+    await device.until(ardrone3.Landing, 2)
+    assert not landing.done()
+    await reported(drone, device, FlyingState.LANDING)
+    await landing
+    await device.quiet(ardrone3.PCMD)
+
+
+async def test_land_that_was_withdrawn_and_begins_is_settled(drone: Drone, device: ScriptedDevice) -> None:
+    await reported(drone, device, FlyingState.HOVERING)
+    landing = await begun(drone.piloting.land())
+    await device.until(ardrone3.Landing, 1)
+    landing.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await landing
+    device.script[ardrone3.CancelMoveTo] = lambda _: [state(FlyingState.LANDING)]
+    assert await drone.piloting.settle_landing()
+
+
+# Propellers on the ground.
+
+
+async def test_stop_motors_sends_both_and_returns_when_landed(drone: Drone, device: ScriptedDevice) -> None:
+    await reported(drone, device, FlyingState.MOTOR_RAMPING)
+    stopping = await begun(drone.piloting.stop_motors())
+    assert (await device.until(ardrone3.UserTakeOff)).state == 0
+    await device.until(ardrone3.Landing)
+    await device.quiet(ardrone3.Emergency)
+    assert not stopping.done()
+    await reported(drone, device, FlyingState.LANDED)
+    await stopping
+    assert device.got(ardrone3.Emergency) == []
+
+
+async def test_stop_motors_by_force_cuts_motors_that_ramp_on(drone: Drone, device: ScriptedDevice) -> None:
+    device.script[ardrone3.Emergency] = lambda _: [state(FlyingState.EMERGENCY)]
+    await reported(drone, device, FlyingState.MOTOR_RAMPING)
+    await drone.piloting.stop_motors(force=True)
+    times = [at for at, m in device.received if isinstance(m, ardrone3.Landing | ardrone3.Emergency)]
+    assert times[-1] - times[0] >= 0.25
+
+
+async def test_stop_motors_by_force_never_cuts_a_drone_that_has_left_the_ground(
+    drone: Drone, device: ScriptedDevice
+) -> None:
+    await reported(drone, device, FlyingState.MOTOR_RAMPING)
+    stopping = await begun(drone.piloting.stop_motors(force=True))
+    await device.until(ardrone3.Landing)
+    await reported(drone, device, FlyingState.TAKINGOFF)
+    await device.until(ardrone3.Landing, 2)
+    for _ in range(3):
+        await device.quiet(ardrone3.Emergency)
+    await reported(drone, device, FlyingState.LANDING)
+    await reported(drone, device, FlyingState.LANDED)
+    await stopping
+
+
+# What newer commands have replaced.
+
+
+async def test_retired_task_sends_no_command_but_may_stop_what_it_began(drone: Drone, device: ScriptedDevice) -> None:
+    await reported(drone, device, FlyingState.HOVERING)
+    results: list[BaseException | None] = []
+
+    async def replaced() -> None:
+        drone.retire([task])
+        for verb in (drone.piloting.move_by(1.0, 0.0, 0.0, 0.0), drone.piloting.land()):
+            try:
+                await verb
+            except AnafiMavError as error:
+                results.append(error)
+        drone.piloting.pilot(PilotingCommand())
+        drone.piloting.hover()
+        drone.silence([task])
+        with pytest.raises(CommandRejected, match="replaced by a newer command"):
+            drone._commander.halt(ardrone3.CancelMoveTo())
+
+    task = asyncio.get_running_loop().create_task(replaced())
+    await task
+    assert [str(error) for error in results] == ["replaced by a newer command"] * 2
+    await device.until(ardrone3.PCMD)
+    assert [m for m in device.got(ardrone3.MoveBy) if m.dX] == device.got(ardrone3.Landing) == []

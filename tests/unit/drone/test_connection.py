@@ -1,0 +1,216 @@
+"""`connect`: what a block leaves behind on the drone when it ends; and waiting for a state."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import pytest
+from support.world import loopback
+
+from anafi_mav.drone import CommandTimeout, Drone, FlyingState, LinkLost, connect
+from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
+
+HOME = (48.8789, 2.3677, 35.0)
+
+
+def spec(skycontroller: int | None = None) -> DroneSpec:
+    return DroneSpec(
+        address="127.0.0.1",
+        home=HOME,
+        discovery_port=0,
+        handshake_port=0,
+        c2d_port=0,
+        http_port=None,
+        rtsp_port=None,
+        skycontroller=skycontroller,
+    )
+
+
+@pytest.fixture
+async def simulator() -> AsyncIterator[Simulator]:
+    async with Simulator([spec()], speed=4.0, seed=1) as simulator:
+        yield simulator
+
+
+@pytest.fixture
+def real(simulator: Simulator) -> SimulatedDrone:
+    return simulator.drones[0]
+
+
+def commands(real: SimulatedDrone, *names: str) -> list[str]:
+    """Which of these commands the drone received, in their order."""
+    received = [entry.name.rpartition(".")[2] for entry in real.log if entry.kind == "command"]
+    return [name for name in received if name in names]
+
+
+def sources(real: SimulatedDrone) -> list[str]:
+    """Whose sticks flew the drone behind a Skycontroller, one after the other."""
+    return [entry.args["source"] for entry in real.log if entry.name == "piloting source"]
+
+
+async def lift(drone: Drone) -> None:
+    await drone.piloting.take_off()
+    await drone.wait_for(FlyingState.HOVERING)
+
+
+async def test_block_on_the_ground_commands_nothing(real: SimulatedDrone) -> None:
+    async with connect("127.0.0.1", discovery_port=real.discovery_port, name="alpha") as drone:
+        assert (drone.connected, drone.name) == (True, "alpha")
+    assert not drone.connected
+    assert commands(real, "PCMD", "Landing", "TakeOff", "CancelMoveTo", "moveBy") == []
+
+
+async def test_block_that_ends_during_a_move_stops_the_move(real: SimulatedDrone) -> None:
+    async with connect("127.0.0.1", discovery_port=real.discovery_port) as drone:
+        await lift(drone)
+        await drone.piloting.move_to(HOME[0] + 0.001, HOME[1], 20.0)
+        began = asyncio.get_running_loop().time()
+    assert asyncio.get_running_loop().time() - began >= 2.0  # the sticks are centred for two seconds
+    assert commands(real, "CancelMoveTo") == ["CancelMoveTo"]
+    assert real.flying_state == FlyingState.HOVERING
+
+
+async def test_exception_in_the_block_stops_the_move_and_is_raised(real: SimulatedDrone) -> None:
+    async def fly() -> None:
+        async with connect("127.0.0.1", discovery_port=real.discovery_port) as drone:
+            await lift(drone)
+            await drone.piloting.move_to(HOME[0] + 0.001, HOME[1], 20.0)
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        await fly()
+    assert commands(real, "CancelMoveTo") == ["CancelMoveTo"]
+
+
+async def test_cancelled_block_stops_the_move(real: SimulatedDrone) -> None:
+    """Ctrl-C cancels the main task."""
+    moving = asyncio.Event()
+
+    async def fly() -> None:
+        async with connect("127.0.0.1", discovery_port=real.discovery_port) as drone:
+            await lift(drone)
+            await drone.piloting.move_to(HOME[0] + 0.001, HOME[1], 20.0)
+            moving.set()
+            await asyncio.Event().wait()
+
+    task = asyncio.ensure_future(fly())
+    await moving.wait()
+    task.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await task
+    assert commands(real, "CancelMoveTo") == ["CancelMoveTo"]
+
+
+async def test_flight_plan_is_paused_when_the_block_ends() -> None:
+    address, plan = loopback(), Path(__file__).parents[3] / "missions" / "delivery.v1.mavlink"
+    spec = DroneSpec(address=address, home=HOME, http_port=8080, rtsp_port=None)
+    async with Simulator([spec], speed=4.0, seed=1) as simulator:
+        async with connect(address, http_port=8080) as drone:
+            await drone.flight_plan.start(await drone.flight_plan.upload(plan.read_bytes()))
+            await drone.wait_for(FlyingState.FLYING)
+        assert commands(simulator.drones[0], "Pause", "Stop") == ["Pause"]
+
+
+async def test_landing_continues_after_the_block(real: SimulatedDrone) -> None:
+    async with connect("127.0.0.1", discovery_port=real.discovery_port) as drone:
+        await lift(drone)
+        await drone.piloting.land()
+        sticks = len(commands(real, "PCMD"))
+    assert len(commands(real, "PCMD")) == sticks
+    await real.wait_log(lambda entry: entry.kind == "state" and entry.args.get("to") == "landed", 20.0)
+
+
+async def test_return_home_continues_after_the_block(real: SimulatedDrone) -> None:
+    async with connect("127.0.0.1", discovery_port=real.discovery_port) as drone:
+        await lift(drone)
+        move = await drone.piloting.move_to(HOME[0] + 0.0005, HOME[1], 10.0)
+        await move.result()
+        await drone.piloting.return_home()
+        await drone.wait_until(lambda: drone.home.state.returning, "return home")
+    assert commands(real, "Abort", "abort") == []
+
+
+async def test_block_that_ends_while_motors_ramp_lands(real: SimulatedDrone) -> None:
+    async with connect("127.0.0.1", discovery_port=real.discovery_port) as drone:
+        taking_off = asyncio.ensure_future(drone.piloting.take_off())
+        await drone.wait_for(FlyingState.MOTOR_RAMPING)
+        taking_off.cancel()
+    assert "Landing" in commands(real, "Landing")
+    assert real.flying_state in (FlyingState.LANDED, FlyingState.LANDING)
+
+
+async def test_block_that_ends_while_a_hand_launch_waits_stops_the_motors(real: SimulatedDrone) -> None:
+    async with connect("127.0.0.1", discovery_port=real.discovery_port) as drone:
+        await drone.piloting.hand_launch()
+        assert real.flying_state == FlyingState.USERTAKEOFF
+    assert real.flying_state == FlyingState.LANDED
+
+
+async def test_block_behind_a_skycontroller_leaves_the_drone_to_its_pilot() -> None:
+    async with Simulator([spec(skycontroller=3)], speed=4.0, seed=1) as simulator:
+        real = simulator.drones[0]
+        async with connect("127.0.0.1", discovery_port=real.discovery_port) as drone:
+            await lift(drone)
+            assert drone.controller.present
+        assert commands(real, "TakeOff", "PCMD", "CancelMoveTo", "Landing") == ["TakeOff"]
+        assert sources(real) == []
+
+
+async def test_move_behind_a_skycontroller_is_stopped_and_the_sticks_return_to_the_pilot() -> None:
+    async with Simulator([spec(skycontroller=3)], speed=4.0, seed=1) as simulator:
+        real = simulator.drones[0]
+        async with connect("127.0.0.1", discovery_port=real.discovery_port) as drone:
+            await lift(drone)
+            await drone.piloting.move_to(HOME[0] + 0.001, HOME[1], 20.0)
+        assert commands(real, "CancelMoveTo") == ["CancelMoveTo"]
+        assert sources(real) == ["CONTROLLER", "SKY_CONTROLLER"]
+
+
+async def test_block_behind_a_skycontroller_4_ends_without_an_error_of_the_event_loop() -> None:
+    """The web server is reached through a proxy of the mux, whose open connections end with the block."""
+    problems: list[object] = []
+    asyncio.get_running_loop().set_exception_handler(lambda loop, context: problems.append(context))
+    address = loopback()
+    behind = DroneSpec(address=address, home=HOME, http_port=8080, rtsp_port=None, skycontroller=4)
+    async with Simulator([behind], speed=4.0, seed=1):
+        async with connect(address, http_port=8080) as drone:
+            assert await drone.media.list() == ()
+        await asyncio.sleep(0.0)
+    assert problems == []
+
+
+async def test_lost_link_ends_the_block_without_another_error(simulator: Simulator, real: SimulatedDrone) -> None:
+    async with connect("127.0.0.1", discovery_port=real.discovery_port) as drone:
+        await lift(drone)
+        await simulator.close()
+        with pytest.raises(LinkLost):
+            await drone.wait_for(FlyingState.LANDED)
+
+
+async def test_connect_without_a_drone_raises_link_lost(real: SimulatedDrone) -> None:
+    with pytest.raises(LinkLost):
+        async with connect("127.0.0.1", discovery_port=1):
+            pytest.fail("nothing answers there")
+
+
+async def test_wait_that_is_not_met_names_the_state_and_the_time(real: SimulatedDrone) -> None:
+    async with connect("127.0.0.1", discovery_port=real.discovery_port) as drone:
+        await drone.wait_for(FlyingState.LANDED, timeout=0.0)  # it is in that state
+        with pytest.raises(CommandTimeout, match=r"the state hovering or flying within 0\.5 s"):
+            await drone.wait_for(FlyingState.HOVERING, FlyingState.FLYING, timeout=0.5)
+
+
+async def test_condition_that_raises_ends_the_wait_with_its_error(real: SimulatedDrone) -> None:
+    async with connect("127.0.0.1", discovery_port=real.discovery_port) as drone:
+        answers = [False]
+        with pytest.raises(IndexError):  # from the second look on
+            await drone.wait_until(answers.pop, "anything", 10.0)
+
+
+async def test_wait_after_the_link_is_lost_raises(real: SimulatedDrone) -> None:
+    async with connect("127.0.0.1", discovery_port=real.discovery_port) as drone:
+        pass
+    with pytest.raises(LinkLost):
+        await drone.wait_for(FlyingState.LANDED)

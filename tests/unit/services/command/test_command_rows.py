@@ -1,0 +1,210 @@
+"""Each MAV_CMD is one row: what the rows of a system say, and what is refused when a system is made."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import pytest
+
+from anafi_mav.clock import SystemClock
+from anafi_mav.drone import Drone
+from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.node import Node
+from anafi_mav.services import commands, system
+from anafi_mav.services.command_targets import height
+from anafi_mav.services.commands import Action, Altitude, Command, Definition, Effect, Progress, effect_of_mode
+from anafi_mav.services.flavours import ARDUPILOT, PX4, STANDARD, Flavour
+from anafi_mav.services.service import Service
+from anafi_mav.services.system import System
+from anafi_mav.vehicle.base.modes import FlightMode
+
+NAN = math.nan
+
+BY_PARAMETER = "by its parameters"
+
+ROWS: dict[str, tuple[bool, Altitude, object, Progress]] = {
+    "COMPONENT_ARM_DISARM": (False, Altitude.UNUSED, BY_PARAMETER, Progress.PROMPT),
+    "CONDITION_YAW": (False, Altitude.UNUSED, Effect.CHANGE, Progress.PROMPT),
+    "DO_ACCEPT_MAG_CAL": (False, Altitude.UNUSED, Effect.CHANGE, Progress.PROMPT),
+    "DO_CANCEL_MAG_CAL": (False, Altitude.UNUSED, Effect.CHANGE, Progress.PROMPT),
+    "DO_CHANGE_ALTITUDE": (False, Altitude.UNUSED, Effect.CHANGE, Progress.PROMPT),
+    "DO_CHANGE_SPEED": (False, Altitude.UNUSED, Effect.CHANGE, Progress.PROMPT),
+    "DO_FENCE_ENABLE": (False, Altitude.UNUSED, Effect.CHANGE, Progress.PROMPT),
+    "DO_FLIGHTTERMINATION": (False, Altitude.UNUSED, Effect.STOP, Progress.PROMPT),
+    "DO_ORBIT": (True, Altitude.AMSL, Effect.CHANGE, Progress.PROMPT),
+    "DO_PAUSE_CONTINUE": (False, Altitude.UNUSED, BY_PARAMETER, Progress.PROMPT),
+    "DO_REPOSITION": (True, Altitude.BY_FRAME, BY_PARAMETER, Progress.EARLY),
+    "DO_SET_HOME": (True, Altitude.AMSL, Effect.CHANGE, Progress.PROMPT),
+    "DO_SET_MISSION_CURRENT": (False, Altitude.UNUSED, Effect.CHANGE, Progress.PROMPT),
+    "DO_SET_MODE": (False, Altitude.UNUSED, effect_of_mode, Progress.LATE),
+    "DO_SET_ROI": (True, Altitude.BY_FRAME, Effect.CHANGE, Progress.PROMPT),
+    "DO_SET_ROI_LOCATION": (True, Altitude.AMSL, Effect.CHANGE, Progress.PROMPT),
+    "DO_SET_ROI_NONE": (False, Altitude.UNUSED, Effect.STOP, Progress.PROMPT),
+    "DO_SET_STANDARD_MODE": (False, Altitude.UNUSED, effect_of_mode, Progress.PROMPT),
+    "DO_START_MAG_CAL": (False, Altitude.UNUSED, Effect.CHANGE, Progress.PROMPT),
+    "GIMBAL_REQUEST_AXIS_CALIBRATION": (False, Altitude.UNUSED, Effect.CHANGE, Progress.PROMPT),
+    "MISSION_START": (False, Altitude.UNUSED, effect_of_mode, Progress.PROMPT),
+    "NAV_LAND": (True, Altitude.UNUSED, Effect.LAND, Progress.PROMPT),
+    "NAV_RETURN_TO_LAUNCH": (False, Altitude.UNUSED, Effect.RETURN, Progress.PROMPT),
+    "NAV_TAKEOFF": (True, Altitude.BY_FRAME, Effect.IRREVOCABLE, Progress.PROMPT),
+    "PREFLIGHT_CALIBRATION": (False, Altitude.UNUSED, Effect.CHANGE, Progress.FINAL_ONLY),
+    "PREFLIGHT_REBOOT_SHUTDOWN": (False, Altitude.UNUSED, Effect.IRREVOCABLE, Progress.FINAL_ONLY),
+}
+"""What a system carries out: location, height, effect, progress. The other MAV_CMD are queries or UNSUPPORTED."""
+
+
+async def make_system() -> System:
+    """A system of which no drone is connected and no endpoint open."""
+    node = Node(clock=SystemClock())
+    return System(node, Drone("127.0.0.1"), 1, SystemClock(), 0.0, allow_kill=False)
+
+
+@pytest.fixture
+def rows() -> Mapping[str, Action]:
+    made = asyncio.run(make_system())
+    found = {id: action for service in made.services for id, action in service.actions().items()}
+    return {dialect.enums["MAV_CMD"][id].name.removeprefix("MAV_CMD_"): action for id, action in found.items()}
+
+
+def test_rows_of_a_system_say_what_each_command_is(rows: Mapping[str, Action]) -> None:
+    said = {
+        name: (
+            row.location,
+            row.altitude,
+            row.effect if isinstance(row.effect, Effect) or row.effect is effect_of_mode else BY_PARAMETER,
+            row.progress,
+        )
+        for name, row in rows.items()
+    }
+    assert said == ROWS
+
+
+@pytest.mark.parametrize(
+    ("name", "params", "place", "flavour", "effect"),
+    [
+        ("COMPONENT_ARM_DISARM", (0.0, NAN, NAN, NAN), (NAN, NAN, NAN), PX4, Effect.STOP),
+        ("COMPONENT_ARM_DISARM", (1.0, NAN, NAN, NAN), (NAN, NAN, NAN), PX4, Effect.CHANGE),
+        ("DO_PAUSE_CONTINUE", (0.0, NAN, NAN, NAN), (NAN, NAN, NAN), PX4, Effect.HOLD),
+        ("DO_PAUSE_CONTINUE", (1.0, NAN, NAN, NAN), (NAN, NAN, NAN), PX4, Effect.CHANGE),
+        ("DO_REPOSITION", (-1.0, 1.0, NAN, NAN), (NAN, NAN, NAN), PX4, Effect.HOLD),
+        ("DO_REPOSITION", (-1.0, 1.0, NAN, 0.0), (NAN, NAN, NAN), PX4, Effect.CHANGE),
+        ("DO_REPOSITION", (-1.0, 1.0, NAN, 0.0), (NAN, NAN, NAN), ARDUPILOT, Effect.HOLD),
+        ("DO_REPOSITION", (-1.0, 1.0, NAN, NAN), (48.0, 2.0, NAN), PX4, Effect.CHANGE),
+        ("DO_SET_MODE", (1.0, 4.0, 3.0, NAN), (NAN, NAN, NAN), PX4, Effect.HOLD),
+        ("DO_SET_MODE", (1.0, 4.0, NAN, NAN), (NAN, NAN, NAN), ARDUPILOT, Effect.STOP),
+        ("DO_SET_MODE", (1.0, 4.0, 6.0, NAN), (NAN, NAN, NAN), PX4, Effect.LAND),
+        ("DO_SET_MODE", (1.0, 4.0, 5.0, NAN), (NAN, NAN, NAN), PX4, Effect.RETURN),
+        ("DO_SET_MODE", (1.0, 4.0, 2.0, NAN), (NAN, NAN, NAN), PX4, Effect.IRREVOCABLE),
+        ("DO_SET_MODE", (1.0, 6.0, 0.0, NAN), (NAN, NAN, NAN), PX4, Effect.LAPSING),
+        ("DO_SET_MODE", (1.0, 99.0, 0.0, NAN), (NAN, NAN, NAN), PX4, Effect.CHANGE),
+        ("DO_SET_STANDARD_MODE", (6.0, NAN, NAN, NAN), (NAN, NAN, NAN), STANDARD, Effect.LAPSING),
+        ("MISSION_START", (0.0, 0.0, NAN, NAN), (NAN, NAN, NAN), PX4, Effect.LAPSING),
+    ],
+)
+def test_effect_depends_on_the_parameters(
+    rows: Mapping[str, Action],
+    name: str,
+    params: tuple[float, float, float, float],
+    place: tuple[float, float, float],
+    flavour: Flavour,
+    effect: Effect,
+) -> None:
+    assert Command(0, rows[name], params, *place, None, flavour=flavour).effect is effect
+
+
+def test_every_mode_has_an_effect() -> None:
+    assert set(commands.EFFECT_OF_MODE) == set(FlightMode)
+
+
+@pytest.mark.parametrize(
+    ("effect", "stops", "revocable"),
+    [
+        (Effect.CHANGE, False, True),
+        (Effect.STOP, True, False),
+        (Effect.HOLD, True, False),
+        (Effect.LAND, True, False),
+        (Effect.RETURN, False, False),
+        (Effect.LAPSING, False, True),
+        (Effect.IRREVOCABLE, False, False),
+    ],
+)
+def test_effect_says_what_is_repeated_and_what_is_cancelled(effect: Effect, stops: bool, revocable: bool) -> None:
+    assert (effect.stops, effect.is_revocable) == (stops, revocable)
+
+
+@pytest.mark.parametrize(
+    ("flavour", "progress"), [(PX4, Progress.FINAL_ONLY), (STANDARD, Progress.FINAL_ONLY), (ARDUPILOT, None)]
+)
+def test_progress_of_a_restart_is_not_sent_to_ardupilot_clients(
+    rows: Mapping[str, Action], flavour: Flavour, progress: Progress | None
+) -> None:
+    row = rows["PREFLIGHT_REBOOT_SHUTDOWN"]
+    assert Command(0, row, (1.0, NAN, NAN, NAN), NAN, NAN, NAN, None, flavour=flavour).progress is progress
+
+
+async def _nothing(command: Command) -> None: ...
+
+
+PLAIN = Action(_nothing, location=False, altitude=Altitude.UNUSED, effect=Effect.CHANGE)
+
+
+class _Refused(Service):
+    """A service whose rows cannot be registered."""
+
+    rows: Mapping[int, Action]
+    asked: tuple[int, ...] = ()
+
+    def actions(self) -> Mapping[int, Action]:
+        return self.rows
+
+    def queries(self) -> Any:
+        return dict.fromkeys(self.asked, lambda inbound, command: 0)
+
+
+@pytest.mark.parametrize(
+    ("id", "row", "reason"),
+    [
+        (dialect.MAV_CMD_NAV_LOITER_UNLIM, PLAIN, "MAV_CMD 17: MAVLink says True of its location, the row False"),
+        (
+            dialect.MAV_CMD_DO_SET_SERVO,
+            Action(_nothing, location=True, altitude=Altitude.UNUSED, effect=Effect.CHANGE),
+            "MAV_CMD 183: MAVLink says False of its location, the row True",
+        ),
+        (
+            dialect.MAV_CMD_DO_SET_SERVO,
+            Action(_nothing, location=False, altitude=Altitude.AMSL, effect=Effect.CHANGE),
+            "MAV_CMD 183: its z cannot be a height, it has no location",
+        ),
+        (
+            dialect.MAV_CMD_DO_SET_SERVO,
+            Action(_nothing, location=False, altitude=Altitude.UNUSED, effect=effect_of_mode),
+            "MAV_CMD 183: it must have both mode and `effect_of_mode`, or none of them",
+        ),
+        (dialect.MAV_CMD_DO_ORBIT, PLAIN, r"two services claim \[34\]"),
+        (dialect.MAV_CMD_REQUEST_MESSAGE, PLAIN, r"\[512\] are both queries and actions"),
+    ],
+)
+async def test_row_that_contradicts_another_or_mavlink_is_refused(
+    monkeypatch: pytest.MonkeyPatch, id: int, row: Action, reason: str
+) -> None:
+    wrong = type("Wrong", (_Refused,), {"rows": {id: row}})
+    monkeypatch.setattr(system, "SERVICES", (*system.SERVICES, wrong))
+    with pytest.raises(ValueError, match=reason):
+        await make_system()
+
+
+async def test_query_with_a_location_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    wrong = type("Wrong", (_Refused,), {"rows": {}, "asked": (dialect.MAV_CMD_NAV_LOITER_UNLIM,)})
+    monkeypatch.setattr(system, "SERVICES", (*system.SERVICES, wrong))
+    with pytest.raises(ValueError, match="MAV_CMD 17: MAVLink says True of its location"):
+        await make_system()
+
+
+def test_height_of_a_command_whose_row_has_none_raises() -> None:
+    definition = Definition(location=True, altitude=Altitude.UNUSED, effect=Effect.CHANGE)
+    vehicle: Any = None
+    with pytest.raises(ValueError, match="its row says that it has no height"):
+        height(vehicle, Command(21, definition, (NAN, NAN, NAN, NAN), 48.0, 2.0, 10.0, None))

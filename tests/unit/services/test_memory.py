@@ -1,0 +1,188 @@
+"""What outlives the gateway: written whole, read with care, never lost."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import math
+import os
+from pathlib import Path
+
+import pytest
+
+from anafi_mav import mav_enums
+from anafi_mav.services.memory import MAX_BYTES, Memory
+from anafi_mav.state_lock import state_folder
+from anafi_mav.vehicle.fence.plan_items import PlanItem, opaque_id
+
+SERIAL = "PI040443BA8K000123"
+ITEMS = (
+    PlanItem(
+        mav_enums.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, 0, (50.0, 0.0, math.nan, -1.5), 488789000, -23677000, 12.25, 1, 1
+    ),
+    PlanItem(
+        mav_enums.MAV_CMD_NAV_WAYPOINT,
+        3,
+        (math.inf, -math.inf, 1.401298464324817e-45, 3.4028234663852886e38),
+        2**31 - 1,
+        -(2**31),
+        math.nan,
+    ),
+)
+
+
+def same(one: tuple[PlanItem, ...], other: tuple[PlanItem, ...]) -> bool:
+    """Equal, with NaN equal to NaN."""
+    return repr(one) == repr(other)
+
+
+async def test_what_is_put_is_there_again(tmp_path: Path) -> None:
+    folder = tmp_path / "new" / "state"
+    memory = Memory(folder)
+    assert memory.load(SERIAL) is None
+    memory.put(1, ITEMS)
+    memory.put(2, ())
+    memory.settings["fence"] = {"action": "LAND", "floor": 2.5}
+    assert await memory.save() is None
+    assert files(folder) == [f"{SERIAL}.json"]
+    again = Memory(folder)
+    assert again.load(SERIAL) is None
+    assert set(again.plans) == {1}
+    assert same(again.plans[1], ITEMS)
+    assert opaque_id(again.plans[1]) == opaque_id(ITEMS)
+    assert again.settings == {"fence": {"action": "LAND", "floor": 2.5}}
+    # Another drone has another file.
+    other = Memory(folder)
+    assert other.load("PI000000000000002") is None
+    assert (other.plans, other.settings) == ({}, {})
+
+
+async def test_the_newest_of_many_is_what_is_there(tmp_path: Path) -> None:
+    memory = Memory(tmp_path)
+    memory.load(SERIAL)
+    saves = []
+    for number in range(50):
+        memory.settings["number"] = number
+        saves.append(asyncio.ensure_future(memory.save()))
+        await asyncio.sleep(0)
+    assert await asyncio.gather(*saves) == [None] * 50
+    again = Memory(tmp_path)
+    again.load(SERIAL)
+    assert again.settings["number"] == 49
+    assert len(files(tmp_path)) == 1  # nothing is left of the writing
+
+
+def files(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+def plan(*item: object) -> bytes:
+    """A file with one list of one item."""
+    return json.dumps({**valid(), "plans": {"1": [item]}}).encode()
+
+
+def valid() -> dict[str, object]:
+    return {"version": 1, "serial": SERIAL, "plans": {"1": [[5003, 0, [1.0, None, "inf", 0.0], 1, 2, 3.0, 1, 0]]}}
+
+
+BAD = {
+    "not JSON": b"{]",
+    "empty": b"",
+    "binary": bytes(range(256)),
+    "a list": b"[]",
+    "no version": json.dumps({**valid(), "version": None}).encode(),
+    "another version": json.dumps({**valid(), "version": 2}).encode(),
+    "another drone": json.dumps({**valid(), "serial": "X"}).encode(),
+    "an unknown key": json.dumps({**valid(), "more": 1}).encode(),
+    "an item that is too short": plan(5003, 0),
+    "a number out of range": plan(99999, 0, [0, 0, 0, 0], 1, 2, 3, 1, 0),
+    "a place out of range": plan(16, 0, [0, 0, 0, 0], 2**31, 2, 3, 1, 0),
+    "a float out of range": plan(16, 0, [1e300, 0, 0, 0], 1, 2, 3, 1, 0),
+    "too many items": json.dumps({**valid(), "plans": {"1": [[16, 0, [0, 0, 0, 0], 1, 2, 3, 1, 0]] * 5001}}).encode(),
+    "deep": b'{"settings":' + b"[" * 100_000,
+    "large": b" " * (MAX_BYTES + 1),
+}
+
+
+@pytest.mark.parametrize("data", BAD.values(), ids=BAD)
+async def test_a_bad_file_is_one_line_and_is_kept(tmp_path: Path, data: bytes) -> None:
+    file = tmp_path / f"{SERIAL}.json"
+    for number in (1, 2):
+        file.write_bytes(data)
+        memory = Memory(tmp_path)
+        line = memory.load(SERIAL)
+        assert line is not None
+        assert line.startswith(f"{file}: ")
+        assert line.endswith(f"put aside as {SERIAL}.unreadable-{number}")
+        assert "\n" not in line
+        assert (memory.plans, memory.settings) == ({}, {})
+        memory.put(1, ITEMS)
+        assert await memory.save() is None
+        assert (tmp_path / f"{SERIAL}.unreadable-{number}").read_bytes() == data
+    assert Memory(tmp_path).load(SERIAL) is None
+
+
+def test_the_good_one_is_good(tmp_path: Path) -> None:
+    """So that each of the bad ones is bad for what its name says."""
+    (tmp_path / f"{SERIAL}.json").write_text(json.dumps(valid()))
+    memory = Memory(tmp_path)
+    assert memory.load(SERIAL) is None
+    assert same(
+        memory.plans[1],
+        (PlanItem(mav_enums.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, 0, (1.0, math.nan, math.inf, 0.0), 1, 2, 3.0),),
+    )
+
+
+async def test_what_cannot_be_read_now_is_not_replaced(tmp_path: Path) -> None:
+    """A folder in its place stands for a file that this user may not read: the tests may run as root."""
+    (tmp_path / f"{SERIAL}.json").mkdir()
+    memory = Memory(tmp_path)
+    line = memory.load(SERIAL)
+    assert line is not None
+    assert "new ones are not kept" in line
+    memory.put(1, ITEMS)
+    assert await memory.save() == memory.problem == line  # whoever uploads is notified each time
+    assert memory.load(SERIAL) is None
+    assert memory.plans[1] == ITEMS  # and has it until the gateway ends, also after a loss of the link
+    assert (tmp_path / f"{SERIAL}.json").is_dir()
+
+
+async def test_a_folder_that_cannot_be_made(tmp_path: Path) -> None:
+    memory = Memory(tmp_path / "state")
+    assert memory.load(SERIAL) is None
+    (tmp_path / "state").write_text("")  # somebody else's file
+    memory.put(1, ITEMS)
+    line = await memory.save()
+    assert line is not None
+    assert line.endswith("what was changed is lost when the gateway ends")
+    assert memory.plans[1] == ITEMS  # it holds all the same
+
+
+@pytest.mark.parametrize("serial", ["", "../../etc/passwd", "a/b", "x" * 65, "a\nb", ".", "é"])
+async def test_a_serial_number_that_is_no_file_name(tmp_path: Path, serial: str) -> None:
+    memory = Memory(tmp_path)
+    assert memory.load(serial) is None
+    memory.put(1, ITEMS)
+    assert await memory.save() is None
+    assert files(tmp_path) == []
+
+
+async def test_without_a_folder(tmp_path: Path) -> None:
+    memory = Memory(None)
+    assert memory.load(SERIAL) is None
+    memory.put(1, ITEMS)
+    assert await memory.save() is None
+
+
+def test_where_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setenv("XDG_STATE_HOME", "/var/xdg")
+    assert state_folder(None) == Path("/var/xdg/anafi-mav")
+    assert state_folder("~/here") == tmp_path / "here"
+    assert state_folder("/there") == Path("/there")
+    for nothing in ("", "relative/path"):  # XDG: a relative path is to be ignored
+        monkeypatch.setenv("XDG_STATE_HOME", nothing)
+        assert state_folder(None) == tmp_path / ".local" / "state" / "anafi-mav"
+    monkeypatch.delenv("XDG_STATE_HOME")
+    assert state_folder(None) == tmp_path / ".local" / "state" / "anafi-mav"
+    assert os.environ.get("XDG_STATE_HOME") is None

@@ -1,0 +1,61 @@
+"""The table of event handlers: which are called for an event of the drone, and in which order."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from anafi_mav.clock import SystemClock
+from anafi_mav.drone import Drone, events
+from anafi_mav.drone.events import Message
+from anafi_mav.mavlink.node import Node
+from anafi_mav.services.system import System
+from anafi_mav.vehicle.base.subscriptions import in_order
+
+
+def test_handlers_of_several_tables_are_called_in_the_order_of_the_tables() -> None:
+    called: list[str] = []
+
+    def handler(name: str) -> Callable[[object, float], None]:
+        return lambda message, now: called.append(f"{name} at {now}")
+
+    joined = in_order(
+        [
+            {events.SpeedChanged: handler("vehicle")},
+            {},
+            {events.AttitudeChanged: handler("attitude"), events.SpeedChanged: handler("first")},
+            {events.SpeedChanged: handler("second")},
+        ]
+    )
+    assert joined.keys() == {events.SpeedChanged, events.AttitudeChanged}
+    for call in joined[events.SpeedChanged]:
+        call(None, 2.5)
+    assert called == ["vehicle at 2.5", "first at 2.5", "second at 2.5"]
+
+
+@pytest.mark.parametrize(
+    ("kind", "owners"),
+    [
+        (
+            events.FlyingStateChanged,
+            "Vehicle MessageService GuidedService EventService FenceService RollSignService OffboardFlight "
+            "WarningService TakeoffPointService",
+        ),
+        (
+            events.SpeedChanged,
+            "MessageService OrbitService FenceService RollSignService OffboardFlight FollowFlight HighLatencyService",
+        ),
+        (events.MavlinkFilePlayingStateChanged, "MessageService MissionFlight System"),
+        (events.MissionItemExecuted, "MissionFlight"),
+        (events.SensorsStatesListChanged, "EventService WarningService System"),
+    ],
+    ids=lambda value: value.__name__ if isinstance(value, type) else "",
+)
+async def test_an_event_reaches_the_vehicle_then_the_services_then_the_messages_on_change(
+    kind: type[Message], owners: str
+) -> None:
+    clock = SystemClock()
+    system = System(Node(clock=clock), Drone("127.0.42.1"), 1, clock, 0.0, allow_kill=False)
+    joined = in_order(system.subscriptions())
+    assert [call.__qualname__.partition(".")[0] for call in joined.get(kind, ())] == owners.split()

@@ -1,0 +1,48 @@
+"""What of a mission is flown and what follows it, by hand."""
+
+from __future__ import annotations
+
+from anafi_mav.plans.rules.legs import Leg, Settings, Step
+from anafi_mav.plans.translation.translate import Cursor
+from anafi_mav.vehicle.mission.course import Course
+
+FILE = Leg(b"QGC WPL 120\n", (0, 1), ((0,), (1,)))
+ZOOM = Step(2, (2,))
+BEHIND = Leg(b"QGC WPL 120\n", (4, 5), ((3, 4), (5,)))
+REST = Cursor(6, ((7, 40),), Settings())
+
+
+def test_part_after_part() -> None:
+    course = Course([FILE, ZOOM, BEHIND], REST)
+    seen = [(course.over, course.stepped, course.following)]
+    said = []
+    for _ in range(3):
+        said.append(course.part_over())
+        seen.append((course.over, course.stepped, course.following))
+    assert said == [2, 4, 6]
+    assert seen == [(False, True, 2), (False, True, 4), (False, True, 6), (False, True, 6)]
+
+
+def test_the_end() -> None:
+    course = Course([FILE])
+    assert (course.over, course.stepped, course.following) == (False, False, None)
+    assert course.part_over() is None
+    assert (course.over, course.stepped, course.following) == (True, False, None)
+    assert Course([ZOOM]).stepped
+
+
+def test_what_the_drone_does_not_have_waits_for_another_word() -> None:
+    course = Course([FILE, ZOOM], REST)
+    course.end_with_this_part()
+    assert (course.parts, course.following, course.later) == ([FILE], 2, 2)
+    course.end_with_this_part()  # the link is lost once more
+    assert course.later == 2
+    assert course.part_over() is None
+    assert (course.over, course.later) == (True, 2)
+
+
+def test_the_rest_alone_waits_too() -> None:
+    """The link is lost while the gateway lays it out."""
+    course = Course([], REST)
+    course.end_with_this_part()
+    assert (course.over, course.later) == (True, 6)

@@ -1,0 +1,93 @@
+"""Which file a mission is flown from, and what its lines stand for: uploaded to a simulated Ai."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+
+import pytest
+from support.simulated import connected
+
+from anafi_mav import mav_enums
+from anafi_mav.plans.plan import Item
+from anafi_mav.plans.translation.translate import Leg, Start, translate
+from anafi_mav.vehicle.mission.files import FilesOnDrone
+from anafi_mav.vehicle.mission.progress import Progress
+
+
+def way(latitude: float, command: int = 16) -> Item:
+    return Item(command, 3, (0.0, None, None, None, latitude, 2.0, 20.0))
+
+
+UP, A, B, C, D = way(48.0, 22), way(48.0), way(48.001), way(48.002), way(48.003)
+X = Item(mav_enums.MAV_CMD_NAV_WAYPOINT, 3, (0.0, None, None, None, 48.0005, 2.001, 20.0))
+WHOLE = (UP, A, B, C, D)
+GROUND = Start(48.0, 2.0, 0.0, flying=False, takeoff_amsl=0.0)
+AIR = Start(48.0002, 2.0, 20.0, flying=True, takeoff_amsl=0.0)
+
+
+def leg(mission: tuple[Item, ...], start: Start, first: int = 0) -> Leg:
+    head = translate(mission, 2, start, first).parts[0]
+    assert isinstance(head, Leg)
+    return head
+
+
+@pytest.fixture
+async def files() -> AsyncIterator[FilesOnDrone]:
+    async with connected("ai") as pair:
+        yield FilesOnDrone(pair.drone.flight_plan)
+
+
+def told(mission: tuple[Item, ...], flown: Leg, after: int) -> list[tuple[int, ...]]:
+    """What is done with the lines that the drone flies."""
+    progress = Progress()
+    progress.take(mission)
+    progress.begin(flown, after)
+    done = [progress.executed(line) for line in range(after + 1, len(flown.origins))]
+    assert progress.leg_done
+    return done
+
+
+async def test_the_same_mission_goes_on_in_the_middle_of_its_file(files: FilesOnDrone) -> None:
+    whole, name, _ = await files.beginning_with(leg(WHOLE, GROUND), WHOLE)
+    flown, again, line = await files.beginning_with(leg(WHOLE, AIR, 3), WHOLE)
+    assert flown is whole
+    assert again == name
+    assert told(WHOLE, flown, line) == [(3,), (4,)]
+
+
+@pytest.mark.parametrize(
+    ("mission", "first", "done"),
+    [((UP, A, X, B, C, D), 3, [(3,), (4,), (5,)]), ((B, C, D), 0, [(0,), (1,), (2,)])],
+    ids=["an item more", "two items fewer"],
+)
+async def test_an_edited_mission_has_the_new_numbers(
+    files: FilesOnDrone, mission: tuple[Item, ...], first: int, done: list[tuple[int, ...]]
+) -> None:
+    """The lines that are left are word for word those of the old file, but they stand for other items."""
+    _, name, _ = await files.beginning_with(leg(WHOLE, GROUND), WHOLE)
+    flown, again, line = await files.beginning_with(leg(mission, AIR, first), mission)
+    assert again != name
+    assert line == -1
+    assert told(mission, flown, line) == done
+
+
+async def test_what_was_flown_before_another_mission_is_not_of_this_one(files: FilesOnDrone) -> None:
+    """Also where the rest is the same and has the same numbers: the file's first lines are the old mission's."""
+    mission = (UP, A, X, C, D)
+    await files.beginning_with(leg(WHOLE, GROUND), WHOLE)
+    rest = leg(mission, AIR, 3)
+    assert rest == leg(WHOLE, AIR, 3)
+    assert (await files.beginning_with(rest, mission))[2] == -1
+    # And the old one again is in the middle of nothing: the newest file is the other's.
+    assert (await files.beginning_with(leg(WHOLE, AIR, 3), WHOLE))[2] == -1
+
+
+async def test_the_same_text_of_other_items_of_one_mission_is_not_gone_on_with(files: FilesOnDrone) -> None:
+    """A place that a mission has twice: lines alone do not say which item they are."""
+    mission = (UP, A, B, C, B, C)
+    long, short = leg(mission[:4], GROUND), leg(mission, AIR, 4)
+    assert long.content.splitlines()[-1].split(b"\t")[1:] == short.content.splitlines()[-1].split(b"\t")[1:]
+    await files.beginning_with(long, mission)
+    flown, _, line = await files.beginning_with(short, mission)
+    assert line == -1
+    assert told(mission, flown, line) == [(4,), (5,)]

@@ -1,0 +1,346 @@
+"""The I/O-free cores of offboard: what setpoint messages ask for, whose setpoints fly, and when they no longer do."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+from anafi_mav.mavlink import dialect
+from anafi_mav.services.setpoint.setpoint_messages import attitude_setpoint, global_setpoint, local_setpoint
+from anafi_mav.vehicle.base.silence import SILENCE
+from anafi_mav.vehicle.base.velocity_loop import turn_towards
+from anafi_mav.vehicle.offboard.setpoints import AttitudeSetpoint, MotionSetpoint, Origin, Setpoint
+from anafi_mav.vehicle.offboard.stream import (
+    MAX_PILOTS,
+    STRAGGLING,
+    TOGETHER,
+    TRANSITIONS,
+    Event,
+    OffboardStream,
+    State,
+    lasts,
+)
+
+NAN = math.nan
+
+
+def test_every_offboard_state_knows_its_events() -> None:
+    impossible = {
+        (State.IDLE, Event.ENGAGE),
+        (State.IDLE, Event.ENGAGE_SINGLE),
+        (State.IDLE, Event.SILENCE),
+        (State.ENGAGED, Event.ENGAGE_SINGLE),
+        (State.SINGLE, Event.SILENCE),
+    }
+    for state in State:
+        for event in Event:
+            assert ((state, event) in impossible) is (event not in TRANSITIONS[state])
+
+
+def attitude_target(mask: int, q: tuple[float, ...], thrust: float, yaw_rate: float = 0.0) -> object:
+    return dialect.MAVLink_set_attitude_target_message(0, 1, 1, mask, list(q), 0.0, 0.0, yaw_rate, thrust)
+
+
+def test_offboard_attitude() -> None:
+    # yaw 90 degrees, nothing else: q = (cos 45, 0, 0, sin 45)
+    half = math.sqrt(0.5)
+    setpoint = attitude_setpoint(attitude_target(7, (half, 0, 0, half), 0.75))
+    assert isinstance(setpoint, AttitudeSetpoint)
+    assert setpoint.yaw == pytest.approx(math.pi / 2)
+    assert setpoint.climb == pytest.approx(0.5)
+    # heading west of north by 170, target east by 90: the short way is counter-clockwise, -100 degrees
+    assert turn_towards(setpoint.yaw, math.radians(-170)) == pytest.approx(1.5 * math.radians(-100))
+
+
+@pytest.mark.parametrize(
+    ("mask", "thrust", "climb"), [(7, 0.5, 0.0), (7, 0.0, -1.0), (7, 1.0, 1.0), (7, NAN, 0.0), (7 | 64, 1.0, 0.0)]
+)
+def test_thrust_is_vertical_speed(mask: int, thrust: float, climb: float) -> None:
+    setpoint = attitude_setpoint(attitude_target(mask, (1, 0, 0, 0), thrust))
+    assert isinstance(setpoint, AttitudeSetpoint)
+    assert setpoint.climb == climb
+
+
+@pytest.mark.parametrize(
+    ("mask", "q", "reason"),
+    [
+        (128, (1, 0, 0, 0), "body rates alone"),
+        (7, (0, 0, 0, 0), "no rotation"),
+        (7, (NAN, 0, 0, 0), "no rotation"),
+        (7, (0, 1, 0, 0), "upside down"),
+        (7, (1.2, 0, 0, 0), "length 1"),
+        (7, (1e30, 0, 1e30, 0), "length 1"),
+    ],
+)
+def test_setpoints_that_cannot_be_flown(mask: int, q: tuple[float, ...], reason: str) -> None:
+    refusal = attitude_setpoint(attitude_target(mask, q, 0.5))
+    assert isinstance(refusal, str)
+    assert reason in refusal
+
+
+@pytest.mark.parametrize("thrust", [-5.0, -0.01, 1.01, 100.0])
+def test_thrust_of_another_unit_is_not_full_thrust(thrust: float) -> None:
+    assert attitude_setpoint(attitude_target(7, (1, 0, 0, 0), thrust)) == "thrust is not between 0 and 1"
+
+
+LEVEL = AttitudeSetpoint(0, 0, 0, 0, 0)
+NOSE_DOWN = AttitudeSetpoint(0, -0.1, 0, 0, 0)
+
+
+def test_an_offboard_session_ends_with_its_setpoints() -> None:
+    stream = OffboardStream()
+    assert stream.candidate("a", 0.0) is None
+    assert stream.receive("a", LEVEL, 10.0)
+    assert stream.candidate("a", 10.4) == "a"
+    assert stream.candidate("a", 10.0 + SILENCE) is None
+    stream.engage("a")
+    assert stream.receive("a", LEVEL, 10.4)
+    assert not stream.expire(10.4 + SILENCE - 0.01)
+    assert stream.expire(10.4 + SILENCE)
+    assert stream.state is State.IDLE
+    assert stream.setpoint is None
+    assert not stream.expire(99.0)
+
+
+@pytest.mark.parametrize(
+    ("setpoint", "guided", "seconds"),
+    [
+        (MotionSetpoint(Origin.LOCAL, velocity=(1.0, 0.0, 0.0)), 1.5, 1.45),
+        (MotionSetpoint(Origin.LOCAL, yaw_rate=0.3), 3.0, 2.95),
+        (MotionSetpoint(Origin.LOCAL, velocity=(1.0, 0.0, 0.0), yaw=1.0), 0.5, 0.45),
+        (MotionSetpoint(Origin.LOCAL, velocity=(1.0, 0.0, 0.0)), None, 0.45),
+        (MotionSetpoint(Origin.LOCAL, velocity=(1.0, 0.0, 0.0), acceleration=(1.0, 0.0, 0.0)), 1.5, 0.45),
+        (MotionSetpoint(Origin.LOCAL, velocity=(1.0, 0.0, 0.0), position=(9.0, 0.0, 0.0)), 1.5, 0.45),
+        (MotionSetpoint(Origin.LOCAL, acceleration=(1.0, 0.0, 0.0)), 1.5, 0.45),
+        (LEVEL, 1.5, 0.45),
+    ],
+)
+def test_silence_that_ends_a_setpoint_is_longer_for_velocities_of_guided_alone(
+    setpoint: Setpoint, guided: float | None, seconds: float
+) -> None:
+    assert lasts(setpoint, guided) == pytest.approx(seconds)
+
+
+def test_sticks_of_a_velocity_stay_young_until_shortly_before_its_end() -> None:
+    """The layer below centres sticks of half a second: it must not before a velocity of 1.5 s is over."""
+    stream, velocity = OffboardStream(), MotionSetpoint(Origin.LOCAL, velocity=(1.0, 0.0, 0.0))
+    stream.receive("a", velocity, 10.0, 1.45)
+    stream.engage("a")
+    assert [round(stream.stick_age(10.0 + age), 2) for age in (0.0, 0.5, 1.0, 1.2, 1.45)] == [0.0, 0.0, 0.0, 0.2, 0.45]
+    assert not stream.receive("b", LEVEL, 11.4)  # the pilot's velocity still flies
+    assert not stream.expire(11.44)
+    assert stream.expire(11.45)
+
+
+def test_silence_of_a_stream_that_flies_nothing_changes_nothing() -> None:
+    stream = OffboardStream()
+    stream.receive("a", LEVEL, 0.0)
+    assert not stream.expire(5.0)
+    assert stream.state is State.IDLE
+
+
+def test_a_session_has_one_pilot_and_ends_with_him() -> None:
+    stream = OffboardStream()
+    stream.receive("a", LEVEL, 0.0)
+    stream.receive("b", NOSE_DOWN, 0.1)
+    assert stream.candidate("a", 0.2) == "a"  # who asks flies, not who sent last
+    assert stream.candidate("c", 0.2) == "b"
+    stream.engage("a")
+    assert stream.setpoint == LEVEL
+    assert not stream.receive("b", NOSE_DOWN, 0.3)
+    assert stream.setpoint == LEVEL
+    assert stream.deadline() == SILENCE
+    assert stream.expire(SILENCE)
+    assert stream.state is State.STREAMING  # b streams on, and flies nothing
+    assert stream.setpoint is None
+    assert not stream.expire(0.3 + SILENCE)
+    assert stream.state is State.IDLE
+
+
+def test_a_crowd_of_senders_is_bounded() -> None:
+    stream = OffboardStream()
+    for number in range(MAX_PILOTS):
+        assert stream.receive(number, LEVEL, 0.0)
+    assert not stream.receive("one more", LEVEL, 0.1)
+    assert stream.receive("one more", LEVEL, SILENCE)  # the others have fallen silent
+
+
+PLACE = MotionSetpoint(Origin.LOCAL, position=(1.0, 2.0, -3.0))
+
+
+def test_a_single_setpoint_ends_by_no_silence() -> None:
+    stream = OffboardStream()
+    stream.receive("a", PLACE, 0.0)
+    stream.engage_single("a", PLACE, 0.0)
+    assert stream.deadline() is None
+    assert not stream.expire(60.0)
+    assert stream.setpoint == PLACE
+    stream.disengage()
+    assert stream.setpoint is None
+    assert not stream.expire(60.0)
+    assert stream.state is State.IDLE
+
+
+def test_a_single_setpoint_may_have_waited_for_its_turn() -> None:
+    stream = OffboardStream()
+    stream.receive("a", PLACE, 0.0)
+    stream.expire(SILENCE)
+    assert stream.state is State.IDLE
+    stream.engage_single("a", PLACE, 0.0)
+    assert stream.setpoint == PLACE
+    assert stream.age(1.0) == 1.0
+
+
+def test_a_second_setpoint_makes_a_stream_of_the_first() -> None:
+    stream = OffboardStream()
+    assert not stream.follows("a", 0.0)
+    stream.receive("a", PLACE, 0.0)
+    stream.engage_single("a", PLACE, 0.0)
+    assert stream.follows("a", TOGETHER - 0.01)
+    assert not stream.follows("a", TOGETHER)
+    assert not stream.follows("b", 0.1)
+    stream.receive("a", PLACE, 0.4)
+    stream.engage("a")
+    assert stream.expire(0.4 + SILENCE)
+
+
+def test_a_position_straggles_after_the_silence_of_positions_alone() -> None:
+    stream = OffboardStream()
+    stream.receive("a", PLACE, 0.0)
+    stream.engage("a")
+    assert not stream.straggles("a", 0.1)
+    assert stream.expire(SILENCE)
+    assert stream.straggles("a", SILENCE + STRAGGLING - 0.01)
+    assert not stream.straggles("a", SILENCE + STRAGGLING)
+    assert not stream.straggles("b", SILENCE + 0.1)
+    stream.receive("b", LEVEL, 10.0)
+    stream.engage("b")
+    assert stream.expire(10.0 + SILENCE)
+    assert not stream.straggles("b", 10.0 + SILENCE)
+
+
+IGNORE_POSITION, IGNORE_VELOCITY, IGNORE_ACCELERATION = 0x007, 0x038, 0x1C0
+IGNORE_YAW, IGNORE_YAW_RATE, FORCE = 0x400, 0x800, 0x200
+
+
+def local(mask: int, frame: int = 1, **values: float) -> Any:
+    message = dialect.MAVLink_set_position_target_local_ned_message(
+        0, 1, 1, frame, mask, 1.0, 2.0, -3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 0.5, 0.25
+    )
+    for name, value in values.items():
+        setattr(message, name, value)
+    return message
+
+
+def on_earth(mask: int, frame: int = 6, **values: float) -> Any:
+    message = dialect.MAVLink_set_position_target_global_int_message(
+        0, 1, 1, frame, mask, 488789000, 23677000, 30.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 0.5, 0.25
+    )
+    for name, value in values.items():
+        setattr(message, name, value)
+    return message
+
+
+def masked(first: int, mask: int, values: tuple[float, float, float]) -> tuple[float | None, ...]:
+    """What is left of three values; the mask's bits are written out here, not computed as the code does."""
+    bits = {0: (0x001, 0x002, 0x004), 3: (0x008, 0x010, 0x020), 6: (0x040, 0x080, 0x100)}[first]
+    return tuple(None if mask & bit else value for bit, value in zip(bits, values, strict=True))
+
+
+def test_every_type_mask_says_what_it_asks_for() -> None:
+    """All 4096 of them."""
+    refused = set()
+    for mask in range(0x1000):
+        setpoint = local_setpoint(local(mask))
+        if isinstance(setpoint, str):
+            refused.add((mask & 0xDFF == 0xDFF, bool(mask & FORCE) and mask & IGNORE_ACCELERATION != 0x1C0, setpoint))
+            continue
+        assert setpoint.position == masked(0, mask, (1.0, 2.0, -3.0))
+        assert setpoint.velocity == masked(3, mask, (4.0, 5.0, 6.0))
+        assert setpoint.acceleration == masked(6, mask, (7.0, 8.0, 9.0))
+        assert setpoint.yaw == (None if mask & IGNORE_YAW else 0.5)
+        assert setpoint.yaw_rate == (None if mask & IGNORE_YAW_RATE else 0.25)
+    assert refused == {
+        (True, False, "it asks for nothing"),
+        (False, True, "forces cannot be flown, an acceleration can"),
+    }
+
+
+@pytest.mark.parametrize(
+    ("frame", "origin", "body"),
+    [
+        (1, Origin.LOCAL, False),
+        (7, Origin.VEHICLE, False),
+        (8, Origin.VEHICLE, True),
+        (9, Origin.VEHICLE, True),
+        (12, Origin.VEHICLE, True),
+    ],
+)
+def test_local_frames(frame: int, origin: Origin, body: bool) -> None:
+    setpoint = local_setpoint(local(0, frame))
+    assert isinstance(setpoint, MotionSetpoint)
+    assert (setpoint.origin, setpoint.body) == (origin, body)
+
+
+@pytest.mark.parametrize(("frame", "origin"), [(5, Origin.SEA), (6, Origin.TAKEOFF)])
+def test_global_frames(frame: int, origin: Origin) -> None:
+    setpoint = global_setpoint(on_earth(0, frame))
+    assert isinstance(setpoint, MotionSetpoint)
+    assert (setpoint.origin, setpoint.body) == (origin, False)
+    assert setpoint.position == pytest.approx((48.8789, 2.3677, 30.0))
+
+
+def test_all_other_frames_are_refused_by_name() -> None:
+    for frame in range(256):
+        if frame not in (1, 7, 8, 9, 12):
+            assert isinstance(local_setpoint(local(0, frame)), str)
+        if frame not in (5, 6):
+            assert isinstance(global_setpoint(on_earth(0, frame)), str)
+    assert "terrain" in str(global_setpoint(on_earth(0, 11)))
+    assert "terrain" in str(local_setpoint(local(0, 11)))
+
+
+@pytest.mark.parametrize("value", [NAN, math.inf, -math.inf])
+def test_a_value_that_is_no_number_is_refused_when_it_is_asked_for(value: float) -> None:
+    for name, bit in [("x", 0x001), ("vz", 0x020), ("afy", 0x080), ("yaw", IGNORE_YAW), ("yaw_rate", IGNORE_YAW_RATE)]:
+        assert local_setpoint(local(0, **{name: value})) == "not all of its values are numbers"
+        assert isinstance(local_setpoint(local(bit, **{name: value})), MotionSetpoint)
+    assert isinstance(global_setpoint(on_earth(0, alt=value)), str)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("vx", 500.0), ("vz", -21.0), ("afx", 981.0), ("yaw_rate", 30.0), ("x", 1e30)]
+)
+def test_another_unit_is_not_flown(name: str, value: float) -> None:
+    assert isinstance(local_setpoint(local(0, **{name: value})), str)
+
+
+def test_half_a_place_on_earth_is_none() -> None:
+    assert (
+        global_setpoint(on_earth(0x001)) == global_setpoint(on_earth(0x002)) == "latitude and longitude belong together"
+    )
+    height = global_setpoint(on_earth(0x003))
+    assert isinstance(height, MotionSetpoint)
+    assert height.position == (None, None, 30.0)
+
+
+@pytest.mark.parametrize(
+    ("mask", "moves"),
+    [
+        (IGNORE_VELOCITY | IGNORE_ACCELERATION | IGNORE_YAW | IGNORE_YAW_RATE, True),  # 3576 of MAVProxy's position
+        (IGNORE_VELOCITY | IGNORE_ACCELERATION | IGNORE_YAW_RATE, True),
+        (IGNORE_VELOCITY | IGNORE_ACCELERATION | IGNORE_YAW_RATE | 0x003, True),  # a height alone
+        (IGNORE_VELOCITY | IGNORE_ACCELERATION | IGNORE_YAW_RATE | 0x004, True),  # no height
+        (IGNORE_VELOCITY | IGNORE_ACCELERATION | IGNORE_YAW_RATE | 0x001, False),
+        (IGNORE_VELOCITY | IGNORE_ACCELERATION | IGNORE_YAW, False),
+        (IGNORE_ACCELERATION | IGNORE_YAW_RATE, False),
+        (IGNORE_VELOCITY | IGNORE_YAW_RATE, False),
+        (IGNORE_POSITION | IGNORE_ACCELERATION | IGNORE_YAW_RATE, False),  # 4039 without yaw: MAVProxy's velocity
+    ],
+)
+def test_what_the_drone_flies_by_itself(mask: int, moves: bool) -> None:
+    setpoint = local_setpoint(local(mask))
+    assert isinstance(setpoint, MotionSetpoint)
+    assert setpoint.moves is moves

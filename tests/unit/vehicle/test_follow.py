@@ -1,0 +1,148 @@
+"""Where a drone that follows belongs. Axes: north, east; angles in degrees here."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+from anafi_mav.mavlink import dialect
+from anafi_mav.services.setpoint.target_messages import sighting
+from anafi_mav.vehicle.follow import FORESIGHT, TRANSITIONS, Event, Follower, FollowSettings, Sighting, State
+
+NAN = math.nan
+
+
+def test_every_state_of_following_knows_its_events() -> None:
+    for state in State:
+        for event in Event:
+            impossible = (state, event) == (State.OFF, Event.SILENCE)
+            assert impossible is (event not in TRANSITIONS[state])
+
+
+def following(angle: float = 180.0, *, speed: float = 2.0, seconds: int = 30, **settings: Any) -> Follower:
+    """A target that has walked north for a while, and is at (2 * seconds, 0) at time `seconds`."""
+    follower = Follower(FollowSettings(angle=angle, responsiveness=0.0, **settings))
+    for second in range(seconds + 1):
+        follower.see(speed * second, 0.0, 100.0, (speed, 0.0), float(second))
+        follower.aim(speed * second - 8.0, 0.0, 8.0, float(second))
+    return follower
+
+
+@pytest.mark.parametrize(
+    ("angle", "place"), [(180.0, (52.0, 0.0)), (0.0, (68.0, 0.0)), (90.0, (60.0, 8.0)), (-90.0, (60.0, -8.0))]
+)
+def test_the_side_of_the_target(angle: float, place: tuple[float, float]) -> None:
+    wanted = following(angle).aim(50.0, 0.0, 8.0, 30.0)
+    assert wanted is not None
+    assert (wanted.x.position, wanted.y.position) == pytest.approx(place, abs=0.01)
+    assert (wanted.x.velocity, wanted.y.velocity) == pytest.approx((2.0, 0.0))
+    assert wanted.height == 8.0
+
+
+def test_the_nose_points_to_the_target() -> None:
+    wanted = following().aim(60.0, -5.0, 8.0, 30.0)
+    assert wanted is not None
+    assert wanted.yaw == pytest.approx(math.pi / 2)  # the target is to the east
+
+
+def test_the_target_goes_on_for_a_moment_and_then_stands() -> None:
+    follower = following()
+    assert follower.target(30.5) == pytest.approx((61.0, 0.0))
+    assert follower.target(99.0) == pytest.approx((60.0 + 2.0 * FORESIGHT, 0.0))
+    wanted = follower.aim(50.0, 0.0, 8.0, 32.0)
+    assert wanted is not None
+    assert wanted.x.velocity == 0.0
+
+
+def test_a_target_that_has_not_moved_is_followed_from_where_the_drone_is() -> None:
+    follower = Follower(FollowSettings(distance=10.0))
+    assert follower.aim(0.0, 30.0, 8.0, 0.0) is None
+    follower.see(0.0, 0.0, None, None, 1.0)
+    wanted = follower.aim(0.0, 30.0, 8.0, 1.0)
+    assert wanted is not None
+    assert (wanted.x.position, wanted.y.position) == pytest.approx((0.0, 10.0), abs=1e-6)
+
+
+def test_a_target_that_tells_no_velocity_is_seen_to_move() -> None:
+    follower = Follower(FollowSettings(responsiveness=0.0))
+    for second in range(5):
+        follower.see(0.0, 3.0 * second, None, None, float(second))
+    assert follower.speed == pytest.approx(3.0)
+    wanted = follower.aim(0.0, 0.0, 8.0, 4.0)
+    assert wanted is not None
+    assert wanted.y.velocity == pytest.approx(3.0)
+
+
+def test_a_position_that_is_said_twice_stops_nobody() -> None:
+    """MAVSDK repeats the last one each second, right before its user tells the next."""
+    follower = Follower(FollowSettings(responsiveness=0.0))
+    for second in range(8):
+        follower.see(1.5 * second, 0.0, None, None, float(second))
+        follower.see(1.5 * second, 0.0, None, None, second + 0.995)
+    assert follower.speed == pytest.approx(1.5)
+    assert follower.target(8.0) == pytest.approx((12.0, 0.0))
+    for tenth in range(20):
+        follower.see(10.5, 0.0, None, None, 8.0 + 0.1 * tenth)
+    assert follower.speed == 0.0
+    assert follower.target(10.0) == pytest.approx((10.5, 0.0))
+
+
+def test_two_positions_at_once_make_no_rocket() -> None:
+    follower = Follower(FollowSettings(responsiveness=0.0))
+    follower.see(0.0, 0.0, None, None, 0.0)
+    follower.see(1.5, 0.0, None, None, 0.005)
+    assert follower.speed == 0.0
+    follower.see(60.0, 0.0, None, None, 1.0)
+    assert follower.speed == pytest.approx(20.0)
+
+
+def test_the_drone_does_not_rush_round_a_target_that_turns() -> None:
+    """It turns round: from behind to behind is half a circle, 25 m at 8 m distance and 5 m/s at most."""
+    follower = following(tangential_speed=5.0)
+    follower.see(60.0, 0.0, None, (-2.0, 0.0), 31.0)
+    travelled = 0.0
+    last = follower.aim(52.0, 0.0, 8.0, 31.0)
+    for step in range(1, 20):
+        now = 31.0 + 0.2 * step
+        follower.see(60.0 - 2.0 * 0.2 * step, 0.0, None, (-2.0, 0.0), now)
+        wanted = follower.aim(52.0, 0.0, 8.0, now)
+        target, before = follower.target(now), follower.target(now - 0.2)
+        assert wanted is not None
+        assert last is not None
+        assert target is not None
+        assert before is not None
+        travelled = math.hypot(
+            (wanted.x.position or 0.0) - (last.x.position or 0.0), (wanted.y.position or 0.0) - (last.y.position or 0.0)
+        )
+        assert travelled <= (5.0 + 2.0) * 0.2 + 0.1
+        last = wanted
+
+
+def test_a_calm_follower_smoothes() -> None:
+    calm, quick = Follower(FollowSettings(responsiveness=0.8)), Follower(FollowSettings(responsiveness=0.1))
+    for follower in (calm, quick):
+        follower.see(0.0, 0.0, None, (0.0, 0.0), 0.0)
+        follower.see(10.0, 0.0, None, (0.0, 0.0), 1.0)
+    assert calm.target(1.0) == pytest.approx((2.0, 0.0))
+    assert quick.target(1.0) == pytest.approx((9.0, 0.0))
+
+
+def target(capabilities: int, vel: tuple[float, float, float] = (1.0, 2.0, 0.0), alt: float = 40.0) -> Any:
+    return dialect.MAVLink_follow_target_message(
+        0, capabilities, 488789000, 23677000, alt, vel, [NAN] * 3, [1.0, NAN, NAN, NAN], [NAN] * 3, [NAN] * 3, 0
+    )
+
+
+def test_what_a_follow_target_says() -> None:
+    assert sighting(target(1)) == Sighting(48.8789, 2.3677, 40.0, None)  # MAVSDK says so, whatever its velocity field
+    assert sighting(target(3)) == Sighting(48.8789, 2.3677, 40.0, (1.0, 2.0))
+    assert sighting(target(1, (NAN, NAN, NAN), NAN)) == Sighting(48.8789, 2.3677, None, None)
+
+
+@pytest.mark.parametrize(
+    ("capabilities", "vel"), [(0, (0, 0, 0)), (2, (0, 0, 0)), (3, (NAN, 0, 0)), (3, (math.inf, 0, 0)), (3, (50, 0, 0))]
+)
+def test_what_is_no_target(capabilities: int, vel: tuple[float, float, float]) -> None:
+    assert isinstance(sighting(target(capabilities, vel)), str)

@@ -1,0 +1,98 @@
+"""Who began a landing or a return: a client, the drone, or the pilot at the Skycontroller."""
+
+from __future__ import annotations
+
+import pytest
+
+from anafi_mav.vehicle.initiator import Initiator, Initiators
+
+CLIENT, DRONE, PILOT = Initiator.CLIENT, Initiator.DRONE, Initiator.PILOT
+
+
+def lands(who: Initiators, now: float = 100.0, *, plan: bool = False, skycontroller: bool = False) -> Initiator | None:
+    who.on_landing(now, plan_lands=plan, skycontroller=skycontroller)
+    return who.landing
+
+
+def returns(who: Initiators, now: float = 100.0, *, own: bool = False, plan: bool = False, sc: bool = False) -> None:
+    who.on_return(now, by_itself=own, by_plan=plan, skycontroller=sc)
+
+
+@pytest.mark.parametrize("skycontroller", [False, True])
+def test_landing_that_was_commanded_is_the_clients(skycontroller: bool) -> None:
+    who = Initiators()
+    who.land_commanded(99.0)
+    assert lands(who, skycontroller=skycontroller) is CLIENT
+
+
+def test_landing_at_the_end_of_a_plan_is_the_clients() -> None:
+    assert lands(Initiators(), plan=True, skycontroller=True) is CLIENT
+
+
+@pytest.mark.parametrize(("skycontroller", "expected"), [(False, DRONE), (True, PILOT)])
+def test_landing_that_nothing_explains(skycontroller: bool, expected: Initiator) -> None:
+    assert lands(Initiators(), skycontroller=skycontroller) is expected
+
+
+def test_landing_long_after_the_command_is_not_its() -> None:
+    who = Initiators()
+    who.land_commanded(80.0)
+    assert lands(who, skycontroller=True) is PILOT
+
+
+def test_landing_of_the_pilot_stays_his_when_a_client_commands_it_too() -> None:
+    who = Initiators()
+    assert lands(who, skycontroller=True) is PILOT
+    who.land_commanded(101.0)
+    assert who.landing is PILOT
+
+
+def test_landing_after_a_return_belongs_to_who_began_the_return() -> None:
+    who = Initiators()
+    returns(who, own=True)
+    assert lands(who) is DRONE  # reported before the return's end
+    who = Initiators()
+    returns(who, own=True, sc=True)
+    who.on_return_over(120.0)
+    assert lands(who, 121.0, skycontroller=True) is DRONE
+    who = Initiators()
+    who.return_commanded(99.0)
+    returns(who, sc=True)
+    who.on_return_over(120.0)
+    assert lands(who, 121.0, skycontroller=True) is CLIENT
+    who = Initiators()
+    returns(who, own=True)
+    who.on_return_over(120.0)
+    who.on_landing_over(unsent=True)
+    assert lands(who, 140.0, skycontroller=True) is PILOT  # another landing
+
+
+@pytest.mark.parametrize(
+    ("own", "plan", "sc", "commanded", "expected"),
+    [
+        (True, False, False, False, DRONE),
+        (True, False, True, True, DRONE),
+        (False, True, True, False, CLIENT),
+        (False, False, False, False, CLIENT),
+        (False, False, True, True, CLIENT),
+        (False, False, True, False, PILOT),
+    ],
+)
+def test_return(own: bool, plan: bool, sc: bool, commanded: bool, expected: Initiator) -> None:
+    who = Initiators()
+    if commanded:
+        who.return_commanded(99.0)
+    returns(who, own=own, plan=plan, sc=sc)
+    assert who.returning is expected
+
+
+def test_return_of_a_client_stays_its_own_in_later_phases() -> None:
+    who = Initiators()
+    who.return_commanded(99.0)
+    returns(who, 100.0, sc=True)
+    returns(who, 160.0, sc=True)
+    assert who.returning is CLIENT
+    who.on_return_over(170.0)
+    assert who.returning is None
+    returns(who, 180.0, sc=True)
+    assert who.returning is PILOT
