@@ -47,10 +47,10 @@ class Contention:
             self._guest = False
 
     def lost(self, age: float, *, dismissed: bool = False) -> bool:
-        """Note a connection that was last heard `age` s after its handshake; True when another controller took it.
+        """Note a lost connection; return True when another controller acquired the drone.
 
-        One short connection alone may have been bad radio, unless the drone `dismissed` us, or flew for another
-        controller already.
+        The connection was last heard `age` s after its handshake. One short connection alone may have been bad radio,
+        unless the drone `dismissed` us, or was flown by another controller already.
         """
         if age > SHORT:
             self._short = self._yields = 0

@@ -28,7 +28,7 @@ FRAMES = ("one", "many")
 
 MAX_PORT = 65535
 MAX_BAUD = 4_000_000
-"""What USB bridges go up to."""
+"""Fastest rate of common USB bridges."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Scheme:
     """One kind of endpoint."""
 
     arguments: str
-    """What follows "scheme://"."""
+    """Form of the part after "scheme://"."""
     description: str
     factory: Callable[[EndpointUrl, Sink, Clock], Endpoint]
     listens: bool = False
@@ -96,7 +96,10 @@ def parse_endpoint(url: str, flavours: Sequence[str] = ()) -> EndpointUrl:
 
 
 def is_open_to_network(url: EndpointUrl) -> bool:
-    """True when other machines can send to this endpoint: it listens, and on more than this machine's loopback."""
+    """True when other machines can send to this endpoint.
+
+    It listens, and on more than this machine's loopback.
+    """
     if not SCHEMES[url.scheme].listens or url.place.rstrip(".").lower() == "localhost":
         return False
     try:

@@ -28,7 +28,10 @@ _V2_SMALLEST = 6
 
 
 class FrameType(enum.IntEnum):
-    """What the receiver has to do with a frame (arsdk-ng ARSDK_TRANSPORT_DATA_TYPE_*)."""
+    """Type of a frame: data, data with acknowledgement, low-latency data or acknowledgement.
+
+    It states how the receiver has to handle the frame (arsdk-ng ARSDK_TRANSPORT_DATA_TYPE_*).
+    """
 
     ACK = 1
     NOACK = 2

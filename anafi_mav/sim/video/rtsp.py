@@ -1,10 +1,10 @@
 """The drone's video server: RTSP on TCP 554, pictures in RTP over UDP.
 
-``/live`` has a stream for each camera, ``/replay/<resource id>`` plays a recording and stops at its end. Pictures come
-thirty times a second of the machine's clock, whatever the speed of the simulated world, and only while a client
-plays; each reports the state of drone and camera at its moment. They are taken in steps of the simulated world, so that
-no two of them are of one moment, however late this process runs. A client that joins gets a key picture first. A
-session whose client is silent for a minute, in RTSP and RTCP, is forgotten; it survives the end of its RTSP connection,
+``/live`` has a stream for each camera, ``/replay/<resource id>`` plays a recording and stops at its end. Pictures are
+sent thirty times a second of the host's clock, whatever the speed of the simulated world, and only while a client
+plays; each contains the state of drone and camera at its moment. They are taken in steps of the simulated world: no two
+show the same moment, however late this process runs. A client that joins gets a key picture first. A session whose
+client is silent for a minute, in RTSP and RTCP, is removed; it survives the end of its RTSP connection,
 as Parrot's client expects.
 """
 
@@ -38,7 +38,7 @@ MAX_SESSIONS = 16
 MAX_CONNECTIONS = 32
 READ_SIZE = 4096
 PERIOD = 1.0 / FRAME_RATE
-"""s of the machine's clock between two pictures."""
+"""s of the host's clock between two pictures."""
 
 _LIVE, _REPLAY = "live", "replay/"
 _PUBLIC = "OPTIONS, DESCRIBE, SETUP, PLAY, PAUSE, TEARDOWN, GET_PARAMETER"
@@ -46,7 +46,7 @@ _PUBLIC = "OPTIONS, DESCRIBE, SETUP, PLAY, PAUSE, TEARDOWN, GET_PARAMETER"
 
 @dataclass(frozen=True)
 class _Resource:
-    """What is at a URL."""
+    """Resource at a URL."""
 
     name: str
     streams: tuple[Stream, ...]
@@ -56,7 +56,7 @@ class _Resource:
 
 @dataclass
 class _Session:
-    """What a client has set up."""
+    """RTSP session that a client has set up."""
 
     id: str
     resource: _Resource
@@ -66,7 +66,7 @@ class _Session:
     position: float = 0.0
     """s of a recording."""
     until: float = 0.0
-    """Where it stops."""
+    """s of a recording at which it stops."""
     timer: asyncio.TimerHandle | None = None
 
 
@@ -79,7 +79,10 @@ class _Refused(Exception):
 
 
 class VideoServer:
-    """One drone's. `note` hears what clients do; `hears` says whether the air carries anything; `send` is the air."""
+    """One drone's.
+
+    `note` hears what clients do; `hears` says whether the air carries anything; `send` is the air.
+    """
 
     def __init__(
         self,
@@ -101,12 +104,15 @@ class VideoServer:
         self._connections: set[asyncio.Task[None]] = set()
         self._sessions: dict[str, _Session] = {}
         self._due = 0.0
-        """s of the machine's clock until the next picture."""
+        """s of the host's clock until the next picture."""
         self._address = ""
         self.port = 0
 
     async def start(self, address: str, port: int) -> None:
-        """Listen. Raises `OSError` when the port is taken or not permitted; 0 lets the system choose."""
+        """Listen.
+
+        Raises `OSError` when the port is taken or not permitted; 0 lets the system choose.
+        """
         self._address = address
         server = await asyncio.start_server(self._serve, address, port)
         self._server = server
@@ -285,7 +291,7 @@ class VideoServer:
     # -- resources and sessions
 
     def _find(self, uri: str) -> tuple[_Resource, str]:
-        """What a URL names, and which stream of it; "" is all."""
+        """Return the resource of a URL and the name of its stream; "" means all streams."""
         url = rtsp.split_url(uri)
         path = "" if url is None else url[2].rstrip("/")
         if path == _LIVE or path.startswith(_LIVE + "/"):
@@ -345,11 +351,11 @@ class VideoServer:
 
     @property
     def playing(self) -> bool:
-        """Whether pictures are taken."""
+        """True while a client plays."""
         return any(session.playing for session in self._sessions.values())
 
     def tick(self, now: float, passed: float) -> None:
-        """Take the picture that is due, after the world has moved on for `passed` s of the machine's clock.
+        """Take the picture that is due, after the world has moved on for `passed` s of the host's clock.
 
         One at most: a world that moves in longer steps than `PERIOD` has fewer pictures, and none twice.
         """

@@ -57,7 +57,10 @@ class Battery:
 
 @dataclass(frozen=True)
 class GimbalModel:
-    """One gimbal: deg, the same relative to the body and to the horizon; (0, 0) is an axis that does not turn."""
+    """Ranges of one gimbal in deg, the same relative to the body and to the horizon.
+
+    (0, 0) is an axis that does not turn.
+    """
 
     pitch: tuple[float, float]
     roll: tuple[float, float] = (0.0, 0.0)
@@ -66,7 +69,7 @@ class GimbalModel:
 
 @dataclass(frozen=True)
 class Card:
-    """A place to store media: what `user_storage` (or, with ids, `user_storage_v2`) tells of it."""
+    """Storage for media, as `user_storage` (or, with ids, `user_storage_v2`) describes it."""
 
     name: str
     capacity: int
@@ -76,7 +79,7 @@ class Card:
 
 @dataclass(frozen=True)
 class Envelope:
-    """What the aircraft is and what it stands (anafi_ros paper)."""
+    """Dimensions and limits of the aircraft (anafi_ros paper)."""
 
     size_mm: tuple[int, int, int]
     """Unfolded."""
