@@ -355,7 +355,7 @@ class VideoServer:
         return any(session.playing for session in self._sessions.values())
 
     def tick(self, now: float, passed: float) -> None:
-        """Take the picture that is due, after the world has moved on for `passed` s of the host's clock.
+        """Take the picture that is due; the world has moved on for `passed` s of the host's clock.
 
         One at most: a world that moves in longer steps than `PERIOD` has fewer pictures, and none twice.
         """
