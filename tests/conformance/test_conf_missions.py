@@ -150,6 +150,36 @@ async def test_conf_049_a_mission_that_waits_for_arming_is_forgotten() -> None:
         assert w.commands("common.Mavlink.Start") == []
 
 
+async def test_conf_049_a_start_at_arming_whose_file_cannot_be_loaded_leaves_mission() -> None:
+    """The drone's web server is not reached: a text says so, and the mode no longer says that a mission is flown."""
+    async with world() as w:
+        await put(w, ROUND)
+        assert (await w.client.command(dialect.MAV_CMD_DO_SET_MODE, 1, 4, 4)).result == dialect.MAV_RESULT_ACCEPTED
+        await mode(w, 0x04040000)
+        mark = w.client.mark()
+        assert (await w.client.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)).result == dialect.MAV_RESULT_ACCEPTED
+        await w.client.wait("STATUSTEXT", lambda m: m.severity == dialect.MAV_SEVERITY_ERROR, since=mark, timeout=20.0)
+        await mode(w, w.modes.hold, since=mark)
+        await state(w, NOT_STARTED)
+        assert w.commands("common.Mavlink.Start") == []
+
+
+async def test_conf_049_a_start_at_arming_that_a_disarming_ends_leaves_mission() -> None:
+    """The file is on its way to the drone when the client disarms: nothing begins, and no mode says that it does."""
+    async with world(web=True) as w:
+        await put(w, ROUND)
+        assert (await w.client.command(dialect.MAV_CMD_DO_SET_MODE, 1, 4, 4)).result == dialect.MAV_RESULT_ACCEPTED
+        await mode(w, 0x04040000)
+        mark = w.client.mark()
+        w.client.send_command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)
+        w.client.send_command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0)
+        await w.client.heartbeat(
+            lambda beat: beat.custom_mode == w.modes.hold and not beat.base_mode & ARMED, since=mark
+        )
+        await state(w, NOT_STARTED)
+        assert w.commands("common.Mavlink.Start") == []
+
+
 @both
 async def test_conf_049_refused_by_the_gateway_itself(flavour: str) -> None:
     async with world(flavour=flavour, web=True) as w:

@@ -97,11 +97,14 @@ class Warnings:
 
     def set_motors(self, error: MotorError, motors: int) -> list[Message]:
         """Bit 0 of `motors` is the front left one (ardrone3.xml MotorErrorStateChanged)."""
-        if error is self.motor_error:
+        if error is MotorError.NO_ERROR:
+            motors = 0
+        if (error, motors) == (self.motor_error, self.motors):
             return []
-        self.motor_error, self.motors = error, motors if error is not MotorError.NO_ERROR else 0
-        messages: list[Message] = [ardrone3.MotorErrorStateChanged(self.motors, error)]
-        if error is not MotorError.NO_ERROR:
+        is_new = error is not self.motor_error
+        self.motor_error, self.motors = error, motors
+        messages: list[Message] = [ardrone3.MotorErrorStateChanged(motors, error)]
+        if is_new and error is not MotorError.NO_ERROR:
             self.last_motor_error = _LAST.get(error.name, LastMotorError.NO_ERROR)
             messages.append(ardrone3.MotorErrorLastErrorChanged(self.last_motor_error))
         return messages

@@ -291,6 +291,13 @@ class MissionFlight:
             await self._begin(self.progress.first, number, waited=True)
         except AnafiMavError as error:
             self._vehicle.text(Severity.ERROR, str(error))
+            if self._is_chosen_only:
+                self._vehicle.select(FlightMode.HOLD)
+
+    @property
+    def _is_chosen_only(self) -> bool:
+        """The mode is Mission, and nothing of the mission is flown."""
+        return self._vehicle.selected is FlightMode.MISSION and not self.flying
 
     def _announce(self, resumes: bool) -> None:
         """What is flown, and what happens to it without the gateway."""
@@ -480,6 +487,8 @@ class MissionFlight:
             self._running.cancel()
             ended.append(self._running)
             self._running = None
+            if self._is_chosen_only:
+                self._vehicle.forget_mode()
         if self.progress.state is State.ACTIVE:
             self._stop("")
             self._suspend()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 import re
 import sys
 from collections.abc import Iterator
@@ -90,10 +91,19 @@ def room_of(path: Path) -> str:
     return first.removesuffix(".py")
 
 
-def imports(path: Path) -> Iterator[tuple[int, str]]:
+def imports(path: Path) -> tuple[tuple[int, str], ...]:
     """(line, dotted name) of each import in a file of the package, relative ones resolved, wherever it stands."""
-    package = ["anafi_mav", *path.relative_to(PACKAGE).parent.parts]
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"), str(path))):
+    return imports_of(path.read_text(encoding="utf-8"), "anafi_mav", *path.relative_to(PACKAGE).parent.parts)
+
+
+@functools.cache
+def imports_of(source: str, *package: str) -> tuple[tuple[int, str], ...]:
+    """As `imports`, of the source of a module in this package."""
+    return tuple(_read_imports(source, package))
+
+
+def _read_imports(source: str, package: tuple[str, ...]) -> Iterator[tuple[int, str]]:
+    for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Import):
             for alias in node.names:
                 yield node.lineno, alias.name
