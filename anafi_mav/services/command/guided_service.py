@@ -1,7 +1,7 @@
 """Guided flight by single commands: speed, height, heading, pause, regions of interest, home.
 
-What goes to a place is `actions.reposition`; what circles is `orbit`. A handler returns when the drone confirmed.
-Conformance A4, B1, B2, D1 and items 78-83, 143.
+What goes to a place is `actions.reposition`; what circles is `orbit_service`. A handler returns when the drone
+confirmed. Conformance A4, B1, B2, D1 and items 78-83, 143.
 """
 
 from __future__ import annotations

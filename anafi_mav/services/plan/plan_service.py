@@ -1,4 +1,4 @@
-"""The mission protocol on the wire: a desk of transfers (`plan_desk`, without I/O), its clock, its channels, its file.
+"""The mission protocol on the wire: a desk of transfers (`plan_protocol`), its clock, its channels, its file.
 
 A plan is stored before its upload is acknowledged, and is what the vehicle goes by from then on: `Vehicle.fence` and
 `Vehicle.rally` take theirs.

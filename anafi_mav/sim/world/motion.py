@@ -202,7 +202,7 @@ class _Orders:
 
 
 class Motion:
-    """The fleet's motion. `step()` advances all of it; `body.Body` is the handle of one drone."""
+    """The fleet's motion. `step()` advances all of it; `airframe.Body` is the handle of one drone."""
 
     def __init__(self, airframes: Sequence[Airframe]) -> None:
         count = len(airframes)

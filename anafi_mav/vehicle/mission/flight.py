@@ -1,4 +1,4 @@
-"""Flies a mission: the shell around the cores `mission_progress` and `plans.translate`.
+"""Flies a mission: the shell around the cores `progress` and `plans.translation.translate`.
 
 What the drone can fly by itself it flies from a file (`Leg`); what it cannot, the gateway flies between two files
 (`Step`). The drone says which line it has executed, and nothing else counts. Whatever takes the drone over stops the

@@ -371,6 +371,14 @@ def test_wrong_edge_inside_a_room_is_found(tmp_path: Path, monkeypatch: pytest.M
         assert len(folder_edges(module)) == 1, statement
 
 
+def test_files_of_the_newcomers_index_exist() -> None:
+    text = (REPOSITORY / "docs" / "architecture.md").read_text(encoding="utf-8")
+    part = text.partition("## Where does")[2].partition("|---")[2].partition("\n## ")[0]
+    files = re.findall(r"`([\w/*]+(?:\.py|/))`", part)
+    assert len(files) > 20
+    assert [file for file in files if not [*PACKAGE.glob(file)]] == []
+
+
 def test_linter_holds_every_room_of_services_apart() -> None:
     with (REPOSITORY / "pyproject.toml").open("rb") as file:
         contracts = tomllib.load(file)["tool"]["importlinter"]["contracts"]
