@@ -25,6 +25,7 @@ from anafi_mav import geo, mav_enums
 from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.config import Config, DroneConfig
 from anafi_mav.gateway import Gateway
+from anafi_mav.sim.world.faults import CLEAR, Impairment
 from anafi_mav.units import quaternion_from_euler
 
 PLACE = (HOME[0], HOME[1])
@@ -187,6 +188,36 @@ async def test_conf_076_a_breach_is_acted_upon_once(flavour: str, action: str, c
             assert not w.commands("ardrone3.Piloting.Landing")
             north = [e.args["north"] for e in w.drone.log if e.kind == "pose"]
             assert north[-1] < max(north) - 1.0
+
+
+@both
+@pytest.mark.parametrize("action", ["return", "land"])
+async def test_conf_076_a_client_that_ends_the_action_may_fly_on(flavour: str, action: str) -> None:
+    """A Hold that arrives before the drone has answered the return or landing of a breach ends it for good."""
+    async with world(flavour=flavour, also="px4", speed=1.0) as w:
+        assert (await upload(w.client, square(PLACE, 12.0), FENCE)).type == TAKEN
+        await put(w, ACTION[flavour], NUMBER[flavour][action])
+        await put(w, "ANF_FENCE_AHEAD", 0, 6)
+        await w.take_off()
+        mark = w.client.mark()
+        async with flown(w):
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 9.0, 15.0)
+            w.drone.faults.down = Impairment(delay=0.5)  # the answer comes late
+            await w.client.wait("STATUSTEXT", lambda m: m.text.startswith("Fence breach"), since=mark, timeout=15.0)
+            hold = (1, BRAKE) if flavour == "ardupilot" else (1, 4, 3)
+            ack = await w.client.command(dialect.MAV_CMD_DO_SET_MODE, *hold, timeout=10.0)
+            assert ack.result == ACCEPTED
+            w.drone.faults.down = CLEAR
+            held = BRAKE if flavour == "ardupilot" else MODES["px4"].hold
+            await w.client.heartbeat(lambda beat: beat.custom_mode == held, since=w.client.mark())
+            after = w.client.mark()
+            for _ in range(4):  # longer than an action that failed waits
+                await w.client.heartbeat(lambda beat: beat.custom_mode == held)
+            assert {beat.custom_mode for _, beat in w.client.since(after, "HEARTBEAT")} == {held}
+        name = {"return": "rth.return_to_home", "land": "ardrone3.Piloting.Landing"}[action]
+        assert len(w.commands(name)) == 1
+        assert len([text for text in texts(w.client, mark) if text.startswith("Fence breach")]) == 1
+        assert w.drone.pose.north > 12.0
 
 
 async def test_conf_076_below_the_floor_the_zones_hold() -> None:

@@ -55,6 +55,8 @@ async def _fly_item(host: Host, inbound: Inbound) -> None:
     result = dialect.MAV_MISSION_ERROR
     try:
         ato = height_in_frame(vehicle, item.z, item.frame)
+        if flavour.guided_setpoints and flavour.custom_mode(vehicle.mode) != flavour.custom_mode(FlightMode.GUIDED):
+            raise Refused("Goto refused: not in Guided")  # as in ArduCopter, in whose other modes it moves nothing
         if item.current == _ITEM_GOTO:
             if item.command != dialect.MAV_CMD_NAV_WAYPOINT:
                 raise Refused("Goto refused: the item is no way point", lasting=True)

@@ -51,7 +51,7 @@ class LinkLossService(Service):
             self.host.text(Severity.WARNING, f"{silence}: pilot in control")
         else:
             self.host.text(Severity.CRITICAL, f"{silence}: {policy.action.name.lower()}")
-            self.host.run_action(LinkLossService, self._act(policy.action))
+            self.host.run_action(LinkLossService, self._act(policy.action), is_order=False)
 
     async def _act(self, action: LossAction) -> None:
         vehicle = self.host.vehicle

@@ -112,7 +112,7 @@ class MissionService(Service):
         await self.host.vehicle.set_mode(FlightMode.MISSION, command.right)
 
     async def _choose(self, command: Command) -> None:
-        """MAV_CMD_DO_SET_MISSION_CURRENT: param1 the item, -1 none; param2 1 begins anew after the end."""
+        """MAV_CMD_DO_SET_MISSION_CURRENT: param1 the item, -1 none; param2 1 with -1 resets, see `reset`."""
         item, anew = command.params[:2]
         flight = self._flight
         await flight.storing.over()
@@ -123,7 +123,7 @@ class MissionService(Service):
             raise Refused("Current item refused: param1 is the number of an item", lasting=True)
         if math.isnan(item) or item == KEEP:
             if anew == 1.0:
-                await flight.choose(command.client, 0)
+                await flight.reset(command.client)
             return
         await flight.choose(command.client, _ours(int(item), command.client))
 

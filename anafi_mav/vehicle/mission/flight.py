@@ -155,6 +155,14 @@ class MissionFlight:
             self._keep()
             self.news()
 
+    async def reset(self, client: Hashable) -> None:
+        """Give every loop all its turns again. The current item stays; after the end the mission begins anew."""
+        progress = self.progress
+        if progress.state is State.COMPLETE:
+            await self.choose(client, 0)
+        elif progress.jumps and not progress.ending:
+            await self.choose(client, progress.current)
+
     def armed(self, client: Hashable) -> None:
         """A client has armed: what waited for that begins."""
         if self._arming.ends_with(client):
