@@ -1,6 +1,6 @@
 """Geodesy on the WGS84 ellipsoid (pyproj).
 
-Degrees and metres; bearings clockwise from north.
+Degrees and metres; bearings clockwise from north. No I/O.
 """
 
 from __future__ import annotations

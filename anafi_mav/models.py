@@ -43,7 +43,7 @@ class Intrinsics(msgspec.Struct, frozen=True):
 
 
 class PlanFigures(msgspec.Struct, frozen=True, kw_only=True):
-    """Figures for writing and checking a flight plan before a drone is connected (anafi_ros paper)."""
+    """Figures for writing and checking a flight plan without a drone (anafi_ros paper)."""
 
     version: Literal[1, 2]
     """Of Parrot's flight-plan format."""

@@ -182,7 +182,10 @@ else:
     import fcntl
 
     def _lock(file: int) -> bool:
-        """Lock an open file; False when another holds it. Raises `OSError` where the file system has no locks."""
+        """Lock an open file; False when another holds it.
+
+        Raises `OSError` where the file system has no locks.
+        """
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:

@@ -1,7 +1,8 @@
-"""Keys of a configuration file, as data: reading and checking is `anafi_mav.config.load`.
+"""Keys of a configuration file, as data. No I/O.
 
-Each key carries its meaning (`description`) and, as `expected`, what a value must be. Both are used twice: the
-first makes docs/configuration.md, the second makes that page and the error messages.
+Reading and checking is `anafi_mav.config.load`. Each key carries its meaning (`description`) and, as `expected`, what
+a value must be. Both are used twice: the first makes docs/configuration.md, the second makes that page and the error
+messages.
 """
 
 from __future__ import annotations

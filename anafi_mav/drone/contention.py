@@ -1,4 +1,4 @@
-"""Backing off from a second controller that takes the drone: the policy, without I/O.
+"""Backing off from a second controller that takes the drone: the policy. No I/O.
 
 A drone accepts one controller, and a new handshake ends the session before it. Two controllers that both reconnect
 would throw each other out for ever, in the air. A connection that is lost within `SHORT` of its handshake is taken for

@@ -1,4 +1,6 @@
-"""Endpoint URLs: their grammar, and the table of schemes from which endpoints are made and help is printed.
+"""Endpoint URLs: their grammar and the table of schemes.
+
+Endpoints and the command line's help are made from that table.
 
     udpout://HOST:PORT      udpin://HOST:PORT      tcpin://HOST:PORT      tcpout://HOST:PORT
     serial://DEVICE:BAUD    each with ?flavour=NAME, one of those that the caller knows

@@ -1,4 +1,4 @@
-"""MAVLink frames without I/O: messages into version 2 frames, any bytes into messages.
+"""MAVLink frames: messages into version 2 frames, any bytes into messages. No I/O.
 
 Going out, a message is packed once (`pack`) and framed per channel (`frame`), for only the sequence number and with it
 the checksum differ. Coming in, `Parser` finds frames of version 1 and 2 between whatever else arrives and makes

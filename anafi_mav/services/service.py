@@ -122,6 +122,10 @@ class Service:
         """The rows of the commands that change what the vehicle does, by MAV_CMD."""
         return {}
 
+    def item_commands(self) -> Mapping[int, MessageHandler]:
+        """Return handlers of mission items that are commands and belong to no plan, by the items' `current`."""
+        return {}
+
     def requests(self) -> Mapping[int, Request]:
         """By message id. A stream can be requested without standing here."""
         return {}

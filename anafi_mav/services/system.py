@@ -191,6 +191,9 @@ class System:
         self.telemetry: frozenset[int] = frozenset({*streams, dialect.MAVLINK_MSG_ID_HEARTBEAT})
         """Messages that the next one of their kind replaces: a full channel drops them rather than answers."""
         node.add_telemetry(self.telemetry)
+        for service in self.services:
+            if isinstance(service, PlanService):
+                service.take_tables(_joined(service.item_commands() for service in self.services))
         self._ftp.take_tables(_joined(service.files() for service in self.services))
         self._handlers: dict[int, MessageHandler] = _joined(service.messages() for service in self.services)
         self._handlers[dialect.MAVLINK_MSG_ID_HEARTBEAT] = self._heard

@@ -344,8 +344,11 @@ class SimulatedDrone:
             await self._web.close()
         await self._video.close()
 
-    def tick(self, now: float, elapsed: float, pose: Pose, arrived: bool, still: bool) -> None:
-        """Called by the simulation after each of its turns; see `Firmware.tick`."""
+    def tick(self, now: float, elapsed: float, passed: float, pose: Pose, arrived: bool, still: bool) -> None:
+        """Called by the simulation after each of its turns; see `Firmware.tick`.
+
+        The world has moved on by `elapsed` simulated seconds, for which it takes `passed` s of the host's clock.
+        """
         self.firmware.tick(now, elapsed, pose, arrived, still)
         if self._off_at is not None and self.time >= self._off_at:
             self._go_off()
@@ -355,6 +358,7 @@ class SimulatedDrone:
             self._body.blow(*self.wind.advance(elapsed))
         if self.skycontroller is not None:
             self.skycontroller.tick(now)
+        self._video.tick(now, passed)
         session = self._session
         if session is not None and now >= self._telemetry.next and self._in_reach:
             untold = self.faults.untold

@@ -174,9 +174,10 @@ class Simulator:
         for _ in range(steps):
             motion.step()
         elapsed = steps * STEP
+        passed = elapsed / self._speed
         turns = zip(self.drones, motion.poses(), motion.arrived(), motion.still(), strict=True)
         for drone, pose, arrived, still in turns:
-            drone.tick(now, elapsed, pose, arrived, still)
+            drone.tick(now, elapsed, passed, pose, arrived, still)
             if scenarios and (scenario := scenarios.get(drone.address)) is not None:
                 scenario.tick(drone)
         if self._file is not None:

@@ -1,4 +1,4 @@
-"""Frames of the ARSDK transport: what one datagram holds, in the three protocol versions.
+"""Frames of the ARSDK transport, in the three protocol versions. No I/O.
 
 A datagram is a row of frames. A frame has a type, the id of a queue, a sequence number and a payload; everything is
 little-endian (arsdk-ng libarsdk/src/net/arsdk_transport_net.c). What payloads hold is in `packing`, who sends which

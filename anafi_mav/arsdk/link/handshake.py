@@ -1,4 +1,4 @@
-"""The JSON that opens an ARSDK connection, without I/O.
+"""The JSON that opens an ARSDK connection. No I/O.
 
 Discovery (TCP 44445): the device says who it is, NUL-terminated, and keeps the socket open as long as it is there.
 Handshake (TCP 44444): the controller names its UDP port and protocol versions, the device answers with its own

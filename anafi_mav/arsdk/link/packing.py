@@ -1,4 +1,4 @@
-"""How commands lie in the payloads of frames, both ways, in the three protocol versions.
+"""Packs commands into payloads of frames and back, in three protocol versions. No I/O.
 
 Version 1 puts one command into a frame. Version 2 packs ``u16 length, command`` pairs, version 3 ``varint length,
 command`` pairs, and splits an acknowledged command that is longer than a frame: the next frame of that queue then

@@ -1,4 +1,4 @@
-"""The ARSDK transport without I/O: queues, acknowledgements, retries and pings.
+"""The ARSDK transport: queues, acknowledgements, retries and pings. No I/O.
 
 It serves both ends of the link: the same object acts as controller or device; `Role` picks the queue ids.
 The shell passes datagrams and the time to `receive`, sends what `outgoing` returns and calls `expire` at `deadline`.

@@ -1,1 +1,1 @@
-"""Wire formats of the live video: RTSP, SDP, RTP, RTCP, packets of H.264, Parrot's metadata."""
+"""Wire formats of the live video: RTSP, SDP, RTP, RTCP, H.264, metadata. No I/O."""

@@ -1,4 +1,4 @@
-"""State that the cameras of a drone report, in the vocabulary of `camera_words`.
+"""State that the cameras of a drone report, in the vocabulary of `camera_enums`.
 
 It is the same whichever of Parrot's features reports it.
 """

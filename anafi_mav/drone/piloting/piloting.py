@@ -6,8 +6,8 @@ A verb raises `CommandRejected` when the drone, or what it reported, refuses; `C
 answer, and then its command is withdrawn; `LinkLost` when the link is lost meanwhile. Signs and units are the drone's
 own: body axes front, right, down; heights above the take-off point.
 
-The promises of the verbs are documented here. Their implementation is in `piloting_motors` (up and down),
-`piloting_moves` (guided moves), `piloting_return` (home) and `piloting_sticks` (PCMDs); common to all of them, and
+The promises of the verbs are documented here. Their implementation is in `motors` (up and down),
+`guided_moves` (guided moves), `return_home` (home) and `stick_stream` (PCMDs); common to all of them, and
 therefore here, is above all `hover`.
 """
 
@@ -200,7 +200,7 @@ class Piloting(PilotingSettings):
         """Stop propellers that turn on the ground or just above it.
 
         Returns when the drone reports that they stand. `force` cuts them when they still ramp up after
-        `piloting_motors.FORCED_AFTER`, never once the drone has left the ground.
+        `motors.FORCED_AFTER`, never once the drone has left the ground.
         """
         await self._motors.stop_motors(force=force)
 
@@ -214,7 +214,7 @@ class Piloting(PilotingSettings):
         Returns when it reports that they are cut.
 
         Cancelling this does not withdraw it: it is repeated while there is a link, as Parrot does (arsdk-ng: timeout
-        policy RETRY), for at most `piloting_motors.EMERGENCY_TIMEOUT` while a caller waits. Commands that wait to be
+        policy RETRY), for at most `motors.EMERGENCY_TIMEOUT` while a caller waits. Commands that wait to be
         sent are withdrawn.
         """
         await self._motors.emergency()

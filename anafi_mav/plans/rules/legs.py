@@ -1,6 +1,6 @@
 """Records of a translated mission and of its faults.
 
-`pen` writes them and `translate` returns them.
+`flight_plan_writer` writes them and `translate` returns them.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """Translation of a mission to Parrot's files and to items that the gateway flies itself.
 
 `examine` judges a mission when it is uploaded; `translate` writes the files when it begins. The translation of each
-command is in the table of `rules`; `pen` writes the lines; this module follows the items, with their jumps.
+command is in the table of `rules`; `flight_plan_writer` writes the lines; this module follows the
+items, with their jumps.
 """
 
 from __future__ import annotations

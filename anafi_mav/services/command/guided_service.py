@@ -1,7 +1,7 @@
 """Guided flight by single commands: speed, height, heading, pause, regions of interest, home.
 
-What goes to a place is `actions.reposition`; what circles is `orbit`. A handler returns when the drone confirmed.
-Conformance A4, B1, B2, D1 and items 78-83, 143.
+What goes to a place is `actions.reposition`; what circles is `orbit_service`. A handler returns when the drone
+confirmed. Conformance A4, B1, B2, D1 and items 78-83, 143.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Mapping
-from typing import Any
 
 from anafi_mav import units
 from anafi_mav.drone.events import FlyingStateChanged, PoiMode, RthHomeType
@@ -19,7 +18,7 @@ from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.command_targets import UnsupportedFrame, height, height_in_frame, place
 from anafi_mav.services.commands import Action, Altitude, Command, Effect
 from anafi_mav.services.flavours import Flavour, flavour_of
-from anafi_mav.services.service import Host, Service, client_of
+from anafi_mav.services.service import Host, MessageHandler, Service, client_of
 from anafi_mav.vehicle.base.bounds import FASTEST, SLOWEST, check_height, check_on_earth
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.place import Place
@@ -47,19 +46,6 @@ _ITEM_GOTO, _ITEM_ALTITUDE = 2, 3
 def guided_mode(flavour: Flavour) -> FlightMode:
     """The mode that a vehicle is in when a client of this flavour has sent it somewhere."""
     return FlightMode.GUIDED if flavour.guided_setpoints else FlightMode.HOLD
-
-
-def is_guided_item(item: Any) -> bool:
-    """A mission item that belongs to no mission: ArduPilot's older way of saying "go there" and "go to that height"."""
-    return item.current in (_ITEM_GOTO, _ITEM_ALTITUDE)
-
-
-def fly_item(host: Host, inbound: Inbound) -> None:
-    """Carry out a MISSION_ITEM or MISSION_ITEM_INT that `is_guided_item`; the MISSION_ACK says how it ended.
-
-    dronekit's simple_goto, MAVProxy's and Mission Planner's change of altitude (conformance D1-D3, item 141).
-    """
-    host.run_action(client_of(inbound), _fly_item(host, inbound))
 
 
 async def _fly_item(host: Host, inbound: Inbound) -> None:
@@ -152,6 +138,9 @@ class GuidedService(Service):
             ),
         }
 
+    def item_commands(self) -> Mapping[int, MessageHandler]:
+        return {_ITEM_GOTO: self._item, _ITEM_ALTITUDE: self._item}
+
     def link_down(self) -> None:
         self._paused = self._mission_paused = None
 
@@ -161,6 +150,14 @@ class GuidedService(Service):
     def _on_flying_state(self, message: FlyingStateChanged, now: float) -> None:
         if not self.host.vehicle.in_air:
             self._paused = self._mission_paused = None  # the next flight's heights count from elsewhere
+
+    def _item(self, inbound: Inbound) -> None:
+        """Carry out a MISSION_ITEM or MISSION_ITEM_INT that belongs to no mission; the MISSION_ACK says how it ended.
+
+        ArduPilot's older way to send a goto or a height: dronekit's simple_goto, MAVProxy's and Mission Planner's
+        change of altitude (conformance D1-D3, item 141).
+        """
+        self.host.run_action(client_of(inbound), _fly_item(self.host, inbound))
 
     @property
     def _interrupted(self) -> Goto | None:

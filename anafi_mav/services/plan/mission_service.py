@@ -1,7 +1,7 @@
 """Missions as clients order and follow them: mode and commands, MISSION_CURRENT, MISSION_ITEM_REACHED.
 
-The list itself is `plan_service`'s, how it is flown `mission_flight`'s. Conformance A4, B2, C5 and items 49, 72 to 74,
-122. Commands: MAVLink common.xml MAV_CMD_MISSION_START, MAV_CMD_DO_SET_MISSION_CURRENT.
+The list itself is `plan_service`'s, how it is flown `vehicle.mission.flight`'s. Conformance A4, B2, C5 and items 49,
+72 to 74, 122. Commands: MAVLink common.xml MAV_CMD_MISSION_START, MAV_CMD_DO_SET_MISSION_CURRENT.
 """
 
 from __future__ import annotations

@@ -1,5 +1,6 @@
-"""How each model of the family flies and what it reports, as data. A new one is a new entry of `MODELS`, no subclass.
+"""Flight figures and reported values of each model, as data.
 
+A new model is a new entry of `MODELS`, not a subclass.
 What both sides of the wire know of it, by its data sheet, is the record of the same key in `anafi_mav.models`.
 Numbers of the airframe come from the table of the anafi_ros paper (size, speeds, battery, flight time); ranges of
 settings from Parrot's own events as anafi_ros and GroundSDK record them. Values that no public source gives are

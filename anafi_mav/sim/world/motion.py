@@ -13,7 +13,7 @@ The model is small on purpose and fitted to the measurements in section IV of th
 Tilt, yaw and climb are linear as long as no limit is reached: a step solves them in closed form for a command that is
 constant meanwhile. The drag is that of the mean speed. The push is that of the tilt at the end of the step: the half
 step that this is early makes up for the half step that a command waits, and for the lead that the semi-implicit steps
-of 5 ms had with which the flights in tests/unit/sim_flights.json were recorded. The delays are whole steps.
+of 5 ms had with which the flights in tests/support/sim_flights.json were recorded. The delays are whole steps.
 
 Frames: position and velocity are north, east, down in metres from the place the simulator was given as home; attitude
 is roll (right wing down), pitch (nose up), yaw (clockwise from north) in rad. The ground is a plane at down = 0.
@@ -202,7 +202,7 @@ class _Orders:
 
 
 class Motion:
-    """The fleet's motion. `step()` advances all of it; `body.Body` is the handle of one drone."""
+    """The fleet's motion. `step()` advances all of it; `airframe.Body` is the handle of one drone."""
 
     def __init__(self, airframes: Sequence[Airframe]) -> None:
         count = len(airframes)

@@ -1,4 +1,4 @@
-"""Flies a mission: the shell around the cores `mission_progress` and `plans.translate`.
+"""Flies a mission: the shell around the cores `progress` and `plans.translation.translate`.
 
 What the drone can fly by itself it flies from a file (`Leg`); what it cannot, the gateway flies between two files
 (`Step`). The drone says which line it has executed, and nothing else counts. Whatever takes the drone over stops the
@@ -13,7 +13,7 @@ from collections.abc import Callable, Coroutine, Hashable, Sequence
 from typing import Any
 
 from anafi_mav.drone import events
-from anafi_mav.drone.events import FlyingState, PlayingState
+from anafi_mav.drone.events import FlyingState, Message, PlayingState
 from anafi_mav.errors import AnafiMavError, CommandRejected, LinkLost
 from anafi_mav.plans.plan import Item
 from anafi_mav.plans.translation.translate import Leg
@@ -29,7 +29,7 @@ from anafi_mav.vehicle.mission.progress import ENDINGS, Progress, State
 from anafi_mav.vehicle.mission.record import Keeper, Record
 from anafi_mav.vehicle.mission.steps import fly_step
 from anafi_mav.vehicle.mission.texts import beginning, refusal
-from anafi_mav.vehicle.mission.waits import ArmWait, EndWatch, StoreWait
+from anafi_mav.vehicle.mission.waits import PROOF, ArmWait, EndWatch, StoreWait
 
 _LANDING = (FlyingState.LANDING, FlyingState.EMERGENCY_LANDING)
 
@@ -409,7 +409,11 @@ class MissionFlight:
             events.MavlinkFilePlayingStateChanged: self._on_playing,
             events.MissionItemExecuted: lambda message, now: self._executed(message.idx),
             events.WaypointSkipped: self._on_skipped,
+            **dict.fromkeys(PROOF, self._on_position),
         }
+
+    def _on_position(self, message: Message, now: float) -> None:
+        self._end_watch.on_position(type(message))
 
     def _on_skipped(self, message: events.WaypointSkipped, now: float) -> None:
         item = self.progress.skip(message.item)
