@@ -125,13 +125,13 @@ async def test_conf_112_long_texts_and_severities(flavour: str) -> None:
             (ardrone3.HoveringWarning(1, 0), "Too dark", 4),
             (
                 ardrone3.ForcedLandingAutoTrigger(ardrone3.ForcedLandingReason.BATTERY_TOO_HOT, 30),
-                "Landing by itself in 30 s: battery too hot",
+                "Drone lands in 30 s: battery too hot",
                 1,
             ),
             (rth.HomeReachability(rth.RthHomeReachability.CRITICAL), "Home: critical", 2),
             (
                 rth.RthAutoTrigger(rth.AutoTriggerReason.BATTERY_CRITICAL_SOON, 12),
-                "Returning home by itself in 12 s",
+                "Drone returns home in 12 s",
                 4,
             ),
             (ardrone3.AlertStateChanged(ardrone3.AlertState.CUT_OUT), "Alert: cut out", 2),

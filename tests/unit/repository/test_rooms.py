@@ -18,7 +18,7 @@ else:
 REPOSITORY = Path(__file__).parents[3]
 PACKAGE = REPOSITORY / "anafi_mav"
 
-KIT = {"errors", "units", "geo", "clock", "documents", "models", "printable", "state_lock", "subject"}
+KIT = {"errors", "units", "geo", "clock", "documents", "models", "printable", "state_lock", "subject", "texts"}
 GUARDED = {"lxml", "pymavlink"}
 """Libraries of the build and the tests: no room may import them."""
 
