@@ -27,7 +27,10 @@ def main() -> int:
 
 
 def _end_at_once_on_interrupt(status: int) -> None:
-    """Let SIGINT end the process with this status, unless it is ignored, as for a shell's background jobs."""
+    """Let SIGINT end the process with this status, unless SIGINT is ignored.
+
+    A shell ignores it for its background jobs.
+    """
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
         signal.signal(signal.SIGINT, lambda number, frame: os._exit(status))
 

@@ -1,7 +1,8 @@
-"""Time as a value that is handed in, and the one timer. Cores never read a clock: their shell passes `now`.
+"""Time as a value that is handed in, and the one timer.
 
-`Clock.monotonic` is the one time base of the process (seconds, never steps back); the asyncio loop's own
-time is the same clock, so deadlines of cores can be given to `loop.call_at` unchanged.
+Cores never read a clock: their shell passes `now`. `Clock.monotonic` is the one time base of the process (seconds,
+never steps back); the asyncio loop's own time is the same clock, so deadlines of cores can be given to `loop.call_at`
+unchanged.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from typing import Protocol
 
 
 class Clock(Protocol):
-    """What a shell needs to know about time."""
+    """The two readings of time that a shell needs."""
 
     def monotonic(self) -> float:
         """Seconds since an arbitrary start; never steps."""
@@ -33,7 +34,10 @@ class SystemClock:
 
 
 class Alarm:
-    """Calls a function once, at a time of the event loop's clock. Setting it again replaces the time set before."""
+    """Calls a function once, at a time of the event loop's clock.
+
+    Setting it again replaces the time set before.
+    """
 
     __slots__ = ("_call", "_handle")
 

@@ -1,4 +1,4 @@
-"""A YAML file that somebody wrote by hand: read with care, and what is wrong with it told in one line."""
+"""Reads YAML files written by hand; an error is one line that names the place."""
 
 from __future__ import annotations
 
@@ -51,7 +51,10 @@ def one_line(text: str) -> str:
 
 
 class _Loader(yaml.SafeLoader):
-    """SafeLoader that refuses a key written twice: YAML forbids it, PyYAML keeps the last one silently."""
+    """SafeLoader that refuses a repeated key.
+
+    YAML forbids it, PyYAML keeps the last one silently.
+    """
 
     def compose_mapping_node(self, anchor: Any) -> yaml.MappingNode:
         node = super().compose_mapping_node(anchor)

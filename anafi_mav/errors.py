@@ -12,11 +12,14 @@ class AnafiMavError(Exception):
 
 
 class LocalProtocolError(AnafiMavError, ValueError):
-    """The program asked for something that the protocol cannot express (value out of range, wrong state)."""
+    """The program asked for what the protocol cannot express: value out of range, wrong state."""
 
 
 class RemoteProtocolError(AnafiMavError):
-    """The peer broke the protocol in a way that ends the exchange, e.g. an unreadable handshake reply."""
+    """The peer broke the protocol in a way that ends the exchange.
+
+    An unreadable handshake reply, for example.
+    """
 
 
 class LinkLost(AnafiMavError, ConnectionError):
@@ -31,7 +34,10 @@ class LinkLost(AnafiMavError, ConnectionError):
 
 
 class HandshakeRefused(LinkLost):
-    """What answers there refuses the connection; `status` is its number for why, which Parrot does not explain."""
+    """The device refuses the connection.
+
+    `status` is its number for the reason, which Parrot does not explain.
+    """
 
     def __init__(self, where: str, status: int) -> None:
         super().__init__(f"{where} refused the connection (status {status})")
@@ -39,7 +45,9 @@ class HandshakeRefused(LinkLost):
 
 
 class CommandTimeout(AnafiMavError, TimeoutError):
-    """The drone did not confirm a command in time. ARSDK has no refusal: silence is how a drone says no.
+    """The drone did not confirm a command in time.
+
+    ARSDK has no refusal: silence is how a drone says no.
 
     `command` is Parrot's name of the command, `seconds` how long we waited.
     """
@@ -51,7 +59,10 @@ class CommandTimeout(AnafiMavError, TimeoutError):
 
 
 class CommandRejected(AnafiMavError):
-    """The drone, or its present state as it reported it, refuses the command. `reason` is shown to users."""
+    """The drone, or its present state as it reported it, refuses the command.
+
+    `reason` is shown to users.
+    """
 
     def __init__(self, reason: str) -> None:
         super().__init__(reason)
@@ -59,7 +70,10 @@ class CommandRejected(AnafiMavError):
 
 
 class NotSupported(AnafiMavError):
-    """This drone has no such feature: it did not announce it when it connected. `feature` names it."""
+    """This drone has no such feature: it did not announce it when it connected.
+
+    `feature` names it.
+    """
 
     def __init__(self, feature: str) -> None:
         super().__init__(f"this drone has no {feature}")
@@ -67,8 +81,10 @@ class NotSupported(AnafiMavError):
 
 
 class PlanError(AnafiMavError, ValueError):
-    """A flight plan is unusable: `source` names the file, `item` the item that is wrong, counted from 0 (None: none in
-    particular), `problem` says what it is in a clause."""
+    """A flight plan is unusable.
+
+    `source` names the file, `item` the wrong item, counted from 0 (None: no particular item), `problem` is a clause.
+    """
 
     def __init__(self, source: str, problem: str, item: int | None = None) -> None:
         where = f"{source}: " if item is None else f"{source}: item {item}: "
@@ -79,8 +95,10 @@ class PlanError(AnafiMavError, ValueError):
 
 
 class ConfigError(AnafiMavError, ValueError):
-    """The configuration is unusable at `key_path` ("drones[0].sysid") of the file `source`; the text says what was
-    expected there."""
+    """The configuration is unusable at `key_path` ("drones[0].sysid") of the file `source`.
+
+    The text names what was expected there.
+    """
 
     def __init__(self, key_path: str, problem: str, source: str = "") -> None:
         super().__init__(": ".join(part for part in (source, key_path, problem) if part))

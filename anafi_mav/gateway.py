@@ -3,7 +3,7 @@
     async with Gateway(config) as gateway:
         await gateway.ready(10.0)
 
-One supervisor per drone connects, hands the drone to its `System`, waits for the link to end and begins anew. The
+One supervisor per drone connects, hands the drone to its `System`, waits for the link to end and connects again. The
 gateway knows addresses only; that some of them are simulated is the command line's business.
 """
 
@@ -124,7 +124,7 @@ class _Supervised:
             await self._contend()
 
     async def _contend(self) -> None:
-        """Judge a connection that was lost, and stay away for a while if another controller has taken the drone."""
+        """Stay away for a while if another controller has taken the drone of a lost connection."""
         drone, contention = self.drone, self._contention
         if drone.handshake_at == self._judged or await drone.heard_again():
             return
@@ -163,7 +163,7 @@ class _Supervised:
         return HeldDrone(self.config.name, self.config.address, self.config.interface, serial)
 
     def line(self) -> str:
-        """One line for people: who, where, and how it stands."""
+        """Return one line for people: the drone, its address and its state."""
         where = f" on {self.config.interface}" if self.config.interface else ""
         head = f"drone {self.config.name}: system {self.config.sysid} at {self.config.address}{where}"
         if not self.system.active:
@@ -179,7 +179,10 @@ class _Supervised:
 
 
 class Gateway:
-    """Drones on one side, MAVLink endpoints on the other. Every drone of the configuration needs an address."""
+    """Drones on one side, MAVLink endpoints on the other.
+
+    Every drone of the configuration needs an address.
+    """
 
     def __init__(self, config: Config, *, clock: Clock | None = None) -> None:
         for index, drone in enumerate(config.drones):
@@ -204,10 +207,14 @@ class Gateway:
         await self.close()
 
     async def open(self) -> None:
-        """Lock the state folder and open every endpoint. Raises `ConfigError`; nothing is then left open or locked.
+        """Lock the state folder and open every endpoint.
 
-        `start` does it where this has not. It is a step of its own for the command line, which starts a simulator only
-        when all endpoints are open."""
+        Raises `ConfigError`; nothing is then left open or locked.
+
+        `start` does it where this has not. It is a step of its own for the command line, which starts a simulator
+        only
+        when all endpoints are open.
+        """
         if self._node.endpoints:
             return
         self._lock_state()
@@ -218,7 +225,7 @@ class Gateway:
             raise
 
     def _lock_state(self) -> None:
-        """One gateway per state folder: two would take the drones from each other and overwrite each other's plans."""
+        """Lock the state folder: two gateways would take each other's drones and overwrite plans."""
         self._state = state_folder(self.config.state)
         if self._state is None:
             return
@@ -246,12 +253,15 @@ class Gateway:
             self._lock.write([supervised.held() for supervised in self._supervised])
 
     def state_problems(self) -> list[str]:
-        """Return why what outlives the gateway could not be read or kept, a line each; empty when all is well."""
+        """Return a line for each problem with reading or storing state; empty without problems."""
         problems = [self._state_problem] if self._state_problem else []
         return problems + [s.system.memory.problem for s in self._supervised if s.system.memory.problem]
 
     async def start(self) -> None:
-        """Open every endpoint, then begin to connect to every drone. Raises `ConfigError`; nothing is left open."""
+        """Open every endpoint, then begin to connect to every drone.
+
+        Raises `ConfigError`; nothing is left open.
+        """
         await self.open()
         started = self._clock.monotonic()
         for config in self.config.drones:
@@ -274,7 +284,10 @@ class Gateway:
         self._write_lock()
 
     async def ready(self, timeout: float) -> bool:
-        """Wait until each drone is connected or one attempt has failed. True when all of them are connected."""
+        """Wait until each drone is connected or one attempt has failed.
+
+        True when all of them are connected.
+        """
         waits = [asyncio.ensure_future(s.first_attempt.wait()) for s in self._supervised]
         if waits:
             _, pending = await asyncio.wait(waits, timeout=timeout)
@@ -308,7 +321,7 @@ class Gateway:
 
     @property
     def systems(self) -> tuple[System, ...]:
-        """The MAVLink system of each drone in the order of the configuration; empty before `start`."""
+        """MAVLink system of each drone, listed as in the configuration; empty before `start`."""
         return tuple(supervised.system for supervised in self._supervised)
 
     def lines(self) -> list[str]:
@@ -318,7 +331,7 @@ class Gateway:
         ]
 
     def counters(self) -> Counter[str]:
-        """Everything counted: by the MAVLink side under its own names, by each drone's wire behind the drone's name."""
+        """Return all counters: MAVLink's under their own names, each drone's behind its name."""
         result = self._node.counters()
         for s in self._supervised:
             result.update({f"{s.config.name}.{name}": count for name, count in s.drone.counters.items()})

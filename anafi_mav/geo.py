@@ -1,4 +1,7 @@
-"""Geodesy on the WGS84 ellipsoid (pyproj). Degrees and metres; bearings clockwise from north."""
+"""Geodesy on the WGS84 ellipsoid (pyproj).
+
+Degrees and metres; bearings clockwise from north. No I/O.
+"""
 
 from __future__ import annotations
 

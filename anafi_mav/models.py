@@ -1,8 +1,8 @@
-"""The models of the ANAFI family: one record each, with what has to be known before a drone has reported anything.
+"""The models of the ANAFI family, a record each: facts needed before a drone reports any.
 
-These are facts of Parrot's data sheets and of the anafi_ros paper's table of models, and the same for everybody. What a
-drone reports is not here: the simulator sends its own values, and the other side takes what it receives. How an
-airframe flies is not here either: those are the simulator's figures (`sim.world.model`).
+They are facts of Parrot's data sheets and of the anafi_ros paper's table of models, and shared by all rooms. Values
+that a drone reports are not here: the simulator sends its own, and the other side takes what it receives. Figures of
+the airframe are not here either: they are the simulator's (`sim.world.model`).
 """
 
 from __future__ import annotations
@@ -21,10 +21,12 @@ class Payload(enum.Enum):
 
 
 class Intrinsics(msgspec.Struct, frozen=True):
-    """Pinhole model of the live video at zoom 1, in pixels; distortion as in OpenCV's five-parameter model.
+    """Pinhole model of the live video at zoom 1, in pixels.
 
-    Parrot publishes no calibration. These are the ones that anafi_ros carries (camera/camera_info of its paper), each
-    measured on one drone of its model; another of the same model differs by about a percent.
+    Distortion as in OpenCV's five-parameter model. Parrot publishes no calibration. These are the ones that anafi_ros
+    carries (camera/camera_info of its paper), each measured on one drone of its model; another of the same model
+    differs
+    by about a percent.
     """
 
     width: int
@@ -41,7 +43,7 @@ class Intrinsics(msgspec.Struct, frozen=True):
 
 
 class PlanFigures(msgspec.Struct, frozen=True, kw_only=True):
-    """What a flight plan is written for and checked against before the drone is there (anafi_ros paper)."""
+    """Figures for writing and checking a flight plan without a drone (anafi_ros paper)."""
 
     version: Literal[1, 2]
     """Of Parrot's flight-plan format."""
@@ -63,7 +65,7 @@ class Model(msgspec.Struct, frozen=True, kw_only=True):
     protobuf: bool
     """True for models that report some of their states in protobuf only, on request."""
     lens: Intrinsics | None
-    """The lens of its main camera; None when nobody has measured one."""
+    """Lens of its main camera; None when no calibration is known."""
     payloads: tuple[Payload, ...]
     """Its sensors besides the main camera."""
     battery_cells: int | None
@@ -79,11 +81,17 @@ class Model(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def plan_version(self) -> int | None:
-        """Version of Parrot's flight-plan format that it flies; None when it is not known by the model."""
+        """Version of Parrot's flight-plan format that it flies.
+
+        None when the model alone does not decide it.
+        """
         return None if self.plan_figures is None else self.plan_figures.version
 
     def plans(self) -> PlanFigures:
-        """Return the figures of the plans that it flies. Raises `ValueError` when they are not known."""
+        """Return the figures of its flight plans.
+
+        Raises `ValueError` when they are not known.
+        """
         if self.plan_figures is None:
             raise ValueError(f"{self.title}: it is not known what plans it flies")
         return self.plan_figures

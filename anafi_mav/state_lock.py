@@ -38,14 +38,14 @@ TRIES, TRY_EVERY = 5, 0.05
 that is being written may be read half."""
 
 NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL)
-"""What locking says on a file system that has no locks, like some network drives."""
+"""Errors of locking on a file system without locks, like some network drives."""
 
 _HELD = (errno.EWOULDBLOCK, errno.EACCES, errno.EDEADLK)
-"""What locking says when another has the lock: flock, fcntl on some systems, msvcrt."""
+"""Errors of locking when another process holds the lock: flock, fcntl on some systems, msvcrt."""
 
 
 def state_folder(configured: str | None) -> Path | None:
-    """Return the folder of what outlives the gateway, None when the user has no home (XDG Base Directory)."""
+    """Return the state folder, or None when the user has no home (XDG Base Directory)."""
     given = os.environ.get("XDG_STATE_HOME", "")
     try:
         if configured is not None:
@@ -74,7 +74,10 @@ class Holder(msgspec.Struct, frozen=True):
     drones: tuple[HeldDrone, ...] = ()
 
     def find(self, address: str, interface: str | None = None, serial: str = "") -> HeldDrone | None:
-        """Return its drone at this address or with this serial number. Without an interface any one matches."""
+        """Return its drone at this address or with this serial number.
+
+        Without an interface any one matches.
+        """
         for drone in self.drones:
             if serial and drone.serial == serial:
                 return drone
@@ -84,15 +87,20 @@ class Holder(msgspec.Struct, frozen=True):
 
 
 class StateLock:
-    """The lock of one state folder: `acquire`, `write` whenever a drone connects or disconnects, `release`."""
+    """The lock of one state folder.
+
+    `acquire`, `write` whenever a drone connects or disconnects, `release`.
+    """
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._file: int | None = None
 
     def acquire(self) -> Holder | None:
-        """Lock the folder and return None, or return the gateway that holds it. Raises `OSError` for a folder that
-        cannot be used."""
+        """Lock the folder and return None, or return the gateway that holds it.
+
+        Raises `OSError` for a folder that cannot be used.
+        """
         self._folder.mkdir(parents=True, exist_ok=True)
         file = os.open(self._folder / FILE, os.O_RDWR | os.O_CREAT, 0o644)
         try:
@@ -174,7 +182,10 @@ else:
     import fcntl
 
     def _lock(file: int) -> bool:
-        """Lock an open file; False when another holds it. Raises `OSError` where the file system has no locks."""
+        """Lock an open file; False when another holds it.
+
+        Raises `OSError` where the file system has no locks.
+        """
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:

@@ -1,7 +1,7 @@
-"""Conversions between ARSDK's units, MAVLink's and ours. Pure functions of plain numbers.
+"""Conversions between ARSDK's units, MAVLink's and ours. No I/O.
 
-Angles wrap here and nowhere else. MAVLink integers saturate instead of wrapping round: a value the field
-cannot hold is reported as the nearest it can.
+Pure functions of plain numbers. Angles wrap here and nowhere else. MAVLink integers saturate instead of wrapping
+round: a value the field cannot hold is reported as the nearest it can.
 """
 
 from __future__ import annotations

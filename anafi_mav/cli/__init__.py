@@ -1,6 +1,7 @@
-"""The command line: one small module per subcommand, each with `add_arguments(parser)` and `run(arguments)`.
+"""Command line: one small module for each subcommand.
 
-A module is imported when its command is asked for, so that a simulator does not load the MAVLink side.
+Each module has `add_arguments(parser)` and `run(arguments)`. It is imported when its command is called, so that a
+simulator does not load the MAVLink side.
 """
 
 from __future__ import annotations
@@ -30,13 +31,16 @@ COMMANDS = {
 
 
 class Command(Protocol):
-    """What each module of this folder offers."""
+    """Interface of each subcommand's module."""
 
     def add_arguments(self, parser: argparse.ArgumentParser) -> None:
         """Declare the options of the command."""
 
     def run(self, arguments: argparse.Namespace) -> int:
-        """Do it; returns the exit status. Raises `AnafiMavError` for what one line on stderr explains."""
+        """Do it; returns the exit status.
+
+        Raises `AnafiMavError` for what one line on stderr explains.
+        """
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -1,4 +1,7 @@
-"""Finds loopback addresses for simulated drones: each has a whole one to itself, with the ports of the aircraft."""
+"""Finds loopback addresses for simulated drones.
+
+Each drone has an address of its own, with the ports of the aircraft.
+"""
 
 from __future__ import annotations
 
@@ -19,18 +22,27 @@ RTSP_PORT, RTSP_PORT_FOR_USERS = 554, 8554
 
 
 class Ports(NamedTuple):
-    """Where the two servers of a simulated drone are. What is wanted: None is the aircraft's, or its stand-in."""
+    """Ports of the two servers of a simulated drone.
+
+    In a request, None means the aircraft's port or its substitute.
+    """
 
     http: int
     rtsp: int
 
 
 CANDIDATES = [f"127.0.42.{host}" for host in range(1, 255)] + ["127.0.0.1"]
-"""Where simulated drones live. The last is for systems whose loopback is that one address (macOS)."""
+"""Addresses for simulated drones.
+
+The last is for systems whose loopback is that one address (macOS).
+"""
 
 
 def spot(text: str) -> dict[str, str]:
-    """An address as people write it on the command line, "192.168.42.1" or "192.168.42.1%wlan1", as keys of a drone."""
+    """Convert an address of the command line to the configuration keys of a drone.
+
+    "192.168.42.1" or "192.168.42.1%wlan1".
+    """
     address, percent, interface = text.partition("%")
     return {"address": address, "interface": interface} if percent else {"address": address}
 
@@ -50,7 +62,10 @@ class Reservations(contextlib.ExitStack):
         rtsp_port: int | None,
         avoid: Collection[str | None] = (),
     ) -> tuple[str, Ports]:
-        """The first address whose ports are free, and the ports of its servers. Raises `ConfigError`."""
+        """The first address whose ports are free, and the ports of its servers.
+
+        Raises `ConfigError`.
+        """
         for address in CANDIDATES:
             if address in avoid:
                 continue
@@ -62,7 +77,10 @@ class Reservations(contextlib.ExitStack):
         raise ConfigError(key_path, f"expected free ports on one of {CANDIDATES[0]} to {CANDIDATES[-2]}, found none")
 
     def take(self, address: str, discovery_port: int, http_port: int | None, rtsp_port: int | None) -> Ports:
-        """Mark `address` as ours; returns the ports of its servers. Raises OSError if a port is not free."""
+        """Mark `address` as ours; returns the ports of its servers.
+
+        Raises OSError if a port is not free.
+        """
         with contextlib.ExitStack() as attempt:
             attempt.enter_context(_bound(socket.SOCK_DGRAM, address, discovery_port))
             with _bound(socket.SOCK_DGRAM, address, C2D_PORT):
@@ -89,7 +107,10 @@ class Reservations(contextlib.ExitStack):
 
 
 def _server_port(address: str, wanted: int | None, usual: int, stand_in: int) -> int:
-    """The port that a server may have there: `wanted`, else the usual or its stand-in. Raises OSError if taken."""
+    """The port that a server may have there: `wanted`, else the usual or its stand-in.
+
+    Raises OSError if taken.
+    """
     if wanted is None:
         try:
             _bound(socket.SOCK_STREAM, address, usual).close()
@@ -101,7 +122,10 @@ def _server_port(address: str, wanted: int | None, usual: int, stand_in: int) ->
 
 
 def _bound(kind: socket.SocketKind, address: str, port: int) -> socket.socket:
-    """A socket at that place; raises OSError (EADDRINUSE, EADDRNOTAVAIL, EACCES) if it cannot be had."""
+    """Return a socket bound to the address and port.
+
+    Raises OSError (EADDRINUSE, EADDRNOTAVAIL, EACCES) if they are not available.
+    """
     bound = socket.socket(socket.AF_INET, kind)
     try:
         if kind is socket.SOCK_STREAM:  # as asyncio's servers do it: a port is free while old connections fade

@@ -1,4 +1,4 @@
-"""The simulator as a process of its own: `anafi-mav sim` with every simulated drone of a configuration in it."""
+"""Simulator in its own process: `anafi-mav sim` with a configuration's simulated drones."""
 
 from __future__ import annotations
 
@@ -29,7 +29,10 @@ REFUSED = 2
 
 
 class SimulatorProcess:
-    """Started by `start`, ended by `close`. It ends itself when its stdin closes, so it cannot outlive us."""
+    """Started by `start`, ended by `close`.
+
+    It ends itself when its stdin closes, so it cannot outlive us.
+    """
 
     def __init__(self) -> None:
         self._process: asyncio.subprocess.Process | None = None
@@ -38,10 +41,11 @@ class SimulatorProcess:
         self._ready: asyncio.Future[None] = asyncio.get_running_loop().create_future()
 
     async def start(self, fleet: Mapping[str, object], log: Path | None = None) -> None:
-        """Start it with the drones of `fleet` (the JSON of `anafi-mav sim --fleet`) and wait until it is ready.
+        """Start the simulator with the drones of `fleet` and wait until it is ready.
 
-        It writes its log to `log`, an absolute path because it runs in another directory.
-        Raises `ConfigError` if it refuses the fleet, `AnafiMavError` if it fails otherwise.
+        `fleet` is the JSON of `anafi-mav sim --fleet`. The simulator writes its log to `log`, an absolute path
+        because it runs in another directory. Raises `ConfigError` if it refuses the fleet, `AnafiMavError` if it
+        fails otherwise.
         """
         logging = () if log is None else ("--log", str(log))
         self._process = process = await asyncio.create_subprocess_exec(
@@ -99,7 +103,7 @@ class SimulatorProcess:
         await asyncio.gather(*self._readers, return_exceptions=True)
 
     async def _read_lines(self) -> None:
-        """Looks for the line that begins with `ready`; what follows is read so that the pipe never fills."""
+        """Wait for the line that begins with `ready`, and read on so that the pipe never fills."""
         assert self._process is not None
         assert self._process.stdout is not None
         async for line in self._process.stdout:

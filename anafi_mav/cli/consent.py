@@ -1,7 +1,8 @@
-"""Permission to connect to a drone: a handshake takes it from the controller that has it, in the air too.
+"""Permission to connect to a drone, because a handshake disconnects its present controller.
 
-Whether another controller is connected cannot be known before the handshake. So `info` and `doctor` ask first, and
-without a terminal they connect only with `--take`. What a gateway of this machine holds they never connect to.
+This happens in the air too. Whether another controller is connected cannot be known before the handshake. So `info`
+and `doctor` ask first, and without a terminal they connect only with `--take`. They never connect to a drone that a
+gateway of this host holds.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ class Held(NamedTuple):
 
 
 def gateway_of(state: str | None, address: str, interface: str | None, serial: str = "") -> Held | None:
-    """Return the gateway of this machine that holds a drone, known by its address or its serial number."""
+    """Return the gateway of this host that holds the drone with this address or serial number."""
     holder = read_holder(state_folder(state))
     drone = None if holder is None else holder.find(address, interface, serial)
     return None if holder is None or drone is None else Held(holder, drone)

@@ -1,7 +1,7 @@
-"""`anafi-mav discover`: which aircraft and controllers can be reached from here, as lines for a configuration.
+"""`anafi-mav discover`: lists reachable aircraft and controllers, as configuration lines.
 
-Looking asks a device for its introduction and nothing else, so it disturbs nobody who is connected to it. The usual
-addresses are tried on the interfaces that are in their networks, so nothing is sent to routers.
+Only the discovery description of a device is requested, so a controller that is connected to it is not disturbed. The
+usual addresses are tried on the interfaces that are in their networks, so nothing is sent to routers.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ USUAL = {
     "192.168.53.1": "a Skycontroller by USB",
     "10.202.0.1": "Parrot's own simulator",
 }
-"""Where Parrot's devices are (Olympe, olympe/connection)."""
+"""Usual addresses of Parrot's devices (Olympe, olympe/connection)."""
 
 MAX_TIMEOUT = 60.0
 MAX_NAME = 32
@@ -51,7 +51,7 @@ class Place:
 
 @dataclass(frozen=True)
 class Find:
-    """Who answered there."""
+    """Device that answered, and its place."""
 
     place: Place
     device: DeviceInfo
@@ -122,7 +122,10 @@ def _place(text: str) -> Place:
 
 
 def places(wanted: Sequence[Place], here: Sequence[tuple[str, ipaddress.IPv4Network]]) -> list[Place]:
-    """Where to look: what was asked for, and every address on every interface that is in its network."""
+    """Return the places to try: the requested ones, and each address on its interfaces.
+
+    Those are the interfaces that are in the network of the address.
+    """
     result = list(wanted)
     for address in [*USUAL, *(place.address for place in wanted if place.interface is None)]:
         on = [interface for interface, network in here if ipaddress.IPv4Address(address) in network]
@@ -133,7 +136,10 @@ def places(wanted: Sequence[Place], here: Sequence[tuple[str, ipaddress.IPv4Netw
 
 
 async def discover(where: Collection[Place], timeout: float) -> list[Find]:
-    """Look at all of these at once; each device once, by its interface where two answer to one address."""
+    """Try all these places at once and return each device once.
+
+    It is listed with its interface if known, since two devices may answer to one address.
+    """
     answers = await asyncio.gather(*(_look(place, timeout) for place in where))
     finds: dict[tuple[str, int], Find] = {}
     for find in answers:
@@ -169,7 +175,7 @@ def configuration(finds: Sequence[Find]) -> list[str]:
 
 
 def title(device: DeviceInfo) -> str:
-    """What a device is, for people."""
+    """Return the display name of a device's model."""
     if device.model_id in CONTROLLERS:
         return f"{CONTROLLERS[device.model_id]} with the drone behind it,"
     model = MODELS.get(device.model_id)

@@ -1,7 +1,8 @@
-"""`anafi-mav doctor ADDRESS`: one line for each thing that has to be right before a drone can be flown, with the mend.
+"""`anafi-mav doctor ADDRESS`: checks the conditions for flying a drone, a line each.
 
-Everything up to the drone's introduction disturbs no other controller. The handshake does, so the rest needs
-permission: see `consent`. docs/troubleshooting.md explains each line.
+A line for a failed check contains its repair. Everything up to the drone's discovery description disturbs no other
+controller. The handshake does, so the rest needs permission: see `consent`. docs/troubleshooting.md explains each
+line.
 """
 
 from __future__ import annotations
@@ -47,7 +48,7 @@ class Finding(NamedTuple):
     wrong: bool
     fact: str
     mend: str = ""
-    """What to do about it; empty when nothing is wrong."""
+    """Repair, as an instruction; empty when nothing is wrong."""
 
     def __str__(self) -> str:
         return f"{self.check}: WRONG: {self.fact}; {self.mend}" if self.wrong else f"{self.check}: ok: {self.fact}"
@@ -62,7 +63,7 @@ def wrong(check: str, fact: str, mend: str) -> Finding:
 
 
 class Place(NamedTuple):
-    """What is examined."""
+    """Address, interface and ports that are examined."""
 
     address: str
     interface: str | None = None
@@ -216,7 +217,10 @@ _RESTART = "restart the drone and wait until its light is steady"
 
 
 def ports(place: Place, states: dict[int, str], device: DeviceInfo | None) -> Iterator[Finding]:
-    """Judge the ports by what the device is. A Skycontroller 4 has everything behind its mux."""
+    """Judge the ports by the kind of device.
+
+    A Skycontroller 4 has everything behind its mux.
+    """
     if OPEN not in states.values():
         if REFUSED in states.values():
             fact = f"{place.address} answers, and none of {', '.join(map(str, states))} is open"

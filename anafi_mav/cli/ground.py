@@ -1,4 +1,7 @@
-"""A small ground station on one endpoint: hears a vehicle, transfers plans, gives orders. For `anafi-mav plan`."""
+"""Small ground station on one endpoint: receives messages, transfers plans, sends commands.
+
+For `anafi-mav plan`.
+"""
 
 from __future__ import annotations
 
@@ -44,7 +47,7 @@ class Ground:
     def __init__(self, url: str) -> None:
         self.url = url
         self.on_message: Callable[[Inbound], None] = lambda inbound: None
-        """Told of what comes from the vehicle that was chosen."""
+        """Called with each message of the vehicle that was chosen."""
         self.target: tuple[int, int] = (0, 0)
         """System and component of that vehicle."""
         self.heartbeat: Any = None
@@ -75,7 +78,7 @@ class Ground:
         await self._node.close()
 
     def send(self, message: Message) -> None:
-        """To whoever is there."""
+        """Send a message to every peer of the endpoint."""
         self._node.send(message, sysid=SYSID, compid=COMPID)
 
     async def _beat(self) -> None:
@@ -116,7 +119,10 @@ class Ground:
     # Who is there.
 
     async def vehicle(self, sysid: int | None) -> None:
-        """Wait for the vehicle with this system id, or for the only one. Raises `LinkLost` and `ConfigError`."""
+        """Wait for the vehicle with this system id, or for the only one.
+
+        Raises `LinkLost` and `ConfigError`.
+        """
         now = self._clock.monotonic()
         limit = now + VEHICLE_LIMIT
         first: float | None = None
@@ -145,7 +151,7 @@ class Ground:
     # What is done with it.
 
     async def run(self, transfer: Upload | Download, progress: Callable[[int, int], None]) -> None:
-        """Carry a transfer to its end; `progress` hears how many items of how many have been carried."""
+        """Run a transfer to its end; `progress` is called with (items transferred, items in total)."""
         self._transfer = transfer
         try:
             for message in transfer.start(self._clock.monotonic()):
@@ -163,7 +169,10 @@ class Ground:
             self._transfer = None
 
     async def command(self, id: int, *params: float) -> None:
-        """An order, until the vehicle has answered. Raises `CommandRejected` and `LinkLost`."""
+        """Send a command and wait for its acknowledgement.
+
+        Raises `CommandRejected` and `LinkLost`.
+        """
         values = [*params, *([0.0] * (7 - len(params)))]
         name = dialect.enums["MAV_CMD"][id].name.removeprefix("MAV_CMD_")
         for confirmation in range(COMMAND_TRIES):

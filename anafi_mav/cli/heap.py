@@ -6,9 +6,11 @@ import gc
 
 
 def settle() -> None:
-    """Let the collector pass over everything that is there by now. Call it once, before anything is connected.
+    """Exclude all objects that exist now from garbage collection.
 
-    A hundred thousand objects of modules, above all of the dialect, live as long as the process. To look through them
-    stops everything for a twentieth of a second, again and again, and whoever builds a long list makes it happen.
+    Call it once, before anything is connected.
+
+    A hundred thousand objects of modules, above all of the dialect, live as long as the process. Scanning them
+    stops everything for a twentieth of a second, again and again, and code that builds a long list triggers it.
     """
     gc.freeze()

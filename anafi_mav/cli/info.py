@@ -1,6 +1,7 @@
-"""`anafi-mav info ADDRESS`: model, serial number, firmware, battery, features and limits of one drone.
+"""`anafi-mav info ADDRESS`: prints the properties of one drone.
 
-It connects as the gateway does, which takes the drone from any other controller: see `consent`.
+They are model, serial number, firmware, battery, features and limits. It connects as the gateway does, which
+disconnects any other controller: see `consent`.
 """
 
 from __future__ import annotations
@@ -64,7 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 async def _serial(address: str, interface: str | None = None) -> str:
-    """Return the serial number in the introduction of the device there; empty when it gives none."""
+    """Return the serial number in a device's discovery description; empty when it has none."""
     try:
         return (await look_either(address, interface=interface)).serial
     except (AnafiMavError, OSError):
@@ -88,7 +89,7 @@ async def _ask(address: str, interface: str | None = None) -> dict[str, Any]:
 
 
 def _facts(drone: Drone) -> dict[str, Any]:
-    """What the drone has reported of itself; None where it has not."""
+    """Return the properties that the drone has reported; None for the others."""
     identity, battery, gps, product = drone.identity, drone.battery.state, drone.gps.state, drone.product.state
     controller = drone.controller.state
     return {

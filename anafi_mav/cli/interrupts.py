@@ -21,7 +21,10 @@ def raise_on_interrupt() -> None:
 
 
 def run(work: Coroutine[Any, Any, ResultT]) -> ResultT:
-    """Run a coroutine as asyncio.run does; SIGINT cancels it. Raises KeyboardInterrupt then, once it has ended."""
+    """Run a coroutine as asyncio.run does; SIGINT cancels it.
+
+    Raises KeyboardInterrupt then, once it has ended.
+    """
     interrupted = False
 
     async def guarded() -> ResultT:

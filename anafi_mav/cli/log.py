@@ -1,7 +1,7 @@
-"""The log of the commands that run for long: one line per event, with time, level and source.
+"""Log of the long-running commands: one line per event, with time, level and source.
 
 Text of peers is cleaned, and a line that repeats is written once every few seconds with a count: a program that sends
-a refused command ten times a second must not hide what else happens.
+a refused command ten times a second must not hide other events.
 """
 
 from __future__ import annotations
@@ -27,7 +27,10 @@ _NUMBER = re.compile(r"\d+(\.\d+)?")
 
 
 class CleanFormatter(logging.Formatter):
-    """Formats a record as one line of printable text with its drone; a traceback follows line by line."""
+    """Formats a record as one line of printable text that names its drone.
+
+    A traceback follows line by line.
+    """
 
     def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802
         subject = DRONE.get()

@@ -1,4 +1,4 @@
-"""Numbers of the command line, each mistake told in one line that names the option."""
+"""Numbers of the command line; each mistake is reported in one line that names the option."""
 
 from __future__ import annotations
 
@@ -33,7 +33,10 @@ def number(flag: str, text: str, wanted: str) -> float:
 
 
 def size(flag: str, text: str) -> int:
-    """Bytes, with k, M or G behind for a thousand, a million or a billion of them. Raises `ConfigError`."""
+    """Bytes, with k, M or G behind for a thousand, a million or a billion of them.
+
+    Raises `ConfigError`.
+    """
     factor = _UNITS.get(text[-1:], 1)
     return integer(flag, text if factor == 1 else text[:-1], "a number of bytes like 500k or 16G") * factor
 

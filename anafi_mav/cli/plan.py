@@ -1,4 +1,7 @@
-"""`anafi-mav plan`: flight plans as files (`plan_files`) and on vehicles (`plan_link`, `plan_fly`)."""
+"""`anafi-mav plan`: flight plans in files and on vehicles.
+
+Files: `plan_files`; vehicles: `plan_link`, `plan_fly`.
+"""
 
 from __future__ import annotations
 
@@ -45,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Do it. Raises `PlanError` for a plan that is none, `ConfigError` for a wrong option."""
+    """Run the action. Raises `PlanError` for an invalid plan, `ConfigError` for a wrong option."""
     log.set_up(logging.ERROR)  # how an endpoint fares is told when it matters
     name = ACTIONS[arguments.action].module
     module = importlib.import_module(f"anafi_mav.cli.{name}")

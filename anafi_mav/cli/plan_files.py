@@ -60,9 +60,10 @@ def _facts(plan: Plan) -> dict[str, Any]:
 
 
 def check(arguments: argparse.Namespace) -> int:
-    """Say what would go wrong with it on a model, on those of a fleet, or on all; 1 when it would on one of them.
+    """Report the problems of a plan on one model, on those of a fleet, or on all.
 
-    A Parrot file is for one kind of drone and does not say which: 1 when none of the models flies it.
+    Returns 1 when one of them has an error. A Parrot file is for one kind of drone and does not name it: 1 when
+    none of the models flies it.
     """
     name, plans, settings = arguments.file.name, _plans(arguments), limits(arguments)
     findings = {model: lint(plan, model, settings) for model, plan in plans.items()}
@@ -146,7 +147,9 @@ def convert(arguments: argparse.Namespace) -> int:
 
 
 def store(plan: Plan, arguments: argparse.Namespace, source: Path) -> None:
-    """Write a plan to `arguments.out` and say what that does not hold. Raises `PlanError` and `ConfigError`.
+    """Write a plan to `arguments.out` and say what that does not hold.
+
+    Raises `PlanError` and `ConfigError`.
 
     A drone gets what it can fly, translated, unless it is one of its own files already.
     """
@@ -164,7 +167,10 @@ def store(plan: Plan, arguments: argparse.Namespace, source: Path) -> None:
 
 
 def may_replace(out: Path, *, force: bool) -> None:
-    """Ask before a file is replaced. Raises `ConfigError` where there is no terminal to ask at, or the answer is no."""
+    """Ask before a file is replaced.
+
+    Raises `ConfigError` where there is no terminal to ask at, or the answer is no.
+    """
     if not out.exists() or force:
         return
     if not out.is_file():

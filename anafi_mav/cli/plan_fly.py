@@ -1,4 +1,4 @@
-"""`anafi-mav plan fly`: hands a plan to a vehicle, begins it and tells how far it is, until it is flown."""
+"""`anafi-mav plan fly`: uploads a plan to a vehicle, starts it and reports its progress."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ async def _fly(arguments: argparse.Namespace, sysid: int | None, plan: Plan) -> 
 
 
 class Follower:
-    """Reads what the vehicle tells of its mission, and tells it people."""
+    """Reads the mission progress that the vehicle reports, and prints it."""
 
     def __init__(self, ground: Ground, plan: Plan) -> None:
         self._ground = ground
@@ -62,7 +62,7 @@ class Follower:
         self._reached: set[int] = set()
         self._state = dialect.MISSION_STATE_UNKNOWN
         self._begun = False
-        """What was told before may be of another mission."""
+        """False: reports may still be of an earlier mission."""
         self._armed = False
         self._heard = asyncio.get_running_loop().time()
         self._problem: AnafiMavError | None = None

@@ -49,7 +49,10 @@ class Lists:
         return cls(plan.items, plan.home, tuple(fence_items(plan)), tuple(rally_items(plan)))
 
     def wire(self, kind: int, source: str, *, with_home: bool) -> list[PlanItem]:
-        """One of them as messages carry it; with home as item 0 as an ArduPilot wants it. Raises `PlanError`."""
+        """One of them as messages carry it; with home as item 0 as an ArduPilot wants it.
+
+        Raises `PlanError`.
+        """
         items = {MISSION: self.mission, FENCE: self.fence, RALLY: self.rally}[kind]
         carried = []
         for number, item in enumerate(items):
@@ -70,7 +73,10 @@ _HEADED = (dialect.MAV_CMD_NAV_WAYPOINT, dialect.MAV_CMD_NAV_TAKEOFF, dialect.MA
 
 
 def _without_none(item: Item) -> Item:
-    """ArduPilot has no word for "not set" but 0, and refuses NaN (AP_Mission.cpp sanity_check_params)."""
+    """Replace parameters that are not set by 0, as ArduPilot requires.
+
+    It refuses NaN (AP_Mission.cpp sanity_check_params).
+    """
     one, two, three, four, five, six, seven = (0.0 if value is None else value for value in item.params)
     return replace(item, params=(one, two, three, four, five, six, seven))
 
@@ -85,7 +91,10 @@ def _without_heading(item: Item) -> Item:
 
 
 def upload(arguments: argparse.Namespace) -> int:
-    """Hand it over; 1 when the gateway took it and cannot store it. Raises `Refused` with the vehicle's reason."""
+    """Hand it over; 1 when the gateway took it and cannot store it.
+
+    Raises `Refused` with the vehicle's reason.
+    """
     plan, sysid = plan_options.load(arguments), plan_options.sysid_of(arguments)
     texts = interrupts.run(_upload(arguments, sysid, plan))
     return 1 if NOT_KEPT in texts else 0
@@ -97,9 +106,9 @@ async def _upload(arguments: argparse.Namespace, sysid: int | None, plan: Plan) 
 
 
 async def give(ground: Ground, plan: Plan, source: str) -> list[str]:
-    """Upload the lists that a plan has and return the vehicle's texts; other lists stay as the vehicle has them.
+    """Upload the lists that a plan has and return the vehicle's texts.
 
-    Raises `Refused` and `PlanError`.
+    Other lists stay as the vehicle has them. Raises `Refused` and `PlanError`.
     """
     lists = Lists.of(plan)
     parts = {kind: lists.wire(kind, source, with_home=ground.first_item_is_home) for kind in NAMES}
@@ -187,7 +196,10 @@ async def _download(arguments: argparse.Namespace, sysid: int | None) -> Plan:
 
 
 async def take(ground: Ground) -> Plan:
-    """What a vehicle has. Raises `Refused` when it does not give its mission; fence and rally points may lack."""
+    """Download the plan of a vehicle.
+
+    Raises `Refused` when it does not send its mission; fence and rally points may be missing.
+    """
     source = f"system {ground.target[0]}"
     items = await _take_list(ground, MISSION, needed=True)
     home = None

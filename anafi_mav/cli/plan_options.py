@@ -1,4 +1,4 @@
-"""What the actions of `anafi-mav plan` are told, and the files that they are told of.
+"""Options of the actions of `anafi-mav plan`, and the files that they name.
 
 Apart from the actions, so that a table of a file does not wait for MAVLink's dialect to be loaded.
 """
@@ -25,7 +25,7 @@ MAX_HEIGHT = 1000.0
 
 
 ENDPOINT = "tcpout://127.0.0.1:5760"
-"""Where a gateway with the default configuration serves as many clients as come."""
+"""Endpoint at which a gateway with the default configuration serves any number of clients."""
 
 FAR = 10_000.0
 """m: more is no setting of a drone."""
@@ -50,7 +50,10 @@ def model_argument(parser: argparse.ArgumentParser) -> None:
 
 
 def load(arguments: argparse.Namespace) -> Plan:
-    """The plan that the arguments name. Raises `PlanError`, and only then `ConfigError` for an option."""
+    """The plan that the arguments name.
+
+    Raises `PlanError`, and only then `ConfigError` for an option.
+    """
     data = files.read(arguments.file)
     model = version(arguments.model)
     if model is None and arguments.file.suffix.lower() == PARROT:
@@ -85,7 +88,7 @@ def out_argument(parser: argparse.ArgumentParser) -> None:
 
 
 def target_format(path: Path, model: str | None) -> Format:
-    """What a file of this name is to be. Raises `ConfigError`."""
+    """Return the format of a file by its name. Raises `ConfigError`."""
     suffix = path.suffix.lower()
     if suffix == PARROT:
         found = version(model)
@@ -124,7 +127,7 @@ def check_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def limits(arguments: argparse.Namespace) -> Limits:
-    """What the drone is set to. Raises `ConfigError`."""
+    """Return the limits that are set on the drone. Raises `ConfigError`."""
 
     def metres(flag: str, text: str) -> float:
         wanted = f"metres, above 0 and up to {FAR:g}"
@@ -141,7 +144,7 @@ def limits(arguments: argparse.Namespace) -> Limits:
 
 
 def link_arguments(parser: argparse.ArgumentParser) -> None:
-    """Where the vehicle is."""
+    """Add the options that name the vehicle and its endpoint."""
     parser.add_argument(
         "--endpoint",
         default=ENDPOINT,

@@ -1,4 +1,4 @@
-"""`anafi-mav run`: the gateway, with a simulator beside it when the configuration has simulated drones."""
+"""`anafi-mav run`: the gateway, with a simulator for the configuration's simulated drones."""
 
 from __future__ import annotations
 
@@ -55,9 +55,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Be the gateway until SIGINT or SIGTERM; 1 when something could not be kept in the state folder.
+    """Run the gateway until SIGINT or SIGTERM.
 
-    Raises `ConfigError` before anything is started.
+    Returns 1 when something could not be kept in the state folder. Raises `ConfigError` before anything is started.
     """
     log.set_up((logging.WARNING, logging.INFO, logging.DEBUG)[min(arguments.verbose, 2)])
     try:
@@ -97,7 +97,10 @@ def _serve(arguments: argparse.Namespace) -> int:
 def configuration(
     path: Path | None, drones: Sequence[str] | None, endpoints: Sequence[str] | None, allow_kill: bool
 ) -> Config:
-    """The file at `path`, or the defaults, with what the command line says instead. Raises `ConfigError`."""
+    """The file at `path`, or the defaults, with what the command line says instead.
+
+    Raises `ConfigError`.
+    """
     config = load(path) if path is not None else Config()
     if drones:
         entries = [{"name": f"drone{sysid}", "sysid": sysid, **spot(text)} for sysid, text in enumerate(drones, 1)]
@@ -108,7 +111,10 @@ def configuration(
 
 
 class _Interrupts:
-    """SIGINT, SIGTERM and SIGHUP set `stop`; a SIGINT while drones fly asks for a second one first."""
+    """Signal handling: SIGINT, SIGTERM and SIGHUP set `stop`.
+
+    While drones fly a second SIGINT is required.
+    """
 
     def __init__(self) -> None:
         self.stop = asyncio.Event()
@@ -123,7 +129,10 @@ class _Interrupts:
             loop.add_signal_handler(number, self.receive, number)
 
     def unsaid(self) -> list[str]:
-        """Return what drones in the air do when the gateway ends, unless a first SIGINT has shown it."""
+        """Return what drones in the air do after the gateway ends, unless already shown.
+
+        A first SIGINT shows it.
+        """
         return [] if self._told else self.flying()
 
     def receive(self, number: signal.Signals) -> None:
@@ -278,7 +287,10 @@ def _without_none(values: dict[str, Any]) -> dict[str, Any]:
 
 
 def _scenarios(simulated: Mapping[int, SimConfig], addresses: Mapping[int, str]) -> dict[str, str]:
-    """The scenario files by address, each looked into now, so that a mistake is told before anything is started."""
+    """Return the scenario files by address.
+
+    Each file is read now, so that a mistake is reported before anything is started.
+    """
     paths: dict[str, str] = {}
     for index, sim in simulated.items():
         if sim.scenario is None:

@@ -11,7 +11,10 @@ from anafi_mav.sim.scenario import Scenario
 
 
 def load(key_path: str, path: Path, addresses: Collection[str]) -> Scenario:
-    """Return the scenario in a file, for drones at these addresses. Raises `ConfigError` that names key and file."""
+    """Return the scenario in a file, for drones at these addresses.
+
+    Raises `ConfigError` that names key and file.
+    """
     try:
         found = scenario.load(path)
         found.check_drones(addresses)

@@ -96,7 +96,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 class Fleet(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What is to be simulated; also the JSON of `--fleet`."""
+    """Drones to be simulated; also the JSON of `--fleet`."""
 
     drones: list[DroneSpec]
     speed: float = 1.0
@@ -181,7 +181,10 @@ def _wind(text: str) -> WindSpec:
 
 
 def _scenarios(fleet: Fleet) -> dict[str, Scenario]:
-    """What each drone goes through, by its address. A file that several have is read once."""
+    """Return the scenario of each drone by its address.
+
+    A file that several drones share is read once.
+    """
     addresses = {drone.address for drone in fleet.drones}
     read = {
         path: load_scenario("--scenario", Path(path), addresses) for path in dict.fromkeys(fleet.scenarios.values())
@@ -218,7 +221,7 @@ async def _run(fleet: Fleet, log: Path | None, stdin_watch: bool) -> None:
 
 
 def _line(drone: SimulatedDrone) -> str:
-    """What is known of a drone before anybody talks to it."""
+    """Return the line that describes a drone before a client connects."""
     low, high = drone.spec.versions
     protocol = f"protocol {low}" if low == high else f"protocol {low} to {high}"
     web = drone.http_problem or ("no HTTP" if drone.http_port is None else f"HTTP {drone.http_port}")

@@ -1,8 +1,9 @@
-"""`anafi-mav sim validate`: fly section IV of the anafi_ros paper with simulated drones and compare.
+"""`anafi-mav sim validate`: compares simulated drones with the anafi_ros paper.
 
-Everything goes over real sockets: a simulator of its own, and a `Drone` as the gateway has it at the other end. As in
-the paper the numbers are what the drone says with each picture of its video, 30 times a second. All times are those of
-the drone's own clock, from the moment on when a command has reached it, so that a busy machine makes nothing longer.
+It flies the tests of the paper's section IV. Everything goes over real sockets: a simulator of its own, and a
+`Drone` as the gateway has it at the other end. As in the paper the numbers are the metadata of each picture of the
+drone's video, 30 times a second. All times are those of the drone's own clock, from the moment on when a command
+has reached it, so that a busy host makes nothing longer.
 """
 
 from __future__ import annotations
@@ -54,11 +55,16 @@ REST = 1.0
 """Simulated s of hover before the first test."""
 
 PATIENCE = 10.0
-"""s of the machine's clock for a picture, or for a command to arrive: a video that died has begun anew by then."""
+"""s of the host's clock for a picture, or for a command to arrive.
+
+A video that stopped has restarted by then.
+"""
 
 STANDSTILL = HOLD_LIMIT - 0.1
-"""s of the machine's clock between two pictures from which a test is invalid: the sticks have been let go, since
-whoever holds them did not say so any more."""
+"""s of the host's clock between two pictures from which a test is invalid.
+
+The stick input has timed out by then, since its sender has not renewed it.
+"""
 
 RARE = 0.12
 """Simulated s between two pictures from which a test is invalid: the delays that it measures are as long. They are to
@@ -91,7 +97,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Fly and compare; 1 when something does not agree or the flights are invalid. Raises `ConfigError`."""
+    """Fly and compare; 1 when something does not agree or the flights are invalid.
+
+    Raises `ConfigError`.
+    """
     if arguments.model != "all" and arguments.model not in MODELS:
         raise ConfigError("--model", f"expected one of {', '.join(MODELS)} or all, got {arguments.model!r}")
     models = list(MODELS) if arguments.model == "all" else [arguments.model]
@@ -106,7 +115,10 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 async def validate(models: list[str], speed: float, plots: Path | None) -> int:
-    """Fly and compare these models, print the results, and draw them into a folder that exists; the exit status."""
+    """Fly and compare these models and print the results; return the exit status.
+
+    `plots` is an existing folder for the drawings.
+    """
     try:
         flights = await _fly_all(models, speed)
     except StoodStill as error:
@@ -134,7 +146,10 @@ class StoodStill(Exception):
 
 
 class Flight:
-    """One model in the air, its controller, and what was measured; all times are seconds of the drone's own clock."""
+    """Flight of one model: its controller and the measured values.
+
+    All times are seconds of the drone's own clock.
+    """
 
     def __init__(self, real: SimulatedDrone, speed: float) -> None:
         self.real = real
@@ -151,7 +166,10 @@ class Flight:
         )
 
     async def fly(self) -> None:
-        """All tests, one after the other. Raises `LinkLost`, `CommandTimeout`, `CommandRejected`, `StoodStill`."""
+        """All tests, one after the other.
+
+        Raises `LinkLost`, `CommandTimeout`, `CommandRejected`, `StoodStill`.
+        """
         await self._drone.connect()
         try:
             self._drone.video.subscribe(self._see)
@@ -190,9 +208,9 @@ class Flight:
         return (len(self._frames) - 1) / span
 
     async def _watch(self, zero: float, until: float, each: Callable[[float], None] = lambda t: None) -> Track:
-        """What the pictures say until so long after `zero`; `each` is told the time of every one.
+        """Return the metadata of the pictures until `until` s after `zero`.
 
-        Raises `CommandTimeout` when they do not come any more.
+        `each` is called with the time of every picture. Raises `CommandTimeout` when the pictures stop arriving.
         """
         t = 0.0
         while t < until:

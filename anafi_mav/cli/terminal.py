@@ -1,4 +1,6 @@
-"""What the commands print. Colour only where a terminal is; elsewhere plain lines, each written at once.
+"""Output of the commands.
+
+Colour only on a terminal; elsewhere plain lines, each written at once.
 
 Every line is cleaned of control characters: names and texts of drones and vehicles are in many of them.
 """
@@ -38,9 +40,9 @@ def say(line: str, style: str = "") -> None:
 
 
 def say_json(value: object) -> None:
-    """Print a value as JSON on stdout, indented, with every character outside ASCII as its escape.
+    """Print a value as JSON on stdout, indented and in ASCII.
 
-    A number that JSON does not have (NaN, infinity) is null.
+    Other characters are escaped. A number that JSON does not have (NaN, infinity) is null.
     """
     for line in json.dumps(_plain(value), indent=2, allow_nan=False).replace("\x7f", "\\u007f").split("\n"):
         say(line)
@@ -91,7 +93,10 @@ def complain(line: str, style: str = "red") -> None:
 
 @contextlib.contextmanager
 def progress(what: str, total: int | None) -> Iterator[Callable[[int, int], None]]:
-    """A bar while something is carried: call what it gives with how much of how much. On a terminal only."""
+    """A bar while something is carried: call what it gives with how much of how much.
+
+    On a terminal only.
+    """
     if not sys.stdout.isatty():
         yield lambda done, of: None
         return

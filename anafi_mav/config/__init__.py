@@ -1,6 +1,7 @@
-"""Configuration: a YAML file becomes a frozen, checked `Config`, or one `ConfigError` that names the key.
+"""Configuration: a YAML file becomes a frozen, checked `Config`.
 
-`schema` says what exists and what it means, `load` reads and checks. The gateway takes the result.
+A file that is wrong becomes one `ConfigError` that names the key. `schema` holds the keys and their meaning, `load`
+reads and checks. The gateway takes the result.
 """
 
 from anafi_mav.config.load import from_mapping as from_mapping

@@ -1,4 +1,4 @@
-"""Reads a configuration: YAML text → plain mapping → the structs of `schema`, checked as a whole.
+"""Reads a configuration: YAML text → mapping → the structs of `schema`, checked as a whole.
 
 Whatever is wrong becomes one `ConfigError` of one line, "drones[1].sysid: expected a whole number from 1 to 250,
 got 'x'". Of msgspec's own error only the place is used; what was expected there stands in the schema.
@@ -25,7 +25,10 @@ _HOST_NAME = re.compile(r"(?!-)[A-Za-z0-9-]{1,63}(?<!-)(\.(?!-)[A-Za-z0-9-]{1,63
 
 
 def load(path: Path) -> Config:
-    """The configuration in the file at `path`; paths in it are made relative to its folder. Raises `ConfigError`."""
+    """The configuration in the file at `path`; paths in it are made relative to its folder.
+
+    Raises `ConfigError`.
+    """
     config = _from_document(documents.read(path), str(path))
     return msgspec.structs.replace(config, drones=tuple(_in_folder(path.parent, drone) for drone in config.drones))
 
@@ -50,7 +53,10 @@ def _from_document(document: object, source: str) -> Config:
 
 
 def from_mapping(document: object) -> Config:
-    """The configuration in a mapping of plain values, as a YAML or JSON parser returns it. Raises `ConfigError`."""
+    """The configuration in a mapping of plain values, as a YAML or JSON parser returns it.
+
+    Raises `ConfigError`.
+    """
     try:
         config = msgspec.convert(document, Config)
     except msgspec.ValidationError as error:
@@ -61,7 +67,7 @@ def from_mapping(document: object) -> Config:
 
 
 def remarks(config: Config) -> list[str]:
-    """What is legal but probably not meant, a line each."""
+    """Return a line for each value that is legal but probably not meant."""
     return [
         f"drones[{index}].sysid: {MAVSDK_SYSID} is what MAVSDK calls itself unless told otherwise: "
         "such a client will not see this drone"
@@ -92,7 +98,10 @@ def _key_path(steps: list[str | int]) -> str:
 
 
 def _steps(message: str) -> list[str | int]:
-    """The place that a message of msgspec names: "… - at `$.drones[1].sysid`" → ["drones", 1, "sysid"]."""
+    """Return the place that a message of msgspec names, step by step.
+
+    "… - at `$.drones[1].sysid`" → ["drones", 1, "sysid"].
+    """
     place = re.search(r"`\$([^`]*)`$", message)
     found = re.findall(r"\.([A-Za-z_]\w*)|\[(\d+)\]", place[1] if place else "")
     return [name or int(index) for name, index in found]
@@ -109,7 +118,7 @@ def _inner(node: Any) -> Any:
 
 
 def _expected(node: Any) -> str:
-    """What the schema says a value of this type must be."""
+    """Return the schema's description of what a value of this type must be."""
     while isinstance(node, msgspec.inspect.Metadata | msgspec.inspect.UnionType):
         if isinstance(node, msgspec.inspect.Metadata) and node.extra and "expected" in node.extra:
             return str(node.extra["expected"])
@@ -159,7 +168,10 @@ def _is_ipv4(text: str) -> bool:
 
 
 def _is_host(text: str) -> bool:
-    """An IPv4 address, or a name; what ends in a number is an address or wrong (WHATWG URL §3.5, ends in a number)."""
+    """True for an IPv4 address or a host name.
+
+    A text that ends in a number is an address or wrong (WHATWG URL §3.5, ends in a number).
+    """
     if text.rstrip(".").rpartition(".")[2].isdigit():
         return _is_ipv4(text)
     return _HOST_NAME.fullmatch(text) is not None
@@ -174,7 +186,7 @@ def _twice(what: str, values: Mapping[str, object]) -> Iterator[tuple[str, str]]
 
 
 def _contradictions(config: Config) -> Iterator[tuple[str, str]]:
-    """What no single value shows: (key path, problem) of each rule that is broken."""
+    """Yield (key path, problem) of each broken rule that no single value shows."""
     drones = {f"drones[{index}]": drone for index, drone in enumerate(config.drones)}
     for key_path, drone in drones.items():
         yield from _of_one_drone(key_path, drone)
@@ -195,7 +207,10 @@ def _contradictions(config: Config) -> Iterator[tuple[str, str]]:
 
 
 def _place(address: str, drone: DroneConfig) -> str:
-    """Where a drone is met. The same address on another interface is another place."""
+    """Return the text that identifies a drone's address.
+
+    The same address on another interface is another place.
+    """
     return f"{address}:{drone.discovery_port}" + (f" on {drone.interface}" if drone.interface else "")
 
 

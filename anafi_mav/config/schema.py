@@ -1,7 +1,8 @@
-"""What a configuration file may say. Data only: reading and checking is `anafi_mav.config.load`.
+"""Keys of a configuration file, as data. No I/O.
 
-Each key carries its meaning (`description`) and, as `expected`, what a value must be. Both are used twice: the
-first makes docs/configuration.md, the second makes that page and the error messages.
+Reading and checking is `anafi_mav.config.load`. Each key carries its meaning (`description`) and, as `expected`, what
+a value must be. Both are used twice: the first makes docs/configuration.md, the second makes that page and the error
+messages.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ MAX_PATH = 4096
 """Bytes of a path on Linux (limits.h, PATH_MAX)."""
 
 MAVSDK_SYSID = 245
-"""The system id that MAVSDK gives itself unless told otherwise (MAVSDK mavsdk.h, DEFAULT_SYSTEM_ID_GCS)."""
+"""MAVSDK's default system ID of a ground station (MAVSDK mavsdk.h, DEFAULT_SYSTEM_ID_GCS)."""
 
 
 def expected(what: str) -> dict[str, Any]:
@@ -71,7 +72,10 @@ class WindConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
 
 
 class SimConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A simulated drone. `anafi-mav run` starts it: all of them together in one process of their own."""
+    """A simulated drone.
+
+    `anafi-mav run` starts it: all of them together in one process of their own.
+    """
 
     model: Annotated[
         str,
@@ -259,7 +263,10 @@ class DroneConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
 
 
 class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """The whole file. Every key may be left out: an empty file is what `anafi-mav` flies without one."""
+    """The whole file.
+
+    Every key may be left out: an empty file is what `anafi-mav` flies without one.
+    """
 
     endpoints: Annotated[
         tuple[
@@ -310,4 +317,4 @@ SECTIONS: dict[str, type[msgspec.Struct]] = {
     "drones[…].sim": SimConfig,
     "drones[…].sim.wind": WindConfig,
 }
-"""Where in the file each group of keys stands, in the order of the manual."""
+"""Place in the file of each group of keys, in the order of the manual."""

@@ -1,4 +1,6 @@
-"""The Python API of an ANAFI: `connect` gives a `Drone` with elements, each a frozen state and some verbs.
+"""Python API of an ANAFI: `connect` returns a `Drone` with elements.
+
+Each element has a frozen state and some verbs.
 
     from anafi_mav.drone import FlyingState, connect
 

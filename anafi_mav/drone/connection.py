@@ -1,4 +1,7 @@
-"""`connect`: a drone for the length of an `async with` block, left hovering when the block ends in the air."""
+"""`connect`: a connection to a drone for the length of an `async with` block.
+
+A drone in the air is left hovering when the block ends.
+"""
 
 from __future__ import annotations
 
@@ -34,14 +37,15 @@ async def connect(
     discovery_port: int = DISCOVERY_PORT,
     name: str = "",
 ) -> AsyncIterator[Drone]:
-    """Connect to the drone or Skycontroller at an IPv4 address; the block receives a connected `Drone`.
+    """Connect to the drone or Skycontroller at an IPv4 address; yield a connected `Drone`.
 
-    A drone has one controller: connecting displaces the one it had. `interface` names the network interface to use
-    (Linux). `name` stands in the log. The ports are Parrot's unless a simulator has others.
+    A drone has one controller: connecting displaces the previous one. `interface` names the network interface to use
+    (Linux). `name` is used in the log. The ports are Parrot's unless a simulator has others.
 
-    When the block ends, by an exception too, nothing that it began goes on: motors that idle are stopped, and a drone
-    in the air hovers, with two exceptions: a landing and a return home continue. Without a link the drone then flies
-    home after `HomeState.delay_s` if it knows home. A drone whose Skycontroller's pilot flies is left alone.
+    When the block ends, by an exception too, everything that it started is stopped: motors that idle are stopped, and
+    a drone in the air hovers, with two exceptions: a landing and a return home continue. Without a link the drone
+    then returns home after `HomeState.delay_s` if it knows home. A drone that the pilot at a Skycontroller flies is
+    left alone.
 
     Raises `LinkLost` when nothing answers or the connection is refused, `RemoteProtocolError` when what answers is no
     drone, `CommandTimeout` when the drone does not report its states.

@@ -1,4 +1,4 @@
-"""Backing off from a second controller that takes the drone: the policy, without I/O.
+"""Backing off from a second controller that takes the drone: the policy. No I/O.
 
 A drone accepts one controller, and a new handshake ends the session before it. Two controllers that both reconnect
 would throw each other out for ever, in the air. A connection that is lost within `SHORT` of its handshake is taken for
@@ -47,10 +47,10 @@ class Contention:
             self._guest = False
 
     def lost(self, age: float, *, dismissed: bool = False) -> bool:
-        """Note a connection that was last heard `age` s after its handshake; True when another controller took it.
+        """Note a lost connection; return True when another controller acquired the drone.
 
-        One short connection alone may have been bad radio, unless the drone `dismissed` us, or flew for another
-        controller already.
+        The connection was last heard `age` s after its handshake. One short connection alone may have been bad radio,
+        unless the drone `dismissed` us, or was flown by another controller already.
         """
         if age > SHORT:
             self._short = self._yields = 0

@@ -82,11 +82,17 @@ HANDSHAKE_AFTER = 4.0
 throw out one that was only fading."""
 
 CONTROLLER_TIMEOUT = 5.0
-"""s that a Skycontroller may take to find its drone; then it is asked anew, so that its own state is fresh."""
+"""s that a Skycontroller may take to find its drone.
+
+After that the attempt fails, and the next one queries the Skycontroller again, so that its own state is current.
+"""
 
 
 class Drone:
-    """An ANAFI at a network address; `connect` makes one. It can be connected again after the link is lost."""
+    """An ANAFI at a network address; `connect` makes one.
+
+    It can be connected again after the link is lost.
+    """
 
     def __init__(
         self,
@@ -101,8 +107,11 @@ class Drone:
         name: str = "",
         clock: Clock | None = None,
     ) -> None:
-        """`handshake_port` None: the one that discovery tells. `interface` binds every socket to that network
-        interface. `name` is ours, for the log."""
+        """Create a drone at an address, not connected yet.
+
+        With `handshake_port` None the port from discovery is used. `interface` binds every socket to that network
+        interface. `name` is ours, for the log.
+        """
         self.address = address
         self.name = name or address
         self._discovery_port = discovery_port
@@ -190,7 +199,7 @@ class Drone:
         self._dismissed: common.DisconnectionCause | None = None
         """Cause with which the drone announced the end of the connection."""
         self._hover_due = False
-        """What flew at the beginning of a silence is to be stopped when it is over."""
+        """Motion that was under way when a silence began is to be stopped when the silence ends."""
         self._opening = False
         self._complete = False
         self._counters: Counter[str] = Counter()
@@ -242,10 +251,11 @@ class Drone:
         log.info("%s: connected to %s, protocol %d", self.name, self.identity, session.version)
 
     async def _open(self) -> ControllerSession | None:
-        """Open a session; None: the silent one of before goes on, since the drone has been heard again.
+        """Open a session; None when the previous, silent session resumes.
 
-        The drone may keep a silent session for 8 s (libarsdk) and a handshake would end it, so that the first one
-        waits. Until one has succeeded the silent session is listened to. Raises as `connect`.
+        It resumes when the drone is heard again. The drone may keep a silent session for 8 s (libarsdk) and a
+        handshake would end it, so that the first one waits. Until one has succeeded the silent session is listened
+        to. Raises as `connect`.
         """
         fading = self._fading
         if fading is not None:
@@ -294,7 +304,10 @@ class Drone:
         return True
 
     def _hover_after_silence(self) -> None:
-        """Stop what flies on from before a silence; a flight plan, a landing and a return go on by themselves."""
+        """Stop motion that continues from before a silence.
+
+        A flight plan, a landing and a return are not stopped.
+        """
         due, self._hover_due = self._hover_due, False
         piloting = self.piloting.state
         free = piloting.flying in (FlyingState.HOVERING, FlyingState.FLYING) and not self.home.state.returning
@@ -324,10 +337,10 @@ class Drone:
             fading.end(reason)
 
     def _note_loss(self, session: ControllerSession, *, silent: bool) -> None:
-        """Keep the facts that distinguish another controller's handshake, which silences us, from other losses.
+        """Keep the facts that distinguish another controller's handshake from other losses.
 
-        The one connection of a Skycontroller 4 is closed by it. What loses the drone behind it, and a drone that is
-        switched off, is none.
+        Such a handshake silences us. The one connection of a Skycontroller 4 is closed by it. A Skycontroller that
+        loses its drone, and a drone that is switched off, do not count as one.
         """
         self.last_heard = session.last_received
         known = self._dismissed in (common.DisconnectionCause.OFF_BUTTON, common.DisconnectionCause.RESET_FACTORY)
@@ -344,7 +357,10 @@ class Drone:
         return self.may_be_displaced and self._dismissed is not None
 
     async def heard_again(self) -> bool:
-        """Wait until a silent session is heard again, or a new handshake is due. False: it is not heard."""
+        """Wait until a silent session is heard again, or a new handshake is due.
+
+        False: it is not heard.
+        """
         if self._fading is None:
             return False
         rest = self._fading.last_received + HANDSHAKE_AFTER - loop_time()
@@ -382,7 +398,10 @@ class Drone:
         session.on_speaks = partial(self._on_speaks, session)
 
     async def _find_web_server(self, session: ControllerSession) -> None:
-        """The drone's own, a hundred ports up at a Skycontroller 3, or behind the mux of a Skycontroller 4."""
+        """Set the web server's address: the drone's own, or that of its Skycontroller.
+
+        It is a hundred ports up at a Skycontroller 3, and behind the mux of a Skycontroller 4.
+        """
         if isinstance(session, mux_link.MuxControllerSession):
             try:
                 address, port = await session.open_tcp("drone", self._http_port)
@@ -401,8 +420,11 @@ class Drone:
         return Direct(self.address, self._rtsp_port, self._local_address, self._interface)
 
     async def _read_states(self) -> None:
-        """What Parrot's own SDK does first (olympe arsdkng/drone): set the clock, ask for all states and settings; of
-        the Skycontroller first, if there is one, then of the drone behind it."""
+        """Set the clock and request all states and settings.
+
+        This is what Parrot's own SDK does first (olympe arsdkng/drone); for the Skycontroller first, if one is
+        present, then for the drone behind it.
+        """
         date = datetime.fromtimestamp(self._clock.time()).astimezone().strftime("%Y%m%dT%H%M%S%z")
         if self.controller.present:
             await startup_queries.read(
@@ -462,14 +484,20 @@ class Drone:
         return self.controller.allows(message)
 
     def _require_standing(self, what: str) -> None:
-        """Raise `CommandRejected` unless the drone stands with its motors off and is going to stay so."""
+        """Raise `CommandRejected` unless the drone is landed and is going to stay so.
+
+        Landed: on the ground with its motors off.
+        """
         if self.piloting.state.flying != FlyingState.LANDED:
             raise CommandRejected(f"a drone that does not stand with its motors off is not {what}")
         if self.piloting.about_to_fly:
             raise CommandRejected(f"a drone that is about to take off is not {what}")
 
     def retire(self, tasks: Iterable[asyncio.Task[Any]]) -> None:
-        """From now on these tasks send nothing but what stops something: newer commands have replaced them."""
+        """From now on let these tasks send only commands that stop something.
+
+        Newer commands have replaced them.
+        """
         self._commander.retire(tasks)
 
     def silence(self, tasks: Iterable[asyncio.Task[Any]]) -> None:
@@ -563,7 +591,7 @@ class Drone:
 
     @property
     def counters(self) -> Counter[str]:
-        """What the transport counted on the present or last connection."""
+        """Transport counters of the present or last connection."""
         return self._counters
 
     @property
@@ -579,10 +607,11 @@ class Drone:
         )
 
     async def request_reboot(self, timeout: float = REBOOT_TIMEOUT) -> None:
-        """Send the command to restart; return when the drone has acknowledged its receipt, its only confirmation.
+        """Send the command to restart; return when the drone has acknowledged its receipt.
 
-        Raises `CommandRejected` unless the drone has reported that it is landed; `LinkLost` or `CommandTimeout` when
-        the command has not arrived. Cancelled, it is not sent again.
+        There is no other confirmation. Raises `CommandRejected` unless the drone has reported that it is landed;
+        `LinkLost` or `CommandTimeout` when the command was not acknowledged. When this is cancelled, the command is
+        not sent again.
         """
         if not self.connected:
             raise LinkLost("not connected")
@@ -647,7 +676,10 @@ class Drone:
         predicate: Callable[[MessageT], bool] | None = None,
         timeout: float = ANSWER_TIMEOUT,
     ) -> MessageT:
-        """Return the next message of a class that the predicate accepts. Raises `CommandTimeout` or `LinkLost`."""
+        """Return the next message of a class that the predicate accepts.
+
+        Raises `CommandTimeout` or `LinkLost`.
+        """
 
         def judge(message: MessageT) -> MessageT | None:
             return message if predicate is None or predicate(message) else None
@@ -657,9 +689,10 @@ class Drone:
         return await expectation.wait()
 
     async def wait_until(self, condition: Callable[[], bool], what: str, timeout: float = WAIT_TIMEOUT) -> None:
-        """Return when a condition on the drone's states is true; it is evaluated now and after each message.
+        """Return when a condition on the drone's states is true.
 
-        Raises `CommandTimeout` about `what` after `timeout` s, `LinkLost`, and what the condition raises.
+        The condition is evaluated now and after each message. Raises `CommandTimeout` about `what` after `timeout` s,
+        `LinkLost`, and what the condition raises.
         """
         self._commander.require_link()
         if condition():
@@ -723,7 +756,7 @@ class Drone:
 
 
 def _ignore(message: Message | UnknownMessage, now: float) -> None:
-    """What a session says before it is ours; all states are asked for afterwards."""
+    """Ignore messages of a session before it is ours; all states are requested afterwards."""
 
 
 def _starts_motors(message: Message) -> bool:
@@ -739,7 +772,7 @@ def _model(id: int) -> models.Model:
 
 
 async def _abandon(attempt: asyncio.Future[ControllerSession]) -> None:
-    """Cancel an attempt to connect and wait for it; close the session that it may have opened all the same."""
+    """Cancel an attempt to connect and wait for it; close a session that it still opened."""
     attempt.cancel()
     await asyncio.wait([attempt])
     if not attempt.cancelled() and attempt.exception() is None:

@@ -1,8 +1,9 @@
-"""What every element of a drone has in common: a frozen state, and a table that says how events change it.
+"""Base of every element of a drone: a frozen state, and a table of event reducers.
 
-An element is one noun of the aircraft (battery, link, home, ...). Its state is what the drone last reported; `None`
-means that it has not reported it since the connection was made. States hold ARSDK's own units and signs, the
-field names say which; they are converted where they meet MAVLink.
+An element is one noun of the aircraft (battery, link, home, ...). Its state is the last one reported by the drone;
+`None` means that it has not been reported since the connection was made. The table gives for each event how it
+changes the state. States hold ARSDK's own units and signs, which the field names give; they are converted where they
+meet MAVLink.
 """
 
 from __future__ import annotations
@@ -92,10 +93,10 @@ def members(bits: int, names: type[EnumT]) -> frozenset[EnumT]:
 
 
 def with_item(items: Mapping[KeyT, ValueT] | None, key: KeyT, value: ValueT, flags: int) -> dict[KeyT, ValueT]:
-    """A map after one MAP_ITEM event: `flags` is its `list_flags` (generic.xml list_flags).
+    """Return a map after one MAP_ITEM event.
 
-    First starts the list anew, Empty is a list without items, Remove takes the item out. Events that belong
-    to no list (keyed, but without `list_flags`) pass 0.
+    `flags` is its `list_flags` (generic.xml list_flags): First restarts the list, Empty is a list without items,
+    Remove removes the item. Events that belong to no list (keyed, but without `list_flags`) pass 0.
     """
     if flags & EMPTY:
         return {}

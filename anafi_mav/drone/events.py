@@ -1,7 +1,7 @@
-"""The words of a drone that its users need: the events a subscriber hears, and the enums in its states.
+"""Public names of a drone's messages: its events, and the enums in its states.
 
-They are Parrot's, declared in `anafi_mav.arsdk.messages`; who works with a `Drone` takes them from here and need not
-know the wire.
+They are Parrot's, declared in `anafi_mav.arsdk.messages`; users of a `Drone` import them from here and need not know
+the wire format.
 """
 
 from anafi_mav.arsdk.codec.wire import Message as Message

@@ -39,7 +39,7 @@ def loop_time() -> float:
 
 
 class Wire(Protocol):
-    """What is needed of a session: see `arsdk.session.Session`."""
+    """Interface that is needed of a session: see `arsdk.session.Session`."""
 
     on_delivered: Callable[[int, bool], None]
 
@@ -49,7 +49,10 @@ class Wire(Protocol):
 
 
 class Expectation(Generic[T]):
-    """One awaited answer. It starts to listen when it is made, so make it before the command is sent."""
+    """One awaited answer.
+
+    It starts to listen when it is made, so make it before the command is sent.
+    """
 
     __slots__ = ("_commander", "_judge", "_timer", "answers", "future", "token")
 
@@ -95,10 +98,10 @@ class Expectation(Generic[T]):
         self._timer = self.future.get_loop().call_later(seconds, self.fail, error)
 
     async def wait(self) -> T:
-        """The judge's result. Raises what the judge returned, `CommandTimeout` or `LinkLost`.
+        """Return the judge's result.
 
-        When it fails or is cancelled, the command is taken back: it must not be carried out after we have said
-        that it failed.
+        Raises what the judge returned, `CommandTimeout` or `LinkLost`. When it fails or is cancelled, the command is
+        withdrawn: it must not be carried out after it has been reported as failed.
         """
         try:
             return await self.future
@@ -110,9 +113,10 @@ class Expectation(Generic[T]):
             self.close()
 
     async def came(self, delivery: asyncio.Future[None], what: str, timeout: float) -> bool:
-        """Wait for an answer that need not come: True when it came, False when the drone has the command and is quiet.
+        """Wait for an answer that may be absent; return True when it was received.
 
-        Raises `CommandTimeout` when neither is known in time, `LinkLost`.
+        False when the drone has received the command and then reported nothing. Raises `CommandTimeout` when neither
+        is known in time, `LinkLost`.
         """
         self.expire_after(timeout, CommandTimeout(what, timeout))
         either: set[asyncio.Future[Any]] = {self.future, delivery}
@@ -142,7 +146,7 @@ class _Beginning(NamedTuple):
 
 
 class Commander:
-    """The way out to the drone while there is one, and everybody who waits for something from it."""
+    """Sender of commands to the drone, and registry of the answers that are awaited."""
 
     def __init__(self) -> None:
         self.name = ""
@@ -154,7 +158,7 @@ class Commander:
         self._waiting: dict[type[Message], list[Expectation[Any]]] = {}
         self._deliveries: dict[int, asyncio.Future[None]] = {}
         self.halting: set[asyncio.Future[None]] = set()
-        """Orders to stop something that the drone may not have received yet, whoever gave them."""
+        """Stop commands from any task that the drone may not have received yet."""
         self._retired: weakref.WeakSet[asyncio.Task[Any]] = weakref.WeakSet()
         """Tasks that newer commands have replaced: they send nothing but what stops something."""
         self._silenced: weakref.WeakSet[asyncio.Task[Any]] = weakref.WeakSet()
@@ -162,7 +166,7 @@ class Commander:
         self._beginning: dict[type[Message], _Beginning] = {}
         """By the kind of command that undoes it."""
         self._given_up: dict[type[Message], float] = {}
-        """By the kind of command that undid it, when a beginning was last given up without an answer."""
+        """Loop time of the last aborted, unanswered start, by the command class that undoes it."""
 
     @property
     def connected(self) -> bool:
@@ -196,7 +200,10 @@ class Commander:
         self._given_up.clear()
 
     def retire(self, tasks: Iterable[asyncio.Task[Any]]) -> None:
-        """Let these tasks send nothing but what stops something: what replaced them must not meet their commands."""
+        """From now on let these tasks send only commands that stop something.
+
+        Other commands of theirs must not collide with those of the tasks that replaced them.
+        """
         self._retired.update(tasks)
 
     def silence(self, tasks: Iterable[asyncio.Task[Any]]) -> None:
@@ -212,7 +219,9 @@ class Commander:
             raise CommandRejected("replaced by a newer command")
 
     def send(self, message: Message, *, stops: bool = False) -> int:
-        """Hand a command to the transport. Raises `LinkLost` when there is no link, or what the gate raises.
+        """Hand a command to the transport.
+
+        Raises `LinkLost` when there is no link, or what the gate raises.
 
         `stops`: it stops something. Raises `CommandRejected` in a task that may not send it (see `retire`).
         """
@@ -226,10 +235,11 @@ class Commander:
         return self._wire.send(message)
 
     def deliver(self, message: Message, *, stops: bool = False) -> asyncio.Future[None]:
-        """Send an acknowledged command that is not to be taken back; the future is done when the drone has it.
+        """Send an acknowledged command; the future is done when the drone has received it.
 
-        It fails with `LinkLost`, or `CommandTimeout` when the transport gives up. Do not await it bare, a cancelled
-        wait would cancel it: use `asyncio.wait`.
+        The command is not meant to be withdrawn (but see `take_back`). The future fails with `LinkLost`, or
+        `CommandTimeout` when the transport drops the command. Do not await it bare, a cancelled wait would cancel it:
+        use `asyncio.wait`.
         """
         token = self.send(message, stops=stops)
         delivery: asyncio.Future[None] = asyncio.get_running_loop().create_future()
@@ -237,21 +247,27 @@ class Commander:
         return delivery
 
     def halt(self, message: Message) -> asyncio.Future[None]:
-        """`deliver` an order to stop something; whoever has to confirm a stop waits for `halting`."""
+        """`deliver` a stop command and add it to `halting`.
+
+        A task that has to confirm a stop waits for `halting`.
+        """
         delivery = self.deliver(message, stops=True)
         self.halting.add(delivery)
         delivery.add_done_callback(self.halting.discard)
         return delivery
 
     def halt_if_connected(self, message: Message) -> None:
-        """`halt` for a verb that gives up: the loss of the link is reported elsewhere, and so is a newer command."""
+        """`halt` for a verb that aborts; ignores a lost link and a newer command.
+
+        Both are reported elsewhere.
+        """
         with contextlib.suppress(LinkLost, CommandRejected):
             self.halt(message)
 
     async def halted(self, what: str, timeout: float) -> None:
-        """Return when the drone has received every order to stop something, at once when none is on its way.
+        """Return when the drone has received every stop command, at once when none is pending.
 
-        Raises `CommandTimeout` about `what`, or what became of an order.
+        Raises `CommandTimeout` about `what`, or the error of a stop command that failed.
         """
         halting = list(self.halting)
         if not halting:
@@ -264,7 +280,10 @@ class Commander:
             delivery.result()
 
     def take_back(self, delivery: asyncio.Future[None], error: AnafiMavError) -> None:
-        """Of what `deliver` sent, keep from the drone what it has not received; the delivery fails with this error."""
+        """Withdraw what `deliver` sent, if the drone has not received it yet.
+
+        The delivery fails with this error.
+        """
         for token, other in tuple(self._deliveries.items()):
             if other is delivery:
                 del self._deliveries[token]
@@ -310,7 +329,7 @@ class Commander:
                 self._waiting.pop(answer, None)
 
     def offer(self, message: Message) -> None:
-        """Show an event to those who wait for its kind."""
+        """Pass an event to the expectations that wait for its kind."""
         waiting = self._waiting.get(type(message))
         if waiting is not None:
             for expectation in tuple(waiting):
@@ -342,9 +361,9 @@ class Commander:
     ) -> T:
         """`confirm` for a command that flies the drone until `undo` ends it.
 
-        Given up, it is taken back and undone; with `undo_refused` also when the drone refused it, for one that would
-        begin later. Hover and whatever else takes over ends it by `call_off`, a newer one with the same kind of `undo`
-        replaces it: both raise `CommandRejected` here.
+        When this times out or is cancelled, the command is withdrawn and undone; with `undo_refused` also when
+        the drone refused it, for a command that would begin later. Hover and other commands that replace it end it by
+        `call_off`, a newer one with the same kind of `undo` replaces it: both raise `CommandRejected` here.
         """
         answer = self.expect(answers, judge)
         self.dispatch(answer, command, timeout)
@@ -367,7 +386,10 @@ class Commander:
                 del self._beginning[kind]
 
     def call_off(self, why: str, undo: type[Message] | None = None) -> None:
-        """Take back and undo what was begun and has not been answered: what this kind undoes, or everything."""
+        """Withdraw and undo the starts that have not been answered.
+
+        With `undo` only those that this kind of command undoes, else all.
+        """
         for kind, beginning in tuple(self._beginning.items()):
             if undo not in (None, kind) or beginning.answer.future.done():
                 continue  # an answered one has begun, or never will; its verb does not know yet
@@ -382,13 +404,19 @@ class Commander:
         self.halt_if_connected(beginning.undo)
 
     def may_begin(self, undo: type[Message], memory: float) -> bool:
-        """Can something that this kind of command undoes still begin: is it on its way, or was given up within so many
-        seconds, when the drone may have heard it already?"""
+        """Return True when something that this kind of command undoes can still begin.
+
+        It can while it is on its way, or when it was aborted less than `memory` s ago and the drone may have received
+        it already.
+        """
         given_up = self._given_up.get(undo)
         return undo in self._beginning or (given_up is not None and loop_time() - given_up < memory)
 
     def certainly_not(self, undo: type[Message]) -> None:
-        """What was given up has not begun, and will not: the drone has received the order against it and is quiet."""
+        """Note that an aborted start has not begun, and will not.
+
+        The drone has received the command against it and reports nothing.
+        """
         self._given_up.pop(undo, None)
 
     def dispatch(self, expectation: Expectation[Any], command: Message, timeout: float, *, stops: bool = False) -> None:

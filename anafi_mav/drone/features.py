@@ -1,4 +1,7 @@
-"""What a drone has: derived from what it sent when it connected, never from its model's name."""
+"""Features of a drone, derived from the messages it sent when it connected.
+
+They are never derived from its model's name.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +31,7 @@ from anafi_mav.drone.status.sound import Sound
 
 
 class Elements(Protocol):
-    """What is looked at of a drone."""
+    """Elements of a drone from which its features are derived."""
 
     animations: Animations
     calibration: Calibration

@@ -1,8 +1,9 @@
-"""The drone's web server as a client sees it: media and flight plans are told there, not over ARSDK.
+"""Client of the drone's web server, which provides media and flight plans.
 
-Nothing is open while nobody asks; `close` ends what is left. A drone that refuses is a `CommandRejected` with its
-status, one that does not answer a `CommandTimeout`, one that is not there a `LinkLost`, and one that talks nonsense a
-`RemoteProtocolError`. Redirections are not followed: what the drone has is on the drone.
+These are not available over ARSDK. A connection is open only during requests; `close` ends the remaining ones. A
+drone that refuses is a `CommandRejected` with its status, one that does not answer a `CommandTimeout`, one that is
+not reachable a `LinkLost`, and one that sends an invalid answer a `RemoteProtocolError`. Redirections are not
+followed: all the drone's content is on the drone.
 """
 
 from __future__ import annotations
@@ -143,7 +144,7 @@ async def _refusal(what: str, response: aiohttp.ClientResponse) -> str:
 
 
 class _Translated:
-    """What goes wrong with the web server, in words of ours."""
+    """Errors of the web server, translated to ours."""
 
     def __init__(self, what: str, base: str) -> None:
         self._what = what

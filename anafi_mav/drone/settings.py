@@ -24,12 +24,17 @@ Question: TypeAlias = tuple[Message, type[Message], Callable[[Any], bool | None]
 """Something to ask after connecting: the question, the kind of event that answers it, and its judge."""
 
 REPEAT = 0.5
-"""s after which an unacknowledged target is said again while nothing shows it: attitude and zoom are told five times a
-second."""
+"""s after which an unacknowledged target is sent again while no event shows its effect.
+
+Attitude and zoom are reported five times a second.
+"""
 
 
 def number(value: float, what: str) -> float:
-    """The value. Raises `LocalProtocolError` for NaN and infinities, which ask a drone for nothing."""
+    """The value.
+
+    Raises `LocalProtocolError` for NaN and infinities, which ask a drone for nothing.
+    """
     if not math.isfinite(value):
         raise LocalProtocolError(f"{what}: {value} is not a number")
     return value
@@ -46,7 +51,10 @@ class Commanding(Element[StateT]):
         """Targets given so far, by what they are for: a verb that repeats its own sees that there is a newer one."""
 
     def _require(self, reported: object, feature: str) -> None:
-        """Raise `LinkLost` without a link, `NotSupported` when what the drone should have reported is None or empty."""
+        """Raise `LinkLost` without a link, `NotSupported` for an absent feature.
+
+        It is absent when `reported`, a state that drones with the feature report, is None or empty.
+        """
         self._commander.require_link()
         if reported is None or reported == frozenset() or reported == {}:
             raise NotSupported(feature)
@@ -60,12 +68,18 @@ class Commanding(Element[StateT]):
         *,
         stops: bool = False,
     ) -> T:
-        """Send a setting and return what the judge makes of its answer. `stops`: it ends something that goes on."""
+        """Send a setting and return what the judge makes of its answer.
+
+        `stops`: it ends something that goes on.
+        """
         async with self._setting_lock(answer):
             return await self._commander.confirm(command, (answer,), judge, timeout, stops=stops)
 
     def _setting_lock(self, answer: type[Message]) -> asyncio.Lock:
-        """One change at a time: the answers of two could not be told apart."""
+        """Return the lock that allows one change at a time.
+
+        The answers of two changes could not be distinguished.
+        """
         return self._setting_locks.setdefault(answer, asyncio.Lock())
 
     def _order(self, subject: Hashable, command: Message) -> int:
@@ -75,9 +89,9 @@ class Commanding(Element[StateT]):
         return self._orders[subject]
 
     async def _insist(self, subject: Hashable, command: Message, answer: Expectation[T], timeout: float) -> T:
-        """Send a target that is not acknowledged and repeat it until the answer has come.
+        """Send a target that is not acknowledged and repeat it until the answer has arrived.
 
-        Raises `CommandRejected` when somebody gives the subject another target meanwhile.
+        Raises `CommandRejected` when the subject is given another target meanwhile.
         """
         answer.expire_after(timeout, CommandTimeout(command.NAME, timeout))
         try:
@@ -91,7 +105,10 @@ class Commanding(Element[StateT]):
             answer.close()
 
     async def _set(self, command: Message, answer: type[Message], reported: object) -> float:
-        """Change a setting with a range (one argument, answered with `current`) and return what it is then."""
+        """Change a setting with a range and return its value then.
+
+        The command has one argument; the answer has `current`.
+        """
         (value,) = (getattr(command, name) for name in command.__struct_fields__)
         number(value, command.NAME)
         self._require(reported, command.NAME)

@@ -1,4 +1,4 @@
-"""What a drone is asked after the connection is made, and how long its answers are waited for."""
+"""Queries sent after connecting, with their timeouts."""
 
 from __future__ import annotations
 
@@ -44,7 +44,10 @@ async def read(commander: Commander, who: str, questions: Sequence[Message], mar
 
 
 async def ask(commander: Commander, name: str, questions: list[Question]) -> None:
-    """Ask what is told only on demand. An answer that does not come is a feature that this drone does not have."""
+    """Query the states that the drone reports only on request.
+
+    A missing answer is a feature that this drone does not have.
+    """
     waits = [(command, commander.expect((answer,), judge)) for command, answer, judge in questions]
     try:
         for command, wait in waits:

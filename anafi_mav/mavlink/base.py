@@ -1,6 +1,7 @@
-"""What every endpoint is: the owner of a URL that brings channels. `udp`, `tcp` and `serial_line` are the kinds.
+"""Base class of endpoints: the owner of a URL that opens channels.
 
-Endpoints are the only asyncio code of this room beside `node`, which is their sink.
+`udp`, `tcp` and `serial_line` are the kinds. Endpoints are the only asyncio code of this room beside `node`, which is
+their sink.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ WRITE_AHEAD = 16 * 1024
 """Bytes that asyncio may hold for a full socket before the channel's own queue, which knows what to drop, begins."""
 
 LEAVE_TOGETHER = 4 * 1024
-"""Bytes of a stream that are gathered within a turn of the loop, at most."""
+"""Most bytes of a stream that are gathered within one event-loop iteration."""
 
 CANCEL_WAIT = 0.1
 """s until a task that has not ended is cancelled once more."""
@@ -59,7 +60,7 @@ class EndpointUrl:
 
 
 class Sink(Protocol):
-    """Who hears of channels and what arrives on them."""
+    """Receiver of opened and closed channels and of the frames that arrive on them."""
 
     def opened(self, channel: Channel) -> None: ...
 
@@ -97,7 +98,10 @@ class Endpoint(ABC):
 
     @abstractmethod
     async def open(self) -> None:
-        """Begin. Raises OSError if what the URL asks of this machine cannot be had; nothing is then left open."""
+        """Begin.
+
+        Raises OSError if what the URL asks of this machine cannot be had; nothing is then left open.
+        """
 
     @abstractmethod
     async def close(self) -> None:
@@ -109,12 +113,14 @@ class Endpoint(ABC):
 
 
 class Outbox:
-    """The frames of one turn of the loop leave together: a fleet's telemetry is thousands of small ones a second.
+    """Sends the frames of one event-loop iteration together.
 
-    `limit` bytes at most go at once; the frame that would exceed them begins the next lot. With a limit of 0 nothing
-    is gathered: each frame leaves alone and at once. What answers something that
-    has just been read does not wait for the next turn: whoever reads does so `with` the outbox, and at the end of that
-    block everything leaves.
+    A fleet's telemetry is thousands of small frames a second. At most `limit` bytes go at once; the frame that would
+    exceed them begins the next lot. With a limit of 0 nothing is gathered: each frame leaves alone and at once. An
+    answer
+    to what has just been read does not wait for the next iteration: reading is done `with` the outbox, and at the end
+    of
+    that block everything leaves.
     """
 
     def __init__(self, write: Callable[[bytes], None], limit: int) -> None:
@@ -217,7 +223,7 @@ class StreamPeer(asyncio.Protocol):
 
 
 def reason(error: Exception) -> str:
-    """What an error of the operating system says, without asyncio's and pyserial's words around it."""
+    """Return an operating system's error text without asyncio's and pyserial's additions."""
     number = getattr(error, "errno", None)
     # Name resolution numbers its errors below 0 and has its own text.
     return os.strerror(number) if number is not None and number > 0 else getattr(error, "strerror", "") or str(error)
@@ -236,7 +242,7 @@ UNTRIED = "not tried yet"
 
 
 class Reopening(Endpoint):
-    """An endpoint with at most one stream, that is opened anew whenever it ends."""
+    """An endpoint with at most one stream, opened again whenever it ends."""
 
     def __init__(self, url: EndpointUrl, sink: Sink, clock: Clock) -> None:
         super().__init__(url, sink, clock)

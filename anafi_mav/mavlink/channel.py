@@ -1,8 +1,9 @@
-"""A channel: one remote peer on one endpoint, with its own parser, sequence numbers and outgoing queue. No I/O.
+"""A channel: one remote peer on one endpoint. No I/O.
 
-The endpoint that owns it hands in bytes and takes frames through `write`; it calls `pause` and `resume` when its
-socket is full and empty again. Sequence numbers are given when a frame leaves, so that they are contiguous for each
-sender whatever was dropped before.
+It has its own parser, sequence numbers and outgoing queue. The endpoint that owns it hands in bytes and takes frames
+through `write`; it calls `pause` and `resume` when its socket is full and empty again. Sequence numbers are given
+when
+a frame leaves, so that they are contiguous for each sender whatever was dropped before.
 """
 
 from __future__ import annotations
@@ -14,13 +15,13 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.frames import Packed, Parser, Received, frame, pack
 
 QUEUE_BYTES = 64 * 1024
-"""What waits for a slow peer: some seconds of a small fleet. A serial line, being slow by nature, gets less."""
+"""Bytes that may wait for a slow peer: some seconds of a small fleet. A serial line, being slow, gets less."""
 
 FRAME_BYTES = 12
 """A version 2 frame has so much more than its payload (MAVLink serialization.md §mavlink2_packet_format)."""
 
 _Waiting = tuple[Packed, int, int] | bytes
-"""What waits in a queue: a message with its sender's system and component, or another system's finished frame."""
+"""Entry of a queue: a message with its sender's system and component, or another system's finished frame."""
 
 
 class Channel:
@@ -44,7 +45,7 @@ class Channel:
         self.flavour = flavour
         """The autopilot that clients of this endpoint want to see; None: as configured for all."""
         self.bytes_per_second = bytes_per_second
-        """What the line carries; None where that is no concern."""
+        """Capacity of the line, None when it is not limited."""
         self.counters: Counter[str] = Counter()
         """sent_frames, dropped_frames (queue full, or sent after the channel had closed)."""
         self.sent_bytes = 0
@@ -66,11 +67,14 @@ class Channel:
 
     @property
     def ready(self) -> bool:
-        """The peer takes frames now. Whoever has many to send and could wait with them waits for this."""
+        """True when the peer takes frames now.
+
+        A sender of many frames that can wait, waits for this.
+        """
         return self.is_open and not self._paused
 
     def receive(self, data: bytes) -> list[Received]:
-        """The frames in bytes that arrived; what is none is counted by the parser."""
+        """Return the frames in received bytes; the parser counts other bytes."""
         self.received_bytes += len(data)
         return self.parser.receive_datagram(data) if self._datagrams else self.parser.receive(data)
 
@@ -80,7 +84,10 @@ class Channel:
         return max(0.0, 1.0 - self._waiting_bytes / self._queue_bytes)
 
     def send(self, message: dialect.MAVLink_message, sysid: int, compid: int, *, give_way: bool = False) -> None:
-        """Send as this system and component. Raises `LocalProtocolError` for a field that does not fit."""
+        """Send as this system and component.
+
+        Raises `LocalProtocolError` for a field that does not fit.
+        """
         self.send_packed(pack(message), sysid, compid, give_way=give_way)
 
     def send_packed(self, packed: Packed, sysid: int, compid: int, *, give_way: bool = False) -> None:
@@ -98,7 +105,10 @@ class Channel:
             self._wait(raw, give_way)
 
     def pause(self) -> None:
-        """The peer takes no more for now: frames wait from here on, the oldest that gives way is dropped first."""
+        """Queue frames from now on, because the peer accepts none at present.
+
+        When the queue is full, the oldest frame that gives way is dropped first.
+        """
         self._paused = True
 
     def resume(self) -> None:

@@ -1,4 +1,6 @@
-"""Endpoint URLs: their grammar, and the table of schemes from which endpoints are made and help is printed.
+"""Endpoint URLs: their grammar and the table of schemes.
+
+Endpoints and the command line's help are made from that table.
 
     udpout://HOST:PORT      udpin://HOST:PORT      tcpin://HOST:PORT      tcpout://HOST:PORT
     serial://DEVICE:BAUD    each with ?flavour=NAME, one of those that the caller knows
@@ -28,7 +30,7 @@ FRAMES = ("one", "many")
 
 MAX_PORT = 65535
 MAX_BAUD = 4_000_000
-"""What USB bridges go up to."""
+"""Fastest rate of common USB bridges."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,7 @@ class Scheme:
     """One kind of endpoint."""
 
     arguments: str
-    """What follows "scheme://"."""
+    """Form of the part after "scheme://"."""
     description: str
     factory: Callable[[EndpointUrl, Sink, Clock], Endpoint]
     listens: bool = False
@@ -96,7 +98,10 @@ def parse_endpoint(url: str, flavours: Sequence[str] = ()) -> EndpointUrl:
 
 
 def is_open_to_network(url: EndpointUrl) -> bool:
-    """True when other machines can send to this endpoint: it listens, and on more than this machine's loopback."""
+    """True when other machines can send to this endpoint.
+
+    It listens, and on more than this machine's loopback.
+    """
     if not SCHEMES[url.scheme].listens or url.place.rstrip(".").lower() == "localhost":
         return False
     try:

@@ -1,4 +1,4 @@
-"""MAVLink frames without I/O: messages into version 2 frames, any bytes into messages.
+"""MAVLink frames: messages into version 2 frames, any bytes into messages. No I/O.
 
 Going out, a message is packed once (`pack`) and framed per channel (`frame`), for only the sequence number and with it
 the checksum differ. Coming in, `Parser` finds frames of version 1 and 2 between whatever else arrives and makes
@@ -51,7 +51,10 @@ class Packed(NamedTuple):
 
 
 def pack(message: dialect.MAVLink_message) -> Packed:
-    """The payload of a message. Raises `LocalProtocolError` when a field does not fit its wire type."""
+    """The payload of a message.
+
+    Raises `LocalProtocolError` when a field does not fit its wire type.
+    """
     kind = type(message)
     try:
         packer = _packers.get(kind) or _payload_packer(kind)
@@ -74,7 +77,10 @@ _packers: dict[type[dialect.MAVLink_message], Callable[[Any], bytes]] = {}
 
 
 def _payload_packer(kind: type[dialect.MAVLink_message]) -> Callable[[Any], bytes]:
-    """A function that packs messages of this class; pymavlink's own builds a header and copies on each call."""
+    """Return a function that packs messages of this class.
+
+    pymavlink's own builds a header and copies on each call.
+    """
     if kind.id not in dialect.mavlink_map:
         raise TypeError("it is no message of the dialect")
     codes = re.findall(r"(\d*)([a-zA-Z])", kind.unpacker.format)
@@ -115,10 +121,13 @@ _readers: dict[int, _Reader] = {}
 
 
 def unpack(id: int, payload: bytes) -> dialect.MAVLink_message:
-    """The message in a payload of any length: what is not there is zero, what is too much is newer than our dialect.
+    """Return the message in a payload of any length.
 
-    `id` is one of the dialect's. pymavlink's own decoder tests the checksum a second time and sorts the fields anew for
-    each frame; this one knows each class's fields once, and gives the same message.
+    Absent bytes are zero; surplus bytes belong to a newer dialect than ours. `id` is one of the dialect's.
+    pymavlink's own
+    decoder tests the checksum a second time and sorts the fields again for each frame; this one knows each class's
+    fields
+    once, and gives the same message.
     """
     message: dialect.MAVLink_message = object.__new__(dialect.mavlink_map[id])
     message.__dict__ = (_readers.get(id) or _reader(id))(payload)
@@ -167,7 +176,10 @@ class Received(msgspec.Struct, frozen=True):
     raw: bytes
 
     def version_2(self) -> bytes:
-        """The frame as it may be sent on: a version 1 frame is framed anew, its sequence number kept."""
+        """Return the frame in MAVLink 2, as it is forwarded.
+
+        A version 1 frame is framed again; its sequence number is kept.
+        """
         if self.raw[0] == MAGIC_2:
             return self.raw
         payload = self.raw[HEADER_1:-CHECKSUM]
@@ -175,11 +187,15 @@ class Received(msgspec.Struct, frozen=True):
 
 
 class Parser:
-    """Finds frames in bytes. What is none costs a counter, and at most one checksum per start mark in it.
+    """Finds frames in bytes.
 
-    A frame that fails its checksum is given up by one byte, not by its length, so a false start mark never hides
-    the real frame behind it. Ids that we do not know have no checksum to test; they pass only from a source that
-    has sent a message with a good one, and only if another start mark, or the end of the datagram, follows.
+    Other bytes cost a counter, and at most one checksum per start mark in them. After a frame with a wrong checksum
+    the
+    search goes on one byte later, not behind its length, so a false start mark never hides the real frame behind it.
+    Ids
+    that we do not know have no checksum to test; they pass only from a source that has sent a message with a good
+    one, and
+    only if another start mark, or the end of the datagram, follows.
     """
 
     def __init__(self) -> None:
@@ -188,7 +204,7 @@ class Parser:
         lost_frames (by the gaps in their senders' numbers)."""
         self._pending = b""
         self._sources: dict[tuple[int, int], int] = {}
-        """Who has sent a good frame -> the number of the last one."""
+        """(system, component) that has sent a good frame -> sequence number of its last one."""
 
     def receive(self, data: bytes) -> list[Received]:
         """The frames that end in `data`; the beginning of another is kept for the next call."""
@@ -198,7 +214,7 @@ class Parser:
         return found
 
     def receive_datagram(self, data: bytes) -> list[Received]:
-        """The frames in `data`, which is a whole: a frame that does not end in it is none."""
+        """Return the frames in a whole datagram; a frame that does not end in it is invalid."""
         self._pending = b""
         found, end = self._scan(data, whole=True)
         while end < len(data):
@@ -210,7 +226,10 @@ class Parser:
         return found
 
     def _scan(self, buffer: bytes, *, whole: bool) -> tuple[list[Received], int]:
-        """The frames in `buffer`, and where the one begins that is not complete yet (its length if none does)."""
+        """Return the frames in `buffer` and the start of the incomplete one.
+
+        Without an incomplete frame the second value is the buffer's length.
+        """
         found: list[Received] = []
         position, size = 0, len(buffer)
         while position < size:
@@ -243,7 +262,10 @@ class Parser:
         return found, size
 
     def _length(self, buffer: bytes, position: int, size: int) -> int | None:
-        """Length of the frame that begins here; 0 if its header cannot be one, None if that is not to be seen yet."""
+        """Return the length of the frame that begins here.
+
+        Returns 0 if its header cannot be one, None if too few bytes have arrived to decide.
+        """
         if buffer[position] == MAGIC_1:
             if size < position + HEADER_1:
                 return None
@@ -263,7 +285,7 @@ class Parser:
         return HEADER_2 + buffer[position + 1] + CHECKSUM + (SIGNATURE if flags else 0)
 
     def _decode(self, raw: bytes) -> Received | None:
-        """The message in a frame of the right length; None if the checksum says that it is none."""
+        """Return the message in a frame of the right length, or None if its checksum is wrong."""
         if raw[0] == MAGIC_1:
             _, size, seq, sysid, compid, id = raw[:HEADER_1]
             begin, flags, compatible = HEADER_1, 0, 0

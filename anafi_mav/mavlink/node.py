@@ -1,4 +1,4 @@
-"""The node: all endpoints of the gateway, the router between them and the way to our own hosts.
+"""Node: all endpoints of the gateway, the router between them and the way to our hosts.
 
 node = Node()
 await node.start(["udpout://127.0.0.1:14550", "tcpin://127.0.0.1:5760"])
@@ -37,7 +37,7 @@ class Inbound(msgspec.Struct, frozen=True):
     message: Any
     """A message of the dialect."""
     channel: Channel
-    """Where it came from, and where an answer goes."""
+    """Channel it arrived on, and to which an answer goes."""
     sysid: int
     """System id of the sender."""
     compid: int
@@ -76,7 +76,10 @@ class Node:
         self._stalls: StallWatch | None = None
 
     async def start(self, urls: Sequence[str]) -> None:
-        """Open an endpoint for each URL. Raises `ConfigError` with key path "endpoints[i]"; nothing is left open."""
+        """Open an endpoint for each URL.
+
+        Raises `ConfigError` with key path "endpoints[i]"; nothing is left open.
+        """
         self._stalls = StallWatch(self._stalled)
         self._stalls.start()
         parsed = []
@@ -113,7 +116,7 @@ class Node:
         self._router.add_host(sysid, compid, host)
 
     def remove_hosts(self, sysid: int) -> None:
-        """Deliver no more messages for this system, and route them to others of its name."""
+        """Stop delivering messages for this system, and route them to other systems with its id."""
         self._router.remove_hosts(sysid)
 
     def add_telemetry(self, ids: Iterable[int]) -> None:
@@ -133,7 +136,9 @@ class Node:
         to: Channel | Iterable[Channel] | None = None,
         give_way: bool = False,
     ) -> None:
-        """Send as this system and component to one channel, to some, or to all. A closed one only counts it.
+        """Send as this system and component to one channel, to some, or to all.
+
+        A closed one only counts it.
 
         `give_way`: a full channel drops this before an answer, because the next one of its kind replaces it. Raises
         `LocalProtocolError` for a field that does not fit; nothing is then sent to anybody.

@@ -1,7 +1,7 @@
-"""The mission protocol from a ground station's side, without I/O: one list of items up to a vehicle, or down from it.
+"""The mission protocol from a ground station's side: uploads and downloads. No I/O.
 
-Both transfers are driven alike: `start`, then `receive` for each message of the vehicle and `expire` when `deadline` is
-there, until `result` is set; each returns the messages that are to be sent. Rules and times: MAVLink mission.md.
+Both transfers are driven alike: `start`, then `receive` for each message of the vehicle and `expire` at `deadline`,
+until `result` is set; each returns the messages that are to be sent. Rules and times: MAVLink mission.md.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class Result:
 
 
 class Transfer:
-    """What an upload and a download have in common."""
+    """Base class of an upload and a download."""
 
     def __init__(self, sysid: int, compid: int, mission_type: int) -> None:
         self.sysid, self.compid = sysid, compid
@@ -93,7 +93,7 @@ class Transfer:
 
 
 class Upload(Transfer):
-    """A list to a vehicle, which asks for one item after the other; an empty list clears what it has."""
+    """A list sent to a vehicle, which requests each item; an empty list clears its list."""
 
     def __init__(self, build: Sequence[Build], sysid: int, compid: int, mission_type: int) -> None:
         super().__init__(sysid, compid, mission_type)
@@ -163,7 +163,10 @@ class Upload(Transfer):
 
 
 class Download(Transfer):
-    """A list from a vehicle, item after item. `items` are its MISSION_ITEM_INT, or MISSION_ITEM from older ones."""
+    """A list from a vehicle, item after item.
+
+    `items` are its MISSION_ITEM_INT, or MISSION_ITEM from older ones.
+    """
 
     def __init__(self, sysid: int, compid: int, mission_type: int) -> None:
         super().__init__(sysid, compid, mission_type)

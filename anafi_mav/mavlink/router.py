@@ -1,8 +1,8 @@
-"""Routes messages to our own hosts and to other channels (MAVLink routing.md §rules). No I/O.
+"""Routes messages to our hosts and to other channels (MAVLink routing.md §rules). No I/O.
 
 A host is a component of ours, looked up by system and component. Our hosts are on every channel; other systems are
-learned from what they send. Rules beyond routing.md: a frame that comes back to us is not passed on again, for
-endpoints are easily wired into a ring, and SETUP_SIGNING, which carries a key, never is.
+learned from the messages that they send. Rules beyond routing.md: a frame that comes back to us is not forwarded
+again, for endpoints are easily wired into a ring, and SETUP_SIGNING, which carries a key, never is.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ RING_FRAMES = 512
 
 
 class Route(msgspec.Struct, Generic[KeyT, HostT], frozen=True):
-    """Where a message goes."""
+    """Destinations of a message."""
 
     hosts: tuple[HostT, ...]
     """Our hosts that it is for, in the order of their system and component."""
@@ -40,7 +40,10 @@ class Route(msgspec.Struct, Generic[KeyT, HostT], frozen=True):
 
 
 class Router(Generic[KeyT, HostT]):
-    """Routes between channels, each known by a key, and our hosts. Several channels may lead to one system."""
+    """Routes between channels, each known by a key, and our hosts.
+
+    Several channels may lead to one system.
+    """
 
     def __init__(self) -> None:
         self.counters: Counter[str] = Counter()
@@ -52,15 +55,18 @@ class Router(Generic[KeyT, HostT]):
         self._recent: OrderedDict[bytes, float] = OrderedDict()
 
     def add(self, channel: KeyT) -> None:
-        """This channel is open; nobody has been heard on it yet."""
+        """Add an opened channel, on which no system is known yet."""
         self._channels[channel] = set()
 
     def remove(self, channel: KeyT) -> None:
-        """This channel is gone, and with it whoever was behind it."""
+        """Remove a closed channel and the systems behind it."""
         self._channels.pop(channel, None)
 
     def add_host(self, sysid: int, compid: int, host: HostT) -> None:
-        """Route what is for this component to `host`; what is for this system no longer goes to other systems."""
+        """Route messages for this component to `host`.
+
+        Messages for this system are no longer routed to other systems.
+        """
         self._hosts.setdefault(sysid, {})[compid] = host
         self._hosts = {system: dict(sorted(self._hosts[system].items())) for system in sorted(self._hosts)}
 
@@ -69,7 +75,10 @@ class Router(Generic[KeyT, HostT]):
         self._hosts.pop(sysid, None)
 
     def hosts(self, system: int, component: int) -> tuple[HostT, ...]:
-        """Return our hosts that a target means: system 0 means all systems, component 0 all components."""
+        """Return our hosts that a target addresses.
+
+        System 0 means all systems, component 0 all components.
+        """
         systems = self._hosts if system == 0 else {system: self._hosts.get(system, {})}
         if component == EVERY_COMPONENT:
             return tuple([host for hosts in systems.values() for host in hosts.values()])
@@ -88,7 +97,7 @@ class Router(Generic[KeyT, HostT]):
         return [channel for channel, sources in channels if any(source[0] == sysid for source in sources)]
 
     def route(self, channel: KeyT, received: Received, now: float) -> Route[KeyT, HostT]:
-        """Where a frame from this channel goes; its source is learned."""
+        """Return the destinations of a frame from this channel, and learn its source."""
         source = (received.sysid, received.compid)
         if source in self._spoken:
             self.counters["own_sources"] += 1
@@ -138,7 +147,10 @@ class Router(Generic[KeyT, HostT]):
 
 
 def targets(message: object) -> tuple[int, int]:
-    """Target system and component of a message; 0 is everybody, also where the message has no such field."""
+    """Return target system and component of a message; 0 means all.
+
+    It is 0 too where the message has no such field.
+    """
     if isinstance(message, dialect.MAVLink_manual_control_message):
         return message.target, 0
     return getattr(message, "target_system", 0), getattr(message, "target_component", 0)

@@ -1,4 +1,7 @@
-"""Serial lines: telemetry radios, USB, pseudo-terminals. A device that is away is opened when it comes."""
+"""Serial lines: telemetry radios, USB, pseudo-terminals.
+
+A device that is away is opened when it comes.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +28,7 @@ MIN_WRITE_AHEAD, MIN_QUEUE = 280, 2048
 """Bytes: one frame, and a burst of answers, on however slow a line."""
 
 _AWAY = {errno.ENOENT, errno.ENXIO, errno.ENODEV, errno.EIO}
-"""What opening says of a device that is not there (now). Anything else is a mistake or somebody else's port."""
+"""Errors of opening an absent device. Any other error is a mistake or a port in use."""
 
 
 class _Port(serial.Serial):  # type: ignore[misc]  # pyserial has no annotations
@@ -47,7 +50,10 @@ class _Port(serial.Serial):  # type: ignore[misc]  # pyserial has no annotations
         return data
 
     def write(self, data: bytes) -> int:
-        """Number of bytes taken. Raises BlockingIOError if the line takes none, as the transport expects."""
+        """Number of bytes taken.
+
+        Raises BlockingIOError if the line takes none, as the transport expects.
+        """
         try:
             return os.write(self.fd, data)
         except (BlockingIOError, InterruptedError):

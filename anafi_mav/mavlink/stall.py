@@ -1,7 +1,9 @@
-"""Notices that the host stalled: what clients sent meanwhile is old, and must not be carried out as if it were new.
+"""Notices that the host stalled, so that messages of that time are dropped.
 
 A stopped or overloaded process finds in its sockets what arrived while it could not read: setpoints of a program that
-has ended since, commands whose client has given up waiting. They carry no time of their own.
+has ended since, commands whose client waits no longer. They carry no time of their own, and must not be carried out
+as
+if they were new.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
-"""Which message goes to which channel how often. No I/O, no clock: a vehicle's telemetry asks `due` with its own time.
+"""Intervals of the messages on each channel. No I/O, no clock.
 
-The defaults are intervals at most: a message leaves when there is news, and no more often than this.
+A vehicle's telemetry calls `due` with its own time. The defaults are shortest intervals: a message leaves when its
+values are updated, and not more often than this.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ class _Stream:
         self.next = _NEVER if interval is None else -_NEVER
 
     def due(self, now: float) -> bool:
-        """Whether it may leave now; if so, it counts as sent.
+        """True when the message may leave now; it then counts as sent.
 
         Times are kept on a grid, not from message to message, so that jitter of the source costs no rate: an
         interval equal to the source's passes all but perhaps one of its messages.
@@ -54,14 +55,20 @@ class _Lane(Generic[ChannelT]):
 
 
 class Streams(Generic[ChannelT]):
-    """The intervals of one vehicle's messages on every channel. A channel that is gone is forgotten by itself."""
+    """The intervals of one vehicle's messages on every channel.
+
+    A closed channel is removed by itself.
+    """
 
     def __init__(
         self,
         defaults: Mapping[int, float],
         without: Callable[[ChannelT], Collection[int]] = lambda channel: (),
     ) -> None:
-        """`defaults` are s by message id; `without` names the message ids that a channel does not have by default."""
+        """Create streams with `defaults`, the intervals in s by message id.
+
+        `without` returns the message ids that a channel does not have by default.
+        """
         self._defaults = dict(defaults)
         self._without = without
         self._channels: WeakKeyDictionary[ChannelT, dict[int, _Stream]] = WeakKeyDictionary()
@@ -96,7 +103,7 @@ class Streams(Generic[ChannelT]):
     def due_on(
         self, channels: Sequence[ChannelT], ids: tuple[int, ...], now: float
     ) -> list[tuple[int, list[ChannelT]]]:
-        """Which of these messages may leave now, and on which of these channels; they count as sent there.
+        """Return the messages that may leave now with their channels; they count as sent there.
 
         A list of channels that has changed must be another object, as `Node.channels` is.
         """
@@ -123,7 +130,7 @@ class Streams(Generic[ChannelT]):
         return found
 
     def due(self, channel: ChannelT, id: int, now: float) -> bool:
-        """Whether a message may leave now on this channel; if so, it counts as sent."""
+        """True when a message may leave now on this channel; it then counts as sent."""
         self._forget(id)
         return self._stream(channel, id).due(now)
 

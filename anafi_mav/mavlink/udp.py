@@ -1,4 +1,4 @@
-"""UDP endpoints: `udpout` speaks to one address from the beginning, `udpin` to whoever spoke to it."""
+"""UDP endpoints: `udpout` sends to one address from the start, `udpin` answers its peers."""
 
 from __future__ import annotations
 
@@ -95,10 +95,11 @@ async def _shut(transport: asyncio.DatagramTransport | None) -> None:
 
 
 class UdpOut(Endpoint):
-    """One channel, open from start to end, whether somebody listens there or not.
+    """One channel, open from start to end, whether a peer listens there or not.
 
-    The socket is connected: only that peer is heard. It is opened anew when the network says more than "nobody
-    listens", because a connected socket keeps the local address it had, and a laptop changes networks.
+    The socket is connected: only that peer is heard. It is opened again on any network error but "connection
+    refused",
+    because a connected socket keeps the local address it had, and a laptop changes networks.
     """
 
     def __init__(self, url: EndpointUrl, sink: Sink, clock: Clock) -> None:
@@ -195,7 +196,10 @@ class _Peer:
 
 
 class UdpIn(Endpoint):
-    """Listens; every address that sends a MAVLink frame is a channel until it has been silent for `PEER_SILENCE`."""
+    """Listens; each address that sends a MAVLink frame is a channel.
+
+    It is one until it has been silent for `PEER_SILENCE`.
+    """
 
     def __init__(self, url: EndpointUrl, sink: Sink, clock: Clock) -> None:
         super().__init__(url, sink, clock)

@@ -1,4 +1,7 @@
-"""Where a plan leads: its places in metres around where it begins, for people to look at. Jumps are not followed."""
+"""Path of a plan for pictures: its places in metres around its start.
+
+Jumps are not followed.
+"""
 
 from __future__ import annotations
 
@@ -49,7 +52,10 @@ def place_of(item: Item) -> tuple[float, float] | None:
 
 
 def height_of(item: Item, plan: Plan) -> float | None:
-    """m above take-off. AMSL heights count from that of the planned home; without one they are not known."""
+    """m above take-off.
+
+    AMSL heights count from that of the planned home; without one they are not known.
+    """
     height = item.params[6]
     if height is None or item.frame in ABOVE_TAKEOFF:
         return height
@@ -59,7 +65,7 @@ def height_of(item: Item, plan: Plan) -> float | None:
 
 
 def way(plan: Plan) -> Iterator[Stop]:
-    """The places that are flown to, in the order of their items."""
+    """Yield the places that the plan flies to, in the sequence of its items."""
     before: tuple[float, float] | None = None if plan.home is None else (plan.home.latitude, plan.home.longitude)
     for number, item in enumerate(plan.items):
         if item.command not in _WAYS:

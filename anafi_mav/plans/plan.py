@@ -1,7 +1,8 @@
-"""A flight plan in nobody's format: what QGroundControl, Mission Planner, MAVLink and Parrot mean, without their files.
+"""Flight plan independent of the file formats of QGroundControl, MAVLink and Parrot.
 
-Items are MAVLink's (common.xml MAV_CMD), with one difference: the target of a DO_JUMP is the place of an item in
-`items`, counted from 0, whatever a file or a protocol counts from. None is "not set": null or nan in files.
+It holds what these and Mission Planner mean. Items are MAVLink's (common.xml MAV_CMD), with one difference: the
+target of a DO_JUMP is the index of an item in `items`, counted from 0, whatever a file or a protocol counts from.
+None is "not set": null or nan in files.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ class Item:
     """param1..param7; of an item with a place the last three are latitude (deg), longitude (deg), height (m)."""
     autocontinue: bool = True
     extra: str = field(default="", compare=False)
-    """What QGroundControl's editor keeps with the item, as JSON."""
+    """Data that QGroundControl's editor keeps with the item, as JSON."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +98,7 @@ class Plan:
 
     items: tuple[Item, ...] = ()
     home: Point | None = None
-    """Where the planner thought that it would begin; height above mean sea level."""
+    """Planned start; height above mean sea level."""
     zones: tuple[Polygon | Circle, ...] = ()
     breach_return: Point | None = None
     """Height above home."""
@@ -110,7 +111,7 @@ class Plan:
     blocks: tuple[Block, ...] = ()
     """In the order of their items, which they do not share."""
     editor: str = field(default="", compare=False)
-    """What else QGroundControl's editor keeps, as JSON."""
+    """Other data that QGroundControl's editor keeps, as JSON."""
 
     def __post_init__(self) -> None:
         # The order of zones means nothing, and QGroundControl keeps polygons and circles apart.
@@ -132,7 +133,10 @@ class Loss:
 
 
 def shifted(item: Item, by: int) -> Item:
-    """The same item in a list that counts `by` more before it: only the target of a jump is a number of a list."""
+    """Return the item for a list with `by` more items before it.
+
+    Only the target of a jump changes: it is the only index of a list.
+    """
     target, two, three, four, five, six, seven = item.params
     if item.command != DO_JUMP or target is None:
         return item

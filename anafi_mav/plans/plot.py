@@ -1,4 +1,4 @@
-"""A plan as a picture: a map in metres around where it begins, and how high it goes along its way.
+"""Picture of a plan: a map in metres around its start, and a height profile.
 
 Needs matplotlib, the extra `plots`.
 """
@@ -36,7 +36,10 @@ RETURN_HEIGHT = 20.0
 
 
 def draw(plan: Plan, title: str, target: Path) -> None:
-    """Write the picture. Raises `PlanError` where nothing can be drawn or written, `ImportError` without matplotlib."""
+    """Write the picture.
+
+    Raises `PlanError` where nothing can be drawn or written, `ImportError` without matplotlib.
+    """
     if target.suffix.lower() not in SUFFIXES:
         raise PlanError(target.name, f"pictures end in {', '.join(SUFFIXES)}")
     stops = list(path.way(plan))
@@ -92,7 +95,7 @@ def _map(axes: Any, plan: Plan, stops: list[Stop], origin: tuple[float, float]) 
 
 
 def _rise(axes: Any, plan: Plan, stops: list[Stop], points: list[Point2]) -> None:
-    """Where the drone takes off, and how high it climbs there."""
+    """Draw the take-off: its place, and the height to which the drone climbs there."""
     if plan.home is None or not starts_at_home(plan):
         return
     height = next((stop.height for stop in stops if stop.height is not None), None)
@@ -198,7 +201,10 @@ def _named(axes: Any) -> None:
 
 
 def profile_of(plan: Plan, stops: list[Stop]) -> tuple[list[Point2], list[Point2]]:
-    """Height over the way: from the take-off on, and of the return; m above take-off over m along the ground."""
+    """Return the height profiles of the flight from the take-off, and of the return.
+
+    Points are m along the ground and m above take-off.
+    """
     travelled, flown = 0.0, list[Point2]()
     at = (stops[0].latitude, stops[0].longitude)
     if plan.home is not None and starts_at_home(plan):

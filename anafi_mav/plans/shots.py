@@ -1,4 +1,4 @@
-"""Where a plan photographs and films, for pictures of it. Jumps are not followed."""
+"""Places where a plan takes photos and videos, for pictures of it. Jumps are not followed."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Place = tuple[float, float]
 
 
 class Kind(enum.Enum):
-    """What the camera does."""
+    """Activity of the camera."""
 
     PHOTO = "photo"
     PHOTOS = "photos on the way"
@@ -24,7 +24,10 @@ class Kind(enum.Enum):
 
 @dataclass(frozen=True)
 class Shots:
-    """Single photos by their place, ways with photos or video, and targets with the place that looks at them."""
+    """Photos and videos of a plan.
+
+    Single photos by their place, ways with photos or video, and targets with the place that looks at them.
+    """
 
     photos: tuple[Place, ...]
     ways: tuple[tuple[Kind, Place, Place], ...]
@@ -37,7 +40,7 @@ _TRIGGERS = (mav_enums.MAV_CMD_DO_SET_CAM_TRIGG_DIST, mav_enums.MAV_CMD_DO_SET_C
 
 
 def shots(plan: Plan) -> Shots:
-    """Follow the items in their order."""
+    """Follow the items in sequence and return their photos and videos."""
     stops = {stop.item: stop for stop in path.way(plan)}
     here: Place | None = None if plan.home is None else (plan.home.latitude, plan.home.longitude)
     running: set[Kind] = set()

@@ -82,7 +82,7 @@ def name_of(command: int) -> str:
 
 
 def summary(plan: Plan) -> str:
-    """What is in a plan, in one line."""
+    """Return a summary of a plan in one line."""
     parts = [counted(len(plan.items), "item")]
     if plan.home is not None:
         parts.append(f"home {_place((plan.home.latitude, plan.home.longitude))} at {plan.home.height:g} m AMSL")

@@ -1,7 +1,9 @@
-"""Zones on the ground, and where a way crosses their boundaries: what a fence is made of. No I/O, no clock.
+"""Zones of a fence on the ground, and the crossings of their boundaries.
+
+No I/O, no clock.
 
 Inside means: in all inclusion zones of at least one group (param2 of the items; MAVLink common.xml
-MAV_CMD_NAV_FENCE_*), and in no exclusion zone. Every zone is looked at in a plane of its own, with distances and
+MAV_CMD_NAV_FENCE_*), and in no exclusion zone. Every zone is computed in a plane of its own, with distances and
 bearings from one of its corners along geodesics: exact to a centimetre over the ten kilometres that an ANAFI flies.
 A polygon that crosses itself is inside where a ray from the point crosses it an odd number of times.
 """
@@ -28,7 +30,7 @@ SHORTEST = 0.01
 
 @dataclass(frozen=True)
 class Circle:
-    """A zone around a point, or around home where that is None."""
+    """Circular zone around a point, or around home when `centre` is None."""
 
     name: str
     inclusion: bool
@@ -38,12 +40,15 @@ class Circle:
     """m."""
 
     def depth(self, point: LatLon, home: LatLon | None) -> float:
-        """How far inside the boundary a point is (m), negative outside. A circle around an unknown home is endless."""
+        """How far inside the boundary a point is (m), negative outside.
+
+        A circle around an unknown home is endless.
+        """
         centre = home if self.centre is None else self.centre
         return math.inf if centre is None else self.radius - geo.distance(*centre, *point)
 
     def crossings(self, start: LatLon, end: LatLon, home: LatLon | None) -> list[float]:
-        """Where the straight way from one point to another meets the boundary: shares of the way."""
+        """Return where the straight way between two points crosses the boundary: shares of the way."""
         centre = home if self.centre is None else self.centre
         if centre is None:
             return []
@@ -94,7 +99,7 @@ class Polygon:
         return distance if inside else -distance
 
     def crossings(self, start: LatLon, end: LatLon, home: LatLon | None) -> list[float]:
-        """Where the straight way from one point to another meets the boundary: shares of the way."""
+        """Return where the straight way between two points crosses the boundary: shares of the way."""
         first, last = (np.array(geo.offset(*self._origin, *point)) for point in (start, end))
         way = last - first
         back = self._starts - first
@@ -123,7 +128,10 @@ NOWHERE = Margin(math.inf, "")
 
 
 class Fence:
-    """Zones together. `home` is the middle of a circle around home; while it is unknown there is no such circle."""
+    """Zones together.
+
+    `home` is the middle of a circle around home; while it is unknown there is no such circle.
+    """
 
     def __init__(self, zones: Iterable[Zone] = ()) -> None:
         self.zones = tuple(zones)
@@ -146,7 +154,9 @@ class Fence:
         return result
 
     def leaves(self, start: LatLon, end: LatLon, home: LatLon | None = None) -> Margin | None:
-        """Where the straight way from one point to another is outside: the first such margin; None: nowhere.
+        """Return the first margin outside the fence on the straight way between two points.
+
+        Returns None if the way is inside.
 
         Between two boundaries that it crosses, a way is inside or outside as a whole.
         """

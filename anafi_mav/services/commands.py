@@ -1,6 +1,6 @@
 """The command protocol: what a COMMAND_LONG or COMMAND_INT says, and when it is executed, repeated or answered.
 
-I/O-free. `CommandDesk` decides; `System` runs the handler and sends the acknowledgements.
+No I/O. `CommandDesk` decides; `System` runs the handler and sends the acknowledgements.
 Rules: conformance R5-R10, MAVLink command.md.
 """
 

@@ -71,9 +71,17 @@ class Host(Protocol):
     def spawn(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
         """Run in the background; cancelled when the drone's link goes down."""
 
-    def run_action(self, client: Hashable, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
+    def run_action(
+        self, client: Hashable, work: Coroutine[Any, Any, None], *, is_order: bool = True
+    ) -> asyncio.Task[None]:
         """Run an action that a message without COMMAND_ACK asks for, in its turn among the commands: it replaces the
-        action under way, and newer ones replace it. A refusal becomes a text."""
+        action under way, and newer ones replace it. A refusal becomes a text.
+
+        `is_order`: a client has commanded it; neither the gateway began it, nor a stream of setpoints."""
+
+    @property
+    def replaced_by_order(self) -> bool:
+        """True in an action that a newer order of a client has ended."""
 
     def times(self, at: float | None = None) -> Times:
         """A moment of the monotonic clock (None: now) in the clock of this system's messages."""
@@ -113,6 +121,10 @@ class Service:
 
     def actions(self) -> Mapping[int, Action]:
         """The rows of the commands that change what the vehicle does, by MAV_CMD."""
+        return {}
+
+    def item_commands(self) -> Mapping[int, MessageHandler]:
+        """Return handlers of mission items that are commands and belong to no plan, by the items' `current`."""
         return {}
 
     def requests(self) -> Mapping[int, Request]:

@@ -192,6 +192,9 @@ class System:
         self.telemetry: frozenset[int] = frozenset({*streams, dialect.MAVLINK_MSG_ID_HEARTBEAT})
         """Messages that the next one of their kind replaces: a full channel drops them rather than answers."""
         node.add_telemetry(self.telemetry)
+        for service in self.services:
+            if isinstance(service, PlanService):
+                service.take_tables(_joined(service.item_commands() for service in self.services))
         self._ftp.take_tables(_joined(service.files() for service in self.services))
         self._handlers: dict[int, MessageHandler] = _joined(service.messages() for service in self.services)
         self._handlers[dialect.MAVLINK_MSG_ID_HEARTBEAT] = self._heard
@@ -336,9 +339,16 @@ class System:
         task.add_done_callback(self._tasks.discard)
         return task
 
-    def run_action(self, client: Hashable, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
+    def run_action(
+        self, client: Hashable, work: Coroutine[Any, Any, None], *, is_order: bool = True
+    ) -> asyncio.Task[None]:
         """Run an action that a message without COMMAND_ACK asks for."""
-        return self._commands.run(client, work)
+        return self._commands.run(client, work, is_order=is_order)
+
+    @property
+    def replaced_by_order(self) -> bool:
+        """True in an action that a newer order of a client has ended."""
+        return self._commands.replaced_by_order
 
     def times(self, at: float | None = None) -> Times:
         """A moment of the monotonic clock (None: now) in the clock of this system's messages."""

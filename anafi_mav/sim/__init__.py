@@ -1,4 +1,4 @@
-"""A simulated ANAFI on the real wire: the product behind ``anafi-mav sim``, and what the tests fly.
+"""Simulated ANAFI that speaks ARSDK: used by ``anafi-mav sim`` and by the tests.
 
 It speaks `arsdk` in the device's role and shares nothing else with the gateway, so that a misreading of the protocol
 cannot hide in both.

@@ -61,7 +61,7 @@ MAX_RATE = 200.0
 
 @dataclass(frozen=True)
 class DroneSpec:
-    """What a simulated drone is to be. Raises `ConfigError` for values it cannot be."""
+    """Configuration of a simulated drone. Raises `ConfigError` for impossible values."""
 
     model: str = "4k"
     address: str = "127.0.42.1"
@@ -87,7 +87,7 @@ class DroneSpec:
     skycontroller: int | None = None
     """The generation of the Skycontroller in front of it, whose address `address` then is; None: there is none."""
     wind: WindSpec = CALM
-    """What blows from the start."""
+    """Wind at the start."""
     firmware_quirks: tuple[str, ...] = ()
     """Names of the `Quirk`s that its firmware has from the start."""
 
@@ -147,7 +147,7 @@ class SimulatedDrone:
         """Set its `spec` to let it blow."""
         self._air = Air(self.faults, random.Random(chance.getrandbits(64)), _later)
         self.http_problem = ""
-        """Why there is no web server although one was asked for; empty: there is one, or nobody asked."""
+        """Reason why the requested web server does not run; empty when it runs or was not requested."""
         self.rtsp_problem = ""
         """The same of the video."""
         self._clock = clock
@@ -231,12 +231,12 @@ class SimulatedDrone:
 
     @property
     def http_port(self) -> int | None:
-        """Where the web server listens; None: there is none."""
+        """Return the web server's port, or None without a web server."""
         return None if self._web is None else self._web.port
 
     @property
     def rtsp_port(self) -> int | None:
-        """Where the video server listens; None: there is none."""
+        """Return the video server's port, or None without a video server."""
         return self._video.port or None
 
     def throw(self) -> None:
@@ -313,7 +313,10 @@ class SimulatedDrone:
             self._web = web
 
     def _tcp_port(self, port: int) -> int:
-        """Where a port of the drone is at the address of the Skycontroller; the aircraft's own are known too."""
+        """Return the port at the Skycontroller's address that forwards to a port of the drone.
+
+        `port` may be the number on the real drone or this simulation's own.
+        """
         if port in (HTTP_PORT, self.spec.http_port):
             return self.http_port or port
         if port in (RTSP_PORT, self.spec.rtsp_port):
@@ -341,8 +344,11 @@ class SimulatedDrone:
             await self._web.close()
         await self._video.close()
 
-    def tick(self, now: float, elapsed: float, pose: Pose, arrived: bool, still: bool) -> None:
-        """Called by the simulation after each of its turns; see `Firmware.tick`."""
+    def tick(self, now: float, elapsed: float, passed: float, pose: Pose, arrived: bool, still: bool) -> None:
+        """Called by the simulation after each of its turns; see `Firmware.tick`.
+
+        The world has moved on by `elapsed` simulated seconds, for which it takes `passed` s of the host's clock.
+        """
         self.firmware.tick(now, elapsed, pose, arrived, still)
         if self._off_at is not None and self.time >= self._off_at:
             self._go_off()
@@ -352,6 +358,7 @@ class SimulatedDrone:
             self._body.blow(*self.wind.advance(elapsed))
         if self.skycontroller is not None:
             self.skycontroller.tick(now)
+        self._video.tick(now, passed)
         session = self._session
         if session is not None and now >= self._telemetry.next and self._in_reach:
             untold = self.faults.untold
@@ -386,7 +393,10 @@ class SimulatedDrone:
     # -- the link
 
     def _refuses(self) -> bool:
-        """A firmware that keeps a controller's session, silent or not, refuses the handshake of the next one."""
+        """Return True when the handshake of another controller must be refused.
+
+        A firmware with this quirk keeps a controller's session, silent or not.
+        """
         session = self._session
         keeps = Quirk.HANDSHAKE_REFUSED_8S in self.faults.quirks
         return keeps and session is not None and self._clock() - session.last_received < SESSION_KEPT
@@ -409,7 +419,7 @@ class SimulatedDrone:
         self._off_at, self._factory = self.time + SHUTDOWN_TIME, factory
 
     def _go_off(self) -> None:
-        """Nobody is told: the link is silent from here on."""
+        """Power off without notice: the link is silent from here on."""
         if self.firmware.state is not FlyingState.LANDED:
             self._off_at = None
             return

@@ -1,4 +1,7 @@
-"""Any number of simulated drones in one process: one array of motion, one task that turns the world."""
+"""Simulator of any number of drones in one process.
+
+All share one array of motion and one task that advances the world.
+"""
 
 from __future__ import annotations
 
@@ -48,10 +51,12 @@ class Simulator:
         remember: bool = True,
         scenarios: Mapping[str, Scenario] | None = None,
     ) -> None:
-        """`speed` runs the world faster than the clock, `seed` makes ids the same in every run, `log` is a file of
-        JSON lines, `remember` keeps the log in memory too, `scenarios` says by address what happens to a drone.
+        """Create the drones of `specs`.
 
-        Raises `ConfigError` for specs that cannot live together, `OSError` when the log cannot be written.
+        `speed` runs the world faster than the clock, `seed` makes ids the same in every run, `log` is a file of
+        JSON lines, `remember` keeps the log in memory too, `scenarios` maps a drone's address to its scenario.
+
+        Raises `ConfigError` for specs that exclude each other, `OSError` when the log cannot be written.
         """
         if not specs:
             raise ConfigError("drones", "expected at least one")
@@ -101,7 +106,10 @@ class Simulator:
         await self.close()
 
     async def start(self) -> None:
-        """Open every drone's sockets and let time run. Raises `ConfigError` naming the drone that cannot listen."""
+        """Open every drone's sockets and let time run.
+
+        Raises `ConfigError` naming the drone that cannot listen.
+        """
         self._turn(_clock(), 0)
         try:
             for index, drone in enumerate(self.drones):
@@ -152,7 +160,10 @@ class Simulator:
             self._turn(now, steps)
 
     def advance(self, seconds: float) -> None:
-        """Let the world turn by hand, as long as it has not been started; needs a running loop for its clock."""
+        """Advance the simulated world by hand, before it has been started.
+
+        Needs a running event loop for its clock.
+        """
         now = _clock()
         for _ in range(round(seconds / STEP)):
             now += STEP
@@ -163,9 +174,10 @@ class Simulator:
         for _ in range(steps):
             motion.step()
         elapsed = steps * STEP
+        passed = elapsed / self._speed
         turns = zip(self.drones, motion.poses(), motion.arrived(), motion.still(), strict=True)
         for drone, pose, arrived, still in turns:
-            drone.tick(now, elapsed, pose, arrived, still)
+            drone.tick(now, elapsed, passed, pose, arrived, still)
             if scenarios and (scenario := scenarios.get(drone.address)) is not None:
                 scenario.tick(drone)
         if self._file is not None:

@@ -39,7 +39,10 @@ _ORDERS = {"oldest": False, "newest": True}
 
 
 class WebServer:
-    """One drone's HTTP server. `properties` are what it says of itself, `date` the time on its clock."""
+    """One drone's HTTP server.
+
+    `properties` are what it says of itself, `date` the time on its clock.
+    """
 
     def __init__(
         self, media: MediaStore, plans: FlightPlanStore, properties: Mapping[str, str], date: Callable[[], str]
@@ -76,7 +79,10 @@ class WebServer:
         self.port = 0
 
     async def start(self, address: str, port: int) -> None:
-        """Listen. Raises `OSError` when the port is taken or not permitted; 0 lets the system choose."""
+        """Listen.
+
+        Raises `OSError` when the port is taken or not permitted; 0 lets the system choose.
+        """
         await self._runner.setup()
         try:
             await web.TCPSite(self._runner, address, port).start()
@@ -252,7 +258,7 @@ async def _write(socket: web.WebSocketResponse, queue: asyncio.Queue[str], audib
 
 
 def _deaf(name: str, data: dict[str, Any]) -> None:
-    """Nobody listens."""
+    """Ignore a notification: used after the server has closed."""
 
 
 def _refuse(status: int, error: str) -> web.Response:

@@ -1,9 +1,9 @@
-"""What a simulated drone went through, for tests and for whoever wants to know what really happened.
+"""Log of a simulated drone, for tests and for analysis.
 
 An entry is one line of JSON in the file: ``{"t": 12.345, "drone": "127.0.42.1", "kind": "command",
-"name": "ardrone3.Piloting.PCMD", "args": {"flag": 1, ...}}``. `t` is the monotonic clock of the machine in seconds,
+"name": "ardrone3.Piloting.PCMD", "args": {"flag": 1, ...}}``. `t` is the monotonic clock of the host in seconds,
 which all its processes share. Kinds: command (received), event (sent or meant to be sent, telemetry left out),
-state (flying state), plan (what a flight plan does), session (up, lost), scenario (a step begins or
+state (flying state), plan (progress of a flight plan), session (up, lost), scenario (a step begins or
 ends), pose (the true pose, 10 Hz, and the simulated time in s).
 """
 

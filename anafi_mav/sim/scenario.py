@@ -1,4 +1,4 @@
-"""What is to go wrong, and when: a YAML file of steps, each with a trigger and with what changes then.
+"""Scenario of faults: a YAML file of steps, each with a trigger and its changes.
 
     steps:
       - at: 20                  # simulated seconds after the start
@@ -9,7 +9,7 @@
         drone: 127.0.42.1       # without it: every drone, each in its own time
         link: {both: {loss: 0.2, delay: 0.05}}
 
-A step happens once for each of its drones. docs/simulator.md lists all keys. Whatever is wrong with a file is one
+A step happens once for each of its drones. docs/simulator.md lists all keys. Any error in a file raises one
 `ConfigError` with the key's path, like "steps[1].link.up.loss: expected `float` <= 1.0".
 """
 
@@ -106,7 +106,7 @@ class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Actor(Protocol):
-    """What a scenario sees of a simulated drone, and does to it."""
+    """Interface of a simulated drone that a scenario reads and changes."""
 
     faults: Faults
     wind: Wind

@@ -1,9 +1,10 @@
-"""A simulated Skycontroller between a drone and whoever connects: sticks, buttons, and a say in who flies.
+"""Simulated Skycontroller between a drone and a client: sticks, buttons, piloting source.
 
-What concerns the controller itself (projects skyctrl, drone_manager, mapper) it answers, everything else passes
-through both ways. Its pilot's sticks fly the drone while the piloting source is "SkyController"; with "Controller" they
-are dead and the PCMDs of what is connected count, which are dropped otherwise (skyctrl.xml 4-20-0). A grabbed axis or
-button is told and does nothing else (mapper.xml 138-1). Grab and source fall back when the connection ends.
+It answers messages for the controller itself (projects skyctrl, drone_manager, mapper), everything else passes
+through both ways. Its pilot's sticks fly the drone while the piloting source is "SkyController"; with "Controller"
+they have no effect and the client's PCMDs are used, which are dropped otherwise (skyctrl.xml 4-20-0). A grabbed
+axis or button is reported and does nothing else (mapper.xml 138-1). Grab and source are reset when the connection
+ends.
 """
 
 from __future__ import annotations
@@ -66,7 +67,10 @@ Forward = Callable[[Message | UnknownMessage, float], None]
 
 
 class Skycontroller:
-    """One controller with its drone. `send` is where its own messages go while somebody is connected."""
+    """One controller with its drone.
+
+    `send` sends its own messages while a client is connected.
+    """
 
     def __init__(
         self,
@@ -76,7 +80,10 @@ class Skycontroller:
         note: Callable[[str, dict[str, Any]], None],
         radio: Callable[[bool], None],
     ) -> None:
-        """`forward` gives a command to the drone, `radio` tells the drone whether it hears the controller."""
+        """Create the controller of `drone`.
+
+        `forward` passes a command to the drone, `radio` sets whether the drone receives the controller.
+        """
         self.drone = drone
         self.info = DeviceInfo(
             MODELS[generation], f"PI0{40 + generation}{drone.serial[-13:]:0>13}", drone.port, f"SC{generation}"
@@ -94,16 +101,16 @@ class Skycontroller:
         self.grabbed_axes = 0
         self.send: Callable[[Message], object] | None = None
         self.flying_state = FlyingState.LANDED
-        """What the drone said last; it decides what the take-off button means."""
+        """Last state that the drone reported; it decides the function of the take-off button."""
         self.returning = False
         self.knows_drone = True
         """It would connect to the drone again by itself."""
         self.dropped = 0
         """PCMDs that did not reach the drone because the sticks fly it."""
         self._manager = DeviceManager(drone) if generation >= 4 else None
-        """What speaks protobuf."""
+        """Protobuf services; None on a controller before generation 4."""
         self._calibration: list[tuple[float, skyctrl.State]] = []
-        """What the calibration of the controller's magnetometer will have reached, and when."""
+        """Future steps of the controller's magnetometer calibration: (time, state)."""
         self._pressed = 0
         self._forward = forward
         self._note = note
@@ -189,7 +196,7 @@ class Skycontroller:
 
     @property
     def radio(self) -> bool:
-        """False: the drone is out of reach of the controller, which is still connected to whoever it is."""
+        """False when the drone is out of the controller's reach; the client stays connected to it."""
         return self._radio
 
     @radio.setter
@@ -211,7 +218,7 @@ class Skycontroller:
     # -- the link to whoever is connected
 
     def link_up(self, send: Callable[[Message], object]) -> None:
-        """Somebody connected."""
+        """Handle the connection of a client."""
         self.send = send
 
     def link_lost(self) -> None:
@@ -252,7 +259,7 @@ class Skycontroller:
             self.returning = message.state in (rth.RthState.IN_PROGRESS, rth.RthState.PENDING)
 
     def receive(self, message: Message | UnknownMessage, now: float) -> bool:
-        """Deal with a message of whoever is connected; False: it is for the drone."""
+        """Handle a message of the client; return False when it is for the drone."""
         self._now = now
         match message:
             case skyctrl.AllStates():
@@ -305,7 +312,7 @@ class Skycontroller:
         return True
 
     def _calibrate(self) -> None:
-        """Somebody turns the controller as it wishes, an axis a second."""
+        """Calibrate the magnetometer as if the pilot turned the controller, one axis a second."""
         if not self._calibration:
             axes = (skyctrl.State.CALIBRATING_X, skyctrl.State.CALIBRATING_Y, skyctrl.State.CALIBRATING_Z)
             self._calibration = [(self._now + n, one) for n, one in enumerate((*axes, skyctrl.State.CALIBRATED))]

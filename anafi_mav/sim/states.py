@@ -1,7 +1,7 @@
-"""What AllStates and AllSettings are answered with: everything a connecting controller may ask a 4K for.
+"""Answers to AllStates and AllSettings, which a controller sends when it connects.
 
-Parrot specifies no list; this is what its XML marks "at connection" for the model and what anafi_ros reads when it
-starts. The closing AllStatesChanged or AllSettingsChanged is sent by the caller, after all of it.
+Parrot specifies no list; this is what its XML marks "at connection" for the model (a 4K) and what anafi_ros reads
+when it starts. The closing AllStatesChanged or AllSettingsChanged is sent by the caller, after all of it.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""What a drone tells without being asked, at the aircraft's rates.
+"""Telemetry that a drone sends without a request, at the aircraft's rates.
 
-Attitude, speed and height 5 times a second (or as `--telemetry-rate` says), the gimbal, the zoom and the height above
-ground as often but not below 5 times, position and voltage once (anafi_ros). Messages that are late are not made up
-for.
+Attitude, speed and height 5 times a second (or at `--telemetry-rate`), the gimbal, the zoom and the height above
+ground as often but not below 5 times, position and voltage once (anafi_ros). Messages that are late are not sent
+later.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""What section IV of the anafi_ros paper measured on the aircraft, and the same read off a simulated flight.
+"""Validation of a simulated flight against the measurements of the anafi_ros paper.
 
-A series is a list of (seconds since the drone received the first command, value). The paper gives its results in words
-and figures; the bounds here are those words. "Approximately 100 ms" is taken as within 50 ms, "almost 7 m" as within
-half a metre, "around 0" as within 1 deg, 0.1 m/s or 2 deg/s.
+Section IV of the paper contains them. A series is a list of (seconds since the drone received the first command,
+value). The paper gives its results in words and figures; the bounds here are those words. "Approximately 100 ms" is
+taken as within 50 ms, "almost 7 m" as within half a metre, "around 0" as within 1 deg, 0.1 m/s or 2 deg/s.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _REST = (2 * HOLD + AFTER - 1.0, 2 * HOLD + AFTER)
 
 @dataclass
 class Track:
-    """What the pictures of a video said during one test, against seconds since its first command."""
+    """Video metadata of one test, against seconds since its first command."""
 
     attitude: list[tuple[float, float, float, float]] = field(default_factory=list)
     """t, roll, pitch, yaw in rad"""
@@ -43,7 +43,7 @@ class Track:
     """t, pitch, roll in deg, to the horizon"""
 
     def add(self, t: float, said: FrameMetadata) -> None:
-        """What was said of the picture taken at `t`; what was not said is left out."""
+        """Add the metadata of the picture taken at `t`; absent fields are left out."""
         if said.drone_quat is not None:
             roll, pitch, yaw = euler_from_quaternion(*said.drone_quat)
             self.attitude.append((t, roll, pitch, yaw))
@@ -83,7 +83,10 @@ class Track:
 
 
 def _looks(quat: Quaternion, heading: float) -> tuple[float, float]:
-    """Pitch and roll (rad) of a camera that looks along the drone's heading (rad), up to where it looks backwards."""
+    """Return pitch and roll (rad) of a camera that looks along the drone's heading (rad).
+
+    Valid until the camera looks backwards.
+    """
     w, x, y, z = quat
     north, east, down = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)
     ahead = north * math.cos(heading) + east * math.sin(heading)
@@ -194,7 +197,10 @@ def yaw_results(track: Track, delay: float) -> Iterable[Result]:
 def gimbal_results(
     name: str, position: Series, velocity: Series, span: tuple[float, float], speed: float
 ) -> Iterable[Result]:
-    """From limit to limit in both modes; the paper gives figures and no numbers, the limit is the aircraft's."""
+    """Yield the results of turning the gimbal from limit to limit in both modes.
+
+    The paper gives figures and no numbers, the limit is the aircraft's.
+    """
     low, high = span
     way = high - low
     reached = max(between(position, 0.0, math.inf), default=math.nan)

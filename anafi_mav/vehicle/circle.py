@@ -1,4 +1,4 @@
-"""Circling a place: what the loops of `offboard_control` are asked for, from where the drone is. No I/O.
+"""Circling a place: what the loops of `velocity_loop` are asked for, from where the drone is. No I/O.
 
 A position on the circle abreast of the drone corrects the radius, the velocity along the circle goes with it as a
 feed-forward, and the acceleration that a circle takes points to its centre.

@@ -2,7 +2,7 @@
 
 Parrot's own follow me (feature follow_me) looks for its target in the picture of a controller that shows it, which a
 MAVLink client cannot do. So the gateway follows: FOLLOW_TARGET says where the target is, the geometry is PX4's
-(parameters FLW_TGT_*), and the drone is flown there by the loop of `offboard_control`, nose to the target.
+(parameters FLW_TGT_*), and the drone is flown there by the loop of `velocity_loop`, nose to the target.
 
 Between two messages the target goes on as it did, for `FORESIGHT` at most. Its course is that of its motion; while it
 stands the last one counts, and before the first one the drone keeps to the side of the target that it is on.

@@ -25,6 +25,7 @@ from anafi_mav import geo, mav_enums
 from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.config import Config, DroneConfig
 from anafi_mav.gateway import Gateway
+from anafi_mav.sim.world.faults import CLEAR, Impairment
 from anafi_mav.units import quaternion_from_euler
 
 PLACE = (HOME[0], HOME[1])
@@ -189,6 +190,36 @@ async def test_conf_076_a_breach_is_acted_upon_once(flavour: str, action: str, c
             assert north[-1] < max(north) - 1.0
 
 
+@both
+@pytest.mark.parametrize("action", ["return", "land"])
+async def test_conf_076_a_client_that_ends_the_action_may_fly_on(flavour: str, action: str) -> None:
+    """A Hold that arrives before the drone has answered the return or landing of a breach ends it for good."""
+    async with world(flavour=flavour, also="px4", speed=1.0) as w:
+        assert (await upload(w.client, square(PLACE, 12.0), FENCE)).type == TAKEN
+        await put(w, ACTION[flavour], NUMBER[flavour][action])
+        await put(w, "ANF_FENCE_AHEAD", 0, 6)
+        await w.take_off()
+        mark = w.client.mark()
+        async with flown(w):
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 9.0, 15.0)
+            w.drone.faults.down = Impairment(delay=0.5)  # the answer comes late
+            await w.client.wait("STATUSTEXT", lambda m: " m beyond " in m.text, since=mark, timeout=15.0)
+            hold = (1, BRAKE) if flavour == "ardupilot" else (1, 4, 3)
+            ack = await w.client.command(dialect.MAV_CMD_DO_SET_MODE, *hold, timeout=10.0)
+            assert ack.result == ACCEPTED
+            w.drone.faults.down = CLEAR
+            held = BRAKE if flavour == "ardupilot" else MODES["px4"].hold
+            await w.client.heartbeat(lambda beat: beat.custom_mode == held, since=w.client.mark())
+            after = w.client.mark()
+            for _ in range(4):  # longer than an action that failed waits
+                await w.client.heartbeat(lambda beat: beat.custom_mode == held)
+            assert {beat.custom_mode for _, beat in w.client.since(after, "HEARTBEAT")} == {held}
+        name = {"return": "rth.return_to_home", "land": "ardrone3.Piloting.Landing"}[action]
+        assert len(w.commands(name)) == 1
+        assert len([text for text in texts(w.client, mark) if " m beyond " in text]) == 1
+        assert w.drone.pose.north > 12.0
+
+
 async def test_conf_076_below_the_floor_the_zones_hold() -> None:
     """Held below the floor, the drone is flown on and out sideways: that is stopped like any other way out."""
     async with world(also="px4", speed=1.0) as w:
@@ -213,7 +244,7 @@ async def test_conf_076_below_the_floor_the_zones_hold() -> None:
             status = [m for _, m in w.client.since(0, "FENCE_STATUS")][-1]
             kind = dialect.FENCE_BREACH_MINALT if ahead else dialect.FENCE_BREACH_BOUNDARY
             assert (status.breach_status, status.breach_count, status.breach_type) == (1, 2 - ahead, kind)
-        assert len([text for text in texts(w.client) if text.endswith(": hold")]) == 3
+        assert len([text for text in texts(w.client) if text.startswith("Fence hold: ")]) == 3
 
 
 async def test_conf_076_warned_and_nothing_else() -> None:
@@ -248,7 +279,7 @@ async def test_conf_076_the_pilot_at_the_skycontroller_has_the_last_word() -> No
         await said(w.client, "too fast for", since=mark, timeout=20.0)
         await said(w.client, " m beyond ", since=mark, timeout=20.0)
         await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 24.0, 20.0)
-        assert [text for text in texts(w.client, mark) if text.endswith(": hold")] == []
+        assert [text for text in texts(w.client, mark) if text.startswith("Fence hold: ")] == []
 
 
 @both
@@ -259,7 +290,7 @@ async def test_conf_076_targets_outside_are_refused(flavour: str) -> None:
         await w.take_off()
         for (north, east), words in (
             ((80.0, 0.0), " m beyond inclusion"),
-            ((32.0, 1.0), "beyond the exclusion circle"),
+            ((32.0, 1.0), " m beyond exclusion"),
             ((50.0, 0.0), "path crosses"),
         ):
             place = around(PLACE, (north, east))[0]

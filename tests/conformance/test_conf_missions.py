@@ -35,7 +35,7 @@ from support.missions import (
     way,
     whole,
 )
-from support.plans import ACCEPTED, FENCE, MISSION, UNSUPPORTED_FRAME, around, square, upload
+from support.plans import ACCEPTED, FENCE, MISSION, UNSUPPORTED_FRAME, Item, around, square, upload
 from support.trouble import return_by_itself
 from support.world import ARMED, world
 
@@ -150,6 +150,36 @@ async def test_conf_049_a_mission_that_waits_for_arming_is_forgotten() -> None:
         assert w.commands("common.Mavlink.Start") == []
 
 
+async def test_conf_049_a_start_at_arming_whose_file_cannot_be_loaded_leaves_mission() -> None:
+    """The drone's web server is not reached: a text says so, and the mode no longer says that a mission is flown."""
+    async with world() as w:
+        await put(w, ROUND)
+        assert (await w.client.command(dialect.MAV_CMD_DO_SET_MODE, 1, 4, 4)).result == dialect.MAV_RESULT_ACCEPTED
+        await mode(w, 0x04040000)
+        mark = w.client.mark()
+        assert (await w.client.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)).result == dialect.MAV_RESULT_ACCEPTED
+        await w.client.wait("STATUSTEXT", lambda m: m.severity == dialect.MAV_SEVERITY_ERROR, since=mark, timeout=20.0)
+        await mode(w, w.modes.hold, since=mark)
+        await state(w, NOT_STARTED)
+        assert w.commands("common.Mavlink.Start") == []
+
+
+async def test_conf_049_a_start_at_arming_that_a_disarming_ends_leaves_mission() -> None:
+    """The file is on its way to the drone when the client disarms: nothing begins, and no mode says that it does."""
+    async with world(web=True) as w:
+        await put(w, ROUND)
+        assert (await w.client.command(dialect.MAV_CMD_DO_SET_MODE, 1, 4, 4)).result == dialect.MAV_RESULT_ACCEPTED
+        await mode(w, 0x04040000)
+        mark = w.client.mark()
+        w.client.send_command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)
+        w.client.send_command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0)
+        await w.client.heartbeat(
+            lambda beat: beat.custom_mode == w.modes.hold and not beat.base_mode & ARMED, since=mark
+        )
+        await state(w, NOT_STARTED)
+        assert w.commands("common.Mavlink.Start") == []
+
+
 @both
 async def test_conf_049_refused_by_the_gateway_itself(flavour: str) -> None:
     async with world(flavour=flavour, web=True) as w:
@@ -163,7 +193,7 @@ async def test_conf_049_refused_by_the_gateway_itself(flavour: str) -> None:
         mark = w.client.mark()
         ack = await w.client.command(dialect.MAV_CMD_DO_SET_MODE, *params)
         assert ack.result == dialect.MAV_RESULT_DENIED
-        await said(w, "item 2: 400.0 m above take-off", since=mark)
+        await said(w, "Item 2 refused: 400.0 m > ceiling", since=mark)
         await put(w, ROUND[:-1])
         w.drone.faults.gps = False
         await w.client.wait("GPS_RAW_INT", lambda m: m.fix_type < 3, timeout=10.0)
@@ -341,6 +371,53 @@ async def test_conf_072_the_current_item(flavour: str) -> None:
         assert reached(w) == [3, 4], "what was not flown is not reached"
 
 
+@both
+async def test_conf_072_a_reset_in_flight_keeps_the_item(flavour: str) -> None:
+    """param1 -1, param2 1: a mission without loops is flown on as it is, and begins anew only after its end."""
+    async with world(flavour=flavour, web=True) as w:
+        await put(w, ROUND)
+        await start(w)
+        await state(w, ACTIVE, seq=2, since=0)
+        mark = w.client.mark()
+        ack = await w.client.command(dialect.MAV_CMD_DO_SET_MISSION_CURRENT, -1, 1)
+        assert ack.result == dialect.MAV_RESULT_ACCEPTED
+        await state(w, COMPLETE, since=mark)
+        assert {m.seq - first(w) for _, m in w.client.since(mark, "MISSION_CURRENT")} <= {2, 3, 4}
+        assert reached(w) == [0, 1, 2, 3, 4]
+        assert len(w.commands("common.Mavlink.Start")) == 1
+        other, mark = await w.connect(254), w.client.mark()
+        ack = await other.command(dialect.MAV_CMD_DO_SET_MISSION_CURRENT, -1, 1)
+        assert ack.result == dialect.MAV_RESULT_ACCEPTED
+        await state(w, NOT_STARTED, seq=0, since=mark)
+
+
+@both
+@pytest.mark.parametrize("paused", [False, True])
+async def test_conf_072_a_reset_gives_a_loop_its_turns_again_at_the_same_item(flavour: str, paused: bool) -> None:
+    """Between the two ways of the second turn: the drone flies on to the second one, and then a third turn."""
+    async with world(flavour=flavour, web=True) as w:
+        jump = Item(dialect.MAV_CMD_DO_JUMP, 0.0, 0.0, p1=1.0 + first(w), p2=1.0, frame=2)
+        await put(w, [takeoff(6.0), way(9.0, 0.0, 6.0), way(9.0, 9.0, 6.0), jump, way(0.0, 9.0, 6.0)])
+        await start(w)
+        await state(w, ACTIVE, seq=2, since=0)
+        mark = w.client.mark()
+        await state(w, ACTIVE, seq=1, since=mark)
+        mark = w.client.mark()
+        await state(w, ACTIVE, seq=2, since=mark)
+        if paused:
+            ack = await w.client.command(dialect.MAV_CMD_DO_PAUSE_CONTINUE, 0)
+            assert ack.result == dialect.MAV_RESULT_ACCEPTED
+        ack = await w.client.command(dialect.MAV_CMD_DO_SET_MISSION_CURRENT, -1, 1)
+        assert ack.result == dialect.MAV_RESULT_ACCEPTED
+        if paused:
+            await state(w, PAUSED, seq=2)
+            ack = await w.client.command(dialect.MAV_CMD_MISSION_START, 0, 0)
+            assert ack.result == dialect.MAV_RESULT_ACCEPTED
+        await state(w, COMPLETE, since=mark)
+        assert reached(w) == [0, 1, 2, 3, 1, 2, 3, 1, 2, 3, 4]
+        assert flown(w).count("takeoff") == 1
+
+
 async def test_conf_072_an_ai_begins_in_the_middle_of_the_file_that_it_has() -> None:
     async with world(web=True, model="ai") as w:
         await put(w, [takeoff(6.0), way(12.0, 0.0, 6.0), way(12.0, 12.0, 6.0), way(0.0, 12.0, 6.0)])
@@ -388,6 +465,23 @@ async def test_conf_141_items_that_are_orders(flavour: str, as_int: bool) -> Non
         assert (await order(w.client, 2, *place, 8.0, frame=10, as_int=as_int)).type == UNSUPPORTED_FRAME
         current = await w.client.wait("MISSION_CURRENT")
         assert current.seq == 0
+
+
+@pytest.mark.parametrize("current", [2, 3])
+@pytest.mark.parametrize("number", [17, 5], ids=["brake", "loiter"])
+async def test_conf_141_outside_guided_an_item_moves_nothing(number: int, current: int) -> None:
+    """ArduCopter flies them in Guided only: neither a drone that is held nor one that a stick may fly goes anywhere."""
+    async with world(flavour="ardupilot") as w:
+        await w.take_off(5.0)
+        assert (await w.client.command(dialect.MAV_CMD_DO_SET_MODE, 1, number)).result == dialect.MAV_RESULT_ACCEPTED
+        mark = w.client.mark()
+        place = around(PLACE, (20.0, -10.0))[0]
+        assert (await order(w.client, current, *place, 8.0, as_int=True)).type == dialect.MAV_MISSION_DENIED
+        await said(w, "not in Guided", since=mark)
+        await mode(w, number, since=w.client.mark())
+        assert [e for e in w.drone.log if e.kind == "command" and e.name.endswith("Piloting.moveTo")] == []
+        assert (await w.client.command(dialect.MAV_CMD_DO_SET_MODE, 1, 4)).result == dialect.MAV_RESULT_ACCEPTED
+        assert (await order(w.client, current, *place, 8.0, as_int=True)).type == ACCEPTED
 
 
 @both

@@ -216,6 +216,51 @@ async def test_mission_stopped_by_an_alert_at_its_last_way_point_is_paused() -> 
         assert reached(w) == [0, 1]
 
 
+LOCATION, ALTITUDE = ardrone3.GpsLocationChanged.NAME, ardrone3.AltitudeChanged.NAME
+MOVED = {
+    LOCATION: [takeoff(6.0), way(9.0, 0.0, 6.0), way(9.0, 12.0, 6.0)],
+    ALTITUDE: [takeoff(6.0), way(9.0, 0.0, 6.0), way(9.0, 0.0, 15.0)],
+}
+"""By the name of a report: a mission whose last line changes what it says and little else."""
+
+
+async def stopped_without(w: World, report: str) -> int:
+    """Fly MOVED[report] to its end, which is not reported, and nor is the position there. Return a mark before it."""
+    w.drone.faults.quirks = frozenset({Quirk.LAST_ITEM_NOT_REPORTED})
+    await put(w, MOVED[report])
+    await start(w)
+    await w.drone.wait_log(lambda entry: entry.name == "item" and entry.args["index"] == 3, 40.0)
+    w.drone.faults.untold = frozenset({report})
+    await w.drone.wait_log(lambda entry: entry.name == "plan" and entry.args["state"] == "stopped", 40.0)
+    mark = since = w.client.mark()
+    last = MOVED[report][-1]
+    await settled(w, (9.0, 12.0, 6.0) if report == LOCATION else (9.0, 0.0, last.z))
+    for _ in range(4):  # one a second: longer than a drone's last report and its landing are waited for
+        await w.client.heartbeat(lambda beat: True, since=since)
+        since = w.client.mark()
+    return mark
+
+
+@pytest.mark.parametrize("report", MOVED)
+async def test_mission_end_without_a_position_waits_for_one_and_completes(report: str) -> None:
+    """The last position that was received is of the way to the last way point: it proves nothing."""
+    async with world(web=True) as w:
+        await stopped_without(w, report)
+        assert reached(w) == [0, 1]
+        w.drone.faults.untold = frozenset()
+        await state(w, COMPLETE)
+        assert reached(w) == [0, 1, 2]
+        assert [m.text for _, m in w.client.since(0, "STATUSTEXT") if "paused" in m.text] == []
+        assert lines_reported(w) == [0, 1, 2]
+
+
+async def test_mission_end_without_any_position_is_paused() -> None:
+    async with world(web=True) as w:
+        mark = await stopped_without(w, LOCATION)
+        await state(w, PAUSED, seq=2, since=mark)
+        assert reached(w) == [0, 1]
+
+
 @pytest.mark.parametrize("quirk", [Quirk.LAST_ITEM_NOT_REPORTED, Quirk.STOPPED_BEFORE_EXECUTED])
 async def test_mission_with_quirk_completes_over_a_bad_link(quirk: Quirk) -> None:
     """200 ms and a quarter of the datagrams lost, both ways."""

@@ -21,6 +21,7 @@ import asyncio
 import gc
 import os
 import selectors
+import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -29,6 +30,9 @@ from typing import Any
 
 SHARE = 0.01
 """Of the time that callbacks take."""
+
+DELIVERY_LIMIT = 60.0
+"""s of real time for a datagram to ourselves: only a broken machine needs longer."""
 
 _real = time.monotonic
 _ahead = 0.0
@@ -73,6 +77,27 @@ class Turns:
         self.longest = max(self.longest, time.thread_time() - self._began)
 
 
+class Barrier:
+    """Waits until the kernel has delivered what this process sent before.
+
+    It delivers from a thread of its own when it has much to deliver, in the order in which it was sent: a datagram to
+    ourselves arrives last. (`sched_yield` promises nothing, and on a busy machine costs this process its turn.)
+    """
+
+    def __init__(self) -> None:
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.bind(("127.0.0.1", 0))
+        self._socket.connect(self._socket.getsockname())
+        self._socket.settimeout(DELIVERY_LIMIT)
+
+    def wait(self) -> None:
+        self._socket.send(b"\0")
+        self._socket.recv(1)
+
+    def close(self) -> None:
+        self._socket.close()
+
+
 class Selector(selectors.DefaultSelector):
     """Does not wait when there is nothing to wait for."""
 
@@ -85,6 +110,7 @@ class Selector(selectors.DefaultSelector):
         self.processes: list[asyncio.SubprocessTransport] = []
         """Those whose end the loop has not been told of: a thread may have collected it already."""
         self.turns = Turns()
+        self._barrier = Barrier()
 
     def select(self, timeout: float | None = None) -> Any:
         self.turns.end()
@@ -117,9 +143,13 @@ class Selector(selectors.DefaultSelector):
         """What is ready by itself."""
         ready = super().select(0.0)
         if not ready:
-            os.sched_yield()  # the kernel delivers from a thread of its own when it has much to deliver
+            self._barrier.wait()
             ready = super().select(0.0)
         return ready
+
+    def close(self) -> None:
+        self._barrier.close()
+        super().close()
 
 
 class Loop(asyncio.SelectorEventLoop):

@@ -153,7 +153,7 @@ def unanswered(model: str) -> set[str]:
                     bench = make(model)
                     uid = bench.firmware.plans.put(PLAN)
                 answered = answered or bool(bench.send(message))
-                bench.run(0.02)
+                bench.turn()
             if not answered:
                 silent.append(command)
             _calm(bench)

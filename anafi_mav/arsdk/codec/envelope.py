@@ -1,9 +1,10 @@
-"""The messages of protobuf services, which travel inside feature 133, generic (Ai and later, Skycontroller 4).
+"""Messages of protobuf services (Ai and later, Skycontroller 4).
 
-Generic has four messages of the form ``service id u16, number u16, payload binary``: commands and events, with and
-without acknowledgement. The service id is a hash of the service's name; the payload is the service's own message, a
-oneof of all it can say, with the one field `number` set (Olympe, olympe/messaging/arsdk_messages.py). A declared
-message is a `Record` and a `wire.Message` at once, and is sent and received as any other::
+Feature 133, generic, carries them. It has four messages of the form ``service id u16, number u16, payload binary``:
+commands and events, with and without acknowledgement. The service id is a hash of the service's name; the payload is
+the service's own message, a oneof of all its alternatives, with the one field `number` set (Olympe,
+olympe/messaging/arsdk_messages.py). A declared message is a `Record` and a `wire.Message` at once, and is sent and
+received as any other::
 
     COMMAND = Service("arsdk.camera.Command", "camera2.Command")
 
@@ -45,7 +46,10 @@ ProtobufMessageT = TypeVar("ProtobufMessageT", bound=ProtobufMessage)
 
 @dataclass(frozen=True)
 class Service:
-    """One of the two messages of a .proto file that carry all others, by full name: "arsdk.camera.Command"."""
+    """One of the two top-level messages of a .proto file, `Command` or `Event`.
+
+    It carries all other messages. Named by its full name: "arsdk.camera.Command".
+    """
 
     proto: str
     olympe: str
@@ -89,7 +93,10 @@ _MESSAGES: dict[tuple[int, int], type[ProtobufMessage]] = {}
 
 
 class _Envelope:
-    """The codec of one of generic's four messages; which record is inside, service id and number tell."""
+    """Codec of one of generic's four messages.
+
+    Service id and number identify the record inside.
+    """
 
     def __init__(self, id: MessageId) -> None:
         self._id = id
@@ -118,7 +125,10 @@ class _Envelope:
 
 
 def _open(declared: type[ProtobufMessage], payload: bytes) -> ProtobufMessage | None:
-    """The message in a payload, None if it is not there. Parts of it are merged by reading them as one."""
+    """The message in a payload, None if it is not there.
+
+    Parts of it are merged by reading them as one.
+    """
     try:
         parts = [raw for number, _, raw in walk(payload) if number == declared.NUMBER and isinstance(raw, bytes)]
     except Malformed:

@@ -406,7 +406,7 @@ def _parse(record: type[RecordT], data: bytes, depth: int) -> RecordT:
 
 
 def _absent(field: FieldPlan) -> Any:
-    """What a field is worth that its message lists as meaningful and does not carry."""
+    """Return the default of a field that its message lists as meaningful and does not carry."""
     if field.repeated:
         return ()
     if isinstance(field.wire, Map):
@@ -474,7 +474,10 @@ def _value(kind: Kind, raw: int | bytes, python: type, depth: int) -> Any:
 
 
 def walk(data: bytes) -> Iterator[tuple[int, int, int | bytes]]:
-    """(number, wire type, value) of each field: an integer of a varint, else the bytes. Raises `Malformed`."""
+    """(number, wire type, value) of each field: an integer of a varint, else the bytes.
+
+    Raises `Malformed`.
+    """
     position, end = 0, len(data)
     while position < end:
         tag, position = _read_varint(data, position)

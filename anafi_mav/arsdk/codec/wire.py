@@ -46,7 +46,7 @@ class Buffer(enum.Enum):
 
 
 class Direction(enum.Enum):
-    """Who may send a message."""
+    """Direction of a message: command of a controller or event of a device."""
 
     COMMAND = "controller to device"
     EVENT = "device to controller"
@@ -67,7 +67,10 @@ class OpenEnum(enum.IntEnum):
 
 @dataclass(frozen=True)
 class Scalar:
-    """A number of fixed size; `code` is its letter in the struct module, `parrot` its name in Parrot's XML."""
+    """A number of fixed size.
+
+    `code` is its letter in the struct module, `parrot` its name in Parrot's XML.
+    """
 
     code: str
     parrot: str
@@ -120,7 +123,10 @@ class Message(msgspec.Struct, frozen=True):
 
 
 class UnknownMessage(msgspec.Struct, frozen=True):
-    """A message that no table of ours has, kept as it came so that it can be logged, recorded or forwarded."""
+    """A message that is not declared here.
+
+    It is kept as received so that it can be logged, recorded or forwarded.
+    """
 
     id: MessageId
     payload: bytes
@@ -131,7 +137,7 @@ MessageT = TypeVar("MessageT", bound=Message)
 
 
 class Codec(Protocol):
-    """What knows the bytes of the messages of one id."""
+    """Encoder and decoder of the messages of one id."""
 
     def declared(self) -> Iterable[type[Message]]: ...
 
@@ -172,12 +178,18 @@ def _declare(
 
 
 def carry(id: MessageId, codec: Codec) -> None:
-    """Hand an id to a codec: that of its message, or one that tells apart the messages carried under this id."""
+    """Register the codec of an id.
+
+    It is the codec of one message, or one that distinguishes the messages carried under this id.
+    """
     _CODECS[id] = codec
 
 
 def declared_messages() -> Iterator[type[Message]]:
-    """Every message class declared so far (import `anafi_mav.arsdk.messages` to have all of them)."""
+    """Return every message class declared so far.
+
+    Import `anafi_mav.arsdk.messages` to have all of them.
+    """
     return (message for codec in _CODECS.values() for message in codec.declared())
 
 
@@ -293,9 +305,10 @@ def encode(message: Message | UnknownMessage) -> bytes:
 
 
 def decode(data: bytes) -> Message | UnknownMessage | None:
-    """The message in these command bytes; None when they are too short for what their header says.
+    """Decode the message in these command bytes; None when they are too short.
 
-    Bytes after the last argument are ignored: later firmware appends arguments to old messages.
+    They are too short when they end before the last argument of the message that their header names. Bytes after the
+    last argument are ignored: later firmware appends arguments to old messages.
     """
     if len(data) < HEADER.size:
         return None

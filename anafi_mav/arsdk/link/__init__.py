@@ -1,1 +1,1 @@
-"""The ARSDK link: discovery, handshake, frames, acknowledgement and retry, for both of its ends."""
+"""The ARSDK link: discovery, handshake, frames, acknowledgement and retry, at both ends."""

@@ -31,7 +31,10 @@ ParsedT = TypeVar("ParsedT")
 
 
 class ControllerSession(Session):
-    """A connection to a drone. It owns the discovery connection too, whose end is the drone's way to say goodbye."""
+    """A connection to a drone.
+
+    It owns the discovery connection too, whose end is the drone's way to say goodbye.
+    """
 
     def __init__(
         self,
@@ -50,7 +53,7 @@ class ControllerSession(Session):
         self._standby: Sequence[Message] = ()
         self._standby_seq = -1
         self.device = device
-        """What the drone said of itself."""
+        """Description that the drone sent in discovery."""
         self._discovery = discovery[1]
         self._watch = asyncio.create_task(self._watch_discovery(discovery[0]))
 
@@ -80,7 +83,7 @@ class ControllerSession(Session):
     # -- what is sent for us when the host stalls
 
     def watch(self) -> None:
-        """Start the process that sends what stands by when the event loop stalls; nowhere but on POSIX systems."""
+        """Start the process that sends the standby frames when the event loop stalls (POSIX only)."""
         if self._watchdog is None and watchdog.LIMIT is not None and os.name == "posix" and not self.lost.done():
             self._watchdog = Watchdog(self._stalled, watchdog.LIMIT)
             self._starting = asyncio.create_task(self._start_watchdog(self._watchdog))
@@ -132,7 +135,10 @@ class ControllerSession(Session):
 async def look(
     host: str, *, discovery_port: int = handshake.DISCOVERY_PORT, interface: str | None = None, timeout: float = 2.0
 ) -> DeviceInfo:
-    """What the device at `host` says of itself. Nobody who is connected to it notices. Raises as `connect` does."""
+    """Return the discovery description of the device at `host`.
+
+    A controller that is connected to the device does not notice it. Raises as `connect` does.
+    """
     try:
         return await asyncio.wait_for(_look(host, discovery_port, interface), timeout)
     except asyncio.TimeoutError:
@@ -163,7 +169,7 @@ async def connect(
 ) -> ControllerSession:
     """Connect to the drone at `host`.
 
-    `handshake_port` None means the one that discovery tells. `versions` is the (lowest, highest) ARSDK protocol
+    With `handshake_port` None the port from discovery is used. `versions` is the (lowest, highest) ARSDK protocol
     version offered. `local_address` and `interface` bind all our sockets; None: whatever routes to the drone.
     `on_message` may be called before this returns; `fades`: see `Transport`.
 

@@ -59,7 +59,10 @@ class Mutable:
 
     @property
     def mute(self) -> bool:
-        """True: as if the air were gone. The session is mute, and nobody who connects gets an answer."""
+        """True when the device is mute, as after a total loss of radio.
+
+        The session is mute, and a client that connects gets no answer.
+        """
         return self._mute
 
     @mute.setter
@@ -83,7 +86,7 @@ class DeviceServer(Mutable):
     ) -> None:
         super().__init__()
         self.info = info
-        """What discovery says; `port` is the real handshake port."""
+        """Description sent in discovery; `port` is the real handshake port."""
         self.discovery_port = 0
         self._address = address
         self._c2d_port = c2d_port
@@ -108,7 +111,9 @@ class DeviceServer(Mutable):
         on_session: OnSession,
         ping_after: float = 2.0,
     ) -> DeviceServer:
-        """Listen on `address`; a port 0 lets the system choose. `info.port` is replaced by the handshake port.
+        """Listen on `address`; a port 0 lets the system choose.
+
+        `info.port` is replaced by the handshake port.
 
         Raises `OSError` when a TCP port is taken, `LocalProtocolError` for versions we do not speak.
         """

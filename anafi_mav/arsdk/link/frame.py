@@ -1,4 +1,4 @@
-"""Frames of the ARSDK transport: what one datagram holds, in the three protocol versions.
+"""Frames of the ARSDK transport, in the three protocol versions. No I/O.
 
 A datagram is a row of frames. A frame has a type, the id of a queue, a sequence number and a payload; everything is
 little-endian (arsdk-ng libarsdk/src/net/arsdk_transport_net.c). What payloads hold is in `packing`, who sends which
@@ -28,7 +28,10 @@ _V2_SMALLEST = 6
 
 
 class FrameType(enum.IntEnum):
-    """What the receiver has to do with a frame (arsdk-ng ARSDK_TRANSPORT_DATA_TYPE_*)."""
+    """Type of a frame: data, data with acknowledgement, low-latency data or acknowledgement.
+
+    It states how the receiver has to handle the frame (arsdk-ng ARSDK_TRANSPORT_DATA_TYPE_*).
+    """
 
     ACK = 1
     NOACK = 2

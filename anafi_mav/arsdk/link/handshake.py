@@ -1,4 +1,4 @@
-"""The JSON that opens an ARSDK connection, without I/O.
+"""The JSON that opens an ARSDK connection. No I/O.
 
 Discovery (TCP 44445): the device says who it is, NUL-terminated, and keeps the socket open as long as it is there.
 Handshake (TCP 44444): the controller names its UDP port and protocol versions, the device answers with its own
@@ -31,7 +31,7 @@ REJECTED = -1
 
 @dataclass(frozen=True)
 class DeviceInfo:
-    """What a device says of itself in discovery."""
+    """Description that a device sends in discovery."""
 
     model_id: int
     """Parrot's product number, e.g. 0x0914 = ANAFI 4K."""
@@ -50,7 +50,7 @@ class ConnectRequest:
     d2c_port: int
     """UDP port on which the controller listens."""
     device_id: str = ""
-    """Serial number of the wanted device; empty: whoever answers."""
+    """Serial number of the wanted device; empty: any device."""
     qos_mode: int = 0
     proto_v_min: int = 1
     proto_v_max: int = 1
@@ -68,7 +68,7 @@ class ConnectReply:
 
 
 def format_discovery(info: DeviceInfo) -> bytes:
-    """The text a device sends to whoever connects to its discovery port."""
+    """Return the text that a device sends to each client of its discovery port."""
     text = {"model.id": f"0x{info.model_id:04x}", "serial": info.serial, "port": info.port, "name": info.name}
     return _format(text) + b"\0"
 
@@ -146,7 +146,10 @@ def check_versions(versions: tuple[int, int]) -> None:
 
 
 def pick_version(request: ConnectRequest, versions: tuple[int, int]) -> int | None:
-    """The highest protocol version that the controller and we ((lowest, highest)) speak; None: there is none."""
+    """Return the highest protocol version that both ends support, or None.
+
+    The controller's range is in `request`, ours is `versions` (lowest, highest).
+    """
     low = max(request.proto_v_min, versions[0])
     high = min(request.proto_v_max, versions[1])
     return high if low <= high else None

@@ -26,8 +26,10 @@ SO_BINDTODEVICE = getattr(socket, "SO_BINDTODEVICE", None)
 
 
 def bind_to_interface(sock: socket.socket, interface: str | None) -> None:
-    """Let `sock` use this interface only; None: whatever the routes say. Raises `LinkLost` when that cannot be: a radio
-    may be plugged in later."""
+    """Let `sock` use this interface only; None: whatever the routes say.
+
+    Raises `LinkLost` when that cannot be: a radio may be plugged in later.
+    """
     if interface is None:
         return
     if SO_BINDTODEVICE is None:
@@ -41,8 +43,10 @@ def bind_to_interface(sock: socket.socket, interface: str | None) -> None:
 async def open_connection(
     host: str, port: int, *, local_address: str | None = None, interface: str | None = None
 ) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
-    """A TCP connection over IPv4, which is all that ARSDK knows. Raises `OSError`, of which
-    `LinkLost` is one."""
+    """A TCP connection over IPv4, which is all that ARSDK knows.
+
+    Raises `OSError`, of which `LinkLost` is one.
+    """
     if interface is None:
         local = None if local_address is None else (local_address, 0)
         return await asyncio.open_connection(host, port, family=socket.AF_INET, local_addr=local)
@@ -62,9 +66,9 @@ async def open_connection(
 
 
 def networks() -> list[tuple[str, ipaddress.IPv4Network]]:
-    """The networks that this machine is directly in, with the interface to each; empty where the system is not Linux.
+    """Return the directly connected IPv4 networks, each with its interface.
 
-    Loopback and what lies behind routers is not among them.
+    Loopback and networks behind routers are not included. Empty where the system is not Linux.
     """
     try:
         lines = ROUTES.read_text().splitlines()[1:]

@@ -1,4 +1,4 @@
-"""How commands lie in the payloads of frames, both ways, in the three protocol versions.
+"""Packs commands into payloads of frames and back, in three protocol versions. No I/O.
 
 Version 1 puts one command into a frame. Version 2 packs ``u16 length, command`` pairs, version 3 ``varint length,
 command`` pairs, and splits an acknowledged command that is longer than a frame: the next frame of that queue then
@@ -45,7 +45,10 @@ def longest_command(version: int, acknowledged: bool) -> int:
 
 
 class Waiting:
-    """An acknowledged command that is not in a frame yet, or only in part: `packed` counts those bytes."""
+    """An acknowledged command that is not yet completely in frames.
+
+    `packed` counts the bytes that already are.
+    """
 
     __slots__ = ("command", "forever", "packed", "token")
 
@@ -53,7 +56,7 @@ class Waiting:
         self.token = token
         self.command = command
         self.forever = forever
-        """Whether it is repeated until the link is down."""
+        """True when it is repeated until the link is down."""
         self.packed = 0
 
 
@@ -66,7 +69,10 @@ class Piece(NamedTuple):
 
 
 def pack(version: int, waiting: deque[Waiting]) -> list[Piece]:
-    """Take from `waiting` what the next frame carries. Only a command too long for any frame is split."""
+    """Take from `waiting` what the next frame carries.
+
+    Only a command too long for any frame is split.
+    """
     if version == 1:
         first = waiting.popleft()
         return [Piece(first, first.command, True)]
@@ -97,7 +103,10 @@ class Unpacker:
         """Queue id -> (length, bytes so far) of a split command; bounded by `MAX_COMMAND` and the few ids."""
 
     def unpack(self, id: int, acknowledged: bool, payload: bytes) -> tuple[list[bytes], bool]:
-        """The complete commands of a payload from queue `id`; False: the rest of the payload is unreadable."""
+        """Return the complete commands of a payload from queue `id`, and a success flag.
+
+        The flag is False when the rest of the payload is unreadable.
+        """
         if self._version == 1:
             return [payload], True
         commands: list[bytes] = []

@@ -1,8 +1,8 @@
 """The asyncio shell around one `Transport`: a UDP socket and one timer.
 
-Messages that are sent within one turn of the loop leave together, which packs them into few frames. The timer is
-armed again only when the next deadline comes earlier; when it fires too early it goes back to sleep. At a
-hundred drones with a hundred events a second each, that is what keeps the loop idle.
+Messages that are sent within one event-loop iteration leave together, which packs them into few frames. The timer is
+restarted only when the next deadline is earlier; when it fires too early it is set again. At a hundred drones with a
+hundred events a second each, that is what keeps the loop idle.
 """
 
 from __future__ import annotations
@@ -63,12 +63,15 @@ class Session(asyncio.DatagramProtocol):
         self.mute = False
         """True: everything is dropped, both ways, as if the air were gone (faults of the simulator)."""
         self.air: Air | None = None
-        """What happens to datagrams on their way (faults of the simulator); None: nothing."""
+        """Simulated faults of datagrams on their way; None: none."""
         self.lost: asyncio.Future[str] = self._loop.create_future()
         """Done when the link is down or closed; its result says why."""
         self._peer = peer
         self.on_delivered: Callable[[int, bool], None] = lambda token, arrived: None
-        """Told what became of each acknowledged command, by the token of `send`: received, or given up (version 1)."""
+        """Callback with the result of each acknowledged command.
+
+        Arguments: the token of `send`; True when received, False when dropped after all retries (version 1).
+        """
         self.on_silent: Callable[[str], None] = lambda reason: None
         """Called when the peer is not heard any more; nothing but pings and answers is sent until it speaks."""
         self.on_speaks: Callable[[], None] = lambda: None
@@ -115,7 +118,7 @@ class Session(asyncio.DatagramProtocol):
         return self._transport.counters
 
     def send(self, message: Message | UnknownMessage) -> int:
-        """Send a message at the end of this turn of the loop; the token is for `cancel`.
+        """Send a message at the end of this event-loop iteration; the token is for `cancel`.
 
         Raises `LocalProtocolError` when it cannot be encoded. On a link that is lost it does nothing.
         """
@@ -136,7 +139,10 @@ class Session(asyncio.DatagramProtocol):
             await self._closed.wait()
 
     def end(self, reason: str) -> None:
-        """End at once: nothing is sent or received any more, `lost` is done with this reason. Idempotent."""
+        """End at once: nothing is sent or received any more, `lost` is done with this reason.
+
+        Idempotent.
+        """
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None

@@ -1,17 +1,17 @@
-"""The ARSDK transport without I/O: queues, acknowledgements, retries, pings, for both ends of the link.
+"""The ARSDK transport: queues, acknowledgements, retries and pings. No I/O.
 
-The same object plays the controller and the device; `Role` picks the queue ids. The shell hands datagrams and the
-time to `receive`, sends what `outgoing` returns and calls `expire` when `deadline` has come.
+It serves both ends of the link: the same object acts as controller or device; `Role` picks the queue ids.
+The shell passes datagrams and the time to `receive`, sends what `outgoing` returns and calls `expire` at `deadline`.
 
 Rules (arsdk-ng libarsdk/src/cmd_itf/arsdk_cmd_itf{1,2,3}.c and arsdk_transport.c):
 
 - an acknowledged queue is stop-and-wait: one frame is in flight and is repeated with its sequence number until it
-  is acknowledged; versions 2 and 3 repeat for ever, in version 1 a controller gives up after five repetitions;
-- a receiver takes an unacknowledged frame when its sequence number is above the last one, or more than ten below it (a
-  wrap, or a peer that began anew). DEVIATION: libarsdk has the same rule for acknowledged frames, and so takes a copy
-  that is eleven frames late, or from before a wrap, for a new one; here the numbers of acknowledged frames, of which
-  one is in flight, are compared around the wrap and what is behind is a copy. A copy is acknowledged too, since it is
-  the acknowledgement that got lost;
+  is acknowledged; versions 2 and 3 repeat for ever, in version 1 a controller drops it after five repetitions;
+- a receiver takes an unacknowledged frame when its sequence number is above the last one, or more than ten below it
+  (a wrap, or a peer that restarted). DEVIATION: libarsdk has the same rule for acknowledged frames, and so takes a
+  copy that is eleven frames late, or from before a wrap, for a new one; here the numbers of acknowledged frames, of
+  which one is in flight, are compared around the wrap and what is behind is a copy. A copy is acknowledged too, since
+  it is the acknowledgement that got lost;
 - a side that has received nothing for a while pings; three pings without any answer end the link.
 """
 
@@ -85,7 +85,7 @@ class Delivered(msgspec.Struct, frozen=True):
 
 
 class Undelivered(msgspec.Struct, frozen=True):
-    """This message was given up: "no acknowledgement" (version 1 only) or "queue full"."""
+    """This message was dropped: "no acknowledgement" (version 1 only) or "queue full"."""
 
     token: int
     reason: str
@@ -98,7 +98,10 @@ class Garbage(msgspec.Struct, frozen=True):
 
 
 class Silent(msgspec.Struct, frozen=True):
-    """The peer is not heard any more. Commands are dropped until it speaks; only pings and answers are sent."""
+    """The peer is not heard any more.
+
+    Commands are dropped until it speaks; only pings and answers are sent.
+    """
 
     reason: str
 
@@ -108,7 +111,10 @@ class Speaks(msgspec.Struct, frozen=True):
 
 
 class LinkDown(msgspec.Struct, frozen=True):
-    """The link is dead. Nothing is sent or received any more; a new connection needs a new transport."""
+    """The link is dead.
+
+    Nothing is sent or received any more; a new connection needs a new transport.
+    """
 
     reason: str
 
@@ -149,7 +155,9 @@ class _AckQueue:
 
 
 class Transport:
-    """One connection. Construct it when the handshake is done; `version` is the negotiated protocol version.
+    """One connection.
+
+    Construct it when the handshake is done; `version` is the negotiated protocol version.
 
     A ping goes out when nothing was received for `ping_after` seconds, and again every `ping_after`. The link is
     down after three unanswered pings, or when nothing was received for `silence_limit` seconds. With `fades` it is
@@ -177,7 +185,7 @@ class Transport:
         self.role = role
         self.version = version
         self.counters: Counter[str] = Counter()
-        """What happened how often: "received", "sent", "retransmitted", "duplicate", "garbage.<reason>", …"""
+        """Events by kind: "received", "sent", "retransmitted", "duplicate", "garbage.<reason>", …"""
         self._gives_up = gives_up and version == 1 and role is Role.CONTROLLER
         self._ping_after = ping_after
         self._silence_limit = _NEVER if silence_limit is None else silence_limit
@@ -216,7 +224,7 @@ class Transport:
     # -- receiving
 
     def receive(self, data: bytes, now: float) -> list[Event]:
-        """What this datagram means. Never raises, whatever the bytes are."""
+        """Process a datagram and return its events. Never raises, whatever the bytes are."""
         if self._down:
             return []
         events = self._take_pending()
@@ -336,7 +344,9 @@ class Transport:
             queue.waiting.insert(1 if queue.waiting and queue.waiting[0].packed else 0, entry)
 
     def cancel(self, token: int) -> None:
-        """Forget a message that is not yet acknowledged: it is never sent (again). Unknown tokens are ignored.
+        """Forget a message that is not yet acknowledged: it is never sent (again).
+
+        Unknown tokens are ignored.
 
         A frame in flight is repeated without it, under the same number: a peer that has the frame drops the
         repetition, one that has not never sees the message. The exception is a command too long for one frame
@@ -360,7 +370,10 @@ class Transport:
                 return
 
     def encode_ahead(self, messages: Sequence[Message]) -> list[tuple[int, bytes]]:
-        """Return (sequence number, bytes) of the frames that would carry these messages next, without sending them."""
+        """Return the frames that would carry these messages next, without sending them.
+
+        Each is (sequence number, bytes).
+        """
         queue = self._queues[_ACK_ID[self.role]]
         waiting = deque(Waiting(0, wire.encode(message), True) for message in messages)
         frames = []
@@ -377,7 +390,10 @@ class Transport:
         return (self._queues[_ACK_ID[self.role]].seq + 1) & self._seq_mask
 
     def abandon(self, reason: str, skip: int = 0) -> None:
-        """Drop everything that was not delivered, and pass over `skip` sequence numbers that another process used."""
+        """Drop everything that was not delivered; skip `skip` sequence numbers.
+
+        Those are the numbers that another process used.
+        """
         self._noack.clear()
         for queue in self._queues.values():
             # Of a split command that was begun the peer would take whatever follows for the rest: it is completed.
@@ -448,7 +464,10 @@ class Transport:
     # -- time
 
     def deadline(self) -> float | None:
-        """When `expire` wants to be called; None when the link is down. It may move later without notice."""
+        """When `expire` wants to be called; None when the link is down.
+
+        It may move later without notice.
+        """
         if self._down:
             return None
         if self._pending:
@@ -462,7 +481,10 @@ class Transport:
         return deadline
 
     def expire(self, now: float) -> list[Event]:
-        """What the time that passed means: pings and repetitions for `outgoing`, messages given up, a dead link."""
+        """Process the time that has passed and return the events.
+
+        They are undelivered messages, silence and a dead link; pings and repetitions are prepared for `outgoing`.
+        """
         if self._down:
             return []
         for queue in self._queues.values():

@@ -1,10 +1,11 @@
-"""Watch over the event loop of a gateway that has grabbed a Skycontroller's axes: a stalled one leaves no pilot stuck.
+"""Watch the event loop of a gateway that has grabbed a Skycontroller's axes.
 
-A child process (`watchdog_child`) shares the link's socket. While frames stand by, the loop writes to the child's pipe
-every `KICK`; when it has not for `LIMIT`, the child sends these frames, which give the axes back, and ends nothing
-else. A suspended computer suspends the child too.
+A stalled loop must not leave the pilot without control. A child process (`watchdog_child`) shares the link's socket.
+While standby frames are set, the loop writes to the child's pipe every `KICK`; when it has not for `LIMIT`, the child
+sends these frames, which release the axes, and ends nothing else. A suspended computer suspends the child too.
 
-One of both may use the next sequence number, or write to a stream: who holds the token, a byte in a pipe.
+Only one of both may use the next sequence number, or write to a stream: the one that holds the token, a byte in a
+pipe.
 """
 
 from __future__ import annotations
@@ -99,7 +100,10 @@ class Watchdog:
         return bool(self._frames)
 
     def stand_by(self, frames: Sequence[tuple[int, bytes]]) -> None:
-        """Give the child these (sequence number, bytes) instead of the ones before; none: it stands down."""
+        """Set the standby frames of the child, (sequence number, bytes).
+
+        They replace the previous ones; with an empty sequence the child stands down.
+        """
         began, self._frames = not self._frames, frames
         if self._process is None or self._closed:
             return
@@ -115,7 +119,10 @@ class Watchdog:
             self._timer = None
 
     def acquire(self) -> bool:
-        """Take the token, to write to the link; False: the child has it, and nothing may be written now."""
+        """Acquire the token, to write to the link.
+
+        False when the child has it: nothing may be written now.
+        """
         if self._process is None or self._closed or not self._frames or self._holding:
             return True
         try:
@@ -133,7 +140,10 @@ class Watchdog:
             os.write(self._token_in, _TOKEN)
 
     def secure(self) -> bool:
-        """After a stall, make sure that the child has not acted. False: it has, and nothing may be sent now."""
+        """After a stall, make sure that the child has not acted.
+
+        False: it has, and nothing may be sent now.
+        """
         if self._process is None or not self._frames or self._holding:
             return True
         if self._loop.time() - self._kicked < self._limit * STALL:

@@ -1,7 +1,11 @@
-"""Process that gives a Skycontroller's axes back when the gateway stalls. Run by `watchdog`, never imported by it.
+"""Process that gives a Skycontroller's axes back when the gateway stalls.
 
-It shares the link's socket. The gateway writes records to its pipe; while frames are on stand-by and the pipe is silent
-for the limit, or ends, the child takes the token and sends the frames until they are acknowledged, 2 s at most. Without
+Run by `watchdog`, never imported by it.
+
+It shares the link's socket. The gateway writes records to its pipe; while frames are on stand-by and the pipe is
+silent
+for the limit, or ends, the child takes the token and sends the frames until they are acknowledged, 2 s at most.
+Without
 the token, which the gateway holds while it writes to a stream, the child sends nothing.
 
 Records: kind (1 byte), length (u16), content. "F": frames to stand by with, each ``seq u16, size u16, bytes``; none:

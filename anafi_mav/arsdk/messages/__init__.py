@@ -1,4 +1,4 @@
-"""Parrot's message tables, one module per project or feature, in Parrot's words.
+"""Parrot's message tables, one module per project or feature, in Parrot's words. No I/O.
 
 Importing this package declares all of them. Ids, argument names, types and enum values are facts of Parrot's own
 XML (arsdk-xml, in the parrot-olympe wheel) and are compared with it by ``tests/unit/arsdk/messages/test_xml.py``.

@@ -1,4 +1,7 @@
-"""Project 1, ardrone3: piloting, its states and settings, GPS, home. Units and signs stand where they surprise."""
+"""Project 1, ardrone3: piloting, its states and settings, GPS, home.
+
+Units and signs stand where they surprise.
+"""
 
 from __future__ import annotations
 
@@ -210,12 +213,17 @@ class MoveByStatus(OpenEnum):
 
 @command("ardrone3.Piloting.TakeOff", 1, 0, 1)
 class TakeOff(Message, frozen=True):
-    """Motors on and up to about 1 m. Confirmed by FlyingStateChanged(takingoff); refused by silence."""
+    """Motors on and up to about 1 m.
+
+    Confirmed by FlyingStateChanged(takingoff); refused by silence.
+    """
 
 
 @command("ardrone3.Piloting.PCMD", 1, 0, 2, Buffer.NON_ACK)
 class PCMD(Message, frozen=True):
-    """Stick positions, in percent of the limits the drone itself reports (MaxTilt, MaxRotationSpeed, MaxVerticalSpeed).
+    """Stick positions, in percent of the limits that the drone reports.
+
+    The limits are MaxTilt, MaxRotationSpeed and MaxVerticalSpeed.
 
     Not acknowledged; Parrot sends one every 50 ms. `flag` 1 makes roll and pitch count, with 0 the drone
     brakes by itself. Signs: roll + right, pitch + nose DOWN (forward), yaw + clockwise, gaz + up, each
@@ -248,7 +256,9 @@ class NavigateHome(Message, frozen=True):
 
 @command("ardrone3.Piloting.moveBy", 1, 0, 7)
 class MoveBy(Message, frozen=True):
-    """Fly relative to the body: front, right, DOWN in m, then turn clockwise by dPsi rad. Ends in moveByEnd.
+    """Fly relative to the body: front, right, DOWN in m, then turn clockwise by dPsi rad.
+
+    Ends in moveByEnd.
 
     All zero cancels a running moveBy: it ends with error `interrupted`.
     """
@@ -353,7 +363,10 @@ class AltitudeChanged(Message, frozen=True):
 
 @event("ardrone3.PilotingState.GpsLocationChanged", 1, 4, 9, Buffer.NON_ACK)
 class GpsLocationChanged(Message, frozen=True):
-    """deg, deg (500 = unknown), m above mean sea level; accuracies are one standard deviation in m, -1 = unknown."""
+    """GNSS position with accuracies.
+
+    deg, deg (500 = unknown), m above mean sea level; accuracies are one standard deviation in m, -1 = unknown.
+    """
 
     latitude: Annotated[float, F64]
     longitude: Annotated[float, F64]
@@ -506,7 +519,10 @@ class MaxTiltChanged(Message, frozen=True):
 
 @event("ardrone3.PilotingSettingsState.MaxDistanceChanged", 1, 6, 3)
 class MaxDistanceChanged(Message, frozen=True):
-    """Radius of the geofence round the take-off point, m; enforced only with NoFlyOverMaxDistance."""
+    """Radius of the geofence round the take-off point, m.
+
+    Enforced only with NoFlyOverMaxDistance.
+    """
 
     current: Annotated[float, F32]
     min: Annotated[float, F32]

@@ -1,4 +1,7 @@
-"""Feature 140, controller_info: where the controller is, so that a drone can follow it or come home to it."""
+"""Feature 140, controller_info: position of the controller.
+
+The drone uses it to follow the controller or to return to it.
+"""
 
 from __future__ import annotations
 

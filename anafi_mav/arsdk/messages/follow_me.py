@@ -123,7 +123,10 @@ class TargetIsController(Message, frozen=True):
 
 @command("follow_me.configure_geographic", 134, 0, 6)
 class ConfigureGeographic(Message, frozen=True):
-    """Where to stay from the target: metres, radians. Each bit of `use_default` leaves that value to the drone."""
+    """Wanted position of the drone relative to the target: m, rad.
+
+    Each bit of `use_default` leaves that value to the drone.
+    """
 
     use_default: Annotated[int, Bits(U8, GeoRelConfigureParam)]
     distance: Annotated[float, F32]
@@ -254,7 +257,7 @@ class DollySlideAnimConfig(Message, frozen=True):
 
 @command("follow_me.target_framing_position", 134, 0, 22)
 class TargetFramingPosition(Message, frozen=True):
-    """Where in the picture the target shall be: percent of width and height."""
+    """Wanted position of the target in the picture: percent of width and height."""
 
     horizontal: Annotated[int, I8]
     vertical: Annotated[int, I8]
@@ -268,7 +271,7 @@ class TargetFramingPositionChanged(Message, frozen=True):
 
 @command("follow_me.target_image_detection", 134, 0, 24, Buffer.NON_ACK)
 class TargetImageDetection(Message, frozen=True):
-    """What a tracker outside of the drone saw: radians, 1/s, ms."""
+    """Detection of the target by a tracker outside of the drone: rad, 1/s, ms."""
 
     target_azimuth: Annotated[float, F32]
     target_elevation: Annotated[float, F32]

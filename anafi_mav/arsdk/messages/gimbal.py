@@ -119,7 +119,10 @@ class SetTarget(Message, frozen=True):
 
 @event("gimbal.attitude", 148, 0, 6, Buffer.NON_ACK)
 class Attitude(Message, frozen=True):
-    """deg: pitch + up, yaw + clockwise, roll + clockwise seen from behind; relative to the body and to the horizon."""
+    """Attitude of a gimbal, relative to the body and to the horizon, deg.
+
+    Pitch + up, yaw + clockwise, roll + clockwise seen from behind.
+    """
 
     gimbal_id: Annotated[int, U8]
     yaw_frame_of_reference: Annotated[FrameOfReference, ENUM]

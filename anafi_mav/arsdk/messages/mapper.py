@@ -1,4 +1,4 @@
-"""Feature 138, mapper: who gets the sticks and buttons of a Skycontroller.
+"""Feature 138, mapper: routing of the sticks and buttons of a Skycontroller.
 
 Axes: 0 yaw, 1 throttle, 2 roll, 3 pitch, 4 camera tilt wheel, 5 zoom wheel. Buttons: 0 return home,
 1 take-off/land, 2 reset camera, 3 reset zoom, 4 to 15 an axis at its end (two for each of the six). Masks have the
@@ -94,7 +94,10 @@ class ExpoType(OpenEnum):
 
 @command("mapper.grab", 138, 0, 1)
 class Grab(Message, frozen=True):
-    """Everything grabbed is no longer acted on by the controller and arrives as events; 0, 0 gives all back."""
+    """Grab buttons and axes; 0, 0 releases all.
+
+    The controller no longer acts on grabbed inputs; they arrive as events.
+    """
 
     buttons: Annotated[int, U32]
     axes: Annotated[int, U32]

@@ -183,7 +183,7 @@ class ChargeTimeLeft(Message, frozen=True):
 
 @command("skyctrl.CoPiloting.setPilotingSource", 4, 20, 0)
 class SetPilotingSource(Message, frozen=True):
-    """Who flies: the sticks of the Skycontroller, or what is connected to it."""
+    """Select the piloting source: the Skycontroller's sticks or the connected controller."""
 
     source: Annotated[Source, ENUM]
 

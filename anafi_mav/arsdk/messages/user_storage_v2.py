@@ -1,4 +1,7 @@
-"""Feature 166, user_storage_v2: the storages of the Ai, each with an id (0 internal, 1 memory card as a rule)."""
+"""Feature 166, user_storage_v2: the storages of the Ai.
+
+Each has an id, as a rule 0 internal, 1 memory card.
+"""
 
 from __future__ import annotations
 

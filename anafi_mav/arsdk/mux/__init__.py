@@ -1,1 +1,1 @@
-"""Parrot's mux: ARSDK, the web server and the video over one TCP connection to a Skycontroller 4."""
+"""Parrot's mux: ARSDK, web server and video over one TCP connection to a Skycontroller 4."""

@@ -1,8 +1,10 @@
-"""Parrot's mux: several channels over one TCP connection, the way to a Skycontroller 4. No I/O here.
+"""Parrot's mux: several channels over one TCP connection, used by the Skycontroller 4.
 
-A frame is ``"MUX!", channel u32, size u32`` (with these 12 bytes) and a payload, little-endian. Channel 0 is the mux's
-own: ``id u32, channel u32, six u32`` (libmux mux_priv.h); both ends begin with a handshake that tells the version.
-Discovery and connection are messages of libpomp, ``"POMP", id u32, size u32`` and typed arguments (libpomp
+No I/O here.
+
+A frame is ``"MUX!", channel u32, size u32`` (with these 12 bytes) and a payload, little-endian. Channel 0 is the
+mux's own: ``id u32, channel u32, six u32`` (libmux mux_priv.h); both ends begin with a handshake that carries the
+version. Discovery and connection are messages of libpomp, ``"POMP", id u32, size u32`` and typed arguments (libpomp
 pomp_prot.h, pomp_encoder.c); on the transport channel there is one ARSDK frame in each (arsdk-ng
 arsdk_transport_mux.c). The sockets are in `mux_link`.
 """
@@ -33,7 +35,7 @@ CONN_REQ, CONN_RESP = 1, 2
 HANDSHAKE = 127
 """Control message: args are (is an answer, version)."""
 RESET = 6
-"""Control message: every channel begins anew."""
+"""Control message: every channel restarts."""
 
 MAX_FRAME = 1 << 18
 """Longest frame accepted: an ARSDK frame has up to 64 KiB, what the proxies of libmux read at once as much."""
@@ -83,7 +85,10 @@ def decode_control(payload: bytes) -> Control | None:
 
 
 class Decoder:
-    """Finds the frames in a stream, however it is cut. Never raises; what is no frame is skipped and counted."""
+    """Finds the frames in a stream, however it is cut.
+
+    Never raises; what is no frame is skipped and counted.
+    """
 
     def __init__(self) -> None:
         self._buffer = bytearray()
@@ -142,7 +147,10 @@ def encode_pomp(id: int, arguments: Sequence[tuple[str, Argument]] = ()) -> byte
 
 
 def decode_pomp(data: bytes) -> tuple[int, list[Argument]] | None:
-    """(id, arguments) of a message of libpomp; None when it is none, or has arguments of other types."""
+    """Return (id, arguments) of a libpomp message, or None.
+
+    None when the data is not such a message or has arguments of other types.
+    """
     if len(data) < _HEADER.size:
         return None
     magic, id, size = _HEADER.unpack_from(data)

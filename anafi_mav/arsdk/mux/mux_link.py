@@ -1,4 +1,7 @@
-"""ARSDK over the mux, both ends: discovery, connection and session on one TCP connection. See `mux`."""
+"""ARSDK over the mux, both ends: discovery, connection and session on one TCP connection.
+
+See `mux`.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +28,7 @@ log = logging.getLogger("anafi_mav.arsdk")
 
 READ_SIZE = 1 << 16
 PEER = ("mux", 0)
-"""What the other end is called where a UDP session has an address."""
+"""Name of the other end, in place of the address of a UDP session."""
 
 MAX_WAITING = 1 << 18
 """Bytes that may wait for a slow TCP connection; beyond it frames are dropped as the air drops datagrams, and the
@@ -39,7 +42,7 @@ class Stream:
         self.reader, self.writer = reader, writer
         self._decoder = mux.Decoder()
         self.proxy: mux_proxy.Master | mux_proxy.Slave | None = None
-        """Who gets the frames of TCP connections."""
+        """Receiver of the frames of TCP connections."""
         self.guard: Watchdog | None = None
         """Asked before each frame: the watchdog's process may be writing one."""
         self.write_raw(mux.encode_control(mux.HANDSHAKE, 0, 0, mux.VERSION))
@@ -67,7 +70,10 @@ class Stream:
         self.write_raw(mux.encode_frame(channel, payload))
 
     async def read(self) -> list[mux.Frame] | None:
-        """Frames of channels that are not the mux's own; None at the end of the connection. Raises `OSError`."""
+        """Frames of channels that are not the mux's own; None at the end of the connection.
+
+        Raises `OSError`.
+        """
         data = await self.reader.read(READ_SIZE)
         if not data:
             return None
@@ -138,11 +144,17 @@ class MuxControllerSession(ControllerSession):
         return mux.encode_frame(mux.TRANSPORT, frame)
 
     async def open_tcp(self, host: str, port: int) -> tuple[str, int]:
-        """An address on this machine that leads to a port of "drone" or "skycontroller". Raises `LinkLost`."""
+        """An address on this machine that leads to a port of "drone" or "skycontroller".
+
+        Raises `LinkLost`.
+        """
         return await self._proxy.open(host, port)
 
     async def open_udp(self, host: str, on_datagram: Callable[[bytes], None]) -> UdpTunnel:
-        """A UDP socket at the Skycontroller's side, to talk to "skycontroller" or "drone". Raises `LinkLost`."""
+        """A UDP socket at the Skycontroller's side, to talk to "skycontroller" or "drone".
+
+        Raises `LinkLost`.
+        """
         return await self._proxy.open_udp(host, on_datagram)
 
     def end(self, reason: str) -> None:
@@ -179,7 +191,10 @@ async def connect(
     silence_limit: float | None = 2.5,
     fades: bool = False,
 ) -> MuxControllerSession:
-    """Connect to the device behind the mux at `host`; who calls limits the time. Otherwise as `controller.connect`."""
+    """Connect to the device behind the mux at `host`; the caller limits the time.
+
+    Otherwise as `controller.connect`.
+    """
     try:
         reader, writer = await open_connection(host, port, local_address=local_address, interface=interface)
     except OSError as error:
@@ -214,7 +229,10 @@ async def connect(
 
 
 async def look(host: str, *, port: int = mux.PORT, interface: str | None = None) -> DeviceInfo:
-    """What the device behind the mux at `host` says of itself; who calls limits the time. Raises as `connect` does."""
+    """Return the description of the device behind the mux at `host`.
+
+    The caller limits the time. Raises as `connect` does.
+    """
     try:
         reader, writer = await open_connection(host, port, interface=interface)
     except OSError as error:
@@ -228,7 +246,10 @@ async def look(host: str, *, port: int = mux.PORT, interface: str | None = None)
 async def look_either(
     host: str, *, mux_port: int = mux.PORT, interface: str | None = None, timeout: float = 2.0
 ) -> DeviceInfo:
-    """As `controller.look`; where nothing listens on the discovery port, a Skycontroller 4 is looked for on the mux."""
+    """Return the description of a device; try discovery, then the mux.
+
+    As `controller.look`; when nothing listens on the discovery port, a Skycontroller 4 is looked for on the mux.
+    """
     try:
         return await controller.look(host, interface=interface, timeout=timeout)
     except LinkLost as error:
@@ -257,7 +278,10 @@ async def connect_either(
     timeout: float = 3.0,
     **options: Any,
 ) -> ControllerSession:
-    """As `controller.connect`; where nothing listens on the discovery port, a Skycontroller 4 is tried on the mux."""
+    """Connect to a device by discovery, or else through the mux.
+
+    As `controller.connect`; when nothing listens on the discovery port, a Skycontroller 4 is tried on the mux.
+    """
     try:
         return await controller.connect(
             host,
@@ -285,7 +309,10 @@ async def connect_either(
 
 
 async def _answer(stream: Stream, channel: int, id: int, types: tuple[type, ...]) -> tuple[list[Any], list[mux.Frame]]:
-    """The arguments of the awaited message, and the frames behind it. Raises `LinkLost` at the connection's end."""
+    """The arguments of the awaited message, and the frames behind it.
+
+    Raises `LinkLost` at the connection's end.
+    """
     while True:
         try:
             frames = await stream.read()
@@ -327,9 +354,11 @@ class MuxDeviceSession(DeviceSession):
 
 
 class MuxServer(Mutable):
-    """A device on the mux, one session at a time: a new one ends the one before. As `device.DeviceServer`.
+    """A device on the mux, one session at a time: a new session ends the previous one.
 
-    Who only asks for the introduction disturbs nobody; that it is so on the real thing is assumed.
+    As `device.DeviceServer`.
+
+    A client that only requests the introduction does not affect the session; this is assumed of the real device.
     """
 
     def __init__(
@@ -363,8 +392,11 @@ class MuxServer(Mutable):
         ping_after: float = 2.0,
         tcp_port: Callable[[int], int] = int,
     ) -> MuxServer:
-        """Listen on `address`; port 0 lets the system choose. `tcp_port` says which port of that address stands for a
-        port of the drone. Raises `OSError` when the port is taken."""
+        """Listen on `address`; port 0 lets the system choose.
+
+        `tcp_port` says which port of that address stands for a port of the drone. Raises `OSError` when the port is
+        taken.
+        """
         handshake.check_versions(versions)
         self = cls(info, versions, on_session, ping_after, address, tcp_port)
         self._server = await asyncio.start_server(self._serve, address, port)

@@ -1,9 +1,11 @@
-"""TCP connections and datagrams through the mux: the web server and the video of a drone behind a Skycontroller 4.
+"""TCP connections and datagrams through the mux, for web server and video.
+
+They reach a drone behind a Skycontroller 4.
 
 The controller ("master") asks for a host by name ("drone", "skycontroller"), gets an address, and opens a channel for
 each connection; the device ("slave") connects there and passes bytes both ways. A slave's channel has the number of
-the master's with the highest bit set (libmux mux_channel.c, mux_ip_proxy.c). After each megabyte the sender may ask for
-an acknowledgement and waits for it. The ends of datagrams are in `mux_udp`.
+the master's with the highest bit set (libmux mux_channel.c, mux_ip_proxy.c). After each megabyte the sender may ask
+for an acknowledgement and waits for it. The ends of datagrams are in `mux_udp`.
 """
 
 from __future__ import annotations
@@ -98,7 +100,10 @@ class Slave:
     """The device's end: connects where it is asked to."""
 
     def __init__(self, carrier: Carrier, resolve: Callable[[str], str | None], port: Callable[[int], int]) -> None:
-        """`resolve` gives a host's address (None: unknown), `port` where the port of a host really is."""
+        """Store the resolvers of hosts and ports.
+
+        `resolve` gives a host's address (None: unknown), `port` the real port for a port of a host.
+        """
         self._carrier = carrier
         self._resolve = resolve
         self._port = port
@@ -212,7 +217,7 @@ class Slave:
 
 
 class Master:
-    """The controller's end: listens on this machine and passes each connection to a port behind the mux."""
+    """The controller's end: passes each local connection to a port behind the mux."""
 
     def __init__(self, carrier: Carrier) -> None:
         self._carrier = carrier
@@ -222,15 +227,17 @@ class Master:
         self._resolving: dict[int, asyncio.Future[int]] = {}
         self._servers: list[asyncio.AbstractServer] = []
         self._doors: dict[tuple[str, int], tuple[str, int]] = {}
-        """Where on this machine a port behind the mux is found."""
+        """Local address for each port behind the mux."""
         self._shut = False
         self._tasks: set[asyncio.Task[None]] = set()
         self._next_channel = FIRST_CHANNEL
         self._next_proxy = 1
 
     async def open(self, host: str, port: int) -> tuple[str, int]:
-        """The address on this machine that leads to a port of "drone" or "skycontroller"; the same for as long as the
-        connection lasts. Raises `LinkLost`."""
+        """Return the local address that leads to a port of "drone" or "skycontroller".
+
+        It stays the same for as long as the connection lasts. Raises `LinkLost`.
+        """
         if (host, port) in self._doors:
             return self._doors[host, port]
         address = await self._resolve(host, _TCP, port)
@@ -257,7 +264,10 @@ class Master:
         return name
 
     async def open_udp(self, host: str, on_datagram: Callable[[bytes], None]) -> UdpTunnel:
-        """A UDP socket at the Skycontroller's side, to talk to "skycontroller" or "drone". Raises `LinkLost`."""
+        """A UDP socket at the Skycontroller's side, to talk to "skycontroller" or "drone".
+
+        Raises `LinkLost`.
+        """
         address = await self._resolve(host, _UDP, 0)
         if len(self._channels) >= MAX_CHANNELS:
             raise LinkLost("too many connections over the mux")

@@ -1,8 +1,8 @@
-"""Datagrams through the mux: how the video of a Skycontroller 4 comes to us.
+"""Datagrams through the mux: the transport of the video of a Skycontroller 4.
 
-Each end is one channel of `mux_proxy`. The device ("slave") binds a UDP socket at its side and tells its port, which
-stands in the SETUP of RTSP as ours; when the server's port is known, the controller ("master") aims the socket at it
-(libmux mux_ip_proxy.c, mux_channel.c; pdraw pdraw_demuxer_stream_mux.cpp).
+Each end is one channel of `mux_proxy`. The device ("slave") binds a UDP socket at its side and reports its port,
+which is sent in the SETUP of RTSP as ours; when the server's port is known, the controller ("master") aims the socket
+at it (libmux mux_ip_proxy.c, mux_channel.c; pdraw pdraw_demuxer_stream_mux.cpp).
 """
 
 from __future__ import annotations
@@ -47,7 +47,10 @@ class UdpTunnel:
         self._end = end
 
     async def aim(self, port: int) -> None:
-        """Send to this port of the Skycontroller from now on. Raises `LinkLost` when it does not say that it does."""
+        """Send to this port of the Skycontroller from now on.
+
+        Raises `LinkLost` when it does not say that it does.
+        """
         if not 1 <= port <= 0xFFFF:
             raise LocalProtocolError(f"{port} is no port")
         self._updated = asyncio.get_running_loop().create_future()

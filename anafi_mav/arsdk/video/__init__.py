@@ -1,1 +1,1 @@
-"""The live video's wire formats: RTSP, SDP, RTP, RTCP, H.264 in packets, and Parrot's metadata."""
+"""Wire formats of the live video: RTSP, SDP, RTP, RTCP, H.264, metadata. No I/O."""

@@ -1,7 +1,7 @@
-"""What the two ends of an RTP stream tell each other about it (RTCP, RFC 3550 section 6).
+"""Reports between the two ends of an RTP stream (RTCP, RFC 3550 section 6).
 
-The sender says which of its timestamps is what time, which Olympe needs to place pictures in time; the receiver says
-what arrived. Parrot's own statistics and clock exchange (APP packets) are not read and not sent.
+The sender reports which of its timestamps is what time, which Olympe needs to place pictures in time; the receiver
+reports what arrived. Parrot's own statistics and clock exchange (APP packets) are not read and not sent.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _MICROSECONDS = 1_000_000
 
 @dataclass(frozen=True)
 class ReportBlock:
-    """What a receiver says of one sender."""
+    """Reception report about one sender."""
 
     ssrc: int
     fraction_lost: int
@@ -101,12 +101,18 @@ def encode_receiver_report(report: ReceiverReport, cname: str, *, goodbye: bool 
 
 
 def middle_of(time: int) -> int:
-    """What a receiver names a sender report of that time (µs) by: the middle 32 bits of its NTP form."""
+    """Return the name by which a receiver refers to a sender report of this time (µs).
+
+    It is the middle 32 bits of the report's NTP time.
+    """
     return _ntp(time) >> 16 & 0xFFFFFFFF
 
 
 def _ntp(microseconds: int) -> int:
-    """µs as 32.32 bits, rounded up so that Parrot's integers, which truncate, read the same number back."""
+    """Return µs as 32.32 bits, rounded up.
+
+    So Parrot's integers, which truncate, read the same number back.
+    """
     seconds, rest = divmod(microseconds, _MICROSECONDS)
     return (seconds & 0xFFFFFFFF) << 32 | -(-(rest << 32) // _MICROSECONDS)
 
@@ -126,7 +132,10 @@ def _packet(kind: int, count: int, body: bytes) -> bytes:
 
 
 def decode_reports(data: bytes) -> list[Report]:
-    """The reports and goodbyes in a datagram, up to what cannot be read; other packets are skipped."""
+    """Return the reports and goodbyes in a datagram, up to the first unreadable packet.
+
+    Packets of other types are skipped.
+    """
     reports: list[Report] = []
     position = 0
     while position + _HEADER.size <= len(data):

@@ -1,4 +1,6 @@
-"""RTP packets (RFC 3550) and the order they arrive in. What a packet holds of a picture is in `rtp_h264`.
+"""RTP packets (RFC 3550) and the order they arrive in.
+
+What a packet holds of a picture is in `rtp_h264`.
 
 No I/O: bytes and the time go in, packets come out. A peer's bytes never raise; what cannot be used is counted.
 """
@@ -23,11 +25,11 @@ MAX_HELD = 256
 MAX_DROPOUT = 3000
 """A packet so many numbers ahead is still taken for the same row (RFC 3550 appendix A.1)."""
 MAX_MISORDER = 100
-"""And one so many behind for a late one; anything between the two is a sender that began anew."""
+"""A packet up to so many numbers behind is late; any other distance is a restarted sender."""
 
 
 class Extension(NamedTuple):
-    """A header extension: who defines it, and its body, whole words of 4 bytes."""
+    """A header extension: its profile and its body, whole words of 4 bytes."""
 
     profile: int
     body: bytes
@@ -49,7 +51,10 @@ class Packet(NamedTuple):
 
 
 def encode_packet(packet: Packet) -> bytes:
-    """Raises `LocalProtocolError` when a number does not fit, or the extension is not in whole words."""
+    """Encode a packet.
+
+    Raises `LocalProtocolError` when a number does not fit, or the extension is not in whole words.
+    """
     first, extension = VERSION << 6, b""
     try:
         if packet.extension is not None:
@@ -67,7 +72,7 @@ def encode_packet(packet: Packet) -> bytes:
 
 
 def decode_packet(data: bytes) -> Packet | None:
-    """The packet in a datagram, None if it is none."""
+    """Return the packet in a datagram, or None when it holds no RTP packet."""
     if len(data) < HEADER.size:
         return None
     first, second, sequence, timestamp, ssrc = HEADER.unpack_from(data)
@@ -124,7 +129,7 @@ class ReorderWindow:
         self._gap = False
 
     def receive(self, packet: Packet, now: float) -> list[Received]:
-        """The packets that are in order now."""
+        """Add a packet; return the packets that are in sequence now."""
         if self.ssrc is None:
             self._begin(packet)
         ahead = sequence_distance(self._next, packet.sequence)
@@ -151,7 +156,7 @@ class ReorderWindow:
         self.ssrc, self._next = packet.ssrc, packet.sequence
 
     def expire(self, now: float) -> list[Received]:
-        """The packets that are in order, or that are no longer held back."""
+        """Return the packets that are in sequence, or have waited for `MAX_WAIT`."""
         ready: list[Received] = []
         while self._held:
             held = self._held.pop(self._next, None)

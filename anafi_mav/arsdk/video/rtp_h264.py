@@ -1,11 +1,11 @@
-"""Pictures in RTP: H.264 (RFC 6184, packetization mode 1) with Parrot's metadata in the header extensions.
+"""Pictures in RTP: H.264 (RFC 6184, packetization mode 1) with Parrot's metadata.
 
-A picture is a row of NAL units, without start codes. One that is small goes into a packet of its own or with others
-(STAP-A), one that is large into several (FU-A); the last packet of a picture has the marker.
+A picture is a sequence of NAL units, without start codes. One that is small goes into a packet of its own or with
+others (STAP-A), one that is large into several (FU-A); the last packet of a picture has the marker.
 
-Metadata of version 3 is the extension of the first packet of its picture. Of the protocol buffer each packet carries
-a part behind a header of four bytes: the numbers of the last and of this part and the padding in 16 bits, and where
-the part begins (libvideo-streaming vstrm_rtp_h264.h, vstrm_rtp_h264_tx.c).
+Metadata travels in the header extensions. Version 3 is the extension of the first packet of its picture. Of the
+protocol buffer each packet carries a part behind a header of four bytes: the numbers of the last and of this part and
+the padding in 16 bits, and the offset of the part (libvideo-streaming vstrm_rtp_h264.h, vstrm_rtp_h264_tx.c).
 """
 
 from __future__ import annotations
@@ -217,7 +217,10 @@ class PictureReceiver:
     def __init__(self) -> None:
         self.window = ReorderWindow()
         self.counts: Counter[str] = Counter()
-        """What was dropped: "malformed" packets, "unit"s that could not be read, "metadata", "oversized" pictures."""
+        """Dropped items.
+
+        "malformed" packets, "unit"s that could not be read, "metadata", "oversized" pictures.
+        """
         self._timestamp: int | None = None
         self._ended = True
         """The picture in progress has had its marker."""

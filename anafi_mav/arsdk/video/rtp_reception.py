@@ -1,4 +1,7 @@
-"""How well one sender's RTP arrives, as its receiver reports it (RFC 3550 sections 6.4.1, A.3 and A.8). No I/O."""
+"""Reception statistics of one RTP sender, as its receiver reports them. No I/O.
+
+RFC 3550 sections 6.4.1, A.3 and A.8.
+"""
 
 from __future__ import annotations
 
@@ -49,7 +52,7 @@ class Reception:
             self._report = middle_of(report.time), now
 
     def block(self, now: float) -> ReportBlock | None:
-        """What is to be reported now; None as long as nothing came."""
+        """Return the report block that is due, or None before the first packet."""
         if self._base is None:
             return None
         expected = self._highest - self._base + 1

@@ -1,4 +1,4 @@
-"""RTSP 1.0 (RFC 2326), as far as a drone's video needs it: requests, responses, and what their headers say.
+"""RTSP 1.0 (RFC 2326), as far as a drone's video needs it: requests, responses, headers.
 
 No I/O. Both ends may send requests: a drone announces a changed description and ends sessions itself. Bytes of a
 peer never raise: `MessageReader` answers with a `Malformed` that has the status to send before hanging up.
@@ -113,7 +113,7 @@ class Response:
 
 @dataclass(frozen=True)
 class Malformed:
-    """What came is no RTSP; nothing behind it is read."""
+    """Input that is not RTSP; nothing behind it is read."""
 
     status: Status
     reason: str
@@ -124,7 +124,10 @@ Event = Request | Response | Malformed
 
 
 def encode(message: Message) -> bytes:
-    """The bytes of a message; Content-Length is added. Raises `LocalProtocolError` when a line holds a line end."""
+    """The bytes of a message; Content-Length is added.
+
+    Raises `LocalProtocolError` when a line holds a line end.
+    """
     if isinstance(message, Request):
         first = f"{message.method} {message.uri} {VERSION}"
     else:
@@ -256,7 +259,10 @@ def format_transport(transport: Transport) -> str:
 
 
 def parse_transport(value: str) -> list[Transport]:
-    """The ways that a header Transport offers, best first; those that are not RTP/AVP are left out."""
+    """Return the transports that a header Transport offers, best first.
+
+    Those that are not RTP/AVP are left out.
+    """
     found = []
     for offer in value.split(","):
         first, *parameters = offer.strip().split(";")
@@ -305,7 +311,10 @@ def format_range(start: float | None, stop: float | None = None) -> str:
 
 
 def parse_range(value: str) -> tuple[float | None, float | None] | None:
-    """(start, stop) of a header Range in s; None as start is "now" or not said, as stop the end; None: not readable."""
+    """Return (start, stop) of a header Range in s, or None when it is not readable.
+
+    Start is None for "now" or when absent, stop is None for the end.
+    """
     match = re.fullmatch(r"npt\s*=\s*([0-9.:]+|now)?\s*-\s*([0-9.:]+)?\s*(?:;.*)?", value.strip())
     if match is None:
         return None
@@ -325,7 +334,7 @@ def parse_range(value: str) -> tuple[float | None, float | None] | None:
 
 @dataclass(frozen=True)
 class RtpInfo:
-    """Where a stream begins (header RTP-Info): its URL, first sequence number and timestamp."""
+    """Start of a stream (header RTP-Info): its URL, first sequence number and timestamp."""
 
     url: str
     sequence: int | None = None
@@ -345,7 +354,7 @@ def format_rtp_info(infos: Sequence[RtpInfo]) -> str:
 
 
 def parse_rtp_info(value: str) -> list[RtpInfo]:
-    """What can be read of it."""
+    """Return the readable entries of a header RTP-Info."""
     infos = []
     for piece in value.split(","):
         parameters = dict(part.strip().partition("=")[::2] for part in piece.split(";"))
@@ -365,7 +374,10 @@ def parse_rtp_info(value: str) -> list[RtpInfo]:
 
 
 def split_url(url: str) -> tuple[str, int, str] | None:
-    """(host, port, path without its first slash) of an rtsp:// URL; None if it is none."""
+    """Return (host, port, path without its first slash) of an rtsp:// URL, or None.
+
+    None when it is not such a URL.
+    """
     match = re.fullmatch(r"rtsp://(?:[^@/]*@)?([^/:@]+)(?::([0-9]{1,5}))?(?:/(.*))?", url)
     if match is None:
         return None
@@ -374,7 +386,10 @@ def split_url(url: str) -> tuple[str, int, str] | None:
 
 
 def join_url(base: str, control: str) -> str:
-    """The URL of a stream: its control attribute, from where the description was (RFC 2326 C.1.1)."""
+    """Return the URL of a stream from its control attribute (RFC 2326 C.1.1).
+
+    `base` is the URL of the description.
+    """
     if control in ("", "*"):
         return base
     if control.lower().startswith("rtsp://"):

@@ -1,7 +1,10 @@
-"""Session descriptions (SDP, RFC 4566) of Parrot's video streams: which cameras a drone shows, and how.
+"""Session descriptions (SDP, RFC 4566) of Parrot's video streams.
+
+They list the cameras that a drone shows, and how.
 
 Each stream is an ``m=`` line of its own; its title ("Front camera"), by which Olympe chooses it, is the ``i=`` line
-below. What Parrot adds are attributes ``a=X-com-parrot-*`` (libvideo-metadata vmeta_session.h), named here as there.
+below. Parrot's additions are attributes ``a=X-com-parrot-*`` (libvideo-metadata vmeta_session.h), named here as
+there.
 """
 
 from __future__ import annotations
@@ -55,7 +58,7 @@ class MediaDescription:
 
     title: str = ""
     control: str = ""
-    """Where it is set up, below the session's URL or of its own."""
+    """URL for SETUP, relative to the session's URL or absolute."""
     payload_type: int = 96
     encoding: str = "H264"
     clock_rate: int = 90000
@@ -79,7 +82,7 @@ class SessionDescription:
     tool: str = ""
     """The software and its version."""
     address: str = "0.0.0.0"
-    """Where the streams come from; 0.0.0.0: where the description came from."""
+    """Source address of the streams; 0.0.0.0: the sender of the description."""
     session_id: int = 0
     control: str = ""
     duration: float | None = None
@@ -130,7 +133,10 @@ def _attribute_lines(attributes: Attributes) -> list[str]:
 
 
 def parse_description(data: bytes) -> SessionDescription | None:
-    """What can be read of a description; None if it is none. Streams that are no video are left out."""
+    """Return the readable parts of a description, or None when it is not a description.
+
+    Streams that are no video are left out.
+    """
     lines = data.decode(errors="replace").splitlines()
     if not lines or lines[0] != "v=0" or len(lines) > MAX_LINES:
         return None

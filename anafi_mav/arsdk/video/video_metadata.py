@@ -1,12 +1,13 @@
-"""What a Parrot camera says about each picture: the two formats that travel beside the video.
+"""Metadata of each picture of a Parrot camera, in its two formats.
 
 `FrameMetadata` is the record; on the wire it is one of (libvideo-metadata vmeta_frame_v3.c, vmeta.proto):
 
 * version 3, "P3": a big-endian structure of fixed-point numbers, in ANAFI 4K, Thermal and USA;
 * "Pb": the protocol buffer `TimedMetadata`, in ANAFI Ai and later (`video_metadata_proto`).
 
-Both are bodies of RTP header extensions, whose profile names the format; `rtp_h264` puts them there. A body of a peer
-that cannot be read is None, never an error. What a format cannot say, or says is unknown, is None in the record.
+Both travel beside the video as bodies of RTP header extensions, whose profile names the format; `rtp_h264` puts them
+there. A body of a peer that cannot be read is None, never an error. A value that a format does not have, or that is
+marked unknown, is None in the record.
 
 Quaternions turn the frame of the drone or of the picture (x forward, y right, z down) into north, east, down.
 """
@@ -34,7 +35,7 @@ UNKNOWN_SATELLITES = 255
 
 
 class FlyingState(OpenEnum):
-    """What the drone is doing; the numbers are the same in both formats."""
+    """Flying state of the drone; the numbers are the same in both formats."""
 
     LANDED = 0
     TAKINGOFF = 1
@@ -48,7 +49,10 @@ class FlyingState(OpenEnum):
 
 
 class PilotingMode(OpenEnum):
-    """Who flies, by the numbers of the protocol buffer; version 3 has others (`_V3_MODES`)."""
+    """Piloting mode, by the numbers of the protocol buffer.
+
+    Version 3 has others (`_V3_MODES`).
+    """
 
     UNKNOWN = 0
     MANUAL = 1
@@ -78,7 +82,10 @@ class LinkStatus(OpenEnum):
 
 
 class Quaternion(NamedTuple):
-    """A rotation from the frame of drone or picture (x forward, y right, z down) to north, east, down."""
+    """A rotation from the frame of drone or picture to north, east, down.
+
+    That frame is x forward, y right, z down.
+    """
 
     w: float
     x: float
@@ -234,9 +241,10 @@ def _fixed_quat(quat: Quaternion | None) -> tuple[int, ...]:
 
 
 def encode_v3(metadata: FrameMetadata) -> bytes:
-    """The body of a header extension of profile `V3_PROFILE`, numbers rounded to what the format can hold.
+    """Encode the body of a header extension of profile `V3_PROFILE`.
 
-    Raises `LocalProtocolError` when a number does not fit, or ground distance, speed, battery or state is None.
+    Numbers are rounded to what the format can hold. Raises `LocalProtocolError` when a number does not fit, or ground
+    distance, speed, battery or state is None.
     """
     speed = _known(metadata.speed, "the speed")
     place = metadata.location
@@ -281,7 +289,7 @@ def encode_v3(metadata: FrameMetadata) -> bytes:
 
 
 def decode_v3(body: bytes) -> FrameMetadata | None:
-    """The record in the body of a header extension of profile `V3_PROFILE`; None if it is too short.
+    """Decode the body of a header extension of profile `V3_PROFILE`; None if it is too short.
 
     Extensions of the structure that we do not know are skipped.
     """

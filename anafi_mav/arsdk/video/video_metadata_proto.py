@@ -1,4 +1,7 @@
-"""The metadata of pictures as a protocol buffer: vmeta.proto's `TimedMetadata`, and what of it `FrameMetadata` has."""
+"""Metadata of pictures as a protocol buffer: vmeta.proto's `TimedMetadata`.
+
+It is converted to and from `FrameMetadata`, as far as that has its fields.
+"""
 
 from __future__ import annotations
 
@@ -121,7 +124,9 @@ class _TimedMetadata(Record, frozen=True, kw_only=True):
 
 
 def encode_proto(metadata: FrameMetadata) -> bytes:
-    """The serialized `TimedMetadata`. Raises `LocalProtocolError` when a number does not fit its field.
+    """The serialized `TimedMetadata`.
+
+    Raises `LocalProtocolError` when a number does not fit its field.
 
     proto3 does not tell a number that is zero from one that is missing.
     """

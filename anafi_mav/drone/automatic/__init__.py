@@ -1,1 +1,1 @@
-"""Elements of what the drone flies by itself: flight plans, animations, follow me, points of interest."""
+"""Elements of automatic flight: flight plans, animations, follow me, points of interest."""

@@ -1,7 +1,7 @@
-"""Element animations: figures that the drone flies by itself to make a film or a panorama of photos.
+"""Element animations: automatic flights that make a film or a panorama of photos.
 
 A value that is left out is the drone's own default. Angles are rad (clockwise seen from above is positive), distances
-m, speeds m/s and rad/s (animation.xml). While a figure is flown the drone ignores all piloting commands; a setpoint
+m, speeds m/s and rad/s (animation.xml). While an animation runs the drone ignores all piloting commands; a setpoint
 and `piloting.hover` cancel it first. No ANAFI flips.
 """
 
@@ -23,7 +23,10 @@ from anafi_mav.drone.status.alerts import spoken
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, NotSupported
 
 FIGURE_TIMEOUT = 60.0
-"""s between two signs of life of a figure: it tells how far it is every few percent."""
+"""s between two reports of a running animation.
+
+The drone reports its progress every few percent.
+"""
 
 _FIGURES: Mapping[Type, type[Message]] = {
     Type.HORIZONTAL_PANORAMA: animation.HorizontalPanoramaState,
@@ -71,7 +74,9 @@ def _figure(state: AnimationsState, m: Any) -> AnimationsState:
 
 
 class Animations(Commanding[AnimationsState]):
-    """Figures of Parrot that the drone flies by itself. None for a number leaves it to the drone.
+    """Figures of Parrot that the drone flies by itself.
+
+    None for a number leaves it to the drone.
 
     Speeds are in m/s, turn speeds in rad/s, distances in m, angles in rad (animation.xml). Every figure returns when
     the drone has begun it; `finished` waits for its end.
@@ -146,7 +151,10 @@ class Animations(Commanding[AnimationsState]):
         turns: float | None = None,
         play: PlayMode | None = None,
     ) -> None:
-        """Circle around the target. `radius_variation` 2 ends twice as far away, -2 half as far, 1 as far."""
+        """Circle around the target.
+
+        `radius_variation` 2 ends twice as far away, -2 half as far, 1 as far.
+        """
         await self._start(
             Type.SPIRAL,
             animation.StartSpiral,
@@ -222,7 +230,10 @@ class Animations(Commanding[AnimationsState]):
         )
 
     async def photo_panorama(self, type: Type = Type.SPHERICAL_PHOTO_PANORAMA) -> None:
-        """Take a photo panorama, one media of many pictures: horizontal, vertical, spherical or super wide."""
+        """Take a photo panorama, one media of many pictures.
+
+        It is horizontal, vertical, spherical or super wide.
+        """
         command = _PANORAMAS.get(type)
         if command is None:
             raise NotSupported(f"a photo panorama {spoken(type)}")
@@ -231,9 +242,9 @@ class Animations(Commanding[AnimationsState]):
     # -- their end
 
     async def finished(self, timeout: float = FIGURE_TIMEOUT) -> bool:
-        """Wait until no animation is flown; return True when the last one was completed, False when cancelled.
+        """Wait until no animation runs; return True if the last one was completed.
 
-        Raises `CommandTimeout` after so long without progress.
+        False when it was cancelled. Raises `CommandTimeout` after `timeout` s without progress.
         """
         self._require(self.state.running, "animations")
         if self.state.running == Type.NONE:
@@ -308,7 +319,7 @@ _PANORAMAS: Mapping[Type, type[Message]] = {
 
 
 def _argument(value: float | OpenEnum | None, param: OpenEnum) -> float | OpenEnum:
-    """What stands in the command; for a value that does not count, its zero."""
+    """Return the argument for the command; zero for a value that is left out."""
     if param.name == "PLAY_MODE":
         return PlayMode.NORMAL if value is None else value
     if param.name == "FINISH_ACTION":

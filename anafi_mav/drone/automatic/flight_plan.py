@@ -132,7 +132,7 @@ class FlightPlan(Commanding[FlightPlanState]):
         self._asked: str | None = None
         """The plan whose start was asked for last."""
         self._unwanted: tuple[str, float] | None = None
-        """A plan whose start was given up, and until when the drone may still begin it."""
+        """Plan whose start was aborted, and loop time until which the drone may still begin it."""
 
     def reset(self) -> None:
         super().reset()
@@ -186,7 +186,10 @@ class FlightPlan(Commanding[FlightPlanState]):
             raise RemoteProtocolError(f"the drone's list of flight plans: {error}") from error
 
     async def get(self, uid: str) -> dict[str, Any]:
-        """Return the details of one plan. Raises `CommandRejected` when the drone has none with this id."""
+        """Return the details of one plan.
+
+        Raises `CommandRejected` when the drone has none with this id.
+        """
         self._available()
         told = await self._rest.json("GET", f"{API}/flightplan/{_checked(uid)}")
         if not isinstance(told, dict):

@@ -1,4 +1,7 @@
-"""Element follow me: the drone follows a target, or looks at it. What the target does, the controller tells."""
+"""Element follow me: the drone follows a target, or looks at it.
+
+The controller reports the motion of the target.
+"""
 
 from __future__ import annotations
 
@@ -81,7 +84,9 @@ class FollowMe(Commanding[FollowMeState]):
     }
 
     async def start(self, mode: Mode, timeout: float = ANSWER_TIMEOUT) -> None:
-        """Follow the target or look at it; returns when the drone does. Raises `CommandRejected` with what is missing.
+        """Follow the target or look at it; returns when the drone does.
+
+        Raises `CommandRejected` with what is missing.
 
         A start that times out or is cancelled is withdrawn: a drone that lacks something would begin once it has it.
         """
@@ -110,7 +115,10 @@ class FollowMe(Commanding[FollowMeState]):
         return f"cannot follow: it lacks {lacks}" if lacks else "cannot follow"
 
     async def stop(self, timeout: float = ANSWER_TIMEOUT) -> None:
-        """End following; returns when the drone has, at once when it is neither following nor starting to."""
+        """End following; returns when the drone has stopped.
+
+        Returns at once when the drone is neither following nor about to.
+        """
         self._require(self.state.mode, "follow me")
         self._commander.call_off("stopped", follow_me.Stop)
         await self._commander.halted(follow_me.Stop.NAME, timeout)
@@ -123,10 +131,10 @@ class FollowMe(Commanding[FollowMeState]):
     def tell_target(
         self, place: Position, velocity: tuple[float, float, float] = (0.0, 0.0, 0.0), accuracy: float = 1.0
     ) -> None:
-        """Send the place of the controller (altitude above mean sea level; velocity north, east, down in m/s).
+        """Send the place of the controller.
 
-        It is the target while `target_is_controller`; `accuracy` is in m. Send it once a second at least: it is not
-        acknowledged.
+        Altitude above mean sea level; velocity north, east, down in m/s; `accuracy` in m. It is the target while
+        `target_is_controller`. Send it once a second at least: it is not acknowledged.
         """
         self._require(self.state.mode, "follow me")
         north, east, down = (number(speed, "speed of the target") for speed in velocity)

@@ -1,4 +1,4 @@
-"""Element poi: the nose, and if wanted the camera, held on a place while the pilot flies the rest."""
+"""Element poi: nose, and on request the camera, held on a place while the pilot flies."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class PoiState(msgspec.Struct, frozen=True):
     mode: PoiMode | None = None
     """Relation of the gimbal to the place."""
     missing: frozenset[Indicator] | None = None
-    """What it lacks; empty = available. Ai only."""
+    """Missing inputs; empty = available. Ai only."""
 
 
 class Poi(Commanding[PoiState]):
@@ -55,10 +55,11 @@ class Poi(Commanding[PoiState]):
         mode: PoiMode = PoiMode.LOCKED_GIMBAL,
         timeout: float = ANSWER_TIMEOUT,
     ) -> None:
-        """Look at a place (deg, deg, m above take-off); returns when the drone does, or will once it hovers.
+        """Point the nose at a place (deg, deg, m above take-off).
 
-        LOCKED_GIMBAL points the camera too, FREE_GIMBAL leaves it to the gimbal's verbs. Raises `CommandRejected` when
-        it is unavailable: not flying, or no GPS. A start that times out or is cancelled is withdrawn.
+        Returns when the drone does, or will once it hovers. LOCKED_GIMBAL points the camera too, FREE_GIMBAL leaves
+        it to the gimbal's verbs. Raises `CommandRejected` when it is unavailable: not flying, or no GPS. A start that
+        times out or is cancelled is withdrawn.
         """
         if position(latitude, longitude, altitude) is None:
             raise LocalProtocolError(f"no place on earth: {latitude}, {longitude}, {altitude}")
@@ -78,7 +79,7 @@ class Poi(Commanding[PoiState]):
         await self._commander.begin(command, (ardrone3.PilotedPOIV2,), judge, timeout, ardrone3.StopPilotedPOI())
 
     async def stop(self, timeout: float = ANSWER_TIMEOUT) -> None:
-        """End looking at the place; returns at once when there is none."""
+        """End pointing at the place; returns at once when none is active or about to be."""
         self._require(self.state.status, "points of interest")
         self._commander.call_off("stopped", ardrone3.StopPilotedPOI)
         await self._commander.halted(ardrone3.StopPilotedPOI.NAME, timeout)

@@ -1,11 +1,12 @@
-"""Element controller: the Skycontroller between us and the drone, and who of its pilot and our user flies.
+"""Element controller: the Skycontroller between us and the drone, and its piloting source.
 
-The sticks have the drone. When a user commands motion, the piloting source is taken and the four axes of the sticks are
-grabbed, so that the pilot is seen; when the motion is over, both go back. A pilot who moves a stick has the drone at
-once and keeps it until the user has been quiet for a while. The return-home and the take-off/land button are never
-grabbed: they are the pilot's. A Skycontroller takes both back by itself when the connection ends (skyctrl.xml 4-20-0).
+It arbitrates between the Skycontroller's pilot and our user. The sticks normally have control. When a user commands
+motion, the piloting source is acquired and the four axes of the sticks are grabbed, so that stick input of the pilot
+is seen; when the motion is over, both are released. A pilot who moves a stick has control at once and keeps it until
+the user has sent no motion for a while. The return-home and the take-off/land button are never grabbed: they are the
+pilot's. A Skycontroller takes both back by itself when the connection ends (skyctrl.xml 4-20-0).
 
-Without a Skycontroller the state is empty, its verbs raise `NotSupported`, and nothing stands in the way of motion.
+Without a Skycontroller the state is empty, its verbs raise `NotSupported`, and motion is not restricted.
 """
 
 from __future__ import annotations
@@ -95,9 +96,12 @@ class Controller(Element[ControllerState]):
         take_over: Callable[[], None] | None = None,
         stand_by: Callable[[Sequence[Message]], None] = lambda messages: None,
     ) -> None:
-        """`moving` says whether a move that a user ordered is under way; `take_over` ends what the user ordered.
+        """Store the callbacks for moves, for a takeover by the pilot and for a stall of the host.
 
-        `stand_by` gets what has to be sent when the host stalls; nothing while the axes are the pilot's.
+        `moving` returns True while a move that a user commanded is under way; `take_over` ends the user's commands.
+
+        `stand_by` receives the messages to send when the host stalls; an empty sequence while the axes are the
+        pilot's.
         """
         super().__init__()
         self.present = False
@@ -152,7 +156,11 @@ class Controller(Element[ControllerState]):
 
     @property
     def pilot_acquired_control(self) -> bool:
-        """True while motion of ours is refused: the pilot moved a stick against it less than `PILOT_KEEPS` ago."""
+        """True while our motion is refused because the pilot acquired control.
+
+        That lasts for `PILOT_KEEPS` s after the pilot moved a stick, and longer while our user keeps moving the
+        sticks.
+        """
         return self.present and loop_time() < self._pilot_keeps_until
 
     @property
@@ -164,7 +172,9 @@ class Controller(Element[ControllerState]):
         return self.present and not self.taken and self.state.source != Source.CONTROLLER
 
     def allows(self, message: Message) -> bool:
-        """Shown every command before it is sent. A command of motion takes sticks and source for our user.
+        """Shown every command before it is sent.
+
+        A command of motion takes sticks and source for our user.
 
         False: a stick position that must not be sent, since the pilot flies; a level one while he has the source is
         among them. Raises `CommandRejected` for any other motion then.
@@ -219,7 +229,10 @@ class Controller(Element[ControllerState]):
         self._yield("gateway stalled")
 
     async def release(self) -> None:
-        """`give_back` for good, before the connection is closed; waits a moment for the controller to say so."""
+        """`give_back` for good, before the connection is closed.
+
+        Waits for `GOODBYE` s at most for the controller to confirm it.
+        """
         if not self.taken:
             return
         self._pilot_keeps_until = math.inf
@@ -232,7 +245,10 @@ class Controller(Element[ControllerState]):
             await back.wait()
 
     def questions(self) -> tuple[Message, ...]:
-        """What to ask a Skycontroller that speaks protobuf; one that does not stays silent."""
+        """Return the queries for a Skycontroller that speaks protobuf.
+
+        Empty for other models, which do not answer.
+        """
         if self.model not in PROTOBUF:
             return ()
         return (device_manager.GetState(), controller_network.GetState())
@@ -282,9 +298,10 @@ class Controller(Element[ControllerState]):
     # -- verbs
 
     async def grab(self, axes: int = 0, buttons: int = 0, timeout: float = ANSWER_TIMEOUT) -> None:
-        """Have axes and buttons (masks, bit n = number n) reported in the state instead of acting; zeros end it.
+        """Grab axes and buttons: they are reported in the state instead of acting.
 
-        The axes of the sticks, which are grabbed during motion, are not changed.
+        `axes` and `buttons` are masks, bit n = number n; zeros release them. The axes of the sticks, which are
+        grabbed during motion, are not changed.
 
         Raises `LocalProtocolError` for the sticks, which are grabbed by motion alone, and for the buttons that stay
         the pilot's.
@@ -323,7 +340,10 @@ class Controller(Element[ControllerState]):
         return self.state.visible
 
     async def connect_drone(self, serial: str, key: str = "", timeout: float = 30.0) -> None:
-        """Connect the Skycontroller to another drone. Its connection to this program ends: connect again."""
+        """Connect the Skycontroller to another drone.
+
+        Its connection to this program ends: connect again.
+        """
         self._require()
 
         if self.state.protobuf:
@@ -394,8 +414,11 @@ _MOVES = (
 
 
 def is_motion(message: Message) -> bool:
-    """Does this command fly the drone somewhere? Letting the sticks go does not, and neither does what stops, lands,
-    takes off or returns: for these nobody's sticks are in the way."""
+    """Return True when this command moves the drone.
+
+    Centring the sticks does not, and neither do commands that stop, land, take off or return: the pilot's sticks do
+    not conflict with these.
+    """
     if isinstance(message, ardrone3.PCMD):
         return bool(message.roll or message.pitch or message.yaw or message.gaz)
     if isinstance(message, ardrone3.MoveBy):

@@ -1,7 +1,9 @@
-"""What a Skycontroller reports: its own state, the drones it knows, its pilot's sticks. The verbs are in `controller`.
+"""State that a Skycontroller reports: its own, the drones it knows, its pilot's sticks.
 
-A Skycontroller 4 says of its drones in protobuf (devicemanager) what the older ones say in drone_manager, and may say
-it in both; its own links it tells in controllernetwork.
+The verbs are in `controller`.
+
+A Skycontroller 4 reports its drones in protobuf (devicemanager), the older ones in drone_manager; it may use both.
+Its own links it reports in controllernetwork.
 """
 
 from __future__ import annotations
@@ -145,7 +147,7 @@ def _known(state: ControllerState, message: drone_manager.KnownDroneItem) -> Con
 
 
 def _devices(state: ControllerState, message: device_manager.State) -> ControllerState:
-    """What is not in it has not changed."""
+    """Apply a device-manager state; fields that it does not carry have not changed."""
     if message.known_devices is not None:
         known = [_paired(one) for one in message.known_devices.devices[:MAX_ITEMS]]
         state = replace(state, known={one.serial: one for one in known if one is not None})

@@ -56,10 +56,12 @@ Ask: TypeAlias = tuple[Message, type[Message]]
 
 
 class Camera(Commanding[CamerasState]):
-    """All cameras of the drone; `camera[id]` is the state of one, the verbs use the main one unless `id` says another.
+    """All cameras of the drone.
 
-    Verbs that change a setting return the value that the drone confirmed: one that it does not take is clamped, or the
-    setting stays as it was. Raises `NotSupported` for what this camera does not have.
+    `camera[id]` is the state of one camera; the verbs use the main one unless `id` names another.
+
+    Verbs that change a setting return the value that the drone confirmed: one that it does not accept is clamped, or
+    the setting stays as it was. Raises `NotSupported` for features that this camera does not have.
     """
 
     NOTHING = CamerasState()
@@ -82,7 +84,9 @@ class Camera(Commanding[CamerasState]):
         return (await self._ask(id, "photo", lambda s, now: s.photo(id, now, wish))).photo
 
     async def take_photo(self, id: int = MAIN, timeout: float = SAVE_TIMEOUT) -> str | None:
-        """Take a photo; return its media id once it is stored. A series returns None as soon as it has begun.
+        """Take a photo; return its media id once it is stored.
+
+        A series returns None as soon as it has begun.
 
         Raises `CommandRejected` when no photo can be taken (in mode RECORDING, or the storage is full).
         """
@@ -104,7 +108,10 @@ class Camera(Commanding[CamerasState]):
         return result if isinstance(result, str) else None
 
     async def stop_photo(self, id: int = MAIN, timeout: float = SAVE_TIMEOUT) -> str | None:
-        """End a series; return its media id if the drone reports one. Raises `CommandRejected` without a series."""
+        """End a series; return its media id if the drone reports one.
+
+        Raises `CommandRejected` without a series.
+        """
         speech, now = self._known(id)
         if now.taking is False:
             raise CommandRejected("no photo is being taken")
@@ -169,7 +176,10 @@ class Camera(Commanding[CamerasState]):
     # -- zoom
 
     async def zoom(self, level: float, id: int = MAIN, timeout: float = ZOOM_TIMEOUT) -> float:
-        """Zoom to a factor (1: no zoom; clipped to the range of the camera); return it once it is reached."""
+        """Zoom to a factor, 1 being no zoom; return it once it is reached.
+
+        The factor is clipped to the range of the camera.
+        """
         speech, now = self._known(id)
         wanted = clip(number(level, "zoom"), 1.0, self._zoom_max(now))
 
@@ -248,7 +258,10 @@ class Camera(Commanding[CamerasState]):
     async def lock_exposure(
         self, on: bool = True, at: tuple[float, float] | None = None, id: int = MAIN
     ) -> bool | None:
-        """Lock or unlock the exposure; `at` (x, y: 0 to 1 from the upper left) locks it to what suits that place."""
+        """Lock or unlock the exposure.
+
+        With `at` (x, y: 0 to 1 from the upper left) it is locked to the exposure of that place.
+        """
         if not self[id].exposure_lockable:
             self._require(None, "exposure lock")
         return (await self._ask(id, "exposure", lambda s, now: s.lock_exposure(id, now, on, at))).exposure_locked
@@ -302,14 +315,17 @@ class Camera(Commanding[CamerasState]):
     # -- the connection
 
     def questions(self) -> list[Question]:
-        """What to ask a drone that speaks protobuf: it tells nothing of its cameras unasked."""
+        """Return the queries for a drone that speaks protobuf.
+
+        It reports its cameras only on request.
+        """
         return [
             (camera2.ListCameras(), camera2.CameraList, lambda message: True),
             (mains.GetState(include_default_capabilities=True), mains.State, lambda message: True),
         ]
 
     def details(self) -> list[Question]:
-        """What to ask once the cameras are known."""
+        """Return the queries to send once the cameras are known."""
 
         def about(id: int) -> Question:
             command = camera2.GetState(camera_id=id, include_default_capabilities=True)
@@ -335,7 +351,10 @@ class Camera(Commanding[CamerasState]):
     async def _ask(
         self, id: int, field: str, ask: Callable[[type[Classic] | type[Modern], CameraState], Ask]
     ) -> CameraState:
-        """Change a setting; returns the state after the drone's answer. `field` must have been reported."""
+        """Change a setting; returns the state after the drone's answer.
+
+        `field` must have been reported.
+        """
         speech, now = self._known(id)
         self._require(getattr(now, field), f"camera {id}: {field.replace('_', ' ')}")
         command, answer = ask(speech, now)
@@ -361,7 +380,10 @@ class Camera(Commanding[CamerasState]):
         first: float,
         next: float | None,
     ) -> Any:
-        """Send a command and judge the news of this camera; each of them gives the drone `next` more seconds."""
+        """Send a command and judge the progress reports of this camera.
+
+        `first` is the timeout, s; each report restarts it with `next` s, unless that is None.
+        """
 
         def listen(message: Any) -> Any:
             news = read(message)

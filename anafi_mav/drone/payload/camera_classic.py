@@ -1,4 +1,4 @@
-"""The cameras of 4K, Thermal and USA (feature camera): how its events change the state, and what commands look like."""
+"""The cameras of 4K, Thermal and USA (feature camera): event reducers and commands."""
 
 from __future__ import annotations
 
@@ -287,7 +287,7 @@ RECORDING_EVENTS: tuple[type[Message], ...] = (wire.RecordingProgress, wire.Reco
 
 
 def photo_news(m: Any) -> News | None:
-    """What a photo event says."""
+    """Return the progress that a photo event reports."""
     if isinstance(m, wire.PhotoState):
         return News(m.cam_id, Progress.STARTED if m.state == State.ACTIVE else Progress.ENDED)
     if m.result == PhotoResult.PHOTO_SAVED:
@@ -298,7 +298,10 @@ def photo_news(m: Any) -> News | None:
 
 
 def recording_news(m: Any) -> News | None:
-    """What a recording event says. The state alone ends nothing: the media id comes with the progress."""
+    """Return the progress that a recording event reports, or None.
+
+    The state alone ends nothing: the media id arrives with the progress.
+    """
     if isinstance(m, wire.RecordingState):
         return News(m.cam_id, Progress.STARTED) if m.state == State.ACTIVE else None
     if m.result == RecordingResult.STARTED:
@@ -322,7 +325,10 @@ def _onoff(on: bool) -> State:
 
 
 class Classic:
-    """A command, and the kind of event that answers it. Each takes the camera's id and its state."""
+    """A command, and the kind of event that answers it.
+
+    Each takes the camera's id and its state.
+    """
 
     @staticmethod
     def mode(id: int, now: CameraState, mode: CameraMode) -> tuple[Message, type[Message]]:

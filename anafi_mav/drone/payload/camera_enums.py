@@ -1,8 +1,9 @@
-"""One vocabulary for two features: the cameras of 4K, Thermal and USA (camera) and those of the Ai (camera2).
+"""Common vocabulary of two camera features: camera and camera2.
 
-Both have much the same values under other numbers: photo is 1 in one and 0 in the other, styles are shifted by one, the
-lists of ISO values and framerates part after a few entries. Names agree but for a prefix ("FPS_24", "_24"), so that
-values are translated by name. A value of ours is that bare name; quantities are numbers.
+The cameras of 4K, Thermal and USA have the feature camera, those of the Ai camera2. Both have much the same values
+under other numbers: photo is 1 in one and 0 in the other, styles are shifted by one, the lists of ISO values and
+framerates differ after a few entries. Names agree but for a prefix ("FPS_24", "_24"), so that values are translated
+by name. A value of ours is that bare name; quantities are numbers.
 """
 
 from __future__ import annotations
@@ -211,7 +212,7 @@ def bare(value: OpenEnum) -> str:
 
 
 def word(words: type[WordT], value: OpenEnum | None) -> WordT | None:
-    """Ours for Parrot's; None when there is none, or nothing was said."""
+    """Translate Parrot's value to ours; None when it has no equivalent or is not reported."""
     if value is None:
         return None
     name = bare(value)
@@ -238,7 +239,10 @@ def parrot(values: type[ParrotT], wanted: enum.Enum) -> ParrotT:
 
 @lru_cache(maxsize=512, typed=True)
 def quantity(value: OpenEnum | None) -> float | None:
-    """The number that a value stands for: s of a shutter, ISO, K, frames a second; None for one that is not known."""
+    """Return the number that a value stands for; None when it is not known.
+
+    s of a shutter, ISO, K, frames a second.
+    """
     if value is None:
         return None
     numerator, over, denominator = bare(value).partition("_OVER_")

@@ -1,7 +1,7 @@
-"""The cameras of the Ai (protobuf feature camera2): how its events change the state, and what commands look like.
+"""The cameras of the Ai (protobuf feature camera2): event reducers and commands.
 
-Every setting is a field of one configuration; the drone answers a change with its state. Fields that an event does not
-carry are left as they are.
+Every setting is a field of one configuration; the drone answers a change with its state. Fields that an event does
+not carry are left as they are.
 """
 
 from __future__ import annotations
@@ -187,14 +187,20 @@ def _config(now: CameraState, c: wire.Config) -> dict[str, Any]:
 
 
 def _level(now: Range | None, value: float | None) -> Range | None:
-    """A level of the picture with the range that is known; before the capabilities came that is Parrot's -1 to 1."""
+    """Return a picture level with its known range.
+
+    Until the capabilities have arrived the range is Parrot's -1 to 1.
+    """
     if value is None or not math.isfinite(value):
         return None
     return Range(value, -1.0, 1.0) if now is None else replace(now, current=value)
 
 
 def _rules(rules: tuple[wire.CapabilitiesRule, ...], style: StyleSettings | None) -> dict[str, Any]:
-    """What the settings can be. Each rule is a set of values that go together."""
+    """Return the possible values of the settings.
+
+    Each rule is a set of values that go together.
+    """
     rules = rules[:MAX_OPTIONS]
 
     def union(name: str) -> list[Any]:
@@ -286,7 +292,10 @@ _DONE = (wire.PhotoStopReason.USER_REQUEST, wire.PhotoStopReason.CAPTURE_DONE)
 
 
 def photo_news(m: Any) -> News | None:
-    """What a photo event says: START, then STOP with the media id, once for a series as for a single picture."""
+    """Return the progress that a photo event reports, or None.
+
+    The events are START, then STOP with the media id, once for a series as for a single picture.
+    """
     if m.type in (wire.PhotoEvent.START, wire.PhotoEvent.TAKING_PHOTO):
         return News(m.camera_id, Progress.STARTED)
     if m.type != wire.PhotoEvent.STOP:
@@ -299,7 +308,7 @@ def photo_news(m: Any) -> News | None:
 
 
 def recording_news(m: Any) -> News | None:
-    """What a recording event says."""
+    """Return the progress that a recording event reports, or None."""
     if m.type == wire.RecordingEvent.START:
         return News(m.camera_id, Progress.STARTED)
     if m.type != wire.RecordingEvent.STOP:
@@ -331,7 +340,10 @@ def _pixels(wanted: float) -> wire.PhotoResolution:
 
 
 class Modern:
-    """A command, and the kind of event that answers it. Each takes the camera's id and its state."""
+    """A command, and the kind of event that answers it.
+
+    Each takes the camera's id and its state.
+    """
 
     @staticmethod
     def mode(id: int, now: CameraState, mode: CameraMode) -> tuple[Message, type[Message]]:

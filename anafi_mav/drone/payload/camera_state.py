@@ -1,4 +1,7 @@
-"""What the cameras of a drone report, in the words of `camera_words`, whichever of Parrot's features reports it."""
+"""State that the cameras of a drone report, in the vocabulary of `camera_enums`.
+
+It is the same whichever of Parrot's features reports it.
+"""
 
 from __future__ import annotations
 
@@ -200,7 +203,7 @@ def changed(state: CamerasState, id: int, **changes: Any) -> CamerasState:
 
 
 class Progress(enum.Enum):
-    """What can be heard of a picture or a film that was asked for."""
+    """Progress of a requested photo or recording."""
 
     STARTED = enum.auto()
     SAVED = enum.auto()
@@ -218,4 +221,4 @@ class News(msgspec.Struct, frozen=True):
     media: str = ""
     """Media id, of SAVED and ENDED."""
     reason: str = ""
-    """Of FAILED, and of an end that nobody asked for."""
+    """Reason of FAILED, and of an end that was not requested."""

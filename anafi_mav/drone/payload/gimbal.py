@@ -144,7 +144,10 @@ def _with(state: Gimbals, id: int, **changes: object) -> Gimbals:
 
 
 class Gimbal(Commanding[Gimbals]):
-    """All gimbals of the drone; `gimbal[id]` is the state of one, the verbs use the main one by default."""
+    """All gimbals of the drone.
+
+    `gimbal[id]` is the state of one gimbal; the verbs use the main one by default.
+    """
 
     NOTHING: ClassVar[Gimbals] = {}
     REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = {
@@ -174,9 +177,12 @@ class Gimbal(Commanding[Gimbals]):
     # -- where to look
 
     def aim(self, *, yaw: Aim | None = None, pitch: Aim | None = None, roll: Aim | None = None, id: int = MAIN) -> None:
-        """Send angles (deg) once, without waiting: for targets that arrive in a stream. None leaves an axis alone.
+        """Send angles (deg) once, without waiting: for targets that arrive in a stream.
 
-        Angles beyond the bounds are clipped to them. Raises `NotSupported` for an axis that this gimbal does not have.
+        None leaves an axis alone.
+
+        Angles beyond the bounds are clipped to them. Raises `NotSupported` for an axis that this gimbal does not
+        have.
         """
         targets = self._targets({Axis.YAW: yaw, Axis.PITCH: pitch, Axis.ROLL: roll}, id)
         self._order(id, self._command(targets, ControlMode.POSITION, id))
@@ -184,9 +190,10 @@ class Gimbal(Commanding[Gimbals]):
     def turn(
         self, *, yaw: Aim | None = None, pitch: Aim | None = None, roll: Aim | None = None, id: int = MAIN
     ) -> None:
-        """Turn with these rates (deg/s), sent once: the drone holds them until the next target or the end of the range.
+        """Turn with these rates, deg/s, sent once.
 
-        Rates beyond the speed setting are clipped to it. Zero stops an axis, but it can be lost: `stop` makes sure.
+        The drone holds them until the next target or the end of the range. Rates beyond the speed setting are clipped
+        to it. Zero stops an axis, but the message can be lost: `stop` makes sure.
         """
         rates = {Axis.YAW: yaw, Axis.PITCH: pitch, Axis.ROLL: roll}
         shares = {axis: self._share(axis, aim, id) for axis, aim in rates.items() if aim is not None}
@@ -232,7 +239,7 @@ class Gimbal(Commanding[Gimbals]):
         return await self._insist(id, self._command(still, ControlMode.VELOCITY, id), answer, timeout)
 
     async def reset_orientation(self, id: int = MAIN, timeout: float = 2 * ANSWER_TIMEOUT) -> GimbalAttitude:
-        """Turn to the drone's reference orientation; return the attitude once the gimbal stands there."""
+        """Turn to the drone's reference orientation; return the attitude once the gimbal rests."""
         self._axes(id)
         self._orders[id] += 1
         return await self._commander.confirm(gimbal.ResetOrientation(id), (gimbal.Attitude,), _Standing(id), timeout)
@@ -240,7 +247,10 @@ class Gimbal(Commanding[Gimbals]):
     # -- settings
 
     async def set_max_speed(self, degrees_per_second: float, id: int = MAIN) -> Mapping[Axis, Range]:
-        """Set the highest rate, deg/s, one for all axes (gimbal.xml 148-0-4); return the setting of each axis."""
+        """Set the highest rate, deg/s, one for all axes; return the setting of each axis.
+
+        gimbal.xml 148-0-4.
+        """
         if not math.isfinite(degrees_per_second):
             raise LocalProtocolError("a speed is not a number")
         self._require(self[id].max_speed, gimbal.SetMaxSpeed.NAME)
@@ -280,7 +290,10 @@ class Gimbal(Commanding[Gimbals]):
     # -- calibration
 
     async def calibrate(self, id: int = MAIN, timeout: float = CALIBRATION_TIMEOUT) -> None:
-        """Calibrate the gimbal; returns when that succeeded. Raises `CommandRejected` when it failed."""
+        """Calibrate the gimbal; returns when that succeeded.
+
+        Raises `CommandRejected` when it failed.
+        """
         self._require(self[id].calibration, gimbal.Calibrate.NAME)
 
         def judge(message: gimbal.CalibrationResult | gimbal.CalibrationState) -> bool | AnafiMavError | None:
@@ -364,7 +377,10 @@ class Gimbal(Commanding[Gimbals]):
 
 
 class _Standing:
-    """A judge: the attitude at which the gimbal has come to a stand, in the frame that each axis holds."""
+    """A judge: the attitude at which the gimbal has come to rest.
+
+    It is in the frame that each axis holds.
+    """
 
     def __init__(self, id: int) -> None:
         self._id = id

@@ -1,7 +1,7 @@
-"""Element media: what the drone has photographed and filmed.
+"""Element media: the photos and videos in the drone's storages.
 
-ARSDK tells how many there are and whether they are indexed; everything else is asked of the drone's web server, which
-is used only while somebody asks (`/api/v1/media`, developer.parrot.com and Olympe's media module).
+ARSDK reports how many there are and whether they are indexed; everything else is requested from the drone's web
+server, which is used only on request of a caller (`/api/v1/media`, developer.parrot.com and Olympe's media module).
 """
 
 from __future__ import annotations
@@ -106,7 +106,10 @@ class MediaItem(msgspec.Struct, frozen=True):
 
 
 class Notification(msgspec.Struct, frozen=True):
-    """An event of the media store: "media_created", "resource_removed", "indexing_state_changed", …"""
+    """An event of the media store.
+
+    "media_created", "resource_removed", "indexing_state_changed", …
+    """
 
     name: str
     data: dict[str, Any] = {}
@@ -118,7 +121,7 @@ class Notification(msgspec.Struct, frozen=True):
 
 
 def _item(told: Any) -> MediaItem | None:
-    """A media of the drone's; None when it is none."""
+    """Return a media of the drone; None when the data is not readable as one."""
     try:
         return msgspec.convert(told, MediaItem, strict=False)
     except (msgspec.ValidationError, RecursionError):
@@ -161,7 +164,7 @@ class Media(Commanding[MediaState]):
         return tuple(item for item in items if item is not None)
 
     async def get(self, media_id: str) -> MediaItem:
-        """Return one media. Raises `CommandRejected` when there is none with this id."""
+        """Return one media. Raises `CommandRejected` when no media has this id."""
         item = _item(await self._ask("GET", f"{API}/medias/{_name(media_id)}"))
         if item is None:
             raise RemoteProtocolError(f"media {media_id} is not readable")

@@ -249,11 +249,11 @@ class Storage(Commanding[Storages]):
         return min(ids or self.state or [0])
 
     def questions(self) -> list[Question]:
-        """What to ask a drone that speaks protobuf and has reported no storage."""
+        """Return the queries for a drone that speaks protobuf and has reported no storage."""
         return [] if self.state else [(v3.ListStorages(), v3.StorageList, lambda message: True)]
 
     def details(self) -> list[Question]:
-        """What to ask once those storages are known."""
+        """Return the queries to send once those storages are known."""
 
         def about(id: int) -> Question:
             command = v3.GetState(id=id, include_default_capabilities=True)
@@ -289,7 +289,9 @@ class Storage(Commanding[Storages]):
         id: int | None = None,
         timeout: float = FORMAT_TIMEOUT,
     ) -> None:
-        """Erase everything; returns when that is complete. `timeout` counts from the last report of progress.
+        """Erase everything; returns when that is complete.
+
+        `timeout` counts from the last report of progress.
 
         Raises `CommandRejected` when the drone refuses (it flies or records) or fails.
         """

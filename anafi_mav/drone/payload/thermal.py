@@ -1,6 +1,6 @@
-"""Element thermal: the thermal camera of Thermal and USA, what it shows and what it takes the world for.
+"""Element thermal: the thermal camera of Thermal and USA.
 
-The Ai has none. Temperatures are Kelvin, as on the wire.
+It covers rendering and measurement settings. The Ai has no thermal camera. Temperatures are Kelvin, as on the wire.
 """
 
 from __future__ import annotations
@@ -116,7 +116,10 @@ class Thermal(Commanding[ThermalState]):
         return await self._change(thermal.SetMode(mode), thermal.Mode, lambda m: ThermalMode(m.mode))
 
     async def set_rendering(self, mode: RenderingMode, blending: float | None = None) -> tuple[RenderingMode, float]:
-        """Set the mixture of thermal and visible picture; `blending` None keeps its share. Return both."""
+        """Set the mixture of thermal and visible picture; `blending` None keeps its share.
+
+        Return both.
+        """
         self._require(self.state.rendering, "thermal camera")
         share = (self.state.blending or 0.0) if blending is None else number(blending, "share of the thermal picture")
         return await self._change(

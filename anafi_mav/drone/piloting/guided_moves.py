@@ -23,7 +23,10 @@ from anafi_mav.units import RAD_PER_DEG, wrap_360
 MOVE_BY_MARGIN = 20.0
 """s that a relative move may take beyond the flight itself."""
 MOVE_BY_SLOWEST = 0.5
-"""m/s and rad/s below which a relative move is given up: the speed is the drone's choice, this is far below it."""
+"""m/s and rad/s below which a relative move is aborted.
+
+The drone chooses the speed; this is far below it.
+"""
 
 FASTEST = 16.0
 """m/s over ground, the Ai's top speed (anafi_ros paper, table I): stands for "no limit" where Parrot has no word for it
@@ -149,9 +152,9 @@ class GuidedMoves:
         )
 
     def stop(self, why: str) -> bool:
-        """Cancel our moveTo and moveBys; in the order of the queue, so a later move is not hit.
+        """Cancel our moveTo and moveBys; return True when a moveTo was cancelled.
 
-        True when a moveTo was cancelled.
+        The cancellations go through the command queue in sequence, so a later move is not hit.
         """
         journey = self._moves.cancel_to(why)
         if journey is not None:

@@ -1,7 +1,7 @@
-"""How a landing is ended: positive gaz, as ardrone3.xml 1-0-3 says, and a take-off command where one was asked for.
+"""End a landing by positive gaz (ardrone3.xml 1-0-3), and by a take-off command on request.
 
 Gaz starts nothing on the ground. A TakeOff does, so it is withdrawn when the drone reports that it has landed, and a
-firmware that executes it all the same is made to land again (`Motors.stay_down`).
+firmware that executes it all the same is made to land again (`Motors.take_off_withdrawn`).
 """
 
 from __future__ import annotations
@@ -91,7 +91,10 @@ class LandingEnd:
             self._sticks.centre_after_gaz()
 
     async def _hold_gaz(self, ended: asyncio.Future[bool]) -> None:
-        """Send full gaz every 50 ms until the drone reports something else than a landing, for `GAZ_FOR` at most."""
+        """Send full gaz every 50 ms until the drone reports another state than a landing.
+
+        For `GAZ_FOR` s at most.
+        """
         until = loop_time() + GAZ_FOR
         while not ended.done() and loop_time() < until:
             self._sticks.send_now(FULL_GAZ)

@@ -1,7 +1,7 @@
-"""Up and down: the verbs that start the motors, and those that end a flight.
+"""Take-off and landing: the verbs that start the motors, and those that end a flight.
 
-A take-off that was given up may have reached the drone all the same: a landing and an emergency have to catch what may
-still begin.
+A take-off that was aborted may have reached the drone all the same: a landing and an emergency have to stop motors
+that may still start.
 """
 
 from __future__ import annotations
@@ -23,7 +23,10 @@ RAMPING_TIMEOUT = 10.0
 """s that the motors may take from their first turn to the take-off."""
 
 TAKE_OFF_MEMORY = 10.0
-"""s after a take-off was given up in which the drone may still carry it out, or already does and could not say so."""
+"""s after an aborted take-off in which the drone may still carry it out.
+
+Or it already takes off but could not report it.
+"""
 
 LAND_INSISTS = 10.0
 """s for which a Landing is repeated while the motors ramp up or the drone rises: ardrone3.xml 1-0-3 promises a landing
@@ -54,7 +57,10 @@ _MOTORS_CUT = frozenset({FlyingState.EMERGENCY, FlyingState.LANDED})
 
 
 class Motors:
-    """Take-off, hand launch, landing, emergency. `Piloting` says what its verbs of the same names promise."""
+    """Take-off, hand launch, landing, emergency.
+
+    `Piloting` says what its verbs of the same names promise.
+    """
 
     def __init__(
         self,
@@ -98,7 +104,10 @@ class Motors:
             self._commander.halt_if_connected(ardrone3.Landing())
 
     def take_off_wanted(self) -> None:
-        """A command that starts the motors is about to be sent: those that start from now on are wanted."""
+        """Note that a command that starts the motors is about to be sent.
+
+        From now on motors that start are wanted.
+        """
         self._stays_down_until = self._withdrawn_until = -math.inf
 
     def landing_doubtful(self) -> None:
@@ -117,7 +126,10 @@ class Motors:
         self._withdrawn_until = -math.inf
 
     def take_off_withdrawn(self) -> None:
-        """A TakeOff against a landing was withdrawn and may have arrived: a drone that has landed must stay down."""
+        """Note that a TakeOff against a landing was withdrawn and may have arrived.
+
+        A drone that has landed must stay down.
+        """
         self._withdrawn_until = loop_time() + STAYS_DOWN
         if self._flight.state.flying == FlyingState.LANDED:
             self._stay_down()
@@ -126,7 +138,7 @@ class Motors:
         self._stays_down_until = self._may_take_off_until = loop_time() + STAYS_DOWN
 
     async def settle_landing(self, timeout: float) -> bool:
-        """Return True when a Landing that was withdrawn has begun all the same; False when it certainly does not.
+        """Return True when a withdrawn Landing has begun all the same; False when it will not.
 
         That is known once the drone has received a later command, and then reports nothing.
         """
@@ -254,9 +266,10 @@ class Motors:
         return state in _LANDING and (state != FlyingState.LANDING or loop_time() >= self._doubtful_until)
 
     async def _insist(self, timeout: float) -> None:
-        """Send Landing until the drone lands: again at each state that shows that the one before did not count.
+        """Send Landing until the drone lands.
 
-        Withdrawn when this is cancelled or fails; the drone may have received it all the same (`settle_landing`).
+        It is repeated at each state that shows that the previous one had no effect. It is withdrawn when this is
+        cancelled or fails; the drone may have received it all the same (`settle_landing`).
         """
         doubtful = self._flight.state.flying == FlyingState.LANDING
         rising = self._flight.state.flying in TURNING or self._flight.state.flying == FlyingState.TAKINGOFF
@@ -331,8 +344,8 @@ class Motors:
     async def _catch_take_off(self, timeout: float) -> None:
         """Return when the drone is off the ground, or when it certainly stays there.
 
-        That is known once it has received a Landing, behind any take-off of ours, and then says nothing. Raises
-        `CommandTimeout` while it is not known; the Landing is not taken back.
+        That is known once it has received a Landing, behind any take-off of ours, and then reports nothing. Raises
+        `CommandTimeout` while it is not known; the Landing is not withdrawn.
         """
         self._end_hand_launch()
         answer = self._commander.expect(

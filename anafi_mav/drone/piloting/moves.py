@@ -1,12 +1,12 @@
-"""What we started and has not ended: the moveTo, the moveBys and the return home of this connection.
+"""Moves that we started and that have not ended.
 
-Hover must cancel exactly these, and only these. The drone's events say how a move goes on and ends; this module
-reads them, `piloting` sends the commands.
+They are the moveTo, the moveBys and the return home of this connection. Hover must cancel exactly these, and only
+these. The drone's events report how a move continues and ends; this module reads them, `piloting` sends the commands.
 
-Two facts make the bookkeeping more than a flag. A new moveTo replaces the running one without a word about it, and
-a new moveBy makes the previous one end as "interrupted" (ardrone3.xml 1-0-10, 1-0-7). And an event does not say
-which command it answers: it may belong to a move that was cancelled a moment ago. Of a moveTo it tells the target, so
-two that could be confused do not get the same one.
+Two facts make the bookkeeping more than a flag. A new moveTo replaces the running one without an event about it, and
+a new moveBy makes the previous one end as "interrupted" (ardrone3.xml 1-0-10, 1-0-7). And an event does not name the
+command that it answers: it may belong to a move that was cancelled a moment ago. An event about a moveTo contains the
+target, so two that could be confused do not get the same one.
 """
 
 from __future__ import annotations
@@ -32,7 +32,10 @@ from anafi_mav.drone.status.home import Home
 from anafi_mav.errors import CommandRejected
 
 MAX_UNHEARD = 8
-"""moveTos that are remembered after they were called off; the drone answers one within a few tenths of a second."""
+"""Aborted moveTos that are remembered.
+
+The drone answers one within a few tenths of a second.
+"""
 
 STRAY_FOR = 2.0
 """s after a cancelled moveBy in which a moveByEnd may still be its own, or that of the zero move that cancelled it."""
@@ -43,7 +46,10 @@ _SAME_HEIGHT = 1e-3
 _ROUNDED = 1.0
 """m by which the echo of the only moveTo that is waited for may differ from its target."""
 _APART, _APART_SHARE = 2e-3, 2e-6
-"""m, and share of the height, between two moveTos that are told apart by it: twice what `_same` lets pass."""
+"""m, and share of the height, by which two moveTos differ at least.
+
+Twice the tolerance of `_same`.
+"""
 _NO_MOVE = 1e-3
 """m or rad below which a moveBy went nowhere."""
 
@@ -76,7 +82,10 @@ class Displacement(msgspec.Struct, frozen=True):
 
 
 class Move:
-    """A move under way. `target` is set for a moveTo only; its altitude is above the take-off point."""
+    """A move under way.
+
+    `target` is set for a moveTo only; its altitude is above the take-off point.
+    """
 
     __slots__ = ("answer", "echo", "ended", "running", "target")
 
@@ -92,7 +101,10 @@ class Move:
         """Do not await this one, a cancelled wait would cancel it: use `result`."""
 
     async def under_way(self) -> bool:
-        """Wait until the drone flies this moveTo, or will not: for others than the verb that started it."""
+        """Wait until the drone flies this moveTo, or will not; return True when it does.
+
+        For callers other than the verb that started it.
+        """
         answer = self.answer.future
         await asyncio.wait({answer})
         return not answer.cancelled() and answer.exception() is None
@@ -110,7 +122,10 @@ class Move:
         return any(place is not None and _same(message, place) for place in (self.target, self.echo))
 
     def may_be_to(self, message: ardrone3.MoveToChanged) -> bool:
-        """True when this event's target is this move's but for rounding, as by a detour through another frame."""
+        """Return True when this event's target is this move's but for rounding.
+
+        Such rounding occurs in a conversion through another frame.
+        """
         target = self.target
         if target is None or position(message.latitude, message.longitude, message.altitude) is None:
             return False
@@ -155,11 +170,16 @@ class Moves:
         self._cancelling: Move | None = None
         """The moveTo that we cancelled and whose CANCELED has not come yet."""
         self._unheard: deque[Position] = deque(maxlen=MAX_UNHEARD)
-        """Targets of moveTos that were called off or replaced before the drone had said anything of them. It may still,
-        until it flies a newer one."""
+        """Targets of moveTos that were aborted or replaced before the drone had reported on them.
+
+        It may still do so until it flies a newer one.
+        """
         self._stray_until = 0.0
         self.inherited = True
-        """The drone was found flying: a moveBy of an earlier connection may be under way, which no event tells."""
+        """True when a moveBy of an earlier connection may be under way.
+
+        The drone was found flying; no event reports such a moveBy.
+        """
         self.aborting = False
         """A return is being aborted: until the drone has answered, what it last said of a return is not true."""
 
@@ -170,15 +190,21 @@ class Moves:
     # -- what we do
 
     def distinct(self, target: Position) -> Position:
-        """The target for a new moveTo: this one, or a little below it where the drone's words on a move that was called
-        off would be taken for its own. Not above it, which the ceiling may forbid."""
+        """Return a target for a new moveTo that cannot be confused with an aborted move.
+
+        It is this target, or one a little below it when the drone's events about an aborted move would be taken for
+        its own. Not above it, which the ceiling may forbid.
+        """
         while any(_same(target, other) for other in self._unheard):
             step = max(_APART, _APART_SHARE * abs(target.altitude))
             target = msgspec.structs.replace(target, altitude=target.altitude - step)
         return target
 
     def begin_to(self, move: Move) -> Move | None:
-        """A moveTo is about to be sent. Returns one that nobody waits for any more, it was not under way yet."""
+        """Note that a moveTo is about to be sent; return the pending one that it replaces.
+
+        None when no moveTo of ours was pending. The one returned was not under way yet, and its verb no longer waits.
+        """
         before, self.to = self.to, move
         if before is None:
             return None
@@ -213,7 +239,10 @@ class Moves:
             self._unheard.append(move.target)
 
     def cancel_by(self, why: str, now: float) -> list[Move]:
-        """The moveBys are about to be cancelled; returns them. They end here: the drone's event names none of them."""
+        """The moveBys are about to be cancelled; returns them.
+
+        They end here: the drone's event names none of them.
+        """
         moves, self.by = list(self.by), deque()
         for move in moves:
             move.answer.fail(CommandRejected(why))
@@ -234,7 +263,7 @@ class Moves:
         self.aborting = False
 
     def expect_stray(self, now: float) -> None:
-        """A moveBy that is nobody's is about to be ended; its event is not about a move of ours."""
+        """Note that a moveBy that is not ours is about to be ended; its event is not about ours."""
         self.inherited = False
         self._stray_until = now + STRAY_FOR
 
@@ -254,7 +283,7 @@ class Moves:
     # -- what the drone says
 
     def reactions(self) -> Mapping[type[Message], Callable[[Any, float], None]]:
-        """Who wants to hear which event, after the reducers."""
+        """Return the handlers of events, called after the reducers."""
         return {
             ardrone3.MoveToChanged: self._on_move_to,
             ardrone3.MoveByEnd: self._on_move_by_end,
@@ -320,7 +349,7 @@ class Moves:
         move.answer.fail(CommandRejected(_MOVE_BY_REFUSALS.get(message.error, "the drone could not make the move")))
 
     def _is_stray(self, message: ardrone3.MoveByEnd, now: float) -> bool:
-        """Does this event belong to a moveBy that was cancelled before the present one was asked for?
+        """Return True when this event belongs to a moveBy that was cancelled before the present one.
 
         Nothing but a newer moveBy interrupts one, and a move that is not zero does not succeed by staying.
         """

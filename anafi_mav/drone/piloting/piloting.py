@@ -1,11 +1,14 @@
-"""Element piloting: the verbs that fly the drone. Each returns when the drone has confirmed it.
+"""Element piloting: the verbs that fly the drone.
 
-A verb raises `CommandRejected` when the drone, or what it reported, refuses; `CommandTimeout` when it stays silent,
-and then its command is taken back; `LinkLost` when the link dies meanwhile. Signs and units are the drone's own:
-body axes front, right, down; heights above the take-off point.
+Each returns when the drone has confirmed it.
 
-What the verbs promise is said here. How they do it is in `piloting_motors` (up and down), `piloting_moves` (guided
-moves), `piloting_return` (home) and `piloting_sticks` (PCMDs); here is what concerns them all, `hover` above all.
+A verb raises `CommandRejected` when the drone, or what it reported, refuses; `CommandTimeout` when it does not
+answer, and then its command is withdrawn; `LinkLost` when the link is lost meanwhile. Signs and units are the drone's
+own: body axes front, right, down; heights above the take-off point.
+
+The promises of the verbs are documented here. Their implementation is in `motors` (up and down),
+`guided_moves` (guided moves), `return_home` (home) and `stick_stream` (PCMDs); common to all of them, and
+therefore here, is above all `hover`.
 """
 
 from __future__ import annotations
@@ -69,7 +72,10 @@ class Piloting(PilotingSettings):
         self.link_lost()
 
     def link_lost(self) -> None:
-        """Nothing of before is sent again, and what was started is nobody's any more."""
+        """Drop everything from before the loss of the link.
+
+        No command is sent again, and started moves are no longer ours.
+        """
         self._sticks.silence()
         self._moves.clear(MoveEnd.LINK_LOST)
         self._stopping.clear()
@@ -139,16 +145,19 @@ class Piloting(PilotingSettings):
         return self._motors.about_to_fly
 
     def require_free(self) -> None:
-        """Raise `CommandRejected` while the drone returns for reasons of its own, or lands: no move of ours gets in its
-        way."""
+        """Raise `CommandRejected` while the drone returns by itself or lands.
+
+        A move of ours must not interfere with these.
+        """
         self._guided.require_free()
 
     # -- up and down
 
     async def take_off(self, timeout: float = ANSWER_TIMEOUT) -> None:
-        """Start the motors and rise to about a metre; returns when the drone reports that it is taking off.
+        """Start the motors and rise to about a metre.
 
-        A drone refuses by silence; `CommandRejected` then names what it has reported against a take-off.
+        Returns when the drone reports that it is taking off. A drone refuses by not answering; `CommandRejected` then
+        names what it has reported against a take-off.
         """
         await self._motors.take_off(timeout)
 
@@ -160,7 +169,10 @@ class Piloting(PilotingSettings):
         await self._motors.hand_launch(timeout)
 
     async def cancel_hand_launch(self, timeout: float = ANSWER_TIMEOUT) -> None:
-        """Stop the idling motors; returns when they stand, at once when they do and nothing may start them."""
+        """Stop the idling motors; returns when they stand.
+
+        Returns at once when they stand already and no command may still start them.
+        """
         await self._motors.cancel_hand_launch(timeout)
 
     async def land(self, timeout: float = ANSWER_TIMEOUT) -> None:
@@ -171,23 +183,24 @@ class Piloting(PilotingSettings):
         await self._motors.land(timeout)
 
     async def end_landing(self, timeout: float = ANSWER_TIMEOUT, *, take_off: bool = False) -> None:
-        """End a landing; returns when the drone reports another state, at once when it does not land.
+        """End a landing; returns when the drone reports another state.
 
-        By gaz for a second at most, and with `take_off` by TakeOff too (SmartTakeOffLand on the Ai), which starts the
-        motors of a drone that has landed: only for a user who wants just that. The sticks are centred then. Raises
-        `CommandRejected` when LANDED is reported first, or the drone goes on landing: nothing of this is sent after it.
+        Returns at once when it does not land. It sends gaz for a second at most, and with `take_off` a TakeOff too
+        (SmartTakeOffLand on the Ai), which starts the motors of a drone that has landed: only for a user who wants
+        just that. The sticks are centred then. Raises `CommandRejected` when LANDED is reported first, or the drone
+        goes on landing: nothing of this is sent after it.
         """
         await self._landing_end.end(timeout, take_off=take_off)
 
     async def settle_landing(self, timeout: float = ANSWER_TIMEOUT) -> bool:
-        """Return True when the drone lands, also by a Landing of ours that was withdrawn and arrived all the same."""
+        """Return True when the drone lands, also by a withdrawn Landing that arrived all the same."""
         return await self._motors.settle_landing(timeout)
 
     async def stop_motors(self, *, force: bool = False) -> None:
-        """Stop propellers that turn on the ground or just above it; returns when the drone reports that they stand.
+        """Stop propellers that turn on the ground or just above it.
 
-        `force` cuts them when they still ramp up after `piloting_motors.FORCED_AFTER`, never once the drone has
-        left the ground.
+        Returns when the drone reports that they stand. `force` cuts them when they still ramp up after
+        `motors.FORCED_AFTER`, never once the drone has left the ground.
         """
         await self._motors.stop_motors(force=force)
 
@@ -196,10 +209,12 @@ class Piloting(PilotingSettings):
         self._motors.take_off_wanted()
 
     async def emergency(self) -> None:
-        """Cut the motors at once: in the air the drone falls. Returns when it reports that they are cut.
+        """Cut the motors at once: in the air the drone falls.
+
+        Returns when it reports that they are cut.
 
         Cancelling this does not withdraw it: it is repeated while there is a link, as Parrot does (arsdk-ng: timeout
-        policy RETRY), for at most `piloting_motors.EMERGENCY_TIMEOUT` while a caller waits. Commands that wait to be
+        policy RETRY), for at most `motors.EMERGENCY_TIMEOUT` while a caller waits. Commands that wait to be
         sent are withdrawn.
         """
         await self._motors.emergency()
@@ -246,13 +261,17 @@ class Piloting(PilotingSettings):
     # -- home
 
     async def return_home(self, timeout: float = ANSWER_TIMEOUT) -> Move | None:
-        """Fly home; returns when the return is running or pending. None: the drone was returning already."""
+        """Fly home; returns when the return is running or pending.
+
+        None: the drone was returning already.
+        """
         return await self._returns.return_home(timeout)
 
     async def cancel_return_home(self, timeout: float = ANSWER_TIMEOUT, *, even_its_own: bool = False) -> None:
-        """Stop a return that a user commanded, through this program or not, also one that has not begun yet.
+        """Stop a return that a user commanded, also one that has not begun yet.
 
-        One that the drone began by itself is stopped only with `even_its_own`, else `CommandRejected` is raised.
+        It may have been commanded through this program or not. One that the drone began by itself is stopped only
+        with `even_its_own`, else `CommandRejected` is raised.
         """
         await self._returns.cancel_return_home(timeout, even_its_own=even_its_own)
 
@@ -263,12 +282,13 @@ class Piloting(PilotingSettings):
     # -- sticks, and the end of everything
 
     def pilot(self, command: PilotingCommand | None, age: float = 0.0) -> None:
-        """Hold a stick position: a PCMD leaves now and every 50 ms, for 0.5 s (`sticks.HOLD_LIMIT`) unless repeated.
+        """Hold a stick position for 0.5 s (`sticks.HOLD_LIMIT`) unless repeated.
 
-        None centres the sticks for two seconds, and so does the end of the repetition. `age` (s) is the time since the
-        position was set: one that is corrected on the way is not a new one. A position ends a moveTo or moveBy of
-        this program, during which the drone would ignore it. Nothing is sent and nothing kept while `sticks_blocked`.
-        Raises `NotSupported` before the drone has reported its limits, `LinkLost` without a link.
+        A PCMD is sent now and every 50 ms. None centres the sticks for two seconds, and so does the end of the
+        repetition. `age` (s) is the time since the position was set: one that is corrected on the way is not a new
+        one. A position ends a moveTo or moveBy of this program, during which the drone would ignore it. Nothing is
+        sent and nothing kept while `sticks_blocked`. Raises `NotSupported` before the drone has reported its limits,
+        `LinkLost` without a link.
         """
         self._commander.require_link()
         if command is None:
@@ -353,7 +373,10 @@ class Piloting(PilotingSettings):
             self._stop_once(animation.Cancel())
 
     def _stop_once(self, order: Message) -> None:
-        """Halt what setpoints take over from many times a second. Once it was heard and not obeyed, say it again."""
+        """Halt what setpoints take over from many times a second.
+
+        Once it was heard and not obeyed, say it again.
+        """
         kind = type(order)
         if loop_time() < self._stopping.get(kind, -math.inf):
             return

@@ -21,7 +21,10 @@ from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, Lin
 
 
 class Returns:
-    """Returns home that were asked for. `Piloting` says what its verbs of the same names promise."""
+    """Returns home that were asked for.
+
+    `Piloting` says what its verbs of the same names promise.
+    """
 
     def __init__(
         self, commander: Commander, flight: Element[PilotingState], home: Home, sticks: StickStream, moves: Moves
@@ -37,7 +40,7 @@ class Returns:
         """It is meant for a return of the drone's own, too."""
 
     def link_lost(self) -> None:
-        """The order to end a return is nobody's any more."""
+        """Drop the command that ends a return; it is no longer ours."""
         self._abortion = None
 
     async def return_home(self, timeout: float) -> Move | None:
@@ -91,7 +94,10 @@ class Returns:
             raise CommandTimeout(rth.Abort.NAME, timeout)
 
     def abort(self, even_its_own: bool = False) -> asyncio.Future[None]:
-        """End a return. Until the drone has answered, what it last said of a return is no longer true."""
+        """End a return.
+
+        Until the drone has answered, what it last said of a return is no longer true.
+        """
         self._moves.aborting = True
         self._abortion_insists = even_its_own
 
@@ -107,7 +113,10 @@ class Returns:
         return delivery
 
     def drop(self, why: str) -> bool:
-        """The return that we asked for, running or on its way, is not ours any more. False: there was none."""
+        """The return that we asked for, running or on its way, is not ours any more.
+
+        False: there was none.
+        """
         returning, self._moves.returning = self._moves.returning, None
         if returning is None:
             return False
@@ -118,7 +127,10 @@ class Returns:
         return True
 
     def on_state(self, message: rth.State, now: float) -> None:
-        """The drone says how a return goes on. An order against a return that is now its own is taken back."""
+        """Follow the state of a return.
+
+        A command against a return is withdrawn when that is now the drone's own.
+        """
         self._moves.on_return(message, now)
         if self._home.state.returning_by_itself and self._abortion is not None and not self._abortion_insists:
             # It was given against a return that a user had asked for.

@@ -1,4 +1,7 @@
-"""Element piloting: the limits and habits of the drone in flight, as verbs. Each returns what the drone confirms."""
+"""Element piloting: the limits and habits of the drone in flight, as verbs.
+
+Each returns what the drone confirms.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +36,10 @@ class PilotingSettings(Commanding[PilotingState]):
         return await self._set(ardrone3.MaxDistance(metres), ardrone3.MaxDistanceChanged, self.state.max_distance)
 
     async def set_geofence(self, on: bool) -> bool:
-        """Switch the geofence, which keeps the drone within `max_distance` of `PilotingState.geofence_centre`."""
+        """Switch the geofence.
+
+        It keeps the drone within `max_distance` of `PilotingState.geofence_centre`.
+        """
         self._require(self.state.geofence, ardrone3.NoFlyOverMaxDistance.NAME)
         return await self._change(
             ardrone3.NoFlyOverMaxDistance(int(on)),
@@ -58,7 +64,10 @@ class PilotingSettings(Commanding[PilotingState]):
         )
 
     async def set_max_horizontal_speed(self, metres_per_second: float) -> float:
-        """Set the highest speed over ground, m/s. Later generations only; elsewhere it is an argument of a move."""
+        """Set the highest speed over ground, m/s.
+
+        Later generations only; elsewhere it is an argument of a move.
+        """
         return await self._set(
             ardrone3.MaxHorizontalSpeed(metres_per_second),
             ardrone3.MaxHorizontalSpeedChanged,

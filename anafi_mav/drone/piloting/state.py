@@ -1,4 +1,7 @@
-"""What the drone reports about its flight: attitude, motion, flying state, limits. The verbs are in `piloting`."""
+"""Flight state that the drone reports: attitude, motion, flying state, limits.
+
+The verbs are in `piloting`.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""The PCMDs on their way: the stick position that holds now, sent when it is due, and when none may be sent at all.
+"""Send the present stick position as PCMDs when they are due, and block them when needed.
 
-What is due when is decided in `sticks`, without I/O; this is its timer and its way to the drone.
+The due times are computed in `sticks`, without I/O; this is its timer and its connection to the drone.
 """
 
 from __future__ import annotations
@@ -31,7 +31,10 @@ _STICKS_DEAD = frozenset(
 
 
 class StickStream:
-    """Sends PCMDs while there are any to send. All of it acts at once; a dead stream sends and keeps nothing."""
+    """Sends PCMDs while there are any to send.
+
+    All of it acts at once; a dead stream sends and keeps nothing.
+    """
 
     def __init__(
         self,
@@ -40,7 +43,10 @@ class StickStream:
         home: Home,
         pilot_has_source: Callable[[], bool] = lambda: False,
     ) -> None:
-        """`pilot_has_source` returns True while the pilot at a Skycontroller has the piloting source."""
+        """Store the sources of flight state, home and piloting source.
+
+        `pilot_has_source` returns True while the pilot at a Skycontroller has the piloting source.
+        """
         self._commander = commander
         self._pilot_has_source = pilot_has_source
         self._flight = flight
@@ -79,7 +85,10 @@ class StickStream:
         return None
 
     def hold(self, position: Percent, age: float) -> None:
-        """This position from now on, said `age` s ago: see `Piloting.pilot`. Whoever calls has asked `blocked`."""
+        """Hold this position, set `age` s ago, from now on: see `Piloting.pilot`.
+
+        The caller has checked `blocked`.
+        """
         now = loop_time()
         self._after_gaz = False
         self._sticks.command(position, now, now - age)
@@ -91,12 +100,18 @@ class StickStream:
         self.pump()
 
     def send_now(self, position: Percent) -> None:
-        """Send one PCMD in a landing, outside of the 20 Hz grid; the caller repeats it, and then centres."""
+        """Send one PCMD in a landing, outside of the 20 Hz grid.
+
+        The caller repeats it, and then centres.
+        """
         if self._flight.state.flying == FlyingState.LANDING and not self.landings_asked:
             self._send(self._sticks.single(position, loop_time()))
 
     def centre_after_gaz(self) -> None:
-        """Centre for two seconds, in a landing too: a firmware that keeps the last PCMD must not keep the gaz."""
+        """Centre for two seconds, in a landing too.
+
+        A firmware that keeps the last PCMD must not keep the gaz.
+        """
         self._after_gaz = True
         self.centre()
 
@@ -115,20 +130,24 @@ class StickStream:
             self._next.set(deadline)
 
     def let_go(self) -> None:
-        """Let go of what deflection there is. What begins now may be refused; the sticks must not stay as they are."""
+        """Let go of what deflection there is.
+
+        What begins now may be refused; the sticks must not stay as they are.
+        """
         if self._sticks.active:
             self.centre()
 
     def silence(self) -> None:
-        """No more PCMDs: something else flies the drone now."""
+        """Stop sending PCMDs: something else flies the drone now."""
         self._after_gaz = False
         self._sticks.stop()
         self._next.cancel()
 
     def release(self) -> None:
-        """Send centred PCMDs, then none: a return waits for flag 0 (rth.xml 146-0-11), from any controller.
+        """Send centred PCMDs, then none.
 
-        Not while the pilot at a Skycontroller has the piloting source: the sticks that count are his.
+        A return waits for flag 0 (rth.xml 146-0-11), from any controller. Nothing is sent while the pilot at a
+        Skycontroller has the piloting source: the sticks that count are the pilot's.
         """
         if self.dead is None and not self._pilot_has_source():
             for _ in range(RELEASES):

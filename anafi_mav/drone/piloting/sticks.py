@@ -1,4 +1,6 @@
-"""The sticks: a setpoint as PCMD percentages, and when which PCMD is due. No I/O; time is handed in.
+"""The sticks: a setpoint as PCMD percentages, and when which PCMD is due.
+
+No I/O; time is handed in.
 
 PCMD is not acknowledged and the drone forgets it soon, so what holds is repeated every 50 ms (ardrone3.xml 1-0-2).
 Letting go is explicit: centred sticks are repeated for two seconds, because a single datagram can be lost.
@@ -22,8 +24,11 @@ CENTRED_REPEATS = 40
 """PCMDs that centre the sticks: two seconds of them."""
 
 HOLD_LIMIT = 0.5
-"""s that a deflection holds without being said again. Whoever flies renews it; a deflection that outlives its sender is
-the worst that can happen, so the layer nearest to the drone ends it, whatever those above forgot."""
+"""s that a deflection holds without being sent again.
+
+The pilot or program in control renews it. A deflection that outlives its sender is the worst that can happen, so the
+layer nearest to the drone ends it, whatever the layers above missed.
+"""
 
 MIN_SPACING = 0.02
 """s between two PCMDs on average, however often the sticks move: a drone that takes them every 50 ms gains nothing from
@@ -32,7 +37,10 @@ the heading has just left; then the newest position waits, older ones are never 
 
 
 class PilotingCommand(msgspec.Struct, frozen=True):
-    """Position of the sticks in aerospace signs (FRD body, + up for the climb); clipped to the limits."""
+    """Position of the sticks in aerospace signs; clipped to the limits.
+
+    FRD body, + up for the climb.
+    """
 
     roll_deg: float = 0.0
     """Tilt, + right."""
@@ -53,7 +61,10 @@ class Limits(msgspec.Struct, frozen=True):
 
 
 class Percent(NamedTuple):
-    """Stick positions in PCMD's signs: roll + right, pitch + nose DOWN, yaw + clockwise, gaz + up; -100..100."""
+    """Stick positions in PCMD's signs, -100..100.
+
+    roll + right, pitch + nose DOWN, yaw + clockwise, gaz + up.
+    """
 
     roll: int
     pitch: int
@@ -65,9 +76,9 @@ CENTRED = Percent(0, 0, 0, 0)
 
 
 def percent(command: PilotingCommand, limits: Limits) -> Percent:
-    """The stick positions of a setpoint, rounded to the nearest percent and clipped to -100..100.
+    """Return the stick positions of a setpoint, in percent, clipped to -100..100.
 
-    Raises `LocalProtocolError` for a setpoint that is not a number.
+    They are rounded to the nearest percent. Raises `LocalProtocolError` for a setpoint that is not a number.
     """
     return Percent(
         _share(command.roll_deg, limits.tilt_deg),
@@ -90,7 +101,10 @@ def is_deflected(pcmd: PCMD) -> bool:
 
 
 class Sticks:
-    """When to send which stick position. `deadline` says when `due` has something, `due` hands it out once."""
+    """When to send which stick position.
+
+    `deadline` says when `due` has something, `due` hands it out once.
+    """
 
     __slots__ = ("_expires", "_last", "_next", "_paid_until", "_position", "_remaining", "_seq")
 
@@ -99,7 +113,7 @@ class Sticks:
         self._remaining: int | None = 0
         """PCMDs still to come; None: until further notice."""
         self._last = CENTRED
-        """What was sent last."""
+        """Position that was sent last."""
         self._next = 0.0
         self._expires = 0.0
         self._paid_until = -math.inf
@@ -122,7 +136,10 @@ class Sticks:
         return self._next if self.active else None
 
     def command(self, position: Percent, now: float, said: float | None = None) -> None:
-        """Hold this position until `HOLD_LIMIT` after it was `said` (None: now), then the sticks centre."""
+        """Hold this position until `HOLD_LIMIT` after it was set; then the sticks centre.
+
+        `said` is the time at which it was set, None: now.
+        """
         if not self.active or position != self._position:  # the same said again leaves with the next repetition
             self._next = max(now, self._paid_until - MIN_SPACING)
         self._position, self._remaining = position, None
@@ -161,15 +178,18 @@ class Sticks:
         return self._pcmd(position, now)
 
     def _pcmd(self, position: Percent, now: float) -> PCMD:
-        """Build a PCMD whose flag is 1 only where roll or pitch is deflected, as Parrot's own programs send it.
+        """Build a PCMD whose flag is 1 only when roll or pitch is deflected.
 
-        With flag 0 the drone holds its place, and begins a return or a point of interest that waits for it to hover
-        (GroundSDK PilotingCommand, Olympe; ardrone3.xml 1-0-2, 1-0-5; rth.xml 146-0-11). With flag 1 and no deflection
-        it is asked for 0 degrees of tilt, which wind carries away.
+        Parrot's own programs do so. With flag 0 the drone holds its place, and begins a return or a point of interest
+        that waits for it to hover (GroundSDK PilotingCommand, Olympe; ardrone3.xml 1-0-2, 1-0-5; rth.xml 146-0-11).
+        With flag 1 and no deflection it is commanded to 0 degrees of tilt, which wind carries away.
         """
         return PCMD(int(position.roll != 0 or position.pitch != 0), *position, self._stamp(now))
 
     def _stamp(self, now: float) -> int:
-        """timestampAndSeqNum: a counter in the top byte, milliseconds below; the drone keeps statistics of it."""
+        """Return timestampAndSeqNum: a counter in the top byte, milliseconds below.
+
+        The drone keeps statistics of it.
+        """
         self._seq = (self._seq + 1) & 0xFF
         return self._seq << 24 | int(now * 1000.0) & 0xFFFFFF

@@ -1,1 +1,1 @@
-"""Elements that report the drone's condition: identity, battery, position, link, alerts, home."""
+"""Elements that report state: identity, battery, position, link, alerts, home."""

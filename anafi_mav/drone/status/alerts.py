@@ -51,7 +51,10 @@ def _forced_landing(state: AlertsState, message: ardrone3.ForcedLandingAutoTrigg
 
 
 class Alerts(Element[AlertsState]):
-    """Warnings that the drone reports. No verbs: `Drone.blockers` sums up what prevents a take-off."""
+    """Warnings that the drone reports.
+
+    No verbs: `Drone.blockers` sums up what prevents a take-off.
+    """
 
     NOTHING = AlertsState()
     REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = {
@@ -131,9 +134,9 @@ _CHARGE: tuple[tuple[BlockerKind, OpenEnum], ...] = (
 
 
 def takeoff_blockers(alerts: AlertsState, battery: BatteryState, calibration: CalibrationState) -> list[Blocker]:
-    """What the drone has reported that can keep it on the ground; empty when nothing is known.
+    """Return the reported reasons that can prevent a take-off; empty when nothing is known.
 
-    ARSDK refuses a take-off by silence. The take-off checklist (alarms.xml 175-0-2) is the drone's own list of
+    ARSDK refuses a take-off without an answer. The take-off checklist (alarms.xml 175-0-2) is the drone's own list of
     reasons and decides alone about alerts and sensors, whose last report may be old; firmware without it leaves the
     alert, the calibration and the sensors. A critical battery counts in any case.
     """

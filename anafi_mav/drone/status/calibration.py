@@ -19,7 +19,10 @@ from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout
 _REQUIRED, _RECOMMENDED = 1, 2
 
 TURNING_TIMEOUT = 60.0
-"""s between two signs of life: somebody turns the drone by hand about one axis after the other."""
+"""s between two reports of a calibration.
+
+Meanwhile the user turns the drone by hand about one axis after the other.
+"""
 
 
 _AXES = (CalibrationAxis.X_AXIS, CalibrationAxis.Y_AXIS, CalibrationAxis.Z_AXIS)
@@ -77,7 +80,10 @@ class Calibration(Commanding[CalibrationState]):
     }
 
     async def start_magnetometer(self, timeout: float = ANSWER_TIMEOUT) -> None:
-        """Begin to calibrate the magnetometer; returns when the drone waits to be turned about `state.axis`."""
+        """Begin to calibrate the magnetometer.
+
+        Returns when the drone waits to be turned about `state.axis`.
+        """
         self._require(self.state.started, "magnetometer calibration")
         await self._change(
             common.MagnetoCalibration(1),

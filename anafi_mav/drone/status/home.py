@@ -154,7 +154,10 @@ class Home(Commanding[HomeState]):
     }
 
     def request_states(self) -> None:
-        """Make the drone report all its states again, that of a return among them. Raises `LinkLost`."""
+        """Make the drone report all its states again, that of a return among them.
+
+        Raises `LinkLost`.
+        """
         self._commander.send(common.AllStates())
 
     async def set_min_altitude(self, metres: float) -> float:

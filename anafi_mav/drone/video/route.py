@@ -1,4 +1,4 @@
-"""How the datagrams of a video come to us: over UDP sockets of our own, or through the mux of a Skycontroller 4."""
+"""Routes of a video's datagrams: own UDP sockets, or the mux of a Skycontroller 4."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ class Channels(Protocol):
     """Two ways for datagrams: RTP and, beside it, RTCP."""
 
     ports: tuple[int, int]
-    """What the server has to send to."""
+    """Ports that the server has to send RTP and RTCP to."""
 
     @property
     def foreign(self) -> int:
-        """Datagrams of others, which nobody heard."""
+        """Number of datagrams from other senders, which were dropped."""
 
     async def aim(self, ports: tuple[int, int]) -> None:
         """Hear these ports of the server and nothing else. Raises `LinkLost`."""
@@ -44,10 +44,10 @@ class Channels(Protocol):
 
 
 class Route(Protocol):
-    """Where a video server is, and how its datagrams come to us."""
+    """Location of a video server, and the route of its datagrams."""
 
     HEADERS: tuple[tuple[str, str], ...]
-    """What a SETUP says beyond the standard."""
+    """Headers of a SETUP beyond the standard."""
 
     async def connect(self) -> RtspClient:
         """Raises `LinkLost`."""
@@ -144,7 +144,10 @@ class _UdpChannels:
 
 
 class Direct:
-    """A server at an address: a drone's own, or that of a Skycontroller 3, which hands on its drone's."""
+    """A server at an address: a drone's own, or that of a Skycontroller 3.
+
+    A Skycontroller 3 forwards the video of its drone.
+    """
 
     HEADERS: tuple[tuple[str, str], ...] = ()
 
@@ -187,9 +190,10 @@ class _MuxChannels:
 
 
 class Mux:
-    """The server of a Skycontroller 4, which hands on its drone's: RTSP and datagrams go through the mux.
+    """The server of a Skycontroller 4, which forwards the video of its drone.
 
-    As Olympe does it (olympe features/video/pdraw.py, pdraw pdraw_demuxer_stream_mux.cpp).
+    RTSP and datagrams go through the mux. As Olympe does it (olympe features/video/pdraw.py, pdraw
+    pdraw_demuxer_stream_mux.cpp).
     """
 
     HEADERS: tuple[tuple[str, str], ...] = (("X-com-parrot-link-type", "mux"),)

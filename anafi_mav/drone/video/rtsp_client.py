@@ -1,7 +1,7 @@
-"""One RTSP connection as a client sees it: questions and their answers, and what the server asks by itself.
+"""One RTSP connection of a client: requests and their answers, and requests of the server.
 
 A server that refuses is a `CommandRejected` with its status, one that does not answer a `CommandTimeout`, one that is
-not there a `LinkLost`, and one that talks nonsense a `RemoteProtocolError`.
+not reachable a `LinkLost`, and one that sends an invalid answer a `RemoteProtocolError`.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ MAX_WAITING = 1 << 16
 """Bytes that may wait for a server that does not read: hundreds of requests, of which we send one at a time."""
 
 _POLITE = ("OPTIONS", "GET_PARAMETER", "ANNOUNCE", "TEARDOWN")
-"""What a server may ask of its client; anything else is not implemented."""
+"""Methods that a server may request of its client; any other is answered "not implemented"."""
 
 
 class RtspClient:
@@ -37,7 +37,7 @@ class RtspClient:
 
     def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self.counters: Counter[str] = Counter()
-        """Answers nobody waited for ("stray"), and what the server asked, by method."""
+        """Unexpected answers ("stray"), and the server's requests by method."""
         self.ended: asyncio.Future[str] = asyncio.get_running_loop().create_future()
         """Done when the connection is over, or the server is done with us, with the reason."""
         self.here: str = writer.get_extra_info("sockname")[0]

@@ -1,7 +1,7 @@
-"""One video stream from its beginning to its end: the RTSP session, its datagrams, and the pictures in them.
+"""One video stream from its beginning to its end: RTSP session, datagrams, pictures.
 
-Nothing is decoded. A stream that nobody keeps alive is ended by the drone after a time that it tells; one whose
-pictures stop coming is ended here.
+Nothing is decoded. A stream without keep-alives is ended by the drone after a timeout that it reports; one whose
+pictures stop arriving is ended here.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ SESSION_TIMEOUT = 60
 KEEP_ALIVE = 0.4
 """Part of that time after which we say something, as librtsp does: one lost word must not end a video."""
 MIN_KEEP_ALIVE = 1.0
-"""s; a server that tells a timeout of zero is not to be flooded."""
+"""s; a server that reports a timeout of zero is not to be flooded."""
 
 MAX_MISSED = 3
 """Words without an answer after which a session is over (librtsp RTSP_CLIENT_MAX_FAILED_KEEP_ALIVE)."""
@@ -45,7 +45,7 @@ GOODBYE = 1.0
 """s to wait for the answer to a TEARDOWN."""
 
 NAME = "anafi-mav"
-"""What we are called in reports."""
+"""Our CNAME in RTCP reports."""
 
 LIVE = "live"
 """The path of what the cameras see now; `replay/<resource>` is a recording."""
@@ -80,8 +80,11 @@ class Stream:
         on_picture: Callable[[Picture, float], None],
         wanted: Callable[[], bool],
     ) -> None:
-        """`title` None is the drone's own choice; pictures come with the loop's time of their arrival. When it is not
-        `wanted` any more it ends, also if cancelling it came to nothing (`asyncio.wait_for` before Python 3.12)."""
+        """Create a stream; `title` None is the drone's own choice.
+
+        Pictures are passed on with the loop's time of their arrival. When the stream is no longer `wanted` it ends,
+        also if cancelling it had no effect (`asyncio.wait_for` before Python 3.12).
+        """
         self.shown: Shown | None = None
         """Known before the first picture comes."""
         self.counters: Counter[str] = Counter()
@@ -94,12 +97,15 @@ class Stream:
         self._timer: asyncio.TimerHandle | None = None
         self._last_picture = 0.0
         self._source = random.getrandbits(32)
-        """What we call ourselves in reports."""
+        """Our SSRC in RTCP reports."""
         self._reception: Reception | None = None
 
     async def run(self) -> None:
-        """Show the video until it is not wanted any more. Raises `LinkLost` when it ends by itself, `CommandTimeout`
-        when the drone does not answer or shows nothing, `CommandRejected`, `NotSupported`, `RemoteProtocolError`."""
+        """Show the video until it is not wanted any more.
+
+        Raises `LinkLost` when it ends by itself, `CommandTimeout` when the drone does not answer or shows nothing,
+        `CommandRejected`, `NotSupported`, `RemoteProtocolError`.
+        """
         client = await self._route.connect()
         channels: Channels | None = None
         goodbye: tuple[str, str] | None = None
@@ -204,7 +210,7 @@ class Stream:
 
 
 def _described(response: Response, url: str) -> tuple[str, SessionDescription]:
-    """What a DESCRIBE said, and the URL that its streams are below."""
+    """Return the description in a DESCRIBE response, and the base URL of its streams."""
     description = sdp.parse_description(response.body)
     if description is None:
         raise RemoteProtocolError("the drone's description of its video is none")
@@ -256,7 +262,7 @@ def _shown(description: SessionDescription, media: MediaDescription) -> Shown:
 
 
 def _numbers(text: str | None) -> tuple[float, ...]:
-    """Numbers between commas; empty when one of them is none."""
+    """Return the numbers between commas; empty when one of them is not a finite number."""
     try:
         numbers = tuple(float(piece) for piece in (text or "").split(","))
     except ValueError:

@@ -1,7 +1,7 @@
-"""Element video: what the drone says of itself in every picture, and the pictures, undecoded.
+"""Element video: the pictures of the drone, undecoded, and their metadata.
 
 The metadata of a picture is the only source of white-balance gains, exact exposure and gain, fields of view and
-goodput, and tells attitude and speed 30 times a second. The video runs while somebody uses it; else the events of the
+goodput, and contains attitude and speed 30 times a second. The video runs while it has a user; else the events of the
 other elements serve, 5 times a second.
 """
 
@@ -99,7 +99,10 @@ def attitude(quat: tuple[float, float, float, float] | None) -> Attitude | None:
 
 
 class Video(Element[VideoState]):
-    """The live video, undecoded, with the metadata of each picture. One stream at a time, shared by all its users."""
+    """The live video, undecoded, with the metadata of each picture.
+
+    One stream at a time, shared by all its users.
+    """
 
     NOTHING = VideoState()
     REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = {}
@@ -127,7 +130,10 @@ class Video(Element[VideoState]):
     # -- the connection
 
     def link_up(self, route: Route) -> None:
-        """The drone is there; its video is found this way. Who has watched before goes on watching."""
+        """Note that the drone is connected and its video is reached by `route`.
+
+        Users that watched before continue to watch.
+        """
         self._route = route
         if self._users:
             self._start()
@@ -140,7 +146,7 @@ class Video(Element[VideoState]):
         self.reset()
 
     async def close(self) -> None:
-        """As `link_lost`, and wait until the drone has been told."""
+        """As `link_lost`, and wait until the drone has been notified."""
         self.link_lost()
         await self._ended()
 
@@ -285,7 +291,7 @@ class Video(Element[VideoState]):
         self.counters.update(stream.receiver.window.counts)
 
     def _forget(self) -> None:
-        """What the last picture said."""
+        """Forget the contents of the last picture."""
         if self._stale is not None:
             self._stale.cancel()
             self._stale = None
@@ -320,8 +326,10 @@ class Video(Element[VideoState]):
         self._tell(self._picture_callbacks, picture)
 
     def _taken(self, picture: Picture) -> float:
-        """s on the camera's clock where it tells it; else since the stream began, by the timestamps of RTP, which
-        wrap."""
+        """Return the time of a picture, s, on the camera's clock.
+
+        If the camera does not report it, it is the time since the stream began, by the timestamps of RTP, which wrap.
+        """
         before, taken = self._clock or (picture.timestamp, 0.0)
         taken += ((picture.timestamp - before + _CLOCK_WRAP // 2) % _CLOCK_WRAP - _CLOCK_WRAP // 2) / CLOCK_RATE
         if picture.metadata is not None and picture.metadata.timestamp is not None:

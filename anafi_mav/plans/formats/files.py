@@ -15,7 +15,7 @@ from anafi_mav.plans.plan import MAX_BYTES, Loss, Plan
 
 
 class Format(enum.Enum):
-    """What a file can be."""
+    """File formats of a plan."""
 
     QGC = ".plan"
     WAYPOINTS = ".waypoints"
@@ -36,7 +36,10 @@ def load(path: Path, version: parrot.Version = 2, height: float | None = None) -
 
 
 def read(path: Path) -> bytes:
-    """The content of a file, for `parse`. Raises `PlanError`, also for what is no file: a pipe would be waited for."""
+    """The content of a file, for `parse`.
+
+    Raises `PlanError`, also for what is no file: a pipe would be waited for.
+    """
     source = path.name
     flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
     try:
@@ -96,7 +99,10 @@ def encode(plan: Plan, form: Format) -> tuple[bytes, list[Loss]]:
 
 
 def save(plan: Plan, path: Path, form: Format) -> list[Loss]:
-    """Write a file, replacing what was there as a whole; what of the plan it does not hold. Raises `PlanError`."""
+    """Write a file, replacing what was there as a whole; what of the plan it does not hold.
+
+    Raises `PlanError`.
+    """
     data, losses = encode(plan, form)
     put(data, path)
     return losses

@@ -1,8 +1,8 @@
-"""A line that somebody drew on a map, KML's or GeoJSON's, as a plan: a waypoint at each of its points.
+"""Reads a line drawn on a map (KML, GeoJSON) as a plan with a waypoint at each point.
 
-Of both only lines are read. Their heights are left: KML's are above the ground or the sea by a mode that most programs
-leave out, GeoJSON's are above the ellipsoid (RFC 7946 §3.1.1), and neither knows a take-off point. So whoever reads a
-line says one height for all of it.
+Of both formats only lines are read. Their heights are ignored: KML's are above the ground or the sea by a mode that
+most programs leave out, GeoJSON's are above the ellipsoid (RFC 7946 §3.1.1), and neither knows a take-off point. So
+the caller gives one height for the whole line.
 """
 
 from __future__ import annotations
@@ -45,7 +45,10 @@ def is_kml(text: str) -> bool:
 
 
 def read_geojson(text: str, source: str, height: float | None) -> Plan:
-    """The plan along the one LineString of a file; `height` in m above take-off. Raises `PlanError`."""
+    """The plan along the one LineString of a file; `height` in m above take-off.
+
+    Raises `PlanError`.
+    """
     try:
         lines = list(_line_strings(msgspec.json.decode(text), MAX_DEPTH))
     except (ValueError, TypeError, RecursionError, LookupError) as error:
@@ -69,7 +72,10 @@ def _line_strings(document: Any, depth: int) -> list[list[Any]]:
 
 
 def read_kml(text: str, source: str, height: float | None) -> Plan:
-    """The plan along the one LineString of a file; `height` in m above take-off. Raises `PlanError`."""
+    """The plan along the one LineString of a file; `height` in m above take-off.
+
+    Raises `PlanError`.
+    """
     # Entities are declared in a document type, which no KML has: the parser expands them without bounds.
     if "<!DOCTYPE" in text:
         raise PlanError(source, "it declares a document type: no KML")

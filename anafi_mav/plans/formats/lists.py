@@ -1,4 +1,7 @@
-"""Fences and rally points as the items by which MAVLink and MAVProxy's files know them (common.xml MAV_CMD_NAV_*)."""
+"""Conversion of fences and rally points to and from MAVLink items.
+
+MAVLink and MAVProxy's files use these items (common.xml MAV_CMD_NAV_*).
+"""
 
 from __future__ import annotations
 

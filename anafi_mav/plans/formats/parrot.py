@@ -1,8 +1,8 @@
-"""Parrot's `.mavlink`: `QGC WPL 120`, no home, and of MAVLink's commands those that the drone flies.
+"""Parrot's `.mavlink`: `QGC WPL 120`, no home, only the commands that the drone flies.
 
-Version 1 is for ANAFI 4K, Thermal and USA, version 2 for the Ai. The first line does not tell them apart: who reads a
-file says which it is. Facts: Parrot's developer pages on flight plans; GroundSDK's reader and writer. What is here is
-the file; how a mission that the drone cannot fly as it is becomes one that it can, is not.
+Version 1 is for ANAFI 4K, Thermal and USA, version 2 for the Ai. The first line does not distinguish them: the reader
+of a file names the version. Facts: Parrot's developer pages on flight plans; GroundSDK's reader and writer. Only the
+file is handled here; the translation of a mission that the drone cannot fly as it is, is not.
 """
 
 from __future__ import annotations
@@ -114,7 +114,10 @@ def _kept(params: Params, known: frozenset[int]) -> Params:
 
 
 def _photo_of_version_1(item: Item, before: list[Item]) -> list[Item]:
-    """IMAGE_START_CAPTURE as MAVLink has it, behind a SET_STILL_MODE with its format where the last one had another."""
+    """Convert a version 1 photo line to MAVLink's IMAGE_START_CAPTURE.
+
+    A SET_STILL_MODE with its format is put before it if the last one in `before` has another format.
+    """
     interval, count, kind = item.params[:3]
     start = Item(_START_PHOTO, MISSION, (None, interval, count, None, None, None, None), item.autocontinue)
     last = next((one for one in reversed(before) if one.command == SET_STILL_MODE), None)
@@ -157,7 +160,7 @@ def write(plan: Plan, version: Version) -> tuple[bytes, list[Loss]]:
 
 
 def _held(number: int, item: Item, version: Version, losses: list[Loss]) -> Item | None:
-    """What the version holds of an item; None when it cannot hold it at all."""
+    """Return an item as the version can hold it, or None when it cannot hold it at all."""
     known = COMMANDS[version].get(item.command)
     if known is None:
         losses.append(Loss(f"command {item.command}: version {version} has none such", number))

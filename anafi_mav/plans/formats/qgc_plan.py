@@ -83,7 +83,7 @@ class _Reader:
     def __init__(self, source: str) -> None:
         self.source = source
         self.item: int | None = None
-        """What is being read, for messages."""
+        """Number of the item that is being read, for messages."""
         self._items: list[Item] = []
         self._numbers: dict[int, int] = {}
         """Places of items by QGroundControl's doJumpId."""
@@ -339,7 +339,10 @@ def _stored_item(number: int, item: Item) -> dict[str, Any]:
 
 
 def _first_place(items: Sequence[Item]) -> tuple[float, float]:
-    """Where the first item with a place is; what is no place on the globe was another parameter."""
+    """Return the position of the first item with a place; 0, 0 without one.
+
+    Values that are no place on the globe are other parameters.
+    """
     for item in items:
         latitude, longitude = item.params[4:6]
         if item.frame == MISSION or latitude is None or longitude is None:

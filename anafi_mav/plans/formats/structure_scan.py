@@ -24,7 +24,10 @@ TRIGGER, LOOK, LOOK_NO_MORE = (
 
 
 def items_of(scan: dict[str, Any]) -> list[Item]:
-    """What is flown. Raises `KeyError`, `TypeError` or `ValueError` for what is no structure scan of version 3."""
+    """Return the items of a structure scan.
+
+    Raises `KeyError`, `TypeError` or `ValueError` for anything but a structure scan of version 3.
+    """
     if scan["version"] != VERSION:
         raise ValueError(f"its version is {scan['version']}, not {VERSION}")
     camera = scan["CameraCalc"]
@@ -50,7 +53,10 @@ def items_of(scan: dict[str, Any]) -> list[Item]:
 
 
 def around(corners: list[tuple[float, float]], distance: float) -> list[tuple[float, float]]:
-    """The polygon whose sides run `distance` m outside of this one's. Its corners go clockwise, as seen from above."""
+    """The polygon whose sides run `distance` m outside of this one's.
+
+    Its corners go clockwise, as seen from above.
+    """
     if len(corners) < 3:
         raise ValueError(f"a polygon of {len(corners)} corners")
     origin = corners[0]

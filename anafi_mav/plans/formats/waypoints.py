@@ -1,8 +1,8 @@
-"""`QGC WPL 110`, the text of MAVProxy, Mission Planner and pymavlink: a line an item, twelve columns between tabs.
+"""`QGC WPL 110`, the text format of MAVProxy, Mission Planner and pymavlink.
 
-Item 0 of a mission is home, as in an ArduPilot (QGroundControl MissionController.cc reads it so); a first item that is
-no NAV_WAYPOINT is none. A file whose items are all of a fence, or all rally points, is one of those: MAVProxy keeps
-them so. 120 in the first line is Parrot's, see `parrot`.
+One line for each item, twelve columns between tabs. Item 0 of a mission is home, as in an ArduPilot (QGroundControl
+MissionController.cc reads it so); a first item that is no NAV_WAYPOINT is not home. A file whose items are all of a
+fence, or all rally points, is one of those: MAVProxy keeps them so. 120 in the first line is Parrot's, see `parrot`.
 """
 
 from __future__ import annotations
@@ -24,7 +24,10 @@ _RALLY = (mav_enums.MAV_CMD_NAV_RALLY_POINT,)
 
 
 def rows(text: str, source: str) -> list[Item]:
-    """The items of a file, whatever its first line says, in the order of the lines. Raises `PlanError`."""
+    """Return the items of a file in the sequence of its lines; the first line is not checked.
+
+    Raises `PlanError`.
+    """
     lines = [line for line in text.splitlines()[1:] if line.strip() and not line.startswith("#")]
     if len(lines) > MAX_ITEMS + 1:
         raise PlanError(source, f"{len(lines)} items are more than {MAX_ITEMS}")
@@ -115,7 +118,7 @@ def write(plan: Plan) -> tuple[bytes, list[Loss]]:
 
 
 def editor_losses(plan: Plan) -> list[Loss]:
-    """What only QGroundControl's own format holds."""
+    """Return the losses of data that only QGroundControl's own format holds."""
     losses = [
         Loss(f"the {block.kind} of {block.count} items from here on can no longer be edited as one", block.first)
         for block in plan.blocks

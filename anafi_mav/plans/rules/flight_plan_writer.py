@@ -1,7 +1,7 @@
-"""Lines of the files that a drone flies, written one after the other: what `rules` write with.
+"""Flight-plan writer: `rules` use it to write the lines of the drone's files.
 
-A leg is one file. What was set before it began and still holds (speed, region of interest, gimbal) is set anew in front
-of it, for nothing of one file holds in the next.
+A `Leg` is one file. Settings made before its start that still hold (speed, region of interest, gimbal) are written
+again at its beginning, because no setting of one file holds in the next.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ class Pen:
         self.numbers_regions = any(item.command == SET_VIEW_MODE and item.params[0] == LOOK_AT_ROI for item in items)
         """SET_ROI only numbers them, as in Parrot's version 1."""
         self.place = Point(start.latitude, start.longitude, start.ato)
-        """Where the drone is by now; height above take-off."""
+        """Position of the drone after the lines written so far; height above take-off."""
         self.heading = start.heading
         self.flying = start.flying
         self.item = 0
@@ -98,7 +98,7 @@ class Pen:
         self.flown = 0
         """Of them, those that take their time: ways to another place, waits, turns, panoramas."""
         self.photographed = 0
-        """Lines that take photos; how long they take, nobody says."""
+        """Lines that take photos; their duration is not documented."""
         self._amsl = start.takeoff_amsl
         self._stopped = False
         """No photo has been taken since they were stopped."""
@@ -110,11 +110,11 @@ class Pen:
         self._origins: list[int] = []
         self._done: list[list[int]] = []
         self._began, self._began_heading = self.place, self.heading
-        """Where the drone is when this file begins."""
+        """Position and heading of the drone at the start of this file."""
         self._rois: list[Point] = []
         """Of this file, by their number in it."""
         self._still: tuple[float, float, float] | None = None
-        """What this file has set."""
+        """Values of SET_STILL_MODE that this file has set: mode, step, format."""
 
     # -- what rules say
 
@@ -154,7 +154,7 @@ class Pen:
         self.waiting.clear()
 
     def close(self) -> None:
-        """What is flown next is another file."""
+        """End the current file; the next line begins another one."""
         if self._lines:
             self._stay()
             content, lost = parrot.write(Plan(tuple(self._lines)), self.version)
@@ -253,7 +253,11 @@ class Pen:
         return value - self._amsl
 
     def names_place(self, item: Item) -> bool:
-        """It names a place: neither nothing nor 0, 0, which is "here" (MAVLink mission.md, ArduPilot)."""
+        """Return True when the item has a position.
+
+        Absent coordinates and 0, 0 mean "here" (MAVLink mission.md, ArduPilot). Other invalid coordinates are
+        refused.
+        """
         latitude, longitude = item.params[4:6]
         if (latitude or 0.0, longitude or 0.0) == (0.0, 0.0):
             return False
@@ -264,7 +268,10 @@ class Pen:
         return True
 
     def destination(self, item: Item) -> Point:
-        """Where an item flies to: what it does not say is as it is when it begins, also a height of 0 without place."""
+        """Return the destination of an item.
+
+        Values that it does not set are those at its beginning, also a height of 0 without place.
+        """
         latitude, longitude, height = item.params[4:]
         if not self.names_place(item):
             up = self.height(item) if height else None
@@ -333,7 +340,7 @@ class Pen:
         self.settings = replace(self.settings, beside=angle)
 
     def aim(self, pitch: float | None, roll: float | None = None, yaw: float | None = None) -> None:
-        """Turn the camera; what is None stays."""
+        """Turn the camera; an angle of None does not change."""
         was = self.settings.gimbal or (None, None, None)
         pitch = was[0] if pitch is None else pitch
         roll = was[1] if roll is None else roll
@@ -417,7 +424,10 @@ class Pen:
         self._many(GPSLAPSE, metres, count)
 
     def stop_photos(self) -> None:
-        """No line when the mission has stopped them and begun none: ground stations stop twice, in two ways."""
+        """Stop taking photos.
+
+        No line is written when they are already stopped: ground stations stop twice, in two ways.
+        """
         self.settings = replace(self.settings, photos=None)
         if not self._stopped:
             self.line(mav_enums.MAV_CMD_IMAGE_STOP_CAPTURE)

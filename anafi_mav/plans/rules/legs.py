@@ -1,4 +1,7 @@
-"""What a mission is translated to, and what is wrong with it: records that `pen` writes and `translate` returns."""
+"""Records of a translated mission and of its faults.
+
+`flight_plan_writer` writes them and `translate` returns them.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,7 @@ from anafi_mav.plans.plan import Point
 
 
 class FaultKind(enum.Enum):
-    """What a mission is refused for, as MISSION_ACK tells it."""
+    """Reasons for refusing a mission, as MISSION_ACK reports them."""
 
     COMMAND = "the drone cannot do it: UNSUPPORTED"
     FRAME = "its height counts from what the drone does not know: UNSUPPORTED_FRAME"
@@ -47,7 +50,7 @@ class UnknownHeight(PlanError):
 
 @dataclass(frozen=True)
 class Start:
-    """What is known when a mission begins."""
+    """State of the drone at the start of a mission."""
 
     latitude: float
     longitude: float
@@ -66,7 +69,10 @@ class Leg:
 
     content: bytes
     origins: tuple[int, ...]
-    """For each line (the index that MissionItemExecuted tells): the item of the mission that it comes from."""
+    """Index of the mission item that each line is made from.
+
+    MissionItemExecuted reports the index of the line.
+    """
     done: tuple[tuple[int, ...], ...]
     """For each line: the items of the mission that are done when it is executed, in their order. An item that needs no
     line, such as a label, is done with the line before it."""
@@ -83,7 +89,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Settings:
-    """What items have set, and holds until others set it otherwise."""
+    """Settings made by items, which hold until other items change them."""
 
     speed: tuple[float, float] | None = None
     """Type and m/s."""

@@ -1,4 +1,4 @@
-"""What a row of the table of commands says; the rows are in `rules`."""
+"""Row of the table of commands; the rows are in `rules`."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Row:
     command: int
     verdict: Verdict
     how: str
-    """What it becomes, and which values are refused; or why it is."""
+    """Lines that it becomes and values that are refused; or the reason for its verdict."""
     write: Write | None = None
     moves: bool = False
     """It flies, or takes its time."""

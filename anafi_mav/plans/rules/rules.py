@@ -1,7 +1,7 @@
-"""What each MAV_CMD becomes in a flight plan of the drone, as a table: how exactly, by which lines, and else why not.
+"""Table of each MAV_CMD in a flight plan of the drone: its exactness and its lines.
 
-docs/plan-translation.md is made from it. What a command means is MAVLink's common.xml; what a line means is Parrot's
-flight plan page. A command that is not here is refused.
+For a refused command it holds the reason. docs/plan-translation.md is made from it. The meaning of a command is from
+MAVLink's common.xml; the meaning of a line is from Parrot's flight plan page. A command that is not here is refused.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""What would go wrong with a plan on a drone of a model, told before anybody flies: lint, without a drone.
+"""Check of a plan for a drone model before a flight: lint, without a drone.
 
-The mission is translated as for a flight from the planned home, and what the drone would fly is followed line by line.
+The mission is translated as for a flight from the planned home, and the lines that the drone would fly are followed.
 Times and distances are estimates, with the assumptions below.
 """
 
@@ -75,7 +75,7 @@ class Limits:
 
 @dataclass(frozen=True)
 class Findings:
-    """What there is to say."""
+    """Result of a check: problems, distance and time."""
 
     problems: tuple[Problem, ...]
     """Those of items in their order, then those of the plan."""
@@ -90,7 +90,10 @@ class Findings:
 
 
 def check(plan: Plan, model: Model, limits: Limits | None = None) -> Findings:
-    """Look for all that is wrong with a plan. Raises `ValueError` for a model of which no plans are known."""
+    """Find all faults of a plan.
+
+    Raises `ValueError` for a model whose plans are not known.
+    """
     figures = model.plans()
     if not plan.items:
         return Findings((_error("it has no mission"),))

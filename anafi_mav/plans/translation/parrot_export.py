@@ -13,7 +13,10 @@ from anafi_mav.plans.translation.translate import Leg, Start, Step, examine, tra
 
 
 def start_of(plan: Plan) -> Start:
-    """On the ground at the planned home; without one at the first place, whose height above the sea is not known."""
+    """Return the start of a plan: on the ground at the planned home.
+
+    Without home it is the first place, whose height above the sea is not known.
+    """
     if plan.home is not None:
         return Start(plan.home.latitude, plan.home.longitude, 0.0, False, plan.home.height)
     first = next((place for item in plan.items if (place := place_of(item)) is not None), (0.0, 0.0))

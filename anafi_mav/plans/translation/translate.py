@@ -1,7 +1,8 @@
-"""From a mission to what the drone flies: files of Parrot's, and between them what the gateway flies itself.
+"""Translation of a mission to Parrot's files and to items that the gateway flies itself.
 
-`examine` judges a mission when it is uploaded; `translate` writes the files when it begins. What each command becomes
-is the table of `rules`; how lines are written is `pen`; this is the way through the items, with its jumps.
+`examine` judges a mission when it is uploaded; `translate` writes the files when it begins. The translation of each
+command is in the table of `rules`; `flight_plan_writer` writes the lines; this module follows the
+items, with their jumps.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ MAX_LINES = 2000
 """Lines that are written at once: more than a battery flies, and a file of some 100 kB."""
 
 MAX_VISITS = 20_000
-"""Items that are looked at for that, each turn of a loop anew: many may need no line."""
+"""Items that are examined for that, again in each pass of a loop: many may need no line."""
 
 MAX_IDLE = 100
 """Items, beyond twice those of the mission, that may come one after the other in loops without anything being flown or
@@ -51,7 +52,7 @@ MAX_JUMPS = 0xFFFF
 
 @dataclass(frozen=True)
 class Report:
-    """What a mission is to a drone, known when it is uploaded."""
+    """Result of examining a mission for a drone when it is uploaded."""
 
     faults: tuple[Fault, ...]
     """Not empty: it is refused."""
@@ -62,7 +63,7 @@ class Report:
 
 @dataclass(frozen=True)
 class Cursor:
-    """Where a flight goes on that was too long to be written at once."""
+    """Position in a mission at which a flight continues that was too long to be written at once."""
 
     item: int
     jumps: tuple[tuple[int, int], ...]
@@ -74,12 +75,12 @@ class Cursor:
 
 @dataclass(frozen=True)
 class Flight:
-    """What is flown."""
+    """Translated flight: its parts and its remaining items."""
 
     parts: tuple[Leg | Step, ...]
     """Empty when nothing is to be done, such as a take-off in the air."""
     notes: tuple[Loss, ...]
-    """What is not as the mission has it."""
+    """Differences from the mission."""
     rest: Cursor | None
     """How it goes on when the parts have been flown: `translate` it with what is known then. None: it is over."""
     done: tuple[int, ...] = ()
@@ -138,7 +139,10 @@ def translate(
 
 
 def _judged(items: Sequence[Item], version: Version) -> tuple[list[Fault], list[Loss]]:
-    """Each item by itself, after those that stand before it: at most one fault of each, and what is left out."""
+    """Judge each item by itself, after the items before it in the list.
+
+    Returns at most one fault of each item, and the parts that are left out.
+    """
     pen = Pen(version, Start(0.0, 0.0, 0.0, flying=True, takeoff_amsl=0.0), items)
     pen.muted = True
     faults = []
@@ -189,7 +193,7 @@ def _wrong_jump(number: int, item: Item, count: int) -> Fault | None:
 
 
 def _wrong_ways(items: Sequence[Item], version: Version) -> list[Fault]:
-    """What no item is to blame for by itself."""
+    """Return the faults that no single item has by itself."""
     if not items:
         return []
     ways = _reached(items)
@@ -213,7 +217,10 @@ def _wrong_ways(items: Sequence[Item], version: Version) -> list[Fault]:
 
 
 def _endless(items: Sequence[Item], ways: set[int]) -> Iterator[list[int]]:
-    """The loops without end, each from one of its items round to it: where a flight stays when all counts are used."""
+    """Yield the endless loops, each as the items from one of them round to it.
+
+    A flight stays in one of them when all jump counts are used.
+    """
     walks: dict[int, int] = {}
     """Items that were come by, and on which walk."""
     for start in sorted(ways):
@@ -284,7 +291,7 @@ def _stepped(items: Sequence[Item], flown: set[int], flight: Flight) -> Iterator
 
 
 def _cursor(items: Sequence[Item], version: Version, start: Start, first: int, jumps: Mapping[int, int]) -> Cursor:
-    """What holds at an item, from all that stand before it in the list."""
+    """Return the cursor at an item, with the settings of all items before it in the list."""
     if not 0 <= first < len(items):
         raise PlanError("mission", f"it has {len(items)} items", first)
     pen = Pen(version, start, items)
@@ -343,7 +350,10 @@ def _way_up(items: Sequence[Item], first: int) -> int | None:
 
 
 def _rise(pen: Pen, items: Sequence[Item], first: int) -> None:
-    """From the ground: without an item that takes off, straight up to the height of the first way point."""
+    """Write the take-off from the ground.
+
+    Without an item that takes off, the drone climbs straight up to the height of the first way point.
+    """
     pen.item = first
     number = _way_up(items, first)
     if number is None:

@@ -57,13 +57,17 @@ _RESULT_BY_ERROR: tuple[tuple[type[AnafiMavError], int], ...] = (
 )
 
 
-@dataclass(frozen=True)
+@dataclass
 class _Running:
     """Something that changes what the vehicle does, under way."""
 
     client: Hashable
     answer: tuple[Inbound, Execution] | None
     """Whom to answer; None for messages that have no answer."""
+    is_order: bool = True
+    """A client has commanded it; neither the gateway began it, nor a stream of setpoints."""
+    replaced_by_order: bool = False
+    """A newer order has ended it."""
 
 
 class CommandService(Service):
@@ -125,10 +129,17 @@ class CommandService(Service):
         if self._running:
             await asyncio.wait(tuple(self._running))
 
-    def run(self, client: Hashable, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
+    def run(self, client: Hashable, work: Coroutine[Any, Any, None], *, is_order: bool = True) -> asyncio.Task[None]:
         """Run an action that came by a message without acknowledgement; a refusal of it becomes a text."""
         self._desk.forget(client)  # the vehicle was moved by other means than this client's newest command
-        return self._spawn(self._explained(work), _Running(client, None))
+        return self._spawn(self._explained(work), _Running(client, None, is_order))
+
+    @property
+    def replaced_by_order(self) -> bool:
+        """True in an action that a newer order of a client has ended."""
+        task = asyncio.current_task()
+        running = None if task is None else self._running.get(task)
+        return running is not None and running.replaced_by_order
 
     def end_others(self) -> list[asyncio.Task[None]]:
         """What begins now replaces what was under way; whoever waits for that learns that it was cancelled.
@@ -137,9 +148,11 @@ class CommandService(Service):
         """
         current = asyncio.current_task()
         others = list(itertools.takewhile(lambda task: task is not current, self._running))
-        for task in others:
-            task.cancel()
         running = None if current is None else self._running.get(current)
+        for task in others:
+            if running is not None and running.is_order:
+                self._running[task].replaced_by_order = True
+            task.cancel()
         self._desk.supersede(None if running is None else running.client)
         return others
 

@@ -2,7 +2,7 @@
 
 An ANAFI calibrates one compass, about one axis after the other, and stores the result by itself. Progress and result
 are MAG_CAL_PROGRESS and MAG_CAL_REPORT, which MAVProxy, Mission Planner and QGroundControl show. PX4's way is in
-`maintenance`.
+`calibration_service`.
 """
 
 from __future__ import annotations

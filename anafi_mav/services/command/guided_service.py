@@ -1,7 +1,7 @@
 """Guided flight by single commands: speed, height, heading, pause, regions of interest, home.
 
-What goes to a place is `actions.reposition`; what circles is `orbit`. A handler returns when the drone confirmed.
-Conformance A4, B1, B2, D1 and items 78-83, 143.
+What goes to a place is `actions.reposition`; what circles is `orbit_service`. A handler returns when the drone
+confirmed. Conformance A4, B1, B2, D1 and items 78-83, 143.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Mapping
-from typing import Any
 
 from anafi_mav import texts, units
 from anafi_mav.drone.events import FlyingStateChanged, PoiMode, RthHomeType
@@ -19,7 +18,7 @@ from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.command_targets import UnsupportedFrame, height, height_in_frame, place
 from anafi_mav.services.commands import Action, Altitude, Command, Effect
 from anafi_mav.services.flavours import Flavour, flavour_of
-from anafi_mav.services.service import Host, Service, client_of
+from anafi_mav.services.service import Host, MessageHandler, Service, client_of
 from anafi_mav.vehicle.base.bounds import FASTEST, SLOWEST, check_height, check_on_earth
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.place import Place
@@ -49,19 +48,6 @@ def guided_mode(flavour: Flavour) -> FlightMode:
     return FlightMode.GUIDED if flavour.guided_setpoints else FlightMode.HOLD
 
 
-def is_guided_item(item: Any) -> bool:
-    """A mission item that belongs to no mission: ArduPilot's older way of saying "go there" and "go to that height"."""
-    return item.current in (_ITEM_GOTO, _ITEM_ALTITUDE)
-
-
-def fly_item(host: Host, inbound: Inbound) -> None:
-    """Carry out a MISSION_ITEM or MISSION_ITEM_INT that `is_guided_item`; the MISSION_ACK says how it ended.
-
-    dronekit's simple_goto, MAVProxy's and Mission Planner's change of altitude (conformance D1-D3, item 141).
-    """
-    host.run_action(client_of(inbound), _fly_item(host, inbound))
-
-
 async def _fly_item(host: Host, inbound: Inbound) -> None:
     item, flavour = inbound.message, flavour_of(inbound.channel)
     scale = 1e7 if item.get_msgId() == dialect.MAVLINK_MSG_ID_MISSION_ITEM_INT else 1.0
@@ -69,6 +55,8 @@ async def _fly_item(host: Host, inbound: Inbound) -> None:
     result = dialect.MAV_MISSION_ERROR
     try:
         ato = height_in_frame(vehicle, item.z, item.frame)
+        if flavour.guided_setpoints and flavour.custom_mode(vehicle.mode) != flavour.custom_mode(FlightMode.GUIDED):
+            raise Refused(texts.GOTO, texts.NOT_GUIDED)  # as in ArduCopter, in whose other modes it moves nothing
         if item.current == _ITEM_GOTO:
             if item.command != dialect.MAV_CMD_NAV_WAYPOINT:
                 raise Refused(texts.GOTO, texts.NOT_A_WAY_POINT, lasting=True)
@@ -150,6 +138,9 @@ class GuidedService(Service):
             ),
         }
 
+    def item_commands(self) -> Mapping[int, MessageHandler]:
+        return {_ITEM_GOTO: self._item, _ITEM_ALTITUDE: self._item}
+
     def link_down(self) -> None:
         self._paused = self._mission_paused = None
 
@@ -159,6 +150,14 @@ class GuidedService(Service):
     def _on_flying_state(self, message: FlyingStateChanged, now: float) -> None:
         if not self.host.vehicle.in_air:
             self._paused = self._mission_paused = None  # the next flight's heights count from elsewhere
+
+    def _item(self, inbound: Inbound) -> None:
+        """Carry out a MISSION_ITEM or MISSION_ITEM_INT that belongs to no mission; the MISSION_ACK says how it ended.
+
+        ArduPilot's older way to send a goto or a height: dronekit's simple_goto, MAVProxy's and Mission Planner's
+        change of altitude (conformance D1-D3, item 141).
+        """
+        self.host.run_action(client_of(inbound), _fly_item(self.host, inbound))
 
     @property
     def _interrupted(self) -> Goto | None:

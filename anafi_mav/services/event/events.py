@@ -1,4 +1,4 @@
-"""The EVENT interface without I/O: the sequence of events with those that can be had again, and the health report.
+"""The EVENT interface: the sequence of events with those that can be had again, and the health report. No I/O.
 
 Protocol: MAVLink events.md, mavlink/libevents; conformance C12.
 """

@@ -1,4 +1,4 @@
-"""MAVLink FTP: the server's side of the protocol, over files of which some can be replaced as a whole. I/O-free.
+"""MAVLink FTP: the server's side of the protocol, over files of which some can be replaced as a whole. No I/O.
 
 `FtpServer.receive` takes the payload of a FILE_TRANSFER_PROTOCOL and returns the payload of the answer; a burst is then
 taken part by part with `burst`. What files there are is asked of a `Files`. Protocol: MAVLink ftp.md.

@@ -55,7 +55,7 @@ class LinkLossService(Service):
             self.host.text(
                 Severity.CRITICAL, texts.STATION_LOST_STATE.fill(seconds=seconds, state=policy.action.name.lower())
             )
-            self.host.run_action(LinkLossService, self._act(policy.action))
+            self.host.run_action(LinkLossService, self._act(policy.action), is_order=False)
 
     async def _act(self, action: LossAction) -> None:
         vehicle = self.host.vehicle

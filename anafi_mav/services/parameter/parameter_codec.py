@@ -1,6 +1,6 @@
 """How parameters travel: the float field of PARAM_VALUE and PARAM_SET, QGroundControl's hash, ArduPilot's packed file.
 
-I/O-free, and without a word about what the parameters mean.
+No I/O, and without a word about what the parameters mean.
 """
 
 from __future__ import annotations

@@ -22,7 +22,7 @@ COMPASS_SIDES = 38
 """Bits of CAL_MAG_SIDES: 2 nose down, 4 left side down, 32 upright. QGroundControl shows one picture for each.
 
 An ANAFI is turned about each of its three axes (arsdk common.xml 0-14-2), and each picture stands for one of them
-(`maintenance`).
+(`calibration_service`).
 """
 
 

@@ -151,7 +151,8 @@ class FenceService(Service):
             self._watch.done(self.host.vehicle.orders)
         else:
             self.host.text(Severity.CRITICAL, texts.FENCE_BREACH.fill(action=action.value, reason=verdict.text))
-            self.host.run_action(FenceService, self._carry_out(action))  # in its turn: what is newer replaces it
+            # In its turn: what is newer replaces it.
+            self.host.run_action(FenceService, self._carry_out(action), is_order=False)
 
     async def _carry_out(self, action: Reaction) -> None:
         vehicle = self.host.vehicle
@@ -167,12 +168,16 @@ class FenceService(Service):
                     await vehicle.hold()
         except AnafiMavError as error:
             self.host.text(Severity.ERROR, texts.FENCE_ACTION_FAILED.fill(action=action.value, error=reason_of(error)))
-            self._watch.failed(self.host.clock.monotonic())
+            self._not_done()
         except asyncio.CancelledError:
-            self._watch.failed(self.host.clock.monotonic())
+            self._not_done()
             raise
         else:
             self._watch.done(vehicle.orders)
+
+    def _not_done(self) -> None:
+        """The action has failed, or something newer has ended it."""
+        self._watch.failed(self.host.clock.monotonic(), replaced=self.host.replaced_by_order)
 
     async def _return_or_hold(self) -> None:
         try:

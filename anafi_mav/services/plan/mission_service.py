@@ -1,7 +1,7 @@
 """Missions as clients order and follow them: mode and commands, MISSION_CURRENT, MISSION_ITEM_REACHED.
 
-The list itself is `plan_service`'s, how it is flown `mission_flight`'s. Conformance A4, B2, C5 and items 49, 72 to 74,
-122. Commands: MAVLink common.xml MAV_CMD_MISSION_START, MAV_CMD_DO_SET_MISSION_CURRENT.
+The list itself is `plan_service`'s, how it is flown `vehicle.mission.flight`'s. Conformance A4, B2, C5 and items 49,
+72 to 74, 122. Commands: MAVLink common.xml MAV_CMD_MISSION_START, MAV_CMD_DO_SET_MISSION_CURRENT.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ class MissionService(Service):
         await self.host.vehicle.set_mode(FlightMode.MISSION, command.right)
 
     async def _choose(self, command: Command) -> None:
-        """MAV_CMD_DO_SET_MISSION_CURRENT: param1 the item, -1 none; param2 1 begins anew after the end."""
+        """MAV_CMD_DO_SET_MISSION_CURRENT: param1 the item, -1 none; param2 1 with -1 resets, see `reset`."""
         item, anew = command.params[:2]
         flight = self._flight
         await flight.storing.over()
@@ -125,7 +125,7 @@ class MissionService(Service):
             raise Refused(texts.CURRENT_ITEM, texts.PARAM1_ITEM, lasting=True)
         if math.isnan(item) or item == KEEP:
             if anew == 1.0:
-                await flight.choose(command.client, 0)
+                await flight.reset(command.client)
             return
         await flight.choose(command.client, _ours(int(item), command.client))
 

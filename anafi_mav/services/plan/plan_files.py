@@ -1,8 +1,9 @@
 """Plans as ArduPilot's files "@MISSION/mission.dat", "fence.dat" and "rally.dat": MAVProxy's `wp ftp` and `wp ftpload`.
 
 A header of five numbers (magic, MAV_MISSION_TYPE, options, first item, number of items), then the items as the payloads
-of MISSION_ITEM_INT in the order of the wire (ArduPilot AP_Filesystem_Mission, MAVProxy mission_item_protocol.py). No
-I/O.
+of MISSION_ITEM_INT in the order of the wire (ArduPilot AP_Filesystem_Mission, MAVProxy mission_item_protocol.py).
+
+No I/O.
 """
 
 from __future__ import annotations

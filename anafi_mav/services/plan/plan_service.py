@@ -1,4 +1,4 @@
-"""The mission protocol on the wire: a desk of transfers (`plan_desk`, without I/O), its clock, its channels, its file.
+"""The mission protocol on the wire: a desk of transfers (`plan_protocol`), its clock, its channels, its file.
 
 A plan is stored before its upload is acknowledged, and is what the vehicle goes by from then on: `Vehicle.fence` and
 `Vehicle.rally` take theirs.
@@ -18,7 +18,6 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.plans.formats.parrot import Version
-from anafi_mav.services.command.guided_service import fly_item, is_guided_item
 from anafi_mav.services.files import Query, ServedFile
 from anafi_mav.services.flavours import PX4, Flavour, flavour_of
 from anafi_mav.services.memory import NOT_KEPT
@@ -55,6 +54,11 @@ class PlanService(Service):
         self._alarm = Alarm(self._expire)
         self._due = 0.0
         """When the timer ends."""
+        self._item_commands: Mapping[int, MessageHandler] = {}
+
+    def take_tables(self, item_commands: Mapping[int, MessageHandler]) -> None:
+        """Receive the handlers of items that belong to no plan, by their `current`."""
+        self._item_commands = item_commands
 
     def capabilities(self) -> int:
         return (
@@ -134,8 +138,8 @@ class PlanService(Service):
 
     def _receive(self, inbound: Inbound) -> None:
         message = inbound.message
-        if message.get_msgId() in _ITEMS and is_guided_item(message):
-            fly_item(self.host, inbound)
+        if message.get_msgId() in _ITEMS and (handler := self._item_commands.get(message.current)) is not None:
+            handler(inbound)
             return
         self._perform(self._desk.receive(message, self._peer(inbound), self.host.clock.monotonic()))
 

@@ -1,8 +1,8 @@
-"""The transfer of one list of items, both ways, as a state machine without I/O: a mission, a fence or rally points.
+"""The transfer of one list of items, both ways, as a state machine: a mission, a fence or rally points. No I/O.
 
 A client's upload replaces the plan as a whole, once all of it has arrived, was found good and is stored; whatever goes
 wrong before leaves the old plan as it was. A download is answered from the plan as it was when the client asked for
-its list. `PlanDesk` (plan_desk) holds the three lists and sorts the messages.
+its list. `PlanDesk` (plan_protocol) holds the three lists and sorts the messages.
 
 Rules: MAVLink mission.md; conformance A7, C5, D1, items 46, 61-72.
 """

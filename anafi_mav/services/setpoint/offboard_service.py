@@ -6,6 +6,7 @@ What the messages mean is in `setpoint_messages`, how they are flown in `vehicle
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 from anafi_mav import texts
@@ -28,7 +29,7 @@ class OffboardService(Service):
         super().__init__(host)
         self._flight = host.vehicle.offboard
         self._flight.warn_throttled = host.warn_throttled
-        self._flight.run_action = host.run_action
+        self._flight.run_action = partial(host.run_action, is_order=False)
 
     def capabilities(self) -> int:
         return (

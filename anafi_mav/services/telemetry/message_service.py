@@ -46,7 +46,7 @@ LONGEST = 2**31 - 1
 class MessageService(Service):
     """What leaves by itself, and what leaves because somebody asked.
 
-    What is new is gathered until the end of the loop's turn (see `news`).
+    What is new is gathered until the end of the loop's turn (see `update_tracker`).
     """
 
     def __init__(self, host: Host) -> None:

@@ -6,8 +6,8 @@ in dBm. MAVLink's fields have the scale of the device, and each family of client
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
+from pathlib import Path
 
 from anafi_mav import units
 from anafi_mav.drone.status.link import Link
@@ -19,6 +19,9 @@ UNKNOWN_U8 = 255
 UNUSED_CHANNEL = 0xFFFF
 
 BEST_QUALITY = 5
+
+MEMINFO = Path("/proc/meminfo")
+"""Linux reports its memory here, in KiB (proc_meminfo(5)). Other systems do not have it."""
 
 
 def rc_channels(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
@@ -51,14 +54,23 @@ def radio_status(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | No
     return dialect.MAVLink_radio_status_message(_signal(dbm, times), unknown, 100, unknown, unknown, 0, 0)
 
 
+def memory_mib(meminfo: Path = MEMINFO) -> tuple[int, int] | None:
+    """MiB of memory, and of it what programs can still get, page cache included; None where no kernel reports it."""
+    try:
+        fields = dict(line.split(":", 1) for line in meminfo.read_text("ascii").splitlines())
+        total, available = (int(fields[name].split()[0]) >> 10 for name in ("MemTotal", "MemAvailable"))
+    except (OSError, ValueError, LookupError):
+        return None
+    return total, available
+
+
 def onboard_computer_status(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
     """ONBOARD_COMPUTER_STATUS of the machine that the gateway runs on, as far as every system tells it."""
     unknown_i8, unknown_i16, unknown_u32 = 127, 0x7FFF, 0xFFFFFFFF
     total = used = unknown_u32
-    if "SC_AVPHYS_PAGES" in os.sysconf_names:
-        page = os.sysconf("SC_PAGE_SIZE")
-        total = os.sysconf("SC_PHYS_PAGES") * page >> 20
-        used = total - (os.sysconf("SC_AVPHYS_PAGES") * page >> 20)
+    if (memory := memory_mib()) is not None:
+        total, available = memory
+        used = total - available
     return dialect.MAVLink_onboard_computer_status_message(
         times.boot_us,
         times.boot_ms,

@@ -1,1 +1,1 @@
-"""The simulated autopilot: the flying state, guidance, return, plans, and what ends a flight."""
+"""The simulated autopilot: flying state, guidance, return, plans, and the ends of a flight."""

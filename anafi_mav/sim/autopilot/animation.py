@@ -1,9 +1,10 @@
 """Feature animation: figures that the drone flies by itself to make a picture or a film.
 
-What is available is told as it changes: in the air, with a fix and a calibrated magnetometer, while neither a flight
-plan nor a return flies; the figures around something also need something to be around. While one runs all piloting
-commands are ignored (animation.xml); that a landing, a return, a flight plan and the loss of the link end it is
-assumed. A start that is not available is ignored, as Parrot's other guided flights are.
+Changes of the available figures are reported. A figure is available in the air, with a fix and a calibrated
+magnetometer, while neither a flight plan nor a return is active; the figures around a target also need a target.
+While one runs all piloting commands are ignored (animation.xml); that a landing, a return, a flight plan and the loss
+of the link end it is assumed. The start of a figure that is not available is ignored, as for Parrot's other guided
+flights.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ _ALONE = frozenset(Type) - NEEDS_TARGET - {Type.NONE, Type.FLIP}
 
 
 class _Begun(NamedTuple):
-    """Where a leg began."""
+    """State of the drone at the start of a leg."""
 
     pose: Pose
     heading: float
@@ -76,7 +77,7 @@ class Animations:
         self._aimed = False
         """There is something to fly around."""
         self._sensed: tuple[bool, ...] = ()
-        """What `sensors` was last called with."""
+        """Arguments of the last call of `sensors`."""
 
     @property
     def running(self) -> bool:
@@ -200,7 +201,10 @@ class Animations:
     # -- what can be flown
 
     def sensors(self, fix: bool, magneto: bool, guided: bool, free: bool, target: bool) -> None:
-        """What figures need: `guided`, a drone in the air that takes commands; `free`, nothing else flies it."""
+        """Update the conditions that figures need, and report the figures available if they changed.
+
+        `guided`: the drone is in the air and takes commands; `free`: no other flight task is active.
+        """
         sensed = (fix, magneto, guided, free, target)
         if sensed == self._sensed:
             return
@@ -234,7 +238,7 @@ class Animations:
         ]
 
     def states_report(self) -> list[Message]:
-        """What AllStates tells of it."""
+        """Return this part's messages of the AllStates answer."""
         type = Type.NONE if self._figure is None else self._figure.type
         report: list[Message] = [self._availability(), animation.State(type, self._percent)]
         if self._figure is not None:
@@ -281,4 +285,4 @@ _STATES: dict[Type, Callable[..., Message]] = {
     Type.SPHERICAL_PHOTO_PANORAMA: animation.SphericalPhotoPanoramaState,
     Type.SUPER_WIDE_PHOTO_PANORAMA: animation.SuperWidePhotoPanoramaState,
 }
-"""The state of a figure tells its values in the order of its command."""
+"""State message of a figure; its values have the order of the command's."""

@@ -1,8 +1,7 @@
-"""What each animation flies: its command made into legs, which `animation` flies one after the other.
+"""Geometry of the animations: converts their commands into legs, which `animation` flies.
 
-animation.xml says what a figure looks like in a sentence and nothing of numbers; the defaults, how many pictures a
-panorama has, and the geometry beyond that sentence are assumed. Metres, m/s, rad; tilt of the camera in deg above the
-horizon.
+animation.xml describes a figure in one sentence without numbers; the defaults, how many pictures a panorama has, and
+the geometry beyond that sentence are assumed. Metres, m/s, rad; tilt of the camera in deg above the horizon.
 """
 
 from __future__ import annotations
@@ -36,7 +35,7 @@ _TURNS = 20.0
 
 
 class Target(NamedTuple):
-    """What an animation is about: m from the simulator's origin."""
+    """Target of an animation: m from the simulator's origin."""
 
     north: float
     east: float
@@ -45,7 +44,10 @@ class Target(NamedTuple):
 
 @dataclass(frozen=True)
 class Leg:
-    """To a place with a heading (not wrapped), the camera and its zoom reaching theirs at its end."""
+    """One straight part of a figure: position and heading (not wrapped) of its end.
+
+    The camera and its zoom reach their values at its end.
+    """
 
     north: float
     east: float
@@ -67,14 +69,14 @@ class Figure(NamedTuple):
 
     type: Type
     values: Mapping[str, Any]
-    """What its state event tells besides the state: the values of the command or the defaults."""
+    """Further values of its state event: those of the command or the defaults."""
     legs: tuple[Leg, ...]
     panorama: str
-    """What the web server calls the pictures that it takes; empty: it takes none."""
+    """Web server's name of the pictures that it takes; empty: it takes no pictures."""
 
 
 class Stage(NamedTuple):
-    """Where a figure begins."""
+    """State of the drone at the start of a figure."""
 
     pose: Pose
     heading: float
@@ -144,7 +146,7 @@ NEEDS_TARGET = frozenset({Type.SPIRAL, Type.PARABOLA, Type.CANDLE, Type.DOLLY_SL
 
 
 def values_of(command: Message) -> dict[str, Any] | None:
-    """The values that count: those provided, the defaults for the others; None when one of them is none."""
+    """Return the provided values and the defaults of the others, or None when one is unusable."""
     kind = animation.StartTwistUp if isinstance(command, animation.StartPositionTwistUp) else type(command)
     defaults = _DEFAULTS.get(kind, {})
     names = [name for name in command.__struct_fields__ if name != "provided_params"]
@@ -263,7 +265,10 @@ def _towards(stage: Stage) -> tuple[Target, float, float]:
 
 
 def _facing(point: tuple[float, float, float], target: Target, heading: float, **more: Any) -> Leg:
-    """To a place, with nose and camera on the target there; the heading is the shortest turn from another one."""
+    """Return the leg to a point at whose end nose and camera face the target.
+
+    The heading of its end is reached by the shortest turn from `heading`.
+    """
     north, east, up = point
     away = math.hypot(target.north - north, target.east - east)
     yaw = heading + wrap_pi(math.atan2(target.east - east, target.north - north) - heading) if away > 0.5 else heading
@@ -324,7 +329,10 @@ def _candle(stage: Stage, speed: float, vertical_distance: float) -> list[Leg]:
 
 
 def _dolly_slide(stage: Stage, speed: float, angle: float, horizontal_distance: float) -> list[Leg]:
-    """Straight to where the drone would be if it had been turned about the target by the angle, so far."""
+    """Fly straight towards the place that a turn about the target by `angle` would lead to.
+
+    The leg is `horizontal_distance` long.
+    """
     target, bearing, distance = _towards(stage)
     turned = bearing + math.pi + angle
     north = target.north + distance * math.cos(turned) - stage.pose.north

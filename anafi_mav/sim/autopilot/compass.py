@@ -1,4 +1,4 @@
-"""Calibration of the magnetometer: one axis after the other, as if somebody turned the drone by hand."""
+"""Calibration of the magnetometer: one axis after the other, as if turned by hand."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ class Compass:
         self._next = 0.0
 
     def require(self, required: bool) -> list[Message]:
-        """Somebody put a magnet beside it, or took it away."""
+        """Set whether a calibration is required, as a magnet beside the drone would do."""
         if self.required is required:
             return []
         self.required = required
         return [self._required()]
 
     def handle(self, message: Message, time: float) -> list[Message] | None:
-        """The answer to a command of this feature; None when it is none."""
+        """Return the answer to a command of this feature, or None for any other message."""
         if not isinstance(message, common.MagnetoCalibration):
             return None
         self._running = bool(message.calibrate)
@@ -39,7 +39,7 @@ class Compass:
         return [self._started(), self._axis(), self._axes()]
 
     def tick(self, time: float) -> list[Message]:
-        """What has come due by now (s)."""
+        """Advance to `time` (s) and return the messages that are due."""
         if not self._running or time < self._next:
             return []
         self._next = time + AXIS_TIME
@@ -65,5 +65,5 @@ class Compass:
         return common.MagnetoCalibrationStartedChanged(int(self._running))
 
     def states_report(self) -> list[Message]:
-        """What AllStates tells of the magnetometer."""
+        """Return the magnetometer messages of the AllStates answer."""
         return [self._axes(), self._required(), self._axis(), self._started()]

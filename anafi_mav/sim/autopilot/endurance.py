@@ -1,4 +1,4 @@
-"""What the battery is still good for: is home in reach, when must the return begin, when does it come down.
+"""Endurance: reachability of home, times of the automatic return and the forced landing.
 
 Everything is counted in percent of the battery. A hover takes 100 % per flight time of the model, and a way is flown
 at the speeds of `homing`. Parrot publishes neither thresholds nor times; all of them are assumed, but the events and
@@ -50,7 +50,10 @@ _ROUNDING = 1e-6
 
 
 class Endurance:
-    """Looks at charge and distance. `return_due` and `landing_due` are for the firmware to act on."""
+    """Looks at charge and distance.
+
+    `return_due` and `landing_due` are for the firmware to act on.
+    """
 
     def __init__(self, model: Model, settings: Settings) -> None:
         self._settings = settings
@@ -101,7 +104,7 @@ class Endurance:
         flying: bool,
         returning: bool,
     ) -> list[Message]:
-        """Look at it; what is to be told.
+        """Update the predictions and return the messages to send.
 
         `home` is (north, east) in m, None if unknown; `flying`: in the air, but not in a forced landing; `returning`:
         on the way home already.
@@ -170,7 +173,10 @@ class Endurance:
         return messages
 
     def cancel(self) -> list[Message]:
-        """rth.cancel_auto_trigger: not again in this flight. Without such a plan it has no effect (rth.xml)."""
+        """rth.cancel_auto_trigger: not again in this flight.
+
+        Without such a plan it has no effect (rth.xml).
+        """
         self._cancelled = self._cancelled or self._return.due is not None
         return self._withdraw()
 
@@ -203,7 +209,7 @@ class Endurance:
         return ardrone3.ForcedLandingAutoTrigger(reason, 0 if self._forced else self._landing.left)
 
     def states_report(self) -> list[Message]:
-        """What AllStates tells of it."""
+        """Return this part's messages of the AllStates answer."""
         return [
             rth.HomeReachability(self.reachability),
             ardrone3.ReturnHomeBatteryCapacity(self.capacity),
@@ -231,9 +237,10 @@ class _Countdown:
         self.over = self.due is not None and time >= self.due
 
     def follow(self, time: float, seconds: float, shortest: float = 0.0) -> bool:
-        """`seconds` are left by the latest reckoning: plan, go on or withdraw; True: there is something to tell.
+        """Plan, update or withdraw the countdown; return True when it must be reported.
 
-        Once planned it comes no later, however long a battery is held at its level, and no sooner than `shortest`.
+        `seconds` are left by the latest prediction. Once planned the action is not postponed, however long a
+        battery is held at its level, and does not happen sooner than `shortest`.
         """
         if self.due is None:
             if seconds > NOTICE + _ROUNDING:

@@ -70,7 +70,7 @@ class Firmware(Flight):
         self.guidance.pilot(sticks, now)
 
     def throw(self) -> None:
-        """Somebody throws the drone, as after UserTakeOff."""
+        """Throw the drone, as after UserTakeOff."""
         self._fire(Event.THROWN)
 
     def _take_off(self, message: Message) -> None:
@@ -163,7 +163,7 @@ class Firmware(Flight):
 
     @property
     def _taken(self) -> bool:
-        """Something flies that is not given up for a point or a target."""
+        """True while a flight is active that a point of interest or a target does not replace."""
         return self.homing.flying or self.flight_plan.playing or self.animations.running
 
     def _follow_me(self, message: Message) -> None:

@@ -1,7 +1,8 @@
-"""The simulated autopilot: state machine, time, and what happens by itself; `Firmware` adds what it is told.
+"""Simulated autopilot: state machine, time and automatic behaviour.
 
-No I/O and no clock. Two times are told apart: `now` is the machine's clock, which the link and its watchdogs run on;
-`time` is the simulated one, which runs `--speed` times as fast and everything about the aircraft runs on.
+`Firmware` adds the handling of commands. No I/O and no clock. There are two times: `now` is the host's clock, used by
+the link and its watchdogs; `time` is the simulated one, which runs `--speed` times as fast and is used for everything
+about the aircraft.
 """
 
 from __future__ import annotations
@@ -51,7 +52,7 @@ SETTLE_TIME = 1.0
 SENSOR_PERIOD = 0.05
 """s between two looks at battery, GPS and what else does not fly."""
 STRAY = 1.0
-"""m/s from which a hovering drone counts as flying although nobody steers it."""
+"""m/s from which a hovering drone counts as flying although it gets no stick input."""
 SATELLITES = 14
 
 _REST = Pose(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -131,14 +132,17 @@ class Flight:
         """When a TakeOff is executed that this firmware executes late."""
         self._return_at: float | None = None
         self._alone = False
-        """Nobody is there, and a flight plan plays on."""
+        """True when no controller is connected and a flight plan plays on."""
         self._took_off_at: float | None = None
         self._unseen = SENSOR_PERIOD
         """Simulated seconds since the sensors were last looked at."""
         self.guidance.apply_limits()
 
     def reboot(self, identity: Identity, *, factory: bool = False) -> None:
-        """Switched off and on again, on the ground. What is on the card and in the settings stays, unless `factory`."""
+        """Switched off and on again, on the ground.
+
+        What is on the card and in the settings stays, unless `factory`.
+        """
         self.identity = identity
         self.payload.reboot(identity.run_id, self.time, wipe=factory)
         if factory:
@@ -165,7 +169,7 @@ class Flight:
         return sensor is not common.Sensor.MAGNETOMETER or not self.compass.required
 
     def blockers(self) -> frozenset[TakeoffChecklistType]:
-        """What a take-off would be refused for."""
+        """Return the reasons for which a take-off would be refused."""
         found = self.faults.refuse_take_off
         if self.warnings.motors:
             found = found | {TakeoffChecklistType.MOTOR_DOWN}
@@ -188,7 +192,7 @@ class Flight:
         return self._origin.altitude + self.pose.up
 
     def _scene(self) -> Scene:
-        """What the first gimbal's camera sees."""
+        """Return the scene that the first gimbal's camera sees."""
         self.gimbal.advance(self.time)
         looks = self.gimbal.attitude(self.pose)
         place = (*self.place(), self.altitude) if self.fix else (UNKNOWN, UNKNOWN, UNKNOWN)
@@ -197,7 +201,7 @@ class Flight:
         )
 
     def position_report(self) -> list[Message]:
-        """Where GPS says the drone is: deg, deg, m above mean sea level."""
+        """Report the GPS position: deg, deg, m above mean sea level."""
         if not self.fix:
             return [
                 ardrone3.PositionChanged(UNKNOWN, UNKNOWN, UNKNOWN),
@@ -221,9 +225,9 @@ class Flight:
     # -- the link
 
     def link_lost(self) -> None:
-        """Nobody is there any more: hover, and go home after a while if there is a home.
+        """Handle the loss of the controller: hover, then return home after a delay if home is known.
 
-        A flight plan that is to survive it plays on first.
+        A flight plan that continues without a controller plays to its end first.
         """
         if self.flight_plan.survives_disconnection:
             self._alone = True
@@ -236,16 +240,16 @@ class Flight:
             self._return_at = self.time + self.settings.number("rth_delay")
 
     def link_up(self) -> None:
-        """Somebody is there. A return that has begun goes on."""
+        """Handle the connection of a controller. A return that has begun continues."""
         self._return_at = None
         self._alone = False
 
     # -- time
 
     def tick(self, now: float, elapsed: float, pose: Pose, arrived: bool, still: bool) -> None:
-        """`elapsed` simulated seconds went by and brought the drone to `pose`.
+        """Advance by `elapsed` simulated seconds, after which the drone is at `pose`.
 
-        `arrived`: the body has done what it was told; `still`: it does not move.
+        `arrived`: the body has reached its target; `still`: it does not move.
         """
         self.pose = pose
         self.time += elapsed
@@ -340,7 +344,7 @@ class Flight:
         self._mind_the_battery()
 
     def _tell_readiness(self) -> None:
-        """Whether a flight plan or a point of interest could be started now."""
+        """Update the conditions for starting a flight plan or a point of interest."""
         rising = (FlyingState.MOTOR_RAMPING, FlyingState.TAKINGOFF)
         can_fly = self.state in GUIDED or self.state in rising or (self.state is LANDED and not self.blockers())
         fix, calibrated, guided = self.fix, not self.compass.required, self.state in GUIDED
@@ -352,14 +356,14 @@ class Flight:
         self.poi.sensors(fix, calibrated, guided)
 
     def _look_at_targets(self) -> None:
-        """What follow me and animations need."""
+        """Update the conditions that follow me and animations need."""
         calibrated, guided = not self.compass.required, self.state in GUIDED
         self.follow.sensors(self.fix, calibrated, guided, self.pose, self.time)
         free = not self.flight_plan.playing and not self.homing.flying
         self.animations.sensors(self.fix, calibrated, guided, free, self.target is not None)
 
     def _look_after_aircraft(self, elapsed: float) -> None:
-        """Motors, vibration, wind, and whether somebody carries it."""
+        """Update the warnings: motors, vibration, wind, and being carried."""
         warnings, faults = self.warnings, self.faults
         place = (self.pose.north, self.pose.east)
         messages = warnings.set_motors(faults.motor_error, faults.motors)
@@ -490,7 +494,7 @@ class Flight:
         self.homing.request(reason, self.pose, hovering)
 
     def _free(self) -> None:
-        """Something else takes over: nothing is looked at or followed any more, and no animation flown."""
+        """Stop animations, follow me and points of interest, because another flight task starts."""
         if self.animations.running:
             self.animations.end()
             self._body.hover()
@@ -500,7 +504,10 @@ class Flight:
 
     @property
     def target(self) -> Target | None:
-        """What an animation would be about: the point of interest, or who is followed or could be."""
+        """Return the target of an animation: the point of interest or the follow-me target.
+
+        Follow me has a target even before it is started.
+        """
         point = self.poi.point if self.poi.running else self.follow.target(self.time)
         return None if point is None else Target(*point)
 
@@ -508,7 +515,7 @@ class Flight:
 
     @property
     def airborne(self) -> bool:
-        """In the air and ready to be told where to go."""
+        """True in the air, when the drone accepts guided commands."""
         return self.state in GUIDED
 
     def _execute_take_off(self) -> None:

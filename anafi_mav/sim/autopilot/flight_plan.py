@@ -1,7 +1,7 @@
-"""A flight plan while it plays: item after item, from the file that was uploaded (features common and flight_plan).
+"""Execution of an uploaded flight plan, item by item (features common and flight_plan).
 
-The file's own index (0 is the first line after the header) is what MissionItemExecuted tells. What Parrot does not
-publish is assumed and said where it stands: the speed without DO_CHANGE_SPEED, that a way point which cannot be
+MissionItemExecuted reports the file's own index (0 is the first line after the header). What Parrot does not
+publish is assumed, with a note at its place: the speed without DO_CHANGE_SPEED, that a way point which cannot be
 reached is skipped, what ends a plan from outside.
 """
 
@@ -45,7 +45,7 @@ CAMERA_LIMIT = 5.0
 """s that a single photo is waited for."""
 
 _LOOKED_AT = (Part.MAVLINK_FILE, Part.WAYPOINTS_BEYOND_GEOFENCE, Part.FIRST_WAYPOINT_TOO_FAR)
-"""What only the file tells: known from one start to the next."""
+"""Components that depend on the file: known from one start to the next."""
 
 _MOVED = 0.05
 _LAND_SAFE = 1.0
@@ -53,11 +53,11 @@ _LAND_SAFE = 1.0
 
 
 class Pilot(Protocol):
-    """What a plan needs of the firmware."""
+    """Interface of the firmware that a plan uses."""
 
     @property
     def airborne(self) -> bool:
-        """In the air and at nobody's command."""
+        """True in the air, when the drone accepts guided commands."""
         ...
 
     def plan_take_off(self) -> None: ...
@@ -95,7 +95,7 @@ class FlightPlan:
         self.state = PlayingState.STOPPED
         self._uid = ""
         self._name = ""
-        """What events call it: the uid, or the custom id of start_at."""
+        """Name in events: the uid, or the custom id of start_at."""
         self._type = MavlinkType.FLIGHT_PLAN_V2 if model.plan_version == 2 else MavlinkType.FLIGHT_PLAN
         self._items: tuple[Item, ...] = ()
         self._index = 0
@@ -124,7 +124,10 @@ class FlightPlan:
 
     @property
     def items(self) -> tuple[Item, ...]:
-        """The lines of the plan that plays, or played last; the index is that of MissionItemExecuted."""
+        """Return the items of the plan that plays, or played last.
+
+        Their index is that of MissionItemExecuted.
+        """
         return self._items
 
     @property
@@ -134,13 +137,13 @@ class FlightPlan:
 
     @property
     def survives_disconnection(self) -> bool:
-        """It plays on when nobody is there any more."""
+        """True when the plan plays on after the loss of the controller."""
         if not self.playing:
             return False
         return self._goes_on if self._goes_on is not None else not self._settings["return_on_disconnect"]
 
     def states_report(self) -> list[Message]:
-        """What AllStates tells of it."""
+        """Return this part's messages of the AllStates answer."""
         messages: list[Message] = [
             self._playing_report(),
             common.AvailabilityStateChanged(int(self.available)),
@@ -157,7 +160,10 @@ class FlightPlan:
     # -- conditions
 
     def sensors(self, fix: bool, magneto: bool, can_fly: bool) -> None:
-        """What a plan needs: a fix, a calibrated magnetometer, and a drone that flies or may take off."""
+        """Update the conditions that a plan needs.
+
+        They are a fix, a calibrated magnetometer, and a drone that flies or may take off.
+        """
         was = self.available
         seen = {Part.GPS: fix, Part.CALIBRATION: magneto, Part.TAKE_OFF: can_fly}
         for part in Part:
@@ -189,7 +195,10 @@ class FlightPlan:
         item: int = 0,
         goes_on: bool | None = None,
     ) -> bool:
-        """Start at an item, or go on after a pause; False when it is refused, which events have explained."""
+        """Start at an item, or resume after a pause; return False when it is refused.
+
+        Events report the reason of a refusal.
+        """
         if uid == self._uid and self.state is PlayingState.PAUSED:
             self._begun, self._progress = False, None
             self._set(PlayingState.PLAYING)
@@ -247,7 +256,7 @@ class FlightPlan:
             self._emit(self._playing_report())
 
     def stop(self, *, hover: bool) -> None:
-        """End it, or say that none plays. `hover`: nobody else takes over."""
+        """End the plan. `hover`: no other flight task follows, so the drone hovers."""
         if self.state is PlayingState.STOPPED:
             return
         if hover and self.playing:
@@ -317,7 +326,10 @@ class FlightPlan:
             self._end_with_last_line()
 
     def _end_with_last_line(self) -> None:
-        """The plan is over; real firmware may report its last line before that, afterwards, or not at all."""
+        """End the plan and report its last line.
+
+        Real firmware may report that line before the end, afterwards, or not at all.
+        """
         quirks, report = self._faults.quirks, common.MissionItemExecuted(self._index)
         late = Quirk.STOPPED_BEFORE_EXECUTED in quirks
         reported = Quirk.LAST_ITEM_NOT_REPORTED not in quirks

@@ -1,9 +1,9 @@
 """Feature follow_me: the drone looks at a target, or follows it.
 
-The target is whoever controls, if the controller says so and tells where it is (controller_info.gps), or what it has
-found in the picture (target_image_detection), taken to stand on the ground. The numbers are assumed: Parrot
-publishes none. The sticks fly the drone while it only looks; that they do nothing while it follows, and that any other
-guided flight ends it, is assumed too.
+The target is the controller, if it requests so and sends its position (controller_info.gps), or the object that it
+has found in the picture (target_image_detection), taken to stand on the ground. The numbers are assumed: Parrot
+publishes none. The sticks fly the drone while it only looks; that they do nothing while it follows, and that any
+other guided flight ends it, is assumed too.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ _ALL = (1 << len(Input)) - 1
 
 @dataclass
 class _Fix:
-    """Where the target was at a time: m, m/s."""
+    """Position and velocity of the target at a time: m, m/s."""
 
     time: float
     north: float
@@ -76,7 +76,7 @@ class _Fix:
 
 
 class _Conditions(NamedTuple):
-    """What following depends on."""
+    """Conditions of following."""
 
     fix: bool
     calibrated: bool
@@ -94,7 +94,10 @@ class _Conditions(NamedTuple):
 
 
 class _Vector(NamedTuple):
-    """From the target to the drone: m, rad above the horizon, rad from north (RELATIVE: from where it goes)."""
+    """Vector from the target to the drone: m, rad above the horizon, rad from north.
+
+    In the RELATIVE mode the azimuth is from the target's direction of motion.
+    """
 
     distance: float
     elevation: float
@@ -102,7 +105,10 @@ class _Vector(NamedTuple):
 
 
 class FollowMe:
-    """One drone's. `aim` points the camera (deg above the horizon), `fastest` is the greatest yaw rate (rad/s)."""
+    """One drone's.
+
+    `aim` points the camera (deg above the horizon), `fastest` is the greatest yaw rate (rad/s).
+    """
 
     def __init__(
         self,
@@ -173,7 +179,7 @@ class FollowMe:
     # -- commands
 
     def handle(self, message: Message, pose: Pose, time: float) -> list[Message] | None:
-        """The answer to a command of this feature, None when it is none."""
+        """Return the answer to a command of this feature, or None for any other message."""
         handler = _HANDLERS.get(type(message))
         if handler is None:
             return None
@@ -386,7 +392,7 @@ class FollowMe:
             yield follow_me.RelativeConfig(left, *vector)
 
     def telemetry(self) -> list[Message]:
-        """Where it believes its target to be, regularly while it is engaged."""
+        """Report the estimated position of the target, regularly while engaged."""
         target = self._target(self._time) if self.engaged else None
         if target is None:
             return []
@@ -396,7 +402,7 @@ class FollowMe:
         return [follow_me.TargetTrajectory(latitude, longitude, altitude, target.vn, target.ve, -target.vu)]
 
     def states_report(self) -> list[Message]:
-        """What AllStates tells of it."""
+        """Return this part's messages of the AllStates answer."""
         return [
             self._state(),
             *(follow_me.ModeInfo(mode, *info) for mode, info in self._infos.items()),
@@ -408,7 +414,10 @@ class FollowMe:
 
 
 def _info(mode: Mode, now: _Conditions) -> tuple[int, int]:
-    """What is there and what would be welcome: bits that are set are fine (followme.xml mode_info)."""
+    """Return the bits of the required and of the improving conditions that are met.
+
+    A set bit is a met condition (followme.xml mode_info).
+    """
     satellite, picture = Input.TARGET_GPS_GOOD_ACCURACY, Input.IMAGE_DETECTION
     needed, welcome = (satellite, picture) if now.by_controller else (picture, satellite)
     has = {satellite: now.satellite, picture: now.picture}

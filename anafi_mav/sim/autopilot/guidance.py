@@ -1,4 +1,4 @@
-"""Who steers: the sticks, a moveBy, a moveTo or the return home, and what happens when one takes over from another.
+"""Selection of the active flight task: the sticks, a moveBy, a moveTo or the return home.
 
 A move leaves the sticks without effect, but for yaw in a moveTo without orientation (ardrone3.xml moveTo). A new
 moveTo replaces a running one silently, a new moveBy interrupts a running one (both ardrone3.xml). While a return home
@@ -58,7 +58,7 @@ class Guidance:
         self._sticks_used = False
         self._stare: float | None = None
         self.taken = False
-        """Somebody else flies: moves are refused."""
+        """True while another flight task is active: moves are refused."""
         self._progress: tuple[float, Pose, float] | None = None
         """When, where and with which heading a move was last seen to get on."""
         self.take_off_place = (0.0, 0.0)
@@ -66,7 +66,7 @@ class Guidance:
 
     @property
     def busy(self) -> bool:
-        """Somebody wants to move."""
+        """True while stick input, a move or a return home requests motion."""
         remembered = self._tilting and Quirk.FLAG_REMEMBERED in self._faults.quirks
         return self._move is not None or self._homing.flying or self._sticks_used or remembered
 
@@ -133,7 +133,10 @@ class Guidance:
     # -- sticks
 
     def pilot(self, sticks: ardrone3.PCMD, now: float) -> None:
-        """PCMD: percent of the limits; pitch + is nose down. Without `flag` roll and pitch do not count."""
+        """PCMD: percent of the limits; pitch + is nose down.
+
+        Without `flag` roll and pitch do not count.
+        """
         if self._homing.flying:
             return
         self._tilting = bool(sticks.flag & 1)
@@ -197,7 +200,10 @@ class Guidance:
         self._emit(wanted.end(error, self._body, pose))
 
     def move_to(self, message: ardrone3.MoveTo | move.ExtendedMoveTo, pose: Pose, ready: bool) -> None:
-        """Start a move to a place, or say ERROR. `ready`: the drone takes moves and knows its own place."""
+        """Start a move to a place, or say ERROR.
+
+        `ready`: the drone takes moves and knows its own place.
+        """
         if isinstance(message, ardrone3.MoveTo):
             wanted = MoveTo(message, own_speeds(self._settings))
         else:

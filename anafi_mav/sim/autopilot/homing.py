@@ -1,8 +1,9 @@
-"""Where home is, and the way there: climb, cruise, descend, then hover or land (feature rth and its ardrone3 twins).
+"""Home location and return home: climb, cruise, descend, then hover or land.
 
-Home is learnt at take-off, if there is a GPS fix, or with the first fix in the air; before that every location is
-reported as 500. What the user prefers as home counts when it is there, else it is the take-off place (rth.xml,
-home_type). State changes leave as rth.state and as NavigateHomeStateChanged, which the aircraft sends both.
+Feature rth and its ardrone3 aliases. Home is set at take-off, if there is a GPS fix, or with the first fix in the
+air; before that every location is reported as 500. The home that the user prefers is used when it is available,
+else the take-off place (rth.xml, home_type). State changes are sent as rth.state and as NavigateHomeStateChanged,
+as the aircraft does.
 """
 
 from __future__ import annotations
@@ -103,7 +104,10 @@ class Homing:
 
     @property
     def home_offset(self) -> tuple[float, float] | None:
-        """The same as (north, east) in the simulator's plane, m; None also while the drone has no fix."""
+        """Return home as (north, east) in the simulator's plane, m.
+
+        Returns None without a home and while the drone has no fix.
+        """
         home = self.home
         return None if home is None or not self._fix else self._origin.offset(home.latitude, home.longitude)
 
@@ -115,7 +119,10 @@ class Homing:
             self._emit(message)
 
     def set_custom(self, latitude: float, longitude: float, altitude: float, pose: Pose) -> None:
-        """rth.set_custom_location: taken when the drone knows its own place and the other is within MaxDistance."""
+        """Handle rth.set_custom_location.
+
+        The location is accepted when the drone has a fix and the location is within MaxDistance of it.
+        """
         if self._fix and _somewhere(latitude, longitude, altitude):
             north, east = self._origin.offset(latitude, longitude)
             reach = self._settings.number("max_distance")
@@ -158,11 +165,11 @@ class Homing:
         return messages
 
     def settings_report(self) -> list[Message]:
-        """What AllSettings tells of home."""
+        """Return the home messages of the AllSettings answer."""
         return [self._home_changed()]
 
     def states_report(self) -> list[Message]:
-        """What AllStates tells of home and the return."""
+        """Return the messages of home and the return in the AllStates answer."""
         capabilities = sum(1 << type for type in HOME_TYPES)
         available = {
             ardrone3.AvailableHomeType.TAKEOFF: self._fix,
@@ -237,7 +244,10 @@ class Homing:
         return True
 
     def abort(self) -> None:
-        """rth.abort, NavigateHome(0), or something stronger than a return; nothing to say when none runs."""
+        """Abort the return: rth.abort, NavigateHome(0), or a flight task of higher priority.
+
+        Reports nothing when no return is active.
+        """
         if self.active:
             self._stop_body()
             self._set(RthState.AVAILABLE, StateReason.STOPPED)

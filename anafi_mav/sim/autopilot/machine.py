@@ -13,7 +13,7 @@ from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 
 
 class Event(enum.Enum):
-    """What can happen to a drone; named by who makes it happen."""
+    """Events of the flying-state machine; the value names the cause."""
 
     TAKE_OFF = "command TakeOff, accepted"
     USER_TAKE_OFF = "command UserTakeOff(1), accepted"
@@ -103,5 +103,5 @@ GUIDED = frozenset({HOVERING, FLYING})
 
 
 def next_state(state: FlyingState, event: Event) -> FlyingState | None:
-    """Where `event` leads from `state`; None when it does not count there."""
+    """Return the state to which `event` leads from `state`, or None when it is ignored there."""
     return TRANSITIONS[state].get(event)

@@ -1,8 +1,8 @@
-"""moveBy and moveTo while they run: what was asked, where it leads, and the event that ends it.
+"""Running moveBy and moveTo: the request, its target, and the event that ends it.
 
 Distances of a moveBy are in the body frame at its start: front, right, down, clockwise (ardrone3.xml moveBy,
-move.xml extended_move_by). A command that asks for a speed of zero along an axis it wants to travel, or for a number
-that is none, is in error and never starts.
+move.xml extended_move_by). A command with a speed of zero along an axis in which it moves, or with a value that is
+not a finite number, is in error and never starts.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class Speeds:
 
 
 def own_speeds(settings: Settings) -> Speeds:
-    """What a command that names no speeds flies at."""
+    """Return the speeds of a command that contains no speeds."""
     return Speeds(CRUISE, settings.number("max_vertical_speed"), settings.number("max_rotation_speed") * RAD_PER_DEG)
 
 

@@ -1,8 +1,8 @@
-"""The piloted point of interest: the nose (and, if wanted, the camera) follows a point, the pilot flies the rest.
+"""Piloted point of interest: the nose faces a point while the pilot flies the drone.
 
-Rules of ardrone3.xml StartPilotedPOIV2: it runs at once from a hover, else it waits for one and gives up after a
-while; the yaw stick does nothing meanwhile; without GPS, magnetometer or flight it is unavailable and ignored. That
-any other guided motion, a landing or a return ends it is assumed.
+If requested the camera follows the point too. Rules of ardrone3.xml StartPilotedPOIV2: it runs at once from a hover,
+else it waits for one and is aborted after a while; the yaw stick does nothing meanwhile; without GPS, magnetometer or
+flight it is unavailable and ignored. That any other guided motion, a landing or a return ends it is assumed.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _TOO_NEAR = 0.5
 
 
 class Look(NamedTuple):
-    """Where a point is seen: rad, rad/s, rad above the horizon, m over ground."""
+    """Direction and distance of a point: rad, rad/s, rad above the horizon, m over ground."""
 
     bearing: float
     bearing_rate: float
@@ -68,7 +68,10 @@ class Poi:
         fastest: Callable[[], float],
         modern: bool,
     ) -> None:
-        """`fastest` gives the greatest yaw rate now allowed (rad/s); `modern` drones tell what is missing."""
+        """Create it; `fastest` returns the greatest yaw rate allowed (rad/s).
+
+        `modern` drones report the unmet conditions.
+        """
         self._origin = origin
         self._emit = emit
         self._aim = aim
@@ -88,7 +91,7 @@ class Poi:
 
     @property
     def point(self) -> tuple[float, float, float]:
-        """Where it is: m from the simulator's origin."""
+        """Position of the point: m from the simulator's origin."""
         return self._point
 
     @property
@@ -121,7 +124,10 @@ class Poi:
             self._set(PoiStatus.AVAILABLE)
 
     def sensors(self, fix: bool, magneto: bool, guided: bool) -> None:
-        """What it needs: a fix, a calibrated magnetometer, and a drone in the air that takes commands."""
+        """Update the conditions that the point of interest needs.
+
+        They are a fix, a calibrated magnetometer, and a drone in the air that takes commands.
+        """
         needs = {
             Indicator.DRONE_GPS: fix,
             Indicator.DRONE_MAGNETO: magneto,
@@ -139,7 +145,7 @@ class Poi:
             self._set(PoiStatus.AVAILABLE)
 
     def tick(self, time: float, pose: Pose, hovering: bool) -> float | None:
-        """The yaw rate (rad/s) that the point asks for; None when there is none."""
+        """Return the yaw rate (rad/s) that faces the point, or None when none is active."""
         if self.status is PoiStatus.PENDING:
             if hovering:
                 self._set(PoiStatus.RUNNING)
@@ -167,7 +173,7 @@ class Poi:
             self._emit(ardrone3.PilotedPOI(*self._place, status))
 
     def states_report(self) -> list[Message]:
-        """What AllStates tells of it."""
+        """Return this part's messages of the AllStates answer."""
         report: list[Message] = [ardrone3.PilotedPOIV2(*self._place, self._mode, self.status)]
         return [*report, poi.Info(self._missing)] if self._modern else report
 

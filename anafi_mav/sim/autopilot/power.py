@@ -78,7 +78,7 @@ class Battery:
         return battery.Alert(BatteryAlert.POWER_LEVEL, self.level, 1 << ListFlags.FIRST | 1 << ListFlags.LAST)
 
     def states_report(self) -> list[Message]:
-        """What AllStates tells of the battery."""
+        """Return the battery messages of the AllStates answer."""
         return [
             common.BatteryStateChanged(self.percent),
             self._alert_message(),

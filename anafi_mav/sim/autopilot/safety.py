@@ -1,4 +1,7 @@
-"""Alarms, warnings and the take-off checklist. A refused take-off says nothing but which check refused it."""
+"""Alarms, warnings and the take-off checklist.
+
+A refused take-off says nothing but which check refused it.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +23,7 @@ ALARMS = (
     Type.HORIZONTAL_GEOFENCE_REACHED,
     Type.VERTICAL_GEOFENCE_REACHED,
 )
-"""What a 4K reports."""
+"""Alarms that a 4K reports."""
 
 CHECKS = (
     TakeoffChecklistType.UPDATE_ONGOING,
@@ -68,7 +71,7 @@ STEADY_AFTER = 1.0
 
 
 class Warnings:
-    """What is reported as good, worse or bad: wind, vibration, motors, and whether somebody carries the drone."""
+    """Warnings about wind, vibration and motors, and the motion state of a carried drone."""
 
     def __init__(self) -> None:
         self.wind = WarningLevel.OK
@@ -94,17 +97,23 @@ class Warnings:
 
     def set_motors(self, error: MotorError, motors: int) -> list[Message]:
         """Bit 0 of `motors` is the front left one (ardrone3.xml MotorErrorStateChanged)."""
-        if error is self.motor_error:
+        if error is MotorError.NO_ERROR:
+            motors = 0
+        if (error, motors) == (self.motor_error, self.motors):
             return []
-        self.motor_error, self.motors = error, motors if error is not MotorError.NO_ERROR else 0
-        messages: list[Message] = [ardrone3.MotorErrorStateChanged(self.motors, error)]
-        if error is not MotorError.NO_ERROR:
+        is_new = error is not self.motor_error
+        self.motor_error, self.motors = error, motors
+        messages: list[Message] = [ardrone3.MotorErrorStateChanged(motors, error)]
+        if is_new and error is not MotorError.NO_ERROR:
             self.last_motor_error = _LAST.get(error.name, LastMotorError.NO_ERROR)
             messages.append(ardrone3.MotorErrorLastErrorChanged(self.last_motor_error))
         return messages
 
     def carried(self, place: tuple[float, float], time: float, landed: bool) -> list[Message]:
-        """Where a landed drone is; in the air the motion state means nothing and stays (ardrone3.xml MotionState)."""
+        """Update the motion state from the position of a landed drone.
+
+        In the air the motion state has no meaning and does not change (ardrone3.xml MotionState).
+        """
         if not landed:
             self._place = place
             return []
@@ -117,14 +126,14 @@ class Warnings:
         return [ardrone3.MotionState(motion)]
 
     def settings_report(self) -> list[Message]:
-        """What AllSettings tells of the motors."""
+        """Return the motor messages of the AllSettings answer."""
         return [
             ardrone3.MotorErrorStateChanged(self.motors, self.motor_error),
             ardrone3.MotorErrorLastErrorChanged(self.last_motor_error),
         ]
 
     def states_report(self) -> list[Message]:
-        """What AllStates tells of the rest."""
+        """Return the other messages, of the AllStates answer."""
         return [
             ardrone3.MotionState(self.motion),
             ardrone3.WindStateChanged(self.wind),

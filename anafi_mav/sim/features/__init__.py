@@ -1,1 +1,1 @@
-"""Parrot's features beside flight and payload: settings, Wi-Fi, and the Ai's protobuf services."""
+"""Parrot's other features: settings, Wi-Fi, and the Ai's protobuf services."""

@@ -1,7 +1,8 @@
-"""What a Skycontroller 4 says of its drone and its links in protobuf: services devicemanager and controllernetwork.
+"""Skycontroller 4's protobuf services devicemanager and controllernetwork.
 
-The older words (drone_manager) say the same, and are said too. A drone that is back in reach is told of as connected at
-once: the pause that a client may ask for (`supports_fast_connection`) is not made.
+They report its drone and its links. The older messages (drone_manager) report the same and are sent too. A drone that
+is back in reach is reported as connected at once: the pause that a client may ask for (`supports_fast_connection`) is
+not made.
 """
 
 from __future__ import annotations
@@ -25,7 +26,10 @@ class DeviceManager:
         self._device = words.DeviceInfo(uid=drone.serial, model=drone.model_id, network_id=drone.name)
 
     def handle(self, message: Message, connected: bool, known: bool) -> list[Message] | None:
-        """The answer to a command, None when it is none of these services. `known`: the drone is paired."""
+        """Return the answer to a command, or None when it belongs to another service.
+
+        `known`: the drone is paired.
+        """
         match message:
             case words.GetState():
                 return [self.state(connected, known, message.include_default_capabilities)]

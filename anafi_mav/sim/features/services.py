@@ -1,7 +1,8 @@
-"""What an Ai answers beyond its camera: the small protobuf services, obstacle avoidance, and what a move still lacks.
+"""Services of an Ai besides its camera.
 
-Olympe asks most of these when it connects and waits seconds for those that stay silent. Settings are kept and
-reported; none of them changes how the simulated drone flies.
+They are the small protobuf services, obstacle avoidance, and the unmet conditions of a move. Olympe queries most of
+these when it connects and waits seconds for those that do not answer. Settings are kept and reported; none of them
+changes how the simulated drone flies.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ class Services:
         self._hovering_altitude = 1.0
         self._avoidance = obstacle_avoidance.Mode.STANDARD
         self._missing: tuple[int, int] = (-1, -1)
-        """Last told of a move and of a flight plan."""
+        """Unmet conditions of a move and of a flight plan, as last reported."""
 
     def handle(self, message: Message) -> list[Message] | None:
         """The answer to a command; None when it belongs to none of these services."""
@@ -49,7 +50,7 @@ class Services:
         return None if handler is None else list(handler(self, message))
 
     def lacks(self, fix: bool, calibrated: bool, flying: bool) -> list[Message]:
-        """What stands in the way of a move and of a flight plan, if that has changed."""
+        """Report the unmet conditions of a move and of a flight plan, if they changed."""
         plan = (not fix) << move.Indicator.DRONE_GPS | (not calibrated) << move.Indicator.DRONE_MAGNETO
         missing = (plan | (not flying) << move.Indicator.DRONE_FLYING, plan)
         if missing == self._missing:
@@ -58,7 +59,10 @@ class Services:
         return self._lack_report()
 
     def states_report(self) -> list[Message]:
-        """What AllStates tells of them; the rest is told to who asks."""
+        """Return the messages of these services in the AllStates answer.
+
+        The other services answer queries only.
+        """
         return [
             self._avoidance_report(),
             obstacle_avoidance.Alerts(0),

@@ -1,7 +1,8 @@
-"""The settings of the autopilot: one table row each, from the command that sets it to the events that report it.
+"""Settings of the autopilot: a table from setting commands to reporting events.
 
-A drone answers every setting command with the value it now has, also when that is the old one: Parrot's clients wait
-for an event after the command, never for a value (Olympe's expectations). A value out of range is taken to the limit.
+Each setting is one row. A drone answers every setting command with the value it now has, also when that is the old
+one: Parrot's clients wait for an event after the command, never for a value (Olympe's expectations). A value out of
+range is limited to the range.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ _LEGACY_HOME = {
     HomeTypeSetting.PILOT: RthHomeType.PILOT,
 }
 HOME_TYPES = (RthHomeType.TAKEOFF, RthHomeType.CUSTOM, RthHomeType.PILOT)
-"""What a user may prefer: nobody is followed here."""
+"""Home types that a user may prefer; without FOLLOWEE, nothing is followed here."""
 
 DEFAULTS: dict[str, Any] = {
     "geofence": 0,

@@ -1,6 +1,6 @@
-"""What the drone's Wi-Fi can see and do: neighbours and channels, in both of Parrot's languages.
+"""Wi-Fi of the drone: networks in reach and channels, in both of Parrot's message formats.
 
-The neighbours are made up; the channels are those that are allowed nearly everywhere.
+The networks are invented; the channels are those that are allowed nearly everywhere.
 """
 
 from __future__ import annotations
@@ -31,7 +31,10 @@ _EVERYWHERE = 1 << wifi.Environment.INDOOR | 1 << wifi.Environment.OUTDOOR
 
 
 def classic(message: Message) -> list[Message] | None:
-    """The answer to the commands of feature wifi that are no settings; None when it is none of them."""
+    """Return the answer to a command of feature wifi that is not a setting.
+
+    Returns None for any other message.
+    """
     match message:
         case wifi.Scan():
             seen = [one for one in _NEIGHBOURS if message.band >> one[2] & 1]

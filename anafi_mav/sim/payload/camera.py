@@ -70,7 +70,7 @@ class Camera:
         self.lens = lens
         self.id = lens.id
         self.active = lens.id == 0
-        """Whether the thermal mode has chosen it."""
+        """True when the thermal mode has selected this camera."""
         self.mode = CameraCameraMode.RECORDING
         self.photo_mode = CameraPhotoMode.SINGLE
         self.photo_format = PhotoFormat.FULL_FRAME
@@ -110,7 +110,7 @@ class Camera:
         self._alignment = (0.0, 0.0, 0.0)
 
     def handle(self, message: Message) -> list[Message] | None:
-        """The answer to a setting command; None when it is none."""
+        """Return the answer to a setting command, or None for any other message."""
         handler = _HANDLERS.get(type(message))
         return None if handler is None else list(handler(self, message))
 
@@ -118,7 +118,10 @@ class Camera:
 
     @property
     def fine_zoom(self) -> float:
-        """Where the zoom ends if no pixel may be invented: as many of the sensor's as the picture has."""
+        """Return the largest zoom without interpolated pixels.
+
+        There the picture uses as many pixels of the sensor as it has itself.
+        """
         pixels = WIDTHS[self.resolution] if self.mode is CameraCameraMode.RECORDING else WIDTHS[Resolution.RES_UHD_4K]
         return clip(self.lens.width / pixels * self.lens.optical_zoom, 1.0, self.lens.zoom_max)
 
@@ -272,7 +275,10 @@ class Camera:
         return True
 
     def set_photo(self, m: camera.SetPhotoMode) -> bool:
-        """False: these do not go together on this camera. An interval that is too short is taken to the limit."""
+        """False: these do not go together on this camera.
+
+        An interval that is too short is taken to the limit.
+        """
         lens = self.lens
         fits = (
             _photos(lens, m.mode, m.format, m.file_format) is not None
@@ -317,7 +323,7 @@ class Camera:
         return camera.ZoomLevel(self.id, self.zoom)
 
     def zoom_change(self) -> list[Message]:
-        """Its bounds, if they are others than were last told."""
+        """Report the bounds of the zoom if they differ from those last reported."""
         now = self._zoom_info()
         if now == self._told_zoom or self.lens.zoom_max == 1.0:
             return []
@@ -360,7 +366,7 @@ class Camera:
         )
 
     def optics(self) -> Optics:
-        """What its picture is taken with."""
+        """Return the optical settings with which the picture is taken."""
         shutter, iso = self._exposed()
         return Optics(
             hfov=zoomed(self.lens.hfov, self.zoom),
@@ -371,7 +377,7 @@ class Camera:
         )
 
     def _exposed(self) -> tuple[ShutterSpeed, IsoSensitivity]:
-        """What was set, or what the automatic chose (`optics`)."""
+        """Return shutter speed and ISO: the ones set, or those of the automatic (`optics`)."""
         manual = self._exposure_mode
         shutter = self._shutter if manual in _MANUAL_SHUTTER else ShutterSpeed.SHUTTER_1_OVER_60
         return shutter, self._iso if manual in _MANUAL_ISO else IsoSensitivity.ISO_100

@@ -110,7 +110,7 @@ class Camera2:
         return self._capture.shots
 
     def optics(self, id: int) -> Optics:
-        """What its picture is taken with."""
+        """Return the optical settings with which the picture is taken."""
         config, at_work = self._config, self._camera
         mode = config["exposure_mode"].name
         shutter = config["exposure_manual_shutter_speed"] if mode in _MANUAL_SHUTTER else None
@@ -126,7 +126,7 @@ class Camera2:
     # -- time
 
     def tick(self, time: float, flying: bool) -> list[Message]:
-        """What has come due by now (s)."""
+        """Advance to `time` (s) and return the messages that are due."""
         seconds, self._time = time - self._time, time
         self._now = time
         messages = self._translate(self._capture.tick(time)) if self._capture.busy else []
@@ -142,7 +142,7 @@ class Camera2:
         return messages
 
     def telemetry(self) -> list[Message]:
-        """What is told five times a second."""
+        """Return the messages sent five times a second."""
         return [self._zoom_level()]
 
     def work(self, act: Callable[[Capture], Iterable[Message]], time: float) -> list[Message]:
@@ -153,7 +153,10 @@ class Camera2:
     # -- commands
 
     def handle(self, message: Message, time: float) -> list[Message] | None:
-        """The answer to a command of this service; None when it is none. A camera that is not there says nothing."""
+        """Return the answer to a command of this service, or None for any other message.
+
+        A command for a camera that does not exist is not answered.
+        """
         handler = _HANDLERS.get(type(message))
         if handler is None:
             return None
@@ -163,7 +166,10 @@ class Camera2:
         return list(handler(self, message, time))
 
     def operate(self, message: Message, time: float) -> list[Message]:
-        """An order of the autopilot in the words of the older cameras, which flight plans are flown in."""
+        """Execute a camera command of a flight plan, given as a message of the older cameras.
+
+        The autopilot sends these, because flight plans use the older messages.
+        """
         self._now = time
         match message:
             case camera.SetCameraMode():
@@ -368,13 +374,13 @@ class Camera2:
         )
 
     def states_changed(self) -> list[Message]:
-        """Whether it can take photos and record may have changed for another reason."""
+        """Report the photo and recording states, after other events changed them."""
         return [
             camera2.State(camera_id=CAMERA, photo=self._photo_state(), recording=self._recording_state()),
         ]
 
     def states_report(self) -> list[Message]:
-        """What AllStates tells of it: nothing, who wants to know asks."""
+        """Return no message for AllStates: clients query this camera instead."""
         return []
 
     def _photo_state(self) -> camera2.StatePhoto:
@@ -417,7 +423,10 @@ class Camera2:
 
 
 def _rule(index: int, mode: camera2.CameraMode, names: Iterable[str]) -> camera2.CapabilitiesRule:
-    """What goes together in one mode. A list is called as the setting with an s behind, a range with `_range`."""
+    """Return the rule that lists the settings allowed together in one mode.
+
+    The field of a list has the setting's name and an s, that of a range the suffix `_range`.
+    """
     fields: dict[str, Any] = {"index": index, "camera_modes": (mode,)}
     for name in names:
         if name in RANGES:

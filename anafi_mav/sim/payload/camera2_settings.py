@@ -1,4 +1,4 @@
-"""What the Ai's camera can be set to, by the field of `camera2.Config`.
+"""Settings that the Ai's camera accepts, by the field of `camera2.Config`.
 
 From the table of the anafi_ros paper (48 megapixels, ISO 50 to 6400, 1/10000 to 1/15 s, 4K and 1080p at 24 to 120
 frames a second, H.265) and Olympe's examples for it (720p; bursts are JPEG); what these leave open is assumed.

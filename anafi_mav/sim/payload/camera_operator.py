@@ -1,4 +1,7 @@
-"""Who works the camera for the autopilot: flight plans, animations and points of interest aim, zoom and photograph."""
+"""Camera control for the autopilot: aiming, zooming and taking pictures.
+
+Used by flight plans, animations and points of interest.
+"""
 
 from __future__ import annotations
 
@@ -64,7 +67,10 @@ class Operator:
         return self._payload.cameras.shots
 
     def panorama_begin(self, kind: str, count: int) -> None:
-        """`count` pictures of one media will be taken; `kind` in the words of the web server, or empty."""
+        """Begin a panorama: one media of `count` pictures.
+
+        `kind` is the web server's name of the panorama, or empty.
+        """
         self._note("payload", {"panorama": kind, "count": count})
         self._tell(self._payload.panorama_begin(kind, count, self._moment()[0]))
 

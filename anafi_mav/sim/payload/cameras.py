@@ -1,4 +1,7 @@
-"""All cameras of a model of the older kind: who a command is for, which of them is active, recording by itself."""
+"""All cameras of a model before the Ai.
+
+Addresses commands to them, selects the active one and starts automatic recordings.
+"""
 
 from __future__ import annotations
 
@@ -47,13 +50,13 @@ class Cameras:
         return next(capture for capture in self._captures.values() if capture.camera.active)
 
     def optics(self, id: int) -> Optics:
-        """What the picture of a camera is taken with."""
+        """Return the optical settings with which a camera's picture is taken."""
         return self[id].optics()
 
     # -- time
 
     def tick(self, time: float, flying: bool) -> list[Message]:
-        """What has come due by now (s)."""
+        """Advance to `time` (s) and return the messages that are due."""
         seconds, self._time = time - self._time, time
         messages: list[Message] = []
         for capture in self._captures.values():
@@ -67,7 +70,10 @@ class Cameras:
         return messages
 
     def _autorecord(self, flying: bool, time: float) -> Iterable[Message]:
-        """Recording begins with a take-off and ends with a landing, in recording mode and if that is wanted."""
+        """Start recording at take-off and stop it at landing, when autorecord is enabled.
+
+        Only in recording mode.
+        """
         active = self._active
         wanted = active.camera.autorecord is State.ACTIVE and active.camera.mode is CameraCameraMode.RECORDING
         if not wanted or flying == active.recording:
@@ -75,7 +81,7 @@ class Cameras:
         return active.start_recording(time) if flying else active.stop_recording(time)
 
     def telemetry(self) -> list[Message]:
-        """What is told five times a second."""
+        """Return the messages sent five times a second."""
         return [
             capture.camera.zoom_report()
             for capture in self._captures.values()
@@ -89,7 +95,10 @@ class Cameras:
     # -- commands
 
     def handle(self, message: Message, time: float) -> list[Message] | None:
-        """The answer to a command of this feature; None when it is none. A camera that is not there says nothing."""
+        """Return the answer to a command of this feature, or None for any other message.
+
+        A command for a camera that does not exist is not answered.
+        """
         if isinstance(message, camera.SetAntiflickerMode):
             if message.mode in tuple(CameraAntiflickerMode):
                 self._antiflicker = message.mode
@@ -146,7 +155,10 @@ class Cameras:
             yield settings.hdr_change()
 
     def activate(self, mode: ThermalMode, time: float) -> Iterable[Message]:
-        """Another thermal mode: another camera. It tells all its settings, as Parrot's camera.xml has it."""
+        """Activate the camera of a thermal mode.
+
+        It reports all its settings, as Parrot's camera.xml describes.
+        """
         before = self._active
         after = self._captures[ACTIVE[mode]]
         if before is after:
@@ -159,7 +171,7 @@ class Cameras:
         yield from after.states()
 
     def states_changed(self) -> list[Message]:
-        """Whether the active camera can take photos and record may have changed for another reason."""
+        """Report the active camera's photo and recording states, after other events changed them."""
         return self._active.states()
 
     # -- reports
@@ -174,7 +186,7 @@ class Cameras:
         )
 
     def states_report(self) -> list[Message]:
-        """What AllStates tells of the cameras."""
+        """Return the camera messages of the AllStates answer."""
         captures = list(self._captures.values())
         messages = [capture.camera.capabilities() for capture in captures]
         messages += self._lists()
@@ -186,7 +198,7 @@ class Cameras:
         return messages
 
     def _lists(self) -> list[Message]:
-        """What goes together, of all cameras: one list of recordings and one of photos."""
+        """Return the capability lists of all cameras: one of recordings and one of photos."""
         lenses = [capture.camera.lens for capture in self._captures.values()]
         recordings = [(lens.id << 8 | n, one) for lens in lenses for n, one in enumerate(lens.recordings)]
         photos = [(lens.id << 8 | n, two) for lens in lenses for n, two in enumerate(lens.photos)]

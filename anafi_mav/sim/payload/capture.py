@@ -1,7 +1,7 @@
-"""What one camera is doing: photos in all their modes, and recordings, from the command to the file on the card.
+"""Photos and recordings of one camera, from the command to the file on the card.
 
-The order of the events is that of Parrot's camera.xml: a photo's state becomes active, its progress is told, and the
-state becomes inactive when the media is on the card (a lapse: when it is stopped).
+The sequence of the events is that of Parrot's camera.xml: a photo's state becomes active, its progress is reported,
+and the state becomes inactive when the media is on the card (a lapse: when it is stopped).
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ _PHOTO_MODES = {
 
 @dataclass(frozen=True)
 class Studio:
-    """What every camera of a drone works with."""
+    """Parts of a drone that all its cameras share."""
 
     media: MediaStore
     place: Place
@@ -134,11 +134,11 @@ class _Shoot:
     """Shots that are not on the card yet."""
     count: int = 0
     last: tuple[float, float] | None = None
-    """Where a GPS lapse took its last shot: m north, east."""
+    """Position of the last shot of a GPS lapse: m north, east."""
     next_report: float = 0.0
     told_at: float = -math.inf
     result: Message | None = None
-    """The last thing told of its progress."""
+    """Last progress message sent."""
     open: bool = False
     """A panorama: its shots come when the drone looks where they are to be taken, and it is not over yet."""
 
@@ -183,7 +183,7 @@ class Capture:
 
     @property
     def lapsing(self) -> bool:
-        """It takes photos until somebody stops it."""
+        """True while a lapse takes photos until it is stopped."""
         return self._shoot is not None and self._shoot.lapse
 
     @property
@@ -200,7 +200,10 @@ class Capture:
         return PhotoResult.ERROR_NO_STORAGE_SPACE if self._studio.place.free < LEAST_ROOM else None
 
     def begin_panorama(self, kind: str, count: int, time: float) -> Iterable[Message]:
-        """The first of `count` pictures of one media will be taken soon; `kind` in the words of the web server."""
+        """Begin a panorama: one media of `count` pictures, the first of which is taken soon.
+
+        `kind` is the web server's name of the panorama.
+        """
         refusal = self._refusal()
         if refusal is None:
             media = self._studio.media.begin(
@@ -220,7 +223,7 @@ class Capture:
             yield from self._press(self._shoot, time)
 
     def end_panorama(self, time: float) -> Iterable[Message]:
-        """No more pictures. What was taken is written."""
+        """End the panorama and write the pictures taken so far."""
         shoot = self._shoot
         if shoot is None or not shoot.open:
             return
@@ -308,7 +311,7 @@ class Capture:
                 yield self.photo_state()
 
     def _write(self, shoot: _Shoot, shots: list[_Shot]) -> tuple[bool, bool]:
-        """Whether anything was written, and whether this was the last for which there is room."""
+        """Write the shots; return (a file was written, the storage has no room for another)."""
         media, room = self._studio.media, self._studio.place.free
         written: list[Resource] = []
         full = bool(shots) and shots[-1].number >= MAX_RESOURCES
@@ -404,19 +407,22 @@ class Capture:
             yield from self.stop_recording(time, RecordingResult.STOPPED_NO_STORAGE_SPACE)
 
     def _release(self) -> int:
-        """Give back what a recording has reserved: the bytes there are for it, what is written already included."""
+        """Release the storage that a recording has reserved, and return the bytes it can use.
+
+        What it has already written is included.
+        """
         place = self._studio.place
         written, place.reserved = place.reserved, 0
         return max(place.free, written)
 
     def recorded(self, time: float) -> float:
-        """s that the recording lasts already; 0 if there is none."""
+        """Return the duration of the current recording in s; 0 when not recording."""
         return 0.0 if self._take is None else time - self._take.began
 
     # -- both
 
     def tick(self, time: float) -> Iterable[Message]:
-        """What has come due by now (s)."""
+        """Advance to `time` (s) and return the messages that are due."""
         if self._shoot is not None:
             yield from self._advance_photo(self._shoot, time)
         if self._take is not None:
@@ -463,7 +469,7 @@ class Capture:
 
 
 def _fitting(take: _Take, room: int) -> float:
-    """Seconds of video for which there is room (bytes); less than 0 if there is none at all."""
+    """Return the s of video that fit into `room` (bytes); negative when not one frame fits."""
     one = jpeg_scene.mp4_size(take.scene, jpeg_scene.FRAME_TIME)
     frame = jpeg_scene.mp4_size(take.scene, 2 * jpeg_scene.FRAME_TIME) - one
     return jpeg_scene.FRAME_TIME * (1 + (room - one) // frame)

@@ -1,8 +1,8 @@
-"""The gimbals: each axis turns no faster than the speed setting, in the frame of reference last asked for.
+"""Simulated gimbals, limited by the speed setting.
 
-All angles in degrees with Parrot's signs: pitch up, roll clockwise seen from behind, yaw clockwise from above; absolute
-is to the horizon and to north. An axis that cannot be turned moves with the body, or with the picture that the
-electronics keep level.
+Each axis turns in the frame of reference last commanded. All angles in degrees with Parrot's signs: pitch up, roll
+clockwise seen from behind, yaw clockwise from above; absolute is to the horizon and to north. An axis that cannot be
+turned moves with the body, or with the picture that the electronics keep level.
 
 A velocity target is a share (-1..1) of the speed setting and holds until the next target or the end of the range.
 """
@@ -108,7 +108,7 @@ class Gimbal:
                 axis.advance(seconds, self._speed)
 
     def tick(self, time: float) -> list[Message]:
-        """What has come due by now (s)."""
+        """Advance to `time` (s) and return the messages that are due."""
         if self._calibrating_until is None or time < self._calibrating_until:
             return []
         self._calibrating_until = None
@@ -188,7 +188,7 @@ class Gimbal:
         )
 
     def _per_axis(self, values: Callable[[Axis], tuple[float, ...]]) -> list[float]:
-        """Numbers of the three axes in Parrot's order; nothing but zeros for one that does not turn."""
+        """Return the values of the three axes in Parrot's sequence; zeros for a fixed axis."""
         numbers: list[float] = []
         for axis, state in self._axes.items():
             wanted = values(axis)
@@ -212,7 +212,7 @@ class Gimbal:
         return gimbal.CalibrationResult(self.id, result)
 
     def states_report(self, pose: Pose) -> list[Message]:
-        """What AllStates tells of it."""
+        """Return this part's messages of the AllStates answer."""
         bounds = self._per_axis(lambda axis: (self._axes[axis].low, self._axes[axis].high))
         turning = sum(1 << axis for axis, state in self._axes.items() if not state.fixed)
         return [
@@ -243,11 +243,14 @@ class Gimbals:
             one.advance(seconds)
 
     def tick(self, time: float) -> list[Message]:
-        """What has come due by now (s)."""
+        """Advance to `time` (s) and return the messages that are due."""
         return [message for one in self._gimbals for message in one.tick(time)]
 
     def handle(self, message: Message, pose: Pose, time: float, flying: bool) -> list[Message] | None:
-        """The answer to a command of this feature; None when it is none. A gimbal that is not there says nothing."""
+        """Return the answer to a command of this feature, or None for any other message.
+
+        A command for a gimbal that does not exist is not answered.
+        """
         handler = _HANDLERS.get(type(message))
         if handler is None:
             return None
@@ -264,7 +267,7 @@ class Gimbals:
         return [one.attitude(pose) for one in self._gimbals]
 
     def states_report(self, pose: Pose) -> list[Message]:
-        """What AllStates tells of them."""
+        """Return the gimbal messages of the AllStates answer."""
         return [message for one in self._gimbals for message in one.states_report(pose)]
 
 

@@ -40,7 +40,7 @@ Colour = tuple[int, int, int]
 
 @dataclass(frozen=True)
 class Scene:
-    """What the camera sees and from where."""
+    """Scene that the camera sees: position and viewing direction."""
 
     latitude: float = UNKNOWN
     """deg; 500: not known, as everywhere in ARSDK."""
@@ -59,7 +59,10 @@ class Scene:
 
 
 def blocks(scene: Scene, mark: int, width: int, height: int) -> Iterator[Colour]:
-    """Colours of the blocks, row by row; `mark` (a shot's number) is written in binary along the lower edge."""
+    """Yield the colours of the blocks, row by row.
+
+    `mark` (a shot's number) is written in binary along the lower edge.
+    """
     columns, rows = width // _BLOCK, height // _BLOCK
     slope = math.tan(max(-80.0, min(80.0, scene.roll)) * RAD_PER_DEG)
     middle = rows / 2.0 + scene.pitch / _VFOV * rows
@@ -104,7 +107,10 @@ def jpeg(
     exif: bytes | None = None,
     xmp: bytes | None = None,
 ) -> bytes:
-    """A picture; sizes are multiples of 8. `xmp` is the payload of an APP1 segment of its own, behind that of Exif."""
+    """A picture; sizes are multiples of 8.
+
+    `xmp` is the payload of an APP1 segment of its own, behind that of Exif.
+    """
     bits: list[str] = []
     before = [0, 0, 0]
     for colour in blocks(scene, mark, width, height):
@@ -191,7 +197,10 @@ def _degrees(tag: int, angle: float) -> Entry:
 
 
 def exif(scene: Scene, make_model: str, date: str) -> bytes:
-    """The TIFF in a photo's APP1: who took it, when ("YYYY:MM:DD HH:MM:SS") and, if it knew, where."""
+    """Return the TIFF block of a photo's APP1: model, date and, if known, position.
+
+    `date` is "YYYY:MM:DD HH:MM:SS".
+    """
     entries = [_text(0x010F, "Parrot"), _text(0x0110, make_model), _text(0x0132, date)]
     if scene.latitude == UNKNOWN:
         return _HEADER + _directory(entries, 8)

@@ -1,6 +1,6 @@
-"""The index of what the cameras have written: media of one or more files, as Parrot's web server tells of them.
+"""Index of the cameras' media, each of one or more files, as Parrot's web server lists them.
 
-The files are made when somebody asks for them (`Resource.content`) from what is kept of the moment they show, always
+A file is generated when it is requested (`Resource.content`) from the stored data of the moment it shows, always
 the same bytes; so a card may be full without filling the simulator's memory.
 """
 
@@ -113,7 +113,7 @@ class Resource:
 
 @dataclass
 class Media:
-    """What one press of a button came to."""
+    """Result of one press of the shutter button: one or more files."""
 
     id: str
     video: bool
@@ -159,7 +159,10 @@ class Media:
 
 
 class MediaStore:
-    """All media, oldest first. `notify` hears what Parrot's websocket tells; `emit` takes ARSDK events."""
+    """All media, oldest first.
+
+    `notify` receives the notifications of Parrot's websocket; `emit` takes ARSDK events.
+    """
 
     def __init__(self, run_id: str, camera: str, storage: int, emit: Callable[[Message], None]) -> None:
         self.notify: Notify = lambda name, data: None
@@ -176,7 +179,7 @@ class MediaStore:
         """Bytes of all files."""
 
     def begin_run(self, run_id: str) -> None:
-        """What is taken from now on belongs to this run."""
+        """Assign all media taken from now on to this run."""
         self._run_id = run_id
 
     def __iter__(self) -> Iterator[Media]:
@@ -204,7 +207,7 @@ class MediaStore:
     def begin(
         self, *, video: bool, mode: str, date: str, thermal: bool = False, panorama: str = "", expected: int = 0
     ) -> Media:
-        """A media without files; nobody is told before `add`."""
+        """Create a media without files; it is not announced before `add`."""
         media = Media(str(self._next_id), video, mode, date, self._run_id, thermal, panorama, expected)
         self._next_id += 1
         return media
@@ -223,10 +226,10 @@ class MediaStore:
         return Resource(media.id, kind, number, scene, date, self._camera, self._storage, seconds, captured)
 
     def add(self, media: Media, resources: list[Resource]) -> None:
-        """Write files, and tell of them.
+        """Write files and announce them.
 
-        A new media is told of with the files of its first shot, those of the others follow one by one, as Parrot says
-        of a burst (Olympe 8.5, examples/media_ai.py).
+        A new media is announced with the files of its first shot, those of the others follow one by one, as Parrot
+        describes a burst (Olympe 8.5, examples/media_ai.py).
         """
         new = media.id not in self._media
         self._media[media.id] = media
@@ -247,7 +250,7 @@ class MediaStore:
         self.used += resource.size
 
     def remove_resource(self, id: str) -> bool:
-        """Delete a file, and its media with the last one. False when there is none."""
+        """Delete a file, and its media with the last one; return False when the file does not exist."""
         resource = self._resources.pop(id, None)
         if resource is None:
             return False
@@ -262,7 +265,7 @@ class MediaStore:
         return True
 
     def remove(self, id: str) -> bool:
-        """Delete a media with its files. False when there is none."""
+        """Delete a media with its files; return False when it does not exist."""
         media = self._media.pop(id, None)
         if media is None:
             return False
@@ -321,7 +324,7 @@ class MediaStore:
         )
 
     def states_report(self) -> list[Message]:
-        """What AllStates tells of the index."""
+        """Return the messages of the index in the AllStates answer."""
         return [mediastore.State(self.state), self._counters()]
 
 

@@ -1,6 +1,6 @@
-"""What a camera's picture was taken with, in numbers instead of Parrot's steps.
+"""Optical settings of a camera's picture, as numbers instead of Parrot's steps.
 
-The light is the same every day: where the automatic chooses, it takes 1/60 s at ISO 100.
+The light never changes: the automatic always chooses 1/60 s at ISO 100.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ AUTOMATIC_ISO = 100
 _DAYLIGHT = 5000.0
 """K of the automatic white balance. Assumed."""
 _GAINS = (1.60, 2.05)
-"""Of red and blue at that temperature, as a recorded 4K told them."""
+"""Gains of red and blue at that temperature, as recorded from a 4K."""
 
 _TEMPERATURES = {
     "CANDLE": 1850.0,
@@ -62,7 +62,10 @@ def zoomed(hfov: float, zoom: float) -> float:
 
 
 def seconds(shutter: enum.IntEnum) -> float:
-    """Of a shutter speed by its name: SHUTTER_1_OVER_60, SHUTTER_1_OVER_1_5, _1_OVER_1_POINT_5, _1."""
+    """Convert a shutter speed to s by its name.
+
+    Names are like SHUTTER_1_OVER_60, SHUTTER_1_OVER_1_5, _1_OVER_1_POINT_5, _1.
+    """
     match = re.fullmatch(r"(?:SHUTTER)?_1(?:_OVER_(\d+)(?:_(?:POINT_)?(\d))?)?", shutter.name)
     assert match is not None, shutter.name
     return 1.0 if match[1] is None else 1.0 / float(f"{match[1]}.{match[2] or 0}")

@@ -1,4 +1,4 @@
-"""What the drone carries: cameras, the card and what is on it, its calendar, and what an Ai answers besides."""
+"""Payload of the drone: cameras, storage and media, calendar, and an Ai's further services."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Payload:
         self._time = 0.0
 
     def reboot(self, run_id: str, time: float, *, wipe: bool) -> None:
-        """The drone is switched off: what is being taken ends, what is on the card stays unless it is wiped."""
+        """Handle a power-off: end photos and recordings; keep the stored media unless `wipe` is set."""
         self.cameras.work(lambda capture: capture.interrupt(time), time)
         self.storage.forget()
         self.media.begin_run(run_id)
@@ -59,13 +59,19 @@ class Payload:
         return answer
 
     def operate(self, message: Message, time: float) -> list[Message]:
-        """What the autopilot itself has done, in the older camera's words whatever the model's own are."""
+        """Execute a camera command of the autopilot, given as a message of the older cameras.
+
+        This form is used on every model, also on those with the newer camera messages.
+        """
         if isinstance(self.cameras, Camera2):
             return self.cameras.operate(message, time)
         return self.handle(message, time) or []
 
     def panorama_begin(self, kind: str, count: int, time: float) -> list[Message]:
-        """`count` pictures of one media will be taken; a camera that records, or does anything else, lets go."""
+        """Begin a panorama: one media of `count` pictures.
+
+        The camera is switched to photo mode, which stops a recording; refused while it takes photos.
+        """
         messages = self.operate(camera.SetCameraMode(0, camera.CameraCameraMode.PHOTO), time)
         return messages + self.cameras.work(lambda capture: capture.begin_panorama(kind, count, time), time)
 
@@ -78,11 +84,14 @@ class Payload:
         return self.cameras.work(lambda capture: capture.end_panorama(time), time)
 
     def lacks(self, fix: bool, calibrated: bool, flying: bool) -> list[Message]:
-        """What a move or a flight plan still lacks, on models that tell it and if it has changed."""
+        """Report the unmet conditions of a move or a flight plan, if they changed.
+
+        Only on models that report them.
+        """
         return [] if self.services is None else self.services.lacks(fix, calibrated, flying)
 
     def tick(self, time: float, flying: bool) -> list[Message]:
-        """What has come due by now (s)."""
+        """Advance to `time` (s) and return the messages that are due."""
         self._time = time
         formatting = self.storage.place.formatting
         messages = self.cameras.tick(time, flying)
@@ -93,11 +102,11 @@ class Payload:
         return messages
 
     def telemetry(self) -> list[Message]:
-        """What is told five times a second."""
+        """Return the messages sent five times a second."""
         return self.cameras.telemetry()
 
     def states_report(self) -> list[Message]:
-        """What AllStates tells of all of it."""
+        """Return the payload's messages of the AllStates answer."""
         return [
             *self.cameras.states_report(),
             *(() if self.thermal is None else self.thermal.states_report()),

@@ -18,7 +18,7 @@ from anafi_mav.sim.payload.media import MediaStore
 from anafi_mav.sim.world.model import Card, Model
 
 DEFAULT_PERIOD = 1
-"""s between two reports of the free space for who asks for 0 (Parrot's user_storage.xml)."""
+"""s between two reports of free space if the client requests 0 (Parrot's user_storage.xml)."""
 
 STEP_TIMES = {
     FormattingStep.PARTITIONING: 0.5,
@@ -47,9 +47,9 @@ class Place:
         self.reserved = 0
         """Bytes of a file that is being written."""
         self.full = False
-        """Somebody filled it with other things: nothing is free."""
+        """True when it is filled with other data: nothing is free."""
         self.busy: Callable[[], bool] = lambda: False
-        """Whether a camera is writing, which forbids formatting."""
+        """Returns True while a camera is writing, which forbids formatting."""
         self._card = card
         self._name = card.name
         self._media = media
@@ -57,7 +57,7 @@ class Place:
         self._period = 0
         self._next = 0.0
         self._steps: list[tuple[float, FormattingStep, int]] = []
-        """What a formatting will have reached, and when; the last one ends it."""
+        """Future steps of a formatting: (time, step, percent); the last one ends it."""
 
     @property
     def formatting(self) -> bool:
@@ -106,7 +106,7 @@ class Place:
         return [self._words(v1.Decryption(v1.PasswordResult.WRONG_USAGE))]
 
     def tick(self, time: float) -> list[Message]:
-        """What has come due by now (s)."""
+        """Advance to `time` (s) and return the messages that are due."""
         messages: list[Message] = []
         while self._steps and time >= self._steps[0][0]:
             _, step, percent = self._steps.pop(0)
@@ -131,7 +131,7 @@ class Place:
         return v1.State(PhyState.AVAILABLE, state, 0, int(self._period > 0), self._period)
 
     def states_report(self) -> list[Message]:
-        """What AllStates tells of it."""
+        """Return this part's messages of the AllStates answer."""
         return [
             v1.Capabilities(_FEATURES),
             v1.SupportedFormattingTypes(_TYPES),
@@ -154,20 +154,20 @@ class Storage:
 
     @property
     def place(self) -> Place:
-        """Where the cameras write."""
+        """Return the storage that the cameras write to."""
         return self._places[-1]
 
     def tick(self, time: float) -> list[Message]:
-        """What has come due by now (s)."""
+        """Advance to `time` (s) and return the messages that are due."""
         return [message for place in self._places for message in place.tick(time)]
 
     def forget(self) -> None:
-        """Nobody has asked for reports of the free space any more."""
+        """Stop all reports of the free space."""
         for place in self._places:
             place.stop_monitor()
 
     def handle(self, message: Message, time: float) -> list[Message] | None:
-        """The answer to a command of this feature; None when it is none this model knows."""
+        """Return the answer to a command of this feature, or None for one this model does not know."""
         if type(message) not in (_NUMBERED if self._numbered else _PLAIN):
             return None
         id: int = getattr(message, "storage_id", 0)
@@ -188,7 +188,10 @@ class Storage:
         return place.refuse()
 
     def states_report(self) -> list[Message]:
-        """What AllStates tells of them: a list for each word when they are numbered."""
+        """Return the storage messages of the AllStates answer.
+
+        When storages are numbered, each message is a list with one entry for each storage.
+        """
         if not self._numbered:
             return self.place.states_report()
         last = len(self._places) - 1
@@ -209,7 +212,7 @@ def _words(id: int) -> Callable[[Message], Message]:
 
 
 def _number(message: Message, id: int, flags: int) -> Message:
-    """What a message of the older feature is in the newer one."""
+    """Convert a message of the older feature to the newer one."""
     values: dict[str, Any] = {name: getattr(message, name) for name in message.__struct_fields__}
     match message:
         case v1.Capabilities():

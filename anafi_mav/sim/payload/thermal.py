@@ -1,4 +1,7 @@
-"""The thermal camera's own settings (feature thermal): mode, palette, rendering, what it takes the world for."""
+"""Thermal camera's settings (feature thermal): mode, palette, rendering, scene parameters.
+
+Scene parameters are emissivity and background temperature.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +38,10 @@ class Thermal:
     """Of a Thermal or a USA. Everything is kept and reported; none of it changes a picture."""
 
     def __init__(self, on_mode: Callable[[ThermalMode], Iterable[Message]]) -> None:
-        """`on_mode` hears which camera is wanted now; what it gives is told after the mode."""
+        """Create the settings; `on_mode` receives the mode that is set.
+
+        The messages it returns are sent after the mode.
+        """
         self.mode = ThermalMode.DISABLED
         self._on_mode = on_mode
         self._palette: list[Colour] = list(_DEFAULT_PALETTE)
@@ -56,7 +62,7 @@ class Thermal:
         self._shutter = ShutterTrigger.AUTO
 
     def handle(self, message: Message) -> list[Message] | None:
-        """The answer to a command of this feature; None when it is none."""
+        """Return the answer to a command of this feature, or None for any other message."""
         handler = _HANDLERS.get(type(message))
         return None if handler is None else list(handler(self, message))
 
@@ -69,7 +75,10 @@ class Thermal:
             yield from self._on_mode(self.mode)
 
     def _set_palette_part(self, m: thermal.SetPalettePart) -> Iterable[Message]:
-        """Parts arrive as a list; each is answered, and the palette changes when the last one has come."""
+        """Handle one part of a palette and answer it.
+
+        Parts arrive as a list; the palette changes when the last one has arrived.
+        """
         if m.list_flags & 1 << ListFlags.FIRST or self._arriving is None:
             self._arriving = []
         numbers = (m.red, m.green, m.blue, m.index)
@@ -139,7 +148,7 @@ class Thermal:
         ]
 
     def states_report(self) -> list[Message]:
-        """What AllStates tells of it."""
+        """Return this part's messages of the AllStates answer."""
         return [
             thermal.Capabilities(sum(1 << mode for mode in ThermalMode)),
             thermal.Mode(self.mode),

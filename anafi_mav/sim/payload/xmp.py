@@ -1,6 +1,7 @@
-"""The XMP packet of a photo: where it was taken, and where the camera looked (ISO 16684-1, Parrot's photo metadata).
+"""XMP packet of a photo: position and viewing direction of the camera.
 
-Values stand in elements, not in attributes: Olympe's photo example reads the children of the one description.
+Sources: ISO 16684-1, Parrot's photo metadata. Values are in elements, not in attributes: Olympe's photo example reads
+the children of the one description.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from anafi_mav.sim.payload.jpeg_scene import UNKNOWN, Scene
 from anafi_mav.units import wrap_360
 
 HEADER = b"http://ns.adobe.com/xap/1.0/\0"
-"""What an APP1 segment of a JPEG with XMP begins with (XMP specification part 3, 1.1.3)."""
+"""First bytes of an APP1 segment of a JPEG with XMP (XMP specification part 3, 1.1.3)."""
 
 _RDF = "http://www.w3.org/1999/02/22-rdf-syntax-ns#"
 _NAMESPACES = {
@@ -20,7 +21,7 @@ _NAMESPACES = {
 
 
 def packet(scene: Scene, camera: str, captured: float) -> bytes:
-    """Return the packet of a photo that `camera` took `captured` seconds after the drone's start."""
+    """Return the packet of a photo that `camera` took `captured` s after the drone's start."""
     values = {
         "tiff:Make": "Parrot",
         "tiff:Model": camera,

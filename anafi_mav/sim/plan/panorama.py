@@ -1,6 +1,7 @@
-"""PANORAMA_CREATE (2800) of a flight plan while it is flown: the drone turns, the camera tilts, pictures are taken.
+"""Execution of a flight plan's PANORAMA_CREATE (2800).
 
-The item names angles and speeds; that a picture is taken every thirty degrees is assumed.
+The drone turns, the camera tilts, pictures are taken. The item gives angles and speeds; that a picture is taken every
+thirty degrees is assumed.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ class Panorama:
     """One item."""
 
     def __init__(self, item: Item, body: Body, operator: Operator, pose: Pose, time: float, speed: float) -> None:
-        """Begin it; `speed` (m/s) is what a wind is flown against with."""
+        """Begin the panorama; `speed` (m/s) is available to hold the position against wind."""
         turn = clip(item.p1, -_MOST_TURN, _MOST_TURN) if math.isfinite(item.p1) else 0.0
         self._tilt = clip(item.p2, -_MOST_TILT, _MOST_TILT) if math.isfinite(item.p2) else 0.0
         self._tilt_speed = item.p4 if item.p4 > 0.0 else SPEED

@@ -1,4 +1,4 @@
-"""What a flight plan does with the camera: photos, series of them, films."""
+"""Camera actions of a flight plan: photos, series of photos, recordings."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
-"""The drone's own reader of an uploaded flight plan (Parrot's developer pages, GroundSDK's reader and writer).
+"""Drone's reader of an uploaded flight plan.
 
-A first line ``QGC WPL <n>``, then one item a line, twelve columns: index, current, frame, command, p1 to p4, latitude,
-longitude, altitude, autocontinue. Parrot documents tabs and shows blanks; both are taken. A command that the version
-of the file does not have, or a number that is none, spoils the whole file (assumed: Parrot says only that such items
-are not supported).
+Sources: Parrot's developer pages, GroundSDK's reader and writer. A first line ``QGC WPL <n>``, then one item a
+line, twelve columns: index, current, frame, command, p1 to p4, latitude, longitude, altitude, autocontinue. Parrot
+documents tabs and shows blanks; both are accepted. A command that the version of the file does not have, or a
+malformed number, makes the whole file invalid (assumed: Parrot says only that such items are not supported).
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ _PLACED = frozenset({Command.WAYPOINT, Command.SET_ROI_LOCATION})
 
 
 class PlanFileError(Exception):
-    """The file is none; the text says which line and why."""
+    """Invalid flight-plan file; the text names the line and the reason."""
 
 
 class Item(NamedTuple):

@@ -1,4 +1,4 @@
-"""The flight plans that were uploaded to a drone: written by the web server, read by whoever flies them."""
+"""Flight plans uploaded to a drone: written by the web server, read by the flight plan task."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ MAX_PLANS = 100
 @dataclass(frozen=True)
 class StoredPlan:
     uid: str
-    """What `common.Mavlink.Start` names it by."""
+    """Name in `common.Mavlink.Start`."""
     date: str
     """ISO 8601 basic, as the drone's clock had it when the plan came."""
     data: bytes

@@ -1,4 +1,4 @@
-"""The picture that the simulated cameras show: sky above, ground below, as an H.264 stream of a few kB a second.
+"""Simulated camera picture, sky above ground, as an H.264 stream of a few kB a second.
 
 Constrained baseline (ITU-T H.264), one slice a picture, CAVLC. A key picture is predicted from its first macroblock
 and from the one at the left end of the horizon, the only two with a residual; every other macroblock takes 7 or 8
@@ -189,7 +189,10 @@ class Pictures:
 
 
 def _macroblock(prediction: int, level: int) -> str:
-    """Intra 16x16, predicted from above (0), from the left (1) or from both (2), with one DC coefficient."""
+    """Encode an intra 16x16 macroblock with one DC coefficient.
+
+    Prediction is from above (0), from the left (1) or from both (2).
+    """
     bits = _Bits()
     bits.ue(1 + prediction)
     bits.ue(0 if prediction == 2 else 2 - prediction)  # chroma likewise: 2 is from above, 1 from the left

@@ -121,7 +121,7 @@ class Track:
             self._number, self._next_report = 0, now
 
     def end(self) -> None:
-        """Play no more."""
+        """Stop playing."""
         self._number = None
 
     def send(self, now: float, metadata: FrameMetadata | None) -> None:

@@ -1,10 +1,11 @@
 """The drone's video server: RTSP on TCP 554, pictures in RTP over UDP.
 
-``/live`` has a stream for each camera, ``/replay/<resource id>`` plays a recording and stops at its end. Pictures come
-thirty times a second of the machine's clock, whatever the speed of the simulated world, and only while somebody
-plays; each says the state of drone and camera at its moment. Who joins gets a key picture first. A session whose
-client is silent for a minute, in RTSP and RTCP, is forgotten; it survives the end of its RTSP connection, as Parrot's
-client expects.
+``/live`` has a stream for each camera, ``/replay/<resource id>`` plays a recording and stops at its end. Pictures are
+sent thirty times a second of the host's clock, whatever the speed of the simulated world, and only while a client
+plays; each contains the state of drone and camera at its moment. They are taken in steps of the simulated world: no two
+show the same moment, however late this process runs. A client that joins gets a key picture first. A session whose
+client is silent for a minute, in RTSP and RTCP, is removed; it survives the end of its RTSP connection,
+as Parrot's client expects.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import functools
+import math
 import random
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
@@ -35,8 +37,8 @@ MAX_SESSIONS = 16
 """At a time; an aircraft has one or two."""
 MAX_CONNECTIONS = 32
 READ_SIZE = 4096
-LATE = 0.1
-"""s behind its time from which a picture is left out instead of being made up for."""
+PERIOD = 1.0 / FRAME_RATE
+"""s of the host's clock between two pictures."""
 
 _LIVE, _REPLAY = "live", "replay/"
 _PUBLIC = "OPTIONS, DESCRIBE, SETUP, PLAY, PAUSE, TEARDOWN, GET_PARAMETER"
@@ -44,7 +46,7 @@ _PUBLIC = "OPTIONS, DESCRIBE, SETUP, PLAY, PAUSE, TEARDOWN, GET_PARAMETER"
 
 @dataclass(frozen=True)
 class _Resource:
-    """What is at a URL."""
+    """Resource at a URL."""
 
     name: str
     streams: tuple[Stream, ...]
@@ -54,7 +56,7 @@ class _Resource:
 
 @dataclass
 class _Session:
-    """What a client has set up."""
+    """RTSP session that a client has set up."""
 
     id: str
     resource: _Resource
@@ -64,7 +66,7 @@ class _Session:
     position: float = 0.0
     """s of a recording."""
     until: float = 0.0
-    """Where it stops."""
+    """s of a recording at which it stops."""
     timer: asyncio.TimerHandle | None = None
 
 
@@ -77,7 +79,10 @@ class _Refused(Exception):
 
 
 class VideoServer:
-    """One drone's. `note` hears what clients do; `hears` says whether the air carries anything; `send` is the air."""
+    """One drone's.
+
+    `note` hears what clients do; `hears` says whether the air carries anything; `send` is the air.
+    """
 
     def __init__(
         self,
@@ -98,12 +103,16 @@ class VideoServer:
         self._server: asyncio.AbstractServer | None = None
         self._connections: set[asyncio.Task[None]] = set()
         self._sessions: dict[str, _Session] = {}
-        self._ticker: asyncio.Task[None] | None = None
+        self._due = 0.0
+        """s of the host's clock until the next picture."""
         self._address = ""
         self.port = 0
 
     async def start(self, address: str, port: int) -> None:
-        """Listen. Raises `OSError` when the port is taken or not permitted; 0 lets the system choose."""
+        """Listen.
+
+        Raises `OSError` when the port is taken or not permitted; 0 lets the system choose.
+        """
         self._address = address
         server = await asyncio.start_server(self._serve, address, port)
         self._server = server
@@ -116,7 +125,7 @@ class VideoServer:
             server.close()
         for session in tuple(self._sessions.values()):
             self._forget(session, "closed")
-        tasks = [*self._connections, *([] if self._ticker is None else [self._ticker])]
+        tasks = tuple(self._connections)
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
@@ -242,14 +251,14 @@ class VideoServer:
             session.position = session.position if start is None else start
             session.until = min(seconds, seconds if stop is None else stop)
             told = rtsp.format_range(session.position, session.until)
+        if not self.playing:
+            self._due = -math.inf
         session.playing = seconds is None or session.position < session.until
         infos = []
         for track, url in session.tracks.values():
             track.begin(now)
             infos.append(RtpInfo(url, track.sequence, track.timestamp(now)))
         self._note("play", {"session": session.id, "streams": self._titles(session), "range": told})
-        if session.playing and (self._ticker is None or self._ticker.done()):
-            self._ticker = asyncio.create_task(self._run(), name="simulated cameras")
         headers = [("RTP-Info", rtsp.format_rtp_info(infos)), ("Range", told), ("Scale", "1.00")]
         return [*headers, self._header(session)], b""
 
@@ -282,7 +291,7 @@ class VideoServer:
     # -- resources and sessions
 
     def _find(self, uri: str) -> tuple[_Resource, str]:
-        """What a URL names, and which stream of it; "" is all."""
+        """Return the resource of a URL and the name of its stream; "" means all streams."""
         url = rtsp.split_url(uri)
         path = "" if url is None else url[2].rstrip("/")
         if path == _LIVE or path.startswith(_LIVE + "/"):
@@ -340,17 +349,23 @@ class VideoServer:
 
     # -- pictures
 
-    async def _run(self) -> None:
-        """Take pictures as long as somebody looks."""
-        loop = asyncio.get_running_loop()
-        due = loop.time()
-        while any(session.playing for session in self._sessions.values()):
-            self._take(loop.time())
-            due += 1.0 / FRAME_RATE
-            late = loop.time() - due
-            if late > LATE:
-                due += int(late * FRAME_RATE) / FRAME_RATE
-            await asyncio.sleep(max(0.0, due - loop.time()))
+    @property
+    def playing(self) -> bool:
+        """True while a client plays."""
+        return any(session.playing for session in self._sessions.values())
+
+    def tick(self, now: float, passed: float) -> None:
+        """Take the picture that is due; the world has moved on for `passed` s of the host's clock.
+
+        One at most: a world that moves in longer steps than `PERIOD` has fewer pictures, and none twice.
+        """
+        if not self._sessions or not passed or not self.playing:
+            return
+        self._due -= passed
+        if self._due > 0.5 * passed:  # the next tick is nearer to its time
+            return
+        self._due = self._due + PERIOD if self._due > -PERIOD else PERIOD
+        self._take(now)
 
     def _take(self, now: float) -> None:
         said: dict[str, FrameMetadata] = {}
@@ -364,7 +379,7 @@ class VideoServer:
                     said[stream.title] = video.metadata(self._firmware, stream)
                 track.send(now, said.get(stream.title) if session.resource.seconds is None else None)
             if session.resource.seconds is not None:
-                session.position += 1.0 / FRAME_RATE
+                session.position += PERIOD
                 if session.position >= session.until - 0.5 / FRAME_RATE:
                     session.position = session.until
                     self._stop(session, "finished")

@@ -1,4 +1,4 @@
-"""The live video of the simulated models: which streams there are, and what is said of each of their pictures."""
+"""Live video of the simulated models: their streams and the metadata of the pictures."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Stream:
     """One camera as it is streamed."""
 
     title: str
-    """What Olympe asks for as `media_name`."""
+    """Name that Olympe requests as `media_name`."""
     control: str
     """Last part of its URL."""
     width: int
@@ -67,7 +67,7 @@ class Stream:
 
 
 def streams_of(model: Model) -> tuple[Stream, ...]:
-    """The streams of a model's cameras; the first is what who does not choose gets."""
+    """Return the streams of a model's cameras; the first is the default."""
     lens = model.lens
     intrinsics = Intrinsics((lens.cx, lens.cy), (lens.k1, lens.k2, lens.k3), (lens.p1, lens.p2))
     title, control = ("Front camera", "front") if model.modern else ("DefaultVideo", "video")
@@ -94,18 +94,18 @@ def profile(model: Model) -> int:
 
 
 def optics(firmware: Firmware, stream: Stream) -> Optics:
-    """What a stream's camera takes its pictures with."""
+    """Return the optical settings of a stream's camera."""
     if stream.lens is None:
         return Optics(zoomed(stream.hfov, 1.0))
     return firmware.payload.cameras.optics(stream.lens)
 
 
 def metadata(firmware: Firmware, stream: Stream) -> FrameMetadata:
-    """What is said of a picture taken now.
+    """Return the metadata of a picture taken now.
 
-    Its timestamp is of the simulated clock, which `SimulatedDrone.time` tells and on which everything that it says
-    happened: what is measured between two pictures does not depend on how busy the machine is. It is never zero, which
-    the protocol buffer cannot say.
+    Its timestamp is of the simulated clock, the same as `SimulatedDrone.time`, and so are the times of everything
+    that it reports: a measurement between two pictures does not depend on the load of the host. It is never zero,
+    because the protocol buffer cannot carry zero.
     """
     pose, model, seen = firmware.pose, firmware.model, optics(firmware, stream)
     firmware.gimbal.advance(firmware.time)
@@ -152,7 +152,11 @@ def metadata(firmware: Firmware, stream: Stream) -> FrameMetadata:
 
 
 def _milliseconds(exposure: float, model: Model) -> float | None:
-    """Version 3 counts to 256 ms; what an aircraft says beyond is not known, here it says nothing."""
+    """Return the exposure time in ms, or None when an older model cannot report it.
+
+    Version 3 of the metadata is limited to 256 ms; how an aircraft reports longer times is not known, here the
+    field is left out.
+    """
     return exposure * 1000.0 if model.modern or exposure < 0.25 else None
 
 

@@ -1,1 +1,1 @@
-"""The simulated world: models, motion, wind, the radio link, and the faults injected into them."""
+"""The simulated world: models, motion, wind, the radio link, and injected faults."""

@@ -55,9 +55,10 @@ class Body:
         self._enter(Mode.FALL)
 
     def sticks(self, roll: float, pitch: float, yaw_rate: float, climb: float) -> None:
-        """Wanted tilt (rad: roll + right, pitch + nose up), yaw rate (rad/s) and climb rate (m/s up).
+        """Set the tilt, yaw rate and climb rate that the sticks command.
 
-        A zero roll or pitch asks that axis to stop. Counts in STICKS, partly in MOVE (yaw) and LAND (tilt, yaw).
+        Tilt in rad (roll + right, pitch + nose up), yaw rate in rad/s, climb rate in m/s up. A zero roll or pitch
+        asks that axis to stop. Takes effect in STICKS, partly in MOVE (yaw) and LAND (tilt, yaw).
         """
         motion, i = self._motion, self._index
         motion.stick_push[0, i] = -G * math.tan(pitch)

@@ -17,11 +17,14 @@ class Calendar:
         self._zone = timezone.utc
 
     def begin(self, unix_time: float) -> None:
-        """It was then at simulated time 0, in UTC: what GPS tells a drone that nobody has told the time."""
+        """Set the date of simulated time 0, in UTC, as GPS does for a drone without a client's time."""
         self._base, self._zone = unix_time, timezone.utc
 
     def set(self, text: str, time: float) -> bool:
-        """It is `text` at simulated time `time`. False, and nothing is changed, when that is no date."""
+        """It is `text` at simulated time `time`.
+
+        False, and nothing is changed, when that is no date.
+        """
         shape = _SHAPE.fullmatch(text)
         if shape is None:
             return False

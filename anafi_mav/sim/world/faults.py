@@ -1,4 +1,4 @@
-"""What a test or a scenario may break on a simulated drone."""
+"""Faults that a test or a scenario can set on a simulated drone."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from anafi_mav.sim.world.quirks import Quirk
 
 @dataclass(frozen=True)
 class Impairment:
-    """What the air does to the datagrams of one direction. Probabilities are per datagram."""
+    """Impairment of the datagrams of one direction. Probabilities are per datagram."""
 
     loss: float = 0.0
     delay: float = 0.0
@@ -43,7 +43,7 @@ class Faults:
     on_mute: Callable[[bool], None] = field(default=lambda mute: None, repr=False, compare=False)
     """Called with each new value of `mute`; the owner of the sockets sets it."""
     mute: bool = False
-    """The air is gone: nothing is heard and nothing is said, both ways, and nobody connects."""
+    """Total loss of the link: no datagram passes either way, and no controller can connect."""
     up: Impairment = CLEAR
     """From the controller to the drone."""
     down: Impairment = CLEAR
@@ -62,8 +62,10 @@ class Faults:
     refuse_take_off: frozenset[TakeoffChecklistType] = frozenset()
     """Further lines of the take-off checklist that prevent it."""
     refuse_plan: frozenset[FlightPlanComponent] = frozenset()
-    """Further components of a flight plan that are not as they have to be. What the drone looks for in the file itself
-    it finds when it is told to start."""
+    """Further components of a flight plan that are reported as not ready.
+
+    Those that depend on the file are checked when the plan is started.
+    """
     storage_full: bool = False
     """No room for a photo more."""
     quirks: frozenset[Quirk] = frozenset()

@@ -1,4 +1,4 @@
-"""The cameras of the family as data: what each can be told, in Parrot's words.
+"""Cameras of the ANAFI family as data: the settings that each accepts, in Parrot's terms.
 
 From the capability events that anafi_ros recorded (its `extra` folder) and, for optics, the table of the anafi_ros
 paper. What neither gives is marked "assumed".
@@ -202,7 +202,7 @@ AI = replace(
     hfov=68.0,
     adjustable=False,
 )
-"""What the Ai's camera does when it is at work; how it is spoken to is `camera2`'s."""
+"""Properties of the Ai's camera; its messages are in `camera2`."""
 
 
 def _bare(blended: Lens) -> Lens:

@@ -1,4 +1,7 @@
-"""The air between a controller and a simulated drone: what happens to datagrams on their way (`faults.Impairment`)."""
+"""Radio link between a controller and a simulated drone: faults of datagrams on their way.
+
+Configured by `faults.Impairment`.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +21,10 @@ Deliver = Callable[[bytes], None]
 
 
 class Air:
-    """Both directions of one drone's link. `later(seconds, function)` calls a function after a while."""
+    """Both directions of one drone's link.
+
+    `later(seconds, function)` calls a function after a while.
+    """
 
     def __init__(
         self, faults: Faults, chance: random.Random, later: Callable[[float, Callable[[], None]], Any]

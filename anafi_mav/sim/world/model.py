@@ -1,5 +1,6 @@
-"""How each model of the family flies and what it reports, as data. A new one is a new entry of `MODELS`, no subclass.
+"""Flight figures and reported values of each model, as data.
 
+A new model is a new entry of `MODELS`, not a subclass.
 What both sides of the wire know of it, by its data sheet, is the record of the same key in `anafi_mav.models`.
 Numbers of the airframe come from the table of the anafi_ros paper (size, speeds, battery, flight time); ranges of
 settings from Parrot's own events as anafi_ros and GroundSDK record them. Values that no public source gives are
@@ -57,7 +58,10 @@ class Battery:
 
 @dataclass(frozen=True)
 class GimbalModel:
-    """One gimbal: deg, the same relative to the body and to the horizon; (0, 0) is an axis that does not turn."""
+    """Ranges of one gimbal in deg, the same relative to the body and to the horizon.
+
+    (0, 0) is an axis that does not turn.
+    """
 
     pitch: tuple[float, float]
     roll: tuple[float, float] = (0.0, 0.0)
@@ -66,7 +70,7 @@ class GimbalModel:
 
 @dataclass(frozen=True)
 class Card:
-    """A place to store media: what `user_storage` (or, with ids, `user_storage_v2`) tells of it."""
+    """Storage for media, as `user_storage` (or, with ids, `user_storage_v2`) describes it."""
 
     name: str
     capacity: int
@@ -76,7 +80,7 @@ class Card:
 
 @dataclass(frozen=True)
 class Envelope:
-    """What the aircraft is and what it stands (anafi_ros paper)."""
+    """Dimensions and limits of the aircraft (anafi_ros paper)."""
 
     size_mm: tuple[int, int, int]
     """Unfolded."""

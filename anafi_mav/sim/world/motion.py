@@ -13,7 +13,7 @@ The model is small on purpose and fitted to the measurements in section IV of th
 Tilt, yaw and climb are linear as long as no limit is reached: a step solves them in closed form for a command that is
 constant meanwhile. The drag is that of the mean speed. The push is that of the tilt at the end of the step: the half
 step that this is early makes up for the half step that a command waits, and for the lead that the semi-implicit steps
-of 5 ms had with which the flights in tests/unit/sim_flights.json were recorded. The delays are whole steps.
+of 5 ms had with which the flights in tests/support/sim_flights.json were recorded. The delays are whole steps.
 
 Frames: position and velocity are north, east, down in metres from the place the simulator was given as home; attitude
 is roll (right wing down), pitch (nose up), yaw (clockwise from north) in rad. The ground is a plane at down = 0.
@@ -57,7 +57,10 @@ def _second_order(omega: float, damping: float, step: float) -> tuple[float, flo
 
 
 def _first_order(tau: float, step: float) -> tuple[float, float]:
-    """Solve x' = -x / tau over a step: (x at its end, integral of x) for an x of 1 at its beginning."""
+    """Solve x' = -x / tau over a step, with x = 1 at its beginning.
+
+    Returns (x at its end, integral of x).
+    """
     kept = math.exp(-step / tau)
     return kept, tau * (1.0 - kept)
 
@@ -103,7 +106,7 @@ _PUSH_SIGNS: Array = np.array([[G], [-G]])
 
 
 class Mode(enum.IntEnum):
-    """Who flies."""
+    """Motion mode of one drone."""
 
     OFF = 0
     """Motors off or idle, on the ground."""
@@ -120,7 +123,7 @@ class Mode(enum.IntEnum):
 
 
 class Turn(enum.IntEnum):
-    """What the nose does in a MOVE."""
+    """Control of the heading in a MOVE."""
 
     STICK = 0
     """As the yaw stick says."""
@@ -132,7 +135,7 @@ class Turn(enum.IntEnum):
 
 @dataclass(frozen=True)
 class Pose:
-    """Where a drone truly is: metres, m/s, rad. `up` is the height above the take-off plane."""
+    """True pose of a drone: metres, m/s, rad. `up` is the height above the take-off plane."""
 
     north: float
     east: float
@@ -159,7 +162,10 @@ _STICK, _FIRST, _DURING = int(Turn.STICK), int(Turn.FIRST), int(Turn.DURING)
 
 
 class _Orders:
-    """What the drones are told, worked out once and not in every step: masks over the fleet, and which are empty."""
+    """Commanded motion of all drones, computed once and not in every step.
+
+    Contains masks over the fleet, and flags of the masks that are empty.
+    """
 
     def __init__(self, motion: Motion) -> None:
         mode = motion.mode
@@ -196,7 +202,7 @@ class _Orders:
 
 
 class Motion:
-    """The fleet's motion. `step()` advances all of it; `body.Body` is the handle of one drone."""
+    """The fleet's motion. `step()` advances all of it; `airframe.Body` is the handle of one drone."""
 
     def __init__(self, airframes: Sequence[Airframe]) -> None:
         count = len(airframes)
@@ -239,7 +245,7 @@ class Motion:
         """Forward and right, while a step is worked out."""
         self._orders = _Orders(self)
         self.stale = False
-        """Somebody was told something: the orders must be worked out anew."""
+        """True after a command: the commanded motion of the fleet must be computed again."""
         self._poses: list[Pose] | None = None
         """None: a drone has moved since they were made."""
         self.yaw_line = DelayLine([frame.yaw_delay for frame in airframes], STEP)
@@ -293,7 +299,10 @@ class Motion:
         self._touch_ground(orders)
 
     def _follow(self, orders: _Orders, up: Array) -> tuple[Array, Array, Array]:
-        """Velocity, climb and yaw rate that bring the moving drones to their targets; those of the others besides."""
+        """Return the velocity, climb and yaw rate that bring the moving drones to their targets.
+
+        For the other drones the velocity is zero, climb and yaw rate are the commanded ones.
+        """
         moving = going = orders.moving
         way = self.target[:2] - self.position[:2]
         distance = np.hypot(way[0], way[1])
@@ -436,7 +445,7 @@ class Motion:
         return result
 
     def poses(self) -> list[Pose]:
-        """Every drone's pose, in the order of the airframes."""
+        """Return every drone's pose, in the sequence of the airframes."""
         if self._poses is None or self.stale:
             columns = np.concatenate((self.position, self.tilt, [self.yaw], self.velocity))
             columns[2] = 0.0 - columns[2]  # not -0.0 for a drone on the ground

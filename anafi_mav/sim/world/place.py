@@ -1,4 +1,4 @@
-"""The simulator's flat world on the earth: metres north and east of the given home, and back."""
+"""Conversion between the simulator's flat world (m north and east of home) and the earth."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from anafi_mav import geo
 
 @dataclass(frozen=True)
 class Origin:
-    """Where (0, 0, 0) lies: deg, deg, and the ground's height in m above mean sea level."""
+    """Origin (0, 0, 0) of the world: deg, deg, height of the ground in m above mean sea level."""
 
     latitude: float
     longitude: float

@@ -13,7 +13,10 @@ from anafi_mav.errors import ConfigError
 
 
 class Quirk(enum.Enum):
-    """A deviation of the simulated firmware. The value is its name on the command line and in files."""
+    """A deviation of the simulated firmware.
+
+    The value is its name on the command line and in files.
+    """
 
     description: str
     """One sentence for the documentation."""
@@ -63,7 +66,10 @@ QUIRKS = {quirk.value: quirk for quirk in Quirk}
 
 
 def named(names: Iterable[str], key_path: str) -> frozenset[Quirk]:
-    """Return the quirks with these names. Raises `ConfigError` at `key_path` for an unknown name."""
+    """Return the quirks with these names.
+
+    Raises `ConfigError` at `key_path` for an unknown name.
+    """
     for name in (names := tuple(names)):
         if name not in QUIRKS:
             raise ConfigError(key_path, f"expected one of {', '.join(QUIRKS)}, got {name[:60]!r}")

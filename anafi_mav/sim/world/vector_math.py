@@ -30,7 +30,10 @@ class DelayLine:
         self._ring[:, column] = 0.0
 
     def push(self, values: Array) -> Array:
-        """Put in what is commanded now, take out what was commanded `delay` ago: good until the next one is put in."""
+        """Store the current command and return the one of `delay` ago.
+
+        The array returned is valid until the next call.
+        """
         ring, now = self._ring, self._now
         ring[now] = values
         self._now = (now + 1) % len(ring)

@@ -35,7 +35,7 @@ _HYSTERESIS = 0.5
 
 @dataclass(frozen=True)
 class WindSpec:
-    """What wind is wanted. Raises `ConfigError` for one that cannot be."""
+    """Configuration of the wind. Raises `ConfigError` for an impossible one."""
 
     speed: float = 0.0
     """m/s"""
@@ -84,7 +84,7 @@ class Wind:
 
 
 class WindWatch:
-    """What the drone makes of the wind it feels in the air."""
+    """Wind warning of the drone, from the wind measured in the air."""
 
     def __init__(self, resistance: float) -> None:
         """`resistance`: m/s that the model stands."""

@@ -1,4 +1,4 @@
-"""The one height: metres above the take-off point, and its bridge to mean sea level.
+"""The one height: metres above the take-off point, and its bridge to mean sea level. No I/O.
 
 ARSDK flies in heights above take-off (ATO) and reports GPS altitude above mean sea level (AMSL). While the drone
 stands, the AMSL height of the take-off point is latched as GPS AMSL minus ATO; from then on AMSL is ATO plus that

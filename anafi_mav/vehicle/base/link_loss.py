@@ -1,4 +1,4 @@
-"""What is done when no ground station is heard any more: the policy, and the watch over their heartbeats. I/O-free.
+"""What is done when no ground station is heard any more: the policy, and the watch over their heartbeats. No I/O.
 
 Only heartbeats of type GCS count: a program that flies setpoints is no ground station, and its own silence has its own
 consequence. The policy is off unless somebody sets it (conformance E11).

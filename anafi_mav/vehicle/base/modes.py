@@ -1,4 +1,4 @@
-"""Flight modes: one neutral enum. How an autopilot numbers them is its flavour's business.
+"""Flight modes: one neutral enum. How an autopilot numbers them is its flavour's business. No I/O.
 
 The mode of a system is what the drone does, not what somebody asked for; `Vehicle.mode` decides it.
 """

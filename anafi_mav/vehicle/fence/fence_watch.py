@@ -374,11 +374,14 @@ class FenceWatch:
         for side in self._sides.values():
             side.orders, side.retry_at = orders, None
 
-    def failed(self, now: float) -> None:
-        """The action was not carried out: it is tried again, unless the vehicle comes back inside before."""
+    def failed(self, now: float, *, replaced: bool = False) -> None:
+        """The action was not carried out: it is tried again, unless the vehicle comes back inside before.
+
+        `replaced`: a client's order has ended it. Beyond a boundary it is not tried again then.
+        """
         self._acting = None
         for side in self._sides.values():
-            if side.state is not State.INSIDE:
+            if side.state is State.LEAVING or (side.state is State.OUTSIDE and not replaced):
                 side.retry_at = now + RETRY
 
     def link_down(self) -> None:

@@ -1,4 +1,4 @@
-"""Flies a mission: the shell around the cores `mission_progress` and `plans.translate`.
+"""Flies a mission: the shell around the cores `progress` and `plans.translation.translate`.
 
 What the drone can fly by itself it flies from a file (`Leg`); what it cannot, the gateway flies between two files
 (`Step`). The drone says which line it has executed, and nothing else counts. Whatever takes the drone over stops the
@@ -14,7 +14,7 @@ from typing import Any
 
 from anafi_mav import texts
 from anafi_mav.drone import events
-from anafi_mav.drone.events import FlyingState, PlayingState
+from anafi_mav.drone.events import FlyingState, Message, PlayingState
 from anafi_mav.errors import AnafiMavError, CommandRejected, LinkLost
 from anafi_mav.plans.plan import Item
 from anafi_mav.plans.translation.translate import Leg
@@ -31,7 +31,7 @@ from anafi_mav.vehicle.mission.progress import ENDINGS, Progress, State
 from anafi_mav.vehicle.mission.record import Keeper, Record
 from anafi_mav.vehicle.mission.steps import fly_step
 from anafi_mav.vehicle.mission.texts import beginning, refusal
-from anafi_mav.vehicle.mission.waits import ARM_WAIT, ArmWait, EndWatch, StoreWait
+from anafi_mav.vehicle.mission.waits import ARM_WAIT, PROOF, ArmWait, EndWatch, StoreWait
 
 _LANDING = (FlyingState.LANDING, FlyingState.EMERGENCY_LANDING)
 
@@ -156,6 +156,14 @@ class MissionFlight:
             self.progress.choose(item)
             self._keep()
             self.news()
+
+    async def reset(self, client: Hashable) -> None:
+        """Give every loop all its turns again. The current item stays; after the end the mission begins anew."""
+        progress = self.progress
+        if progress.state is State.COMPLETE:
+            await self.choose(client, 0)
+        elif progress.jumps and not progress.ending:
+            await self.choose(client, progress.current)
 
     def armed(self, client: Hashable) -> None:
         """A client has armed: what waited for that begins."""
@@ -294,6 +302,13 @@ class MissionFlight:
             await self._begin(self.progress.first, number, waited=True)
         except AnafiMavError as error:
             self._vehicle.text(Severity.ERROR, text_of(error))
+            if self._is_chosen_only:
+                self._vehicle.select(FlightMode.HOLD)
+
+    @property
+    def _is_chosen_only(self) -> bool:
+        """The mode is Mission, and nothing of the mission is flown."""
+        return self._vehicle.selected is FlightMode.MISSION and not self.flying
 
     def _announce(self, resumes: bool) -> None:
         """What is flown, and what happens to it without the gateway."""
@@ -402,7 +417,11 @@ class MissionFlight:
             events.MavlinkFilePlayingStateChanged: self._on_playing,
             events.MissionItemExecuted: lambda message, now: self._executed(message.idx),
             events.WaypointSkipped: self._on_skipped,
+            **dict.fromkeys(PROOF, self._on_position),
         }
+
+    def _on_position(self, message: Message, now: float) -> None:
+        self._end_watch.on_position(type(message))
 
     def _on_skipped(self, message: events.WaypointSkipped, now: float) -> None:
         item = self.progress.skip(message.item)
@@ -488,6 +507,8 @@ class MissionFlight:
             self._running.cancel()
             ended.append(self._running)
             self._running = None
+            if self._is_chosen_only:
+                self._vehicle.forget_mode()
         if self.progress.state is State.ACTIVE:
             self._stop(None)
             self._suspend()

@@ -10,7 +10,15 @@ from contextlib import contextmanager
 
 from anafi_mav import geo, texts
 from anafi_mav.clock import Alarm
-from anafi_mav.drone.events import AlertState, FlyingState, ForcedLandingReason, PlayError
+from anafi_mav.drone.events import (
+    AlertState,
+    AltitudeChanged,
+    FlyingState,
+    ForcedLandingReason,
+    GpsLocationChanged,
+    Message,
+    PlayError,
+)
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.mission.path import WayPoint
@@ -21,6 +29,16 @@ ARM_WAIT = 10.0
 
 END_WAIT = 2.0
 """s within which a drone whose plan has ended has reported the last line, or begun its landing or return."""
+
+POSITION_WAIT = 10.0
+"""s after that end within which a position must be received that proves the drone at its last way point.
+
+An ANAFI reports its location once a second, and no report is repeated. Of ten, a link that loses half of them loses all
+in one case of a thousand.
+"""
+
+PROOF: frozenset[type[Message]] = frozenset({GpsLocationChanged, AltitudeChanged})
+"""Reports of which the drone's position is made."""
 
 GPS_MARGIN = 2.0
 """m beyond the radius of a way point at which a drone that has stopped there may report itself."""
@@ -93,7 +111,8 @@ class EndWatch:
 
     Parrot does not document whether the last MissionItemExecuted precedes the state stopped. A last line that lands or
     returns is done when the drone has begun that; one of another cause is not the mission's. Any other last line is
-    done when the drone is at the last way point and nothing is wrong. The report itself may also be late.
+    done when the drone is at the last way point and nothing is wrong. The report itself may also be late. A position
+    that was received before the drone stopped proves nothing: over a bad link it may be seconds old.
     """
 
     def __init__(self, vehicle: Aircraft, progress: Progress, ended: Callable[[bool], None]) -> None:
@@ -102,8 +121,12 @@ class EndWatch:
         self._progress = progress
         self._ended = ended
         self._target: WayPoint | None = None
-        self._alarm = Alarm(self._late)
+        self._alarm = Alarm(self._on_alarm)
         self._running = False
+        self._missing: frozenset[type[Message]] = frozenset()
+        """Parts of the position that have not been received since the drone stopped."""
+        self._waits_for_position = False
+        """Only a position is missing for the decision."""
 
     @property
     def running(self) -> bool:
@@ -116,11 +139,22 @@ class EndWatch:
         self.end()
         self._target = target
         self._running = True
+        self._missing = frozenset() if target is None else PROOF
         self._alarm.set_in(END_WAIT)
         self.look()
 
-    def _late(self) -> None:
-        self.look(last=True)
+    def on_position(self, kind: type[Message]) -> None:
+        """Process the arrival of a part of the drone's position."""
+        self._missing -= {kind}
+        if self._waits_for_position and not self._missing:
+            self.look(last=True)
+
+    def _on_alarm(self) -> None:
+        if self._missing and not self._waits_for_position:
+            self._waits_for_position = True
+            self._alarm.set_in(POSITION_WAIT - END_WAIT)
+        else:
+            self.look(last=True)
 
     def look(self, *, last: bool = False) -> None:
         """Landing, return or flying state may have changed."""
@@ -134,11 +168,11 @@ class EndWatch:
                 self._ended(begun)
         elif last or self._is_in_trouble:
             self.end()
-            self._ended(not self._is_in_trouble and self._is_at(target))
+            self._ended(not self._is_in_trouble and not self._missing and self._is_at(target))
 
     def end(self) -> None:
-        """Watch no more."""
-        self._running = False
+        """Stop watching."""
+        self._running = self._waits_for_position = False
         self._alarm.cancel()
 
     @property

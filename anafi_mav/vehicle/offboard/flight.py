@@ -1,8 +1,8 @@
-"""Flies the drone by the pilot's setpoints: the shell around the cores `offboard` and `offboard_control`.
+"""Flies the drone by the pilot's setpoints: the shell around the cores `stream` and `base.velocity_loop`.
 
 An attitude or a velocity reaches the sticks the moment it arrives, and again whenever the drone tells how it moves. A
-position is a move that the drone makes by itself (`offboard_moves`). A timer turns the pilot's silence into a hover,
-which ends a move as well. On the ground a setpoint that climbs takes the drone off (`setpoint_takeoff`); nothing is
+position is a move that the drone makes by itself (`moves`). A timer turns the pilot's silence into a hover,
+which ends a move as well. On the ground a setpoint that climbs takes the drone off (`takeoff`); nothing is
 flown before it hovers.
 """
 

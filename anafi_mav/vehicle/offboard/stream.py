@@ -1,7 +1,7 @@
 """Offboard: setpoints of a program fly the drone for as long as they keep coming, and not a moment longer.
 
-I/O-free: `OffboardStream` keeps whose setpoints there are and whether they fly the drone; what they ask for is in
-`offboard_setpoints`, and `OffboardFlight` flies it.
+No I/O: `OffboardStream` keeps whose setpoints there are and whether they fly the drone; what they ask for is in
+`setpoints`, and `OffboardFlight` flies it.
 
 A session has one pilot: whoever engages it. Setpoints of others change nothing while it lasts. PX4's way to engage is
 mode Offboard, refused without setpoints. ArduPilot's way is to send setpoints in mode Guided, and there a single

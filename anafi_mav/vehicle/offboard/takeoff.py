@@ -1,4 +1,4 @@
-"""Take-off by setpoints: which setpoints climb, and for how long a client has to ask for it. I/O-free.
+"""Take-off by setpoints: which setpoints climb, and for how long a client has to ask for it. No I/O.
 
 Programs of both families begin on the ground: they arm, engage, and send a setpoint that climbs. PX4 then takes off in
 Offboard for any setpoint, ArduCopter in Guided for an attitude with thrust (mode_guided.cpp, `set_angle`). Only a climb

@@ -34,13 +34,8 @@ PRODUCT = {
     "support/scripted_device.py": dict.fromkeys(
         ("_commander", "_open", "_waiting"), "at the end of a test nothing may wait for an answer of the drone"
     ),
-    "conformance/test_extending.py": {"_CODECS": "a message that a test has declared must not stay declared"},
+    "conformance/test_extending.py": {"_CODECS": "an invented message is removed, so that no other test finds it"},
     "conformance/test_params_kept.py": {"_WRITER": "a slow memory card: the thread that writes files is kept busy"},
-    "conformance/test_conf_streams.py": {"_CODECS": "a message that a test has declared must not stay declared"},
-    "conformance/test_params_kept.py": {"_WRITER": "a slow memory card: the thread that writes files is kept busy"},
-    "conformance/test_conf_streams.py": {"_CODECS": "an invented message is removed, so that no other test finds it"},
-    "conformance/test_extending.py": {"_CODECS": "likewise"},
-    "conformance/test_extending.py": {"_CODECS": "likewise"},
     "support/callers.py": dict.fromkeys(
         ("_act", "_return_or_hold", "_break_off", "_expired", "_let_go"),
         "what acts without a client is called where its timer or task calls it: each would need a flight of its own",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 import re
 import sys
 from collections.abc import Iterator
@@ -17,42 +18,52 @@ else:
 
 REPOSITORY = Path(__file__).parents[3]
 PACKAGE = REPOSITORY / "anafi_mav"
+TESTS = REPOSITORY / "tests"
+UNIT = TESTS / "unit"
+FOLDERS = sorted(path.parent.relative_to(PACKAGE).as_posix() for path in PACKAGE.glob("*/**/__init__.py"))
+"""Of the package, as "drone/status"."""
 
 KIT = {"errors", "units", "geo", "clock", "documents", "models", "printable", "state_lock", "subject", "texts"}
 GUARDED = {"lxml", "pymavlink"}
 """Libraries of the build and the tests: no room may import them."""
 
 CORES = [
-    "arsdk/codec/wire.py",
-    "arsdk/messages",
-    "arsdk/link/frame.py",
-    "arsdk/link/packing.py",
-    "arsdk/link/transport.py",
+    *("geo.py", "mav_enums.py", "units.py", "config/schema.py", "plans"),
+    *("arsdk/codec", "arsdk/messages", "arsdk/video", "arsdk/mux/mux.py"),
+    *("arsdk/link/frame.py", "arsdk/link/handshake.py", "arsdk/link/packing.py", "arsdk/link/transport.py"),
+    *("mavlink/channel.py", "mavlink/frames.py", "mavlink/plan_client.py", "mavlink/router.py", "mavlink/streams.py"),
+    *("drone/contention.py", "drone/piloting/sticks.py"),
+    *("sim/autopilot/firmware.py", "sim/autopilot/flight.py"),
+    *("vehicle/base/clients.py", "vehicle/base/height.py", "vehicle/base/link_loss.py", "vehicle/base/modes.py"),
+    *("vehicle/base/roll_sign.py", "vehicle/base/severity.py", "vehicle/base/silence.py"),
+    *("vehicle/base/subscriptions.py", "vehicle/base/velocity_loop.py", "vehicle/fence"),
+    *("vehicle/mission/course.py", "vehicle/mission/progress.py"),
+    *("vehicle/offboard/setpoints.py", "vehicle/offboard/stream.py", "vehicle/offboard/takeoff.py"),
+    *("vehicle/circle.py", "vehicle/follow.py", "vehicle/hold_rule.py", "vehicle/initiator.py"),
+    "vehicle/joystick_override.py",
+    *("services/capabilities.py", "services/checksum.py", "services/commands.py", "services/component_metadata.py"),
+    *("services/event/events.py", "services/ftp/ftp.py"),
+    *("services/parameter/parameter_codec.py", "services/parameter/parameter_metadata.py"),
+    *("services/plan/fence_kind.py", "services/plan/item_messages.py", "services/plan/mission_kind.py"),
+    *("services/plan/plan_files.py", "services/plan/plan_protocol.py", "services/plan/plan_requests.py"),
+    *("services/plan/plan_transfer.py", "services/plan/rally_kind.py"),
+    *("services/setpoint/setpoint_messages.py", "services/setpoint/stick_messages.py"),
+    "services/setpoint/target_messages.py",
+    *("services/telemetry/data_streams.py", "services/telemetry/update_tracker.py"),
 ]
-CORES += [
-    "arsdk/video/video_metadata.py",
-    "arsdk/video/video_metadata_proto.py",
-    "arsdk/video/rtp.py",
-    "arsdk/video/rtp_h264.py",
-]
-CORES += ["arsdk/video/rtcp.py", "arsdk/video/rtp_reception.py", "arsdk/video/rtsp.py", "arsdk/video/sdp.py"]
-CORES += ["arsdk/link/handshake.py", "mavlink/frames.py", "mavlink/router.py", "mavlink/streams.py", "plans"]
-CORES += ["vehicle/mission/course.py", "vehicle/mission/progress.py"]
-CORES += [
-    "vehicle/base/modes.py",
-    "vehicle/offboard/stream.py",
-    "vehicle/base/height.py",
-    "units.py",
-    "geo.py",
-    "config/schema.py",
-]
-CORES += ["mav_enums.py"]
+"""Modules and folders that know neither sockets nor clocks. The list may only grow."""
+
+GENERATED = {"mav_enums.py"}
+"""Cores whose docstring is the generator's."""
+
+NO_IO = "No I/O"
 IO = {"asyncio", "socket", "time", "threading", "selectors", "subprocess"}
 
 
 def read_table() -> dict[str, set[str]]:
     """{room: what it may import} as docs/architecture.md says."""
     text = (PACKAGE.parent / "docs" / "architecture.md").read_text(encoding="utf-8")
+    text = text.partition("### Inside the rooms")[0]
     rows = [line.strip("|").split("|") for line in text.splitlines() if line.startswith("| `")]
     table: dict[str, set[str]] = {}
     for names, _, allowed in rows:
@@ -80,10 +91,19 @@ def room_of(path: Path) -> str:
     return first.removesuffix(".py")
 
 
-def imports(path: Path) -> Iterator[tuple[int, str]]:
+def imports(path: Path) -> tuple[tuple[int, str], ...]:
     """(line, dotted name) of each import in a file of the package, relative ones resolved, wherever it stands."""
-    package = ["anafi_mav", *path.relative_to(PACKAGE).parent.parts]
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"), str(path))):
+    return imports_of(path.read_text(encoding="utf-8"), "anafi_mav", *path.relative_to(PACKAGE).parent.parts)
+
+
+@functools.cache
+def imports_of(source: str, *package: str) -> tuple[tuple[int, str], ...]:
+    """As `imports`, of the source of a module in this package."""
+    return tuple(_read_imports(source, package))
+
+
+def _read_imports(source: str, package: tuple[str, ...]) -> Iterator[tuple[int, str]]:
+    for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Import):
             for alias in node.names:
                 yield node.lineno, alias.name
@@ -174,8 +194,14 @@ def test_a_wrong_edge_is_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     assert edges_not_in_the_table(module) == []
 
 
+def docstring(path: Path) -> str:
+    """The docstring of a module, or of a folder."""
+    file = path / "__init__.py" if path.is_dir() else path
+    return ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) or ""
+
+
 @pytest.mark.parametrize("core", CORES)
-def test_cores_know_neither_sockets_nor_clocks(core: str) -> None:
+def test_core_imports_neither_sockets_nor_clocks(core: str) -> None:
     path = PACKAGE / core
     files = sorted(path.rglob("*.py")) if path.is_dir() else [path]
     assert files
@@ -183,6 +209,184 @@ def test_cores_know_neither_sockets_nor_clocks(core: str) -> None:
         f"{file.name}:{line}: {name}" for file in files for line, name in imports(file) if name.partition(".")[0] in IO
     ]
     assert found == []
+
+
+@pytest.mark.parametrize("core", sorted({*CORES} - GENERATED))
+def test_core_says_in_its_docstring_that_it_has_no_io(core: str) -> None:
+    assert NO_IO in docstring(PACKAGE / core)
+
+
+def test_module_that_says_no_io_is_a_core() -> None:
+    cores = [PACKAGE / core for core in CORES]
+    claims = [path for path in modules() if NO_IO in docstring(path) or "I/O-free" in docstring(path)]
+    missing = [path for path in claims if not any(path == core or core in path.parents for core in cores)]
+    assert [str(path.relative_to(PACKAGE)) for path in missing] == []
+
+
+LARGEST = 20
+"""Modules that a folder holds at most."""
+
+LISTS = {"arsdk/messages", "cli"}
+"""Folders with one module for each item of a list: Parrot's features, the subcommands."""
+
+
+@pytest.mark.parametrize("folder", FOLDERS)
+def test_folder_holds_at_most_twenty_modules(folder: str) -> None:
+    found = [path.name for path in (PACKAGE / folder).glob("*.py") if path.name != "__init__.py"]
+    assert len(found) <= LARGEST or folder in LISTS, found
+
+
+@pytest.mark.parametrize("folder", FOLDERS)
+def test_folder_says_what_it_holds(folder: str) -> None:
+    assert docstring(PACKAGE / folder).strip()
+
+
+def test_unit_tests_mirror_the_package() -> None:
+    """A folder of tests has the name of the folder that it tests; `repository` tests what is around the package."""
+    folders = {path.parent.relative_to(UNIT).as_posix() for path in UNIT.rglob("test_*.py")}
+    assert sorted(folders - {".", "repository"} - {*FOLDERS}) == []
+
+
+def test_test_modules_import_no_test_module() -> None:
+    found = []
+    for path in sorted(TESTS.rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            found += [f"{path.name}: {name}" for name in names if re.search(r"(^|\.)(test_\w+|conftest)$", name)]
+    assert found == []
+
+
+# Inside the rooms.
+
+
+ALL = "all others"
+
+
+def read_folders() -> tuple[dict[str, set[str]], dict[str, str]]:
+    """({place: what it may import}, {module: its place}) as the table "Inside the rooms" says.
+
+    A place is a folder, `x/*` for the modules directly in a folder, or some of these modules by their names.
+    """
+    text = (REPOSITORY / "docs" / "architecture.md").read_text(encoding="utf-8")
+    part = text.partition("### Inside the rooms")[2].partition("\n## ")[0]
+    law: dict[str, set[str]] = {}
+    named: dict[str, str] = {}
+    for line in part.splitlines():
+        if line.startswith("| `"):
+            names, _, allowed = line.strip("|").split("|")
+            places = re.findall(r"`([\w/*]+)`", names)
+            first = places[0]
+            law[first] = {allowed.strip()} if ALL in allowed else set(re.findall(r"`([\w/*]+)`", allowed))
+            named |= dict.fromkeys(places, first)
+    for place, allowed in law.items():
+        if ALL in allowed:
+            room = place.partition("/")[0]
+            law[place] = {other for other in law if other.startswith(f"{room}/")} - {place}
+    return law, named
+
+
+LAW, NAMED = read_folders()
+
+
+def place_of(module: str) -> str | None:
+    """The place of a module, given as "drone/status/gps"; None in a room that has no folders."""
+    folder = module.rpartition("/")[0]
+    for name in (module, f"{folder}/*", folder):
+        if name in NAMED:
+            return NAMED[name]
+    return None
+
+
+def folder_edges(path: Path) -> list[str]:
+    module = path.relative_to(PACKAGE).with_suffix("").as_posix()
+    room, place = module.partition("/")[0], place_of(module)
+    if place is None:
+        return []
+    found = []
+    for line, name in imports(path):
+        parts = name.split(".")[1:] if name.startswith("anafi_mav.") else []
+        if parts[:1] != [room]:
+            continue
+        target = "/".join(parts) if (PACKAGE / ("/".join(parts) + ".py")).is_file() else "/".join(parts[:-1])
+        to = place_of(target)
+        if to is not None and to != place and to not in LAW[place]:
+            found.append(f"{module}:{line}: {place} may not import {name}")
+    return found
+
+
+def test_every_folder_of_a_divided_room_is_in_the_table() -> None:
+    divided = {name.partition("/")[0] for name in LAW}
+    assert divided == {"arsdk", "plans", "drone", "sim", "vehicle", "services"}
+    missing = [
+        str(path.relative_to(PACKAGE))
+        for path in modules()
+        if path.relative_to(PACKAGE).parts[0] in divided
+        and path.name != "__init__.py"
+        and place_of(path.relative_to(PACKAGE).with_suffix("").as_posix()) is None
+    ]
+    assert missing == []
+
+
+def test_every_place_of_the_table_exists() -> None:
+    for name in NAMED:
+        path = PACKAGE / name.removesuffix("/*")
+        assert path.is_dir() or path.with_suffix(".py").is_file(), name
+
+
+@pytest.mark.parametrize("place", sorted(LAW))
+def test_places_import_each_other_one_way_only(place: str) -> None:
+    seen: set[str] = set()
+    todo = [*LAW[place]]
+    while todo:
+        one = todo.pop()
+        assert one in LAW, f"{one} is no place"
+        if one not in seen:
+            seen.add(one)
+            todo += LAW[one]
+    assert place not in seen
+
+
+@pytest.mark.parametrize("folder", FOLDERS)
+def test_imports_inside_a_room_run_along_the_table(folder: str) -> None:
+    found = [edge for path in sorted((PACKAGE / folder).glob("*.py")) for edge in folder_edges(path)]
+    assert found == []
+
+
+def test_wrong_edge_inside_a_room_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(globals(), "PACKAGE", tmp_path)
+    for name in ("services/plan/wrong.py", "services/command/actions.py", "services/commands.py"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text("", encoding="utf-8")
+    module = tmp_path / "services" / "plan" / "wrong.py"
+    module.write_text("from anafi_mav.services.commands import Command", encoding="utf-8")
+    assert folder_edges(module) == []
+    for statement in (
+        "from anafi_mav.services.command.actions import reposition",
+        "from anafi_mav.services.command import actions",
+        "import anafi_mav.services.command.actions",
+        "from ..command import actions",
+    ):
+        module.write_text(statement, encoding="utf-8")
+        assert len(folder_edges(module)) == 1, statement
+
+
+def test_files_of_the_newcomers_index_exist() -> None:
+    text = (REPOSITORY / "docs" / "architecture.md").read_text(encoding="utf-8")
+    part = text.partition("## Where does")[2].partition("|---")[2].partition("\n## ")[0]
+    files = re.findall(r"`([\w/*]+(?:\.py|/))`", part)
+    assert len(files) > 20
+    assert [file for file in files if not [*PACKAGE.glob(file)]] == []
+
+
+def test_linter_holds_every_room_of_services_apart() -> None:
+    with (REPOSITORY / "pyproject.toml").open("rb") as file:
+        contracts = tomllib.load(file)["tool"]["importlinter"]["contracts"]
+    kept = next(
+        contract["modules"] for contract in contracts if contract["name"] == "a room of services knows no other"
+    )
+    rooms = [f for f in FOLDERS if re.fullmatch(r"services/\w+", f)]
+    assert sorted(kept) == [f"anafi_mav.{room.replace('/', '.')}" for room in rooms]
 
 
 def test_the_linter_has_the_same_table() -> None:

@@ -25,6 +25,7 @@ from anafi_mav.arsdk.codec.wire import (
     encode,
     wire_fields,
 )
+from anafi_mav.sim.world.motion import STEP
 
 ROUNDS = 4
 """Times that each command is sent to each model; thousands were run when this was written."""
@@ -72,7 +73,7 @@ def test_nothing_stops_it(model: str) -> None:
             if message is not None:
                 bench.firmware.receive(message, bench.now)
             if chance.random() < 0.2:
-                bench.run(chance.choice((0.01, 0.1, 0.3)))
+                bench.run(chance.choice((STEP, 0.1, 0.3)))
     bench.run(5.0)
     pose = bench.pose
     assert all(math.isfinite(value) for value in (pose.north, pose.east, pose.up, pose.roll, pose.pitch, pose.yaw))

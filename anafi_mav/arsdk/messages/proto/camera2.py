@@ -273,7 +273,10 @@ class StateUserLfic(Record, frozen=True, kw_only=True):
 
 @COMMAND.message("SetZoomTarget", 1)
 class SetZoomTarget(ProtobufMessage, frozen=True, kw_only=True):
-    """`target`: the zoom, 1 and up, or in mode VELOCITY -1 to 1 of `Config.zoom_max_speed`, held until the next one."""
+    """Set the zoom, or the zoom velocity in mode VELOCITY.
+
+    `target`: the zoom, 1 and up, or in mode VELOCITY -1 to 1 of `Config.zoom_max_speed`, held until the next one.
+    """
 
     camera_id: Annotated[int, Field(1, UINT64)] = 0
     control_mode: Annotated[ZoomControlMode, Field(2, ENUM)] = ZoomControlMode.LEVEL

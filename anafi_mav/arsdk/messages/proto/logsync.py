@@ -1,6 +1,6 @@
-"""logsync: who is who in the chain of controllers and drone, so that their logs can be matched.
+"""logsync: identities in the chain of controllers and drone, to match their logs.
 
-Both services go both ways: a drone asks the same.
+Both services go both ways: a drone sends the same requests.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""network: which link carries the Ai, Wi-Fi or 4G, and how good each is (0 unknown, 1 worst to 5 best)."""
+"""network: the active link of the Ai, Wi-Fi or 4G, and the quality of each.
+
+Quality: 0 unknown, 1 worst to 5 best.
+"""
 
 from __future__ import annotations
 
@@ -168,7 +171,7 @@ class SetEthernetIpConfig(ProtobufMessage, frozen=True, kw_only=True):
 
 @EVENT.message("State", 19)
 class State(ProtobufMessage, frozen=True, kw_only=True):
-    """What is None has not changed."""
+    """Changed parts of the network state; a None field has not changed."""
 
     default_capabilities: Annotated[Capabilities | None, Field(1, RECORD)] = None
     routing_info: Annotated[RoutingInfo | None, Field(2, RECORD)] = None

@@ -1,4 +1,7 @@
-"""pointnfly: look at, or fly to, a point. Degrees, metres, m/s, degrees/s; headings clockwise from North."""
+"""pointnfly: look at, or fly to, a point.
+
+Degrees, metres, m/s, degrees/s; headings clockwise from North.
+"""
 
 from __future__ import annotations
 

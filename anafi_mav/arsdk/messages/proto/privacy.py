@@ -1,4 +1,4 @@
-"""privacy: where the Ai keeps its logs and who may pair with it."""
+"""privacy: log storage of the Ai and pairing permissions."""
 
 from __future__ import annotations
 

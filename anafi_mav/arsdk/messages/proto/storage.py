@@ -1,4 +1,7 @@
-"""storage: internal storage and memory card, in firmware 8.5 and later; older Ai have user_storage_v2."""
+"""storage: internal storage and memory card, firmware 8.5 and later.
+
+Older Ai have user_storage_v2.
+"""
 
 from __future__ import annotations
 

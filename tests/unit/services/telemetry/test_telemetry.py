@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -312,3 +313,17 @@ def test_the_shell_answers_a_line_and_prompts() -> None:
     assert answer(None, "  ") == PROMPT  # type: ignore[arg-type]  # asks nothing of its host
     assert answer(None, "halt").startswith("no such command: halt")  # type: ignore[arg-type]
     assert "status" in answer(None, " HELP ")  # type: ignore[arg-type]
+
+
+def test_memory_counts_page_cache_as_available(tmp_path: Path) -> None:
+    meminfo = tmp_path / "meminfo"
+    meminfo.write_text("MemTotal:  4096000 kB\nMemFree:  102400 kB\nMemAvailable:  3072000 kB\nHugePages_Total: 0\n")
+    assert telemetry_link.memory_mib(meminfo) == (4000, 3000)
+
+
+@pytest.mark.parametrize("text", [None, "", "MemTotal: 4096000 kB\n", "MemTotal: many kB\nMemAvailable: 1 kB\n", "no"])
+def test_memory_that_no_kernel_reports_is_unknown(tmp_path: Path, text: str | None) -> None:
+    meminfo = tmp_path / "meminfo"
+    if text is not None:
+        meminfo.write_text(text)
+    assert telemetry_link.memory_mib(meminfo) is None

@@ -255,6 +255,21 @@ def test_a_motor_that_fails_brings_it_down(bench: Bench) -> None:
     bench.take_off()
 
 
+def test_motor_error_of_another_motor_is_reported(bench: Bench) -> None:
+    bench.faults.motors = 0b0100
+    bench.faults.motor_error = MotorError.ERROR_MOSFET
+    bench.run(0.1)
+    lasts = len(bench.of(ardrone3.MotorErrorLastErrorChanged))
+    bench.faults.motors = 0b0101
+    bench.run(0.1)
+    assert bench.of(ardrone3.MotorErrorStateChanged) == [
+        ardrone3.MotorErrorStateChanged(0b0100, MotorError.ERROR_MOSFET),
+        ardrone3.MotorErrorStateChanged(0b0101, MotorError.ERROR_MOSFET),
+    ]
+    assert len(bench.of(ardrone3.MotorErrorLastErrorChanged)) == lasts  # the last error is the same
+    assert ardrone3.MotorErrorStateChanged(0b0101, MotorError.ERROR_MOSFET) in all_settings(bench.firmware)
+
+
 def test_vibration_is_told() -> None:
     bench = Bench()
     bench.faults.vibration = WarningLevel.CRITICAL

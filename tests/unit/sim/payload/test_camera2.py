@@ -11,6 +11,7 @@ from support.sim_bench import Bench
 from anafi_mav.arsdk.codec.wire import Message, decode, encode
 from anafi_mav.arsdk.messages import ardrone3, camera, user_storage_v2
 from anafi_mav.arsdk.messages.proto import camera2
+from anafi_mav.sim.world.motion import STEP
 
 PHOTO, RECORDING = camera2.CameraMode.PHOTO, camera2.CameraMode.RECORDING
 
@@ -144,7 +145,7 @@ def test_what_cannot_be_photographed(bench: Bench) -> None:
 
 
 def test_a_recording(bench: Bench) -> None:
-    bench.run(0.03)  # between two looks at the clock
+    bench.run(2 * STEP)  # between two looks at the clock
     bench.send(camera2.StartRecording(camera_id=0))
     assert [m.recording.duration for m in bench.of(camera2.State) if m.recording is not None][-1] == 0
     bench.run(2.0)

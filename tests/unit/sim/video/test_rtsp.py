@@ -22,6 +22,7 @@ from anafi_mav.sim.payload.media import Kind
 from anafi_mav.sim.video.h264 import KEY_INTERVAL
 from anafi_mav.sim.video.rtsp import MAX_CONNECTIONS, MAX_SESSIONS, VideoServer
 from anafi_mav.sim.world.faults import Impairment
+from anafi_mav.sim.world.motion import STEP
 
 TICK = 90000 / 30
 """Between the timestamps of two pictures."""
@@ -61,6 +62,12 @@ class Studio:
 
         await asyncio.wait_for(wait(), LIMIT)
 
+    async def turn(self) -> None:
+        """Let the server's time pass; the drone on the bench is turned by the test."""
+        while True:
+            await asyncio.sleep(STEP)
+            self.server.tick(asyncio.get_running_loop().time(), STEP)
+
     def film(self, seconds: float) -> str:
         """A recording on the card; the id of its file."""
         store = self.bench.firmware.payload.media
@@ -81,9 +88,11 @@ async def studio(model: str = "4k", session_timeout: int = 60) -> AsyncIterator[
         session_timeout,
     )
     await held.server.start("127.0.0.1", 0)
+    world = asyncio.create_task(held.turn())
     try:
         yield held
     finally:
+        world.cancel()
         await held.server.close()
 
 
@@ -149,14 +158,58 @@ async def test_each_picture_says_the_moment_it_was_taken() -> None:
         assert said.flying_state is FlyingState.HOVERING
 
 
+async def recorded(speed: float, pictures: int) -> list[int]:
+    """Return the times of so many pictures in a row, in us of the simulated clock."""
+    spec = DroneSpec(address="127.0.0.1", discovery_port=0, handshake_port=0, c2d_port=0, http_port=None, rtsp_port=0)
+    async with Simulator([spec], speed=speed, seed=1) as simulator:
+        port = simulator.drones[0].rtsp_port
+        assert port is not None
+        async with viewer(port) as client:
+            eye = await client.setup("live/video")
+            await client.play()
+            seen = await eye.first(pictures)
+    times = [picture.metadata.timestamp for picture in seen if picture.metadata is not None]
+    return [time for time in times if time is not None]
+
+
+@pytest.mark.parametrize(("speed", "steps"), [(1.0, 2), (0.5, 1), (0.25, 1), (10.0, 20)])
+async def test_pictures_are_whole_steps_of_the_motion_apart(speed: float, steps: int) -> None:
+    """1/30 s of the clock each; below a speed of 0.5 one for each step."""
+    times = await recorded(speed, 60)
+    assert len(times) == 60
+    apart = [round((after - before) / 1e6 / STEP) for before, after in itertools.pairwise(times)]
+    assert all(abs(gap - steps) <= (0 if speed <= 1.0 else 1) for gap in apart), apart
+
+
+async def test_pictures_of_a_world_that_turns_late_are_of_different_moments() -> None:
+    """A busy machine: steps are made up for two at a time, or not at all."""
+    held = Studio("4k")
+    held.server = VideoServer(held.bench.firmware, random.Random(1), held.note, lambda: True, held.send)
+    await held.server.start("127.0.0.1", 0)
+    async with viewer(held.server.port) as client:
+        eye = await client.setup("live/video")
+        await client.play()
+        chance, made = random.Random(1), 0
+        while made < 200:
+            steps = chance.randrange(3)
+            for _ in range(steps):
+                held.bench.turn()
+            held.server.tick(float(made), steps * STEP)
+            made += steps
+        seen = await eye.first(95)
+    await held.server.close()
+    times = [picture.metadata.timestamp for picture in seen if picture.metadata is not None]
+    assert len(set(times)) == len(times) >= 95
+    assert held.told("end")[0]["pictures"] == pytest.approx(100, abs=5)
+
+
 async def test_a_pause_ends_the_pictures_and_play_begins_with_a_key_picture() -> None:
     async with watching() as (held, client):
         eye = await client.setup("live/video")
         await client.play()
         await eye.look(3)
         assert (await client.ask("PAUSE")).status == 200
-        assert held.server._ticker is not None
-        await asyncio.wait_for(held.server._ticker, LIMIT)  # nobody looks, so nothing runs
+        assert not held.server.playing
         await client.play()
         await eye.until(lambda: sum(picture.is_key for picture in eye.pictures) == 2)
         assert [name for name, _ in held.notes] == ["setup", "play", "pause", "play"]

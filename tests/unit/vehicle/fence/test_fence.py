@@ -498,6 +498,25 @@ def test_an_action_that_failed_is_tried_again() -> None:
     assert watch.breaches == 1
 
 
+def test_action_that_an_order_has_ended_is_not_tried_again_outside() -> None:
+    watch = watching()
+    assert watch.look(sight(110.0), 0.0) is Reaction.HOLD
+    watch.failed(0.5, replaced=True)
+    assert watch.look(sight(110.0, orders=2), 0.5 + RETRY) is None
+    assert watch.look(sight(110.0, orders=3), 60.0) is None
+    for now in (70.0, 70.0 + CALM):
+        assert watch.look(sight(50.0), now) is None
+    assert watch.look(sight(110.0), 80.0) is Reaction.HOLD  # another breach
+
+
+def test_action_ahead_that_an_order_has_ended_is_tried_again_while_the_boundary_is_ahead() -> None:
+    watch = watching()
+    assert watch.look(sight(85.0, speed=(9.0, 0.0)), 0.0) is Reaction.HOLD
+    watch.failed(0.5, replaced=True)
+    assert watch.look(sight(87.0, speed=(8.0, 0.0), orders=2), 0.7) is None
+    assert watch.look(sight(92.0, speed=(8.0, 0.0), orders=2), 0.5 + RETRY) is Reaction.HOLD
+
+
 def test_an_action_that_failed_is_forgotten_inside() -> None:
     watch = watching()
     watch.look(sight(110.0), 0.0)
