@@ -19,6 +19,7 @@ from types import TracebackType
 
 from typing_extensions import Self
 
+from anafi_mav import texts
 from anafi_mav.arsdk.video.rtsp import DEFAULT_PORT as RTSP_PORT
 from anafi_mav.clock import Clock, SystemClock
 from anafi_mav.config import Config, DroneConfig
@@ -32,6 +33,7 @@ from anafi_mav.services.flavours import FLAVOURS
 from anafi_mav.services.system import System
 from anafi_mav.state_lock import FILE, NO_LOCKS, HeldDrone, Holder, StateLock, state_folder
 from anafi_mav.subject import DRONE
+from anafi_mav.texts import Text
 from anafi_mav.vehicle.base.flying import ON_GROUND
 from anafi_mav.vehicle.base.severity import Severity
 
@@ -114,7 +116,7 @@ class _Supervised:
                 elif problem != self.problem:
                     logger.warning("%s: %s", self.config.name, problem)
                     if isinstance(error, HandshakeRefused):
-                        self.system.announce(Severity.WARNING, f"Connection refused by drone (status {error.status})")
+                        self.system.announce(Severity.WARNING, texts.CONNECTION_REFUSED.fill(status=error.status))
                 self.problem = problem
                 self.first_attempt.set()
                 await self.drone.pause(pause)
@@ -130,12 +132,12 @@ class _Supervised:
         age = drone.last_heard - drone.handshake_at
         if not drone.may_be_displaced or not contention.lost(age, dismissed=drone.dismissed):
             return
-        self._report(Severity.CRITICAL, "Another controller has taken the drone")
+        self._report(Severity.CRITICAL, texts.OTHER_CONTROLLER)
         away = contention.stay_away()
         if away is None:
             return
         await drone.close()
-        self._report(Severity.NOTICE, f"Reconnecting in {away:.0f} s, or on a command")
+        self._report(Severity.NOTICE, texts.RECONNECTING_IN.fill(seconds=away))
         self.problem = f"another controller has taken the drone, staying away for {away:.0f} s"
         asked: asyncio.Future[int] = asyncio.get_running_loop().create_future()
         self.system.listen(lambda inbound: None if asked.done() else asked.set_result(inbound.sysid))
@@ -144,9 +146,9 @@ class _Supervised:
         finally:
             self.system.listen(None)
         if asked.done():
-            self._report(Severity.NOTICE, f"Reconnecting: command of system {asked.result()}")
+            self._report(Severity.NOTICE, texts.RECONNECTING_BY.fill(system=asked.result()))
 
-    def _report(self, severity: Severity, text: str) -> None:
+    def _report(self, severity: Severity, text: Text) -> None:
         logger.log(logging.WARNING, "%s: %s", self.config.name, text)
         self.system.announce(severity, text)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterator
@@ -523,6 +524,53 @@ def python_api() -> str:
     return head + body() + EVENTS.format(names=names)
 
 
+TEXTS = """\
+# Texts for the pilot
+
+<!-- Made by docs/generate.py from anafi_mav/texts.py. -->
+
+For people who read a text in their ground station, or write a program that recognises one. After reading you know
+every text that the gateway sends as STATUSTEXT, and the reasons in it. What to do
+about one is in [troubleshooting](troubleshooting.md).
+
+- `{name}` stands for a value. `{reason}` is one of the reasons below, or what a lower layer reports.
+- A refusal is `{what} refused: {reason}`, a WARNING to every client. A refused motor cut is CRITICAL.
+- A text that names a file or quotes an explanation may be longer than 50 bytes. It then takes several messages.
+- Without a severity, a text is a part of another one, or its severity depends on the situation.
+"""
+
+_SENT = re.compile(r"Severity\.(\w+),\s*texts\.([A-Z]\w+)")
+_THROTTLED = re.compile(r"warn_throttled\(\s*texts\.([A-Z]\w+)")
+
+
+def _severities() -> dict[str, set[str]]:
+    """The severities of each text by its name, where the code names both together."""
+    found: dict[str, set[str]] = {}
+    for path in sorted((HERE.parent / "anafi_mav").rglob("*.py")):
+        code = path.read_text(encoding="utf-8")
+        for severity, name in _SENT.findall(code):
+            found.setdefault(name, set()).add(severity)
+        for name in _THROTTLED.findall(code):
+            found.setdefault(name, set()).add("WARNING")
+    return found
+
+
+def operator_texts() -> str:
+    """The page of all texts."""
+    from anafi_mav import texts
+
+    severities, page = _severities(), TEXTS
+    for line in _read(HERE.parent / "anafi_mav" / "texts.py").splitlines():  # type: ignore[union-attr]
+        if heading := re.fullmatch(r"# == (.*) ==", line):
+            page += f"\n## {heading[1]}\n\n| text | severity |\n|---|---|\n"
+        elif assigned := re.match(r"([A-Z]\w+) = ", line):
+            entry = getattr(texts, assigned[1])
+            if isinstance(entry, texts.Text | texts.Template):
+                text = entry if isinstance(entry, texts.Text) else re.sub(r"(\{\w+)[^}]*\}", r"\1}", entry.pattern)
+                page += f"| `{text}` | {', '.join(sorted(severities.get(assigned[1], ())))} |\n"
+    return page
+
+
 PAGES: dict[str, Callable[[], str]] = {
     "configuration.md": configuration,
     "dialect.md": dialect,
@@ -533,6 +581,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "seed-mavlink.md": seed_mavlink,
     "silence.md": silence,
     "states.md": states,
+    "texts.md": operator_texts,
 }
 
 

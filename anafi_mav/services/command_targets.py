@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 
+from anafi_mav import texts
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.commands import Altitude, Command
 from anafi_mav.vehicle.base.bounds import amsl_to_ato, check_estimate
@@ -22,7 +23,7 @@ class UnsupportedFrame(Refused):
     """A place in a frame we cannot resolve."""
 
     def __init__(self, frame: int | None) -> None:
-        super().__init__(f"Refused: positions in frame {frame} are not supported", lasting=True)
+        super().__init__(texts.POSITION, texts.FRAME_UNSUPPORTED.fill(frame=frame), lasting=True)
 
 
 def height(vehicle: Vehicle, command: Command, *, flown: bool = True) -> float | None:
@@ -45,7 +46,7 @@ def height_in_frame(vehicle: Vehicle, z: float, frame: int | None, *, amsl: bool
     `amsl`: z is AMSL even where the frame says that it is relative.
     """
     if not math.isfinite(z):
-        raise Refused("Refused: the height is not a number", lasting=True)
+        raise Refused(texts.HEIGHT, texts.NOT_A_NUMBER, lasting=True)
     if frame in _AMSL_FRAMES or (amsl and frame in _RELATIVE_FRAMES):
         ato = amsl_to_ato(vehicle, z)
         if flown:
@@ -61,5 +62,5 @@ def place(command: Command) -> Place | None:
     if math.isnan(command.x) and math.isnan(command.y):
         return None
     if not (math.isfinite(command.x) and math.isfinite(command.y)):
-        raise Refused("Refused: latitude and longitude are not both numbers", lasting=True)
+        raise Refused(texts.POSITION, texts.LATITUDE_LONGITUDE_NUMBERS, lasting=True)
     return Place(command.x, command.y)

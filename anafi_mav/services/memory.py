@@ -21,11 +21,13 @@ from typing import Annotated, Any, Literal
 import msgspec
 from msgspec import Meta
 
+from anafi_mav import texts
+from anafi_mav.texts import Text
 from anafi_mav.vehicle.fence.plan_items import MAX_ITEMS, PlanItem
 
 logger = logging.getLogger(__name__)
 
-NOT_KEPT = "Plans not kept: state folder cannot be used"
+NOT_KEPT = texts.PLANS_NOT_KEPT
 """Text to each client that uploads a plan which the gateway cannot store. The log has file and reason."""
 
 VERSION = 1
@@ -104,8 +106,8 @@ class Memory:
         """By MAV_MISSION_TYPE."""
         self.settings: dict[str, Any] = {}
         """Plain JSON values by name. Who reads one looks whether it makes sense: people can write files."""
-        self.problem = ""
-        """Why what is here could not be read or written; empty while all is well."""
+        self.problem: Text | None = None
+        """Why what is here could not be read or written; None while all is well."""
         self._folder = folder
         self._serial = ""
         self._unreadable = False
@@ -118,7 +120,7 @@ class Memory:
             return None
         return self._folder / f"{self._serial}.json"
 
-    def load(self, serial: str) -> str | None:
+    def load(self, serial: str) -> Text | None:
         """Read what is remembered of a drone. Returns a line for people when that could not be read.
 
         Of a drone that is back after a loss of the link there is nothing to read: what is here is as new as its file,
@@ -127,7 +129,7 @@ class Memory:
         if serial and serial == self._serial:
             return None
         self._serial = serial
-        self._unreadable, self.problem = False, ""
+        self._unreadable, self.problem = False, None
         self.plans, self.settings = {}, {}
         path = self.path
         if path is None:
@@ -146,10 +148,10 @@ class Memory:
             return None
         except OSError as error:
             self._unreadable = True
-            self.problem = f"{path}: {error.strerror}; the drone begins without its plans, and new ones are not kept"
+            self.problem = texts.MEMORY_UNREADABLE.fill(path=path, error=error.strerror)
             return self.problem
         except (ValueError, RecursionError) as error:
-            return f"{path}: {error}; put aside as {self._put_aside(path)}"
+            return texts.MEMORY_INVALID.fill(path=path, error=error, aside=self._put_aside(path))
         self.plans = {kind: tuple(map(_loaded, items)) for kind, items in content.plans.items()}
         self.settings = content.settings
         return None
@@ -158,7 +160,7 @@ class Memory:
         """Remember a plan; `save` writes it."""
         self.plans[mission_type] = tuple(items)
 
-    async def save(self) -> str | None:
+    async def save(self) -> Text | None:
         """Write the file as things are now. Returns a line for people when that failed."""
         path = self.path
         if path is None:
@@ -170,9 +172,9 @@ class Memory:
         try:
             await asyncio.get_running_loop().run_in_executor(_WRITER, _write, path, msgspec.json.encode(content))
         except OSError as error:
-            self.problem = f"{path}: {error.strerror}; what was changed is lost when the gateway ends"
+            self.problem = texts.MEMORY_UNWRITABLE.fill(path=path, error=error.strerror)
             return self.problem
-        self.problem = ""
+        self.problem = None
         return None
 
     @staticmethod

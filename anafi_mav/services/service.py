@@ -20,6 +20,7 @@ from anafi_mav.services.files import ServedFile
 from anafi_mav.services.flavours import Flavour
 from anafi_mav.services.memory import Memory
 from anafi_mav.services.stream import Stream, Times
+from anafi_mav.texts import Text
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.vehicle import Vehicle
@@ -61,10 +62,10 @@ class Host(Protocol):
     ) -> None:
         """Send to each of these channels (None: all) what `build` makes for its flavour; None of it is not sent."""
 
-    def text(self, severity: Severity, text: str, to: Channel | None = None) -> None:
+    def text(self, severity: Severity, text: Text, to: Channel | None = None) -> None:
         """A STATUSTEXT to everybody, and a line in the log; or to one channel alone."""
 
-    def warn_throttled(self, text: str) -> None:
+    def warn_throttled(self, text: Text) -> None:
         """Send a warning about something that arrives many times a second, at most once per five seconds."""
 
     def spawn(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:

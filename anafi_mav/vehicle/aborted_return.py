@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import math
 
+from anafi_mav import texts
 from anafi_mav.drone.events import HomeReachability, ReturnReason, WarningLevel
 from anafi_mav.drone.status.alerts import spoken
+from anafi_mav.texts import Text
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.flying import LANDING
 from anafi_mav.vehicle.base.severity import Severity
@@ -23,11 +25,11 @@ _BATTERY = (
 )
 """Reasons that last until the drone stands: the battery does not recover in the air."""
 
-_SHORT = {ReturnReason.LANDING_ZONE_NOT_FOUND: "no landing zone"}
+_SHORT = {ReturnReason.LANDING_ZONE_NOT_FOUND: texts.NO_LANDING_ZONE}
 
 _LAND_NOW = {
-    HomeReachability.CRITICAL: "Home hardly reachable: land now",
-    HomeReachability.NOT_REACHABLE: "Home not reachable: land now",
+    HomeReachability.CRITICAL: texts.HOME_HARDLY_REACHABLE,
+    HomeReachability.NOT_REACHABLE: texts.HOME_UNREACHABLE,
 }
 
 
@@ -54,17 +56,17 @@ class AbortedReturn:
     def report(self, vehicle: Aircraft, now: float) -> None:
         """Notify every client."""
         self._next = now + REPEAT_EVERY
-        for text in self.texts(vehicle):
+        for text in self.reports(vehicle):
             vehicle.text(Severity.CRITICAL, text)
 
-    def texts(self, vehicle: Aircraft) -> list[str]:
+    def reports(self, vehicle: Aircraft) -> list[Text]:
         """The texts, as things stand."""
         reason = "unknown" if self._reason is None else _SHORT.get(self._reason, spoken(self._reason))
-        texts = [f"Return aborted by system {self._system}: {reason}"]
+        said = [texts.RETURN_ABORTED.fill(system=self._system, reason=reason)]
         if self._reason in _BATTERY:
             percent = vehicle.drone.battery.state.percent
-            texts.append(f"No automatic return: battery {'?' if percent is None else percent} %")
+            said.append(texts.NO_AUTOMATIC_RETURN.fill(percent="?" if percent is None else percent))
         reach = vehicle.drone.home.state.reachability
         if reach in _LAND_NOW:
-            texts.append(_LAND_NOW[reach])
-        return texts
+            said.append(_LAND_NOW[reach])
+        return said

@@ -10,16 +10,16 @@ import asyncio
 import contextlib
 from collections.abc import Callable, Hashable
 
-from anafi_mav import geo
+from anafi_mav import geo, texts
 from anafi_mav.clock import Alarm, Clock
 from anafi_mav.drone import PilotingCommand, events
 from anafi_mav.errors import LinkLost
+from anafi_mav.texts import Text
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.bounds import LOWEST, amsl_to_ato, check_estimate, check_height, check_on_earth, check_place
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.place import Place
 from anafi_mav.vehicle.base.refusal import Refused
-from anafi_mav.vehicle.base.roll_sign import ROLL_INVERTED
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.base.velocity_loop import Controller, Motion
@@ -43,7 +43,7 @@ class FollowFlight:
     def __init__(self, vehicle: Aircraft, motion: Callable[[], Motion], clock: Clock) -> None:
         self.settings = FollowSettings()
         self.state = State.OFF
-        self.warn_throttled: Callable[[str], None] = lambda text: vehicle.text(Severity.WARNING, text)
+        self.warn_throttled: Callable[[Text], None] = lambda text: vehicle.text(Severity.WARNING, text)
         self._vehicle = vehicle
         self._motion = motion
         self._clock = clock
@@ -64,23 +64,23 @@ class FollowFlight:
         """Mode Follow begins; returns when the drone hovers and waits for its target, or raises `Refused`."""
         vehicle = self._vehicle
         if not vehicle.in_air:
-            raise Refused("Follow refused: take off first")
+            raise Refused(texts.FOLLOW, texts.TAKE_OFF_FIRST)
         if (descent := vehicle.descent) is not None:
-            raise Refused(f"Follow refused: {descent}")
+            raise Refused(texts.FOLLOW, descent)
         if vehicle.place is None:
-            raise Refused("Follow refused: no GPS fix")
+            raise Refused(texts.FOLLOW, texts.NO_FIX)
         if vehicle.drone.controller.pilot_acquired_control:
-            raise Refused("Follow refused: the pilot at the Skycontroller flies")
+            raise Refused(texts.FOLLOW, texts.PILOT)
         if vehicle.drone.piloting.limits is None:
-            raise Refused("Follow refused: the drone has not reported what full tilt and speed are")
+            raise Refused(texts.FOLLOW, texts.TILT_UNKNOWN)
         if vehicle.sticks_follow_camera:
-            raise Refused("Follow refused: the drone's piloting style makes its sticks relative to the camera")
+            raise Refused(texts.FOLLOW, texts.STICKS_FOLLOW_CAMERA)
         if vehicle.roll.inverted:
-            raise Refused(f"Follow refused: {ROLL_INVERTED}")
+            raise Refused(texts.FOLLOW, texts.ROLL_INVERTED)
         await vehicle.take_over()
         await vehicle.drone.piloting.cancel_return_home()
         if not vehicle.in_air or vehicle.returning:
-            raise Refused("Follow refused: the drone does something else now")
+            raise Refused(texts.FOLLOW, vehicle.activity)
         vehicle.drone.piloting.hover()
         vehicle.select(FlightMode.FOLLOW, self)
         self.state = TRANSITIONS[self.state][Event.ENGAGE]
@@ -96,7 +96,7 @@ class FollowFlight:
         if self.state is State.OFF or (self.state is State.FOLLOWING and sender != self._leader):
             return
         if reason := self._objection(seen):
-            self.warn_throttled(f"Target ignored: {reason}")
+            self.warn_throttled(texts.TARGET_IGNORED.fill(reason=reason))
             return
         reference = self._motion().reference
         if reference is None:
@@ -108,16 +108,16 @@ class FollowFlight:
         self._watch(SILENCE)
         self._fly(now)
 
-    def _objection(self, seen: Sighting) -> str | None:
+    def _objection(self, seen: Sighting) -> Text | None:
         here = self._vehicle.place
         if here is None:
-            return "the drone has no GPS fix"
+            return texts.NO_FIX
         try:
-            check_on_earth(Place(seen.latitude, seen.longitude), "Target")
+            check_on_earth(Place(seen.latitude, seen.longitude), texts.TARGET)
         except Refused as refusal:
-            return refusal.reason.partition("efused: ")[2]
+            return refusal.reason
         distance = geo.distance(here.latitude, here.longitude, seen.latitude, seen.longitude)
-        return f"it is {distance:.0f} m away" if distance > REACH else None
+        return texts.TARGET_FAR.fill(distance=distance) if distance > REACH else None
 
     def end(self) -> list[asyncio.Task[None]]:
         """Something else flies now."""
@@ -149,15 +149,15 @@ class FollowFlight:
             return
         reason = None
         if vehicle.drone.controller.pilot_acquired_control:
-            reason = "the pilot at the Skycontroller flies"
+            reason = texts.PILOT
         elif vehicle.sticks_follow_camera:
-            reason = "the drone's sticks have become relative to the camera"
+            reason = texts.STICKS_FOLLOW_CAMERA
         elif vehicle.roll.inverted:
-            reason = ROLL_INVERTED
+            reason = texts.ROLL_INVERTED
         if reason is not None:
             self.end()
             vehicle.select(FlightMode.HOLD)
-            vehicle.text(Severity.WARNING, f"Follow ended: {reason}")
+            vehicle.text(Severity.WARNING, texts.FOLLOW_ENDED.fill(reason=reason))
             return
         sticks = PilotingCommand()
         try:
@@ -168,7 +168,7 @@ class FollowFlight:
                 check_place(vehicle, place)
                 sticks = self._controller.sticks(wanted, limits, now) or sticks
         except Refused as refusal:
-            self.warn_throttled(f"Target not followed: {refusal.reason.partition('efused: ')[2] or refusal.reason}")
+            self.warn_throttled(texts.TARGET_NOT_FOLLOWED.fill(reason=refusal.reason))
         vehicle.drone.piloting.pilot(sticks)
 
     def _height(self) -> float:
@@ -181,18 +181,18 @@ class FollowFlight:
         height = settings.height
         if settings.altitude_mode is AltitudeMode.TERRAIN:
             if state.altitude is None or state.height is None:
-                raise Refused("Refused: the drone does not tell how high it is above ground")
+                raise Refused(texts.FOLLOW, texts.GROUND_HEIGHT_UNKNOWN)
             height += state.altitude - state.height
         elif settings.altitude_mode is AltitudeMode.TARGET:
             if self._follower.altitude is None:
-                raise Refused("Refused: the target does not tell its altitude")
+                raise Refused(texts.FOLLOW, texts.TARGET_NO_ALTITUDE)
             height += amsl_to_ato(self._vehicle, self._follower.altitude)
         if height < LOWEST:
             if self._kept_height is None:
                 self._kept_height = state.altitude
             if self._kept_height is None:
-                raise Refused("Refused: the drone's height is not known")
-            self.warn_throttled(f"Follow height kept: target asks for {height:.0f} m")
+                raise Refused(texts.FOLLOW, texts.HEIGHT_UNKNOWN)
+            self.warn_throttled(texts.FOLLOW_HEIGHT_KEPT.fill(height=height))
             return self._kept_height
         self._kept_height = None
         if settings.altitude_mode is AltitudeMode.TARGET:
@@ -206,8 +206,8 @@ class FollowFlight:
         was, self.state = self.state, TRANSITIONS[self.state][Event.SILENCE]
         self._vehicle.drone.piloting.hover()
         self._vehicle.select(FlightMode.HOLD)
-        why = "its target fell silent" if was is State.FOLLOWING else "no target appeared"
-        self._vehicle.text(Severity.WARNING, f"Follow ended: {why}")
+        why = texts.TARGET_LOST if was is State.FOLLOWING else texts.NO_TARGET
+        self._vehicle.text(Severity.WARNING, texts.FOLLOW_ENDED.fill(reason=why))
 
     def _watch(self, patience: float) -> None:
         """Come back when the target has said nothing for so long."""

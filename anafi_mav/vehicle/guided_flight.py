@@ -8,8 +8,9 @@ from __future__ import annotations
 import asyncio
 from dataclasses import dataclass, replace
 
-from anafi_mav import units
+from anafi_mav import texts, units
 from anafi_mav.drone import MoveEnd, Position
+from anafi_mav.texts import Text
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.bounds import check_height, check_place
 from anafi_mav.vehicle.base.modes import FlightMode
@@ -97,10 +98,10 @@ class GuidedFlight:
             await self._climb(ato, yaw, mode)
             return
         if here is None:
-            raise Refused("Goto refused: no GPS fix")
+            raise Refused(texts.GOTO, texts.NO_FIX)
         if ato is None:
             if present is None:
-                raise Refused("Goto refused: the drone's height is not known")
+                raise Refused(texts.GOTO, texts.HEIGHT_UNKNOWN)
             ato = present
         else:
             check_height(vehicle, ato)
@@ -114,15 +115,15 @@ class GuidedFlight:
         """
         vehicle = self._vehicle
         if (descent := vehicle.descent) is not None:
-            raise Refused(f"Goto refused: {descent}")
+            raise Refused(texts.GOTO, descent)
         if not vehicle.in_air:
-            raise Refused("Goto refused: the drone is not in the air")
+            raise Refused(texts.GOTO, texts.NOT_IN_AIR)
         if not checked:
             check_place(vehicle, goto.place, start=vehicle.place)
         await vehicle.take_over()
         await vehicle.drone.piloting.cancel_return_home()
         if not vehicle.in_air or vehicle.returning:  # no await from here to the moveTo
-            raise Refused("Goto refused: the drone does something else now")
+            raise Refused(texts.GOTO, vehicle.activity)
         vehicle.select(goto.mode)
         before, self._goto = self._goto, goto
         try:
@@ -148,25 +149,25 @@ class GuidedFlight:
         """
         vehicle = self._vehicle
         check_height(vehicle, ato)
-        await self._begin("Goto", mode)
+        await self._begin(texts.GOTO, mode)
         state = vehicle.drone.piloting.state
         if state.altitude is None:
-            raise Refused("Goto refused: the drone's height is not known")
+            raise Refused(texts.GOTO, texts.HEIGHT_UNKNOWN)
         turn = 0.0 if yaw is None or state.attitude is None else units.wrap_pi(yaw - state.attitude.yaw)
         await vehicle.drone.piloting.move_by(0.0, 0.0, state.altitude - ato, turn)
 
-    async def _begin(self, what: str, mode: FlightMode) -> None:
+    async def _begin(self, what: Text, mode: FlightMode) -> None:
         """Stop the drone for a moveBy. Raises `Refused`, with `what` for the text."""
         vehicle = self._vehicle
         if (descent := vehicle.descent) is not None:
-            raise Refused(f"{what} refused: {descent}")
+            raise Refused(what, descent)
         if not vehicle.in_air:
-            raise Refused(f"{what} refused: the drone is not in the air")
+            raise Refused(what, texts.NOT_IN_AIR)
         await vehicle.take_over()
         await vehicle.drone.piloting.stop()
         await vehicle.drone.piloting.cancel_return_home()
         if not vehicle.in_air or vehicle.returning:
-            raise Refused(f"{what} refused: the drone does something else now")
+            raise Refused(what, vehicle.activity)
         vehicle.select(mode)
 
     async def turn(self, angle: float, rate_dps: float | None, mode: FlightMode) -> None:
@@ -174,7 +175,7 @@ class GuidedFlight:
 
         Returns when it has turned.
         """
-        await self._begin("Turn", mode)
+        await self._begin(texts.TURN, mode)
         await self._vehicle.drone.piloting.move_by(0.0, 0.0, 0.0, angle, turn_rate_dps=rate_dps)
 
     def forget_arrival(self) -> None:

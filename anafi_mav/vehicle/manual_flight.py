@@ -18,9 +18,11 @@ from collections.abc import Callable, Coroutine, Hashable
 from dataclasses import dataclass, replace
 from typing import Any
 
+from anafi_mav import texts
 from anafi_mav.clock import Alarm, Clock
 from anafi_mav.drone import PilotingCommand
 from anafi_mav.errors import LinkLost
+from anafi_mav.texts import Text
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.clients import system_of
 from anafi_mav.vehicle.base.modes import FlightMode
@@ -89,7 +91,7 @@ class ManualFlight:
         self.override = JoystickOverride()
         self._overridable = overridable
         self._overriding = False
-        self.warn_throttled: Callable[[str], None] = lambda text: vehicle.text(Severity.WARNING, text)
+        self.warn_throttled: Callable[[Text], None] = lambda text: vehicle.text(Severity.WARNING, text)
         self.state = State.IDLE
         self._vehicle = vehicle
         self._clock = clock
@@ -108,7 +110,7 @@ class ManualFlight:
         sticks = replace(sticks, climb=self.override.climb(sender, sticks.climb))
         if self.state is State.HELD and sender != self._pilot:
             if not sticks.centred:
-                self.warn_throttled("Sticks ignored: somebody else's are in use")
+                self.warn_throttled(texts.STICKS_IGNORED.fill(reason=texts.OTHER_STICKS))
             return
         if sticks.centred:
             self._let_go(Event.CENTRED)
@@ -145,7 +147,7 @@ class ManualFlight:
         """Stop what flies, in mode Position, and let the joystick fly. Raises as `Vehicle.hold`."""
         await self._vehicle.hold(FlightMode.POSITION, Right(sender, Extent.COMMANDED))
         self.override.take_over(sender, sticks.climb)
-        self._vehicle.text(Severity.WARNING, f"Joystick override by system {system_of(sender) or 0}: Position")
+        self._vehicle.text(Severity.WARNING, texts.JOYSTICK_OVERRIDE.fill(system=system_of(sender) or 0))
 
     def _overridden(self, task: asyncio.Task[None]) -> None:
         """Sticks count again: the drone was taken over, or another action came in between."""
@@ -160,18 +162,18 @@ class ManualFlight:
         """In mode Position they do. What they cannot do is said to whoever means it: a throttle may rest at its end."""
         vehicle, mode = self._vehicle, self._vehicle.mode
         meant = max(abs(sticks.forward), abs(sticks.right), abs(sticks.turn)) >= MEANT
-        reason = None
+        reason: Text | None = None
         if vehicle.on_ground:
             if sticks.climb <= -GESTURE and sticks.turn >= GESTURE:
-                reason = "they do not arm, a command does"
+                reason = texts.STICKS_DO_NOT_ARM
         elif mode is not FlightMode.POSITION:
-            reason = f"they fly the drone in mode Position, this is {mode.value}" if meant else None
+            reason = texts.STICKS_IGNORED_MODE.fill(mode=mode.value) if meant else None
         elif vehicle.drone.controller.pilot_acquired_control:
-            reason = "the pilot at the Skycontroller flies"
+            reason = texts.PILOT
         else:
             return True
         if reason is not None:
-            self.warn_throttled(f"Sticks ignored: {reason}")
+            self.warn_throttled(texts.STICKS_IGNORED.fill(reason=reason))
         return False
 
     def end(self) -> list[asyncio.Task[None]]:
@@ -200,7 +202,7 @@ class ManualFlight:
             self._watch()
         elif self.state is State.HELD:
             self._let_go(Event.SILENCE)
-            self._vehicle.text(Severity.WARNING, "Sticks silent: hovering")
+            self._vehicle.text(Severity.WARNING, texts.STICKS_SILENT)
 
     def _watch(self) -> None:
         """Come back when they have been silent for too long."""

@@ -19,7 +19,7 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from functools import partial
 
-from anafi_mav import geo
+from anafi_mav import geo, texts
 from anafi_mav.clock import Alarm
 from anafi_mav.drone import Position
 from anafi_mav.drone.events import (
@@ -32,6 +32,7 @@ from anafi_mav.drone.events import (
     RthState,
 )
 from anafi_mav.errors import AnafiMavError, LinkLost
+from anafi_mav.texts import Text
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.flying import LANDING
 from anafi_mav.vehicle.base.place import Place
@@ -100,7 +101,7 @@ class _GivenHome:
     """A home that a client chose through this gateway, or a rally point."""
 
     place: Position
-    label: str
+    label: Text
     flight_id: str | None
     """Of the flight in which it was chosen; None where the drone reports none."""
 
@@ -129,7 +130,7 @@ class ReturnEnd:
         """The mode is Return though the drone reports none: it waits above home, or lands."""
         return self._attempt is not None and self._attempt.phase in (_Phase.WAITING, _Phase.LANDING)
 
-    def set_home(self, place: Position, label: str) -> None:
+    def set_home(self, place: Position, label: Text) -> None:
         """A client has set the drone's custom home, or a rally point has become it."""
         if not self._vehicle.on_ground:
             self._given = _GivenHome(place, label, self._vehicle.drone.product.state.flight_id)
@@ -152,10 +153,13 @@ class ReturnEnd:
         """The commanded return has begun: send every client its end. `system` commanded it; None: the gateway."""
         if self._attempt is not attempt:
             return
-        who = "" if system is None else f" by system {system}"
-        self._vehicle.text(Severity.NOTICE, f"Return{who}: {self._prospect}")
+        if system is None:
+            begun = texts.RETURN_STARTED.fill(end=self._prospect)
+        else:
+            begun = texts.RETURN_BY.fill(system=system, end=self._prospect)
+        self._vehicle.text(Severity.NOTICE, begun)
         if self._lands and not self._drone_lands:
-            self._vehicle.text(Severity.INFO, "Link loss on the way: drone hovers at home")
+            self._vehicle.text(Severity.INFO, texts.RETURN_LINK_LOSS)
 
     def end(self) -> list[asyncio.Task[None]]:
         """Another command, the ground or the loss of the link ends the attempt. Returns tasks that are about to end."""
@@ -163,7 +167,7 @@ class ReturnEnd:
         if attempt is None:
             return []
         if attempt.phase is _Phase.WAITING:
-            self._vehicle.text(Severity.NOTICE, "Landing at home cancelled")
+            self._vehicle.text(Severity.NOTICE, texts.HOME_LANDING_CANCELLED)
         return attempt.stop()
 
     def link_down(self) -> None:
@@ -197,7 +201,7 @@ class ReturnEnd:
             if home.rth == RthState.AVAILABLE and home.reason == ReturnReason.FINISHED:
                 self._arrived(attempt)
             elif self._vehicle.in_air:
-                self._hover("stopped" if home.reason == ReturnReason.STOPPED else "not finished")
+                self._hover(texts.HOVER_STOPPED if home.reason == ReturnReason.STOPPED else texts.HOVER_UNFINISHED)
             else:
                 self._attempt = None
 
@@ -236,7 +240,7 @@ class ReturnEnd:
         vehicle = self._vehicle
         vehicle.changed()
         if self.wait > SHORTEST_WAIT:
-            vehicle.text(Severity.NOTICE, f"Return ended: landing in {self.wait:.0f} s")
+            vehicle.text(Severity.NOTICE, texts.RETURN_LANDING_IN.fill(seconds=self.wait))
             await asyncio.sleep(self.wait - SHORTEST_WAIT)
         if (reason := self._late_objection()) is None:
             self._announce_landing()
@@ -244,7 +248,7 @@ class ReturnEnd:
             await asyncio.sleep(SHORTEST_WAIT)
             reason = self._late_objection()
             if reason is None and vehicle.drone.gps.state.location is before:
-                reason = "old GPS position"
+                reason = texts.HOVER_OLD_POSITION
         if reason is not None:
             self._hover(reason)
             return
@@ -253,7 +257,7 @@ class ReturnEnd:
             await self._command_landing()
         except AnafiMavError as error:
             logger.warning("landing at home: %s", error)
-            vehicle.text(Severity.ERROR, "Landing at home failed, hovering")
+            vehicle.text(Severity.ERROR, texts.HOME_LANDING_FAILED)
             if self._attempt is attempt:
                 self._attempt = None
                 vehicle.changed()
@@ -265,26 +269,31 @@ class ReturnEnd:
         await asyncio.sleep(SHORTEST_WAIT)
         attempt.task = None
         if self._vehicle.flying_state not in LANDING:
-            self._hover("no landing seen")
+            self._hover(texts.HOVER_NO_LANDING)
 
     def _announce_landing(self) -> None:
         vehicle, home = self._vehicle, self._vehicle.drone.home.state
-        distance = "" if (metres := _metres(vehicle.place, home.takeoff_location)) is None else f": {metres:.0f} m"
-        tail = distance and f"{distance} from take-off"
-        vehicle.text(Severity.WARNING, f"Landing in {SHORTEST_WAIT:.0f} s, Hold cancels{tail}")
+        if (metres := _metres(vehicle.place, home.takeoff_location)) is None:
+            soon = texts.LANDING_SOON.fill(seconds=SHORTEST_WAIT)
+        else:
+            soon = texts.LANDING_SOON_AT.fill(seconds=SHORTEST_WAIT, distance=metres)
+        vehicle.text(Severity.WARNING, soon)
         precise = home.precise in (PreciseHomeState.AVAILABLE, PreciseHomeState.ACTIVE)
-        vehicle.text(Severity.NOTICE, f"Landing place: {self._label}, {'precise' if precise else 'GPS only'}")
+        accuracy = texts.PRECISE if precise else texts.GPS_ONLY
+        vehicle.text(Severity.NOTICE, texts.LANDING_PLACE.fill(place=self._label, accuracy=accuracy))
 
-    def _hover(self, reason: str | None) -> None:
+    def _hover(self, reason: Text | None) -> None:
         """The return is over, and the drone stays in the air. `reason`: why it does not land, where it was to."""
         vehicle, attempt = self._vehicle, self._attempt
         if attempt is not None:
             self._attempt = None
             attempt.stop()
         altitude = vehicle.drone.piloting.state.altitude
-        at = "at home" if altitude is None else f"at {altitude:.0f} m"
-        severity = Severity.NOTICE if reason is None else Severity.WARNING
-        vehicle.text(severity, f"Return ended, hovering {at}" + ("" if reason is None else f": {reason}"))
+        at = texts.AT_HOME if altitude is None else texts.AT_HEIGHT.fill(height=altitude)
+        if reason is None:
+            vehicle.text(Severity.NOTICE, texts.RETURN_HOVERS.fill(at=at))
+        else:
+            vehicle.text(Severity.WARNING, texts.RETURN_HOVERS_REASON.fill(at=at, reason=reason))
         vehicle.changed()
 
     def _watch_end(self, attempt: Attempt) -> None:
@@ -310,46 +319,46 @@ class ReturnEnd:
 
     def _unanswered(self, attempt: Attempt) -> None:
         if attempt is self._attempt:
-            self._hover("end not reported")
+            self._hover(texts.HOVER_UNREPORTED)
 
     # Where and how.
 
-    def objection(self, *, arrived: bool = False) -> str | None:
+    def objection(self, *, arrived: bool = False) -> Text | None:
         """Return why the gateway leaves the drone hovering at home, in a few words; None: it lands.
 
         `arrived`: also compare the drone's place with home.
         """
         vehicle, home = self._vehicle, self._vehicle.drone.home.state
         if vehicle.drone.controller.present:
-            return "Skycontroller"
+            return texts.HOVER_SKYCONTROLLER
         if home.type == RthHomeType.TAKEOFF:
             target = home.takeoff_location
             if target is not None and not home.fixed_before_takeoff:
-                return "home is first fix"
+                return texts.HOVER_FIRST_FIX
         elif home.type == RthHomeType.CUSTOM:
             target = home.custom_location
             if self._chosen is None:
-                return "home set earlier"
+                return texts.HOVER_OLD_HOME
         else:
-            return _UNCERTAIN_HOMES.get(home.type or RthHomeType.NONE, "home unknown")
+            return _UNCERTAIN_HOMES.get(home.type or RthHomeType.NONE, texts.HOVER_HOME_UNKNOWN)
         if target is None or home.location is None:
-            return "home unknown"
+            return texts.HOVER_HOME_UNKNOWN
         if not arrived:
             return None
         if vehicle.place is None:
-            return "no GPS fix"
+            return texts.NO_FIX
         metres = max(_metres(vehicle.place, target) or 0.0, _metres(vehicle.place, home.location) or 0.0)
-        return f"{metres:.0f} m from home" if metres > NEAR_HOME else None
+        return texts.HOVER_FROM_HOME.fill(distance=metres) if metres > NEAR_HOME else None
 
-    def _late_objection(self) -> str | None:
+    def _late_objection(self) -> Text | None:
         """`objection`, and what may have happened while the drone waited above home."""
         vehicle = self._vehicle
         if not vehicle.in_air or vehicle.returning:
-            return "not hovering"
+            return texts.HOVER_NOT_HOVERING
         if vehicle.drone.piloting.state.poi in (PoiStatus.RUNNING, PoiStatus.PENDING):
-            return "ROI active"
+            return texts.HOVER_ROI
         if self.ending is EndOfReturn.HOVER:
-            return "ANF_RTL_END is 1"
+            return texts.HOVER_BY_SETTING
         return self.objection(arrived=True)
 
     @property
@@ -362,11 +371,11 @@ class ReturnEnd:
         return given if apart < SAME_PLACE else None
 
     @property
-    def _label(self) -> str:
+    def _label(self) -> Text:
         chosen = self._chosen
         if self._vehicle.drone.home.state.type == RthHomeType.CUSTOM and chosen is not None:
             return chosen.label
-        return "take-off point"
+        return texts.TAKEOFF_POINT
 
     @property
     def alone(self) -> str:
@@ -385,20 +394,20 @@ class ReturnEnd:
         return self._drone_lands or (self.ending is EndOfReturn.LAND and self.objection() is None)
 
     @property
-    def _prospect(self) -> str:
+    def _prospect(self) -> Text:
         """The end of a return that begins now, as the end of a text."""
         if self._drone_lands:
-            return "lands at home (ANF_RTH_END)"
+            return texts.LANDS_BY_SETTING
         if self.ending is EndOfReturn.HOVER:
-            return "hovers at home"
+            return texts.HOVERS_AT_HOME
         reason = self.objection()
-        return f"lands at {self._label}" if reason is None else f"hovers, {reason}"
+        return texts.LANDS_AT.fill(place=self._label) if reason is None else texts.HOVERS_BECAUSE.fill(reason=reason)
 
 
 _UNCERTAIN_HOMES = {
-    RthHomeType.PILOT: "home is the pilot",
-    RthHomeType.FOLLOWEE: "home is followed",
-    RthHomeType.VEHICLE: "home is a vehicle",
+    RthHomeType.PILOT: texts.HOVER_HOME_PILOT,
+    RthHomeType.FOLLOWEE: texts.HOVER_HOME_FOLLOWED,
+    RthHomeType.VEHICLE: texts.HOVER_HOME_VEHICLE,
 }
 """Homes that move, or that no client chose in this flight: the drone is left hovering there."""
 

@@ -11,14 +11,16 @@ import contextlib
 from collections.abc import Callable, Coroutine, Hashable
 from typing import Any
 
+from anafi_mav import texts
 from anafi_mav.clock import Alarm
 from anafi_mav.drone.events import AltitudeChanged, FlyingState, FlyingStateChanged
-from anafi_mav.errors import AnafiMavError, CommandRejected
+from anafi_mav.errors import AnafiMavError
+from anafi_mav.texts import Text
 from anafi_mav.vehicle.base.aircraft import STOP_WAIT, Aircraft
 from anafi_mav.vehicle.base.bounds import check_height
 from anafi_mav.vehicle.base.flying import AIRBORNE
 from anafi_mav.vehicle.base.modes import FlightMode
-from anafi_mav.vehicle.base.refusal import Refused, Unfinished
+from anafi_mav.vehicle.base.refusal import Refused, Rejected, Unfinished, not_ready
 from anafi_mav.vehicle.base.severity import Severity
 
 AUTO_DISARM = 10.0
@@ -113,7 +115,7 @@ class Takeoff:
         if vehicle.armed and not vehicle.on_ground:
             return
         if problems := vehicle.prearm_problems():
-            raise Refused("PreArm: " + "; ".join(problems))
+            raise not_ready(problems)
         if self.hand_launch:
             await vehicle.take_over()
             await vehicle.drone.piloting.hand_launch()
@@ -141,7 +143,7 @@ class Takeoff:
             await vehicle.take_over(STOP_WAIT)
             await vehicle.drone.piloting.land()  # a take-off that is on its way to the drone must not follow
             if not vehicle.on_ground:
-                raise Refused("Disarm refused: the drone had just taken off, it lands")
+                raise Refused(texts.DISARM, texts.JUST_TAKEN_OFF)
             self._armed = False
             vehicle.changed()
             return
@@ -152,7 +154,7 @@ class Takeoff:
             vehicle.changed()
             return
         if not force:
-            raise Refused("Disarm refused: the drone is in the air")
+            raise Refused(texts.DISARM, texts.IN_AIR)
         await vehicle.terminate()
 
     @property
@@ -173,9 +175,9 @@ class Takeoff:
         height = self.height if ato is None else ato
         check_height(vehicle, height)
         if not vehicle.on_ground:
-            raise Refused("Takeoff refused: the drone is in the air")
+            raise Refused(texts.TAKEOFF, texts.IN_AIR)
         if problems := vehicle.prearm_problems():
-            raise Refused("PreArm: " + "; ".join(problems))
+            raise not_ready(problems)
         await vehicle.take_over()  # also where it waits for arming: what lifts off then is replaced now
         if not self._armed:
             self._pending = (height, client)
@@ -189,7 +191,7 @@ class Takeoff:
     async def launch(self) -> None:
         """Take off to the drone's own height, for setpoints; returns when the drone confirmed it."""
         if problems := self._vehicle.prearm_problems():
-            raise Refused("PreArm: " + "; ".join(problems))
+            raise not_ready(problems)
         await self._lift_off()
 
     async def abort(self) -> None:
@@ -199,7 +201,7 @@ class Takeoff:
         self._armed = False
         self._vehicle.changed()
 
-    async def over(self, what: str) -> None:
+    async def over(self, what: Text) -> None:
         """Wait until an accepted take-off has reached its height; return at once when the drone does not rise.
 
         Where a Hold has ended the climb, the drone still rises to its own height: then for its first hover. (MAVSDK's
@@ -214,9 +216,9 @@ class Takeoff:
         try:
             await asyncio.wait({end}, timeout=TAKEOFF_WAIT)
             if not end.done():
-                raise Unfinished(f"{what} failed: takeoff not over after {TAKEOFF_WAIT:.0f} s")
+                raise Unfinished(what, texts.TAKEOFF_UNFINISHED.fill(seconds=TAKEOFF_WAIT))
             if not end.result():
-                raise Unfinished(f"{what} failed: takeoff has not reached its height")
+                raise Unfinished(what, texts.TAKEOFF_TOO_LOW)
         finally:
             end.cancel()
             if self._waiting is current:
@@ -290,7 +292,7 @@ class Takeoff:
         try:
             await self._lift_off()
         except AnafiMavError as error:
-            self._vehicle.text(Severity.ERROR, f"Takeoff failed: {error}")
+            self._vehicle.text(Severity.ERROR, texts.TAKEOFF_FAILED.fill(error=error))
             return
         await self._climb(height)
 
@@ -305,12 +307,12 @@ class Takeoff:
             # What it told last is from while it rose.
             present = (await vehicle.drone.expect(AltitudeChanged, timeout=ALTITUDE_WAIT)).altitude
             if not vehicle.in_air or vehicle.returning:
-                raise CommandRejected("the drone does something else now")
+                raise Rejected(vehicle.activity)
             if abs(height - present) > CLOSE_ENOUGH:
                 await vehicle.drone.piloting.move_by(0.0, 0.0, present - height, 0.0)
             self._reached = True
         except AnafiMavError as error:
-            vehicle.text(Severity.ERROR, f"Climb to {height:g} m given up: {error}")
+            vehicle.text(Severity.ERROR, texts.CLIMB_ABORTED.fill(height=height, error=error))
         finally:
             if self._background is asyncio.current_task():
                 self._climbing, self._background = False, None
@@ -333,7 +335,7 @@ class Takeoff:
 
     def _lapsed(self) -> None:
         self.forget()
-        self._vehicle.text(Severity.WARNING, "Takeoff forgotten: nobody armed")
+        self._vehicle.text(Severity.WARNING, texts.TAKEOFF_CANCELLED.fill(seconds=ARM_WAIT))
 
     def _auto_disarm(self) -> None:
         if self._vehicle.drone.piloting.about_to_fly:
@@ -342,5 +344,5 @@ class Takeoff:
             )  # a mission's start is with the drone: who says disarmed now may see it rise
         elif self._armed and self._vehicle.on_ground:
             self._armed = False
-            self._vehicle.text(Severity.INFO, "Disarmed: no take-off followed")
+            self._vehicle.text(Severity.INFO, texts.DISARMED)
             self._vehicle.changed()

@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 
+from anafi_mav import texts
 from anafi_mav.clock import Clock
 from anafi_mav.drone import Drone
 from anafi_mav.drone.element import Position
@@ -33,8 +34,8 @@ from anafi_mav.drone.events import (
     RthState,
     TakeoffLocation,
 )
-from anafi_mav.drone.piloting.landing import ALREADY_LANDED
 from anafi_mav.errors import CommandRejected
+from anafi_mav.texts import Text
 from anafi_mav.vehicle.aborted_return import AbortedReturn
 from anafi_mav.vehicle.base.aircraft import STOP_WAIT, Aircraft
 from anafi_mav.vehicle.base.clients import system_of
@@ -46,7 +47,6 @@ from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.place import Place
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.right import Extent, Right
-from anafi_mav.vehicle.base.roll_sign import INVERTED
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.fence.rally import RallyPoints
@@ -61,12 +61,17 @@ from anafi_mav.vehicle.offboard.flight import OffboardFlight
 from anafi_mav.vehicle.return_end import ReturnEnd
 from anafi_mav.vehicle.takeoff import Takeoff
 
-FORCED = "forced landing"
-LANDS, PILOT_LANDS = "drone is landing", "Skycontroller pilot is landing"
-RETURNS, PILOT_RETURNS = "drone is returning", "Skycontroller pilot is returning"
-RETURNS_BY_ITSELF, MOTOR_DOWN = "drone is returning by itself", "drone returns, motor down"
-NOT_COUNTED = f"again within {APART:g} s"
-UNENDABLE = (FORCED, LANDS, PILOT_LANDS, RETURNS, PILOT_RETURNS, RETURNS_BY_ITSELF, MOTOR_DOWN, NOT_COUNTED)
+NOT_COUNTED = texts.AGAIN_WITHIN.fill(seconds=APART)
+UNENDABLE = (
+    texts.FORCED,
+    texts.LANDS,
+    texts.PILOT_LANDS,
+    texts.RETURNS,
+    texts.PILOT_RETURNS,
+    texts.RETURNS_BY_ITSELF,
+    texts.MOTOR_DOWN,
+    NOT_COUNTED,
+)
 """Why a landing or a return is not ended."""
 
 LANDS_AFTER_RETURN = 2.0
@@ -79,7 +84,7 @@ LOCATIONS_MISSED = 3
 """A drone that reports its location more rarely (a slowed simulator) may miss as many."""
 
 
-ESTIMATED = f"Take-off altitude estimated: GPS only (+-{ESTIMATE_ERROR:g} m)"
+ESTIMATED = texts.TAKEOFF_AMSL_ESTIMATED.fill(error=ESTIMATE_ERROR)
 
 GOOD_ACCURACY = 5
 """m of one standard deviation of GPS altitude that AMSL heights can be used with, without a text."""
@@ -116,7 +121,7 @@ class Vehicle(Aircraft):
         clock: Clock,
         *,
         allow_kill: bool,
-        text: Callable[[Severity, str], None],
+        text: Callable[[Severity, Text], None],
         changed: Callable[[], None],
         end_others: Callable[[], list[asyncio.Task[None]]],
     ) -> None:
@@ -263,7 +268,8 @@ class Vehicle(Aircraft):
         """Cut the motors, at once: what this replaces is not waited for, and sends nothing any more."""
         if not self.allow_kill:
             raise Refused(
-                "Motor cut refused: the drone would fall. Set allow_kill: true to permit it",
+                texts.MOTOR_CUT,
+                texts.MOTOR_CUT_FORBIDDEN,
                 lasting=True,
                 critical=True,
             )
@@ -299,20 +305,20 @@ class Vehicle(Aircraft):
     async def return_home(self, by: Right | None = None) -> None:
         """Fly home by the drone's own return. A landing goes on unless `by` ends it."""
         if self.on_ground:
-            raise Refused("Return refused: the drone is on the ground")
+            raise Refused(texts.RETURN, texts.ON_GROUND)
         if self.return_end.shown:
             return  # it waits above home or lands there, and would climb and fly home once more
         commanded = None if by is None else replace(by, extent=Extent.COMMANDED)
         if lands := self.landing:
-            self._require_endable("Return", commanded)
+            self._require_endable(texts.RETURN, commanded)
             if self.drone.home.state.rth == RthState.UNAVAILABLE:  # the landing would be ended for nothing
-                raise Refused("Return refused: not available, landing goes on")
+                raise Refused(texts.RETURN, texts.RETURN_UNAVAILABLE)
         await self.take_over()
         if lands or self.landing:
             with self._selected_no_more(FlightMode.HOLD):
                 if await self.drone.piloting.settle_landing():
-                    self._require_endable("Return", commanded)
-                    await self._end_landing("Return", commanded)
+                    self._require_endable(texts.RETURN, commanded)
+                    await self._end_landing(texts.RETURN, commanded)
         self._initiators.return_commanded(self._clock.monotonic())
         self._returns_sent += 1
         attempt = self.return_end.command()
@@ -332,7 +338,7 @@ class Vehicle(Aircraft):
 
         `pause`: setpoints of every client are ignored from now on, see `paused`.
         """
-        self._require_endable(mode.value, by)
+        self._require_endable(texts.Subject(mode.value), by)
         own = self.returning_by_itself
         rising = self.drone.piloting.about_to_fly
         latched = self.paused and (pause or mode is self.mode)
@@ -342,7 +348,7 @@ class Vehicle(Aircraft):
             await self.take_over(STOP_WAIT)
             if not self.on_ground or rising:
                 with self._selected_no_more(mode):
-                    await self._stop(mode.value, by, own=own)
+                    await self._stop(texts.Subject(mode.value), by, own=own)
         except BaseException:
             if self.orders <= orders + 1:  # else a newer command has replaced this one, and the latch is its own
                 self.paused = before
@@ -350,20 +356,20 @@ class Vehicle(Aircraft):
         self.select(mode)
         self.paused = (latched or pause) and (rising or not self.on_ground)
         if rising:
-            self.text(Severity.WARNING, f"{mode.value}: a take-off may follow, to 1 m")
+            self.text(Severity.WARNING, texts.MODE_MAY_RISE.fill(mode=mode.value))
 
     async def take_off(self, ato: float | None, by: Right) -> None:
         """Take off to a height, or end a landing: then the drone hovers where it is."""
         if not self.landing or self.on_ground:
             await self.takeoff.begin(ato, by.client)
             return
-        self._require_endable("Takeoff", by)
+        self._require_endable(texts.TAKEOFF, by)
         await self.take_over(STOP_WAIT)
         with self._selected_no_more(FlightMode.HOLD):
             if await self.drone.piloting.settle_landing():
-                await self._end_landing("Takeoff", by, take_off=True)
+                await self._end_landing(texts.TAKEOFF, by, take_off=True)
         if self.on_ground:
-            raise Refused(f"Landing not aborted: {ALREADY_LANDED}")
+            raise Refused(texts.LANDING, texts.ALREADY_LANDED, form=texts.NOT_ABORTED)
         self.select(FlightMode.HOLD)
 
     async def set_mode(self, mode: FlightMode, by: Right) -> None:
@@ -384,20 +390,20 @@ class Vehicle(Aircraft):
                 await self.take_off(None, by)
             case FlightMode.OFFBOARD:
                 if self.descends and not self.offboard.streamed_for(client):
-                    raise Refused("Offboard refused: no setpoints arrive")
-                await self._free("Offboard", commanded)
+                    raise Refused(texts.OFFBOARD, texts.NO_SETPOINTS)
+                await self._free(texts.OFFBOARD, commanded)
                 await self.offboard.engage(client)
                 self.mode_client = client
             case FlightMode.MISSION:
                 if self.mission.there and not self.mission.flying:
-                    await self._free("Mission", commanded)
+                    await self._free(texts.MISSION, commanded)
                 await self.mission.engage(client)
             case FlightMode.TERMINATED:
                 await self.terminate()
             case FlightMode.FOLLOW:
                 await self.follow.engage()
             case FlightMode.ORBIT:
-                raise Refused("Orbit refused: it is begun by a command", lasting=True)
+                raise Refused(texts.ORBIT, texts.BY_COMMAND_ONLY, lasting=True)
 
     # Ending a landing or a return.
 
@@ -412,8 +418,8 @@ class Vehicle(Aircraft):
         return self.landing or self.returning or self._returns_sent > 0
 
     @property
-    def descent(self) -> str | None:
-        return LANDS if self.landing else RETURNS if self.descends else None
+    def descent(self) -> Text | None:
+        return texts.LANDS if self.landing else texts.RETURNS if self.descends else None
 
     @property
     def _forced_landing(self) -> bool:
@@ -422,37 +428,37 @@ class Vehicle(Aircraft):
         forced = alerts.forced_landing not in (None, ForcedLandingReason.NONE) and not alerts.forced_landing_delay_s
         return self.flying_state == FlyingState.EMERGENCY_LANDING or (forced and self.flying_state in LANDING)
 
-    def _require_endable(self, what: str, by: Right | None) -> None:
+    def _require_endable(self, what: Text, by: Right | None) -> None:
         """Raise `Refused` when the drone lands or returns, and `by` may not end that."""
         all_of_them = by is not None and by.extent is Extent.ALL
         if self.landing:
             initiator = self._initiators.landing or Initiator.CLIENT
             if self._forced_landing:
-                raise Refused(f"{what} refused: {FORCED}")
+                raise Refused(what, texts.FORCED)
             if initiator is Initiator.PILOT:
-                raise Refused(f"{what} refused: {PILOT_LANDS}")
+                raise Refused(what, texts.PILOT_LANDS)
             if by is None or (initiator is Initiator.DRONE and not all_of_them):
-                raise Refused(f"{what} refused: {LANDS}")
+                raise Refused(what, texts.LANDS)
         elif self.returning:
             initiator = self._initiators.returning or Initiator.CLIENT
             if self.returning_by_itself:
                 self._require_own_endable(what, by if all_of_them else None)
             elif initiator is Initiator.PILOT:
-                raise Refused(f"{what} refused: {PILOT_RETURNS}")
+                raise Refused(what, texts.PILOT_RETURNS)
             elif by is None:
-                raise Refused(f"{what} refused: {RETURNS}")
+                raise Refused(what, texts.RETURNS)
         elif by is None and self._returns_sent > 0:
-            raise Refused(f"{what} refused: {RETURNS}")
+            raise Refused(what, texts.RETURNS)
 
-    def _require_own_endable(self, what: str, by: Right | None) -> None:
+    def _require_own_endable(self, what: Text, by: Right | None) -> None:
         if by is None:
-            raise Refused(f"{what} refused: {RETURNS_BY_ITSELF}")
+            raise Refused(what, texts.RETURNS_BY_ITSELF)
         if self.drone.home.state.reason == ReturnReason.MOTOR_DOWN:
-            raise Refused(f"{what} refused: {MOTOR_DOWN}")
+            raise Refused(what, texts.MOTOR_DOWN)
         if not by.counted:
-            raise Refused(f"{what} refused: {NOT_COUNTED}")
+            raise Refused(what, NOT_COUNTED)
 
-    async def _free(self, what: str, by: Right) -> None:
+    async def _free(self, what: Text, by: Right) -> None:
         """End a landing or return that `by` may end; returns when the drone hovers, at once when it does neither."""
         if self.descends:
             self._require_endable(what, by)
@@ -460,7 +466,7 @@ class Vehicle(Aircraft):
             with self._selected_no_more(FlightMode.HOLD):
                 await self._stop(what, by)
 
-    async def _stop(self, what: str, by: Right | None, *, own: bool = False) -> None:
+    async def _stop(self, what: Text, by: Right | None, *, own: bool = False) -> None:
         """Hover, and end the landing or return that `by` may end.
 
         `own`: the drone returned by itself when the command arrived. A return that it begins afterwards goes on.
@@ -501,11 +507,11 @@ class Vehicle(Aircraft):
             return
         if not cancels:
             self.holds.offer(by.client, self._clock.monotonic())
-            self.text(Severity.CRITICAL, f"Returns in {home.state.auto_trigger_delay_s or 0} s: Hold again cancels")
+            self.text(Severity.CRITICAL, texts.RETURN_ANNOUNCED.fill(seconds=home.state.auto_trigger_delay_s or 0))
             return
         await home.cancel_auto_trigger()
         if self.returning_by_itself:
-            raise Refused("Return not cancelled: it has begun")
+            raise Refused(texts.RETURN, texts.RETURN_BEGUN, form=texts.NOT_CANCELLED)
         self.holds.withdraw()
         self._return_aborted(by, ReturnReason.LOW_BATTERY)  # the one reason that is announced and can be cancelled
 
@@ -514,17 +520,17 @@ class Vehicle(Aircraft):
         self.aborted_return = AbortedReturn(by.system, reason)
         self.aborted_return.report(self, self._clock.monotonic())
 
-    async def _end_landing(self, what: str, by: Right | None, *, take_off: bool = False) -> None:
+    async def _end_landing(self, what: Text, by: Right | None, *, take_off: bool = False) -> None:
         """End the landing that the drone flies; at once when it flies none."""
         if self.flying_state not in LANDING:
             return
         try:
             await self.drone.piloting.end_landing(take_off=take_off)
         except CommandRejected as error:
-            raise Refused(f"Landing not aborted: {error.reason}") from None
+            raise Refused(texts.LANDING, texts.from_below(error.reason), form=texts.NOT_ABORTED) from None
         self.landing_ended_at = self._clock.monotonic()
         if by is not None:
-            self.text(Severity.NOTICE, f"Landing aborted by system {by.system}: hovering")
+            self.text(Severity.NOTICE, texts.LANDING_ABORTED.fill(system=by.system))
 
     # What the drone reports.
 
@@ -595,7 +601,7 @@ class Vehicle(Aircraft):
         """Report that AMSL heights of this flight will be wrong by as much as GPS is at its beginning."""
         gps = self.drone.gps.state
         if gps.fixed and gps.altitude_accuracy is not None and gps.altitude_accuracy > GOOD_ACCURACY:
-            self.text(Severity.WARNING, f"Take-off altitude inaccurate: GPS +-{gps.altitude_accuracy} m")
+            self.text(Severity.WARNING, texts.TAKEOFF_AMSL_INACCURATE.fill(error=gps.altitude_accuracy))
 
     def on_takeoff_location(self) -> None:
         """Adopt the take-off place that the drone reports for the present flight as origin of the local frame."""
@@ -623,10 +629,10 @@ class Vehicle(Aircraft):
         return None
 
     @property
-    def standing_warnings(self) -> list[str]:
+    def standing_warnings(self) -> list[Text]:
         """Texts that stay true for a while: a client that connects later gets them with its banner."""
         warnings = [ESTIMATED] if self.height.estimated and not self.on_ground else []
-        return [*warnings, INVERTED] if self.roll.inverted else warnings
+        return [*warnings, texts.ROLL_SIGN_INVERTED] if self.roll.inverted else warnings
 
     @property
     def takeoff_record(self) -> TakeoffRecord | None:
@@ -752,7 +758,7 @@ class Vehicle(Aircraft):
 
     def _require_motors(self) -> None:
         if self._terminating:
-            raise Refused("Refused: the motors are being cut")
+            raise Refused(texts.FLIGHT_COMMAND, texts.MOTORS_STOPPING)
 
     def _replace(self) -> list[asyncio.Task[None]]:
         """End what is under way, which can fly the drone no further; tasks that are about to end."""

@@ -38,4 +38,4 @@ async def test_conf_076_077_mavsdk(flavour: str) -> None:
         assert [(m.command, m.param1, m.param2) for m in circles] == [(5003, 80.0 + n, float(n)) for n in range(3)]
         points = await download(w.client, RALLY)
         assert [m.x for m in points] == [round((place[0] + 1e-5 * n) * 1e7) for n in range(1000)]
-        assert not [m for _, m in w.client.since(0, "STATUSTEXT") if "given up" in m.text]
+        assert not [m for _, m in w.client.since(0, "STATUSTEXT") if "aborted" in m.text]

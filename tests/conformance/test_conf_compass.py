@@ -34,8 +34,8 @@ async def test_compass_calibration_is_accepted_at_its_start_and_reported_to_its_
         turns = [m.text for _, m in w.client.since(mark, "STATUSTEXT") if "turn the drone" in m.text]
         assert [text.rpartition("drone ")[2] for text in turns] == [
             "about its long axis",
-            "head over heels",
-            "like a top",
+            "nose over tail",
+            "about its vertical axis",
         ]
         assert (await w.client.command(ACCEPT)).result == ACCEPTED
         answers = [m.result for _, m in w.client.since(mark, "COMMAND_ACK") if m.command == START]

@@ -58,7 +58,7 @@ async def test_a_takeoff_that_nobody_arms_is_forgotten(flavour: str) -> None:
     async with world(flavour=flavour) as w:
         mark, began = w.client.mark(), time.monotonic()
         assert (await w.client.command(TAKE_OFF, -1, NAN, NAN, NAN)).result == ACCEPTED
-        text = "Takeoff forgotten: nobody armed"
+        text = "Takeoff cancelled: not armed within 10 s"
         await w.client.wait("STATUSTEXT", lambda m: m.text == text, since=mark, timeout=ARM_WAIT + 5.0)
         assert ARM_WAIT <= time.monotonic() - began < ARM_WAIT + 0.5
         mark = w.client.mark()
@@ -78,7 +78,7 @@ async def test_an_armed_state_that_no_takeoff_follows_lapses(flavour: str) -> No
         await w.client.heartbeat(lambda beat: not beat.base_mode & ARMED, timeout=AUTO_DISARM + 5.0)
         # A heartbeat is due at once when the bit changes, and a second later in any case.
         assert AUTO_DISARM <= time.monotonic() - began < AUTO_DISARM + 1.2
-        await w.client.wait("STATUSTEXT", lambda m: m.text == "Disarmed: no take-off followed", since=mark)
+        await w.client.wait("STATUSTEXT", lambda m: m.text == "Disarmed: no takeoff", since=mark)
         # Nobody is armed any more: a take-off waits again instead of beginning.
         assert (await w.client.command(TAKE_OFF, -1, NAN, NAN, NAN)).result == ACCEPTED
         await w.client.wait("HEARTBEAT")
@@ -125,7 +125,7 @@ async def test_takeoff_heights_are_refused_not_clamped(height: float) -> None:
         await w.client.command(ARM, 1)
         mark = w.client.mark()
         assert (await w.client.command(TAKE_OFF, 0, 0, 0, 0, x=0.0, y=0.0, z=height)).result == DENIED
-        await w.client.wait("STATUSTEXT", lambda m: m.text.startswith("Refused"), since=mark)
+        await w.client.wait("STATUSTEXT", lambda m: " refused: " in m.text, since=mark)
         assert w.commands("ardrone3.Piloting.TakeOff") == []
 
 

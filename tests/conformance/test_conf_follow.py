@@ -121,7 +121,7 @@ async def test_a_target_that_falls_silent_is_hovered_for(flavour: str) -> None:
         hold = HOLD if flavour == "px4" else 17
         await w.client.heartbeat(lambda beat: beat.custom_mode == hold, since=mark)
         assert now() - last < 3.0
-        await said(w.client, "its target fell silent")
+        await said(w.client, "target lost")
         ended = now()
         await w.drone.wait_log(lambda e: e.kind == "pose" and abs(e.args["vn"]) < 0.2, 10.0, since=ended)
         assert [e for e in motion(w, ended) if e.t > ended + 0.1] == []
@@ -145,7 +145,7 @@ async def test_without_a_target_it_hovers_and_gives_up() -> None:
         assert await follow(w.client, "px4") == 0
         began = now()
         await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD, since=mark, timeout=15.0)
-        await said(w.client, "no target appeared", mark)
+        await said(w.client, "no target received", mark)
         assert now() - began > 8.0
         assert motion(w, began) == []
 
@@ -171,8 +171,8 @@ async def test_where_it_may_not_fly_it_does_not_follow() -> None:
         assert await follow(w.client, "px4") == 0
         began = now()
         for seen, text in [
-            (target(60.0, 0.0), "off fence centre > "),
-            (target(0.0, 0.0, place=(0.0, 0.0)), "both 0"),
+            (target(60.0, 0.0), " m > geofence "),
+            (target(0.0, 0.0, place=(0.0, 0.0)), "latitude and longitude are 0"),
             (target(900.0, 0.0), "900 m away"),
             (target(10.0, 0.0, (60.0, 0.0)), "60 m/s"),
         ]:
@@ -196,7 +196,7 @@ async def test_sticks_that_follow_the_camera_follow_no_target(flavour: str) -> N
             mark = w.client.mark()
             style = piloting_style.SetStyle(piloting_style.PilotingStyleStyle.CAMERA_OPERATED)
             w.drone.firmware.receive(style, now())
-            await said(w.client, "Follow ended: the drone's sticks have become relative to the camera", mark)
+            await said(w.client, "Follow ended: sticks relative to camera", mark)
             ended = now()
             hold = HOLD if flavour == "px4" else 17
             await w.client.heartbeat(lambda beat: beat.custom_mode == hold, since=mark)

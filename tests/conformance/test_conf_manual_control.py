@@ -115,7 +115,7 @@ async def test_a_stick_flies_in_mode_position_only(flavour: str) -> None:
         await w.take_off(8.0)
         began, mark = now(), w.client.mark()
         async with streaming(w.client, manual(x=1000, z=0), 0.04):
-            await said(w.client, "mode Position", mark)
+            await said(w.client, "not Position", mark)
             await asyncio.sleep(0.3)
         assert motion(w, began) == []
         beats = {beat.custom_mode for _, beat in w.client.since(mark, "HEARTBEAT")}
@@ -155,7 +155,7 @@ async def test_the_ground_is_not_left_by_sticks(flavour: str) -> None:
         await by_sticks(w, flavour)
         mark = w.client.mark()
         async with streaming(w.client, manual(z=0, r=1000), 0.04):
-            await said(w.client, "they do not arm", mark)
+            await said(w.client, "arm by command", mark)
             await asyncio.sleep(0.5)
         async with streaming(w.client, manual(z=1000), 0.04):
             await asyncio.sleep(0.5)
@@ -185,7 +185,7 @@ async def test_sticks_have_one_holder() -> None:
             await w.drone.wait_log(lambda e: e.name.endswith(".PCMD") and e.args["pitch"] == 50, 5.0)
             began = now()
             async with streaming(other, manual(y=-1000), 0.04):
-                await said(other, "somebody else's are in use")
+                await said(other, "another joystick flies")
             async with streaming(other, manual(), 0.04):
                 await asyncio.sleep(0.3)
             assert {stick(e)[:2] for e in heard(w, "PCMD", since=began)} == {(0, 50)}

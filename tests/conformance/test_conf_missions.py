@@ -143,7 +143,7 @@ async def test_conf_049_a_mission_that_waits_for_arming_is_forgotten() -> None:
         await put(w, ROUND)
         assert (await w.client.command(dialect.MAV_CMD_DO_SET_MODE, 1, 4, 4)).result == dialect.MAV_RESULT_ACCEPTED
         await mode(w, 0x04040000)
-        await w.client.wait("STATUSTEXT", lambda m: "nobody armed" in m.text, timeout=12.0)
+        await w.client.wait("STATUSTEXT", lambda m: "not armed within" in m.text, timeout=12.0)
         await mode(w, w.modes.hold)
         assert (await w.client.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)).result == dialect.MAV_RESULT_ACCEPTED
         assert (await w.client.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0)).result == dialect.MAV_RESULT_ACCEPTED
@@ -187,13 +187,13 @@ async def test_conf_049_refused_by_the_gateway_itself(flavour: str) -> None:
         params = (1, number) if first(w) else (1, 4, 4)
         ack = await w.client.command(dialect.MAV_CMD_DO_SET_MODE, *params)
         assert ack.result == dialect.MAV_RESULT_TEMPORARILY_REJECTED
-        await said(w, "there is no mission")
+        await said(w, "no mission")
         await put(w, [takeoff(8.0), way(30.0, 0.0, 400.0)])
         await w.take_off(5.0)
         mark = w.client.mark()
         ack = await w.client.command(dialect.MAV_CMD_DO_SET_MODE, *params)
         assert ack.result == dialect.MAV_RESULT_DENIED
-        await said(w, "item 2: 400.0 m above take-off", since=mark)
+        await said(w, "Item 2 refused: 400.0 m > ceiling", since=mark)
         await put(w, ROUND[:-1])
         w.drone.faults.gps = False
         await w.client.wait("GPS_RAW_INT", lambda m: m.fix_type < 3, timeout=10.0)
@@ -213,7 +213,7 @@ async def test_conf_049_items_outside_the_fence_are_refused_when_it_begins() -> 
         mark = w.client.mark()
         ack = await w.client.command(dialect.MAV_CMD_MISSION_START, 0, 0)
         assert ack.result == dialect.MAV_RESULT_DENIED
-        await said(w, "Mission refused: item 3", since=mark)
+        await said(w, "Item 3 refused: ", since=mark)
         assert w.commands("common.Mavlink.Start") == []
 
 
@@ -358,7 +358,7 @@ async def test_conf_072_the_current_item(flavour: str) -> None:
             ).result == dialect.MAV_RESULT_DENIED
         mark = w.client.mark()
         w.client.send(dialect.MAVLink_mission_set_current_message(1, 1, 77))
-        await said(w, f"there is no item {78 - first(w)}", since=mark)
+        await said(w, f"no item {78 - first(w)}", since=mark)
         await start(w)
         await state(w, ACTIVE, seq=1, since=mark)
         await w.drone.wait_log(lambda e: e.name == "item" and e.args["command"] == "waypoint", timeout=20.0)

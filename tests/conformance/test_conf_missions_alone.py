@@ -91,7 +91,7 @@ async def test_conf_122_the_drone_returns_when_the_link_is_lost() -> None:
     async with world(web=True, speed=1.5) as w:
         await put(w, FAR)
         await start(w)
-        await said(w, "the drone returns home")
+        await said(w, "link loss: return home")
         await state(w, ACTIVE, seq=2, since=0)
         await lost_and_back(w, noticed=True)
         mark = w.client.mark()
@@ -308,7 +308,7 @@ async def test_a_gateway_that_ends_between_two_files_goes_on_there(tmp_path: Pat
                     await turning(w)
                     assert reached(w) == [0, 1, 2]
                 else:
-                    await said(w, "the drone flies it no more")
+                    await said(w, "Mission not flying: ")
                     await state(w, PAUSED, seq=3)
                     await w.client.command(dialect.MAV_CMD_MISSION_START, 0, 0, timeout=20.0)
                     simulator.speed = 6.0
@@ -348,8 +348,8 @@ def spoil(folder: Path, key: str) -> None:
 @pytest.mark.parametrize(
     ("key", "words", "then"),
     [
-        ("done", "flown mission in ", NOT_STARTED),
-        ("jumps", "flown mission in ", NOT_STARTED),
+        ("done", "Mission record in ", NOT_STARTED),
+        ("jumps", "Mission record in ", NOT_STARTED),
         ("line", "Mission complete", COMPLETE),
     ],
 )

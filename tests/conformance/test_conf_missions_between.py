@@ -118,7 +118,7 @@ async def test_conf_074_another_mission_before_the_drone_has_begun_ends_the_star
         here = w.drone.pose
         assert math.dist((there.north, there.east, there.up), (here.north, here.east, here.up)) < 0.3
         assert whole(await state(w, NO_MISSION if how == "cleared" else NOT_STARTED)).mission_mode != 1
-        assert [m.text for _, m in w.client.since(mark, "STATUSTEXT") if "begins at" in m.text] == []
+        assert [m.text for _, m in w.client.since(mark, "STATUSTEXT") if "Mission starts" in m.text] == []
         if how != "cleared":  # and what is the mission now flies
             assert (await w.client.command(dialect.MAV_CMD_MISSION_START, 0, 0)).result == dialect.MAV_RESULT_ACCEPTED
             await settled(w, (0.0, 9.0, 6.0))
@@ -141,8 +141,8 @@ async def test_conf_074_another_mission_before_the_drone_has_begun_at_arming(how
             assert (await clear(w.client, MISSION)).type == ACCEPTED
         else:
             await put(w, [takeoff(6.0), way(0.0, 9.0, 6.0)])
-        why = "it was cleared" if how == "cleared" else "another mission was uploaded"
-        await said(w, f"Mission not begun: {why}"[:50], since=mark)
+        why = "mission was cleared" if how == "cleared" else "another was uploaded"
+        await said(w, f"Mission not started: {why}", since=mark)
         stopped = await w.drone.wait_log(lambda e: e.name == "plan" and e.args["state"] == "stopped", 10.0)
         await w.drone.wait_log(lambda e: e.kind == "state" and e.args["event"] == "at_rest", since=stopped.t)
         await mode(w, w.modes.hold, since=w.client.mark())
@@ -246,7 +246,7 @@ async def test_conf_074_what_somebody_else_continues_is_followed(flavour: str, a
             assert ack.result == dialect.MAV_RESULT_ACCEPTED
         (begun,) = w.commands("common.Mavlink.Start")
         somebody_else(w, common.Start(begun.args["filepath"], common.MavlinkType.FLIGHT_PLAN))
-        await said(w, "somebody else has continued it", since=mark)
+        await said(w, "resumed by another controller", since=mark)
         await state(w, ACTIVE, seq=2, since=mark)
         await mode(w, MISSION_MODE[flavour], since=mark)
         await state(w, COMPLETE, since=mark)
@@ -261,5 +261,5 @@ async def test_conf_074_a_plan_that_is_not_the_missions_is_told() -> None:
         mark = w.client.mark()
         await w.drone.wait_log(lambda e: e.name == "plan" and e.args["state"] == "paused", 10.0)
         somebody_else(w, common.Start(begun.args["filepath"], common.MavlinkType.FLIGHT_PLAN))
-        await said(w, "The drone flies a plan that is not", since=mark)
+        await said(w, "Drone flies a plan that is not", since=mark)
         await state(w, NOT_STARTED, since=w.client.mark())

@@ -283,7 +283,7 @@ async def test_conf_063_a_mission_that_cannot_be_stored_is_told_and_the_next_one
         with monkeypatch.context() as broken:
             broken.setattr(Memory, "save", fail)
             assert (await upload(w.client, ONE_WAY, MISSION)).type == ERROR
-            assert (await w.client.wait("STATUSTEXT", lambda m: "failed to store" in m.text, since=0)).severity <= 4
+            assert (await w.client.wait("STATUSTEXT", lambda m: "cannot be stored" in m.text, since=0)).severity <= 4
         assert (await upload(w.client, OTHER_WAY, MISSION)).type == ACCEPTED
         assert len(await download(w.client, MISSION)) == len(OTHER_WAY)
 

@@ -203,7 +203,7 @@ async def test_mission_stopped_on_the_way_to_its_last_way_point_is_paused() -> N
         await state(w, ACTIVE, seq=2, since=0)
         w.drone.firmware.flight_plan.stop(hover=True)
         await state(w, PAUSED, seq=2)
-        await said(w, "Mission paused at item 3: the drone has stopped it")
+        await said(w, "Mission paused at item 3: stopped by the drone")
         assert reached(w) == [0, 1]
 
 

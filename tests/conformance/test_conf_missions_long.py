@@ -87,7 +87,7 @@ async def test_a_loop_without_end_is_flown_file_after_file(model: str, cuts: int
     async with world(web=True, model=model, speed=4.0) as w:
         w.drone.faults.battery = 80
         await put(w, loop(-1.0))
-        await said(w, "flown by the gateway")
+        await said(w, "flown by gateway")
         await start(w)
         await begun(w, cuts + 1)
         await state(w, ACTIVE, seq=1, timeout=60.0)
@@ -178,7 +178,7 @@ async def test_an_ai_leaves_out_a_way_point_that_it_cannot_reach() -> None:
         somebody_else(w, ardrone3.MaxDistance(20.0))
         somebody_else(w, ardrone3.NoFlyOverMaxDistance(1))
         skipped = await w.drone.wait_log(lambda e: e.name == "flight_plan.waypoint_skipped", timeout=30.0)
-        await said(w, "item 3 was out of reach")
+        await said(w, "item 3 skipped: out of reach")
         await state(w, COMPLETE, since=0)
         assert reached(w) == [0, 1, 3]
         assert skipped.args["item"] == 3, "a line of its file"

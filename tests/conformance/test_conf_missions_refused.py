@@ -65,11 +65,11 @@ def mend(w: World) -> None:
 REASONS: dict[Part, tuple[Callable[[World], None], str]] = {
     Part.GPS: (_no_fix, "no GPS fix"),
     # One that has to be calibrated does not take off either, and says so.
-    Part.CALIBRATION: (_needs_calibration, "the magnetometer wants to be calibrated, it cannot take off"),
-    Part.MAVLINK_FILE: (_unreadable_file, "it does not take the file"),
-    Part.TAKE_OFF: (_no_take_off, "it cannot take off"),
-    Part.WAYPOINTS_BEYOND_GEOFENCE: (_low_ceiling, "a way point is beyond its own geofence or ceiling"),
-    Part.CAMERA_AVAILABLE: (_no_camera, "its camera is not available"),
+    Part.CALIBRATION: (_needs_calibration, "calibrate magnetometer, cannot take off"),
+    Part.MAVLINK_FILE: (_unreadable_file, "file not accepted"),
+    Part.TAKE_OFF: (_no_take_off, "cannot take off"),
+    Part.WAYPOINTS_BEYOND_GEOFENCE: (_low_ceiling, "waypoint out of bounds"),
+    Part.CAMERA_AVAILABLE: (_no_camera, "camera unavailable"),
 }
 """What goes wrong in the drone, and what is said of it."""
 
@@ -105,7 +105,7 @@ async def test_conf_049_refused_by_the_drone_for_its_own_reason(part: Part, mode
             ack = await w.client.command(*command)
             assert ack.result == dialect.MAV_RESULT_TEMPORARILY_REJECTED
             await said(w.client, reason, mark)
-            assert f"Mission refused by the drone: {reason}" in texts(w.client, mark)
+            assert f"Mission refused by drone: {reason}" in texts(w.client, mark)
             await told(w, part, False, since)
             refused = w.drone.log.find("event", common.StartingErrorEvent.NAME)
             assert len(refused) == asked, "the drone was asked, and has refused"

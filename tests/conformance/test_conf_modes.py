@@ -52,7 +52,7 @@ async def test_conf_028_a_mode_that_an_anafi_has_not(number: int) -> None:
         before = (await w.client.heartbeat(lambda beat: True)).custom_mode
         mark = w.client.mark()
         assert (await w.client.command(SET_MODE, 1, number)).result == DENIED
-        await w.client.wait("STATUSTEXT", lambda m: "no such mode" in m.text, since=mark)
+        await w.client.wait("STATUSTEXT", lambda m: "not a mode" in m.text, since=mark)
         assert (await w.client.heartbeat(lambda beat: True)).custom_mode == before
 
 

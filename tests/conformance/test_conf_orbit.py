@@ -110,7 +110,7 @@ async def test_an_orbit_of_so_many_radians_ends_in_hold() -> None:
         await w.client.heartbeat(lambda beat: beat.custom_mode == CIRCLING["px4"])
         mark = w.client.mark()
         await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD, since=mark, timeout=40.0)
-        await w.client.wait("STATUSTEXT", lambda m: "has been flown" in m.text, since=mark)
+        await w.client.wait("STATUSTEXT", lambda m: "angle flown" in m.text, since=mark)
 
 
 async def test_without_gps_the_orbit_ends_in_a_hover() -> None:
@@ -141,14 +141,14 @@ async def test_sticks_that_follow_the_camera_are_no_sticks_for_an_orbit() -> Non
         mark = w.client.mark()
         style = piloting_style.SetStyle(piloting_style.PilotingStyleStyle.CAMERA_OPERATED)
         w.drone.firmware.receive(style, asyncio.get_running_loop().time())
-        await said(w.client, "Orbit ended: the drone's sticks have become relative to the camera", mark)
+        await said(w.client, "Orbit ended: sticks relative to camera", mark)
         ended = asyncio.get_running_loop().time()
         await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD, since=mark)
         await w.drone.wait_log(
             lambda e: e.kind == "pose" and math.hypot(e.args["vn"], e.args["ve"]) < 0.3, 10.0, since=ended
         )
         assert (await w.client.command(ORBIT, 8.0, 3.0, **orbit)).result == REJECTED
-        await said(w.client, "Orbit refused: the drone's piloting style", mark)
+        await said(w.client, "Orbit refused: sticks relative to camera", mark)
         assert motion(w, ended) == []
 
 

@@ -81,9 +81,9 @@ async def test_file_of_a_list_replaces_it_without_a_mission_ack(kind: int) -> No
 @pytest.mark.parametrize(
     ("kind", "data", "reason"),
     [
-        (MISSION, b"", "Mission refused: the file has no header"),
-        (MISSION, file_of(LISTS[MISSION], MISSION)[:-1], "Mission refused: the file has not its 3 items"),
-        (FENCE, file_of([circle(PLACE, -5.0)], FENCE), "Fence refused: item 0: -5 is no radius"),
+        (MISSION, b"", "Mission refused: file without header"),
+        (MISSION, file_of(LISTS[MISSION], MISSION)[:-1], "Mission refused: file lacks its 3 items"),
+        (FENCE, file_of([circle(PLACE, -5.0)], FENCE), "Fence refused: item 0: radius -5 m"),
     ],
 )
 async def test_file_that_is_not_good_leaves_the_list_and_says_why(kind: int, data: bytes, reason: str) -> None:

@@ -178,7 +178,7 @@ async def test_conf_063_an_aborted_upload_keeps_the_old_plan(flavour: str, kind:
         send_item(w.client, a_plan(kind, 7, 1.0)[0], 0, kind)
         ack = await w.client.wait("MISSION_ACK", since=mark, timeout=8.0)
         assert (ack.type, ack.mission_type) == (CANCELLED, kind)
-        await w.client.wait("STATUSTEXT", lambda m: "given up" in m.text, since=mark)
+        await w.client.wait("STATUSTEXT", lambda m: "upload aborted" in m.text, since=mark)
         assert [content(item) for item in await download(w.client, kind)] == [item.content for item in plan]
         assert (await upload(w.client, a_plan(kind, 5), kind)).type == ACCEPTED
 
@@ -255,7 +255,7 @@ BAD_ITEMS = [
     (FENCE, [Item(dialect.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, *PLACE, p1=50, frame=10)], UNSUPPORTED_FRAME, "item 0"),
     (RALLY, [Item(dialect.MAV_CMD_NAV_RALLY_POINT, *PLACE, z=20, frame=11)], UNSUPPORTED_FRAME, "item 0"),
     (RALLY, [Item(dialect.MAV_CMD_NAV_RALLY_POINT, *PLACE, z=float("inf"), frame=3)], INVALID_PARAM1 + 6, "item 0"),
-    (FENCE, polygon([PLACE, PLACE, PLACE]), 5, "encloses nothing"),
+    (FENCE, polygon([PLACE, PLACE, PLACE]), 5, "has no area"),
     (
         FENCE,
         [Item(dialect.MAV_CMD_NAV_FENCE_RETURN_POINT, *PLACE), Item(dialect.MAV_CMD_NAV_FENCE_RETURN_POINT, *PLACE)],
@@ -455,7 +455,7 @@ async def test_conf_072_there_is_no_current_item_without_a_mission(flavour: str)
         mark = w.client.mark()
         w.client.send(dialect.MAVLink_mission_set_current_message(1, 1, 3))
         await w.client.wait("MISSION_CURRENT", since=mark, timeout=2.0)
-        await w.client.wait("STATUSTEXT", lambda m: "there is no mission" in m.text, since=0)
+        await w.client.wait("STATUSTEXT", lambda m: "no mission" in m.text, since=0)
 
 
 @lists

@@ -85,7 +85,7 @@ async def test_target_beyond_4_km_is_refused_with_the_drones_geofence_off(flavou
         far, farther = (geo.destination(HOME[0], HOME[1], metres, 0.0) for metres in (3990.0, 4010.0))
         mark = w.client.mark()
         assert await goto(w, CHANGE_MODE, farther) == DENIED
-        await said(w, mark, "Goto refused: 4010 m away, limit 4000 m")
+        await said(w, mark, "Goto refused: 4010 m away > 4000 m")
         assert moves(w) == 0
         assert await goto(w, CHANGE_MODE, far) == ACCEPTED
 

@@ -11,7 +11,8 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.flavours import both
 from support.mav import Client
-from support.world import World, world
+from support.plans import Item, around, circle, upload
+from support.world import HOME, World, world
 
 from anafi_mav import __version__
 from anafi_mav.arsdk.messages import ardrone3, battery, rth
@@ -107,13 +108,15 @@ async def test_conf_111_system_time() -> None:
 async def test_conf_112_long_texts_and_severities(flavour: str) -> None:
     async with world(flavour=flavour) as w:
         mark = w.client.mark()
-        high = {"x": 0.0, "y": 0.0, "z": 3000.0}
-        assert (await w.client.command(dialect.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, **high)).result != ACCEPTED
+        place = (HOME[0], HOME[1])
+        zones = [circle(place, 30.0), circle(around(place, (9.0, 9.0))[0], 5.0, inclusion=False)]
+        return_point = Item(dialect.MAV_CMD_NAV_FENCE_RETURN_POINT, *place, 5.0)
+        assert (await upload(w.client, [*zones, return_point], dialect.MAV_MISSION_TYPE_FENCE)).type == 0
         await w.client.heartbeat(lambda beat: True)
-        [(severity, refusal)] = heard(w.client, mark)
-        assert len(refusal) > 50
-        assert refusal.endswith("ceiling of 150 m")
-        assert severity == dialect.MAV_SEVERITY_WARNING
+        [(severity, fence)] = heard(w.client, mark)
+        assert len(fence) > 50
+        assert fence == "Fence: 1 inclusion circle, 1 exclusion circle; return point unused"
+        assert severity == dialect.MAV_SEVERITY_INFO
         chunks = [m for _, m in w.client.since(mark, "STATUSTEXT")]
         assert {m.id for m in chunks} != {0}
         assert all(len(m.text) == 50 for m in chunks[:-1])
@@ -125,13 +128,13 @@ async def test_conf_112_long_texts_and_severities(flavour: str) -> None:
             (ardrone3.HoveringWarning(1, 0), "Too dark", 4),
             (
                 ardrone3.ForcedLandingAutoTrigger(ardrone3.ForcedLandingReason.BATTERY_TOO_HOT, 30),
-                "Landing by itself in 30 s: battery too hot",
+                "Drone lands in 30 s: battery too hot",
                 1,
             ),
             (rth.HomeReachability(rth.RthHomeReachability.CRITICAL), "Home: critical", 2),
             (
                 rth.RthAutoTrigger(rth.AutoTriggerReason.BATTERY_CRITICAL_SOON, 12),
-                "Returning home by itself in 12 s",
+                "Drone returns home in 12 s",
                 4,
             ),
             (ardrone3.AlertStateChanged(ardrone3.AlertState.CUT_OUT), "Alert: cut out", 2),

@@ -95,7 +95,7 @@ async def test_restart_in_flight_without_flight_id_estimates_and_keeps_away_from
         assert abs(home.altitude - 35_000) < 1_500
         mark = w.client.mark()
         assert await goto(w, 10.0, HOME[2] + 12.0, GLOBAL) == REJECTED
-        refusal = "Refused: estimated AMSL: 12 m < 15 m"
+        refusal = "Height refused: estimated AMSL: 12 m < 15 m"
         await w.client.wait("STATUSTEXT", lambda m: m.text == refusal, since=mark)
         assert w.commands("ardrone3.Piloting.moveTo") == []
         late = await w.connect(sysid=254)
@@ -118,7 +118,7 @@ async def test_restart_in_flight_without_flight_id_refuses_low_mission_items_abo
         )
         ack = await w.client.command(dialect.MAV_CMD_MISSION_START, 0, 0)
         assert ack.result == REJECTED
-        await said(w, "Mission refused: item 2: estimated AMSL < 15 m")
+        await said(w, "Item 2 refused: estimated AMSL: ")
         assert w.commands("common.Mavlink.Start") == []
 
 

@@ -85,7 +85,7 @@ async def test_commanded_return_ends_landed_and_disarmed(flavour: str) -> None:
         await away(w)
         mark = await go_home(w)
         await said(w.client, "Return by system 255: lands at take-off point", mark)
-        await said(w.client, "Link loss on the way: drone hovers at home", mark)
+        await said(w.client, "Link loss during return: drone hovers at home", mark)
         over = await w.drone.wait_log(lambda e: e.name == "rth.state" and e.args["reason"] == 3, 30.0)
         await said(w.client, r"^Landing in 5 s, Hold cancels: \d m from take-off$", mark)
         await said(w.client, "Landing place: take-off point, ", mark)

@@ -14,12 +14,13 @@ from support.world import HOLD, HOME, World, loopback, world
 
 from anafi_mav.config import Config, DroneConfig
 from anafi_mav.gateway import Gateway
-from anafi_mav.services.monitor.roll_sign_service import VERIFIED
 from anafi_mav.sim import DroneSpec, Simulator
 from anafi_mav.sim.world.faults import Impairment
 from anafi_mav.sim.world.quirks import Quirk
 from anafi_mav.sim.world.wind import WindSpec
-from anafi_mav.vehicle.base.roll_sign import INVERTED, Sign
+from anafi_mav.texts import ROLL_SIGN_INVERTED as INVERTED
+from anafi_mav.texts import ROLL_SIGN_VERIFIED as VERIFIED
+from anafi_mav.vehicle.base.roll_sign import Sign
 
 SET_MODE, ORBIT = dialect.MAV_CMD_DO_SET_MODE, dialect.MAV_CMD_DO_ORBIT
 ACCEPTED, REJECTED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_TEMPORARILY_REJECTED
@@ -63,7 +64,7 @@ async def test_velocity_setpoints_with_roll_as_assumed_verify_its_sign() -> None
             await engage(w.client, "px4")
             await said(w, VERIFIED)
         assert most_tilt(w, began) < 12.0
-        assert "Tilt limit 10 deg: roll sign not verified yet" in texts(w)
+        assert "Tilt limit 10 deg: roll sign not verified" in texts(w)
 
 
 async def test_velocity_setpoints_with_inverted_roll_end_in_a_hover_and_are_refused() -> None:

@@ -440,7 +440,7 @@ async def test_a_pilots_stick_ends_offboard_for_good() -> None:
             flown = len(pitches(w))
             await watched(3.0)  # longer than he keeps the drone after his last touch
             assert set(pitches(w, flown)) <= {0}
-        assert any("pilot at the Skycontroller" in m.text for _, m in w.client.since(0, "STATUSTEXT"))
+        assert any("Skycontroller pilot" in m.text for _, m in w.client.since(0, "STATUSTEXT"))
 
 
 # What the drone does by itself.

@@ -121,7 +121,7 @@ async def test_session_on_the_ground_does_not_fly_a_drone_that_somebody_else_tak
             mark = w.client.mark()
             somebody_else(w, ardrone3.TakeOff())
             await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "hovering", 15.0)
-            await said(w.client, "Offboard ended: not its takeoff", mark)
+            await said(w.client, "Offboard ended: takeoff of another client", mark)
             await watched(1.5)
             await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD)
         assert [e for e in heard(w, "PCMD") if e.args["pitch"]] == []
@@ -222,7 +222,7 @@ async def test_hold_while_the_fence_acts_replaces_what_the_fence_commanded(actio
         w.drone.faults.down = w.drone.faults.up = Impairment(delay=0.3)
         mark = w.client.mark()
         somebody_else(w, ardrone3.MoveBy(24.0, 0.0, 0.0, 0.0))
-        await said(w.client, "Fence ahead", mark)
+        await said(w.client, "too fast for", mark)
         assert (await w.client.command(SET_MODE, 1, 4, 3, timeout=8.0)).result == ACCEPTED
         w.drone.faults.down = w.drone.faults.up = Impairment()
         await watched(1.0)

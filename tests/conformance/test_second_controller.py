@@ -20,7 +20,7 @@ from anafi_mav.config import Config, DroneConfig
 from anafi_mav.errors import LinkLost
 from anafi_mav.gateway import Gateway
 
-TAKEN = "Another controller has taken the drone"
+TAKEN = "Drone connected to another controller"
 
 
 @asynccontextmanager

@@ -355,7 +355,7 @@ async def test_offboard_that_falls_silent_during_takeoff_leaves_the_climb() -> N
         async with streaming(w.client, local(VELOCITY_ONLY, v=(2.0, 0.0, 0.0))):
             await rising(w, 4.0)
             assert (await w.client.command(SET_MODE, 1, 6, 0)).result == ACCEPTED
-        await said(w.client, "Offboard setpoints stopped: takeoff goes on", mark)
+        await said(w.client, "Offboard setpoints stopped: takeoff continues", mark)
         await w.at_height(4.0)
         assert [e for e in heard(w, "PCMD") if e.args["pitch"]] == []
 

@@ -252,7 +252,7 @@ async def announced(w: World, seconds: float) -> None:
     needed = firmware.endurance.needed(w.drone.pose, (0.0, 0.0))
     firmware.battery.charge = power.CRITICAL + needed + seconds * firmware.endurance.rate
     await w.drone.wait_log(lambda e: e.name == "rth.rth_auto_trigger" and e.args["reason"] != 0, 5.0)
-    await text(w.client, "Returning home by itself")
+    await text(w.client, "Drone returns home")
 
 
 def returned(w: World) -> bool:

@@ -174,7 +174,7 @@ async def held(w: World, script: Process, name: str, calm: float = 0.0) -> Pose:
     """
     await script.line(lambda line: line == f"held {name}", timeout=60.0)
     loop = asyncio.get_running_loop()
-    disturbed = ("setpoints stopped", "Setpoint not flown", "Sticks silent")
+    disturbed = ("setpoints stopped", "Setpoint dropped", "Sticks silent")
     while True:
         texts_at = [at for at, m in w.client.since(0, "STATUSTEXT") if any(words in m.text for words in disturbed)]
         left = max(texts_at, default=-calm) + calm - loop.time()

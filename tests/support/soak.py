@@ -583,7 +583,7 @@ def judge(flight: Flight) -> None:
     """What the log and the acknowledgements of the steps say."""
     _judge_acks(flight)
     texts = [m.text for client in flight.w.clients for _, m in client.since(0, "STATUSTEXT")]
-    if flight.drawn.skycontroller is None and any("somebody else has continued" in text for text in texts):
+    if flight.drawn.skycontroller is None and any("resumed by another controller" in text for text in texts):
         flight.wrong.append(f"mission is {BLAMED}")
     _judge_sticks(flight)
     _judge_motors(flight)

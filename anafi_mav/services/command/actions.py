@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from functools import partial
 
+from anafi_mav import texts
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.command.guided_service import guided_mode
 from anafi_mav.services.command_targets import height, place
@@ -29,7 +30,7 @@ async def arm_disarm(vehicle: Vehicle, command: Command) -> None:
     elif command.params[0] == 0.0:
         await vehicle.takeoff.disarm(force=command.params[1] == FORCE)
     else:
-        raise Refused("Refused: param1 is 1 to arm, 0 to disarm", lasting=True)
+        raise Refused(texts.ARMING, texts.PARAM1_BINARY, lasting=True)
 
 
 async def takeoff(vehicle: Vehicle, command: Command) -> None:
@@ -65,9 +66,9 @@ async def reposition(vehicle: Vehicle, command: Command) -> None:
     """
     speed, flags, yaw = command.params[0], command.params[1], command.params[3]
     if math.isinf(speed) or abs(yaw) > 2.0 * math.pi:
-        raise Refused("Refused: speed is in m/s, heading in radians of up to a turn", lasting=True)
+        raise Refused(texts.GOTO, texts.PARAM1_SPEED_HEADING, lasting=True)
     if speed > 0.0 and not SLOWEST <= speed <= FASTEST:
-        raise Refused(f"Refused: a speed is {SLOWEST:g} to {FASTEST:g} m/s", lasting=True)
+        raise Refused(texts.SPEED, texts.SPEED_RANGE.fill(slowest=SLOWEST, fastest=FASTEST), lasting=True)
     where, ato = place(command), height(vehicle, command)
     heading = None if math.isnan(yaw) else yaw
     if heading == 0.0 and command.flavour.zero_is_unset:
@@ -75,7 +76,7 @@ async def reposition(vehicle: Vehicle, command: Command) -> None:
     mode = guided_mode(command.flavour)
     if where is None and ato is None and heading is None:
         if speed > 0.0:
-            raise Refused("Refused: a speed needs a place, a height or a heading to go to", lasting=True)
+            raise Refused(texts.GOTO, texts.SPEED_ALONE, lasting=True)
         await vehicle.hold(mode, command.right, pause=True)
         return
     bits = int(flags) if math.isfinite(flags) else 0
@@ -84,11 +85,11 @@ async def reposition(vehicle: Vehicle, command: Command) -> None:
     if heading is not None and bits & RELATIVE_YAW:
         attitude = vehicle.drone.piloting.state.attitude
         if attitude is None:
-            raise Refused("Refused: the present heading is not known")
+            raise Refused(texts.GOTO, texts.HEADING_UNKNOWN)
         heading += attitude.yaw
     if vehicle.takeoff.rises:
         vehicle.guided.check(where, ato)  # one that is refused replaces none that waits
-        await vehicle.takeoff.over("Goto")
+        await vehicle.takeoff.over(texts.GOTO)
     await vehicle.guided.reposition(where, ato, heading, speed if speed > 0.0 else None, mode)
 
 
@@ -99,9 +100,9 @@ def _require_change_of_mode(vehicle: Vehicle, command: Command) -> None:
     """
     flavour = command.flavour
     if not flavour.guided_setpoints:
-        raise Unsupported("Goto refused: flag CHANGE_MODE is missing")
+        raise Unsupported(texts.GOTO, texts.NO_CHANGE_MODE)
     if flavour.custom_mode(vehicle.mode) != flavour.custom_mode(FlightMode.GUIDED):
-        raise Refused("Goto refused: not in Guided, no CHANGE_MODE", lasting=True)
+        raise Refused(texts.GOTO, texts.NOT_GUIDED_NO_CHANGE_MODE, lasting=True)
 
 
 async def set_mode(vehicle: Vehicle, command: Command) -> None:
@@ -112,14 +113,14 @@ async def set_mode(vehicle: Vehicle, command: Command) -> None:
 async def change_mode(vehicle: Vehicle, mode: FlightMode | None, by: Right) -> None:
     """Enter a mode that some message named; None is one that we do not have."""
     if mode is None:
-        raise Refused("Mode refused: an ANAFI has no such mode", lasting=True)
+        raise Refused(texts.MODE, texts.NO_SUCH_MODE, lasting=True)
     await vehicle.set_mode(mode, by)
 
 
 async def terminate(vehicle: Vehicle, command: Command) -> None:
     """MAV_CMD_DO_FLIGHTTERMINATION: param1 1 cuts the motors."""
     if command.params[0] != 1.0:
-        raise Refused("Refused: flight termination cannot be taken back", lasting=True)
+        raise Refused(texts.TERMINATION, texts.NOT_REVOCABLE, lasting=True)
     await vehicle.terminate()
 
 

@@ -10,11 +10,13 @@ import contextlib
 import math
 from collections.abc import Awaitable, Callable, Mapping
 
+from anafi_mav import texts
 from anafi_mav.drone.events import CalibrationAxis, MagnetoCalibrationStateChanged, Message
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.commands import Action, Altitude, Command, Effect, Progress
 from anafi_mav.services.service import Service
+from anafi_mav.texts import Text
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.severity import Severity
 
@@ -24,18 +26,16 @@ _MAGNETOMETER, _HORIZON = 1.0, 2.0
 VERSION = 2
 """Of the texts, and part of the first; MAVSDK believes no other."""
 
-_NO_SUCH = "an ANAFI has the magnetometer's and the gimbal's only"
-
 RESTART_WAIT = 15.0
 """s after which a drone that was to restart should have disconnected."""
 
 _RESTART = 1.0
 """param1 of MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN."""
 
-_SIDES: dict[CalibrationAxis | None, tuple[str, str]] = {
-    CalibrationAxis.X_AXIS: ("front", "roll: turn it about its long axis"),
-    CalibrationAxis.Y_AXIS: ("left", "pitch: turn it nose over tail"),
-    CalibrationAxis.Z_AXIS: ("down", "yaw: turn it about its vertical axis"),
+_SIDES: dict[CalibrationAxis | None, tuple[str, Text]] = {
+    CalibrationAxis.X_AXIS: ("front", texts.CAL_ROLL),
+    CalibrationAxis.Y_AXIS: ("left", texts.CAL_PITCH),
+    CalibrationAxis.Z_AXIS: ("down", texts.CAL_YAW),
 }
 """By the axis that the drone wants to be turned about (arsdk common.xml 0-14-2): the side that is down in PX4's picture
 of that turn, and what to do with the drone in hand. QGroundControl shows the pictures of CAL_MAG_SIDES."""
@@ -57,7 +57,7 @@ class MaintenanceService(Service):
                 progress=Progress.FINAL_ONLY,
             ),
             dialect.MAV_CMD_GIMBAL_REQUEST_AXIS_CALIBRATION: Action(
-                lambda command: self._on_ground(self._gimbal),
+                lambda command: self._on_ground(texts.CALIBRATION, self._gimbal),
                 location=False,
                 altitude=Altitude.UNUSED,
                 effect=Effect.CHANGE,
@@ -79,18 +79,18 @@ class MaintenanceService(Service):
         if not wanted:
             await self.host.vehicle.take_over()  # ends the one that runs
         elif wanted == {2: _MAGNETOMETER}:
-            await self._on_ground(self._magnetometer)
+            await self._on_ground(texts.CALIBRATION, self._magnetometer)
         elif wanted == {5: _HORIZON}:
-            await self._on_ground(self._gimbal)
+            await self._on_ground(texts.CALIBRATION, self._gimbal)
         else:
             # MAVSDK takes a refusal alone for a success; it believes the texts.
-            self._say(f"calibration failed: {_NO_SUCH}", Severity.ERROR)
-            raise Refused(f"Calibration refused: {_NO_SUCH}", lasting=True)
+            self.host.text(Severity.ERROR, texts.CAL_FAILED.fill(error=texts.CALIBRATIONS))
+            raise Refused(texts.CALIBRATION, texts.CALIBRATIONS, lasting=True)
 
-    async def _on_ground(self, work: Work) -> None:
+    async def _on_ground(self, what: Text, work: Work) -> None:
         vehicle = self.host.vehicle
         if not vehicle.on_ground or vehicle.drone.piloting.about_to_fly:
-            raise Refused("Refused: the drone is not on the ground")
+            raise Refused(what, texts.NOT_ON_GROUND)
         await vehicle.take_over()
         await work()
 
@@ -98,18 +98,18 @@ class MaintenanceService(Service):
         self, name: str, work: Callable[[], Awaitable[None]], undo: Callable[[], Awaitable[object]]
     ) -> None:
         """Run a calibration, with the texts of its beginning and its end; given up, it is undone."""
-        self._say(f"calibration started: {VERSION} {name}")
+        self._say(texts.CAL_STARTED.fill(version=VERSION, name=name))
         try:
             await work()
         except asyncio.CancelledError:
-            self._say("calibration cancelled")
+            self._say(texts.CAL_CANCELLED)
             await self._undone(undo)
             raise
         except AnafiMavError as error:
-            self._say(f"calibration failed: {error}", Severity.ERROR)
+            self.host.text(Severity.ERROR, texts.CAL_FAILED.fill(error=error))
             await self._undone(undo)
             raise
-        self._say(f"calibration done: {name}")
+        self._say(texts.CAL_DONE.fill(name=name))
 
     @staticmethod
     async def _undone(undo: Callable[[], Awaitable[object]]) -> None:
@@ -151,13 +151,13 @@ class MaintenanceService(Service):
                 state = self.host.drone.calibration.state
                 now = (state.done or frozenset()) if fresh else frozenset()
                 for finished in sorted(now - (done or frozenset())):
-                    self._say(f"{_SIDES[finished][0]} side done, rotate to a different side")
+                    self._say(texts.CAL_SIDE_DONE.fill(side=_SIDES[finished][0]))
                 if done is None or len(now) != len(done):
-                    self._say(f"progress <{100 * len(now) // len(_SIDES)}>")
+                    self._say(texts.CAL_PROGRESS.fill(percent=100 * len(now) // len(_SIDES)))
                 if state.axis != axis and state.axis in _SIDES:
                     side, what = _SIDES[state.axis]
                     self._say(what)
-                    self._say(f"{side} orientation detected")
+                    self._say(texts.CAL_ORIENTATION.fill(side=side))
                 done, axis = now, state.axis
                 news.clear()
                 await news.wait()
@@ -174,18 +174,18 @@ class MaintenanceService(Service):
         dronekit2 waits half a second for the acknowledgement, and the link is lost later. A text follows if it is not.
         """
         if command.params[0] != _RESTART:
-            raise Refused("Refused: an ANAFI can only be restarted", lasting=True)
-        await self._on_ground(self._restart)
+            raise Refused(texts.RESTART, texts.RESTART_ONLY, lasting=True)
+        await self._on_ground(texts.RESTART, self._restart)
 
     async def _restart(self) -> None:
-        self.host.text(Severity.NOTICE, "The drone restarts")
+        self.host.text(Severity.NOTICE, texts.DRONE_RESTARTS)
         await self.host.drone.request_reboot()
         self.host.spawn(self._watch_restart())
 
     async def _watch_restart(self) -> None:
         """Report a drone that received the command and stays connected. The loss of the link cancels this."""
         await asyncio.sleep(RESTART_WAIT)
-        self.host.text(Severity.ERROR, "Restart failed: drone is still connected")
+        self.host.text(Severity.ERROR, texts.RESTART_FAILED)
 
-    def _say(self, text: str, severity: Severity = Severity.INFO) -> None:
-        self.host.text(severity, f"[cal] {text}")
+    def _say(self, text: Text) -> None:
+        self.host.text(Severity.INFO, text)

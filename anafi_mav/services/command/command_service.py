@@ -37,7 +37,7 @@ from anafi_mav.services.commands import (
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.service import Host, MessageHandler, Query, Service, client_of
 from anafi_mav.vehicle.base.modes import FlightMode
-from anafi_mav.vehicle.base.refusal import Refused, Unsupported
+from anafi_mav.vehicle.base.refusal import Refused, Unsupported, text_of
 from anafi_mav.vehicle.base.right import Extent, Right
 from anafi_mav.vehicle.base.severity import Severity
 
@@ -241,7 +241,7 @@ class CommandService(Service):
     def _explain(self, error: AnafiMavError) -> int:
         """Tell everybody why something was refused; the MAV_RESULT that says so."""
         critical = isinstance(error, Refused) and error.critical
-        self.host.text(Severity.CRITICAL if critical else Severity.WARNING, str(error))
+        self.host.text(Severity.CRITICAL if critical else Severity.WARNING, text_of(error))
         for kind, result in _RESULT_BY_ERROR:
             if isinstance(error, kind):
                 return result

@@ -12,6 +12,7 @@ import contextlib
 import math
 from collections.abc import Mapping
 
+from anafi_mav import texts
 from anafi_mav.drone.events import CalibrationAxis
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
@@ -26,9 +27,9 @@ COMPASS_MASK = 1
 LARGEST_MASK = 255
 
 AXES: dict[CalibrationAxis | None, str] = {
-    CalibrationAxis.X_AXIS: "about its long axis",
-    CalibrationAxis.Y_AXIS: "head over heels",
-    CalibrationAxis.Z_AXIS: "like a top",
+    CalibrationAxis.X_AXIS: texts.AXIS_ROLL,
+    CalibrationAxis.Y_AXIS: texts.AXIS_PITCH,
+    CalibrationAxis.Z_AXIS: texts.AXIS_YAW,
 }
 """How to turn the drone in the hand, by the axis that it reports (arsdk common.xml 0-14-2)."""
 
@@ -69,7 +70,7 @@ class CompassService(Service):
         _check_mask(command)
         vehicle = self.host.vehicle
         if not vehicle.on_ground or vehicle.drone.piloting.about_to_fly:
-            raise Refused("Compass calibration refused: not on the ground")
+            raise Refused(texts.COMPASS_CALIBRATION, texts.NOT_ON_GROUND)
         await vehicle.take_over()
         self._succeeded = False
         await self.host.drone.calibration.start_magnetometer()
@@ -79,7 +80,7 @@ class CompassService(Service):
         """The drone has stored the result; there is nothing left to do."""
         _check_mask(command)
         if not self._succeeded:
-            raise Refused("Compass calibration not accepted: none done")
+            raise Refused(texts.COMPASS_CALIBRATION, texts.NOT_CALIBRATED)
 
     async def _cancel(self, command: Command) -> None:
         """ACCEPTED without one under way, too, as in ArduPilot."""
@@ -101,13 +102,13 @@ class CompassService(Service):
                 await drone.calibration.abort_magnetometer()
             self._report(dialect.MAG_CAL_NOT_STARTED if cancelled else dialect.MAG_CAL_FAILED)
             if cancelled:
-                self.host.text(Severity.NOTICE, "Compass calibration cancelled")
+                self.host.text(Severity.NOTICE, texts.COMPASS_CANCELLED)
                 raise
-            self.host.text(Severity.ERROR, f"Compass calibration failed: {error}")
+            self.host.text(Severity.ERROR, texts.COMPASS_FAILED.fill(error=error))
         else:
             self._succeeded = True
             self._report(dialect.MAG_CAL_SUCCESS)
-            self.host.text(Severity.NOTICE, "Compass calibration done")
+            self.host.text(Severity.NOTICE, texts.COMPASS_DONE)
         finally:
             progress.cancel()
 
@@ -123,7 +124,7 @@ class CompassService(Service):
                 if now != told:
                     self._send_progress(now[1])
                     if now[0] in AXES and (told is None or now[0] != told[0]):
-                        self.host.text(Severity.NOTICE, f"Compass: turn the drone {AXES[now[0]]}")
+                        self.host.text(Severity.NOTICE, texts.COMPASS_TURN.fill(axis=AXES[now[0]]))
                 told = now
                 updated.clear()
                 await updated.wait()
@@ -154,4 +155,4 @@ class CompassService(Service):
 def _check_mask(command: Command) -> None:
     mask = 0.0 if math.isnan(command.params[0]) else command.params[0]
     if not 0.0 <= mask <= LARGEST_MASK or not mask.is_integer() or (mask and not int(mask) & COMPASS_MASK):
-        raise Refused("Compass calibration refused: param1 is 0 or 1", lasting=True)
+        raise Refused(texts.COMPASS_CALIBRATION, texts.PARAM1_BINARY, lasting=True)

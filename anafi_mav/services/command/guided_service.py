@@ -10,7 +10,7 @@ import asyncio
 import math
 from collections.abc import Mapping
 
-from anafi_mav import units
+from anafi_mav import texts, units
 from anafi_mav.drone.events import FlyingStateChanged, PoiMode, RthHomeType
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
@@ -56,15 +56,15 @@ async def _fly_item(host: Host, inbound: Inbound) -> None:
     try:
         ato = height_in_frame(vehicle, item.z, item.frame)
         if flavour.guided_setpoints and flavour.custom_mode(vehicle.mode) != flavour.custom_mode(FlightMode.GUIDED):
-            raise Refused("Goto refused: not in Guided")  # as in ArduCopter, in whose other modes it moves nothing
+            raise Refused(texts.GOTO, texts.NOT_GUIDED)  # as in ArduCopter, in whose other modes it moves nothing
         if item.current == _ITEM_GOTO:
             if item.command != dialect.MAV_CMD_NAV_WAYPOINT:
-                raise Refused("Goto refused: the item is no way point", lasting=True)
+                raise Refused(texts.GOTO, texts.NOT_A_WAY_POINT, lasting=True)
             where = Place(item.x / scale, item.y / scale)
-            check_on_earth(where, "Goto")
+            check_on_earth(where, texts.GOTO)
             if vehicle.takeoff.rises:
                 vehicle.guided.check(where, ato)
-                await vehicle.takeoff.over("Goto")
+                await vehicle.takeoff.over(texts.GOTO)
             await vehicle.guided.reposition(where, ato, None, mode=guided_mode(flavour))
         else:
             await change_altitude(vehicle, ato, flavour)
@@ -178,15 +178,15 @@ class GuidedService(Service):
         """
         kind, speed, throttle = command.params[:3]
         if not (math.isnan(throttle) or throttle in (0.0, KEEP, DEFAULT)):
-            raise Refused("Speed refused: an ANAFI's throttle cannot be set", lasting=True)
+            raise Refused(texts.SPEED, texts.NO_THROTTLE, lasting=True)
         if math.isnan(kind):
             kind = _GROUNDSPEED
         if kind not in (_AIRSPEED, _GROUNDSPEED, _UPWARDS, _DOWNWARDS):
-            raise Refused("Speed refused: param1 is 0 to 3", lasting=True)
+            raise Refused(texts.SPEED, texts.PARAM1_TO_3, lasting=True)
         if math.isnan(speed) or speed == KEEP:
             return
         if speed != DEFAULT and not SLOWEST <= speed <= FASTEST:
-            raise Refused(f"Speed refused: param2 is {SLOWEST:g} to {FASTEST:g} m/s, -1 or -2", lasting=True)
+            raise Refused(texts.SPEED, texts.PARAM2_SPEED.fill(slowest=SLOWEST, fastest=FASTEST), lasting=True)
         wanted = None if speed == DEFAULT else speed
         vehicle = self.host.vehicle
         if kind in (_AIRSPEED, _GROUNDSPEED):
@@ -201,7 +201,7 @@ class GuidedService(Service):
         vehicle = self.host.vehicle
         frame = command.params[1]
         if not math.isfinite(frame):
-            raise Refused("Refused: param2 is a frame", lasting=True)
+            raise Refused(texts.ALTITUDE_CHANGE, texts.PARAM2_FRAME, lasting=True)
         ato = height_in_frame(vehicle, command.params[0], int(frame))
         await change_altitude(vehicle, ato, command.flavour)
 
@@ -212,15 +212,15 @@ class GuidedService(Service):
         """
         angle, rate, way, relative = command.params
         if not math.isfinite(angle) or abs(angle) > DEG_PER_TURN:
-            raise Refused("Turn refused: param1 is an angle of up to 360 degrees", lasting=True)
+            raise Refused(texts.TURN, texts.PARAM1_ANGLE, lasting=True)
         if math.isinf(rate) or rate < 0.0 or 0.0 < rate < SLOWEST_TURN or math.isinf(way):
-            raise Refused(f"Turn refused: param2 is {SLOWEST_TURN:g} deg/s or more, param3 -1, 0 or 1", lasting=True)
+            raise Refused(texts.TURN, texts.PARAM2_RATE.fill(slowest=SLOWEST_TURN), lasting=True)
         if not (math.isnan(relative) or relative in (0.0, 1.0)):  # ArduCopter refuses it too
-            raise Refused("Turn refused: param4 is 0 (absolute) or 1", lasting=True)
+            raise Refused(texts.TURN, texts.PARAM4_RELATIVE, lasting=True)
         vehicle = self.host.vehicle
         attitude = vehicle.drone.piloting.state.attitude
         if not vehicle.in_air or attitude is None:
-            raise Refused("Turn refused: the drone is not in the air, or does not tell its heading")
+            raise Refused(texts.TURN, texts.HEADING_UNKNOWN if vehicle.in_air else vehicle.activity)
         now = attitude.yaw * units.DEG_PER_RAD
         turn = heading_of(angle, 0.0 if math.isnan(way) else way, relative == 1.0, now)
         if (goto := vehicle.guided.goto) is not None:
@@ -251,11 +251,11 @@ class GuidedService(Service):
                 vehicle.paused = False  # setpoints may fly it again
                 return
             if goto is None:
-                raise Refused("Continue refused: nothing was paused, or something else was ordered since")
+                raise Refused(texts.CONTINUE, texts.NOTHING_PAUSED)
             await vehicle.guided.go(goto)
             self._paused = None
         else:
-            raise Refused("Refused: param1 is 0 to pause, 1 to continue", lasting=True)
+            raise Refused(texts.PAUSE, texts.PARAM1_BINARY, lasting=True)
 
     # Regions of interest.
 
@@ -264,7 +264,7 @@ class GuidedService(Service):
         piloted POI, which needs a hovering drone and waits for it). An unset height is that of the take-off point."""
         where = place(command)
         if where is None:
-            raise Refused("Region of interest refused: it has no place", lasting=True)
+            raise Refused(texts.ROI, texts.NO_PLACE, lasting=True)
         await self._look(where, height(self.host.vehicle, command) or 0.0)
 
     async def _look_anywhere(self, command: Command) -> None:
@@ -279,13 +279,13 @@ class GuidedService(Service):
         elif kind == dialect.MAV_ROI_LOCATION or math.isnan(kind):
             await self._look_at(command)
         else:
-            raise Refused("Region of interest refused: only a location or none", lasting=True)
+            raise Refused(texts.ROI, texts.ROI_KINDS, lasting=True)
 
     async def _look(self, where: Place, ato: float) -> None:
         vehicle = self.host.vehicle
-        check_on_earth(where, "Region of interest")
+        check_on_earth(where, texts.ROI)
         if not vehicle.in_air:
-            raise Refused("Region of interest refused: the drone is not in the air")
+            raise Refused(texts.ROI, texts.NOT_IN_AIR)
         await self.host.drone.poi.start(where.latitude, where.longitude, ato, PoiMode.LOCKED_GIMBAL)
 
     # Home.
@@ -294,9 +294,7 @@ class GuidedService(Service):
         try:
             await self.host.drone.home.set_preferred_type(kind)
         except AnafiMavError as error:
-            self.host.text(
-                Severity.CRITICAL, f"The drone prefers a custom home, and could not be told otherwise: {error}"
-            )
+            self.host.text(Severity.CRITICAL, texts.HOME_TYPE_KEPT.fill(error=error))
 
     async def _set_home(self, command: Command) -> None:
         """MAV_CMD_DO_SET_HOME: param1 1 where the drone is, else the command's place.
@@ -307,13 +305,13 @@ class GuidedService(Service):
         if command.params[0] == 1.0:
             where, ato = vehicle.place, 0.0  # below the drone, not where it flies
             if where is None:
-                raise Refused("Home refused: the drone does not know where it is")
+                raise Refused(texts.HOME, texts.POSITION_UNKNOWN)
         else:
             where = place(command)
             if where is None:
-                raise Refused("Home refused: it has no place", lasting=True)
+                raise Refused(texts.HOME, texts.NO_PLACE, lasting=True)
             ato = height(vehicle, command, flown=False) or 0.0
-        check_on_earth(where, "Home")
+        check_on_earth(where, texts.HOME)
         async with vehicle.home_choice:
             before = home.state.preferred_type
             try:
@@ -324,5 +322,5 @@ class GuidedService(Service):
                 if before is not None and before != RthHomeType.CUSTOM:
                     await asyncio.wait([self.host.spawn(self._prefer(before))])
                 raise
-        vehicle.return_end.set_home(given, "set home")
-        self.host.text(Severity.NOTICE, "Home set: the drone returns there until its home type is changed")
+        vehicle.return_end.set_home(given, texts.SET_HOME)
+        self.host.text(Severity.NOTICE, texts.HOME_SET)

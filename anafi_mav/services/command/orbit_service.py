@@ -12,7 +12,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 
-from anafi_mav import geo, units
+from anafi_mav import geo, texts, units
 from anafi_mav.drone import events
 from anafi_mav.drone.piloting.moves import Move, MoveEnd
 from anafi_mav.errors import LinkLost
@@ -21,11 +21,11 @@ from anafi_mav.services.command_targets import height, place
 from anafi_mav.services.commands import Action, Altitude, Command, Effect
 from anafi_mav.services.service import Host, Service
 from anafi_mav.services.stream import Stream, Times
+from anafi_mav.texts import Text
 from anafi_mav.vehicle.base.bounds import SLOWEST, check_height, check_on_earth, check_place
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.place import Place
 from anafi_mav.vehicle.base.refusal import Refused
-from anafi_mav.vehicle.base.roll_sign import ROLL_INVERTED
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.base.velocity_loop import Controller, tilt_limit
@@ -112,17 +112,17 @@ class OrbitService(Service):
         circle = self._described(command)
         here = vehicle.place
         if not vehicle.in_air:
-            raise Refused("Orbit refused: the drone is not in the air")
+            raise Refused(texts.ORBIT, texts.NOT_IN_AIR)
         if (descent := vehicle.descent) is not None:
-            raise Refused(f"Orbit refused: {descent}")
+            raise Refused(texts.ORBIT, descent)
         if here is None:
-            raise Refused("Orbit refused: no GPS fix")
+            raise Refused(texts.ORBIT, texts.NO_FIX)
         if vehicle.drone.controller.pilot_acquired_control:
-            raise Refused("Orbit refused: the pilot at the Skycontroller flies")
+            raise Refused(texts.ORBIT, texts.PILOT)
         if vehicle.sticks_follow_camera:
-            raise Refused("Orbit refused: the drone's piloting style makes its sticks relative to the camera")
+            raise Refused(texts.ORBIT, texts.STICKS_FOLLOW_CAMERA)
         if vehicle.roll.inverted:
-            raise Refused(f"Orbit refused: {ROLL_INVERTED}")
+            raise Refused(texts.ORBIT, texts.ROLL_INVERTED)
         start = entry(circle, here)
         for point in outline(circle, here):
             check_place(vehicle, point)
@@ -141,7 +141,7 @@ class OrbitService(Service):
             await vehicle.take_over()
             await vehicle.drone.piloting.cancel_return_home()
             if not vehicle.in_air or vehicle.returning:
-                raise Refused("Orbit refused: the drone does something else now")
+                raise Refused(texts.ORBIT, vehicle.activity)
             vehicle.drone.piloting.hover()  # ends a move of ours, which would ignore sticks
             self._lap = Lap(circle)
             vehicle.select(FlightMode.ORBIT, self)
@@ -153,25 +153,25 @@ class OrbitService(Service):
         running = self.circle
         where = place(command) or (None if running is None else running.centre) or vehicle.place
         if where is None:
-            raise Refused("Orbit refused: it has no centre, and no GPS fix")
-        check_on_earth(where, "Orbit")
+            raise Refused(texts.ORBIT, texts.ORBIT_NO_CENTRE)
+        check_on_earth(where, texts.ORBIT)
         if math.isnan(radius):
             radius = DEFAULT_RADIUS if running is None else running.signed_radius
         if not SMALLEST <= abs(radius) <= LARGEST:
-            raise Refused(f"Orbit refused: its radius is {SMALLEST:g} to {LARGEST:g} m", lasting=True)
+            raise Refused(texts.ORBIT, texts.RADIUS_RANGE.fill(smallest=SMALLEST, largest=LARGEST), lasting=True)
         if math.isnan(speed):
             speed = DEFAULT_SPEED if running is None else running.speed
         if not SLOWEST <= speed <= 100.0:
-            raise Refused("Orbit refused: param2 is a speed in m/s", lasting=True)
+            raise Refused(texts.ORBIT, texts.PARAM2_ORBIT, lasting=True)
         if math.isnan(angle) or angle == 0.0:
             angle = math.inf
         if angle < 0.0:
-            raise Refused("Orbit refused: param4 is an angle in rad to fly", lasting=True)
+            raise Refused(texts.ORBIT, texts.PARAM4_ORBIT, lasting=True)
         ato = height(vehicle, command)
         if ato is None:
             ato = piloting.altitude if running is None else running.height
         if ato is None:
-            raise Refused("Orbit refused: the drone's height is not known")
+            raise Refused(texts.ORBIT, texts.HEIGHT_UNKNOWN)
         check_height(vehicle, ato)
         heading = 0.0 if piloting.attitude is None else piloting.attitude.yaw
         return Circle(
@@ -189,13 +189,13 @@ class OrbitService(Service):
         """The circle at a speed that the drone's tilt leaves room for; a text tells when that is another one."""
         limits = self.host.drone.piloting.limits
         if limits is None:
-            raise Refused("Orbit refused: the drone has not reported what full tilt and speed are")
+            raise Refused(texts.ORBIT, texts.TILT_UNKNOWN)
         tilt = tilt_limit(limits, self.host.vehicle.offboard.motion) * units.DEG_PER_RAD
         most = fastest(circle.radius, tilt)
         if circle.speed <= most:
             return circle
-        name = "MaxTilt" if tilt >= limits.tilt_deg else "unverified roll"
-        text = f"Orbit at {most:.1f} m/s, not {circle.speed:.1f}: {name}, {tilt:.0f} deg"
+        name = texts.MAX_TILT if tilt >= limits.tilt_deg else texts.UNVERIFIED_ROLL
+        text = texts.ORBIT_SLOWED.fill(speed=most, asked=circle.speed, limit=name, tilt=tilt)
         self.host.text(Severity.NOTICE, text)
         return replace(circle, speed=most)
 
@@ -208,7 +208,7 @@ class OrbitService(Service):
         if end is MoveEnd.DONE:
             self._begin()
         else:
-            self.host.text(Severity.WARNING, f"Orbit given up: the move to it was {end.value}")
+            self.host.text(Severity.WARNING, texts.ORBIT_ABORTED.fill(end=end.value))
             self.host.vehicle.select(FlightMode.HOLD)
 
     def _begin(self) -> None:
@@ -231,23 +231,23 @@ class OrbitService(Service):
         demand = None if vehicle.place is None else lap.demand(vehicle.offboard.motion)
         sticks = None if demand is None or limits is None else controller.sticks(demand, limits, now)
         if vehicle.drone.controller.pilot_acquired_control:
-            self._give_up("the pilot at the Skycontroller flies", Severity.WARNING)
+            self._give_up(texts.PILOT, Severity.WARNING)
         elif vehicle.sticks_follow_camera:
-            self._give_up("the drone's sticks have become relative to the camera", Severity.WARNING)
+            self._give_up(texts.STICKS_FOLLOW_CAMERA, Severity.WARNING)
         elif vehicle.roll.inverted:
-            self._give_up(ROLL_INVERTED, Severity.WARNING)
+            self._give_up(texts.ROLL_INVERTED, Severity.WARNING)
         elif sticks is None:
-            self._give_up("nobody knows where the drone is", Severity.WARNING)
+            self._give_up(texts.POSITION_UNKNOWN, Severity.WARNING)
         elif lap.done:
-            self._give_up("it has been flown", Severity.INFO)
+            self._give_up(texts.ORBIT_DONE, Severity.INFO)
         else:
             vehicle.drone.piloting.pilot(sticks)
 
-    def _give_up(self, why: str, severity: Severity) -> None:
+    def _give_up(self, why: Text, severity: Severity) -> None:
         self.host.vehicle.select(FlightMode.HOLD)
         with contextlib.suppress(LinkLost):
             self.host.drone.piloting.hover()
-        self.host.text(severity, f"Orbit ended: {why}")
+        self.host.text(severity, texts.ORBIT_ENDED.fill(reason=why))
 
     def _status(self, vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
         """ORBIT_EXECUTION_STATUS: while it lasts, the way to the circle included."""
@@ -273,7 +273,7 @@ def _facing(behaviour: float) -> Facing:
     try:
         return Facing(behaviour)
     except ValueError:
-        raise Refused("Orbit refused: param3 is a yaw behaviour from 0 to 5", lasting=True) from None
+        raise Refused(texts.ORBIT, texts.PARAM3_ORBIT, lasting=True) from None
 
 
 def _bearing(centre: Place, place: Place) -> float:

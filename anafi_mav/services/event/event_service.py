@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from anafi_mav import texts
 from anafi_mav.drone import events as parrot
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
@@ -143,7 +144,7 @@ class EventService(Service):
         if vehicle.armed:
             return dialect.MAV_RESULT_TEMPORARILY_REJECTED
         for problem in vehicle.prearm_problems():
-            self.host.text(Severity.WARNING, f"PreArm: {problem}")
+            self.host.text(Severity.WARNING, texts.PREARM.fill(reason=problem))
         self._tell(report(vehicle))
         return dialect.MAV_RESULT_ACCEPTED
 

@@ -206,14 +206,14 @@ HEALTH_SUMMARY = Event(
         ("warning", "health_component_t"),
     ),
 )
-SILENT = _check(10, "check_flying_state", "The drone has not said whether it flies")
+SILENT = _check(10, "check_flying_state", "Flying state unknown")
 EMERGENCY = _check(11, "check_emergency", "Emergency stop")
 CHECKLIST = _check(
     12,
     "check_takeoff_checklist",
     "Take-off checklist: {3}",
     value="takeoff_check_t",
-    text="The drone itself will not take off.",
+    text="The drone refuses to take off.",
 )
 MAGNETOMETER = _check(
     13,
@@ -230,12 +230,12 @@ NO_FIX = _check(
     "check_gps",
     "No GPS fix",
     Level.WARNING,
-    text="Without it the drone knows no way home and flies to no place.",
+    text="Return home and flight to a position are not possible.",
 )
 
-CALIBRATING = _check(19, "check_calibrating", "The magnetometer is being calibrated")
-FENCE = _check(20, "check_fence", "The drone stands where the fence does not let it fly")
-OTHER = _check(21, "check_other", "The drone would not take off", text="Messages say why when it is to arm.")
+CALIBRATING = _check(19, "check_calibrating", "Magnetometer calibration in progress")
+FENCE = _check(20, "check_fence", "Drone is outside the fence")
+OTHER = _check(21, "check_other", "Takeoff not possible", text="A message gives the reason when a client arms.")
 
 ARMED = Event(100, "armed", "Armed", Level.INFO)
 DISARMED = Event(101, "disarmed", "Disarmed", Level.INFO)

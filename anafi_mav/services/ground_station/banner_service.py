@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Mapping
 
-from anafi_mav import __version__
+from anafi_mav import __version__, texts
 from anafi_mav.drone import Drone
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
@@ -15,6 +15,7 @@ from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import Command
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.service import Host, Query, Service, client_of
+from anafi_mav.texts import Text
 from anafi_mav.vehicle.base.severity import Severity
 
 GONE = 30.0
@@ -31,19 +32,20 @@ _NO_CLIENTS = (dialect.MAV_TYPE_CAMERA, dialect.MAV_TYPE_GIMBAL, dialect.MAV_TYP
 
 
 PILOT_IN_CONTROL = (
-    "Skycontroller in control until a client flies",
-    "Until then station loss and fence only warn",
+    texts.SKYCONTROLLER_IN_CONTROL,
+    texts.SKYCONTROLLER_WARNS_ONLY,
 )
 """First texts behind a Skycontroller: what a client must not rely on."""
 
 
-def banner(drone: Drone, flavour: Flavour) -> list[str]:
+def banner(drone: Drone, flavour: Flavour) -> list[Text]:
     """The texts: the gateway, and the drone with its firmware."""
     identity = drone.identity
-    gateway = f"anafi-mav {__version__}"
     return [
-        f"{flavour.title} ({gateway})" if flavour.title else gateway,
-        f"{identity.model.title} {identity.serial} firmware {identity.firmware}",
+        texts.BANNER_FLAVOUR.fill(title=flavour.title, version=__version__)
+        if flavour.title
+        else texts.BANNER.fill(version=__version__),
+        texts.BANNER_DRONE.fill(model=identity.model.title, serial=identity.serial, firmware=identity.firmware),
     ]
 
 

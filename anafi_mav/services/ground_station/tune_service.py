@@ -10,6 +10,7 @@ import asyncio
 import contextlib
 from collections.abc import Mapping
 
+from anafi_mav import texts
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
@@ -41,7 +42,7 @@ class TuneService(Service):
         sound = self.host.drone.sound
         try:
             if on and not self.host.vehicle.on_ground:
-                self.host.warn_throttled("Tune refused: the drone beeps on the ground only")
+                self.host.warn_throttled(texts.TUNE_REFUSED)
                 return
             if not on:
                 await sound.stop()
@@ -51,4 +52,4 @@ class TuneService(Service):
             await sound.stop()
         except AnafiMavError as error:
             with contextlib.suppress(AnafiMavError):
-                self.host.warn_throttled(f"Tune not played: {error}")
+                self.host.warn_throttled(texts.TUNE_FAILED.fill(error=error))

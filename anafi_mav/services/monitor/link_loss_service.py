@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from anafi_mav import texts
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
@@ -11,6 +12,7 @@ from anafi_mav.mavlink.stall import STALL
 from anafi_mav.services.service import Host, Service
 from anafi_mav.vehicle.base.link_loss import GcsWatch, LossAction
 from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.refusal import reason_of
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.vehicle import Landed
 
@@ -38,19 +40,21 @@ class LinkLossService(Service):
 
     def heartbeat(self, inbound: Inbound) -> None:
         if inbound.message.type == dialect.MAV_TYPE_GCS and self._watch.heard(inbound.now):
-            self.host.text(Severity.NOTICE, "Ground station is back")
+            self.host.text(Severity.NOTICE, texts.STATION_BACK)
 
     def _lost(self) -> None:
         vehicle, policy, controller = self.host.vehicle, self.host.vehicle.gcs_loss, self.host.drone.controller
-        silence = f"No ground station for {policy.after:g} s"
+        seconds = policy.after
         if vehicle.landed not in (Landed.IN_AIR, Landed.TAKEOFF):
-            self.host.text(Severity.WARNING, silence)
+            self.host.text(Severity.WARNING, texts.STATION_LOST.fill(seconds=seconds))
         elif vehicle.mode is FlightMode.RETURN:
-            self.host.text(Severity.WARNING, f"{silence}: the drone is returning")
+            self.host.text(Severity.WARNING, texts.STATION_LOST_STATE.fill(seconds=seconds, state=texts.RETURNS))
         elif controller.pilot_has_source or controller.pilot_acquired_control:
-            self.host.text(Severity.WARNING, f"{silence}: pilot in control")
+            self.host.text(Severity.WARNING, texts.STATION_LOST_STATE.fill(seconds=seconds, state=texts.MISSION_PILOT))
         else:
-            self.host.text(Severity.CRITICAL, f"{silence}: {policy.action.name.lower()}")
+            self.host.text(
+                Severity.CRITICAL, texts.STATION_LOST_STATE.fill(seconds=seconds, state=policy.action.name.lower())
+            )
             self.host.run_action(LinkLossService, self._act(policy.action), is_order=False)
 
     async def _act(self, action: LossAction) -> None:
@@ -63,6 +67,8 @@ class LinkLossService(Service):
             else:
                 await vehicle.return_home()
         except AnafiMavError as error:
-            self.host.text(Severity.CRITICAL, f"Not done: {error}")
+            self.host.text(
+                Severity.CRITICAL, texts.STATION_LOST_FAILED.fill(action=action.name.lower(), error=reason_of(error))
+            )
             if action is LossAction.RETURN:  # without a way home, what is left is not to fly on
                 await self._act(LossAction.HOLD)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from anafi_mav import texts
 from anafi_mav.services.service import Host, Service
 from anafi_mav.vehicle.base.severity import Severity
 
@@ -17,4 +18,4 @@ class PilotService(Service):
         controller = self.host.drone.controller
         if controller.takeovers != self._takeovers:
             self._takeovers = controller.takeovers
-            self.host.text(Severity.WARNING, f"Skycontroller pilot has control: {controller.takeover_reason}")
+            self.host.text(Severity.WARNING, texts.PILOT_HAS_CONTROL.fill(reason=controller.takeover_reason))

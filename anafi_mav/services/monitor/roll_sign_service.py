@@ -5,17 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from anafi_mav import texts
 from anafi_mav.drone import events
 from anafi_mav.drone.piloting.state import Attitude, Velocity
 from anafi_mav.services.service import Service
-from anafi_mav.vehicle.base.roll_sign import INVERTED, Sign
+from anafi_mav.vehicle.base.roll_sign import Sign
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 
 KEY = "roll_sign"
 """Name of the record in the drone's file."""
-
-VERIFIED = "Roll sign verified"
 
 
 def written(firmware: str, sign: Sign) -> Mapping[str, Any]:
@@ -40,7 +39,7 @@ class RollSignService(Service):
         check = self.host.vehicle.roll
         check.recall(read(self.host.memory.settings.get(KEY), self.host.drone.identity.firmware))
         if check.inverted:
-            self.host.text(Severity.WARNING, INVERTED)
+            self.host.text(Severity.WARNING, texts.ROLL_SIGN_INVERTED)
 
     def subscriptions(self) -> Subscriptions:
         return {
@@ -74,9 +73,9 @@ class RollSignService(Service):
     def _report(self) -> None:
         sign, firmware = self.host.vehicle.roll.sign, self.host.drone.identity.firmware
         if sign is Sign.LEFT:
-            self.host.text(Severity.CRITICAL, INVERTED)
+            self.host.text(Severity.CRITICAL, texts.ROLL_SIGN_INVERTED)
         else:
-            self.host.text(Severity.INFO, VERIFIED)
+            self.host.text(Severity.INFO, texts.ROLL_SIGN_VERIFIED)
         if firmware:
             self.host.memory.settings[KEY] = written(firmware, sign)
             self.host.spawn(self._save())

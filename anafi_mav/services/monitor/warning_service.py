@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterator, Mapping
 
+from anafi_mav import texts
 from anafi_mav.drone import Drone
 from anafi_mav.drone.events import (
     AlertLevel,
@@ -27,6 +28,7 @@ from anafi_mav.drone.status.alerts import Alerts, spoken
 from anafi_mav.drone.status.calibration import Calibration
 from anafi_mav.drone.status.home import Home
 from anafi_mav.services.service import Host, Service
+from anafi_mav.texts import Text
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 
@@ -37,53 +39,67 @@ _COVERED = (AlertState.NONE, AlertState.CRITICAL_BATTERY, AlertState.LOW_BATTERY
 """Alerts that say nothing, or what the battery's own alerts say."""
 
 
-def _when(seconds: int | None) -> str:
-    return "now" if not seconds else f"in {seconds} s"
+def _when(seconds: int | None) -> Text:
+    return texts.IN_SECONDS.fill(seconds=seconds) if seconds else texts.NOW
 
 
-def _battery(alert: BatteryAlert, level: AlertLevel, percent: int | None) -> str:
+def _battery(alert: BatteryAlert, level: AlertLevel, percent: int | None) -> Text:
     if alert != BatteryAlert.POWER_LEVEL:
-        return f"Battery {spoken(alert)}: {spoken(level)}"
-    left = "" if percent is None else f" ({percent} %)"
-    return f"Battery {'low' if level == AlertLevel.WARNING else spoken(level)}{left}"
+        return texts.BATTERY_ALERT.fill(alert=spoken(alert), level=spoken(level))
+    word = "low" if level == AlertLevel.WARNING else spoken(level)
+    if percent is None:
+        return texts.BATTERY_LEVEL.fill(level=word)
+    return texts.BATTERY_PERCENT.fill(level=word, percent=percent)
 
 
-def standing(drone: Drone) -> Iterator[tuple[Hashable, Severity, str]]:
+def standing(drone: Drone) -> Iterator[tuple[Hashable, Severity, Text]]:
     """(what about, how serious, the text) of each warning that holds."""
     alerts, battery, home = drone.alerts.state, drone.battery.state, drone.home.state
     if alerts.forced_landing not in (None, ForcedLandingReason.NONE):
-        text = f"Landing by itself {_when(alerts.forced_landing_delay_s)}: {spoken(alerts.forced_landing)}"
+        text = texts.LANDS_BY_ITSELF.fill(
+            when=_when(alerts.forced_landing_delay_s), reason=spoken(alerts.forced_landing)
+        )
         yield ("landing", alerts.forced_landing), Severity.ALERT, text
     if home.auto_trigger not in (None, AutoTriggerReason.NONE):
-        text = f"Returning home by itself {_when(home.auto_trigger_delay_s)}: {spoken(home.auto_trigger)}"
+        text = texts.RETURNS_HOME_BY_ITSELF.fill(
+            when=_when(home.auto_trigger_delay_s), reason=spoken(home.auto_trigger)
+        )
         yield ("return", home.auto_trigger), Severity.WARNING, text
     if home.reachability in (HomeReachability.CRITICAL, HomeReachability.NOT_REACHABLE):
-        yield ("reach", home.reachability), Severity.CRITICAL, f"Home: {spoken(home.reachability)}"
+        yield (
+            ("reach", home.reachability),
+            Severity.CRITICAL,
+            texts.HOME_REACH.fill(reachability=spoken(home.reachability)),
+        )
     for alert, level in battery.alerts.items():
         if level > AlertLevel.NONE:
             severity = _LEVELS.get(level, Severity.CRITICAL)
             yield ("battery", alert, level), severity, _battery(alert, level, battery.percent)
     for name, degree in (("Wind", alerts.wind), ("Vibration", alerts.vibration), ("Icing", alerts.icing)):
         if degree is not None and degree > WarningLevel.OK:
-            yield (name, degree), _LEVELS.get(degree, Severity.CRITICAL), f"{name}: {spoken(degree)}"
+            yield (
+                (name, degree),
+                _LEVELS.get(degree, Severity.CRITICAL),
+                texts.CONDITION.fill(name=name, degree=spoken(degree)),
+            )
     if alerts.too_dark_to_hover:
-        yield "dark", Severity.WARNING, "Too dark to hold the position without GPS"
+        yield "dark", Severity.WARNING, texts.TOO_DARK
     if alerts.too_high_to_hover:
-        yield "high", Severity.WARNING, "Too high to hold the position without GPS"
+        yield "high", Severity.WARNING, texts.TOO_HIGH
     if alerts.motor_error not in (None, MotorError.NO_ERROR):
-        yield ("motor", alerts.motor_error), Severity.CRITICAL, f"Motor: {spoken(alerts.motor_error)}"
+        yield ("motor", alerts.motor_error), Severity.CRITICAL, texts.MOTOR_ERROR.fill(error=spoken(alerts.motor_error))
     if alerts.alert is not None and alerts.alert not in _COVERED:
-        yield ("alert", alerts.alert), Severity.CRITICAL, f"Alert: {spoken(alerts.alert)}"
+        yield ("alert", alerts.alert), Severity.CRITICAL, texts.ALERT.fill(alert=spoken(alerts.alert))
     for alarm, raised in alerts.alarms.items():
         if raised:
-            yield ("alarm", alarm), Severity.WARNING, f"Alarm: {spoken(alarm)}"
+            yield ("alarm", alarm), Severity.WARNING, texts.ALARM.fill(alarm=spoken(alarm))
     for sensor, works in drone.calibration.state.sensors.items():
         if not works:
-            yield ("sensor", sensor), Severity.WARNING, f"Sensor {spoken(sensor)} does not work"
+            yield ("sensor", sensor), Severity.WARNING, texts.SENSOR_FAILED.fill(sensor=spoken(sensor))
     if drone.calibration.state.magneto_required:
-        yield "magnetometer", Severity.WARNING, "The magnetometer has to be calibrated"
+        yield "magnetometer", Severity.WARNING, texts.CALIBRATE_MAGNETOMETER
     if drone.piloting.state.flying == FlyingState.EMERGENCY:
-        yield "emergency", Severity.EMERGENCY, "Motors cut"
+        yield "emergency", Severity.EMERGENCY, texts.MOTORS_CUT
 
 
 _RELEVANT: frozenset[type[Message]] = frozenset(

@@ -14,6 +14,7 @@ from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
+from anafi_mav import texts
 from anafi_mav.drone.events import Message
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
@@ -41,6 +42,8 @@ from anafi_mav.services.parameter.parameter_table_fence import FENCE_NATIVE
 from anafi_mav.services.parameter.parameter_table_follow import FOLLOW_NATIVE
 from anafi_mav.services.parameter.parameter_table_px4 import PX4_NAMES
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
+from anafi_mav.texts import Text
+from anafi_mav.vehicle.base.refusal import reason_of
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 
@@ -317,17 +320,17 @@ class ParameterService(Service):
         parameter = listed.parameters[index]
         # ArduPilot's clients do not know the types: ArduPilot itself looks at the name alone.
         if flavour.bytewise and message.param_type != parameter.kind.mav:
-            self._refuse(inbound, dialect.MAV_PARAM_ERROR_TYPE_MISMATCH, "wrong type")
+            self._refuse(inbound, dialect.MAV_PARAM_ERROR_TYPE_MISMATCH, texts.WRONG_TYPE)
             return
         value = carried(message.param_value, parameter.kind, bytewise=flavour.bytewise)
         if parameter.write is None:
             if value == parameter.value(self.host):
                 self._answer(inbound)
             else:
-                self._refuse(inbound, dialect.MAV_PARAM_ERROR_READ_ONLY, "read only")
+                self._refuse(inbound, dialect.MAV_PARAM_ERROR_READ_ONLY, texts.READ_ONLY)
             return
         if not parameter.accepts(self.host, value):
-            self._refuse(inbound, dialect.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, "out of range")
+            self._refuse(inbound, dialect.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, texts.OUT_OF_RANGE)
             return
         self._queue(inbound, parameter, value)
 
@@ -360,7 +363,9 @@ class ParameterService(Service):
             try:
                 await parameter.write(self.host, value)
             except AnafiMavError as error:
-                self.host.text(Severity.WARNING, f"{parameter.name} not set: {error}")
+                self.host.text(
+                    Severity.WARNING, texts.PARAMETER_NOT_SET.fill(name=parameter.name, reason=reason_of(error))
+                )
         await self._settle()
         if listed.changes[index] == before:  # otherwise every client was notified, this one too
             self._answer(inbound)
@@ -397,14 +402,18 @@ class ParameterService(Service):
         listed = self._lists[flavour_of(inbound.channel).name]
         self.host.send(listed.message(listed.index[name_of(inbound.message.param_id)]), inbound.channel)
 
-    def _refuse(self, inbound: Inbound, error: int, why: str) -> None:
+    def _refuse(self, inbound: Inbound, error: int, why: Text) -> None:
         """PARAM_ERROR, which QGroundControl 4 does not know, the value that holds, and a text to the sender."""
         self._error(inbound, error)
         self._answer(inbound)
         now = self.host.clock.monotonic()
         if now - self._refused_at.get(inbound.channel, -math.inf) >= REFUSAL_EVERY:
             self._refused_at[inbound.channel] = now
-            self.host.text(Severity.WARNING, f"{name_of(inbound.message.param_id)} not set: {why}", inbound.channel)
+            self.host.text(
+                Severity.WARNING,
+                texts.PARAMETER_NOT_SET.fill(name=name_of(inbound.message.param_id), reason=why),
+                inbound.channel,
+            )
 
     def _error(self, inbound: Inbound, error: int) -> None:
         message: Any = inbound.message

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 
+from anafi_mav import texts
 from anafi_mav.drone import events
 from anafi_mav.services.parameter.parameter import Limits, Parameter, current, fact, mapped, number, twin
 from anafi_mav.services.parameter.parameter_codec import Kind
@@ -65,7 +66,7 @@ async def _set_final_altitude(host: Host, value: float) -> None:
     put_end_of_return(host, EndOfReturn.LAND if value == 0.0 else EndOfReturn.HOVER)
     height = _final_altitude(host)
     if math.isfinite(height) and abs(value - height) >= 1.0:
-        host.text(Severity.NOTICE, f"RTL_ALT_FINAL: hovers at {height / CM:.0f} m (ANF_RTH_END_ALT)")
+        host.text(Severity.NOTICE, texts.RTL_ALT_FINAL.fill(height=height / CM))
 
 
 FINAL_ALTITUDE = Parameter(

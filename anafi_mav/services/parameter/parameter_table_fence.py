@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from anafi_mav import texts
 from anafi_mav.drone import events
 from anafi_mav.services.parameter.parameter import Parameter, mapped, own, twin
 from anafi_mav.services.parameter.parameter_codec import Kind
@@ -30,14 +31,14 @@ _NUMBERS = {action: number for number, action in PX4_ACTIONS.items()}
 def _put_action(host: Host, value: float) -> None:
     action = PX4_ACTIONS[int(value)]
     if action is Reaction.TERMINATE and not host.vehicle.allow_kill:
-        host.text(Severity.WARNING, "Fence: its action was a motor cut, which is not allowed any more: hold")
+        host.text(Severity.WARNING, texts.FENCE_NO_MOTOR_CUT)
         action = Reaction.HOLD
     host.vehicle.fence.action = action
 
 
 async def _set_action(host: Host, value: float) -> None:
     if PX4_ACTIONS[int(value)] is Reaction.TERMINATE and not host.vehicle.allow_kill:
-        raise Refused("Refused: a fence that cuts the motors needs allow_kill: true", lasting=True)
+        raise Refused(texts.FENCE, texts.KILL_FENCE, lasting=True)
     _put_action(host, value)
 
 
@@ -182,7 +183,7 @@ def _types(host: Host) -> float:
 async def _set_types(host: Host, value: float) -> None:
     types = int(value)
     if not types & CEILING:
-        raise Refused("Refused: the drone always keeps to its ceiling, bit 0 stays set", lasting=True)
+        raise Refused(texts.FENCE, texts.CEILING_BIT, lasting=True)
     watch = host.vehicle.fence
     watch.disable(ZONES | HOME_CIRCLE | FLOOR)
     # Circles around home that were uploaded are zones like others; bit 1 is the drone's own circle of FENCE_RADIUS.

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 
+from anafi_mav import texts
 from anafi_mav.drone import events
 from anafi_mav.services.parameter.parameter import Limits, Parameter, current, fact, mapped, number, twin
 from anafi_mav.services.parameter.parameter_codec import Kind
@@ -72,7 +73,7 @@ async def _set_fence_radius(host: Host, value: float) -> None:
         await piloting.set_geofence(False)
         return
     if setting is not None and value < setting.min:
-        raise Refused(f"Refused: the drone's geofence has a radius of at least {setting.min:g} m", lasting=True)
+        raise Refused(texts.FENCE, texts.FENCE_RADIUS.fill(radius=setting.min), lasting=True)
     await piloting.set_max_distance(value)
     await piloting.set_geofence(True)
 
@@ -106,7 +107,7 @@ def _land_delay(host: Host) -> float:
 
 async def _set_land_delay(host: Host, value: float) -> None:
     if HOVERS < value < 0.0:
-        raise Refused("Refused: RTL_LAND_DELAY is -1 to hover, or 0 and more to land", lasting=True)
+        raise Refused(texts.RETURN, texts.LAND_DELAY, lasting=True)
     if value == HOVERS:
         put_end_of_return(host, EndOfReturn.HOVER)
     else:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from anafi_mav import texts
 from anafi_mav.mavlink import dialect
 from anafi_mav.plans.zones import Circle, Polygon
 from anafi_mav.services.flavours import PX4, Flavour
 from anafi_mav.services.plan.plan_transfer import PlanKind
+from anafi_mav.texts import Text
 from anafi_mav.vehicle.fence.fence import CIRCLES, HOME_CIRCLE, POLYGONS, fence_of, group_of, inclusion_word
 from anafi_mav.vehicle.fence.plan_items import Fault, PlanItem, place_fault
 
@@ -33,21 +35,21 @@ class FenceKind(PlanKind):
         first, second = item.params[:2]
         if item.command in POLYGONS:
             if not (math.isfinite(first) and first == int(first) and 3 <= first <= self.capacity):
-                return Fault(dialect.MAV_MISSION_INVALID_PARAM1, f"{first:g} is no number of corners")
+                return Fault(dialect.MAV_MISSION_INVALID_PARAM1, texts.NOT_CORNERS.fill(value=first))
         elif item.command in CIRCLES or item.command == HOME_CIRCLE:
             if not (math.isfinite(first) and first >= 0.0):  # `taken` leaves one of 0 out
-                return Fault(dialect.MAV_MISSION_INVALID_PARAM1, f"{first:g} is no radius")
+                return Fault(dialect.MAV_MISSION_INVALID_PARAM1, texts.NOT_RADIUS.fill(value=first))
         elif item.command != _RETURN_POINT:
-            return Fault(dialect.MAV_MISSION_UNSUPPORTED, f"command {item.command} is no part of a fence")
+            return Fault(dialect.MAV_MISSION_UNSUPPORTED, texts.COMMAND_UNSUPPORTED.fill(command=item.command))
         if not (math.isnan(second) or (math.isfinite(second) and second == int(second))):
-            return Fault(dialect.MAV_MISSION_INVALID_PARAM2, f"{second:g} is no inclusion group")
+            return Fault(dialect.MAV_MISSION_INVALID_PARAM2, texts.NOT_GROUP.fill(value=second))
         return None if item.command == HOME_CIRCLE or _is_void(item) else place_fault(item)
 
     def taken(self, items: Sequence[PlanItem], flavour: Flavour) -> Sequence[PlanItem]:
         return [item for item in items if not _is_void(item)]
 
-    def remarks(self, items: Sequence[PlanItem]) -> Sequence[str]:
-        return [f"Fence circle {number} ignored: radius 0" for number, item in enumerate(items) if _is_void(item)]
+    def remarks(self, items: Sequence[PlanItem]) -> Sequence[Text]:
+        return [texts.FENCE_CIRCLE_IGNORED.fill(number=number) for number, item in enumerate(items) if _is_void(item)]
 
     def check_plan(self, items: Sequence[PlanItem], flavour: Flavour = PX4) -> Fault | None:
         number = 0
@@ -59,19 +61,19 @@ class FenceKind(PlanKind):
             # Only an inclusion polygon has a group (MAVLink common.xml).
             keys = {(one.command, one.params[0], group_of(one) if POLYGONS.get(one.command) else 0) for one in same}
             if item.command in POLYGONS and (len(same) < corners or len(keys) > 1):
-                reason = f"the polygon that begins with item {number} has not its {corners} corners"
+                reason = texts.POLYGON_INCOMPLETE.fill(number=number, corners=corners)
                 return Fault(dialect.MAV_MISSION_INVALID_PARAM1, reason)
             return_points += item.command == _RETURN_POINT
             number += corners
         if return_points > 1:
-            return Fault(dialect.MAV_MISSION_INVALID, "it has more than one return point")
+            return Fault(dialect.MAV_MISSION_INVALID, texts.RETURN_POINTS)
         for zone in fence_of(items).zones:
             if isinstance(zone, Polygon) and zone.area < SMALLEST_AREA:
-                return Fault(dialect.MAV_MISSION_INVALID, f"the {zone.name} encloses nothing, or crosses itself")
+                return Fault(dialect.MAV_MISSION_INVALID, texts.ZONE_EMPTY.fill(zone=zone.name))
         return None
 
 
-def summary(items: Sequence[PlanItem]) -> str:
+def summary(items: Sequence[PlanItem]) -> Text:
     """A fence in a line, for people; what it asks for that is not done is told."""
     zones = fence_of(items).zones
     words = []
@@ -80,10 +82,12 @@ def summary(items: Sequence[PlanItem]) -> str:
             count = sum(isinstance(zone, kind) and zone.inclusion is inclusion for zone in zones)
             if count:
                 words.append(f"{count} {inclusion_word(inclusion)} {word}{'s' if count > 1 else ''}")
-    line = ", ".join(words) or "no zones"
+    if not items:
+        return texts.NO_FENCE
+    line = texts.FENCE_SUMMARY.fill(zones=", ".join(words) or texts.NO_ZONES)
     groups = [zone.group for zone in zones if zone.inclusion]
     if len(groups) > len(set(groups)):
-        line += "; inside is what all inclusion zones of one group have in common"
+        line = texts.FENCE_GROUPS.fill(fence=line)
     if any(item.command == _RETURN_POINT for item in items):
-        line += "; the return point is kept and not used"
+        line = texts.FENCE_RETURN_POINT.fill(fence=line)
     return line

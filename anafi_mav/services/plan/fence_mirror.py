@@ -13,7 +13,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from anafi_mav import geo
+from anafi_mav import geo, texts
 from anafi_mav.drone import Range
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.plans.zones import Circle
@@ -68,7 +68,7 @@ class FenceMirror:
             return
         if away is not None:
             self._moved_at = now
-            self._host.text(Severity.WARNING, f"Drone's fence circle ends: centre is {away:.0f} m off")
+            self._host.text(Severity.WARNING, texts.GEOFENCE_ENDS.fill(distance=away))
         self._task = self._host.spawn(self._change(wanted, mirrored, now))
 
     def wanted(self) -> tuple[bool, float | None, float | None]:
@@ -102,7 +102,7 @@ class FenceMirror:
             self._failed = None
         except AnafiMavError as error:
             self._failed = radius, now
-            self._host.text(Severity.WARNING, f"The drone's own geofence could not be changed: {error}")
+            self._host.text(Severity.WARNING, texts.GEOFENCE_FAILED.fill(error=error))
 
     async def _set(self, radius: float, mirrored: Mapping[str, Any] | None) -> None:
         piloting = self._host.drone.piloting
@@ -113,7 +113,7 @@ class FenceMirror:
         await self._remember({"radius": radius, "distance": before["distance"], "geofence": before["geofence"]})
         confirmed = await piloting.set_max_distance(radius)
         await piloting.set_geofence(True)
-        self._host.text(Severity.NOTICE, f"Fence: the drone keeps to {confirmed:g} m around its centre by itself, too")
+        self._host.text(Severity.NOTICE, texts.GEOFENCE_SET.fill(radius=confirmed))
 
     async def _restore(self, mirrored: Mapping[str, Any]) -> None:
         piloting = self._host.drone.piloting
@@ -124,10 +124,10 @@ class FenceMirror:
             if not mirrored["geofence"]:
                 await piloting.set_geofence(False)
             await piloting.set_max_distance(mirrored["distance"])
-            word = "on" if mirrored["geofence"] else "off"
-            text = f"The drone's own geofence is what it was: {mirrored['distance']:g} m, {word}"
+            word = texts.ON if mirrored["geofence"] else texts.OFF
+            text = texts.GEOFENCE_RESTORED.fill(radius=mirrored["distance"], state=word)
         else:
-            text = "The drone's own geofence stays as it is: somebody has changed it"
+            text = texts.GEOFENCE_KEPT
         await self._remember(None)
         self._host.text(Severity.NOTICE, text)
 

@@ -11,6 +11,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from anafi_mav import texts
 from anafi_mav.drone import events
 from anafi_mav.drone.events import PlayingState
 from anafi_mav.errors import AnafiMavError
@@ -20,7 +21,7 @@ from anafi_mav.services.plan.fence_mirror import FenceMirror
 from anafi_mav.services.service import Host, Service
 from anafi_mav.services.stream import Stream, Times
 from anafi_mav.vehicle.base.modes import FlightMode
-from anafi_mav.vehicle.base.refusal import Refused
+from anafi_mav.vehicle.base.refusal import Refused, reason_of
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.fence.fence_watch import CEILING, EVERYTHING, FLOOR, FenceWatch, Reaction, Sight, State
@@ -129,28 +130,27 @@ class FenceService(Service):
         blind, breaches = watch.blind, watch.breaches
         action = watch.look(self._sight(now), now)
         if watch.blind and not blind:
-            self.host.text(Severity.WARNING, "Fence not watched: the drone does not know where it is")
+            self.host.text(Severity.WARNING, texts.FENCE_BLIND)
         if watch.breaches != breaches:
             self._breach_ms = self.host.times().boot_ms
         if action is not None:
             self._begin(action)
         elif before is State.OUTSIDE and watch.state is not State.OUTSIDE:
-            self.host.text(Severity.NOTICE, "Inside the fence again")
+            self.host.text(Severity.NOTICE, texts.FENCE_INSIDE)
         self._tell()
 
     def _begin(self, action: Reaction) -> None:
         verdict = self._watch.verdict
         assert verdict is not None
-        head = "Fence ahead" if verdict.ahead else "Fence breach"
         controller = self.host.drone.controller
         if action is Reaction.WARN:
-            self.host.text(Severity.WARNING, f"{head}: {verdict.text}")
+            self.host.text(Severity.WARNING, texts.FENCE_WARNING.fill(reason=verdict.text))
         elif controller.pilot_has_source or controller.pilot_acquired_control:
             # A person flies, or can at once: nothing of ours acts against him.
-            self.host.text(Severity.CRITICAL, f"{head}: {verdict.text}: pilot in control")
+            self.host.text(Severity.CRITICAL, texts.FENCE_PILOT.fill(reason=verdict.text))
             self._watch.done(self.host.vehicle.orders)
         else:
-            self.host.text(Severity.CRITICAL, f"{head}: {verdict.text}: {action.value}")
+            self.host.text(Severity.CRITICAL, texts.FENCE_BREACH.fill(action=action.value, reason=verdict.text))
             # In its turn: what is newer replaces it.
             self.host.run_action(FenceService, self._carry_out(action), is_order=False)
 
@@ -167,7 +167,7 @@ class FenceService(Service):
                 case _:
                     await vehicle.hold()
         except AnafiMavError as error:
-            self.host.text(Severity.ERROR, f"Fence: {action.value} failed: {error}")
+            self.host.text(Severity.ERROR, texts.FENCE_ACTION_FAILED.fill(action=action.value, error=reason_of(error)))
             self._not_done()
         except asyncio.CancelledError:
             self._not_done()
@@ -183,7 +183,7 @@ class FenceService(Service):
         try:
             await self.host.vehicle.return_home()
         except AnafiMavError as error:
-            self.host.text(Severity.ERROR, f"Fence: no return: {error}: hold")
+            self.host.text(Severity.ERROR, texts.FENCE_NO_RETURN.fill(error=reason_of(error)))
             await self.host.vehicle.hold()
 
     # Telling.
@@ -221,9 +221,9 @@ class FenceService(Service):
         if what == DISABLE_FLOOR:
             wanted = FLOOR
         if what not in (DISABLE, ENABLE, DISABLE_FLOOR) or wanted not in range(1, EVERYTHING + 1):
-            raise Refused("Fence: param1 is 0, 1 or 2, param2 bits of FENCE_TYPE", lasting=True)
+            raise Refused(texts.FENCE, texts.FENCE_PARAMS, lasting=True)
         if what != ENABLE and wanted == CEILING:
-            raise Refused("Fence: the drone always keeps to its ceiling; set another one instead", lasting=True)
+            raise Refused(texts.FENCE, texts.CEILING_STAYS, lasting=True)
         if what == ENABLE:
             watch.enable(int(wanted))
         else:

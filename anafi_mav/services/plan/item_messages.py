@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from anafi_mav import texts
 from anafi_mav.mavlink import dialect
 from anafi_mav.vehicle.fence.plan_items import DEGREES, UNSET, Fault, PlanItem, has_place
 
@@ -30,9 +31,9 @@ def item_of(message: Any) -> PlanItem | Fault:
         scale = DEGREES if has_place(message.command, message.frame) else 1.0
         x, y = _integer(message.x, scale), _integer(message.y, scale)
     if x is None:
-        return Fault(dialect.MAV_MISSION_INVALID_PARAM5_X, f"{message.x:g} is no latitude")
+        return Fault(dialect.MAV_MISSION_INVALID_PARAM5_X, texts.BAD_LATITUDE)
     if y is None:
-        return Fault(dialect.MAV_MISSION_INVALID_PARAM6_Y, f"{message.y:g} is no longitude")
+        return Fault(dialect.MAV_MISSION_INVALID_PARAM6_Y, texts.BAD_LONGITUDE)
     params = (message.param1, message.param2, message.param3, message.param4)
     return PlanItem(message.command, message.frame, params, x, y, message.z, message.autocontinue, message.current)
 

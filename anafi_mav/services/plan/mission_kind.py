@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import msgspec
 
+from anafi_mav import texts
 from anafi_mav.mavlink import dialect
 from anafi_mav.plans.formats.parrot import Version
 from anafi_mav.plans.plan import Item, Loss
@@ -19,6 +20,7 @@ from anafi_mav.plans.translation.translate import FaultKind, Report, examine
 from anafi_mav.services.flavours import PX4, Flavour
 from anafi_mav.services.plan.mission_items import from_wire
 from anafi_mav.services.plan.plan_transfer import PlanKind
+from anafi_mav.texts import Text
 from anafi_mav.vehicle.fence.plan_items import Fault, PlanItem
 
 _HEADED = frozenset(
@@ -74,18 +76,16 @@ class Examined:
     neutral: tuple[Item, ...]
     report: Report
 
-    def words(self, first: int) -> str:
+    def words(self, first: int) -> Text:
         """For people who call the first item `first`: what of it is flown, and how."""
         if not self.items:
-            return "No mission"
+            return texts.NO_MISSION_STORED
         report = self.report
-        words = f"Mission: {len(self.items)} items"
+        words = texts.MISSION_ITEMS.fill(count=len(self.items))
         if report.stepped:
-            words += (
-                f"; some are flown by the gateway, {_some(report.stepped, first)}. Without it what follows is not flown"
-            )
+            words = texts.MISSION_STEPS.fill(mission=words, steps=_some(report.stepped, first))
         if report.approximations:
-            words += f"; not exactly as it says: {_some(report.approximations, first)}"
+            words = texts.MISSION_APPROXIMATE.fill(mission=words, losses=_some(report.approximations, first))
         return words
 
 
@@ -119,7 +119,7 @@ class MissionKind(PlanKind):
         result = _RESULTS.get(fault.kind)
         if result is None:
             result = dialect.MAV_MISSION_INVALID_PARAM1 - 1 + (fault.param or 1)
-        return Fault(result, f"item {fault.item + FIRST_LABEL}: {fault.reason}")
+        return Fault(result, texts.ITEM_REASON.fill(number=fault.item + FIRST_LABEL, reason=fault.reason))
 
     def examined(self, items: Sequence[PlanItem]) -> Examined:
         """A mission, and what it is to the drone; the last one is known, whichever thread asked."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Hashable, Mapping
 
+from anafi_mav import texts
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
@@ -17,6 +18,7 @@ from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.plan.mission_kind import FIRST_LABEL, offset
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
 from anafi_mav.services.stream import Stream, Times
+from anafi_mav.texts import Text
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.severity import Severity
@@ -84,7 +86,7 @@ class MissionService(Service):
         kept = memory.settings.get(RECORD)
         record = Record.read(kept, self._flight.progress.items)
         if kept is not None and record is None:
-            self.host.text(Severity.WARNING, f"flown mission in {memory.path}: ignored, it is not of the mission there")
+            self.host.text(Severity.WARNING, texts.MISSION_RECORD_IGNORED.fill(path=memory.path))
         self._flight.link_up(record)
 
     def link_down(self) -> None:
@@ -108,7 +110,7 @@ class MissionService(Service):
     async def _start(self, command: Command) -> None:
         """MAV_CMD_MISSION_START: the mission begins or goes on, as by its mode. Only the whole of it."""
         if any(value not in (0.0, KEEP) and not math.isnan(value) for value in command.params[:2]):
-            raise Refused("Mission refused: a part of it cannot be started, set the current item first", lasting=True)
+            raise Refused(texts.MISSION, texts.MISSION_PART, lasting=True)
         await self.host.vehicle.set_mode(FlightMode.MISSION, command.right)
 
     async def _choose(self, command: Command) -> None:
@@ -118,9 +120,9 @@ class MissionService(Service):
         await flight.storing.over()
         self._sent = {}
         if not flight.there:
-            raise Refused("Current item refused: there is no mission", lasting=True)
+            raise Refused(texts.CURRENT_ITEM, texts.NO_MISSION, lasting=True)
         if math.isinf(item) or (not math.isnan(item) and item != int(item)):
-            raise Refused("Current item refused: param1 is the number of an item", lasting=True)
+            raise Refused(texts.CURRENT_ITEM, texts.PARAM1_ITEM, lasting=True)
         if math.isnan(item) or item == KEEP:
             if anew == 1.0:
                 await flight.reset(command.client)
@@ -163,7 +165,7 @@ class MissionService(Service):
     def _tell_reached(self, item: int) -> None:
         self.host.send_by_flavour(lambda flavour: dialect.MAVLink_mission_item_reached_message(item + offset(flavour)))
 
-    def _say(self, severity: Severity, text: Callable[[int], str]) -> None:
+    def _say(self, severity: Severity, text: Callable[[int], Text]) -> None:
         """A text to all, with the items' numbers as maps show them."""
         self.host.text(severity, text(FIRST_LABEL))
 

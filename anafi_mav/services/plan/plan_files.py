@@ -11,8 +11,10 @@ from __future__ import annotations
 import struct
 from collections.abc import Mapping, Sequence
 
+from anafi_mav import texts
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.plan.item_messages import item_int, item_of
+from anafi_mav.texts import Text
 from anafi_mav.vehicle.fence.plan_items import Fault, PlanItem
 
 PATHS: Mapping[int, str] = {
@@ -46,26 +48,26 @@ def pack_plan(items: Sequence[PlanItem], mission_type: int) -> bytes:
 def unpack_plan(content: bytes, mission_type: int) -> list[PlanItem] | Fault:
     """Return the list in a file, or why it holds none."""
     if len(content) < _HEADER.size:
-        return _invalid("the file has no header")
+        return _invalid(texts.FILE_NO_HEADER)
     magic, kind, options, first, count = _HEADER.unpack_from(content)
     if magic != MAGIC or kind != mission_type:
-        return _invalid("the file is of another kind")
+        return _invalid(texts.FILE_OTHER_KIND)
     if options != 0 or first != 0:
-        return _invalid("the file is a part of a list")
+        return _invalid(texts.FILE_PART)
     if len(content) != size_of(count):
-        return _invalid(f"the file has not its {count} items")
+        return _invalid(texts.FILE_ITEMS.fill(count=count))
     items: list[PlanItem] = []
     names = dialect.MAVLink_mission_item_int_message.ordered_fieldnames
     for seq, values in enumerate(_ITEM.iter_unpack(content[_HEADER.size :])):
         message = dialect.MAVLink_mission_item_int_message(**dict(zip(names, values, strict=True)))
         item = item_of(message)
         if isinstance(item, Fault):
-            return Fault(item.result, f"item {seq}: {item.reason}")
+            return Fault(item.result, texts.ITEM_REASON.fill(number=seq, reason=item.reason))
         if message.seq != seq:
-            return _invalid(f"item {seq} has the number {message.seq}")
+            return _invalid(texts.FILE_NUMBER.fill(number=seq, seq=message.seq))
         items.append(item)
     return items
 
 
-def _invalid(reason: str) -> Fault:
+def _invalid(reason: Text) -> Fault:
     return Fault(dialect.MAV_MISSION_INVALID, reason)

@@ -13,6 +13,7 @@ from collections import deque
 from collections.abc import Callable, Hashable, Iterable
 from typing import Any
 
+from anafi_mav import texts
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.plan.plan_transfer import Commit, Effect, Peer, PlanKind, PlanTransfer, Reply, Say, State
 from anafi_mav.vehicle.base.severity import Severity
@@ -102,7 +103,7 @@ class PlanDesk:
         if not all(transfer.may_clear(peer, now) for transfer in self.transfers.values()):
             return [
                 _ack(peer, dialect.MAV_MISSION_DENIED, ALL),
-                Say(Severity.WARNING, "Plans not cleared: another client transfers one just now"),
+                Say(Severity.WARNING, texts.PLANS_NOT_CLEARED),
             ]
         for transfer in self.transfers.values():
             transfer.begin_clear(peer, now)

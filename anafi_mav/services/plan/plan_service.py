@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from functools import partial
 
-from anafi_mav import units
+from anafi_mav import texts, units
 from anafi_mav.clock import Alarm
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
@@ -28,6 +28,7 @@ from anafi_mav.services.plan.plan_protocol import MESSAGES, PlanDesk
 from anafi_mav.services.plan.plan_transfer import Changed, Commit, Effect, Peer, PlanKind, Reply, Say
 from anafi_mav.services.plan.rally_kind import RallyKind
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
+from anafi_mav.texts import Text
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.fence.plan_items import MAX_ITEMS, Fault, PlanItem
 from anafi_mav.vehicle.fence.rally import Return
@@ -94,7 +95,7 @@ class PlanService(Service):
         else:
             outcome = transfer.replace(items, self._peer(inbound), self.host.clock.monotonic())
         if isinstance(outcome, Fault):
-            self.host.warn_throttled(f"{transfer.kind.name.capitalize()} refused: {outcome.reason}")
+            self.host.warn_throttled(texts.REFUSED.fill(what=transfer.kind.name.capitalize(), reason=outcome.reason))
             return False
         self._perform(outcome)
         return True
@@ -110,15 +111,18 @@ class PlanService(Service):
             items = memory.plans.get(kind, ())
             wrong = self._wrong(transfer.kind, items)
             if wrong is not None:
-                self.host.text(Severity.WARNING, f"{transfer.kind.name} in {memory.path}: ignored, {wrong}")
+                self.host.text(
+                    Severity.WARNING,
+                    texts.PLAN_IGNORED.fill(kind=transfer.kind.name.capitalize(), path=memory.path, reason=wrong),
+                )
             transfer.put(() if wrong is not None else items)
             self._take(kind)
 
-    def _wrong(self, kind: PlanKind, items: Sequence[PlanItem]) -> str | None:
+    def _wrong(self, kind: PlanKind, items: Sequence[PlanItem]) -> Text | None:
         """Why a plan that was kept is not taken."""
         for number, item in enumerate(items):
             if (fault := kind.check_item(item)) is not None:
-                return f"item {kind.label(number, PX4)}: {fault.reason}"
+                return texts.ITEM_REASON.fill(number=kind.label(number, PX4), reason=fault.reason)
         fault = self._mission.examine(items) if kind is self._mission else kind.check_plan(items)
         return None if fault is None else fault.reason
 
@@ -167,11 +171,11 @@ class PlanService(Service):
             except Exception:
                 # Whatever went wrong, clients must not wait for ever for what comes after it.
                 logger.exception("%s: a plan could not be stored", self.host.drone.name)
-                fault = Fault(dialect.MAV_MISSION_ERROR, "the gateway failed to store it")
+                fault = Fault(dialect.MAV_MISSION_ERROR, texts.NOT_STORED)
             if fault is not None:
                 transfer = self._desk.transfers.get(commit.mission_type)
                 what = "Plans" if transfer is None else transfer.kind.name.capitalize()
-                self.host.warn_throttled(f"{what} refused: {fault.reason}")
+                self.host.warn_throttled(texts.REFUSED.fill(what=what, reason=fault.reason))
             self._perform(self._desk.stored(commit, self.host.clock.monotonic(), fault))
 
     async def _put(self, commit: Commit) -> Fault | None:
@@ -242,9 +246,9 @@ class PlanService(Service):
                 vehicle.mission.take(examined.neutral, identity)
         elif kind == FenceKind.mission_type:
             if items != vehicle.fence.items:
-                self.host.text(Severity.INFO, f"Fence: {summary(items)}" if items else "No fence")
+                self.host.text(Severity.INFO, summary(items))
             vehicle.fence.take(items)
         elif kind == RallyKind.mission_type:
             if items and vehicle.rally.purpose is Return.HOME and items != vehicle.rally.items:
-                self.host.text(Severity.INFO, f"Rally points not used: RTL_TYPE is home ({len(items)})")
+                self.host.text(Severity.INFO, texts.RALLY_BY_TYPE.fill(count=len(items)))
             vehicle.rally.take(items)

@@ -16,10 +16,12 @@ from typing import Any, TypeAlias
 
 import msgspec
 
+from anafi_mav import texts
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.flavours import PX4, Flavour
 from anafi_mav.services.plan.item_messages import item_float, item_int, item_of
 from anafi_mav.services.plan.plan_requests import REQUEST_EVERY, Requests
+from anafi_mav.texts import Text
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.fence.plan_items import MAX_ITEMS, Fault, PlanItem, opaque_id
 
@@ -112,7 +114,7 @@ class Say:
     """A text to everybody."""
 
     severity: Severity
-    text: str
+    text: Text
 
 
 Effect: TypeAlias = Reply | Commit | Changed | Say
@@ -144,7 +146,7 @@ class PlanKind:
         """The plan in a list that a client of this flavour sent; the inverse of `shown`."""
         return items
 
-    def remarks(self, items: Sequence[PlanItem]) -> Sequence[str]:
+    def remarks(self, items: Sequence[PlanItem]) -> Sequence[Text]:
         """Warnings about a list that a client sent and that is accepted: items that `taken` leaves out."""
         return ()
 
@@ -230,7 +232,10 @@ class PlanTransfer:
             return self._deny(self.kind.refusal, peer)
         if count > self.kind.capacity:
             return self._deny(
-                Fault(dialect.MAV_MISSION_NO_SPACE, f"{count} items are more than {self.kind.capacity}"), peer
+                Fault(
+                    dialect.MAV_MISSION_NO_SPACE, texts.TOO_MANY_ITEMS.fill(count=count, capacity=self.kind.capacity)
+                ),
+                peer,
             )
         return self._begin(_Upload(peer, [], Requests(0, count - 1), now), now)
 
@@ -247,10 +252,10 @@ class PlanTransfer:
         if last == len(items) > first:
             last -= 1
         if not 0 <= first <= last < max(len(items), first + 1) or first > len(items):
-            fault = Fault(dialect.MAV_MISSION_INVALID_SEQUENCE, f"there are no items {first} to {last} to replace")
+            fault = Fault(dialect.MAV_MISSION_INVALID_SEQUENCE, texts.NO_ITEMS_TO_REPLACE.fill(first=first, last=last))
             return self._deny(fault, peer)
         if first >= self.kind.capacity:
-            return self._deny(Fault(dialect.MAV_MISSION_NO_SPACE, f"it has {first} items already"), peer)
+            return self._deny(Fault(dialect.MAV_MISSION_NO_SPACE, texts.LIST_FULL.fill(count=first)), peer)
         return self._begin(_Upload(peer, items, Requests(first, last), now), now)
 
     def _begin(self, upload: _Upload, now: float) -> list[Effect]:
@@ -299,7 +304,7 @@ class PlanTransfer:
         fault = item if isinstance(item, Fault) else self.kind.check_item(item)
         if fault is not None:
             number = self.kind.label(message.seq, peer.flavour)
-            return self._refuse(Fault(fault.result, f"item {number}: {fault.reason}"), now)
+            return self._refuse(Fault(fault.result, texts.ITEM_REASON.fill(number=number, reason=fault.reason)), now)
         assert isinstance(item, PlanItem)
         upload.items[message.seq : message.seq + 1] = [item]
         if upload.requests.came():
@@ -320,12 +325,14 @@ class PlanTransfer:
         if self.kind.refusal is not None:
             return self.kind.refusal
         if self.state is State.STORING or self._busy(peer, now):
-            return Fault(dialect.MAV_MISSION_DENIED, "another client transfers it just now")
+            return Fault(dialect.MAV_MISSION_DENIED, texts.ANOTHER_CLIENT_TRANSFERS)
         if len(sent) > self.kind.capacity:
-            return Fault(dialect.MAV_MISSION_NO_SPACE, f"{len(sent)} items are more than {self.kind.capacity}")
+            return Fault(
+                dialect.MAV_MISSION_NO_SPACE, texts.TOO_MANY_ITEMS.fill(count=len(sent), capacity=self.kind.capacity)
+            )
         for seq, item in enumerate(sent):
             if (fault := self.kind.check_item(item)) is not None:
-                return Fault(fault.result, f"item {seq}: {fault.reason}")
+                return Fault(fault.result, texts.ITEM_REASON.fill(number=seq, reason=fault.reason))
         items = tuple(self.kind.taken(sent, peer.flavour))
         if (fault := self.kind.check_plan(items, peer.flavour)) is not None:
             return fault
@@ -439,9 +446,14 @@ class PlanTransfer:
                 self._end(Event.SILENCE)
                 return [
                     self._ack(upload.peer, dialect.MAV_MISSION_OPERATION_CANCELLED),
-                    Say(Severity.WARNING, f"{self.kind.name.capitalize()} upload given up: "
-                        f"item {self.kind.label(upload.requests.expected, upload.peer.flavour)} does not come"),
-                ]  # fmt: skip
+                    Say(
+                        Severity.WARNING,
+                        texts.UPLOAD_ABORTED.fill(
+                            kind=self.kind.name.capitalize(),
+                            number=self.kind.label(upload.requests.expected, upload.peer.flavour),
+                        ),
+                    ),
+                ]
             return [self._request(upload, now)]
         if upload is None and done is not None and done.echoes > 0 and now >= done.due:
             done.echoes -= 1
@@ -482,11 +494,11 @@ class PlanTransfer:
         )
 
     def _occupied(self, peer: Peer) -> list[Effect]:
-        return self._deny(Fault(dialect.MAV_MISSION_DENIED, "another client transfers it just now"), peer)
+        return self._deny(Fault(dialect.MAV_MISSION_DENIED, texts.ANOTHER_CLIENT_TRANSFERS), peer)
 
     def _deny(self, fault: Fault, peer: Peer) -> list[Effect]:
         """No transfer begins."""
-        text = f"{self.kind.name.capitalize()} refused: {fault.reason}"
+        text = texts.REFUSED.fill(what=self.kind.name.capitalize(), reason=fault.reason)
         return [self._ack(peer, fault.result), Say(Severity.WARNING, text)]
 
     def _refuse(self, fault: Fault, now: float) -> list[Effect]:

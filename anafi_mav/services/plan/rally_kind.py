@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from anafi_mav import texts
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.plan.plan_transfer import PlanKind
 from anafi_mav.vehicle.fence.plan_items import Fault, PlanItem, place_fault
@@ -15,7 +16,7 @@ class RallyKind(PlanKind):
 
     def check_item(self, item: PlanItem) -> Fault | None:
         if item.command != dialect.MAV_CMD_NAV_RALLY_POINT:
-            return Fault(dialect.MAV_MISSION_UNSUPPORTED, f"command {item.command} is no rally point")
+            return Fault(dialect.MAV_MISSION_UNSUPPORTED, texts.COMMAND_UNSUPPORTED.fill(command=item.command))
         if not abs(item.z) <= 10_000.0:
-            return Fault(dialect.MAV_MISSION_INVALID_PARAM7, f"{item.z:g} m is no height")
+            return Fault(dialect.MAV_MISSION_INVALID_PARAM7, texts.NOT_HEIGHT.fill(value=item.z))
         return place_fault(item)

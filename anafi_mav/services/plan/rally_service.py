@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import math
 
+from anafi_mav import texts
 from anafi_mav.drone import Position
 from anafi_mav.drone.events import RthHomeType
 from anafi_mav.errors import AnafiMavError
@@ -96,7 +97,7 @@ class RallyService(Service):
         if state.preferred_type is None or state.types is None or RthHomeType.CUSTOM not in state.types:
             return False
         if state.preferred_type == RthHomeType.CUSTOM and self._before() is None:
-            self.host.warn_throttled("Rally points not used: the drone returns to the home that was set")
+            self.host.warn_throttled(texts.RALLY_HOME_SET)
             return False
         return True
 
@@ -126,13 +127,13 @@ class RallyService(Service):
             except AnafiMavError as error:
                 self._rejected[point] = now + REJECTED_FOR
                 self._chosen = None
-                self.host.text(Severity.WARNING, f"Rally point {point.number} not used: {error}")
+                self.host.text(Severity.WARNING, texts.RALLY_FAILED.fill(number=point.number, error=error))
                 # Not at the next tick: a return in between would go to the custom home of some other day.
                 await self._restore()
             else:
                 self._chosen = point
-                self.host.vehicle.return_end.set_home(self._given, f"rally point {point.number}")
-                self.host.text(Severity.NOTICE, f"Returns end at rally point {point.number}")
+                self.host.vehicle.return_end.set_home(self._given, texts.RALLY_POINT.fill(number=point.number))
+                self.host.text(Severity.NOTICE, texts.RETURNS_TO_RALLY.fill(number=point.number))
 
     async def _leave(self) -> None:
         async with self.host.vehicle.home_choice:
@@ -149,11 +150,11 @@ class RallyService(Service):
             if home.state.preferred_type == RthHomeType.CUSTOM and not taken_over:
                 await home.set_preferred_type(before)
         except AnafiMavError as error:
-            self.host.warn_throttled(f"The drone's home type could not be put back: {error}")
+            self.host.warn_throttled(texts.HOME_TYPE_NOT_RESTORED.fill(error=error))
             return
         await self._remember(None)
         if not (taken_over or self.host.vehicle.on_ground):
-            self.host.text(Severity.NOTICE, "Returns end at home")
+            self.host.text(Severity.NOTICE, texts.RETURNS_TO_HOME)
 
     def _before(self) -> RthHomeType | None:
         """What the drone preferred before we changed it; None: we have not."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from anafi_mav import texts
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
@@ -30,4 +31,4 @@ class FollowService(Service):
         if not isinstance(seen, str):
             self._flight.receive(client_of(inbound), seen)
         elif self._flight.engaged:
-            self.host.warn_throttled(f"Target ignored: {seen}")
+            self.host.warn_throttled(texts.TARGET_IGNORED.fill(reason=seen))

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Hashable, Mapping
 
+from anafi_mav import texts
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.flavours import flavour_of
@@ -42,7 +43,7 @@ class ManualControlService(Service):
     def _manual_control(self, inbound: Inbound) -> None:
         sticks = manual_sticks(inbound.message)
         if isinstance(sticks, str):
-            self.host.warn_throttled(f"MANUAL_CONTROL ignored: {sticks}")
+            self.host.warn_throttled(texts.MANUAL_CONTROL_IGNORED.fill(reason=sticks))
         elif sticks is not None:
             self._flight.receive(client_of(inbound), sticks, overrides=flavour_of(inbound.channel).joystick_overrides)
 
@@ -51,7 +52,7 @@ class ManualControlService(Service):
         before, at = self._channels.pop(client, (Channels(), -math.inf))
         channels = (before if now - at < SILENCE else Channels()).after(inbound.message)
         if isinstance(channels, str):
-            self.host.warn_throttled(f"RC_CHANNELS_OVERRIDE ignored: {channels}")
+            self.host.warn_throttled(texts.RC_OVERRIDE_IGNORED.fill(reason=channels))
         elif channels.released:
             self._flight.silent(client)
         else:

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
+from anafi_mav import texts
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.flavours import flavour_of
@@ -16,6 +17,7 @@ from anafi_mav.services.service import Host, MessageHandler, Service, client_of
 from anafi_mav.services.setpoint.offboard_echo import STREAMS
 from anafi_mav.services.setpoint.setpoint_messages import attitude_setpoint, global_setpoint, local_setpoint
 from anafi_mav.services.stream import Stream
+from anafi_mav.texts import Text
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.offboard.setpoints import Setpoint
 
@@ -49,15 +51,15 @@ class OffboardService(Service):
     def subscriptions(self) -> Subscriptions:
         return self._flight.subscriptions()
 
-    def _takes(self, read: Callable[[Any], Setpoint | str]) -> MessageHandler:
+    def _takes(self, read: Callable[[Any], Setpoint | Text]) -> MessageHandler:
         def take(inbound: Inbound) -> None:
             setpoint = read(inbound.message)
-            if isinstance(setpoint, str):
-                objection: str | None = setpoint
+            if isinstance(setpoint, Text):
+                objection: Text | None = setpoint
             else:
                 guided = flavour_of(inbound.channel).guided_setpoints
                 objection = self._flight.receive(client_of(inbound), setpoint, guided=guided)
             if objection is not None:
-                self.host.warn_throttled(f"Setpoint refused: {objection}")
+                self.host.warn_throttled(texts.REFUSED.fill(what=texts.SETPOINT, reason=objection))
 
         return take

@@ -30,8 +30,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from anafi_mav import units
+from anafi_mav import texts, units
 from anafi_mav.mavlink import dialect
+from anafi_mav.texts import Text
 from anafi_mav.vehicle.offboard.setpoints import NOTHING, AttitudeSetpoint, MotionSetpoint, Origin, Vector
 
 UNIT_TOLERANCE = 0.1
@@ -53,26 +54,26 @@ FARTHEST = 1e6
 """m beyond which a coordinate is a mistake."""
 
 
-def attitude_setpoint(message: dialect.MAVLink_set_attitude_target_message) -> AttitudeSetpoint | str:
+def attitude_setpoint(message: dialect.MAVLink_set_attitude_target_message) -> AttitudeSetpoint | Text:
     """The setpoint in a message, or one sentence on why it cannot be flown."""
     mask = message.type_mask
     if mask & dialect.ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE:
-        return "body rates alone cannot be flown: an ANAFI takes angles"
+        return texts.ATTITUDE_RATES
     try:
         roll, pitch, yaw = units.euler_from_quaternion(*message.q)
     except ValueError:
-        return "the attitude quaternion is no rotation"
+        return texts.ATTITUDE_NO_ROTATION
     if not abs(math.hypot(*message.q) - 1.0) <= UNIT_TOLERANCE:
-        return "the attitude quaternion is not of length 1"
+        return texts.ATTITUDE_LENGTH
     if abs(roll) > math.pi / 2:
-        return "the attitude quaternion is upside down"
+        return texts.ATTITUDE_UPSIDE_DOWN
     yaw_rate = 0.0
     if not mask & dialect.ATTITUDE_TARGET_TYPEMASK_BODY_YAW_RATE_IGNORE and math.isfinite(message.body_yaw_rate):
         yaw_rate = message.body_yaw_rate
     thrust = 0.5
     if not mask & dialect.ATTITUDE_TARGET_TYPEMASK_THROTTLE_IGNORE and math.isfinite(message.thrust):
         if not -THRUST_TOLERANCE <= message.thrust <= 1.0 + THRUST_TOLERANCE:
-            return "thrust is not between 0 and 1"
+            return texts.THRUST_RANGE
         thrust = units.clip(message.thrust, 0.0, 1.0)
     return AttitudeSetpoint(roll, pitch, yaw, yaw_rate, 2.0 * thrust - 1.0)
 
@@ -95,7 +96,7 @@ _GLOBAL_FRAMES: dict[int, Origin] = {
 _TERRAIN_FRAMES = (dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT, dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT)
 
 
-def local_setpoint(message: dialect.MAVLink_set_position_target_local_ned_message) -> MotionSetpoint | str:
+def local_setpoint(message: dialect.MAVLink_set_position_target_local_ned_message) -> MotionSetpoint | Text:
     """The setpoint of a SET_POSITION_TARGET_LOCAL_NED, or one sentence on why it cannot be flown."""
     frame = _LOCAL_FRAMES.get(message.coordinate_frame)
     if frame is None:
@@ -103,7 +104,7 @@ def local_setpoint(message: dialect.MAVLink_set_position_target_local_ned_messag
     return _motion(message, *frame, (message.x, message.y, message.z))
 
 
-def global_setpoint(message: dialect.MAVLink_set_position_target_global_int_message) -> MotionSetpoint | str:
+def global_setpoint(message: dialect.MAVLink_set_position_target_global_int_message) -> MotionSetpoint | Text:
     """The setpoint of a SET_POSITION_TARGET_GLOBAL_INT, or one sentence on why it cannot be flown."""
     origin = _GLOBAL_FRAMES.get(message.coordinate_frame)
     if origin is None:
@@ -111,14 +112,14 @@ def global_setpoint(message: dialect.MAVLink_set_position_target_global_int_mess
     place = (message.lat_int / 1e7, message.lon_int / 1e7, message.alt)
     setpoint = _motion(message, origin, False, place)
     if isinstance(setpoint, MotionSetpoint) and (setpoint.position[0] is None) != (setpoint.position[1] is None):
-        return "latitude and longitude belong together"
+        return texts.HALF_PLACE
     return setpoint
 
 
-def _no_frame(frame: int) -> str:
+def _no_frame(frame: int) -> Text:
     if frame in _TERRAIN_FRAMES:
-        return f"heights above terrain (frame {frame}) cannot be flown, an ANAFI has no map of it"
-    return f"frame {frame} is not supported"
+        return texts.TERRAIN_UNSUPPORTED.fill(frame=frame)
+    return texts.FRAME_UNSUPPORTED.fill(frame=frame)
 
 
 def _motion(
@@ -127,7 +128,7 @@ def _motion(
     origin: Origin,
     body: bool,
     coordinates: tuple[float, float, float],
-) -> MotionSetpoint | str:
+) -> MotionSetpoint | Text:
     mask = message.type_mask
     position = _wanted(coordinates, mask, dialect.POSITION_TARGET_TYPEMASK_X_IGNORE)
     velocity = _wanted((message.vx, message.vy, message.vz), mask, dialect.POSITION_TARGET_TYPEMASK_VX_IGNORE)
@@ -136,19 +137,19 @@ def _motion(
     yaw_rate = None if mask & dialect.POSITION_TARGET_TYPEMASK_YAW_RATE_IGNORE else message.yaw_rate
     asked = (*position, *velocity, *acceleration, yaw, yaw_rate)
     if all(value is None for value in asked):
-        return "it asks for nothing"
+        return texts.NOTHING_ASKED
     if not all(value is None or math.isfinite(value) for value in asked):
-        return "not all of its values are numbers"
+        return texts.NOT_ALL_NUMBERS
     if acceleration != NOTHING and mask & dialect.POSITION_TARGET_TYPEMASK_FORCE_SET:
-        return "forces cannot be flown, an acceleration can"
+        return texts.FORCES
     if _size(position) > FARTHEST:
-        return "that is no place on earth"
+        return texts.NOT_ON_EARTH
     if _size(velocity) > MOST_SPEED:
-        return f"no ANAFI flies {_size(velocity):.0f} m/s"
+        return texts.TOO_FAST.fill(speed=_size(velocity))
     if _size(acceleration) > MOST_ACCELERATION:
-        return f"no ANAFI accelerates by {_size(acceleration):.0f} m/s2"
+        return texts.TOO_MUCH_ACCELERATION.fill(acceleration=_size(acceleration))
     if abs(yaw_rate or 0.0) > MOST_TURN:
-        return f"no ANAFI turns by {abs(yaw_rate or 0.0):.0f} rad/s"
+        return texts.TURNS_TOO_FAST.fill(rate=abs(yaw_rate or 0.0))
     if yaw is not None:
         yaw = units.wrap_pi(yaw)
     return MotionSetpoint(origin, body, position, velocity, acceleration, yaw, yaw_rate)

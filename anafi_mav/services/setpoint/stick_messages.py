@@ -10,7 +10,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from anafi_mav import texts
 from anafi_mav.mavlink import dialect
+from anafi_mav.texts import Text
 from anafi_mav.vehicle.manual_flight import Sticks
 
 DEAD_ZONE = 0.03
@@ -26,15 +28,15 @@ SHORTEST, LONGEST = 800, 2200
 """us that a channel may be: what transmitters send, with their trims."""
 
 
-def manual_sticks(message: dialect.MAVLink_manual_control_message) -> Sticks | str | None:
+def manual_sticks(message: dialect.MAVLink_manual_control_message) -> Sticks | Text | None:
     """The sticks of a MANUAL_CONTROL, or one sentence on why they are none; None: it has no axis at all."""
     axes = (message.x, message.y, message.r, message.z)
     if all(axis == NO_AXIS for axis in axes):
         return None
     if any(abs(axis) > 1000 and axis != NO_AXIS for axis in axes):
-        return "an axis is beyond 1000"
+        return texts.AXIS_RANGE
     if message.z < 0:
-        return "its throttle is 0 to 1000 with 500 in the middle"
+        return texts.THROTTLE_RANGE
     forward, right, turn = (0.0 if axis == NO_AXIS else axis / 1000.0 for axis in axes[:3])
     climb = 0.0 if message.z == NO_AXIS else (message.z - 500) / 500.0
     return Sticks(*map(_beyond_dead_zone, (forward, right, turn, climb)))
@@ -49,7 +51,7 @@ class Channels:
     throttle: int | None = None
     yaw: int | None = None
 
-    def after(self, message: dialect.MAVLink_rc_channels_override_message) -> Channels | str:
+    def after(self, message: dialect.MAVLink_rc_channels_override_message) -> Channels | Text:
         """What they are after one more RC_CHANNELS_OVERRIDE, or one sentence on why that is none."""
         said = {
             "roll": message.chan1_raw,
@@ -59,7 +61,7 @@ class Channels:
         }
         said = {name: value for name, value in said.items() if value != KEPT}
         if any(value != RELEASED and not SHORTEST <= value <= LONGEST for value in said.values()):
-            return f"a channel is not between {SHORTEST} and {LONGEST} us"
+            return texts.CHANNEL_RANGE.fill(shortest=SHORTEST, longest=LONGEST)
         return replace(self, **{name: value or None for name, value in said.items()})
 
     @property

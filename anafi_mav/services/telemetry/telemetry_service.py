@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from anafi_mav import texts
 from anafi_mav.drone import events
 from anafi_mav.drone.events import Message
 from anafi_mav.services.service import Host, Service
@@ -51,9 +52,9 @@ class TelemetryService(Service):
         if is_old != self._position_is_old:
             self._position_is_old = is_old
             if is_old:
-                self.host.text(Severity.WARNING, f"Position unknown: no GPS location for {POSITION_OLD:g} s")
+                self.host.text(Severity.WARNING, texts.POSITION_LOST.fill(seconds=POSITION_OLD))
             else:
-                self.host.text(Severity.NOTICE, "Position known again")
+                self.host.text(Severity.NOTICE, texts.POSITION_FOUND)
 
     def streams(self) -> Mapping[int, Stream]:
         return {

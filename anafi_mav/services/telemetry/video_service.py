@@ -10,7 +10,7 @@ import asyncio
 import math
 from collections.abc import Callable, Mapping
 
-from anafi_mav import units
+from anafi_mav import texts, units
 from anafi_mav.drone.payload.camera import Camera
 from anafi_mav.drone.status.link import Link, LinkState
 from anafi_mav.drone.video.video import VideoFrame
@@ -129,7 +129,7 @@ class VideoTelemetryService(Service):
             async with self.host.drone.video.watching():
                 await asyncio.Event().wait()  # until it is cancelled
         except AnafiMavError as error:
-            self.host.warn_throttled(f"No video to read the exposure from: {error}")
+            self.host.warn_throttled(texts.NO_EXPOSURE.fill(error=error))
 
     def _frame(self, frame: VideoFrame) -> None:
         self.host.mark_updated(dialect.MAVLINK_MSG_ID_ANAFI_CAMERA_EXPOSURE, frame.arrived)

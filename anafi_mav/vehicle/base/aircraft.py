@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import asyncio
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Mapping
 
+from anafi_mav import texts
 from anafi_mav.drone import Drone
 from anafi_mav.drone.events import FlyingState, PilotingStyleStyle
+from anafi_mav.texts import Text
 from anafi_mav.vehicle.base.flying import AIRBORNE, ON_GROUND
 from anafi_mav.vehicle.base.height import HeightReference
 from anafi_mav.vehicle.base.helm import Helm
@@ -26,10 +28,23 @@ STOP_WAIT = 0.5
 """s that a command that stops something waits for what it replaces. What has not ended by then can send nothing."""
 
 
+_ACTIVITIES: Mapping[FlyingState | None, Text] = {
+    FlyingState.LANDED: texts.ON_GROUND,
+    FlyingState.MOTOR_RAMPING: texts.STARTS_MOTORS,
+    FlyingState.USERTAKEOFF: texts.STARTS_MOTORS,
+    FlyingState.TAKINGOFF: texts.TAKES_OFF,
+    FlyingState.HOVERING: texts.HOVERS,
+    FlyingState.FLYING: texts.FLIES,
+    FlyingState.LANDING: texts.LANDS,
+    FlyingState.EMERGENCY: texts.EMERGENCY_STOP,
+    FlyingState.EMERGENCY_LANDING: texts.FORCED,
+}
+
+
 class Aircraft(ABC):
     """One drone that can be flown. All methods run on the event loop's thread."""
 
-    def __init__(self, drone: Drone, *, text: Callable[[Severity, str], None], changed: Callable[[], None]) -> None:
+    def __init__(self, drone: Drone, *, text: Callable[[Severity, Text], None], changed: Callable[[], None]) -> None:
         self.drone = drone
         self.height = HeightReference()
         self.roll = RollCheck()
@@ -87,7 +102,7 @@ class Aircraft(ABC):
 
     @property
     @abstractmethod
-    def descent(self) -> str | None:
+    def descent(self) -> Text | None:
         """The reason to refuse what may not end a landing or return: the drone does either, or was commanded to."""
 
     @property
@@ -130,30 +145,37 @@ class Aircraft(ABC):
         return self.origin if takeoff is None else Place(takeoff.latitude, takeoff.longitude)
 
     @property
+    def activity(self) -> Text:
+        """What the drone does now, as the reason of a refusal."""
+        if self.returning:
+            return texts.RETURNS
+        return _ACTIVITIES.get(self.flying_state, texts.FLYING_STATE_UNKNOWN)
+
+    @property
     def sticks_follow_camera(self) -> bool:
         """What sticks mean depends on where the camera looks (piloting_style.xml): no loop closes over that."""
         return self.drone.piloting.state.style == PilotingStyleStyle.CAMERA_OPERATED
 
-    def prearm_problems(self) -> list[str]:
+    def prearm_problems(self) -> list[Text]:
         """Why the drone would not take off, in sentences; empty when it would."""
-        problems: list[str] = []
+        problems: list[Text] = []
         if self.flying_state is None:
-            problems.append("the drone has not said whether it flies")
+            problems.append(texts.FLYING_STATE_UNKNOWN)
         if self.flying_state == FlyingState.EMERGENCY:
-            problems.append("emergency stop")
-        problems += self.drone.takeoff_blockers()
+            problems.append(texts.EMERGENCY_STOP)
+        problems += map(texts.from_below, self.drone.takeoff_blockers())
         if (problem := self.fence_problem) is not None:
             problems.append(problem)
         return problems
 
     @property
-    def fence_problem(self) -> str | None:
+    def fence_problem(self) -> Text | None:
         """Why the fence keeps the drone on the ground, in a sentence; None when it does not."""
         if self.on_ground:
             try:
                 self.fence.check_place(point_of(self.place), point_of(self.home))
             except OutsideFence as error:
-                return str(error)
+                return error.reason
         return None
 
     # What everybody who flies it needs. Each verb returns when the drone confirmed, or raises.

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import math
 
-from anafi_mav import geo
+from anafi_mav import geo, texts
+from anafi_mav.texts import Text
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.height import ESTIMATE_FLOOR
 from anafi_mav.vehicle.base.place import Place, point_of
@@ -48,57 +49,58 @@ def check_height(vehicle: Aircraft, ato: float) -> None:
     """Raise `Refused` unless a target height (m above take-off) is one the drone may go to."""
     ceiling = vehicle.drone.piloting.state.max_altitude
     if not math.isfinite(ato):
-        raise Refused("Refused: the height is not a number", lasting=True)
+        raise Refused(texts.HEIGHT, texts.NOT_A_NUMBER, lasting=True)
     if ato < (lowest := lowest_height(vehicle)):
-        raise TooLow(f"Refused: {ato:.1f} m above take-off is below {lowest:.1f} m", lasting=True)
+        raise TooLow(texts.HEIGHT, texts.TOO_LOW.fill(height=ato, lowest=lowest), lasting=True)
     if ceiling is not None and ato > ceiling.current:
         raise Refused(
-            f"Refused: {ato:.1f} m above take-off is above the drone's ceiling of {ceiling.current:g} m",
+            texts.HEIGHT,
+            texts.ABOVE_CEILING.fill(height=ato, ceiling=ceiling.current),
             lasting=True,
         )
     try:
         vehicle.fence.check_height(ato)
     except OutsideFence as error:
-        raise Refused(f"Refused: {error}", lasting=True) from error
+        raise Refused(texts.HEIGHT, error.reason, lasting=True) from error
 
 
 def amsl_to_ato(vehicle: Aircraft, amsl: float) -> float:
     """Height above take-off (m) of an AMSL height; raises `Refused` when no bridge is known."""
     ato = vehicle.height.ato(amsl)
     if ato is None:
-        raise Refused("Refused: AMSL unknown: no GPS fix")
+        raise Refused(texts.HEIGHT, texts.AMSL_UNKNOWN)
     return ato
 
 
 def check_estimate(vehicle: Aircraft, ato: float) -> None:
     """Raise `Refused` for an AMSL target that may be the ground because the bridge to AMSL is an estimate."""
     if vehicle.height.estimated and ato < ESTIMATE_FLOOR:
-        raise Refused(f"Refused: estimated AMSL: {ato:.0f} m < {ESTIMATE_FLOOR:g} m")
+        raise Refused(texts.HEIGHT, texts.NEAR_ESTIMATE.fill(height=ato, lowest=ESTIMATE_FLOOR))
 
 
-def check_on_earth(place: Place, what: str) -> None:
+def check_on_earth(place: Place, what: Text) -> None:
     """Raise `Refused` unless this is a place."""
     if not (abs(place.latitude) <= 90.0 and abs(place.longitude) <= 180.0):
-        raise Refused(f"{what} refused: that is no place on earth", lasting=True)
+        raise Refused(what, texts.NOT_ON_EARTH, lasting=True)
     if abs(place.latitude) < NOWHERE and abs(place.longitude) < NOWHERE:
-        raise Refused(f"{what} refused: latitude and longitude are both 0", lasting=True)
+        raise Refused(what, texts.AT_NULL, lasting=True)
 
 
 def check_place(vehicle: Aircraft, place: Place, *, start: Place | None = None) -> None:
     """Raise `Refused` unless the drone may fly there, and the straight way from `start` if that is given."""
-    check_on_earth(place, "Goto")
+    check_on_earth(place, texts.GOTO)
     centre, home = vehicle.geofence_centre, vehicle.home
     around = centre or vehicle.place
     if around is not None:
         distance = geo.distance(around.latitude, around.longitude, place.latitude, place.longitude)
         if distance > FARTHEST:
-            raise Refused(f"Goto refused: {distance:.0f} m away, limit {FARTHEST:g} m", lasting=True)
+            raise Refused(texts.GOTO, texts.TOO_FAR.fill(distance=distance, limit=FARTHEST), lasting=True)
         if centre is not None:
             _check_geofence(vehicle, distance)
     try:
         vehicle.fence.check_place(point_of(place), point_of(home), point_of(start))
     except OutsideFence as error:
-        raise Refused(f"Goto refused: {error}", lasting=error.lasting) from error
+        raise Refused(texts.GOTO, error.reason, lasting=error.lasting) from error
 
 
 def _check_geofence(vehicle: Aircraft, distance: float) -> None:
@@ -106,5 +108,7 @@ def _check_geofence(vehicle: Aircraft, distance: float) -> None:
     state = vehicle.drone.piloting.state
     if state.geofence and state.max_distance is not None and distance > state.max_distance.current:
         raise Refused(
-            f"Goto refused: {distance:.0f} m off fence centre > {state.max_distance.current:g} m", lasting=True
+            texts.GOTO,
+            texts.BEYOND_GEOFENCE.fill(distance=distance, limit=state.max_distance.current),
+            lasting=True,
         )

@@ -2,14 +2,31 @@
 
 from __future__ import annotations
 
-from anafi_mav.errors import AnafiMavError
+from collections.abc import Sequence
+
+from anafi_mav import texts
+from anafi_mav.errors import AnafiMavError, CommandRejected
+from anafi_mav.texts import Template, Text
 
 
 class Refused(AnafiMavError):
-    """We do not do this. `lasting` tells a request that is wrong in itself from one that comes at a bad moment."""
+    """We do not do this. `lasting` tells a request that is wrong in itself from one that comes at a bad moment.
 
-    def __init__(self, reason: str, *, lasting: bool = False, critical: bool = False) -> None:
-        super().__init__(reason)
+    The text is `{what} refused: {reason}`, unless `form` is another one of these two fields.
+    """
+
+    def __init__(
+        self,
+        what: Text,
+        reason: Text,
+        *,
+        form: Template = texts.REFUSED,
+        lasting: bool = False,
+        critical: bool = False,
+    ) -> None:
+        self.text = form.fill(what=what, reason=reason)
+        super().__init__(self.text)
+        self.what = what
         self.reason = reason
         self.lasting = lasting
         self.critical = critical
@@ -18,9 +35,41 @@ class Refused(AnafiMavError):
 class Unfinished(AnafiMavError):
     """A command was accepted for later, and what it waited for has failed: MAV_RESULT_FAILED."""
 
+    def __init__(self, what: Text, reason: Text) -> None:
+        super().__init__(texts.FAILED.fill(what=what, reason=reason))
+
 
 class Unsupported(Refused):
     """The vehicle has no such command, or not with these parameters: MAV_RESULT_UNSUPPORTED."""
 
-    def __init__(self, reason: str) -> None:
-        super().__init__(reason, lasting=True)
+    def __init__(self, what: Text, reason: Text) -> None:
+        super().__init__(what, reason, lasting=True)
+
+
+class Rejected(CommandRejected):
+    """What the gateway flies itself cannot go on; the reason is one of the table."""
+
+    def __init__(self, reason: Text) -> None:
+        super().__init__(reason)
+
+
+class DroneRefused(CommandRejected):
+    """The drone does not start the mission that it was commanded to fly."""
+
+    def __init__(self, text: Text) -> None:
+        super().__init__(text)
+
+
+def not_ready(problems: Sequence[Text]) -> Refused:
+    """Return the refusal of a take-off that has these problems."""
+    return Refused(texts.ARMING, texts.joined(problems), form=texts.PREARM)
+
+
+def reason_of(error: AnafiMavError) -> Text:
+    """Return the reason of an error, without the subject that a refusal has."""
+    return error.reason if isinstance(error, Refused) else texts.from_below(error)
+
+
+def text_of(error: AnafiMavError) -> Text:
+    """Return the whole text of an error."""
+    return error.text if isinstance(error, Refused) else texts.from_below(error)

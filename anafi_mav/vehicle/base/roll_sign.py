@@ -48,13 +48,6 @@ G = 9.81
 """m/s2."""
 
 
-ROLL_INVERTED = "roll sign inverted"
-"""Why a loop over velocity is refused."""
-
-INVERTED = "Roll sign inverted: velocity control refused"
-"""Text to every client."""
-
-
 class Sign(enum.Enum):
     """What is known of the sign of AttitudeChanged.roll."""
 

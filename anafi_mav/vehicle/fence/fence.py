@@ -30,15 +30,15 @@ def fence_of(items: Iterable[PlanItem]) -> Fence:
             if len(polygon) == int(item.params[0]):
                 corners = [(corner.latitude, corner.longitude) for corner in polygon]
                 inclusion = POLYGONS[item.command]
-                name = f"{inclusion_word(inclusion)} polygon of items {number - len(polygon) + 1} to {number}"
+                name = f"{inclusion_word(inclusion)} {number - len(polygon) + 1}-{number}"
                 zones.append(Polygon(name, inclusion, group_of(item), corners))
                 polygon = []
         elif item.command in CIRCLES:
             inclusion = CIRCLES[item.command]
-            name = f"{inclusion_word(inclusion)} circle of item {number}"
+            name = f"{inclusion_word(inclusion)} {number}"
             zones.append(Circle(name, inclusion, group_of(item), (item.latitude, item.longitude), item.params[0]))
         elif item.command == HOME_CIRCLE:
-            zones.append(Circle(f"circle around home of item {number}", True, group_of(item), None, item.params[0]))
+            zones.append(Circle(f"home circle {number}", True, group_of(item), None, item.params[0]))
     return Fence(zones)
 
 

@@ -16,9 +16,10 @@ from dataclasses import dataclass
 
 import msgspec
 
-from anafi_mav import geo, mav_enums
+from anafi_mav import geo, mav_enums, texts
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.plans.zones import Circle, Fence, LatLon, Margin
+from anafi_mav.texts import Text
 from anafi_mav.vehicle.fence.fence import fence_of
 from anafi_mav.vehicle.fence.plan_items import PlanItem
 
@@ -127,10 +128,11 @@ however it will until it is back."""
 
 
 class OutsideFence(AnafiMavError):
-    """A place, a height or the way to a place is not inside the fence. The text is a clause: "it is 12 m beyond …"."""
+    """A place, a height or the way to a place is not inside the fence. The text is a clause: "12 m beyond …"."""
 
-    def __init__(self, reason: str, *, lasting: bool = True) -> None:
+    def __init__(self, reason: Text, *, lasting: bool = True) -> None:
         super().__init__(reason)
+        self.reason = reason
         self.lasting = lasting
         """It will still be so when somebody asks again."""
 
@@ -164,8 +166,8 @@ class Verdict:
     """What a look found out, other than that all is well."""
 
     breach: Breach
-    text: str
-    """A clause: "3 m beyond the inclusion polygon of items 0 to 4"."""
+    text: Text
+    """A clause: "3 m beyond inclusion 0-4"."""
     ahead: bool = False
     """It is not beyond yet."""
 
@@ -298,7 +300,7 @@ class FenceWatch:
     def check_height(self, ato: float) -> None:
         """Raise `OutsideFence` for a height (m above take-off) below the floor."""
         if self._has_floor and self.action is not Reaction.NONE and ato < self.floor:
-            raise OutsideFence(f"{ato:.1f} m above take-off is below the fence's floor of {self.floor:g} m")
+            raise OutsideFence(texts.BELOW_FENCE.fill(height=ato, floor=self.floor))
 
     def check_place(self, place: LatLon | None, home: LatLon | None, start: LatLon | None = None) -> None:
         """Raise `OutsideFence` unless a place is inside, and the straight way to it from `start`.
@@ -309,14 +311,14 @@ class FenceWatch:
         if not zones.zones or self.action is Reaction.NONE:
             return
         if place is None:
-            raise OutsideFence("there is a fence and no GPS fix; disable the fence to fly without", lasting=False)
+            raise OutsideFence(texts.FENCE_NO_FIX, lasting=False)
         margin = zones.margin(place, home)
         if margin.metres < 0.0:
-            raise OutsideFence(f"it is {_beyond(margin)}")
+            raise OutsideFence(_beyond(margin))
         if start is not None and zones.margin(start, home).metres >= 0.0:
             way = zones.leaves(start, place, home)
             if way is not None:
-                raise OutsideFence(f"the way there leaves the fence at the {way.zone}")
+                raise OutsideFence(texts.WAY_LEAVES_ZONE.fill(zone=way.zone))
 
     # Watching.
 
@@ -398,11 +400,13 @@ class FenceWatch:
         if breach is Breach.FLOOR:
             below = self.floor - sight.ato
             if self._has_floor and self._above_floor and below > SLACK:
-                return Event.BREACH, Verdict(breach, f"{below:.0f} m below the floor of {self.floor:g} m")
+                return Event.BREACH, Verdict(breach, texts.FENCE_UNDER_FLOOR.fill(distance=below, floor=self.floor))
         elif self.types & CEILING and sight.ceiling is not None:
             above = sight.ato - sight.ceiling
             if above > SLACK:
-                return Event.BREACH, Verdict(breach, f"{above:.0f} m above the drone's ceiling of {sight.ceiling:g} m")
+                return Event.BREACH, Verdict(
+                    breach, texts.FENCE_OVER_CEILING.fill(distance=above, ceiling=sight.ceiling)
+                )
         return SAFE
 
     def _judge_zones(self, zones: Fence, sight: Sight) -> Finding:
@@ -420,7 +424,7 @@ class FenceWatch:
             stopping = REACTION + speed / (2.0 * BRAKING)
             way = zones.leaves(here, geo.destination(*here, north * stopping, east * stopping), sight.home)
             if way is not None:
-                return Event.AHEAD, Verdict(Breach.BOUNDARY, f"too fast to stop before the {way.zone}", ahead=True)
+                return Event.AHEAD, Verdict(Breach.BOUNDARY, texts.FENCE_TOO_FAST.fill(zone=way.zone), ahead=True)
         return SAFE if margin.metres >= BACK_INSIDE else (None, None)
 
 
@@ -428,5 +432,5 @@ def _sides() -> dict[Breach, _Side]:
     return {breach: _Side() for breach in (Breach.BOUNDARY, Breach.FLOOR, Breach.CEILING)}
 
 
-def _beyond(margin: Margin) -> str:
-    return f"{-margin.metres:.0f} m beyond the {margin.zone}"
+def _beyond(margin: Margin) -> Text:
+    return texts.BEYOND_ZONE.fill(distance=-margin.metres, zone=margin.zone)

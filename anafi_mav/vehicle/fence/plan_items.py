@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 import msgspec
 
-from anafi_mav import mav_enums
+from anafi_mav import mav_enums, texts
+from anafi_mav.texts import Text
 
 MAX_ITEMS = 5000
 """Items of a list: more than any client sends, small enough to be checked and stored at once."""
@@ -35,7 +36,7 @@ class Fault:
 
     result: int
     """MAV_MISSION_RESULT."""
-    reason: str
+    reason: Text
     """A clause for people, which names the item where it is one item's fault."""
 
 
@@ -90,13 +91,13 @@ def opaque_id(items: Iterable[PlanItem]) -> int:
 def place_fault(item: PlanItem) -> Fault | None:
     """What is wrong with the place of an item that needs one."""
     if item.frame not in (*AMSL_FRAMES, *RELATIVE_FRAMES):
-        return Fault(mav_enums.MAV_MISSION_UNSUPPORTED_FRAME, f"frame {item.frame} is neither AMSL nor above home")
+        return Fault(mav_enums.MAV_MISSION_UNSUPPORTED_FRAME, texts.FRAME_UNSUPPORTED.fill(frame=item.frame))
     if not abs(item.latitude) <= 90.0:
-        return Fault(mav_enums.MAV_MISSION_INVALID_PARAM5_X, "its latitude is none")
+        return Fault(mav_enums.MAV_MISSION_INVALID_PARAM5_X, texts.BAD_LATITUDE)
     if not abs(item.longitude) <= 180.0:
-        return Fault(mav_enums.MAV_MISSION_INVALID_PARAM6_Y, "its longitude is none")
+        return Fault(mav_enums.MAV_MISSION_INVALID_PARAM6_Y, texts.BAD_LONGITUDE)
     if item.x == 0 and item.y == 0:
-        return Fault(mav_enums.MAV_MISSION_INVALID_PARAM5_X, "its latitude and longitude are both 0")
+        return Fault(mav_enums.MAV_MISSION_INVALID_PARAM5_X, texts.AT_NULL)
     return None
 
 

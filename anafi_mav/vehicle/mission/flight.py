@@ -12,14 +12,16 @@ import contextlib
 from collections.abc import Callable, Coroutine, Hashable, Sequence
 from typing import Any
 
+from anafi_mav import texts
 from anafi_mav.drone import events
 from anafi_mav.drone.events import FlyingState, Message, PlayingState
 from anafi_mav.errors import AnafiMavError, CommandRejected, LinkLost
 from anafi_mav.plans.plan import Item
 from anafi_mav.plans.translation.translate import Leg
+from anafi_mav.texts import Text
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.modes import FlightMode
-from anafi_mav.vehicle.base.refusal import Refused
+from anafi_mav.vehicle.base.refusal import DroneRefused, Refused, not_ready, reason_of, text_of
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.mission.course import Course
@@ -29,7 +31,7 @@ from anafi_mav.vehicle.mission.progress import ENDINGS, Progress, State
 from anafi_mav.vehicle.mission.record import Keeper, Record
 from anafi_mav.vehicle.mission.steps import fly_step
 from anafi_mav.vehicle.mission.texts import beginning, refusal
-from anafi_mav.vehicle.mission.waits import PROOF, ArmWait, EndWatch, StoreWait
+from anafi_mav.vehicle.mission.waits import ARM_WAIT, PROOF, ArmWait, EndWatch, StoreWait
 
 _LANDING = (FlyingState.LANDING, FlyingState.EMERGENCY_LANDING)
 
@@ -45,7 +47,7 @@ class MissionFlight:
         """Says that MISSION_CURRENT has changed."""
         self.reached: Callable[[int], None] = lambda item: None
         """Says that an item is done."""
-        self.say: Callable[[Severity, Callable[[int], str]], None] = lambda severity, text: None
+        self.say: Callable[[Severity, Callable[[int], Text]], None] = lambda severity, text: None
         """A text to everybody; it is made from what they call item 0."""
         self.first_number: Callable[[Hashable], int] = lambda client: 0
         """What a client calls item 0."""
@@ -84,12 +86,12 @@ class MissionFlight:
         if identity == self.identity:
             return
         known, self.identity = self.identity != 0, identity
-        why = "another mission was uploaded" if items else "it was cleared"
+        why = texts.MISSION_REPLACED if items else texts.MISSION_CLEARED
         flown, starting, self._starting = self.flying, self._starting is not None, None
         if flown:
             self._stop(why)
         elif starting and self._running is not None:  # what it began for was answered long ago
-            self._vehicle.text(Severity.WARNING, f"Mission not begun: {why}")
+            self._vehicle.text(Severity.WARNING, texts.MISSION_NOT_STARTED.fill(reason=why))
         if flown or starting:
             self._suspend(starting=starting)
             self._vehicle.select(FlightMode.HOLD)
@@ -106,7 +108,7 @@ class MissionFlight:
             leg, line = starting
             current, self._taken_meanwhile = leg.origins[line + 1], True
         if starting is not None or self.progress.state is State.ACTIVE:
-            self.say(Severity.INFO, lambda first: f"Mission: the same again, it goes on at item {current + first}")
+            self.say(Severity.INFO, lambda first: texts.MISSION_SAME.fill(item=current + first))
             return
         self._anew()
 
@@ -130,7 +132,7 @@ class MissionFlight:
         await self.storing.over()
         progress, vehicle = self.progress, self._vehicle
         if progress.state is State.NONE:
-            raise Refused("Mission refused: there is no mission")
+            raise Refused(texts.MISSION, texts.NO_MISSION)
         if progress.state is State.ACTIVE and item is None:
             return  # it is flown, and goes on without a jolt
         self._require_freedom()
@@ -139,7 +141,7 @@ class MissionFlight:
             await self._begin(progress.first if item is None else item, self.first_number(client), anew=chosen)
             return
         if problems := vehicle.prearm_problems():
-            raise Refused("PreArm: " + "; ".join(problems))
+            raise not_ready(problems)
         await vehicle.take_over()
         vehicle.select(FlightMode.MISSION, self)
         self._arming.begin(client)
@@ -148,10 +150,10 @@ class MissionFlight:
         """Make an item the current one; a mission that is flown goes on there."""
         await self.storing.over()
         if self.progress.state is State.NONE:
-            raise Refused("Current item refused: there is no mission")
+            raise Refused(texts.CURRENT_ITEM, texts.NO_MISSION)
         if not 0 <= item < len(self.progress.items):
             number = item + self.first_number(client)
-            raise Refused(f"Current item refused: there is no item {number}", lasting=True)
+            raise Refused(texts.CURRENT_ITEM, texts.NO_SUCH_ITEM.fill(number=number), lasting=True)
         if self.progress.state is State.ACTIVE:
             await self.engage(client, item)
         else:
@@ -205,13 +207,13 @@ class MissionFlight:
     def _require_freedom(self) -> None:
         vehicle = self._vehicle
         if vehicle.flying_state in _LANDING:
-            raise Refused("Mission refused: the drone is landing")
+            raise Refused(texts.MISSION, texts.LANDS)
         if vehicle.returning_by_itself:
-            raise Refused("Mission refused: the drone returns home by itself")
+            raise Refused(texts.MISSION, texts.RETURNS_BY_ITSELF)
         if vehicle.drone.controller.pilot_acquired_control:
-            raise Refused("Mission refused: the pilot at the Skycontroller flies")
+            raise Refused(texts.MISSION, texts.PILOT)
         if not vehicle.in_air and not vehicle.on_ground:
-            raise Refused("Mission refused: the drone is neither on the ground nor flying yet")
+            raise Refused(texts.MISSION, vehicle.activity)
 
     def _resumes(self, item: int) -> bool:
         """The drone hovers, with the rest of what is to be flown in its memory."""
@@ -254,7 +256,7 @@ class MissionFlight:
             self._beginning = False
         self._require_freedom()
         if progress.items is not items or not vehicle.armed:
-            raise Refused("Mission refused: something else has happened meanwhile")
+            raise Refused(texts.MISSION, texts.MISSION_DISPLACED)
         vehicle.select(FlightMode.MISSION, self)
         self._left, self._course = None, course
         if not resumes:
@@ -279,7 +281,8 @@ class MissionFlight:
 
     def _require_same(self, items: Sequence[Item]) -> None:
         if self.progress.items is not items:
-            raise Refused(f"Mission refused: {'another was uploaded' if self.there else 'it was cleared'} meanwhile")
+            why = texts.MISSION_REPLACED_MEANWHILE if self.there else texts.MISSION_CLEARED_MEANWHILE
+            raise Refused(texts.MISSION, why)
 
     async def _play(self, leg: Leg, uid: str, line: int) -> None:
         """Begin a file, or go on with it; returns when the drone flies it."""
@@ -291,7 +294,7 @@ class MissionFlight:
             if self._starting is not None:
                 self.progress.begin(leg, line)
         except CommandRejected as error:
-            raise CommandRejected(refusal(plan.state, error)) from error
+            raise DroneRefused(refusal(plan.state, error)) from error
         finally:
             self._starting = None
         self._keep()
@@ -303,7 +306,7 @@ class MissionFlight:
             await self.storing.over()
             await self._begin(self.progress.first, number, waited=True)
         except AnafiMavError as error:
-            self._vehicle.text(Severity.ERROR, str(error))
+            self._vehicle.text(Severity.ERROR, text_of(error))
             if self._is_chosen_only:
                 self._vehicle.select(FlightMode.HOLD)
 
@@ -344,7 +347,7 @@ class MissionFlight:
                     self.reached(item)
                 self._part_over()
         except AnafiMavError as error:
-            self._break_off(str(error))
+            self._break_off(reason_of(error))
         else:
             self._finish()
 
@@ -354,7 +357,7 @@ class MissionFlight:
         if (following := self._course.later) is not None:
             self._course.later = None
             self.progress.current = following
-            self._break_off("after a lost link it does not go on by itself")
+            self._break_off(texts.MISSION_LINK_LOST)
             self.progress.choose(following, anew=False)
             self._keep()
             self.news()
@@ -380,28 +383,33 @@ class MissionFlight:
         self._left = None
         self.progress.finish()
         self.keeper.forget()
-        self.say(Severity.INFO, lambda first: "Mission complete")
+        self.say(Severity.INFO, lambda first: texts.MISSION_COMPLETE)
 
     def _stopped_by_drone(self) -> None:
         """Pause the mission: the drone has stopped its plan, as far as its reports go."""
-        self._break_off("the drone has stopped it")
+        self._break_off(texts.MISSION_STOPPED)
         stopped = self._vehicle.drone.flight_plan.state.playing == PlayingState.STOPPED
         self._may_end_late = stopped and self._course.following is None
 
-    def _break_off(self, why: str) -> None:
+    def _break_off(self, why: Text) -> None:
         """It does not go on, and nobody asked for that."""
         if self.progress.state is State.ACTIVE:
             self._stop(why)
             self._vehicle.select(FlightMode.HOLD)
 
-    def _stop(self, why: str) -> None:
+    def _stop(self, why: Text | None) -> None:
         progress = self.progress
         progress.stop()
         self._may_end_late = False
-        current, severity = progress.current, Severity.WARNING if why else Severity.INFO
-        reason = f": {why}" if why else ""
+        current, severity = progress.current, Severity.INFO if why is None else Severity.WARNING
         if not self._beginning:
-            self.say(severity, lambda first: f"Mission paused at item {current + first}{reason}")
+
+            def paused(first: int) -> Text:
+                if why is None:
+                    return texts.MISSION_PAUSED.fill(item=current + first)
+                return texts.MISSION_PAUSED_REASON.fill(item=current + first, reason=why)
+
+            self.say(severity, paused)
         self._end_watch.end()
         self._keep()
         self.news()
@@ -433,7 +441,7 @@ class MissionFlight:
     def _on_skipped(self, message: events.WaypointSkipped, now: float) -> None:
         item = self.progress.skip(message.item)
         if item is not None:
-            self.say(Severity.WARNING, lambda first: f"Mission: item {item + first} was out of reach")
+            self.say(Severity.WARNING, lambda first: texts.MISSION_OUT_OF_REACH.fill(item=item + first))
 
     def _on_playing(self, message: events.MavlinkFilePlayingStateChanged, now: float) -> None:
         progress = self.progress
@@ -446,20 +454,20 @@ class MissionFlight:
                 self.news()
             elif message.filepath != self._uid:
                 if progress.state is State.ACTIVE:
-                    self._break_off("the drone flies another plan")
+                    self._break_off(texts.MISSION_OTHER_PLAN)
                 else:
-                    self._vehicle.text(Severity.NOTICE, "The drone flies a plan that is not of this mission")
+                    self._vehicle.text(Severity.NOTICE, texts.OTHER_PLAN)
             elif progress.state is not State.ACTIVE:
                 # Not by us, but it flies, and who looks at the mission has to see that.
                 self._leave()
                 if self._left is None:
-                    self._vehicle.text(Severity.NOTICE, "The drone flies a plan that is not of this mission")
+                    self._vehicle.text(Severity.NOTICE, texts.OTHER_PLAN)
                     return
                 self._vehicle.select(FlightMode.MISSION, self)
                 (leg, line, jumps), self._left = self._left, None
                 progress.begin(leg, line)
                 progress.jumps = jumps
-                self.say(Severity.NOTICE, lambda first: "Mission goes on: somebody else has continued it")
+                self.say(Severity.NOTICE, lambda first: texts.MISSION_RESUMED_ELSEWHERE)
                 self.news()
         elif self._starting is None and progress.state is State.ACTIVE and progress.leg is not None:
             if progress.leg_done:
@@ -467,7 +475,7 @@ class MissionFlight:
             elif progress.ending and progress.at_last_line and message.state == PlayingState.STOPPED:
                 self._end_watch.begin()
             elif self._vehicle.drone.controller.pilot_acquired_control:
-                self._break_off("the pilot at the Skycontroller flies")
+                self._break_off(texts.MISSION_PILOT)
             elif message.state == PlayingState.STOPPED and (last := self._last_way_point(progress.leg)) is not None:
                 self._end_watch.begin(last)
             else:
@@ -526,7 +534,7 @@ class MissionFlight:
             if self._is_chosen_only:
                 self._vehicle.forget_mode()
         if self.progress.state is State.ACTIVE:
-            self._stop("")
+            self._stop(None)
             self._suspend()
         return ended
 
@@ -542,7 +550,9 @@ class MissionFlight:
 
     def _lapsed(self) -> None:
         self._vehicle.select(FlightMode.HOLD)
-        self._vehicle.text(Severity.WARNING, "Mission not begun: nobody armed")
+        self._vehicle.text(
+            Severity.WARNING, texts.MISSION_NOT_STARTED.fill(reason=texts.NOT_ARMED_WITHIN.fill(seconds=ARM_WAIT))
+        )
 
     def _drop_pending(self) -> None:
         """What waits to be armed will not begin: the mode must not say that it does."""
@@ -582,16 +592,14 @@ class MissionFlight:
         if plays:
             progress.begin(progress.leg, progress.line)
             self._vehicle.select(FlightMode.MISSION, self)
-            how = "the drone flies it"
-            self.say(Severity.NOTICE, lambda first: f"Mission: {how}, at item {current + first} or a later one")
+            self.say(Severity.NOTICE, lambda first: texts.MISSION_FOUND_FLYING.fill(item=current + first))
         elif progress.leg_done and later is None:
             progress.begin(progress.leg, progress.line)
             progress.finish()
             self.keeper.forget()
-            self.say(Severity.INFO, lambda first: "Mission complete")
+            self.say(Severity.INFO, lambda first: texts.MISSION_COMPLETE)
         else:
-            how = "the drone flies it no more"
-            self.say(Severity.NOTICE, lambda first: f"Mission: {how}, paused at item {current + first}")
+            self.say(Severity.NOTICE, lambda first: texts.MISSION_FOUND_PAUSED.fill(item=current + first))
         self.news()
 
     def _keep(self) -> None:

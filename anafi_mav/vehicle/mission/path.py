@@ -9,14 +9,13 @@ import asyncio
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from anafi_mav import mav_enums
+from anafi_mav import mav_enums, texts
 from anafi_mav.errors import PlanError
 from anafi_mav.plans.plan import Item
 from anafi_mav.plans.translation.translate import Cursor, Leg, Start, Step, translate
 from anafi_mav.units import DEG_PER_RAD
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.bounds import check_estimate, check_place
-from anafi_mav.vehicle.base.height import ESTIMATE_FLOOR
 from anafi_mav.vehicle.base.place import Place
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.fence.fence_watch import OutsideFence
@@ -50,9 +49,9 @@ def _start(vehicle: Aircraft) -> Start:
     """Where the flight begins."""
     state, place, amsl = vehicle.drone.piloting.state, vehicle.place, vehicle.height.ato(0.0)
     if place is None:
-        raise Refused("Mission refused: no GPS fix")
+        raise Refused(texts.MISSION, texts.NO_FIX)
     if vehicle.in_air and state.altitude is None:
-        raise Refused("Mission refused: the drone's height is not known")
+        raise Refused(texts.MISSION, texts.HEIGHT_UNKNOWN)
     return Start(
         place.latitude,
         place.longitude,
@@ -75,10 +74,10 @@ async def lay_out(
     try:
         flight = await asyncio.to_thread(translate, items, 1 if version == 1 else 2, start, first, {**(jumps or {})})
     except PlanError as error:
-        where = "" if error.item is None else f"item {error.item + number}: "
-        raise Refused(f"Mission refused: {where}{error.problem}") from error
+        what = texts.MISSION if error.item is None else texts.ITEM.fill(number=error.item + number)
+        raise Refused(what, texts.from_below(error.problem)) from error
     if not flight.parts:
-        raise Refused("Mission refused: nothing of it is left to fly")
+        raise Refused(texts.MISSION, texts.MISSION_OVER)
     _check_estimates(vehicle, items, flight.parts, number)
     return [*flight.parts], flight.rest
 
@@ -93,8 +92,7 @@ def _check_estimates(vehicle: Aircraft, items: Sequence[Item], parts: Sequence[L
                 try:
                     check_estimate(vehicle, point.ato)
                 except Refused as error:
-                    reason = f"estimated AMSL < {ESTIMATE_FLOOR:g} m"
-                    raise Refused(f"Mission refused: item {point.item + number}: {reason}") from error
+                    raise Refused(texts.ITEM.fill(number=point.item + number), error.reason) from error
 
 
 def lines_of(leg: Leg) -> list[str]:
@@ -134,10 +132,8 @@ def _check(vehicle: Aircraft, start: Place | None, point: WayPoint, number: int)
     try:
         check_place(vehicle, point.place, start=start)
         if ceiling is not None and point.ato > ceiling.current:
-            raise Refused(
-                f"{point.ato:.1f} m above take-off is above the drone's ceiling of {ceiling.current:g} m", lasting=True
-            )
+            reason = texts.ABOVE_CEILING.fill(height=point.ato, ceiling=ceiling.current)
+            raise Refused(texts.HEIGHT, reason, lasting=True)
         vehicle.fence.check_height(point.ato)
     except (Refused, OutsideFence) as error:
-        reason = str(error).removeprefix("Goto refused: ")
-        raise Refused(f"Mission refused: item {point.item + number}: {reason}", lasting=True) from error
+        raise Refused(texts.ITEM.fill(number=point.item + number), error.reason, lasting=True) from error

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+from anafi_mav import texts
 from anafi_mav.drone.automatic.flight_plan import FlightPlanState
 from anafi_mav.drone.events import FlightPlanComponent as Part
 from anafi_mav.drone.events import FlightPlanIndicator as Input
 from anafi_mav.errors import CommandRejected
+from anafi_mav.texts import Text
 
 _REASONS = {
-    Part.GPS: "no GPS fix",
-    Part.CALIBRATION: "the magnetometer wants to be calibrated",
-    Part.MAVLINK_FILE: "it does not take the file",
-    Part.TAKE_OFF: "it cannot take off",
-    Part.WAYPOINTS_BEYOND_GEOFENCE: "a way point is beyond its own geofence or ceiling",
-    Part.CAMERA_AVAILABLE: "its camera is not available",
-    Part.MAVLINK_STATE: "it is not ready for a plan",
-    Part.MAVLINK_MEDIA: "it cannot store the pictures",
-    Part.FIRST_WAYPOINT_TOO_FAR: "the first way point is too far away",
+    Part.GPS: texts.NO_FIX,
+    Part.CALIBRATION: texts.DRONE_CALIBRATION,
+    Part.MAVLINK_FILE: texts.DRONE_FILE,
+    Part.TAKE_OFF: texts.DRONE_TAKEOFF,
+    Part.WAYPOINTS_BEYOND_GEOFENCE: texts.DRONE_GEOFENCE,
+    Part.CAMERA_AVAILABLE: texts.DRONE_CAMERA,
+    Part.MAVLINK_STATE: texts.DRONE_NOT_READY,
+    Part.MAVLINK_MEDIA: texts.DRONE_MEDIA,
+    Part.FIRST_WAYPOINT_TOO_FAR: texts.DRONE_FIRST_FAR,
 }
 """Parrot's components of a flight plan that keep it from being begun (arsdk.md §3.1)."""
 
@@ -24,20 +26,20 @@ _INPUTS = {Input.DRONE_GPS: _REASONS[Part.GPS], Input.DRONE_MAGNETO: _REASONS[Pa
 """What an Ai lacks and tells twice: as a missing input, and as one of the components."""
 
 
-def refusal(state: FlightPlanState, error: CommandRejected) -> str:
-    """One sentence on a start that the drone has refused."""
-    reasons = [_REASONS.get(part, part.name.lower()) for part, ok in state.components.items() if not ok]
+def refusal(state: FlightPlanState, error: CommandRejected) -> Text:
+    """Return the refusal of a start that the drone does not accept."""
+    reasons: list[str] = [_REASONS.get(part, part.name.lower()) for part, ok in state.components.items() if not ok]
     reasons += [_INPUTS.get(one) or one.name.lower().replace("_", " ") for one in sorted(state.missing or ())]
-    return f"Mission refused by the drone: {', '.join(dict.fromkeys(reasons)) or error.reason}"
+    return texts.MISSION_REFUSED_BY_DRONE.fill(reasons=", ".join(dict.fromkeys(reasons)) or error.reason)
 
 
-def beginning(item: int, resumes: bool, *, stepped: bool, returns: bool | None) -> str:
+def beginning(item: int, resumes: bool, *, stepped: bool, returns: bool | None) -> Text:
     """Where a mission begins or goes on, and what becomes of it without the gateway.
 
     `stepped`: the drone has a part of it only. `returns`: what its ReturnHomeOnDisconnect is set to.
     """
-    alone = {None: "does as it is set", True: "returns home", False: "flies on"}[returns]
+    alone = {None: texts.LINK_LOSS_UNKNOWN, True: texts.LINK_LOSS_RETURNS, False: texts.LINK_LOSS_CONTINUES}[returns]
     if stepped and returns is not True:
-        alone = "flies to the end of its file and hovers"
-    verb = "goes on" if resumes else "begins"
-    return f"Mission {verb} at item {item}; without link or gateway the drone {alone}"
+        alone = texts.LINK_LOSS_FILE
+    template = texts.MISSION_RESUMES if resumes else texts.MISSION_STARTS
+    return template.fill(item=item, alone=alone)

@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable, Hashable, Iterator
 from contextlib import contextmanager
 
-from anafi_mav import geo
+from anafi_mav import geo, texts
 from anafi_mav.clock import Alarm
 from anafi_mav.drone.events import (
     AlertState,
@@ -73,7 +73,7 @@ class StoreWait:
             try:
                 await asyncio.wait_for(self._stored.wait(), STORE_WAIT)
             except asyncio.TimeoutError:
-                raise Refused("Mission refused: it is still being stored") from None
+                raise Refused(texts.MISSION, texts.MISSION_STORING) from None
 
 
 class ArmWait:

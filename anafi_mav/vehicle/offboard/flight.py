@@ -14,17 +14,17 @@ import math
 from collections.abc import Callable, Coroutine, Hashable
 from typing import Any, NamedTuple
 
-from anafi_mav import units
+from anafi_mav import texts, units
 from anafi_mav.clock import Alarm, Clock
 from anafi_mav.drone import Limits, PilotingCommand, events
 from anafi_mav.drone.events import FlyingState
 from anafi_mav.errors import AnafiMavError, LinkLost
+from anafi_mav.texts import Text
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.bounds import TooLow
 from anafi_mav.vehicle.base.clients import system_of
 from anafi_mav.vehicle.base.modes import FlightMode
-from anafi_mav.vehicle.base.refusal import Refused
-from anafi_mav.vehicle.base.roll_sign import ROLL_INVERTED
+from anafi_mav.vehicle.base.refusal import Refused, reason_of, text_of
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.silence import SILENCE
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
@@ -47,13 +47,10 @@ from anafi_mav.vehicle.offboard.takeoff import Launcher, Phase, SetpointTakeoff,
 WARN_AGAIN = 1.0
 """m/s by which a velocity has to be higher than the last one whose tilt was worth a word."""
 
-TILT_HELD = f"Tilt limit {CAUTIOUS_TILT * units.DEG_PER_RAD:.0f} deg: roll sign not verified yet"
+TILT_HELD = texts.TILT_HELD.fill(tilt=CAUTIOUS_TILT * units.DEG_PER_RAD)
 
 SINGLE_WAIT = 2.0
 """s that a single setpoint may wait until what was under way has let go of the drone; then it is out of date."""
-
-PAUSED = "paused by a client"
-"""Why setpoints in Guided are ignored after a pause."""
 
 _BEFORE_TAKEOFF = (FlyingState.LANDED, FlyingState.MOTOR_RAMPING)
 """States in which silence disarms a drone that setpoints take off."""
@@ -75,7 +72,7 @@ class OffboardFlight:
         """s that a velocity lasts in ArduPilot's Guided (a parameter)."""
         self.motion = Motion(vehicle.roll)
         """How the drone moves; whoever else flies it by sticks uses it too."""
-        self.warn_throttled: Callable[[str], None] = lambda text: vehicle.text(Severity.WARNING, text)
+        self.warn_throttled: Callable[[Text], None] = lambda text: vehicle.text(Severity.WARNING, text)
         """Says what is wrong with something that arrives many times a second."""
         self.run_action: Callable[[Hashable, Coroutine[Any, Any, None]], asyncio.Task[None]] = _at_once
         """Runs what takes the drone over, in its turn among the commands."""
@@ -123,7 +120,7 @@ class OffboardFlight:
 
     # What programs ask for.
 
-    def receive(self, sender: Hashable, setpoint: Setpoint, *, guided: bool = False) -> str | None:
+    def receive(self, sender: Hashable, setpoint: Setpoint, *, guided: bool = False) -> Text | None:
         """A program's newest setpoint; flies the drone at once when this program is the pilot.
 
         `guided`: the program is of the family whose setpoints fly the drone in mode Guided, without engagement.
@@ -136,7 +133,7 @@ class OffboardFlight:
             return reason
         follows = self._stream.follows(sender, now)
         if not self._stream.receive(sender, setpoint, now, lasts(setpoint, self.guided_timeout if guided else None)):
-            return "another program flies"
+            return texts.OTHER_PROGRAM
         deadline = self._stream.deadline()
         if not self._silence.is_set or (deadline is not None and deadline < self._watched_until):
             self._watch()  # the pilot's newest setpoint may last for less time than the one before
@@ -160,7 +157,7 @@ class OffboardFlight:
         """The drone is on the ground, and can take off from there."""
         return self._vehicle.flying_state == FlyingState.LANDED
 
-    def _on_ground(self, sender: Hashable, setpoint: Setpoint, now: float, *, guided: bool) -> str | None:
+    def _on_ground(self, sender: Hashable, setpoint: Setpoint, now: float, *, guided: bool) -> Text | None:
         """A setpoint for a drone that stands: only a climb of the client that armed and engaged is anything to it.
 
         Returns why a setpoint that climbs takes nothing off, or None. ArduCopter flies attitudes alone from the ground.
@@ -168,7 +165,7 @@ class OffboardFlight:
         vehicle, lift = self._vehicle, self._lift
         if guided and isinstance(setpoint, MotionSetpoint):
             self._end_count(sender)
-            return "take off first"
+            return texts.TAKE_OFF_FIRST
         if not climbs(setpoint, vehicle.height.ato):
             self._end_count(sender)
             return None
@@ -180,35 +177,35 @@ class OffboardFlight:
             pilot = self._stream.state is State.ENGAGED and sender == self._stream.pilot
             engaged = pilot and vehicle.mode_client == sender
         if not engaged:
-            return "take off first, or choose Guided" if guided else None
+            return texts.TAKE_OFF_OR_GUIDED if guided else None
         if not self._takeoff.is_armed_by(sender):
-            return "this client has not armed"
+            return texts.NOT_ARMED_BY_CLIENT
         if (reason := self._grounded) is not None:
             return reason
         step = lift.climb(sender, now, SILENCE)
         if step is Step.WARN:
-            vehicle.text(Severity.WARNING, f"Takeoff by setpoints of system {system_of(sender)} in 1 s")
+            vehicle.text(Severity.WARNING, texts.SETPOINT_TAKEOFF_SOON.fill(system=system_of(sender)))
         elif step is Step.TAKE_OFF:
             lift.begin(sender, Phase.LIFTING)
             self.run_action(sender, self._take_off(sender))
         return None
 
     @property
-    def _grounded(self) -> str | None:
+    def _grounded(self) -> Text | None:
         """Why setpoints do not take the drone off; None when they do."""
         if problems := self._vehicle.prearm_problems():
-            return "; ".join(problems)
+            return texts.joined(problems)
         try:
-            self._require_freedom("Takeoff")
+            self._require_freedom(texts.TAKEOFF)
         except Refused as refusal:
-            return refusal.reason.partition("efused: ")[2]
+            return refusal.reason
         return None
 
     def _end_count(self, sender: Hashable) -> None:
         """One setpoint that does not climb ends the second of the client that sent it."""
         if self._lift.phase is Phase.COUNTING and self._lift.client == sender:
             self._lift.stop()
-            self._vehicle.text(Severity.NOTICE, "Takeoff by setpoints cancelled: no climb")
+            self._vehicle.text(Severity.NOTICE, texts.SETPOINT_TAKEOFF_NO_CLIMB)
 
     async def _take_off(self, sender: Hashable) -> None:
         """The second is over: the drone takes off, and the newest setpoint is flown from its first hover on."""
@@ -218,13 +215,13 @@ class OffboardFlight:
             await vehicle.take_over()
             fresh = self._stream.candidate(sender, self._clock.monotonic()) == sender
             if not (self._stands and fresh and self._takeoff.is_armed_by(sender)):
-                raise Refused("Takeoff by setpoints refused: they have stopped")
+                raise Refused(texts.SETPOINT_TAKEOFF, texts.SETPOINTS_STOPPED)
             self._join(sender, Phase.LIFTING, afterwards)
             await self._takeoff.launch()
         except AnafiMavError as error:
             if lift.phase is Phase.LIFTING:
                 self.end()
-            vehicle.text(Severity.ERROR, f"Takeoff by setpoints failed: {error}")
+            vehicle.text(Severity.ERROR, texts.SETPOINT_TAKEOFF_FAILED.fill(error=reason_of(error)))
 
     def _join(self, pilot: Hashable, phase: Phase, afterwards: FlightMode) -> None:
         """The session begins, and flies once the drone hovers at the end of the take-off."""
@@ -250,12 +247,12 @@ class OffboardFlight:
         """The drone takes off. A session that stands by on the ground flies only a take-off that is its own."""
         if self.engaged and self._lift.phase not in (Phase.LIFTING, Phase.JOINED):
             self.end()
-            self._vehicle.text(Severity.WARNING, "Offboard ended: not its takeoff")
+            self._vehicle.text(Severity.WARNING, texts.OFFBOARD_ENDED.fill(reason=texts.NOT_ITS_TAKEOFF))
 
-    def _objection(self, sender: Hashable, setpoint: MotionSetpoint) -> str | None:
+    def _objection(self, sender: Hashable, setpoint: MotionSetpoint) -> Text | None:
         """Why a position cannot be flown to; None when it can, or is being flown to."""
         if self._vehicle.roll.inverted and setpoint.needs_loop:
-            return ROLL_INVERTED
+            return texts.ROLL_INVERTED
         if setpoint.position == NOTHING:
             return None
         if sender == self._stream.pilot and self._goal is not None and self._goal.is_of(setpoint):
@@ -263,9 +260,9 @@ class OffboardFlight:
         try:
             resolve(setpoint, self._vehicle, self.motion)
         except TooLow as refusal:
-            return refusal.reason.partition("efused: ")[2] if self._vehicle.in_air else None
+            return refusal.reason if self._vehicle.in_air else None
         except Refused as refusal:
-            return refusal.reason.partition("efused: ")[2] or refusal.reason
+            return refusal.reason
         return None
 
     def streamed_for(self, client: Hashable) -> bool:
@@ -274,11 +271,11 @@ class OffboardFlight:
 
     async def engage(self, client: Hashable) -> None:
         """Mode Offboard begins for this client; returns when its setpoints fly the drone, or raises `Refused`."""
-        self._require_freedom("Offboard")
+        self._require_freedom(texts.OFFBOARD)
         candidate = self._stream.candidate(client, self._clock.monotonic())
         if candidate is None:
-            reason = ROLL_INVERTED if self._vehicle.roll.inverted else "no setpoints arrive"
-            raise Refused(f"Offboard refused: {reason}")
+            reason = texts.ROLL_INVERTED if self._vehicle.roll.inverted else texts.NO_SETPOINTS
+            raise Refused(texts.OFFBOARD, reason)
         if self._stream.state is State.ENGAGED and candidate == self._stream.pilot:
             return  # it flies already, and goes on without a jolt
         if self._takeoff.under_way:
@@ -290,39 +287,39 @@ class OffboardFlight:
             await self._vehicle.drone.piloting.cancel_return_home()
         pilot = self._stream.candidate(client, self._clock.monotonic())
         if pilot is None or not (self._vehicle.in_air or self._stands) or self._vehicle.returning:
-            raise Refused("Offboard refused: the setpoints stopped, or the drone is not free to fly them")
+            raise Refused(texts.OFFBOARD, texts.SETPOINTS_STOPPED if pilot is None else self._vehicle.activity)
         self._afterwards = FlightMode.HOLD
         self._stream.engage(pilot)
         self._begin(FlightMode.OFFBOARD)
 
-    def _require_freedom(self, what: str) -> None:
+    def _require_freedom(self, what: Text) -> None:
         vehicle = self._vehicle
         lifting = self._takeoff.under_way or self._lift.phase is Phase.LIFTING
         if not (vehicle.in_air or self._stands or lifting):
-            raise Refused(f"{what} refused: take off first")
+            raise Refused(what, texts.TAKE_OFF_FIRST)
         if vehicle.drone.piloting.about_to_fly and not lifting:
-            raise Refused(f"{what} refused: drone is about to take off")
+            raise Refused(what, texts.WILL_TAKE_OFF)
         if vehicle.returning:
-            raise Refused(f"{what} refused: the drone returns home")
+            raise Refused(what, texts.RETURNS)
         if vehicle.drone.controller.pilot_acquired_control:
-            raise Refused(f"{what} refused: the pilot at the Skycontroller flies")
+            raise Refused(what, texts.PILOT)
         if vehicle.drone.piloting.limits is None:
-            raise Refused(f"{what} refused: the drone has not reported what full tilt and speed are")
+            raise Refused(what, texts.TILT_UNKNOWN)
         if vehicle.sticks_follow_camera:
-            raise Refused(f"{what} refused: the drone's piloting style makes its sticks relative to the camera")
+            raise Refused(what, texts.STICKS_FOLLOW_CAMERA)
 
     # ArduPilot's way.
 
-    def _begin_guided(self, sender: Hashable, setpoint: Setpoint, now: float, *, follows: bool) -> str | None:
+    def _begin_guided(self, sender: Hashable, setpoint: Setpoint, now: float, *, follows: bool) -> Text | None:
         mode = self._vehicle.mode
         if self._takeoff.under_way and self._vehicle.selected is FlightMode.GUIDED:
             return None  # at its end the next setpoint is flown
         if not self._vehicle.in_air:
-            return "take off first"
+            return texts.TAKE_OFF_FIRST
         if self._vehicle.paused:
-            return PAUSED
+            return texts.PAUSED_BY_CLIENT
         if mode is not FlightMode.GUIDED:
-            return f"setpoints fly the drone in mode Guided, this is {mode.value}"
+            return texts.IN_MODE.fill(mode=mode.value)
         self._alone = ends(setpoint) and not (follows or self._stream.straggles(sender, now))
         if self._engaging is None or self._engaging.done():
             self._engaging = self.run_action(sender, self._engage_guided(sender, setpoint, now))
@@ -331,17 +328,17 @@ class OffboardFlight:
     async def _engage_guided(self, sender: Hashable, setpoint: Setpoint, said: float) -> None:
         """A setpoint in mode Guided takes the drone over from whatever it does in that mode."""
         try:
-            self._require_freedom("Setpoint")
+            self._require_freedom(texts.SETPOINT)
             if self._vehicle.paused:
-                raise Refused(f"Setpoint refused: {PAUSED}")
+                raise Refused(texts.SETPOINT, texts.PAUSED_BY_CLIENT)
             if self._vehicle.mode is not FlightMode.GUIDED:  # ended by what arrived together with the setpoint
-                raise Refused(f"Setpoint refused: this is {self._vehicle.mode.value}")
+                raise Refused(texts.SETPOINT, texts.IN_MODE.fill(mode=self._vehicle.mode.value))
             await self._vehicle.take_over()
             await self._vehicle.drone.piloting.cancel_return_home()
             if not self._vehicle.in_air or self._vehicle.returning:
-                raise Refused("Setpoint refused: the drone does something else now")
+                raise Refused(texts.SETPOINT, self._vehicle.activity)
         except AnafiMavError as error:
-            self.warn_throttled(str(error))
+            self.warn_throttled(text_of(error))
             return
         now = self._clock.monotonic()
         self._afterwards = FlightMode.GUIDED
@@ -360,7 +357,7 @@ class OffboardFlight:
         """Whoever flew by setpoints flies no more, and the last one does not fly on. Tasks that are about to end."""
         if self._lift.stop() is Phase.COUNTING:
             self._vehicle.mode_client = None  # who counted has to choose the mode once more, and does not count on
-            self._vehicle.text(Severity.NOTICE, "Takeoff by setpoints cancelled")
+            self._vehicle.text(Severity.NOTICE, texts.SETPOINT_TAKEOFF_CANCELLED)
         if not self.engaged:
             return []
         self._stream.disengage()
@@ -442,15 +439,15 @@ class OffboardFlight:
         reason = None
         if vehicle.drone.controller.pilot_acquired_control:
             # He moved a stick. That he let go of it again does not give the drone back to the program.
-            reason = "the pilot at the Skycontroller flies"
+            reason = texts.PILOT
         elif vehicle.sticks_follow_camera:
-            reason = "the drone's sticks have become relative to the camera"
+            reason = texts.STICKS_FOLLOW_CAMERA
         elif vehicle.roll.inverted and isinstance(setpoint, MotionSetpoint) and setpoint.needs_loop:
-            reason = ROLL_INVERTED
+            reason = texts.ROLL_INVERTED
         if reason is not None:
             self.end()
             vehicle.select(FlightMode.HOLD)
-            vehicle.text(Severity.WARNING, f"Offboard ended: {reason}")
+            vehicle.text(Severity.WARNING, texts.OFFBOARD_ENDED.fill(reason=reason))
             return
         now = self._clock.monotonic()
         if isinstance(setpoint, AttitudeSetpoint):
@@ -464,7 +461,7 @@ class OffboardFlight:
             else:
                 self._hold(self._motion_sticks(setpoint, limits, now), now)
         except Refused as refusal:  # what the drone told when the setpoint arrived is not known any more
-            self.warn_throttled(f"Setpoint not flown: {refusal.reason}")
+            self.warn_throttled(texts.SETPOINT_DROPPED.fill(reason=refusal.reason))
             self._hold(PilotingCommand(), now)
 
     def _attitude(self, setpoint: AttitudeSetpoint, limits: Limits, now: float) -> PilotingCommand:
@@ -489,16 +486,15 @@ class OffboardFlight:
                 self.warn_throttled(TILT_HELD)
             elif needed > limits.tilt_deg:
                 self.warn_throttled(
-                    f"MaxTilt of {limits.tilt_deg:.0f} degrees does not hold {speed:.1f} m/s against {WIND:g} m/s of "
-                    f"wind, {math.ceil(needed)} would"
+                    texts.TILT_WIND.fill(tilt=limits.tilt_deg, speed=speed, wind=WIND, needed=math.ceil(needed))
                 )
         located = self._vehicle.place is not None
         wanted = demand(setpoint, self._goal, self._course.yaw, located=located)
         sticks = self._controller.sticks(wanted, limits, now)
         if sticks is None:
-            raise Refused("the drone does not tell how it moves")
+            raise Refused(texts.SETPOINT, texts.MOTION_UNKNOWN)
         if self._controller.short_of is not None and self.motion.trusts_tilt:
-            self.warn_throttled(f"MaxTilt of {limits.tilt_deg:.0f} degrees is too little for this setpoint")
+            self.warn_throttled(texts.TILT_SHORT.fill(tilt=limits.tilt_deg))
         return sticks
 
     def _resolved(self, setpoint: MotionSetpoint) -> Goal | None:
@@ -516,7 +512,7 @@ class OffboardFlight:
         yaw = setpoint.yaw
         if yaw is not None and setpoint.body:
             if self.motion.yaw is None:
-                raise Refused("the drone's heading is not known")
+                raise Refused(texts.SETPOINT, texts.HEADING_UNKNOWN)
             yaw = units.wrap_pi(self.motion.yaw + yaw)
         return _Course(setpoint.body, setpoint.yaw, yaw)
 
@@ -536,7 +532,7 @@ class OffboardFlight:
         if (expired and phase is Phase.LIFTING and self._vehicle.flying_state in _BEFORE_TAKEOFF) or counted:
             self._lift.stop()
             self._vehicle.select(self._afterwards if expired else self._vehicle.selected)
-            self._vehicle.text(Severity.WARNING, "Setpoints stopped on the ground: disarming")
+            self._vehicle.text(Severity.WARNING, texts.GROUND_SETPOINTS_STOPPED)
             self.run_action(lifted, self._takeoff.abort())
         elif expired:
             self._stopped(joined=phase is Phase.JOINED)
@@ -551,8 +547,12 @@ class OffboardFlight:
         if not (self._stands or joined):
             vehicle.drone.piloting.hover()
         vehicle.select(self._afterwards)
-        what = "" if self._stands else ": takeoff goes on" if joined else ": hovering"
-        vehicle.text(Severity.WARNING, f"Offboard setpoints stopped{what}")
+        if self._stands:
+            vehicle.text(Severity.WARNING, texts.OFFBOARD_STOPPED_ON_GROUND)
+        elif joined:
+            vehicle.text(Severity.WARNING, texts.OFFBOARD_STOPPED_TAKEOFF)
+        else:
+            vehicle.text(Severity.WARNING, texts.OFFBOARD_STOPPED_HOVER)
 
     def _watch(self) -> None:
         """Come back when those that matter have been silent for too long."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from anafi_mav import geo
+from anafi_mav import geo, texts
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.bounds import amsl_to_ato, check_estimate, check_height, check_place
 from anafi_mav.vehicle.base.place import Place
@@ -59,7 +59,7 @@ def resolve(setpoint: MotionSetpoint, vehicle: Aircraft, motion: Motion) -> Goal
     if x is not None or y is not None:
         if setpoint.origin is Origin.LOCAL:
             if vehicle.origin is None:
-                raise Refused("Refused: take-off place unknown")
+                raise Refused(texts.SETPOINT, texts.TAKEOFF_POINT_UNKNOWN)
             place = _local_place(vehicle.origin, x, y, vehicle.place)
         else:
             place = Place(x or 0.0, y or 0.0)
@@ -89,12 +89,12 @@ def _from_vehicle(setpoint: MotionSetpoint, vehicle: Aircraft, motion: Motion) -
     x, y, z = setpoint.position
     ahead, aside, down = x or 0.0, y or 0.0, z or 0.0
     if motion.yaw is None:
-        raise Refused("Refused: the drone's heading is not known")
+        raise Refused(texts.SETPOINT, texts.HEADING_UNKNOWN)
     present, here = vehicle.drone.piloting.state.altitude, vehicle.place
     height = None
     if z is not None:
         if present is None:
-            raise Refused("Refused: the drone's height is not known")
+            raise Refused(texts.SETPOINT, texts.HEIGHT_UNKNOWN)
         height = present - down
         if down != 0.0:
             check_height(vehicle, height)
@@ -138,7 +138,7 @@ def demand(setpoint: MotionSetpoint, goal: Goal | None, yaw: float | None, *, lo
         wanted = (goal.position[0] is not None, goal.position[1] is not None)
         x, y, height, turn = goal.x, goal.y, goal.height, goal.turn
         if any(wanted) and not (located and (x is not None) == wanted[0] and (y is not None) == wanted[1]):
-            raise Refused("no GPS fix")
+            raise Refused(texts.SETPOINT, texts.NO_FIX)
     return Demand(
         x=Axis(setpoint.velocity[0], setpoint.acceleration[0], x),
         y=Axis(setpoint.velocity[1], setpoint.acceleration[1], y),

@@ -12,10 +12,12 @@ import math
 from collections.abc import Callable
 from typing import TypeAlias
 
-from anafi_mav import units
+from anafi_mav import texts, units
 from anafi_mav.drone import MoveEnd
-from anafi_mav.errors import AnafiMavError, CommandRejected, LinkLost
+from anafi_mav.errors import AnafiMavError, LinkLost
+from anafi_mav.texts import Text
 from anafi_mav.vehicle.base.aircraft import Aircraft
+from anafi_mav.vehicle.base.refusal import Rejected, reason_of
 from anafi_mav.vehicle.offboard.goals import Goal
 
 MOVE_EVERY = 0.2
@@ -34,7 +36,7 @@ _Wanted: TypeAlias = "tuple[Goal, float | None]"
 class OffboardMoves:
     """The moves of one session of setpoints."""
 
-    def __init__(self, vehicle: Aircraft, warn_throttled: Callable[[str], None]) -> None:
+    def __init__(self, vehicle: Aircraft, warn_throttled: Callable[[Text], None]) -> None:
         self._vehicle = vehicle
         self._warn_throttled = warn_throttled
         self._wanted: _Wanted | None = None
@@ -87,7 +89,7 @@ class OffboardMoves:
             try:
                 await self._move(wanted)
             except AnafiMavError as error:
-                self._failed(wanted, str(error), again=True)
+                self._failed(wanted, reason_of(error), again=True)
             await asyncio.sleep(MOVE_EVERY)
 
     async def _move(self, wanted: _Wanted) -> None:
@@ -100,12 +102,12 @@ class OffboardMoves:
             return
         if goal.place is None:
             if present is None or goal.height is None:
-                raise CommandRejected("the drone's height is not known")
+                raise Rejected(texts.HEIGHT_UNKNOWN)
             self._by(wanted, 0.0, 0.0, present - goal.height, yaw)
             return
         height = present if goal.height is None else goal.height
         if height is None:
-            raise CommandRejected("the drone's height is not known")
+            raise Rejected(texts.HEIGHT_UNKNOWN)
         move = await piloting.move_to(
             goal.place.latitude,
             goal.place.longitude,
@@ -133,25 +135,25 @@ class OffboardMoves:
         except LinkLost:
             return
         except AnafiMavError as error:
-            self._failed(wanted, str(error), again=False)
+            self._failed(wanted, reason_of(error), again=False)
 
     def _ended(self, wanted: _Wanted, how: MoveEnd) -> None:
         if how is MoveEnd.ERROR:
-            self._failed(wanted, "the drone gave the move up", again=True)
+            self._failed(wanted, texts.MOVE_FAILED, again=True)
         elif how is MoveEnd.CANCELED and self._is_news_of(wanted):
-            self._warn_throttled("Setpoint not flown: somebody else ended the move")
+            self._warn_throttled(texts.SETPOINT_DROPPED.fill(reason=texts.MOVE_CANCELLED))
 
     def _is_news_of(self, wanted: _Wanted) -> bool:
         """Of a move that was replaced or stopped there is nothing to say."""
         return self._begun == wanted and self._wanted is None
 
-    def _failed(self, wanted: _Wanted, why: str, *, again: bool) -> None:
+    def _failed(self, wanted: _Wanted, why: Text, *, again: bool) -> None:
         """The drone did not make a move."""
         if not self._is_news_of(wanted):
             return
         if again:
             self._retry_at = asyncio.get_running_loop().time() + RETRY
-        self._warn_throttled(f"Setpoint not flown: {why}")
+        self._warn_throttled(texts.SETPOINT_DROPPED.fill(reason=why))
         # One that was refused leaves an older one alone, which nobody asks for any more.
         if self._vehicle.drone.piloting.sticks_blocked is None:
             with contextlib.suppress(LinkLost):

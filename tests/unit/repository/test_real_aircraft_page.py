@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from anafi_mav.services.monitor.roll_sign_service import VERIFIED
 from anafi_mav.sim.world.quirks import QUIRKS
-from anafi_mav.vehicle.base.roll_sign import INVERTED
+from anafi_mav.texts import ROLL_SIGN_INVERTED as INVERTED
+from anafi_mav.texts import ROLL_SIGN_VERIFIED as VERIFIED
 
 ROOT = Path(__file__).resolve().parents[3]
 PAGE = (ROOT / "docs" / "real-aircraft.md").read_text(encoding="utf-8")
@@ -39,8 +39,8 @@ def test_real_aircraft_page_names_quirks_and_parameters_that_exist() -> None:
 
 def test_real_aircraft_page_quotes_texts_of_the_code() -> None:
     quoted = ("Take-off altitude estimated", "Take-off altitude inaccurate", "Connection refused by drone",
-              "Another controller has taken the drone", "The drone flies a plan that is not of this mission",
-              "Mission refused by the drone", "it does not take the file", "Mission complete")  # fmt: skip
+              "Drone connected to another controller", "Drone flies a plan that is not this mission",
+              "Mission refused by drone", "file not accepted", "Mission complete")  # fmt: skip
     for text in (*quoted, INVERTED, VERIFIED):
         assert text in PAGE, text
         assert text in SOURCE, text
@@ -53,12 +53,12 @@ def test_new_statustexts_fit_one_message() -> None:
         "Take-off altitude estimated: GPS only (+-10 m)",
         "Take-off altitude inaccurate: GPS +-127 m",
         "Setpoint refused: estimated AMSL: -1234 m < 15 m",
-        "Mission refused: item 5000: estimated AMSL < 15 m",
-        "Setpoint refused: AMSL unknown: no GPS fix",
-        "Setpoint refused: take-off place unknown",
-        "Setpoint refused: 4000 m off fence centre > 4000 m",
-        "Drone's fence circle ends: centre is 12345 m off",
-        "Tilt limit 10 deg: roll sign not verified yet",
+        "Item 5000 refused: estimated AMSL: -1234 m < 15 m",
+        "Setpoint refused: AMSL unknown, no GPS fix",
+        "Setpoint refused: take-off point unknown",
+        "Setpoint refused: 4000 m > geofence 4000 m",
+        "Drone geofence ends: centre is 12345 m off",
+        "Tilt limit 10 deg: roll sign not verified",
         "Offboard refused: roll sign inverted",
     )
     assert [text for text in longest if len(text.encode()) > 50] == []

@@ -23,7 +23,7 @@ UNIT = TESTS / "unit"
 FOLDERS = sorted(path.parent.relative_to(PACKAGE).as_posix() for path in PACKAGE.glob("*/**/__init__.py"))
 """Of the package, as "drone/status"."""
 
-KIT = {"errors", "units", "geo", "clock", "documents", "models", "printable", "state_lock", "subject"}
+KIT = {"errors", "units", "geo", "clock", "documents", "models", "printable", "state_lock", "subject", "texts"}
 GUARDED = {"lxml", "pymavlink"}
 """Libraries of the build and the tests: no room may import them."""
 

@@ -46,18 +46,18 @@ def test_texts_about_a_landing_that_goes_on_fit_one_text() -> None:
 
 @pytest.mark.parametrize("reason", [*ReturnReason, None])
 def test_texts_about_an_aborted_return_fit_one_text_each(reason: ReturnReason | None) -> None:
-    texts = AbortedReturn(255, reason).texts(aircraft())
+    texts = AbortedReturn(255, reason).reports(aircraft())
     assert [text for text in texts if len(text) > CHUNK] == []
     assert texts[-1].endswith("land now")
 
 
 def test_aborted_return_names_system_reason_and_battery() -> None:
     vehicle = aircraft(reachability=HomeReachability.REACHABLE, percent=23)
-    assert AbortedReturn(7, ReturnReason.LOW_BATTERY).texts(vehicle) == [
+    assert AbortedReturn(7, ReturnReason.LOW_BATTERY).reports(vehicle) == [
         "Return aborted by system 7: low battery",
         "No automatic return: battery 23 %",
     ]
-    assert AbortedReturn(7, ReturnReason.ICING).texts(vehicle) == ["Return aborted by system 7: icing"]
+    assert AbortedReturn(7, ReturnReason.ICING).reports(vehicle) == ["Return aborted by system 7: icing"]
 
 
 def test_aborted_return_is_due_every_15_s_while_the_drone_neither_returns_nor_lands() -> None:

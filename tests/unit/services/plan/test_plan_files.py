@@ -42,15 +42,15 @@ def test_file_that_is_read_back_holds_the_same_list(kind: int) -> None:
 @pytest.mark.parametrize(
     ("content", "reason"),
     [
-        (b"", "the file has no header"),
-        (bytes(9), "the file has no header"),
+        (b"", "file without header"),
+        (bytes(9), "file without header"),
         (bytes(10), "of another kind"),
         (pack_plan(ITEMS, FENCE), "of another kind"),
-        (pack_plan(ITEMS, MISSION)[:-1], "has not its 3 items"),
-        (pack_plan(ITEMS, MISSION) + b"\0", "has not its 3 items"),
-        (struct.pack("<HHHHH", MAGIC, 0, 1, 0, 0), "is a part of a list"),
-        (struct.pack("<HHHHH", MAGIC, 0, 0, 1, 0), "is a part of a list"),
-        (struct.pack("<HHHHH", MAGIC, 0, 0, 0, 1) + pack_plan(ITEMS, MISSION)[-38:], "item 0 has the number 2"),
+        (pack_plan(ITEMS, MISSION)[:-1], "lacks its 3 items"),
+        (pack_plan(ITEMS, MISSION) + b"\0", "lacks its 3 items"),
+        (struct.pack("<HHHHH", MAGIC, 0, 1, 0, 0), "holds part of a list"),
+        (struct.pack("<HHHHH", MAGIC, 0, 0, 1, 0), "holds part of a list"),
+        (struct.pack("<HHHHH", MAGIC, 0, 0, 0, 1) + pack_plan(ITEMS, MISSION)[-38:], "item 0 has number 2"),
     ],
 )
 def test_file_that_is_not_whole_is_refused(content: bytes, reason: str) -> None:

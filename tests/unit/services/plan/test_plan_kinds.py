@@ -115,7 +115,7 @@ def test_fence_circle_of_radius_0_needs_no_place() -> None:
 def test_fence_circle_of_negative_radius_is_refused() -> None:
     ack, said = upload(plans(), [circle(dialect.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, -1.0)], FENCE, PX4)
     assert ack.type == INVALID_PARAM1
-    assert said == ["Fence refused: item 0: -1 is no radius"]
+    assert said == ["Fence refused: item 0: radius -1 m"]
 
 
 def test_warning_about_a_circle_fits_a_statustext() -> None:

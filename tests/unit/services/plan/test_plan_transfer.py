@@ -207,7 +207,7 @@ def test_repeated_within_250_ms_until_it_gives_up() -> None:
     assert times == pytest.approx([10.0 + REQUEST_EVERY * (n + 1) for n in range(MAX_TRIES)])
     (final,) = replies(effects)
     assert (final.get_type(), final.type) == ("MISSION_ACK", CANCELLED)
-    assert texts(effects) == ["Fence upload given up: item 0 does not come"]
+    assert texts(effects) == ["Fence upload aborted: no item 0"]
     assert plans.transfers[FENCE].items == items(1)
 
 
@@ -326,7 +326,7 @@ def test_a_second_client_during_an_upload_is_refused() -> None:
         effects = plans.receive(message, OTHER, 0.1)
         (final,) = replies(effects)
         assert (final.type, final.target_system, final.target_component) == (DENIED, 254, 191)
-        assert texts(effects) == ["Fence refused: another client transfers it just now"]
+        assert texts(effects) == ["Fence refused: another client transfers"]
     assert [m.type for m in replies(plans.receive(item(0, an_item(7)), OTHER, 0.1))] == [DENIED]
     assert replies(plans.receive(clear(ALL), OTHER, 0.1))[0].type == DENIED
     assert plans.receive(ack(CANCELLED), OTHER, 0.1) == []

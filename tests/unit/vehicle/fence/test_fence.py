@@ -230,14 +230,13 @@ def test_a_fence_of_items() -> None:
         (Polygon, True), (Polygon, True), (Circle, True), (Polygon, False), (Circle, False), (Circle, True),
     ]  # fmt: skip
     assert [zone.group for zone in zones if zone.inclusion] == [1, 0, 2, 3]
-    assert zones[0].name == "inclusion polygon of items 0 to 4"
+    assert zones[0].name == "inclusion 0-4"
     assert isinstance(zones[5], Circle)
     assert zones[5].centre is None
     assert summary(items) == (
-        "2 inclusion polygons, 2 inclusion circles, 1 exclusion polygon, 1 exclusion circle; the return point is kept "
-        "and not used"
+        "Fence: 2 inclusion polygons, 2 inclusion circles, 1 exclusion polygon, 1 exclusion circle; return point unused"
     )
-    assert "have in common" in summary([*corners(5001, 3), *corners(5001, 4)])
+    assert "zones of a group" in summary([*corners(5001, 3), *corners(5001, 4)])
 
 
 @pytest.mark.parametrize(
@@ -289,21 +288,21 @@ def test_bad_items(bad: PlanItem, result: int) -> None:
 @pytest.mark.parametrize(
     ("items", "words"),
     [
-        (corners(5001, 4)[:3], "begins with item 0 has not its 4 corners"),
+        (corners(5001, 4)[:3], "item 0: not 4 corners"),
         (
             [item(dialect.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, LAT, LON, 5.0), *corners(5001, 4)[:2], *corners(5002, 4)],
-            "begins with item 1",
+            "item 1: ",
         ),
-        ([*corners(5001, 4)[:3], *corners(5001, 4, 1.0)[3:]], "begins with item 0"),
-        ([*corners(5001, 4)[:3], *corners(5001, 5)], "begins with item 0"),
+        ([*corners(5001, 4)[:3], *corners(5001, 4, 1.0)[3:]], "item 0: "),
+        ([*corners(5001, 4)[:3], *corners(5001, 5)], "item 0: "),
         (
             [item(dialect.MAV_CMD_NAV_FENCE_RETURN_POINT), item(dialect.MAV_CMD_NAV_FENCE_RETURN_POINT)],
             "more than one return point",
         ),
-        ([item(dialect.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION, LAT, LON, 3.0)] * 3, "encloses nothing"),
+        ([item(dialect.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION, LAT, LON, 3.0)] * 3, "has no area"),
         (
             [item(dialect.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION, LAT + n * 1e-3, LON, 3.0) for n in range(3)],
-            "encloses nothing",
+            "has no area",
         ),
     ],
 )
@@ -378,7 +377,7 @@ def test_a_breach_is_acted_upon_once(action: Reaction) -> None:
     assert first is (None if action is Reaction.NONE else action)
     assert (watch.breach, watch.breaches, watch.breached_at, watch.healthy) == (Breach.BOUNDARY, 1, 1.0, False)
     assert watch.verdict is not None
-    assert watch.verdict.text == "3 m beyond the inclusion circle of item 0"
+    assert watch.verdict.text == "3 m beyond inclusion 0"
     if first not in (None, Reaction.WARN):
         assert watch.look(sight(105.0), 1.5) is None  # under way
         watch.done(2)
@@ -577,7 +576,7 @@ def test_beyond_floor_or_ceiling_the_zones_hold(ato: float, kind: Breach) -> Non
     watch.done(4)
     assert watch.look(sight(90.0, speed=(5.0, 0.0), ato=ato, orders=4), 3.0) is None  # it brakes
     assert watch.look(sight(103.0, ato=ato, orders=5), 4.0) is Reaction.HOLD  # somebody has flown on
-    assert watch.verdict.text == "3 m beyond the inclusion circle of item 0"
+    assert watch.verdict.text == "3 m beyond inclusion 0"
     assert not watch.verdict.ahead
     assert (watch.breach, watch.breaches, watch.breached_at) == (Breach.BOUNDARY, 2, 4.0)
     watch.done(6)
@@ -663,10 +662,10 @@ def test_what_is_enabled() -> None:
     assert (watch.present, watch.in_force) == (True, True)
     assert len(watch.zones.zones) == 2
     watch.disable(HOME_CIRCLE)
-    assert [zone.name for zone in watch.zones.zones] == ["inclusion circle of item 0"]
+    assert [zone.name for zone in watch.zones.zones] == ["inclusion 0"]
     watch.enable(HOME_CIRCLE)
     watch.disable(ZONES)
-    assert [zone.name for zone in watch.zones.zones] == ["circle around home of item 1"]
+    assert [zone.name for zone in watch.zones.zones] == ["home circle 1"]
     watch.disable()
     assert (watch.present, watch.in_force, watch.enabled, watch.types) == (True, False, False, 0)
     assert watch.look(sight(500.0, ato=0.0), 0.0) is None
@@ -679,7 +678,7 @@ def test_what_is_enabled() -> None:
 def test_places_are_asked_for_before() -> None:
     watch = watching()
     watch.check_place(beside(99.0), HERE)
-    with pytest.raises(OutsideFence, match=r"^it is 20 m beyond the inclusion circle of item 0$"):
+    with pytest.raises(OutsideFence, match=r"^20 m beyond inclusion 0$"):
         watch.check_place(beside(120.0), HERE)
     with pytest.raises(OutsideFence, match="no GPS fix") as info:
         watch.check_place(None, HERE)
@@ -690,7 +689,7 @@ def test_places_are_asked_for_before() -> None:
             item(dialect.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION, LAT, LON, 20.0),
         ]
     )
-    with pytest.raises(OutsideFence, match="the way there leaves the fence at the exclusion circle of item 1"):
+    with pytest.raises(OutsideFence, match="path crosses exclusion 1"):
         watch.check_place(beside(50.0), HERE, beside(-50.0))
     watch.check_place(beside(50.0), HERE, beside(50.0, 30.0))
     watch.check_place(beside(50.0), HERE, beside(0.0))  # out of the hole, whichever way
