@@ -107,7 +107,7 @@ def _land_delay(host: Host) -> float:
 
 async def _set_land_delay(host: Host, value: float) -> None:
     if HOVERS < value < 0.0:
-        raise Refused(texts.RETURN, texts.LAND_DELAY, lasting=True)
+        raise Refused(texts.RTL_LAND_DELAY, texts.LAND_DELAY, lasting=True)
     if value == HOVERS:
         put_end_of_return(host, EndOfReturn.HOVER)
     else:
