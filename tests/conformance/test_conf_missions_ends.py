@@ -17,6 +17,7 @@ from support.missions import (
     COMPLETE,
     LAND,
     PAUSED,
+    PLACE,
     RTL,
     mode,
     put,
@@ -214,6 +215,57 @@ async def test_mission_stopped_by_an_alert_at_its_last_way_point_is_paused() -> 
         await start(w)
         await state(w, PAUSED, seq=2, since=0)
         assert reached(w) == [0, 1]
+
+
+async def report_last_line(w: World) -> None:
+    """The drone reports its plan's last line; return when the gateway has processed that report."""
+    w.drone.faults.untold = frozenset()
+    mark = w.client.mark()
+    w.drone.inject(common.MissionItemExecuted(len(w.drone.firmware.flight_plan.items) - 1))
+    w.drone.inject(ardrone3.IcingLevelChanged(ardrone3.WarningLevel.CRITICAL))  # reports keep their order
+    await said(w, "Icing: critical", since=mark)
+
+
+@both
+async def test_mission_whose_last_line_is_reported_after_the_pause_completes(flavour: str) -> None:
+    """The drone's own report is the answer, however late. What flies by then is not disturbed."""
+    async with world(flavour=flavour, web=True) as w:
+        stop = w.drone.firmware.flight_plan.stop
+        mark, _ = await to_the_last_line(w, LAND, lambda: stop(hover=True))
+        await state(w, PAUSED, seq=3, since=mark)
+        ack = await w.client.command(mav_enums.MAV_CMD_DO_REPOSITION, -1, 1, 0, frame=6, x=PLACE[0], y=PLACE[1], z=9.0)
+        assert ack.result == mav_enums.MAV_RESULT_ACCEPTED, ack
+        mark = w.client.mark()
+        await report_last_line(w)
+        await state(w, COMPLETE, since=mark)
+        assert reached(w) == [0, 1, 2, 3]
+        await settled(w, (0.0, 0.0, 9.0))
+
+
+async def test_mission_paused_by_a_client_stays_paused_when_its_last_line_is_reported() -> None:
+    """Resume must not begin the whole mission again for a pilot who has paused it."""
+    async with world(web=True) as w:
+        mark, _ = await to_the_last_line(w, PLAIN["way-point"][-1])
+        ack = await w.client.command(mav_enums.MAV_CMD_DO_SET_MODE, 1, 4, 3)
+        assert ack.result == mav_enums.MAV_RESULT_ACCEPTED, ack
+        await state(w, PAUSED, seq=3, since=mark)
+        await report_last_line(w)
+        await state(w, PAUSED, seq=3)
+        assert reached(w) == [0, 1, 2]
+
+
+async def test_mission_stopped_by_the_drone_is_not_completed_by_the_lines_of_another_plan() -> None:
+    async with world(web=True) as w:
+        stop = w.drone.firmware.flight_plan.stop
+        mark, _ = await to_the_last_line(w, LAND, lambda: stop(hover=True))
+        await state(w, PAUSED, seq=3, since=mark)
+        playing = common.MavlinkFilePlayingStateChanged(
+            common.PlayingState.PLAYING, "other", common.MavlinkType.FLIGHT_PLAN
+        )
+        w.drone.inject(playing)
+        await report_last_line(w)
+        await state(w, PAUSED, seq=3)
+        assert reached(w) == [0, 1, 2]
 
 
 LOCATION, ALTITUDE = ardrone3.GpsLocationChanged.NAME, ardrone3.AltitudeChanged.NAME

@@ -73,6 +73,11 @@ class MissionFlight:
         self._running: asyncio.Task[None] | None = None
         """What the gateway does between two files."""
         self._end_watch = EndWatch(vehicle, self.progress, self._ended)
+        self._may_end_late = False
+        """True while a report of the last line completes a mission that was paused because the drone stopped its plan.
+
+        Nothing has been played since, so that such a report is of that flight.
+        """
 
     # What clients ask for.
 
@@ -370,12 +375,21 @@ class MissionFlight:
             self.news()
 
     def _finish(self) -> None:
+        self._complete()
+        self._vehicle.select(FlightMode.HOLD)
+        self.news()
+
+    def _complete(self) -> None:
         self._left = None
         self.progress.finish()
         self.keeper.forget()
         self.say(Severity.INFO, lambda first: texts.MISSION_COMPLETE)
-        self._vehicle.select(FlightMode.HOLD)
-        self.news()
+
+    def _stopped_by_drone(self) -> None:
+        """Pause the mission: the drone has stopped its plan, as far as its reports go."""
+        self._break_off(texts.MISSION_STOPPED)
+        stopped = self._vehicle.drone.flight_plan.state.playing == PlayingState.STOPPED
+        self._may_end_late = stopped and self._course.following is None
 
     def _break_off(self, why: Text) -> None:
         """It does not go on, and nobody asked for that."""
@@ -386,6 +400,7 @@ class MissionFlight:
     def _stop(self, why: Text | None) -> None:
         progress = self.progress
         progress.stop()
+        self._may_end_late = False
         current, severity = progress.current, Severity.INFO if why is None else Severity.WARNING
         if not self._beginning:
 
@@ -432,6 +447,7 @@ class MissionFlight:
         progress = self.progress
         if message.state == PlayingState.PLAYING:
             self._end_watch.end()
+            self._may_end_late = False
             if self._starting is not None:
                 (leg, line), self._starting = self._starting, None
                 progress.begin(leg, line)
@@ -463,7 +479,7 @@ class MissionFlight:
             elif message.state == PlayingState.STOPPED and (last := self._last_way_point(progress.leg)) is not None:
                 self._end_watch.begin(last)
             else:
-                self._break_off(texts.MISSION_STOPPED)
+                self._stopped_by_drone()
 
     def _last_way_point(self, leg: Leg) -> WayPoint | None:
         """Return the way point that a file ends at; None while others are left, or when it lands or returns."""
@@ -474,13 +490,21 @@ class MissionFlight:
         return points[-1]
 
     def _executed(self, line: int) -> None:
-        done = self.progress.executed(line)
+        progress, leg = self.progress, self.progress.leg
+        paused = self._may_end_late and self._starting is None and progress.state is State.PAUSED
+        late = paused and leg is not None and line == len(leg.origins) - 1
+        if late:
+            progress.begin(leg, progress.line)
+        done = progress.executed(line)
         for item in done:
             self.reached(item)
         if done:
             self._keep()
+        if late:
+            self._may_end_late = False
+            self._complete()  # and no other mode: another flight task may be active by now
         self.news()
-        if self._end_watch.running and self.progress.leg_done:  # it has said so late
+        if self._end_watch.running and progress.leg_done:  # it has said so late
             self._end_watch.end()
             self._leg_over()
 
@@ -495,7 +519,7 @@ class MissionFlight:
                 self._executed(len(leg.origins) - 1)
             self._leg_over()
         else:
-            self._break_off(texts.MISSION_STOPPED)
+            self._stopped_by_drone()
 
     # Helm.
 
@@ -541,7 +565,7 @@ class MissionFlight:
         """The drone may fly on with the file that it has. What the gateway flies itself ends here."""
         self._arming.end()
         self._end_watch.end()
-        self._starting, self._running = None, None
+        self._starting, self._running, self._may_end_late = None, None, False
         self._course.end_with_this_part()
         if self.progress.state is State.ACTIVE:
             self.progress.stop()

@@ -1,0 +1,38 @@
+"""What an action that is replaced learns of it: whether a client's order has come, or something that is none."""
+
+from __future__ import annotations
+
+import asyncio
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from anafi_mav.services.command.command_service import CommandService
+
+
+@pytest.mark.parametrize("newer", ["order", "stream", "gateway"])
+async def test_replaced_action_learns_whether_an_order_has_ended_it(newer: str) -> None:
+    host: Any = SimpleNamespace(spawn=asyncio.ensure_future)
+    service = CommandService(host)
+    began, learned = asyncio.Event(), []
+
+    async def old() -> None:
+        began.set()
+        try:
+            await asyncio.Event().wait()
+        except asyncio.CancelledError:
+            learned.append(service.replaced_by_order)
+            raise
+
+    async def replace() -> None:
+        await asyncio.wait(service.end_others())
+        learned.append(service.replaced_by_order)
+
+    service.run("fence", old(), is_order=False)
+    await began.wait()
+    if newer == "gateway":
+        await replace()
+    else:
+        await service.run("client", replace(), is_order=newer == "order")
+    assert learned == [newer == "order", False]
