@@ -41,7 +41,7 @@ class Notice(Text):
 
 
 class Template:
-    """A text with fields. `longest` holds the longest value that is to be expected of each field."""
+    """A text with fields; `longest` holds the longest expected value of each field."""
 
     kind: type[Text] = Text
 
@@ -61,13 +61,19 @@ class ReasonTemplate(Template):
 
 
 class NoticeTemplate(Template):
-    """A text with fields and without a limit of length: it names a file or a key, or quotes a long explanation."""
+    """A text with fields and without a limit of length.
+
+    It names a file or a key, or quotes a long explanation.
+    """
 
     kind = Notice
 
 
 class Below:
-    """Stands for a text from below, whose length this table does not know: the STATUSTEXT may take several messages."""
+    """Stands for a text of a lower layer, whose length this table does not know.
+
+    The STATUSTEXT may take several messages.
+    """
 
     def __init__(self, example: str) -> None:
         self.example = example
@@ -80,7 +86,7 @@ BELOW = Below("no answer in 5 s")
 
 
 def from_below(text: object) -> Text:
-    """Return a text that was written by a lower layer: an error of the drone or of the operating system."""
+    """Return the text of a lower layer: an error of the drone or of the operating system."""
     return Reason(text)
 
 

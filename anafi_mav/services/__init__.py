@@ -1,1 +1,4 @@
-"""MAVLink microservices of one system over a drone: a folder for each, over the modules that lie here."""
+"""MAVLink microservices of one system over a drone.
+
+Each microservice has a folder; the modules that lie here are the floor of all of them.
+"""

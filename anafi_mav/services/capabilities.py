@@ -7,7 +7,10 @@ from anafi_mav.services.flavours import Flavour
 
 
 def capability_bits(promised: int, flavour: Flavour) -> int:
-    """MAV_PROTOCOL_CAPABILITY bits that clients of a flavour are told, given those of the services."""
+    """Return the MAV_PROTOCOL_CAPABILITY bits for clients of a flavour.
+
+    `promised` are the bits of the services.
+    """
     encoding = (
         dialect.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
         if flavour.bytewise

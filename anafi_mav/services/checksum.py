@@ -6,5 +6,8 @@ import zlib
 
 
 def crc32(data: bytes, crc: int = 0) -> int:
-    """MAVLink's CRC-32: the common one without its inversions at the beginning and at the end (MAVLink crc.md)."""
+    """Return MAVLink's CRC-32 (MAVLink crc.md).
+
+    It is the common one without its inversions at the beginning and at the end.
+    """
     return zlib.crc32(data, crc ^ 0xFFFFFFFF) ^ 0xFFFFFFFF

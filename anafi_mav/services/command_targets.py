@@ -1,4 +1,4 @@
-"""Where a command means: its place and height, by its frame and by who sent it.
+"""Place and height of a command, by its frame and by the flavour of its sender.
 
 Conformance E2 (take-off), B1 "INT frame" (AMSL whatever the frame says), C2 (frames), architecture "One height".
 """
@@ -41,9 +41,9 @@ def height(vehicle: Vehicle, command: Command, *, flown: bool = True) -> float |
 
 
 def height_in_frame(vehicle: Vehicle, z: float, frame: int | None, *, amsl: bool = False, flown: bool = True) -> float:
-    """Height above take-off (m) of `z` in a MAV_FRAME (None: AMSL). Raises `Refused`, `UnsupportedFrame`.
+    """Return the height above take-off (m) of `z` in a MAV_FRAME (None: AMSL).
 
-    `amsl`: z is AMSL even where the frame says that it is relative.
+    `amsl`: z is AMSL even where the frame is relative. Raises `Refused`, `UnsupportedFrame`.
     """
     if not math.isfinite(z):
         raise Refused(texts.HEIGHT, texts.NOT_A_NUMBER, lasting=True)

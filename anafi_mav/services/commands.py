@@ -1,6 +1,6 @@
-"""The command protocol: what a COMMAND_LONG or COMMAND_INT says, and when it is executed, repeated or answered.
+"""The command protocol: decoding, execution, retransmission and answer of a command.
 
-No I/O. `CommandDesk` decides; `System` runs the handler and sends the acknowledgements.
+No I/O. `CommandDesk` decides; `CommandService` runs the handler and sends the acknowledgements.
 Rules: conformance R5-R10, MAVLink command.md.
 """
 
@@ -22,7 +22,10 @@ RESEND_WINDOW = 3.5
 the last IN_PROGRESS, QGroundControl after 1.2 s, and neither can know that only the acknowledgement was lost (R10)."""
 
 REFUSAL_WINDOW = 1.0
-"""s after an action did not succeed in which the same one gets the same answer. Short: the reason may be gone."""
+"""s after an action failed in which the same one gets the same answer.
+
+Short: the reason may have ended.
+"""
 
 MAX_CLIENTS = 64
 """Clients whose newest action is remembered; there are a handful, and an address is easily made up."""
@@ -41,7 +44,10 @@ _UNSET_INT = (2**31 - 1, -(2**31))
 
 
 class Effect(enum.Enum):
-    """The kind of change that a command asks for: decides whether it is repeated, and whether it can be cancelled."""
+    """Kind of change that a command requests.
+
+    It decides whether a retransmission executes it again, and whether it can be cancelled.
+    """
 
     CHANGE = "any other change: the same command sent again is answered, and COMMAND_CANCEL ends it"
     STOP = "ends something and begins nothing: carried out each time it arrives, and never cancelled"
@@ -79,7 +85,10 @@ EFFECT_OF_MODE = {
 
 
 def effect_of_mode(command: Command) -> Effect:
-    """The effect of the mode that a command names; a mode that we do not have is refused, which changes nothing."""
+    """Return the effect of the mode that a command names.
+
+    A mode that we do not have is refused, which changes nothing.
+    """
     mode = command.mode
     return Effect.CHANGE if mode is None else EFFECT_OF_MODE[mode]
 
@@ -103,7 +112,7 @@ class Progress(enum.Enum):
 
 @dataclass(frozen=True, kw_only=True)
 class Definition:
-    """What has to be known of a MAV_CMD, apart from what it does."""
+    """Facts about a MAV_CMD apart from its handler."""
 
     location: bool
     """x and y are a place: degrees, times 1e7 in a COMMAND_INT. Wrong by mistake it would be 4.8e8 degrees, so it is
@@ -127,7 +136,7 @@ class Definition:
 
 @dataclass(frozen=True)
 class Action(Definition):
-    """A MAV_CMD that changes what the vehicle does: the one row that says all about it."""
+    """A MAV_CMD that changes the vehicle's behaviour, with all its facts in one row."""
 
     handler: Callable[[Command], Awaitable[None]]
     """Executed once however often the command arrives; returns when the drone confirmed, or raises an
@@ -140,7 +149,7 @@ QUERY = Definition(location=False, altitude=Altitude.UNUSED, effect=Effect.CHANG
 
 @dataclass(frozen=True)
 class Command:
-    """One command, whichever message brought it. Unset parameters are NaN."""
+    """One command, from any of its messages. Unset parameters are NaN."""
 
     id: int
     definition: Definition
@@ -155,9 +164,9 @@ class Command:
     frame: int | None
     """MAV_FRAME of a COMMAND_INT; None for COMMAND_LONG."""
     client: Hashable = None
-    """Who sent it: (channel, system id, component id)."""
+    """Sender: (channel, system id, component id)."""
     flavour: Flavour = PX4
-    """The autopilot that who sent it believes to speak to."""
+    """The autopilot that the sender takes us for."""
     at: float = 0.0
     """When it arrived, on the monotonic clock."""
     counted: bool = True
@@ -165,12 +174,12 @@ class Command:
 
     @property
     def right(self) -> Right:
-        """The right that its client has by it; what it ends of that is for its handler to say."""
+        """The right that its client has by it; its handler decides what it may end."""
         return Right(self.client, Extent.ALL, self.at, self.counted)
 
     @property
     def effect(self) -> Effect:
-        """What it asks for."""
+        """Effect that it requests."""
         effect = self.definition.effect
         return effect if isinstance(effect, Effect) else effect(self)
 
@@ -186,7 +195,7 @@ class Command:
         return None if progress is Progress.FINAL_ONLY and self.flavour.first_answer_as_final else progress
 
     def same_as(self, other: Command) -> bool:
-        """Equal, with NaN equal to NaN."""
+        """True when both commands are equal, with NaN equal to NaN."""
         return (self.id, self.frame) == (other.id, other.frame) and all(
             a == b or (math.isnan(a) and math.isnan(b))
             for a, b in zip(
@@ -247,14 +256,14 @@ class Execution:
     """MAV_RESULT; IN_PROGRESS until it ended."""
     ended: float = math.inf
     superseded: bool = False
-    """Another client's action has taken the vehicle over since."""
+    """Another client's action has replaced it since."""
 
 
 class CommandDesk:
-    """Tells a new action from the retransmission of one.
+    """Distinguishes a new action from the retransmission of one.
 
-    Of each client the newest action counts: arm, disarm, arm within two seconds are three actions, although the third
-    equals the first.
+    For each client only the newest action counts: arm, disarm, arm within two seconds are three actions, although the
+    third equals the first.
     """
 
     def __init__(self) -> None:
@@ -268,12 +277,12 @@ class CommandDesk:
         mode: FlightMode | None = None,
         landing_ended_at: float = -math.inf,
     ) -> int | None:
-        """The MAV_RESULT to answer a command with that this client sends once more; None: it is to be executed.
+        """Return the MAV_RESULT that answers a retransmission; None: execute the command.
 
-        What may be carried out twice is: orders to stop always, but for a landing that another client has ended
-        (`landing_ended_at` is when a client last ended one), a return while no other client has taken over, and modes
-        that have ended by themselves (`mode` is the vehicle's). What another client has replaced is neither carried out
-        over its head nor confirmed: it is answered with CANCELLED.
+        These may be executed twice: commands that stop something always, except a landing that another client has
+        ended (`landing_ended_at` is when a client last ended one); a return while no other client has replaced it;
+        and modes that have ended by themselves (`mode` is the vehicle's). A command that another client has replaced
+        is neither executed against that client nor confirmed: it is answered with CANCELLED.
         """
         newest = self._newest.get(client)
         if newest is None or not newest.command.same_as(command):
@@ -301,13 +310,16 @@ class CommandDesk:
         return execution
 
     def supersede(self, client: Hashable) -> None:
-        """An action of this client has taken the vehicle over from all others."""
+        """Note that an action of this client has replaced those of all others."""
         for other, execution in self._newest.items():
             if other != client:
                 execution.superseded = True
 
     def forget(self, client: Hashable | None = None) -> None:
-        """What was done before no longer counts: for one client, which moved the vehicle by other means, or for all."""
+        """Forget the newest action of one client, or of all clients (None).
+
+        For one client: it moved the vehicle by other means.
+        """
         if client is None:
             self._newest.clear()
         else:

@@ -1,7 +1,7 @@
-"""Component metadata: files with the meaning of parameters and events, loaded over MAVLink FTP. No I/O.
+"""Component metadata: files that describe parameters and events. No I/O.
 
-general.json names the others with the CRC of each, so that a client that has them in its cache does not load them again
-(MAVLink component_metadata.md; schemas in mavlink/mavlink component_metadata).
+Clients load them over MAVLink FTP. general.json names the others with the CRC of each, so that a client that has them
+in its cache does not load them again (MAVLink component_metadata.md; schemas in mavlink/mavlink component_metadata).
 """
 
 from __future__ import annotations
@@ -25,12 +25,18 @@ def to_json(document: Mapping[str, Any]) -> bytes:
 
 
 def compress(content: bytes) -> bytes:
-    """The content as an .xz file. Small decoders, QGroundControl's and MAVSDK's among them, know this checksum only."""
+    """The content as an .xz file.
+
+    Small decoders, QGroundControl's and MAVSDK's among them, know this checksum only.
+    """
     return lzma.compress(content, check=lzma.CHECK_CRC32)
 
 
 def general_file(identity: Identity, others: Mapping[str, tuple[int, bytes]]) -> dict[str, Any]:
-    """general.json: who this is, and where the other files are. `others`: path -> (COMP_METADATA_TYPE, content)."""
+    """Return general.json: identity of this component, and the addresses of the other files.
+
+    `others`: path -> (COMP_METADATA_TYPE, content).
+    """
     general: dict[str, Any] = {"version": 1, "vendorName": "Parrot", "modelName": identity.model.title}
     for key, text in (("firmwareVersion", identity.firmware), ("hardwareVersion", identity.hardware)):
         if (number := plain_version(text)) is not None:
@@ -42,11 +48,14 @@ def general_file(identity: Identity, others: Mapping[str, tuple[int, bytes]]) ->
 
 
 def plain_version(text: str | None) -> str | None:
-    """ "1.8.2-rc4" as "1.8.2", which is what the schema has room for; None when there are no three numbers."""
+    """Return "1.8.2-rc4" as "1.8.2"; None without three numbers.
+
+    The schema has no room for more.
+    """
     found = re.match(r"\d+\.\d+\.\d+(\.\d+)?", text or "")
     return None if found is None else found[0]
 
 
 def uri(path: str) -> str:
-    """Where a client finds a file of this component (MAVLink ftp.md §mavlink-ftp-url-scheme)."""
+    """Return the address of a file of this component (MAVLink ftp.md §mavlink-ftp-url-scheme)."""
     return f"mftp://{path}"

@@ -1,4 +1,7 @@
-"""The files that a vehicle shows over MAVLink FTP, by path. None is on a disk: each is made on request."""
+"""The files that a vehicle shows over MAVLink FTP, by path.
+
+None is on a disk: each is made on request.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,7 @@ from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.flavours import Flavour
 
 Query = Mapping[str, str]
-"""What stands behind the question mark of a path, as ArduPilot's clients write it."""
+"""Query part of a path, after its question mark, as ArduPilot's clients write it."""
 
 MAX_QUERY = 8
 """Words of a query: ArduPilot knows three."""
@@ -30,13 +33,13 @@ class ServedFile:
     """One file of a service."""
 
     make: Callable[[Flavour, Query], bytes | None]
-    """The content as clients of a flavour see it; None: not with such a query."""
+    """Returns the content for clients of a flavour; None when the query is not supported."""
     packed: bool = False
     """Shown to clients of flavours with `packed_files` alone."""
     metadata: int | None = None
     """COMP_METADATA_TYPE. Such a file is made once for each connection, and served compressed as well."""
     write: Callable[[Inbound, bytes], bool] | None = None
-    """Replaces it with what the sender of a message has written; False when that cannot be used. None: read only."""
+    """Replaces it with a client's content; False when that is not usable. None: read only."""
     room: int = 0
     """Bytes that may be written to it."""
 
@@ -97,6 +100,6 @@ class FileTree:
 
 
 def absolute(path: str) -> str | None:
-    """The path from the root, without what means nothing; None for one that wants out of it."""
+    """Return the normalised path from the root; None for one that leads out of it."""
     parts = [part for part in path.split("/") if part not in ("", ".")]
     return None if ".." in parts else "/" + "/".join(parts)

@@ -1,8 +1,10 @@
-"""Flavours: which autopilot a client is shown. The flight core is one; names and numbers differ.
+"""Flavours: the autopilot as which the gateway appears to a client.
 
-A channel has one flavour for as long as it lives. PX4 is what QGroundControl and MAVSDK get the most from, ArduPilot is
-what MAVProxy, dronekit and Mission Planner were written for, standard is MAVLink's own autopilot-neutral way, which few
-clients know (conformance E1, E3, E4).
+The flight core is one; names and numbers differ.
+
+A channel keeps its flavour until it closes. PX4 is what QGroundControl and MAVSDK get the most from, ArduPilot is
+what MAVProxy, dronekit and Mission Planner were written for, standard is MAVLink's own autopilot-neutral way, which
+few clients know (conformance E1, E3, E4).
 """
 
 from __future__ import annotations
@@ -16,24 +18,27 @@ from anafi_mav.mavlink.channel import Channel
 from anafi_mav.vehicle.base.modes import FlightMode
 
 PX4_BITS = 1 << 16
-"""A mode number from here on is one of PX4's packed ones in whatever flavour it comes (conformance E5)."""
+"""Lowest mode number that is one of PX4's packed ones, in any flavour (conformance E5)."""
 
 
 def _whole(number: float) -> int | None:
-    """A parameter that stands for a number of modes; None for what is none."""
+    """Return the mode number in a parameter; None when the value is no such number."""
     if not math.isfinite(number) or number != int(number) or not 0 <= number < 1 << 32:
         return None
     return int(number)
 
 
 def px4_number(main: int, sub: int) -> int:
-    """Main mode in bits 16..23 and sub mode in bits 24..31 (PX4-Autopilot src/modules/commander/px4_custom_mode.h)."""
+    """Return PX4's packed mode number: main mode in bits 16..23, sub mode in bits 24..31.
+
+    Source: PX4-Autopilot src/modules/commander/px4_custom_mode.h.
+    """
     return main << 16 | sub << 24
 
 
 @dataclass(frozen=True)
 class Flavour:
-    """How an autopilot of this family presents the neutral flight core."""
+    """Presentation of the neutral flight core as an autopilot of one family."""
 
     name: str
     """As in the URL of an endpoint."""
@@ -42,7 +47,10 @@ class Flavour:
     numbers: Mapping[FlightMode, int]
     """custom_mode of each mode."""
     modes: Mapping[int, FlightMode]
-    """What a client may ask for by number: not every mode that is shown, and some that are shown as another."""
+    """Modes that a client may select by number.
+
+    Not every mode that is shown is among them, and some are shown as another.
+    """
     version: tuple[int, int, int]
     """The release whose behaviour is followed: major, minor, patch."""
     version_type: int
@@ -67,7 +75,10 @@ class Flavour:
     """Items of plans are requested with MISSION_REQUEST, which clients of this family answer in either form; otherwise
     with MISSION_REQUEST_INT."""
     always_continues: bool = False
-    """A mission goes on after each item: autocontinue 0 means 1, and is read back as 1 (ArduPilot; PX4 stops there)."""
+    """True when a mission continues after each item.
+
+    autocontinue 0 means 1, and is read back as 1 (ArduPilot; PX4 stops there).
+    """
     partial_plans: bool = False
     """Clients replace single items of a plan (MISSION_WRITE_PARTIAL_LIST)."""
     relative_takeoff: bool = False
@@ -96,23 +107,29 @@ class Flavour:
     base_mode_in_custom0: bool = False
     """HIGH_LATENCY2.custom0 is HEARTBEAT.base_mode, as a signed byte."""
     title: str = ""
-    """How the autopilot calls itself in its banner; empty: it does not."""
+    """Name of the autopilot in its banner; empty: none."""
 
     def custom_mode(self, mode: FlightMode) -> int:
-        """custom_mode of a heartbeat in this mode."""
+        """Return the custom_mode of a heartbeat in this mode."""
         return self.numbers[mode]
 
     def mode_of_number(self, number: int) -> FlightMode | None:
-        """The mode that a custom_mode names (SET_MODE, DO_SET_MODE in one number); None when we do not have it."""
+        """Return the mode that a custom_mode selects; None when we do not have it.
+
+        For SET_MODE, and for DO_SET_MODE in one number.
+        """
         if number >= PX4_BITS:
             return _PX4_MODES.get(number)
         return self.modes.get(number)
 
     def mode_of_parameters(self, main: float, sub: float) -> FlightMode | None:
-        """The mode that MAV_CMD_DO_SET_MODE names with param2 and param3; None when we do not have it.
+        """Return the mode that MAV_CMD_DO_SET_MODE names with param2 and param3.
 
-        `packed_modes`: below 256 param2 is the main mode and param3 the sub mode (NaN = 0). All flavours: from 65536 on
-        param2 is a packed number of PX4's. Otherwise param2 is the mode's number (conformance E5).
+        Returns None for a mode that we do not have. `packed_modes`: below 256 param2 is the main mode and param3 the
+        sub mode
+        (NaN = 0). All flavours: from 65536 on param2 is a packed number of PX4's. Otherwise param2 is the mode's
+        number
+        (conformance E5).
         """
         number = _whole(main)
         if number is None:
@@ -284,10 +301,13 @@ _BY_STANDARD: dict[float, FlightMode] = {
 
 
 def mode_of_standard(number: float) -> FlightMode | None:
-    """The mode that MAV_CMD_DO_SET_STANDARD_MODE names; None when we do not have it, or it is begun by a command."""
+    """Return the mode that MAV_CMD_DO_SET_STANDARD_MODE selects; None when it cannot.
+
+    We do not have the mode then, or a command of its own begins it.
+    """
     return _BY_STANDARD.get(number)
 
 
 def flavour_of(channel: Channel) -> Flavour:
-    """The flavour of a channel's endpoint; PX4 where its URL names none."""
+    """Return the flavour of a channel's endpoint; PX4 when its URL names none."""
     return FLAVOURS[channel.flavour or PX4.name]

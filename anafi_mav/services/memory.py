@@ -1,7 +1,8 @@
-"""What outlives the gateway: the plans of a drone and the gateway's own settings for it, one file per drone.
+"""Stores the data that outlives the gateway: one file per drone.
 
-A file is replaced as a whole, never half: whoever reads it finds the old or the new. One that cannot be read is put
-aside under another name and told of in one line; nothing of it is lost, and the drone begins with nothing.
+A file holds the plans of a drone and the gateway's own settings for it. It is replaced as a whole, never half: a
+reader finds the old or the new one. A file that cannot be read is moved to another name and reported in one line;
+nothing of it is lost, and the drone starts without stored data.
 """
 
 from __future__ import annotations
@@ -115,7 +116,7 @@ class Memory:
 
     @property
     def path(self) -> Path | None:
-        """The file; None where there is none."""
+        """Return the drone's file; None without a folder or a valid serial number."""
         if self._folder is None or not _SERIAL.fullmatch(self._serial):
             return None
         return self._folder / f"{self._serial}.json"

@@ -1,6 +1,7 @@
-"""Many messages that can wait, a few at a time: parameter lists and bursts of files, beside the telemetry.
+"""Paced sender of many messages that can wait: parameter lists and bursts of files.
 
-A line that says how fast it is gets half of it filled with these; any other as many as it takes without queueing.
+A few are sent at a time, beside the telemetry. A line with a known rate gets half of it filled with these; any other
+as many as it takes without queueing.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ BATCH, PAUSE = 8, 0.01
 """Messages at a time, and s between them, where the line is fast: some 800 a second, as PX4 sends its list."""
 
 BUSY = 0.02
-"""s until a peer that takes no more is looked at again."""
+"""s until a peer that accepts nothing at present is checked again."""
 
 
 class Trickle:

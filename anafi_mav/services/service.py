@@ -1,6 +1,6 @@
-"""What a MAVLink microservice is to the system that hosts it: tables of what it takes, and a host to answer through.
+"""Interface between a MAVLink service and its host, the system.
 
-A system is the sum of its services. Each says in tables which messages, commands and requests are its own; the host
+A system is the sum of its services. Each lists in tables which messages, commands and requests are its own; the host
 sorts what arrives into them, and nothing else connects the two.
 """
 
@@ -37,7 +37,7 @@ Request = Callable[[Inbound, Command], Answer]
 
 
 class Host(Protocol):
-    """What a system gives its services."""
+    """Interface of a system for its services."""
 
     sysid: int
     drone: Drone
@@ -52,7 +52,10 @@ class Host(Protocol):
         """The open channels without the muted ones."""
 
     def send(self, message: dialect.MAVLink_message, to: Channel | Sequence[Channel] | None = None) -> None:
-        """Send as the autopilot to one channel, to some, or to all. Nothing is sent while the link is down."""
+        """Send as the autopilot to one channel, to some, or to all.
+
+        Nothing is sent while the link is down.
+        """
 
     def send_heartbeat(self) -> None:
         """Send one more HEARTBEAT to all."""
@@ -60,13 +63,19 @@ class Host(Protocol):
     def send_by_flavour(
         self, build: Callable[[Flavour], dialect.MAVLink_message | None], to: Sequence[Channel] | None = None
     ) -> None:
-        """Send to each of these channels (None: all) what `build` makes for its flavour; None of it is not sent."""
+        """Send to each of these channels (None: all) the message that `build` makes for its flavour.
+
+        If `build` returns None, nothing is sent.
+        """
 
     def text(self, severity: Severity, text: Text, to: Channel | None = None) -> None:
         """A STATUSTEXT to everybody, and a line in the log; or to one channel alone."""
 
     def warn_throttled(self, text: Text) -> None:
-        """Send a warning about something that arrives many times a second, at most once per five seconds."""
+        """Send a warning on a frequent event, at most once per five seconds.
+
+        Such an event arrives many times a second.
+        """
 
     def spawn(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
         """Run in the background; cancelled when the drone's link goes down."""
@@ -74,8 +83,9 @@ class Host(Protocol):
     def run_action(
         self, client: Hashable, work: Coroutine[Any, Any, None], *, is_order: bool = True
     ) -> asyncio.Task[None]:
-        """Run an action that a message without COMMAND_ACK asks for, in its turn among the commands: it replaces the
-        action under way, and newer ones replace it. A refusal becomes a text.
+        """Run an action that a message without COMMAND_ACK requests, as one of the commands.
+
+        It replaces the active action, and newer ones replace it. A refusal becomes a text.
 
         `is_order`: a client has commanded it; neither the gateway began it, nor a stream of setpoints."""
 
@@ -90,19 +100,25 @@ class Host(Protocol):
         """Return True when this message is streamed on some channel."""
 
     def mark_updated(self, id: int, at: float) -> None:
-        """Send a streamed message for a value that no event reports. `at`: when it was true (s, monotonic)."""
+        """Send a streamed message for a value that no event reports.
+
+        `at`: when it was true (s, monotonic).
+        """
 
     def set_muted(self, channel: Channel, *, muted: bool) -> None:
         """Send only answers on this channel; with False everything again."""
 
 
 def client_of(inbound: Inbound) -> Hashable:
-    """Who sent this, told apart from everybody else."""
+    """Return a key that identifies the sender of a message among all clients."""
     return (inbound.channel, inbound.sysid, inbound.compid)
 
 
 class Service:
-    """One MAVLink microservice of one system. Tables are read when the system is made, `subscriptions` at link up."""
+    """One MAVLink microservice of one system.
+
+    Tables are read when the system is made, `subscriptions` at link up.
+    """
 
     def __init__(self, host: Host) -> None:
         self.host = host
@@ -120,11 +136,11 @@ class Service:
         return {}
 
     def actions(self) -> Mapping[int, Action]:
-        """The rows of the commands that change what the vehicle does, by MAV_CMD."""
+        """Return the rows of the commands that change the vehicle's behaviour, by MAV_CMD."""
         return {}
 
     def item_commands(self) -> Mapping[int, MessageHandler]:
-        """Return handlers of mission items that are commands and belong to no plan, by the items' `current`."""
+        """Return handlers of mission items that belong to no plan, by the items' `current`."""
         return {}
 
     def requests(self) -> Mapping[int, Request]:
@@ -136,7 +152,7 @@ class Service:
         return {}
 
     def files(self) -> Mapping[str, ServedFile]:
-        """What MAVLink FTP serves, by path."""
+        """Return the files that MAVLink FTP serves, by path."""
         return {}
 
     def link_up(self) -> None:
@@ -146,17 +162,23 @@ class Service:
         """The drone's link is gone: nothing that was asked for outlives it."""
 
     def subscriptions(self) -> Subscriptions:
-        """Return the handlers of the drone's events, by kind. Read once per connection, after `link_up`."""
+        """Return the handlers of the drone's events, by kind.
+
+        Read once per connection, after `link_up`.
+        """
         return {}
 
     def received(self, inbound: Inbound) -> None:
         """A message that names this system as its target has arrived, before it is handled."""
 
     def heartbeat(self, inbound: Inbound) -> None:
-        """Somebody's heartbeat, a ground station's or anybody else's: the one message that is for every service."""
+        """Handle the HEARTBEAT of a ground station or any other component.
+
+        It is the one message that every service receives.
+        """
 
     def state_changed(self) -> None:
-        """Mode, armed state, health, or whether it flies, or something else that clients wait for has changed."""
+        """Handle a change of mode, armed state, health, flying state or another awaited state."""
 
     def tick(self, now: float) -> None:
         """About ten times a second while the link is up."""

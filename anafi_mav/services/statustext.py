@@ -1,4 +1,7 @@
-"""STATUSTEXT: what people read. Long texts travel in chunks of 50 bytes (MAVLink common.xml STATUSTEXT)."""
+"""STATUSTEXT: what people read.
+
+Long texts travel in chunks of 50 bytes (MAVLink common.xml STATUSTEXT).
+"""
 
 from __future__ import annotations
 
@@ -15,7 +18,10 @@ LONGEST = 500
 
 
 def _clean(text: str) -> bytes:
-    """One line without control characters: NUL ends a text on the wire, and QGroundControl drops what ends in a tab."""
+    """Return the text as one line without control characters.
+
+    NUL ends a text on the wire, and QGroundControl drops what ends in a tab.
+    """
     line = " ".join("".join(character if character.isprintable() else " " for character in text).split())
     data = line.encode()
     if len(data) > LONGEST:
@@ -24,13 +30,19 @@ def _clean(text: str) -> bytes:
 
 
 class TextNumbers:
-    """Numbers that tie the chunks of one long text together: 1..65535, 0 means a text in one piece."""
+    """Numbers that tie the chunks of one long text together.
+
+    1..65535; 0 means a text in one piece.
+    """
 
     def __init__(self) -> None:
         self._next = itertools.cycle(range(1, 1 << 16))
 
     def messages(self, severity: Severity, text: str) -> list[dialect.MAVLink_statustext_message]:
-        """The message, or the chunks in order, that carry `text`; none for a text of nothing."""
+        """Return the message, or the sequence of chunks, that carries `text`.
+
+        The list is empty for an empty text.
+        """
         data = _clean(text)
         if not data:
             return []

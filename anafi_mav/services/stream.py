@@ -1,4 +1,7 @@
-"""A stream: a message that a vehicle sends by itself, and how often. Intervals per channel are in `mavlink.streams`."""
+"""A stream: a message that a vehicle sends by itself, and how often.
+
+Intervals per channel are in `mavlink.streams`.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +17,10 @@ from anafi_mav.vehicle.vehicle import Vehicle
 
 
 class Times(msgspec.Struct, frozen=True):
-    """When the newest field of a message was true, since the gateway started; and for whom it is made."""
+    """Time at which the newest field of a message was true, and the flavour it is made for.
+
+    The time counts from the start of the gateway.
+    """
 
     boot_ns: int
     flavour: Flavour = PX4
@@ -29,7 +35,7 @@ class Times(msgspec.Struct, frozen=True):
         return self.boot_ns // 1000
 
     def for_flavour(self, flavour: Flavour) -> Times:
-        """The same moment, told to clients of another flavour."""
+        """Return the same moment for clients of another flavour."""
         return Times(self.boot_ns, flavour)
 
 
@@ -38,7 +44,10 @@ Builder = Callable[[Vehicle, Times], "dialect.MAVLink_message | None"]
 
 @dataclass(frozen=True)
 class Stream:
-    """One message that a vehicle sends by itself; when a channel is full it gives way to answers."""
+    """One message that a vehicle sends by itself.
+
+    When a channel is full it gives way to answers.
+    """
 
     build: Builder
     updates: tuple[type[Message], ...] = ()
@@ -52,7 +61,7 @@ class Stream:
     on_change: bool = False
     """A state message that also leaves at once when the vehicle's mode, armed or landed state changes."""
     flavoured: bool = False
-    """What it says depends on the flavour of who is told."""
+    """True when its content depends on the flavour of the receiver."""
 
     @property
     def is_repeated(self) -> bool:

@@ -103,7 +103,7 @@ SERVICES: tuple[type[Service], ...] = (
     VideoTelemetryService,
     PilotService,
 )
-"""What a system consists of, beside commands and messages themselves."""
+"""Services of a system, beside commands and messages themselves."""
 
 AUTOPILOT = dialect.MAV_COMP_ID_AUTOPILOT1
 
@@ -224,11 +224,11 @@ class System:
         self._ticker = asyncio.get_running_loop().create_task(self._tick())
 
     async def settle(self) -> None:
-        """The link is lost, and not yet given up here: commands that waited for the drone end."""
+        """End the commands that wait for the drone: the link is lost, but the system still exists."""
         await self._commands.settle()
 
     def link_down(self) -> None:
-        """The link is gone: whoever waits is told, then the system is silent."""
+        """Notify waiting clients that the link is lost, then make the system silent."""
         if not self.active:
             return
         if self._undo is not None:
@@ -246,9 +246,9 @@ class System:
         self._node.remove_hosts(self.sysid)
 
     async def let_go(self) -> None:
-        """The gateway ends: a flying drone is left hovering, or returning or landing where it does that already.
+        """Prepare for the end of the gateway: leave a flying drone hovering, returning or landing.
 
-        Clients must not be heard.
+        It returns or lands only where it does that already. Messages of clients must not be received any longer.
         """
         if not self.active:
             return
@@ -276,7 +276,10 @@ class System:
         return self._messages.is_streamed(id)
 
     def mark_updated(self, id: int, at: float) -> None:
-        """Send a streamed message for a value that no event reports. `at`: when it was true (s, monotonic)."""
+        """Send a streamed message for a value that no event reports.
+
+        `at`: when it was true (s, monotonic).
+        """
         self._messages.mark_updated(id, at)
 
     def set_muted(self, channel: Channel, *, muted: bool) -> None:
@@ -288,7 +291,10 @@ class System:
         self._told = ([], [])
 
     def send(self, message: dialect.MAVLink_message, to: Channel | Sequence[Channel] | None = None) -> None:
-        """Send as the autopilot to one channel, to some, or to all. Nothing is sent while the link is down."""
+        """Send as the autopilot to one channel, to some, or to all.
+
+        Nothing is sent while the link is down.
+        """
         if self.active:
             channels = self.channels if to is None else to
             give_way = message.get_msgId() in self.telemetry
@@ -297,7 +303,10 @@ class System:
     def send_by_flavour(
         self, build: Callable[[Flavour], dialect.MAVLink_message | None], to: Sequence[Channel] | None = None
     ) -> None:
-        """Send to each of these channels (None: all) what `build` makes for its flavour; None of it is not sent."""
+        """Send to each of these channels (None: all) the message that `build` makes for its flavour.
+
+        If `build` returns None, nothing is sent.
+        """
         groups: dict[str, tuple[Flavour, list[Channel]]] = {}
         for channel in self.channels if to is None else to:
             flavour = flavour_of(channel)
@@ -323,7 +332,10 @@ class System:
             self._node.send(message, sysid=self.sysid, compid=AUTOPILOT, to=self.channels)
 
     def warn_throttled(self, text: Text) -> None:
-        """Send a warning about something that arrives many times a second, every `STATUS_EVERY` seconds at most."""
+        """Send a warning on a frequent event, at most every `STATUS_EVERY` seconds.
+
+        Such an event arrives many times a second.
+        """
         now = self.clock.monotonic()
         if now - self._warned_at.get(text, -math.inf) < STATUS_EVERY:
             return
@@ -393,9 +405,9 @@ class System:
             handler(message, now)
 
     def subscriptions(self) -> Iterator[Subscriptions]:
-        """Return all tables of event handlers, in the order that decides which handler of an event is called first.
+        """Yield all tables of event handlers, in the sequence in which the handlers are called.
 
-        The vehicle comes first, because services read its state. Services follow in their order in `self.services`.
+        The vehicle is first, because services read its state. Services follow in their order in `self.services`.
         State messages that leave `on_change` are last, because they contain what the services make of the event.
         """
         yield self.vehicle.subscriptions()
@@ -428,7 +440,10 @@ class System:
             self.send_heartbeat()
 
     def _hold_mode(self, last: tuple[FlightMode, bool, Health, Landed] | None) -> None:
-        """Let heartbeats say Mission a little longer when a mission has ended in the air and the drone hovers."""
+        """Keep the mode Mission in HEARTBEAT a little longer after a mission that ended in the air.
+
+        This applies while the drone hovers.
+        """
         vehicle = self.vehicle
         hovers = vehicle.armed and vehicle.mode in (FlightMode.HOLD, FlightMode.GUIDED)
         if self._mission_over.is_set:
@@ -445,9 +460,9 @@ class System:
     # What clients send.
 
     def listen(self, on_command: Callable[[Inbound], None] | None) -> None:
-        """Call this with each command to the system that is no query while the system does not exist; None: no longer.
+        """Call `on_command` with each command to the system while the system does not exist.
 
-        Commands to any of its components count, but not those to all systems.
+        Queries are excluded. None ends this. Commands to any of its components count, but not those to all systems.
         """
         assert not self.active
 
@@ -483,7 +498,7 @@ class System:
             logger.exception("%s: %s not handled", self.drone.name, message.get_type())
 
     def _refuse(self, inbound: Inbound) -> None:
-        """Answer a command to one of the components in `ABSENT`, when it is addressed to that component alone."""
+        """Answer a command to one of the components in `ABSENT` alone: it is unsupported."""
         message = inbound.message
         if message.get_msgId() in COMMANDS and message.target_system == self.sysid and message.target_component:
             answer = _unsupported(inbound)

@@ -1,6 +1,7 @@
-"""What clients are notified of after one of them has ended a return that the drone began: at once, and again and again.
+"""Repeated reminders to clients after one of them has ended the drone's own return.
 
-The drone does not return a second time for the same reason, so its reason is repeated to the pilot.
+The drone does not return a second time for the same reason, so its reason is sent to the pilot at once and then at
+intervals.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ class AbortedReturn:
         return self._reason in _BATTERY
 
     def due(self, vehicle: Aircraft, now: float) -> bool:
-        """True when a reminder is due. While the drone returns or lands after all, none is."""
+        """True when a reminder is due; never while the drone returns or lands."""
         return now >= self._next and not vehicle.returning and vehicle.flying_state not in LANDING
 
     def report(self, vehicle: Aircraft, now: float) -> None:
@@ -60,7 +61,7 @@ class AbortedReturn:
             vehicle.text(Severity.CRITICAL, text)
 
     def reports(self, vehicle: Aircraft) -> list[Text]:
-        """The texts, as things stand."""
+        """Return the texts for the present state of the drone."""
         reason = "unknown" if self._reason is None else _SHORT.get(self._reason, spoken(self._reason))
         said = [texts.RETURN_ABORTED.fill(system=self._system, reason=reason)]
         if self._reason in _BATTERY:

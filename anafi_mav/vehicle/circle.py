@@ -1,4 +1,4 @@
-"""Circling a place: what the loops of `velocity_loop` are asked for, from where the drone is. No I/O.
+"""Circling a place: demands on the loops of `velocity_loop`. No I/O.
 
 A position on the circle abreast of the drone corrects the radius, the velocity along the circle goes with it as a
 feed-forward, and the acceleration that a circle takes points to its centre.
@@ -18,29 +18,38 @@ from anafi_mav.vehicle.base.place import Place
 from anafi_mav.vehicle.base.velocity_loop import Axis, Demand, G, Motion
 
 SMALLEST = 2.0
-"""m of radius. On a smaller circle GPS does not know which side of it the drone is on."""
+"""m of radius. On a smaller circle GPS cannot tell on which side of it the drone is."""
 
 LARGEST = 5000.0
-"""m of radius: more is a number in the wrong place."""
+"""m of radius: more is a number in the wrong field."""
 
 SHARE_OF_TILT = 0.5
-"""Of the push that full tilt gives, for the circle itself. The rest is for drag, wind and corrections."""
+"""Share of the thrust at full tilt that the circle itself may use.
+
+The rest is for drag, wind and corrections.
+"""
 
 DEFAULT_RADIUS = 10.0
-"""m, clockwise, when nobody says."""
+"""m, clockwise, when the command gives no radius."""
 
 DEFAULT_SPEED = 3.0
-"""m/s along the circle when nobody says."""
+"""m/s along the circle when the command gives no speed."""
 
 LOOKS = 16
-"""Points of a circle that have to be where the drone may fly. Between two it is 2 % of the radius further out."""
+"""Number of points of a circle that must be where the drone may fly.
+
+Between two it is 2 % of the radius further out.
+"""
 
 ON_IT = 5.0
 """m from the circle within which the drone begins to circle; from further away it flies there first."""
 
 
 class Facing(enum.Enum):
-    """Where the nose points. Values of ORBIT_YAW_BEHAVIOUR; 5, "as it is", is the first."""
+    """Heading of the nose on the circle.
+
+    Values of ORBIT_YAW_BEHAVIOUR; 5, "as it is", is the first.
+    """
 
     CENTRE = 0
     KEEP = 1
@@ -50,7 +59,7 @@ class Facing(enum.Enum):
 
 @dataclass(frozen=True)
 class Circle:
-    """An orbit, as it is flown."""
+    """An orbit in the values that are flown."""
 
     centre: Place
     radius: float
@@ -65,21 +74,24 @@ class Circle:
     heading: float = 0.0
     """rad from north, for `Facing.KEEP`."""
     angle: float | None = None
-    """rad to fly along it; None: until something else is asked for."""
+    """rad to fly along it; None: until another command."""
 
     @property
     def signed_radius(self) -> float:
-        """m, + clockwise: as MAVLink writes both in one."""
+        """m, + clockwise: radius and direction in one, as MAVLink writes them."""
         return self.radius * self.direction
 
 
 def fastest(radius: float, tilt_deg: float) -> float:
-    """m/s along a circle that full tilt leaves room for."""
+    """Return the speed (m/s) along a circle that full tilt allows."""
     return math.sqrt(SHARE_OF_TILT * G * math.tan(tilt_deg * units.RAD_PER_DEG) * radius)
 
 
 def entry(circle: Circle, here: Place) -> Place:
-    """The point of the circle that is nearest to a place; north of the centre from the centre itself."""
+    """Return the point of the circle that is nearest to a place.
+
+    From the centre itself it is the point north of the centre.
+    """
     north, east = geo.offset(*circle.centre.point, *here.point)
     distance = math.hypot(north, east)
     north, east = (1.0, 0.0) if distance < 1e-3 else (north / distance, east / distance)
@@ -87,7 +99,10 @@ def entry(circle: Circle, here: Place) -> Place:
 
 
 def outline(circle: Circle, here: Place) -> list[Place]:
-    """Points of the circle to look at before it is flown, where it is entered from `here` first."""
+    """Return the points of the circle to check before it is flown.
+
+    The first is the entry from `here`.
+    """
     corners = (2.0 * math.pi * n / LOOKS for n in range(LOOKS))
     centre, radius = circle.centre.point, circle.radius
     return [
@@ -97,7 +112,7 @@ def outline(circle: Circle, here: Place) -> list[Place]:
 
 
 def heading_at(circle: Circle, bearing: float) -> float | None:
-    """rad from north that the nose is to point to, at a bearing from the centre; None: it may point anywhere."""
+    """Return the heading (rad from north) at a bearing from the centre; None: any heading."""
     if circle.facing is Facing.CENTRE:
         return units.wrap_pi(bearing + math.pi)
     if circle.facing is Facing.TANGENT:
@@ -106,7 +121,7 @@ def heading_at(circle: Circle, bearing: float) -> float | None:
 
 
 class Lap:
-    """One drone on one circle: how far it has come."""
+    """Progress of one drone on one circle."""
 
     def __init__(self, circle: Circle) -> None:
         self.circle = circle
@@ -119,7 +134,7 @@ class Lap:
         return self.circle.angle is not None and self.flown >= self.circle.angle
 
     def demand(self, motion: Motion) -> Demand | None:
-        """What the sticks are to achieve now; None while nobody knows where the drone is."""
+        """Return the present demand for the loops; None while the drone's position is unknown."""
         circle = self.circle
         if motion.reference is None:
             return None

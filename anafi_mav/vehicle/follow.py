@@ -1,4 +1,4 @@
-"""Following a target: where it is, where the drone belongs, and who says so. No I/O; time is handed in.
+"""Following a target: its place, and the drone's place beside it. No I/O.
 
 Parrot's own follow me (feature follow_me) looks for its target in the picture of a controller that shows it, which a
 MAVLink client cannot do. So the gateway follows: FOLLOW_TARGET says where the target is, the geometry is PX4's
@@ -18,32 +18,41 @@ from anafi_mav import units
 from anafi_mav.vehicle.base.velocity_loop import Axis, Demand
 
 SILENCE = 2.5
-"""s without a word of the target until the drone hovers: MAVSDK sends one a second, and one may be lost."""
+"""s without a report of the target until the drone hovers.
+
+MAVSDK sends one a second, and one may be lost.
+"""
 
 PATIENCE = 10.0
 """s that a drone in mode Follow waits for its target to appear."""
 
 FORESIGHT = 1.5
-"""s that the target is believed to go on as it did."""
+"""s for which the target is assumed to continue its motion."""
 
 MOVING = 0.5
-"""m/s from which the target's motion has a course."""
+"""m/s from which the direction of the target's motion counts as its course."""
 
 REACH = 500.0
-"""m beyond which a target is not followed: a mistake, most likely, and too far to look at in any case."""
+"""m beyond which a target is not followed.
+
+It is a mistake, most likely, and too far to look at in any case.
+"""
 
 FASTEST = 20.0
-"""m/s likewise."""
+"""m/s beyond which a target is not followed."""
 
 BASELINE = 0.5
-"""s between two positions that a velocity is read off: two that come at once would make a rocket of a walker."""
+"""s between two positions from which a velocity is measured.
+
+Two that arrive at once would give a walker the speed of a rocket.
+"""
 
 SLUGGISH = 0.1
-"""The least share of a new position that is believed, however calm the target is to be."""
+"""Lowest weight of a new position, however smooth the target's motion must be."""
 
 
 class AltitudeMode(enum.IntEnum):
-    """What the height of the drone counts from (FLW_TGT_ALT_M)."""
+    """Reference of the drone's height (FLW_TGT_ALT_M)."""
 
     TAKEOFF = 0
     TERRAIN = 1
@@ -52,10 +61,10 @@ class AltitudeMode(enum.IntEnum):
 
 @dataclass
 class FollowSettings:
-    """Where the drone belongs, in PX4's terms and with its defaults."""
+    """Wanted position relative to the target, in PX4's terms and with its defaults."""
 
     height: float = 8.0
-    """m above what `altitude_mode` says (FLW_TGT_HT)."""
+    """m above the reference of `altitude_mode` (FLW_TGT_HT)."""
     distance: float = 8.0
     """m over ground (FLW_TGT_DST)."""
     angle: float = 180.0
@@ -69,7 +78,7 @@ class FollowSettings:
 
 
 class State(enum.Enum):
-    """Where following stands."""
+    """State of following."""
 
     OFF = "another mode flies"
     WAITING = "hovers until a target appears"
@@ -77,7 +86,7 @@ class State(enum.Enum):
 
 
 class Event(enum.Enum):
-    """What can happen to it."""
+    """Event that changes the state."""
 
     ENGAGE = "mode Follow asked for"
     TARGET = "the target told where it is"
@@ -100,42 +109,42 @@ TRANSITIONS: dict[State, dict[Event, State]] = {
         Event.END: State.OFF,
     },
 }
-"""The pair that is missing cannot happen: nobody waits for a target while another mode flies."""
+"""The missing pair cannot happen: there is no waiting for a target in another mode."""
 
 
 @dataclass(frozen=True)
 class Sighting:
-    """What one FOLLOW_TARGET says."""
+    """Content of one FOLLOW_TARGET."""
 
     latitude: float
     longitude: float
     altitude: float | None
     """m above mean sea level."""
     velocity: tuple[float, float] | None
-    """m/s north and east; None: not told."""
+    """m/s north and east; None: not reported."""
 
 
 class Follower:
-    """The target of one vehicle, in metres north and east as `Motion` counts them."""
+    """The target of one vehicle, in metres north and east of the reference of `Motion`."""
 
     def __init__(self, settings: FollowSettings) -> None:
         self.settings = settings
         self.altitude: float | None = None
-        """m above mean sea level, as last told."""
+        """m above mean sea level, as last reported."""
         self._place: tuple[float, float] | None = None
         self._velocity = (0.0, 0.0)
         self._at = self._heard_at = -math.inf
         self._raw = self._mark = (0.0, 0.0)
-        """The newest position as it was told, and the one that the velocity is read off against."""
+        """The newest reported position, and the position from which the velocity is measured."""
         self._raw_at = self._mark_at = -math.inf
         self._side: float | None = None
-        """Direction (rad from north) from the target to where the drone belongs."""
+        """Direction (rad from north) from the target to the wanted position of the drone."""
         self._course: float | None = None
         self._aimed_at = -math.inf
 
     @property
     def known(self) -> bool:
-        """A target has appeared."""
+        """True when a target has been reported."""
         return self._place is not None
 
     @property
@@ -146,7 +155,7 @@ class Follower:
     def see(
         self, north: float, east: float, altitude: float | None, velocity: tuple[float, float] | None, now: float
     ) -> None:
-        """The target is there. Without a velocity its motion is read off its positions."""
+        """Take a reported position; without a reported velocity it is measured from the positions."""
         believed = max(SLUGGISH, 1.0 - self.settings.responsiveness)
         expected = self.target(now)
         heard_of, self.altitude = self._heard_at, altitude
@@ -175,13 +184,13 @@ class Follower:
             self._course = math.atan2(self._velocity[1], self._velocity[0])
 
     def _begin(self, north: float, east: float, velocity: tuple[float, float], now: float) -> None:
-        """What was known before counts for nothing."""
+        """Start with a new position and velocity; earlier ones no longer count."""
         self._place = self._raw = self._mark = (north, east)
         self._velocity = velocity
         self._at = self._raw_at = self._mark_at = now
 
     def _read_off(self, north: float, east: float, now: float) -> tuple[float, float] | None:
-        """The velocity (m/s) since the last mark; None while that is too young to tell."""
+        """Return the velocity (m/s) since the last mark; None while the mark is too recent."""
         elapsed = now - self._mark_at
         if elapsed < BASELINE:
             return None
@@ -191,14 +200,17 @@ class Follower:
         return velocity[0] * share, velocity[1] * share
 
     def target(self, now: float) -> tuple[float, float] | None:
-        """Where the target is believed to be (north, east); None before it has appeared."""
+        """Return the estimated position of the target (north, east); None before its first report."""
         if self._place is None:
             return None
         ahead = min(max(now - self._at, 0.0), FORESIGHT)
         return self._place[0] + self._velocity[0] * ahead, self._place[1] + self._velocity[1] * ahead
 
     def aim(self, north: float, east: float, height: float, now: float) -> Demand | None:
-        """Where a drone that is at (north, east) belongs, `height` m above take-off; None without a target."""
+        """Return the demand for a drone at (north, east); None without a target.
+
+        `height` is the height to fly at, in m above take-off.
+        """
         target = self.target(now)
         if target is None:
             return None

@@ -1,6 +1,6 @@
-"""Flies the drone after a target: the shell around the core `follow`.
+"""Flies the drone after a target: the part with I/O around the core `follow`.
 
-It closes on the drone's own speed, as velocities of a program do. When the target falls silent the drone hovers, in
+Its loop closes on the drone's own speed, as for velocity setpoints. When the target is silent the drone hovers, in
 mode Hold.
 """
 
@@ -57,11 +57,14 @@ class FollowFlight:
 
     @property
     def engaged(self) -> bool:
-        """The drone follows, or waits for its target."""
+        """True when the drone follows, or waits for its target."""
         return self.state is not State.OFF
 
     async def engage(self) -> None:
-        """Mode Follow begins; returns when the drone hovers and waits for its target, or raises `Refused`."""
+        """Begin mode Follow; return when the drone hovers and waits for its target.
+
+        Raises `Refused`.
+        """
         vehicle = self._vehicle
         if not vehicle.in_air:
             raise Refused(texts.FOLLOW, texts.TAKE_OFF_FIRST)
@@ -92,7 +95,10 @@ class FollowFlight:
         self._watch(PATIENCE)
 
     def receive(self, sender: Hashable, seen: Sighting) -> None:
-        """Somebody tells where a target is. The first one to do so in mode Follow leads until the mode ends."""
+        """Take a target's position from a sender.
+
+        The first sender in mode Follow is followed until the mode ends.
+        """
         if self.state is State.OFF or (self.state is State.FOLLOWING and sender != self._leader):
             return
         if reason := self._objection(seen):
@@ -120,7 +126,7 @@ class FollowFlight:
         return texts.TARGET_FAR.fill(distance=distance) if distance > REACH else None
 
     def end(self) -> list[asyncio.Task[None]]:
-        """Something else flies now."""
+        """End this flight task: something else flies the drone now."""
         if self.state is not State.OFF:
             self.state = TRANSITIONS[self.state][Event.END]
             self._silence.cancel()
@@ -130,12 +136,12 @@ class FollowFlight:
         return []
 
     def link_down(self) -> None:
-        """The drone is gone, and follows nobody."""
+        """End mode Follow: the drone is disconnected."""
         self._silence.cancel()
         self.state = State.OFF
 
     def subscriptions(self) -> Subscriptions:
-        """Return the handlers of what reports how the drone moves: the loop closes on it."""
+        """Return the handlers of messages that report the drone's motion: the loop closes on it."""
         return {events.SpeedChanged: self._on_speed}
 
     def _on_speed(self, message: events.SpeedChanged, now: float) -> None:
@@ -172,7 +178,9 @@ class FollowFlight:
         vehicle.drone.piloting.pilot(sticks)
 
     def _height(self) -> float:
-        """Return the height (m above take-off) to fly at; raises `Refused` when that is not known or not allowed.
+        """Return the height to fly at (m, above take-off).
+
+        Raises `Refused` when it is unknown or not allowed.
 
         A target that asks for less than `LOWEST` is followed at the height that the drone had then: programs send an
         altitude of 0 for one that they do not know.
@@ -210,6 +218,6 @@ class FollowFlight:
         self._vehicle.text(Severity.WARNING, texts.FOLLOW_ENDED.fill(reason=why))
 
     def _watch(self, patience: float) -> None:
-        """Come back when the target has said nothing for so long."""
+        """Schedule the end of the mode after `patience` s without a report of the target."""
         delay = max(self._heard_at + patience - self._clock.monotonic(), 0.0)
         self._silence.set_in(delay)

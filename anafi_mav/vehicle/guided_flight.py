@@ -1,6 +1,7 @@
-"""Flies the drone by single orders: to a place, a height and a heading. The drone makes each move by itself.
+"""Flies the drone by single commands: to a place, a height and a heading.
 
-Not a `Helm`: a move needs nobody who keeps telling the drone how.
+The drone makes each move by itself. A move needs no continuous setpoints, so this class does not implement the
+flight-task interface.
 """
 
 from __future__ import annotations
@@ -18,12 +19,15 @@ from anafi_mav.vehicle.base.place import Place
 from anafi_mav.vehicle.base.refusal import Refused
 
 SAME_HEIGHT = 0.1
-"""m by which the height of a moveTo may differ from the one asked for: some millimetres tell two of them apart."""
+"""m by which the height of a moveTo may differ from the commanded one.
+
+Some millimetres distinguish two of them.
+"""
 
 
 @dataclass(frozen=True)
 class Goto:
-    """Where a guided move leads."""
+    """Target of a guided move."""
 
     place: Place
     ato: float
@@ -33,10 +37,10 @@ class Goto:
     speed: float | None
     """m/s over ground, of this move only; None: the vehicle's cruise speed."""
     mode: FlightMode
-    """The mode that the vehicle is in on the way."""
+    """Mode of the vehicle on the way."""
 
     def is_to(self, target: Position) -> bool:
-        """A moveTo with this target (height above take-off) flies there."""
+        """True when a moveTo with this target (height above take-off) flies there."""
         return (
             self.place.latitude == target.latitude
             and self.place.longitude == target.longitude
@@ -51,17 +55,17 @@ class Goto:
 
 
 class GuidedFlight:
-    """The moves of one vehicle, one at a time: where it is on its way to, and where it has arrived."""
+    """The moves of one vehicle, one at a time: the present target and the last arrival."""
 
     def __init__(self, vehicle: Aircraft) -> None:
         self._vehicle = vehicle
         self._goto: Goto | None = None
         self._arrived: tuple[Place, Position | None] | None = None
-        """Where the last move ended well, and the drone's newest GPS location then."""
+        """Target of the last completed move, and the drone's newest GPS location then."""
 
     @property
     def goto(self) -> Goto | None:
-        """Where the drone is on its way to, by `go` or by a single setpoint in Guided; None when on no such way."""
+        """Target of the present move, by `go` or by a single setpoint in Guided; None without one."""
         goto, vehicle, move = self._goto, self._vehicle, self._vehicle.drone.piloting.move
         if move is None or move.target is None:
             return None
@@ -73,7 +77,10 @@ class GuidedFlight:
         return Goto(Place(target.latitude, target.longitude), target.altitude, None, None, FlightMode.GUIDED)
 
     def check(self, place: Place | None, ato: float | None) -> None:
-        """Raise `Refused` for a place or height (m above take-off) that cannot be flown to at present; None: any."""
+        """Raise `Refused` for a place or height (m, above take-off) that cannot be flown to now.
+
+        None is not checked.
+        """
         if ato is not None:
             check_height(self._vehicle, ato)
         if place is not None:
@@ -87,8 +94,10 @@ class GuidedFlight:
         speed: float | None = None,
         mode: FlightMode = FlightMode.HOLD,
     ) -> None:
-        """Go to a place, height (m above take-off) and heading (rad); None keeps what is, a place that is being flown
-        to too (as PX4 does). Returns when it moves; a change of height without a GPS fix returns at its end.
+        """Go to a place, height (m, above take-off) and heading (rad).
+
+        None keeps the present value; for the place also the target of a move under way (as PX4 does). Returns when
+        the drone moves; a change of height without a GPS fix returns at its end.
 
         `speed` (m/s over ground) counts for this move only. `mode` is Hold or Guided.
         """
@@ -109,9 +118,9 @@ class GuidedFlight:
         await self.go(Goto(place or kept, ato, yaw, speed, mode), checked=place is None)
 
     async def go(self, goto: Goto, *, checked: bool = False) -> None:
-        """Fly to a place, or change how it is being flown to. Returns when the drone is on its way.
+        """Fly to a place, or change the move to it. Returns when the drone is on its way.
 
-        `checked`: the place is where the drone is, which needs no leave.
+        `checked`: the place is the drone's own position, which needs no check.
         """
         vehicle = self._vehicle
         if (descent := vehicle.descent) is not None:
@@ -171,21 +180,23 @@ class GuidedFlight:
         vehicle.select(mode)
 
     async def turn(self, angle: float, rate_dps: float | None, mode: FlightMode) -> None:
-        """Turn by `angle` (rad, clockwise +) where the drone hovers, at `rate_dps` (None: the drone's own).
+        """Turn by `angle` where the drone hovers; return when it has turned.
 
-        Returns when it has turned.
+        `angle` is in rad, clockwise +; `rate_dps` in deg/s (None: the drone's own).
         """
         await self._begin(texts.TURN, mode)
         await self._vehicle.drone.piloting.move_by(0.0, 0.0, 0.0, angle, turn_rate_dps=rate_dps)
 
     def forget_arrival(self) -> None:
-        """Something else is ordered: the drone is where it says it is."""
+        """Forget the last arrival, because another command is run: the GPS location counts again."""
         self._arrived = None
 
     @property
     def _standing(self) -> Place | None:
-        """Where the drone is by having arrived there, as long as its GPS location is from before: that comes once a
-        second only, and to keep it would lead the drone back by some metres."""
+        """Target of the last move while the drone's GPS location is still from before the arrival.
+
+        A location is reported once a second only, and to use it would fly the drone back by some metres.
+        """
         if self._arrived is None or self._vehicle.drone.gps.state.location is not self._arrived[1]:
             return None
         return self._arrived[0]

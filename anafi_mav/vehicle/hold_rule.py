@@ -1,4 +1,6 @@
-"""When a client's Hold counts against a return that the drone begins or announces. No I/O; time is handed in.
+"""Rule for a client's Hold against a return that the drone begins or announces.
+
+No I/O; time is passed in.
 
 Programs send Hold many times, a person means each of them. So a Hold counts only when its client sent no other in the
 5 s before, and an announced return is cancelled only by a second Hold that answers the text about the first.
@@ -20,12 +22,12 @@ MAX_CLIENTS = 64
 
 
 class HoldRule:
-    """The Holds of each client, and which announcement each has answered once."""
+    """The Holds of each client, and the announcement that each has answered once."""
 
     def __init__(self) -> None:
         self._newest: dict[Hashable, float] = {}
         self._offered: dict[Hashable, float] = {}
-        """When the text about an announced return left, by the client whose Hold it answered."""
+        """Send time of the text about an announced return, by the client whose Hold it answered."""
 
     def arrive(self, client: Hashable, now: float) -> bool:
         """Note a Hold, retransmissions included; True when it counts."""
@@ -47,5 +49,5 @@ class HoldRule:
         return APART <= now - self._offered.get(client, -math.inf) <= ANSWER
 
     def withdraw(self) -> None:
-        """No return is announced: what was offered before does not count for the next announcement."""
+        """Note that no return is announced: earlier texts do not count for the next announcement."""
         self._offered.clear()

@@ -1,7 +1,7 @@
-"""Who began the landing or return that the drone flies: a client, the drone, or the pilot at the Skycontroller.
+"""Initiator of a landing or return: a client, the drone, or the pilot at the Skycontroller.
 
-The drone does not report it. It is concluded from what was commanded through the gateway, from the reported reasons of
-a return, and from whether there is a Skycontroller at all. No I/O; time is handed in.
+The drone does not report it. It is concluded from the commands sent through the gateway, from the reported reasons of
+a return, and from whether there is a Skycontroller at all. No I/O; time is passed in.
 """
 
 from __future__ import annotations
@@ -10,14 +10,17 @@ import enum
 import math
 
 REPORTED_WITHIN = 15.0
-"""s after a Landing was sent in which a landing that begins is that one (it is repeated for 10 s)."""
+"""s after a Landing was sent in which a landing that begins is attributed to it.
+
+It is repeated for 10 s.
+"""
 
 ENDS_IN_LANDING = 3.0
-"""s after the end of a return in which a landing that begins is its end."""
+"""s after the end of a return in which a landing that begins counts as its end."""
 
 
 class Initiator(enum.Enum):
-    """Who began it."""
+    """Initiator of a landing or return."""
 
     CLIENT = "a client, or the gateway for it"
     DRONE = "the drone"
@@ -25,7 +28,7 @@ class Initiator(enum.Enum):
 
 
 class Initiators:
-    """Keeps who began the present landing, and who began the present or last return."""
+    """Keeps the initiator of the present landing, and of the present or last return."""
 
     def __init__(self) -> None:
         self.landing: Initiator | None = None
@@ -35,18 +38,18 @@ class Initiators:
         self._land_sent = -math.inf
         self._return_sent = -math.inf
         self._returned: tuple[Initiator, float] | None = None
-        """Who began the return that ended last, and when it ended."""
+        """Initiator of the return that ended last, and its end time."""
 
     def land_commanded(self, now: float) -> None:
-        """A Landing is about to be sent."""
+        """Note that a Landing is about to be sent."""
         self._land_sent = now
 
     def return_commanded(self, now: float) -> None:
-        """A return is about to be commanded."""
+        """Note that a return is about to be commanded."""
         self._return_sent = now
 
     def on_landing(self, now: float, *, plan_lands: bool, skycontroller: bool) -> None:
-        """The drone has begun to land. `plan_lands`: its flight plan ends so."""
+        """Note that the drone has begun to land. `plan_lands`: its flight plan ends so."""
         if now - self._land_sent <= REPORTED_WITHIN or plan_lands:
             self.landing = Initiator.CLIENT
         elif self.returning is not None:
@@ -57,13 +60,16 @@ class Initiators:
             self.landing = Initiator.PILOT if skycontroller else Initiator.DRONE
 
     def on_landing_over(self, *, unsent: bool) -> None:
-        """The drone does not land: it stands, or flies again. `unsent`: no Landing waits for its answer."""
+        """Note that the drone does not land: it stands, or flies again.
+
+        `unsent`: no Landing waits for its answer.
+        """
         if self.landing is not None and unsent:
             self._land_sent = -math.inf
         self.landing = None
 
     def on_return(self, now: float, *, by_itself: bool, by_plan: bool, skycontroller: bool) -> None:
-        """The drone returns; `by_itself` and `by_plan` are what it reports as the reason."""
+        """Note that the drone returns; `by_itself` and `by_plan` are its reported reason."""
         if by_itself:
             self.returning = Initiator.DRONE
         elif by_plan or not skycontroller or now - self._return_sent <= REPORTED_WITHIN:
@@ -72,7 +78,7 @@ class Initiators:
             self.returning = Initiator.PILOT
 
     def on_return_over(self, now: float) -> None:
-        """The drone does not return."""
+        """Note that the drone does not return."""
         if self.returning is not None:
             self._returned = self.returning, now
             self.returning = None

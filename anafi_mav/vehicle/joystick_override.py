@@ -1,8 +1,10 @@
-"""When a joystick takes the drone over from what flies it, as PX4's COM_RC_OVERRIDE. No I/O; time is handed in.
+"""Detects a joystick that overrides the active flight task, as PX4's COM_RC_OVERRIDE.
+
+No I/O; time is passed in.
 
 The edge counts: a stick that leaves the middle after it has rested there. So a joystick that lies on the table, or is
-switched on with a stick at its end, does nothing. The throttle never takes over, since that of many joysticks rests at
-its lower end, and after a takeover it counts only once it has passed the middle.
+switched on with a stick at its end, does nothing. The throttle never overrides, since that of many joysticks rests at
+its lower end, and after an override it counts only once it has passed the middle.
 """
 
 from __future__ import annotations
@@ -19,14 +21,17 @@ REST = 0.5
 """s that all three sticks must have rested there."""
 
 GAP = 0.5
-"""s between two messages after which the rest begins again: nothing is known of what was between them."""
+"""s between two messages after which the rest begins again.
+
+The sticks' motion between the two is unknown.
+"""
 
 MAX_CLIENTS = 8
 """Clients whose sticks are remembered."""
 
 
 class Override(enum.IntFlag):
-    """Bits of COM_RC_OVERRIDE: what a joystick may take the drone over from."""
+    """Bits of COM_RC_OVERRIDE: flight that a joystick may override."""
 
     AUTO = 1
     """Goto, mission, follow, orbit, and a return or landing that a client commanded."""
@@ -39,12 +44,15 @@ class StickEdge:
 
     def __init__(self) -> None:
         self._since = math.inf
-        """When they came to rest; infinite while they are deflected."""
+        """Time at which they came to rest; infinite while they are deflected."""
         self._armed = False
         self._newest = -math.inf
 
     def moved(self, largest: float, threshold: float, now: float) -> bool:
-        """Note the largest deflection of the three sticks; True when it takes over, once for each rest."""
+        """Note the largest deflection of the three sticks; True when it starts a stick override.
+
+        It does so once for each rest of the sticks.
+        """
         if now - self._newest > GAP:
             self._since, self._armed = math.inf, False
         self._newest = now
@@ -65,15 +73,15 @@ class JoystickOverride:
 
     sources: Override = Override.AUTO
     threshold: float = 0.3
-    """Share of the way beyond which a stick takes over."""
+    """Share of the way beyond which a stick overrides."""
 
     def __post_init__(self) -> None:
         self._edges: dict[Hashable, StickEdge] = {}
         self._throttle: dict[Hashable, float] = {}
-        """Side on which the throttle of a client was when it took over; absent once it has passed the middle."""
+        """Side of a client's throttle when it overrode; absent once it has passed the middle."""
 
     def moved(self, client: Hashable, largest: float, now: float) -> bool:
-        """Note the largest deflection of a client's three sticks; True when it takes over."""
+        """Note the largest deflection of a client's three sticks; True when it overrides."""
         edge = self._edges.pop(client, None) or StickEdge()
         self._edges[client] = edge
         if len(self._edges) > MAX_CLIENTS:
@@ -81,13 +89,13 @@ class JoystickOverride:
         return edge.moved(largest, self.threshold, now)
 
     def take_over(self, client: Hashable, climb: float) -> None:
-        """Note that a client has taken over with its throttle at `climb`."""
+        """Note that a client has overridden with its throttle at `climb`."""
         self._throttle.clear()
         if climb:
             self._throttle[client] = math.copysign(1.0, climb)
 
     def climb(self, client: Hashable, climb: float) -> float:
-        """Return the throttle of a client as far as it counts."""
+        """Return a client's throttle; 0 until it has passed the middle after an override."""
         side = self._throttle.get(client)
         if side is None:
             return climb

@@ -5,7 +5,7 @@ streamed all the time, and a goto or a mission is not ended by it. A stick of PX
 over and selects that mode (`joystick_override`). A stick asks for a share of the drone's own MaxTilt,
 MaxVerticalSpeed and MaxRotationSpeed (arsdk 2.2). `services.setpoint.stick_messages` reads them from messages.
 
-`SILENCE` after the last word of whoever flies the sticks are centred.
+The sticks are centred `SILENCE` after the last message of the client that flies them.
 """
 
 from __future__ import annotations
@@ -39,14 +39,14 @@ GESTURE = 0.95
 
 
 class State(enum.Enum):
-    """Where the sticks stand."""
+    """State of the sticks."""
 
     IDLE = "centred, or nobody holds them"
     HELD = "somebody holds them away from the middle"
 
 
 class Event(enum.Enum):
-    """What can happen to them."""
+    """Event that changes the state of the sticks."""
 
     CENTRED = "who holds them has let go, or somebody else's are centred"
     DEFLECTED = "somebody moves them"
@@ -68,7 +68,7 @@ TRANSITIONS: dict[State, dict[Event, State]] = {
 
 @dataclass(frozen=True)
 class Sticks:
-    """Where they are: shares of the way, -1..1."""
+    """Stick positions as fractions of full deflection, -1..1."""
 
     forward: float = 0.0
     right: float = 0.0
@@ -82,10 +82,13 @@ class Sticks:
 
 
 class ManualFlight:
-    """The sticks of ground stations on one vehicle, and the drone flown by those who move them."""
+    """Flies one vehicle by the sticks of ground stations."""
 
     def __init__(self, vehicle: Aircraft, clock: Clock, overridable: Callable[[], Override]) -> None:
-        """`overridable` returns what flies the drone now, as far as a joystick may take over from it."""
+        """Create the flight by sticks for one vehicle.
+
+        `overridable` returns the kind of flight that is active now, as far as a joystick may override it.
+        """
         self.run_action: Callable[[Hashable, Coroutine[Any, Any, None]], asyncio.Task[None]]
         """Runs an action of a client, in its turn among the commands; set by the service."""
         self.override = JoystickOverride()
@@ -100,7 +103,10 @@ class ManualFlight:
         self._silence = Alarm(self._expired)
 
     def receive(self, sender: Hashable, sticks: Sticks, *, overrides: bool = False) -> None:
-        """Take a client's stick positions. With `overrides` they may take the drone over from what flies it."""
+        """Take a client's stick positions.
+
+        With `overrides` they may take the drone over from what flies it.
+        """
         vehicle = self._vehicle
         if overrides and self._takes_over(sender, sticks):
             self._overriding = True
@@ -154,12 +160,15 @@ class ManualFlight:
         self._overriding = False
 
     def silent(self, sender: Hashable) -> None:
-        """Somebody's sticks are gone."""
+        """Centre the sticks when this client holds them: it has released all its channels."""
         if sender == self._pilot:
             self._let_go(Event.CENTRED)
 
     def _may_fly(self, sticks: Sticks) -> bool:
-        """In mode Position they do. What they cannot do is said to whoever means it: a throttle may rest at its end."""
+        """Return True when these sticks may fly the drone: in the air and in mode Position.
+
+        A refusal is sent as a text only when the deflection looks deliberate: a throttle may rest at its end.
+        """
         vehicle, mode = self._vehicle, self._vehicle.mode
         meant = max(abs(sticks.forward), abs(sticks.right), abs(sticks.turn)) >= MEANT
         reason: Text | None = None
@@ -177,19 +186,19 @@ class ManualFlight:
         return False
 
     def end(self) -> list[asyncio.Task[None]]:
-        """Something else flies now."""
+        """End this flight task: something else flies the drone now."""
         self._let_go(Event.END)
         return []
 
     def link_down(self) -> None:
-        """Nobody holds the sticks of a drone that is gone."""
+        """Release the sticks when the drone is disconnected."""
         self._silence.cancel()
         self.override.forget()
         self._overriding = False
         self.state, self._pilot, self._said = State.IDLE, None, -math.inf
 
     def _let_go(self, event: Event) -> None:
-        """Centre the sticks, if somebody held them."""
+        """Centre the sticks if a client held them."""
         held = self.state is State.HELD
         self.state, self._pilot = TRANSITIONS[self.state][event], None
         self._silence.cancel()

@@ -1,9 +1,9 @@
-"""The end of a return that a client or the gateway commanded: a landing at home, or a hover and a text with the reason.
+"""The end of a return that was commanded here: a landing at home, or a hover and a text.
 
-The drone ends its returns as its own setting says (ANF_RTH_END; hovering, from the factory) and the gateway does not
-write that setting: it is also the end of returns that the drone begins by itself. PX4 and ArduCopter land by default.
-So the gateway commands the landing, once the drone has reported that the return is finished, and only where it is
-certain enough of the place: see `objection`.
+The text has the reason. The command is a client's or the gateway's own. The drone ends its returns by its own setting
+(ANF_RTH_END; hovering, from the factory) and the gateway does not write that setting: it is also the end of returns
+that the drone begins by itself. PX4 and ArduCopter land by default. So the gateway commands the landing, once the
+drone has reported that the return is finished, and only where it is certain enough of the place: see `objection`.
 
 A commanded return is one `Attempt`. Any newer command, the ground and the loss of the link end it, and with it
 everything that would still have been sent for it.
@@ -48,6 +48,12 @@ SHORTEST_WAIT = 5.0
 
 LONGEST_WAIT = 60.0
 """s above home that a client can ask for (ArduCopter's largest RTL_LOIT_TIME)."""
+
+LOCATION_WAIT = 1.5
+"""s after the end of a return in which a location from after that end arrives.
+
+An ANAFI reports its location once a second: the last one may be from before it stopped, some metres away.
+"""
 
 UNREPORTED = 10.0
 """s of hovering at home after which a drone that reports no end of its return is asked for its states."""
@@ -150,7 +156,10 @@ class ReturnEnd:
             attempt.stop()
 
     def announce(self, attempt: Attempt, system: int | None) -> None:
-        """The commanded return has begun: send every client its end. `system` commanded it; None: the gateway."""
+        """The commanded return has begun: send every client its end.
+
+        `system` commanded it; None: the gateway.
+        """
         if self._attempt is not attempt:
             return
         if system is None:
@@ -162,7 +171,10 @@ class ReturnEnd:
             self._vehicle.text(Severity.INFO, texts.RETURN_LINK_LOSS)
 
     def end(self) -> list[asyncio.Task[None]]:
-        """Another command, the ground or the loss of the link ends the attempt. Returns tasks that are about to end."""
+        """Another command, the ground or the loss of the link ends the attempt.
+
+        Returns tasks that are about to end.
+        """
         attempt, self._attempt = self._attempt, None
         if attempt is None:
             return []
@@ -229,7 +241,7 @@ class ReturnEnd:
             attempt.task = asyncio.get_running_loop().create_task(self._see_landing(attempt))
         elif self.ending is EndOfReturn.HOVER:
             self._hover(None)
-        elif (reason := self.objection(arrived=True)) is not None:
+        elif (reason := self.objection()) is not None:
             self._hover(reason)
         else:
             attempt.phase = _Phase.WAITING
@@ -239,6 +251,11 @@ class ReturnEnd:
         """Wait above home, then land. Every condition is judged again before each step."""
         vehicle = self._vehicle
         vehicle.changed()
+        if self.objection(arrived=True) is not None:
+            await asyncio.sleep(LOCATION_WAIT)
+            if (reason := self.objection(arrived=True)) is not None:
+                self._hover(reason)
+                return
         if self.wait > SHORTEST_WAIT:
             vehicle.text(Severity.NOTICE, texts.RETURN_LANDING_IN.fill(seconds=self.wait))
             await asyncio.sleep(self.wait - SHORTEST_WAIT)
@@ -265,7 +282,10 @@ class ReturnEnd:
             attempt.task = None
 
     async def _see_landing(self, attempt: Attempt) -> None:
-        """The drone's own setting says that it lands: see to it that it is not shown for longer than it is true."""
+        """Report a hover when the landing by the drone's own setting does not begin in time.
+
+        So a landing is not shown for longer than it is true.
+        """
         await asyncio.sleep(SHORTEST_WAIT)
         attempt.task = None
         if self._vehicle.flying_state not in LANDING:
@@ -283,7 +303,10 @@ class ReturnEnd:
         vehicle.text(Severity.NOTICE, texts.LANDING_PLACE.fill(place=self._label, accuracy=accuracy))
 
     def _hover(self, reason: Text | None) -> None:
-        """The return is over, and the drone stays in the air. `reason`: why it does not land, where it was to."""
+        """The return is over, and the drone stays in the air.
+
+        `reason`: why it does not land, where it was to.
+        """
         vehicle, attempt = self._vehicle, self._attempt
         if attempt is not None:
             self._attempt = None

@@ -1,7 +1,7 @@
-"""From the ground into the air: arming, which an ANAFI does not know, and the take-off to a height.
+"""Arming, which an ANAFI does not know, and the take-off to a height.
 
-The drone takes off to a height of its own; the climb to the asked one is a move that follows in the background. An
-armed state that nothing follows lapses, and so does a take-off that waits for its client to arm.
+The drone takes off to a height of its own; the climb to the requested one is a move that follows in the background.
+An armed state that nothing follows lapses, and so does a take-off that waits for its client to arm.
 """
 
 from __future__ import annotations
@@ -27,10 +27,13 @@ AUTO_DISARM = 10.0
 """s that an armed vehicle waits for a take-off (as PX4's COM_DISARM_PRFLT)."""
 
 ARM_WAIT = 10.0
-"""s that a take-off waits for somebody to arm: QGroundControl sends take-off first and arms on its acceptance."""
+"""s that a take-off waits for arming.
+
+QGroundControl sends take-off first and arms on its acceptance.
+"""
 
 CLIMB_WAIT = 15.0
-"""s for the drone to hover after it took off, before the climb to the asked height is given up."""
+"""s after the take-off without a hover until the climb to the requested height is aborted."""
 
 TAKEOFF_WAIT = 30.0
 """s that a command waits for the end of a take-off."""
@@ -57,7 +60,7 @@ class Takeoff:
         """Arming starts the motors and waits for the drone to be thrown (a parameter; Parrot's UserTakeOff)."""
         self._vehicle = vehicle
         self._tell_armed = armed
-        """Who waited for this client to arm begins."""
+        """Called with a client that has armed: a mission that waits for its arming begins."""
         self._armed = False
         self._armed_by: set[Hashable] = set()
         """Clients that have armed since the vehicle was disarmed last."""
@@ -79,7 +82,10 @@ class Takeoff:
 
     @property
     def armed(self) -> bool:
-        """Arming was accepted and has not lapsed. What flies is armed in any case (`Aircraft.armed`)."""
+        """Arming was accepted and has not lapsed.
+
+        What flies is armed in any case (`Aircraft.armed`).
+        """
         return self._armed
 
     @property
@@ -104,12 +110,14 @@ class Takeoff:
     # What clients ask for. Each returns when the drone confirmed, or raises.
 
     async def arm(self, client: Hashable = None) -> None:
-        """Accept arming. An ANAFI has no such state: nothing turns until a take-off; it lapses after `AUTO_DISARM`.
+        """Accept arming.
+
+        An ANAFI has no such state: nothing turns until a take-off; it lapses after `AUTO_DISARM`.
 
         With `hand_launch` the motors do turn, and the drone flies as soon as it leaves the hand.
 
-        A take-off that this client asked for begins now. Another client's does not: whoever arms to look at something
-        must not find propellers turning.
+        A take-off that this client commanded begins now. Another client's does not: a client that arms only to look
+        at something must not find propellers turning.
         """
         vehicle = self._vehicle
         if vehicle.armed and not vehicle.on_ground:
@@ -134,9 +142,10 @@ class Takeoff:
             self._tell_armed(client)
 
     async def disarm(self, *, force: bool) -> None:
-        """Disarm on the ground; propellers that turn there stop first, with `force` by cutting the motors if need be.
+        """Disarm on the ground; propellers that turn there are stopped first.
 
-        In the air only `force` with `allow_kill` does it: the motors stop, the drone falls.
+        With `force` the motors are cut for that if need be. In the air only `force` with `allow_kill` disarms: the
+        motors stop, the drone falls.
         """
         vehicle = self._vehicle
         if vehicle.on_ground:
@@ -195,18 +204,22 @@ class Takeoff:
         await self._lift_off()
 
     async def abort(self) -> None:
-        """Disarm a drone that stands, land one that is about to leave the ground: its setpoints have stopped."""
+        """Disarm a drone that stands, land one that is about to leave the ground.
+
+        Its setpoints have stopped.
+        """
         await self._vehicle.take_over(STOP_WAIT)
         await self._vehicle.drone.piloting.land()
         self._armed = False
         self._vehicle.changed()
 
     async def over(self, what: Text) -> None:
-        """Wait until an accepted take-off has reached its height; return at once when the drone does not rise.
+        """Wait until an accepted take-off has reached its height.
 
-        Where a Hold has ended the climb, the drone still rises to its own height: then for its first hover. (MAVSDK's
-        goto_location sends Hold first.) Of several commands that wait the newest stays, the others are cancelled.
-        Raises `Unfinished` when the take-off fails, or lasts for longer than `TAKEOFF_WAIT`.
+        Returns at once when the drone does not rise. When a Hold has ended the climb, the drone still rises to its
+        own height: the wait is then for its first hover. (MAVSDK's goto_location sends Hold first.) Of several
+        commands that wait the newest stays, the others are cancelled. Raises `Unfinished` when the take-off fails, or
+        lasts for longer than `TAKEOFF_WAIT`.
         """
         if not self.rises:
             return
@@ -231,7 +244,10 @@ class Takeoff:
             waiting.cancel()
 
     async def _until_risen(self) -> bool:
-        """Wait for the end of a take-off, or of a rise. True: it has reached its height. Never raises."""
+        """Wait for the end of a take-off, or of a rise.
+
+        True: it has reached its height. Never raises.
+        """
         if self.under_way:
             assert self._background is not None
             await asyncio.wait({self._background})
@@ -248,7 +264,10 @@ class Takeoff:
         self._lapsing.cancel()
 
     def end(self) -> list[asyncio.Task[None]]:
-        """Something else flies now: what goes on in the background is given up. Returns tasks that are about to end."""
+        """Abort the background part of the take-off: another flight task is active now.
+
+        Returns tasks that are about to end.
+        """
         task, self._background, self._climbing = self._background, None, False
         if task is None:
             return []
@@ -256,7 +275,10 @@ class Takeoff:
         return [task]
 
     def end_climb(self) -> None:
-        """The drone lands or returns: it does not climb. A take-off that has yet to begin is not disturbed."""
+        """The drone lands or returns: it does not climb.
+
+        A take-off that has yet to begin is not disturbed.
+        """
         if self._climbing:
             self.end()
 
@@ -270,7 +292,7 @@ class Takeoff:
         self._disarming.cancel()
 
     def link_down(self) -> None:
-        """What was asked for before counts for nothing."""
+        """Disarm and cancel everything that was commanded before."""
         self._armed = False
         for task in tuple(self._tasks):
             task.cancel()
@@ -278,7 +300,10 @@ class Takeoff:
     # Taking off.
 
     async def _lift_off(self) -> None:
-        """The drone's own take-off. Until it has succeeded or failed, the armed state does not lapse."""
+        """The drone's own take-off.
+
+        Until it has succeeded or failed, the armed state does not lapse.
+        """
         self._disarming.cancel()
         self._vehicle.paused = False  # a pause that comes from here on ends this take-off
         try:
@@ -288,7 +313,10 @@ class Takeoff:
                 self._disarming.set_in(AUTO_DISARM)
 
     async def _take_off_and_report(self, height: float) -> None:
-        """The take-off that waited for arming: its command was answered long ago, so failures are texts."""
+        """Take off after the wait for arming; failures are sent as texts.
+
+        The command was answered long ago.
+        """
         try:
             await self._lift_off()
         except AnafiMavError as error:

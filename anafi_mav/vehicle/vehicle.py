@@ -1,8 +1,11 @@
-"""The flight core: one drone as the vehicle that MAVLink's clients think they fly. No flavour, no message.
+"""The flight core: one drone as the vehicle that MAVLink's clients see.
 
-It knows what MAVLink has and an ANAFI has not (an armed state, a chosen mode) and keeps it honest: both follow what the
-drone does, and a verb returns when the drone confirmed. Whatever is to fly the drone takes it over here. How it gets
-into the air is `takeoff`, how to a place `guided_flight`; who keeps telling it how to fly is a `Helm`.
+No flavour, no message.
+
+It holds the states that MAVLink has and an ANAFI has not (armed, chosen mode) and keeps them true: both follow the
+drone's behaviour, and a verb returns when the drone confirmed. Every flight task is acquired and released here. The
+take-off is in `takeoff`, the flight to a place in `guided_flight`; a part that sends the drone setpoints all the time
+is a flight task.
 """
 
 from __future__ import annotations
@@ -94,7 +97,7 @@ _AUTO = (FlightMode.MISSION, FlightMode.FOLLOW, FlightMode.ORBIT, FlightMode.RET
 
 
 class Landed(enum.Enum):
-    """Where the vehicle is between ground and air."""
+    """State of the vehicle between ground and air."""
 
     UNKNOWN = 0
     ON_GROUND = 1
@@ -127,7 +130,7 @@ class Vehicle(Aircraft):
     ) -> None:
         super().__init__(drone, text=text, changed=changed)
         self.gcs_loss = LossPolicy()
-        """What to do when no ground station is heard any more (a parameter)."""
+        """Reaction to the loss of all ground stations (a parameter)."""
         self.rally = RallyPoints()
         self.orders = 0
         """Counts who took the vehicle over, and what ended all orders: the ground, the loss of the link."""
@@ -197,7 +200,7 @@ class Vehicle(Aircraft):
 
     @property
     def place(self) -> Place | None:
-        """Where the drone is; None without a fix, and in flight while the newest location is old."""
+        """Return the drone's position; None without a fix, and in flight while the newest is old."""
         return None if self.position_is_old else super().place
 
     @property
@@ -227,8 +230,10 @@ class Vehicle(Aircraft):
 
     @property
     def overridable(self) -> Override:
-        """What flies the drone, as far as a joystick may take over from it; whether a landing or return ends, `hold`
-        decides."""
+        """Return the active kind of flight, as far as a joystick may override it.
+
+        Whether a landing or return may be ended is decided by `hold`.
+        """
         mode = self.mode
         if self.offboard.engaged and mode in (FlightMode.OFFBOARD, FlightMode.GUIDED):
             return Override.OFFBOARD
@@ -252,8 +257,10 @@ class Vehicle(Aircraft):
 
     @property
     def enterable_modes(self) -> frozenset[FlightMode]:
-        """Modes that a client may ask for as things stand. Hold, Land and Return are always among them: whether the
-        drone can, it says itself."""
+        """Modes that a client may ask for as things stand.
+
+        Hold, Land and Return are always among them: whether the drone can, it says itself.
+        """
         modes = {FlightMode.HOLD, FlightMode.GUIDED, FlightMode.POSITION, FlightMode.TAKEOFF}
         modes |= {FlightMode.LAND, FlightMode.RETURN, FlightMode.OFFBOARD}
         if self.place is not None:
@@ -459,7 +466,10 @@ class Vehicle(Aircraft):
             raise Refused(what, NOT_COUNTED)
 
     async def _free(self, what: Text, by: Right) -> None:
-        """End a landing or return that `by` may end; returns when the drone hovers, at once when it does neither."""
+        """End a landing or return that `by` may end; returns when the drone hovers.
+
+        Returns at once when the drone neither lands nor returns.
+        """
         if self.descends:
             self._require_endable(what, by)
             await self.take_over(STOP_WAIT)
@@ -489,7 +499,10 @@ class Vehicle(Aircraft):
             await self._answer_announced(announced, by)
 
     def _announced_for(self, by: Right) -> bool | None:
-        """A return is announced and this Hold counts. True: it cancels it, False: it is the first; None otherwise."""
+        """A return is announced and this Hold counts.
+
+        True: it cancels it, False: it is the first; None otherwise.
+        """
         trigger = self.drone.home.state.auto_trigger
         cancellable = trigger not in (None, AutoTriggerReason.NONE, AutoTriggerReason.MOTOR_DOWN)
         if not cancellable:
@@ -516,7 +529,10 @@ class Vehicle(Aircraft):
         self._return_aborted(by, ReturnReason.LOW_BATTERY)  # the one reason that is announced and can be cancelled
 
     def _return_aborted(self, by: Right, reason: ReturnReason | None) -> None:
-        """Notify everybody that a client has ended a return of the drone's own, or cancelled it: at once, and again."""
+        """Notify all clients that a client has ended or cancelled a return of the drone's own.
+
+        They are notified at once, and repeatedly.
+        """
         self.aborted_return = AbortedReturn(by.system, reason)
         self.aborted_return.report(self, self._clock.monotonic())
 
@@ -535,7 +551,10 @@ class Vehicle(Aircraft):
     # What the drone reports.
 
     def subscriptions(self) -> Subscriptions:
-        """Return the handlers of events that change the vehicle's own state. Services are called after them."""
+        """Return the handlers of events that change the vehicle's own state.
+
+        Services are called after them.
+        """
         return {
             FlyingStateChanged: lambda message, now: self.on_flying_state(),
             GpsLocationChanged: lambda message, now: self.on_location(),
@@ -598,19 +617,25 @@ class Vehicle(Aircraft):
             self.text(Severity.WARNING, ESTIMATED)
 
     def _report_accuracy(self) -> None:
-        """Report that AMSL heights of this flight will be wrong by as much as GPS is at its beginning."""
+        """Warn that AMSL heights of this flight have the error of GPS at its beginning."""
         gps = self.drone.gps.state
         if gps.fixed and gps.altitude_accuracy is not None and gps.altitude_accuracy > GOOD_ACCURACY:
             self.text(Severity.WARNING, texts.TAKEOFF_AMSL_INACCURATE.fill(error=gps.altitude_accuracy))
 
     def on_takeoff_location(self) -> None:
-        """Adopt the take-off place that the drone reports for the present flight as origin of the local frame."""
+        """Adopt the take-off place of the present flight as origin of the local frame.
+
+        The drone reports it.
+        """
         location = self.drone.home.state.takeoff_location
         if location is not None and self.flying_state is not None and not self.on_ground:
             self.origin = Place(location.latitude, location.longitude)
 
     def link_up(self, kept: TakeoffRecord | None) -> None:
-        """Begin with a drone that has reported all its states. `kept` is of the last flight that was seen."""
+        """Begin with a drone that has reported all its states.
+
+        `kept` is of the last flight that was seen.
+        """
         self.height.recall(kept)
         self.on_flying_state()
         self.on_location()  # the one that it has reported counts for as long as a new one
@@ -636,7 +661,10 @@ class Vehicle(Aircraft):
 
     @property
     def takeoff_record(self) -> TakeoffRecord | None:
-        """The take-off point of the present flight, to be kept; None on the ground or without a flight id."""
+        """Return the record of the present flight's take-off point, to be stored.
+
+        Returns None on the ground or without a flight id.
+        """
         height, origin = self.height, self.origin
         if self.on_ground or not height.flight_id or height.takeoff_amsl is None:
             return None
@@ -644,7 +672,10 @@ class Vehicle(Aircraft):
         return TakeoffRecord(height.flight_id, height.takeoff_amsl, height.estimated, *place)
 
     def on_return(self) -> None:
-        """The drone's return began, ended or changed: setpoints and the climb after a take-off never fight it."""
+        """React to a drone's return that began, ended or changed.
+
+        Setpoints and the climb after a take-off end then, so that they never fight the return.
+        """
         self._note_return()
         home = self.drone.home.state
         finished = home.rth == RthState.AVAILABLE and home.reason == ReturnReason.FINISHED
@@ -676,15 +707,19 @@ class Vehicle(Aircraft):
 
     @property
     def alone(self) -> str | None:
-        """The end of a return or landing without the gateway, as a predicate of the drone; None: neither is on."""
+        """Return how a return or landing ends without the gateway, as a predicate of the drone.
+
+        Returns None if neither is active.
+        """
         if self.landing:
             return "is landing, and goes on landing"
         return self.return_end.alone if self.descends else None
 
     async def let_go(self) -> None:
-        """The gateway ends: a landing or a return goes on, everything else is ended, and a flying drone hovers.
+        """Prepare for the end of the gateway: a landing or return goes on, else the drone hovers.
 
-        One whose sticks are the Skycontroller pilot's is left to him: nothing of ours flies it.
+        Everything else is ended. When the Skycontroller's pilot has the sticks, the drone is left to that pilot:
+        nothing of ours flies it.
         """
         if self.descends:
             if not self.landing:
@@ -697,7 +732,7 @@ class Vehicle(Aircraft):
             await self.drone.piloting.stop()
 
     def _note_landing(self, before: FlyingState | None) -> None:
-        """Keep who began the landing that begins or ends."""
+        """Record the initiator of the landing that begins or ends."""
         initiators, now = self._initiators, self._clock.monotonic()
         if before is None:
             self._note_return()
@@ -713,7 +748,7 @@ class Vehicle(Aircraft):
             self.aborted_return = None
 
     def _note_return(self) -> None:
-        """Keep who began the return that begins or ends."""
+        """Record the initiator of the return that begins or ends."""
         now, home = self._clock.monotonic(), self.drone.home.state
         if not self.returning:
             self._initiators.on_return_over(now)
@@ -729,10 +764,12 @@ class Vehicle(Aircraft):
 
     @contextmanager
     def _selected_no_more(self, wanted: FlightMode | None) -> Iterator[None]:
-        """The mode that was chosen is over but for `wanted`, before the drone shows what it is told in the block: a
-        setpoint or stick of that mode that comes meanwhile is not a newer order. On the ground there is none to stop.
+        """Withdraw the chosen mode, unless it is `wanted`, while the drone is commanded.
 
-        What the drone does not do leaves all as it was.
+        The mode ends before the drone shows the effect of the command in the block. A setpoint or stick input of that
+        mode that arrives meanwhile is no newer command. On the ground there is no mode to withdraw.
+
+        If the command fails, the mode is restored, unless a newer command has arrived.
         """
         before, orders = self._selected, self.orders
         if before is not wanted and not self.on_ground:

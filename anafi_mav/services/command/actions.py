@@ -1,4 +1,7 @@
-"""The command table: MAV_CMD → what the vehicle does. A handler returns when the drone confirmed, or raises."""
+"""The command table: MAV_CMD → the vehicle's action.
+
+A handler returns when the drone confirmed, or raises.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +37,7 @@ async def arm_disarm(vehicle: Vehicle, command: Command) -> None:
 
 
 async def takeoff(vehicle: Vehicle, command: Command) -> None:
-    """MAV_CMD_NAV_TAKEOFF. What z means depends on who asks (conformance E2).
+    """Run MAV_CMD_NAV_TAKEOFF; the reference of z depends on the client (conformance E2).
 
     Unset: the height of MIS_TAKEOFF_ALT. COMMAND_LONG with latitude and longitude exactly 0, or from a client whose
     family means it so: above the take-off point (MAVProxy, dronekit, Mission Planner). Any other COMMAND_LONG: AMSL
@@ -48,7 +51,7 @@ async def takeoff(vehicle: Vehicle, command: Command) -> None:
 
 
 async def land(vehicle: Vehicle, command: Command) -> None:
-    """MAV_CMD_NAV_LAND: here, whatever position it names."""
+    """MAV_CMD_NAV_LAND: land here; its position is ignored."""
     await vehicle.land()
 
 
@@ -58,11 +61,14 @@ async def return_to_launch(vehicle: Vehicle, command: Command) -> None:
 
 
 async def reposition(vehicle: Vehicle, command: Command) -> None:
-    """MAV_CMD_DO_REPOSITION: param1 speed in m/s (unset or <= 0: the drone's own), param4 heading in rad, x, y, z.
+    """Run MAV_CMD_DO_REPOSITION: go to a place, height and heading.
 
-    param2 bit 0 (CHANGE_MODE): see `_require_change_of_mode`; bit 1 (RELATIVE_YAW): the heading counts from the present
-    one. z obeys the frame: 0 and 5 AMSL, 3 and 6 above take-off. ArduPilot's clients send a heading of 0 for none
-    (conformance D1). All unset is pause, with or without CHANGE_MODE: it stops something. A speed alone is refused.
+    param1 speed in m/s (unset or <= 0: the drone's own), param4 heading in rad, x, y, z.
+
+    param2 bit 0 (CHANGE_MODE): see `_require_change_of_mode`; bit 1 (RELATIVE_YAW): the heading is relative to the
+    present one. z obeys the frame: 0 and 5 AMSL, 3 and 6 above take-off. ArduPilot's clients send a heading of 0 for
+    an unset one (conformance D1). All unset is pause, with or without CHANGE_MODE: it stops something. A speed alone
+    is refused.
     """
     speed, flags, yaw = command.params[0], command.params[1], command.params[3]
     if math.isinf(speed) or abs(yaw) > 2.0 * math.pi:
@@ -111,7 +117,7 @@ async def set_mode(vehicle: Vehicle, command: Command) -> None:
 
 
 async def change_mode(vehicle: Vehicle, mode: FlightMode | None, by: Right) -> None:
-    """Enter a mode that some message named; None is one that we do not have."""
+    """Enter a mode that a message selected; None is a mode that we do not have."""
     if mode is None:
         raise Refused(texts.MODE, texts.NO_SUCH_MODE, lasting=True)
     await vehicle.set_mode(mode, by)

@@ -1,4 +1,4 @@
-"""What is done on the ground: calibration with progress texts, and a restart.
+"""MAVLink service for ground maintenance: calibration with progress texts, and restart.
 
 Texts are PX4's own, which QGroundControl and MAVSDK read ("[cal] ...": MAVSDK plugins/calibration, conformance B2).
 """
@@ -72,8 +72,11 @@ class MaintenanceService(Service):
         }
 
     async def _calibrate(self, command: Command) -> None:
-        """MAV_CMD_PREFLIGHT_CALIBRATION: param2 1 the magnetometer, param5 2 the horizon, which is the gimbal's; all 0
-        ends what is under way. It ends with the calibration: accepted when the drone says that it has succeeded."""
+        """Run MAV_CMD_PREFLIGHT_CALIBRATION for the magnetometer or the gimbal's horizon.
+
+        param2 1: magnetometer; param5 2: horizon. With all parameters 0 the calibration under way ends. The command
+        ends with the calibration: ACCEPTED when the drone reports that it has succeeded.
+        """
         values = [0.0 if math.isnan(value) else value for value in (*command.params, command.x, command.y, command.z)]
         wanted = {index: value for index, value in enumerate(values, 1) if value != 0.0}
         if not wanted:
@@ -97,7 +100,7 @@ class MaintenanceService(Service):
     async def _told(
         self, name: str, work: Callable[[], Awaitable[None]], undo: Callable[[], Awaitable[object]]
     ) -> None:
-        """Run a calibration, with the texts of its beginning and its end; given up, it is undone."""
+        """Run a calibration and send its texts; undo it when it fails or is cancelled."""
         self._say(texts.CAL_STARTED.fill(version=VERSION, name=name))
         try:
             await work()
@@ -130,10 +133,9 @@ class MaintenanceService(Service):
         await self._told("mag", turn, element.abort_magnetometer)
 
     async def _watch_axes(self) -> None:
-        """Send which way to turn the drone, which axes are done and the progress, whenever one of them changes.
+        """Send the direction to turn, the finished axes and the progress, whenever one changes.
 
-        Axes that were done before count for nothing: what a drone reports of them until its first news is of the last
-        calibration.
+        Axes reported before the first update are ignored: they belong to the last calibration.
         """
         done: frozenset[CalibrationAxis] | None = None
         axis: CalibrationAxis | None = None
@@ -169,9 +171,12 @@ class MaintenanceService(Service):
         await self._told("level", gimbal.calibrate, gimbal.cancel_calibration)
 
     async def _reboot(self, command: Command) -> None:
-        """MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: param1 1. ACCEPTED once the drone has received it, as on every autopilot.
+        """MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: param1 1.
 
-        dronekit2 waits half a second for the acknowledgement, and the link is lost later. A text follows if it is not.
+        ACCEPTED once the drone has received it, as on every autopilot.
+
+        dronekit2 waits half a second for the acknowledgement, and the link is lost later. A text follows if it is
+        not.
         """
         if command.params[0] != _RESTART:
             raise Refused(texts.RESTART, texts.RESTART_ONLY, lasting=True)
@@ -183,7 +188,10 @@ class MaintenanceService(Service):
         self.host.spawn(self._watch_restart())
 
     async def _watch_restart(self) -> None:
-        """Report a drone that received the command and stays connected. The loss of the link cancels this."""
+        """Report a drone that received the command and stays connected.
+
+        The loss of the link cancels this.
+        """
         await asyncio.sleep(RESTART_WAIT)
         self.host.text(Severity.ERROR, texts.RESTART_FAILED)
 

@@ -1,6 +1,6 @@
-"""The command protocol's service: runs commands, keeps their senders informed, ends what a newer one replaces.
+"""The command protocol's service: runs commands, informs their senders, ends replaced ones.
 
-What a command means is in the table of actions; whether it is a new one, `CommandDesk` knows (both without I/O).
+The table of actions holds the meaning of a command; `CommandDesk` knows whether it is a new one (both without I/O).
 Rules: conformance R5-R10, C2, MAVLink command.md.
 """
 
@@ -44,7 +44,10 @@ from anafi_mav.vehicle.base.severity import Severity
 logger = logging.getLogger(__name__)
 
 SETTLE = 0.1
-"""s that commands get to end by themselves when the link is lost; they wait for the drone, which says so at once."""
+"""s that commands have to end by themselves when the link is lost.
+
+They wait for the drone, whose loss they learn at once.
+"""
 
 _Decode = Callable[[Any, Definition, Hashable, Flavour], Command]
 
@@ -59,11 +62,11 @@ _RESULT_BY_ERROR: tuple[tuple[type[AnafiMavError], int], ...] = (
 
 @dataclass
 class _Running:
-    """Something that changes what the vehicle does, under way."""
+    """A running action that changes the vehicle's state."""
 
     client: Hashable
     answer: tuple[Inbound, Execution] | None
-    """Whom to answer; None for messages that have no answer."""
+    """Client and command to acknowledge; None for messages without acknowledgement."""
     is_order: bool = True
     """A client has commanded it; neither the gateway began it, nor a stream of setpoints."""
     replaced_by_order: bool = False
@@ -82,7 +85,10 @@ class CommandService(Service):
         """Oldest first."""
 
     def take_tables(self, queries: Mapping[int, Query], actions: Mapping[int, Action]) -> None:
-        """Register the commands of all services. Raises `ValueError` when a row contradicts MAVLink or another."""
+        """Register the commands of all services.
+
+        Raises `ValueError` when a row contradicts MAVLink or another row.
+        """
         if twice := queries.keys() & actions.keys():
             raise ValueError(f"{sorted(twice)} are both queries and actions")
         for id in queries:
@@ -92,7 +98,7 @@ class CommandService(Service):
         self._queries, self._actions = queries, actions
 
     def acts_on(self, command: int) -> bool:
-        """True for a command that changes what the vehicle does, and is no query."""
+        """True for a command that changes the vehicle's state, and is no query."""
         return command in self._actions
 
     def actions(self) -> Mapping[int, Action]:
@@ -111,26 +117,32 @@ class CommandService(Service):
         }
 
     async def settle(self, limit: float = SETTLE) -> None:
-        """Let commands that wait for the drone end, when the link is lost: a restart, for one, has succeeded."""
+        """Wait until running commands have ended after the link is lost, `limit` s at most.
+
+        A restart, for one, has succeeded then.
+        """
         if self._running:
             await asyncio.wait(tuple(self._running), timeout=limit)
 
     def link_down(self) -> None:
-        """Whoever waits is told that it failed; the tasks end with the host's."""
+        """Send FAILED to each client that waits for an acknowledgement.
+
+        The tasks end with the host's.
+        """
         for running in tuple(self._running.values()):
             if running.answer is not None:
                 self._finish(*running.answer, dialect.MAV_RESULT_FAILED)
         self._desk.forget()
 
     async def end_all(self) -> None:
-        """Cancel everything that runs, and wait for it."""
+        """Cancel all running actions, and wait for their end."""
         for task in tuple(self._running):
             task.cancel()
         if self._running:
             await asyncio.wait(tuple(self._running))
 
     def run(self, client: Hashable, work: Coroutine[Any, Any, None], *, is_order: bool = True) -> asyncio.Task[None]:
-        """Run an action that came by a message without acknowledgement; a refusal of it becomes a text."""
+        """Run an action of a message that has no acknowledgement; its refusal is sent as a text."""
         self._desk.forget(client)  # the vehicle was moved by other means than this client's newest command
         return self._spawn(self._explained(work), _Running(client, None, is_order))
 
@@ -142,9 +154,9 @@ class CommandService(Service):
         return running is not None and running.replaced_by_order
 
     def end_others(self) -> list[asyncio.Task[None]]:
-        """What begins now replaces what was under way; whoever waits for that learns that it was cancelled.
+        """Cancel all older running actions; their senders get CANCELLED.
 
-        A newer action than this one goes on: it has come to replace this one.
+        A newer action than the calling one continues: it will replace this one.
         """
         current = asyncio.current_task()
         others = list(itertools.takewhile(lambda task: task is not current, self._running))
@@ -208,7 +220,7 @@ class CommandService(Service):
             self._finish(inbound, execution, result)
 
     def _finish(self, inbound: Inbound, execution: Execution, result: int) -> None:
-        """The one final acknowledgement of an action."""
+        """Send the one final acknowledgement of an action."""
         if execution.result == dialect.MAV_RESULT_IN_PROGRESS:
             execution.result, execution.ended = result, self.host.clock.monotonic()
             self._acknowledge(inbound, execution.command.id, result)
@@ -226,10 +238,11 @@ class CommandService(Service):
             self._finish(*running.answer, dialect.MAV_RESULT_CANCELLED)
 
     def _cancel(self, inbound: Inbound) -> None:
-        """COMMAND_CANCEL: end a running action of that number, whoever began it; its sender gets CANCELLED.
+        """COMMAND_CANCEL: cancel any client's running action of that number.
 
-        Without one there is nothing to say (MAVLink command.md). What has been accepted is not taken back, and what
-        cannot be called off honestly goes on to its own answer.
+        The action's sender gets CANCELLED. Without such an action nothing is sent (MAVLink command.md). An accepted
+        command is not withdrawn, and an action that cannot honestly be cancelled continues to its own
+        acknowledgement.
         """
         for task, running in tuple(self._running.items()):
             if running.answer is None:
@@ -239,7 +252,7 @@ class CommandService(Service):
                 task.cancel()
 
     def _explain(self, error: AnafiMavError) -> int:
-        """Tell everybody why something was refused; the MAV_RESULT that says so."""
+        """Send the reason of a refusal as a text; return its MAV_RESULT."""
         critical = isinstance(error, Refused) and error.critical
         self.host.text(Severity.CRITICAL if critical else Severity.WARNING, text_of(error))
         for kind, result in _RESULT_BY_ERROR:

@@ -1,4 +1,4 @@
-"""ArduPilot's commands for the compass: DO_START_MAG_CAL, DO_ACCEPT_MAG_CAL and DO_CANCEL_MAG_CAL.
+"""ArduPilot's compass calibration: DO_START_MAG_CAL, DO_ACCEPT_MAG_CAL, DO_CANCEL_MAG_CAL.
 
 An ANAFI calibrates one compass, about one axis after the other, and stores the result by itself. Progress and result
 are MAG_CAL_PROGRESS and MAG_CAL_REPORT, which MAVProxy, Mission Planner and QGroundControl show. PX4's way is in
@@ -65,8 +65,11 @@ class CompassService(Service):
         self._turning, self._succeeded = None, False
 
     async def _start(self, command: Command) -> None:
-        """ACCEPTED when the drone waits to be turned, as in ArduPilot, not at the end. Retry, delay and restart of the
-        command (param2, 4, 5) are ArduPilot's own and ignored: the drone starts at once and does not restart."""
+        """ACCEPTED when the drone waits to be turned, as in ArduPilot, not at the end.
+
+        Retry, delay and restart of the command (param2, 4, 5) are ArduPilot's own and ignored: the drone starts at
+        once and does not restart.
+        """
         _check_mask(command)
         vehicle = self.host.vehicle
         if not vehicle.on_ground or vehicle.drone.piloting.about_to_fly:
@@ -77,13 +80,13 @@ class CompassService(Service):
         self._turning = self.host.run_action(command.client, self._turn())
 
     async def _accept(self, command: Command) -> None:
-        """The drone has stored the result; there is nothing left to do."""
+        """Accept: nothing to do, because the drone has stored the result by itself."""
         _check_mask(command)
         if not self._succeeded:
             raise Refused(texts.COMPASS_CALIBRATION, texts.NOT_CALIBRATED)
 
     async def _cancel(self, command: Command) -> None:
-        """ACCEPTED without one under way, too, as in ArduPilot."""
+        """Cancel; ACCEPTED without a calibration under way, too, as in ArduPilot."""
         _check_mask(command)
         turning = self._turning
         if turning is not None and not turning.done():
@@ -91,7 +94,10 @@ class CompassService(Service):
             await asyncio.wait([turning])
 
     async def _turn(self) -> None:
-        """Report the calibration to its end. A newer command, or DO_CANCEL_MAG_CAL, ends it on the drone too."""
+        """Report the calibration to its end.
+
+        A newer command, or DO_CANCEL_MAG_CAL, ends it on the drone too.
+        """
         drone = self.host.drone
         progress = self.host.spawn(self._report_progress())
         try:

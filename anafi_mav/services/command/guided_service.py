@@ -1,4 +1,4 @@
-"""Guided flight by single commands: speed, height, heading, pause, regions of interest, home.
+"""Guided flight by single commands: speed, height, heading, pause, ROI, home.
 
 What goes to a place is `actions.reposition`; what circles is `orbit_service`. A handler returns when the drone
 confirmed. Conformance A4, B1, B2, D1 and items 78-83, 143.
@@ -30,21 +30,24 @@ from anafi_mav.vehicle.guided_flight import Goto
 from anafi_mav.vehicle.vehicle import Vehicle
 
 KEEP, DEFAULT = -1.0, -2.0
-"""What stands for "no change" and "back to the default" in speed and throttle (MAVLink common.xml DO_CHANGE_SPEED)."""
+"""Values for "no change" and "back to the default" in speed and throttle.
+
+Source: MAVLink common.xml DO_CHANGE_SPEED.
+"""
 
 _AIRSPEED, _GROUNDSPEED = 0.0, 1.0
 _UPWARDS, _DOWNWARDS = 2.0, 3.0
 """SPEED_TYPE."""
 
 SLOWEST_TURN = 1.0
-"""deg/s. A turn that is slower than this is a number in the wrong place, and would take for ever."""
+"""deg/s. A slower turn is a number in the wrong field, and would take forever."""
 
 _ITEM_GOTO, _ITEM_ALTITUDE = 2, 3
-"""`current` of a mission item that is an order (ArduPilot, MAVLink mission.md)."""
+"""`current` of a mission item that is a command (ArduPilot, MAVLink mission.md)."""
 
 
 def guided_mode(flavour: Flavour) -> FlightMode:
-    """The mode that a vehicle is in when a client of this flavour has sent it somewhere."""
+    """Return the mode of a vehicle that a client of this flavour has sent to a place."""
     return FlightMode.GUIDED if flavour.guided_setpoints else FlightMode.HOLD
 
 
@@ -83,7 +86,7 @@ async def _fly_item(host: Host, inbound: Inbound) -> None:
 
 
 async def change_altitude(vehicle: Vehicle, ato: float, flavour: Flavour) -> None:
-    """Go to a height (m above take-off): on the way to a place there, else here."""
+    """Go to a height (m above take-off): at the target of a move under way, else here."""
     goto = vehicle.guided.goto
     if goto is None:
         await vehicle.guided.reposition(None, ato, None, mode=guided_mode(flavour))
@@ -101,14 +104,14 @@ def _effect_of_pause(command: Command) -> Effect:
 
 
 class GuidedService(Service):
-    """Changes what is being flown, and what the drone looks at."""
+    """Changes the flight under way, and the camera's target."""
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self._paused: tuple[Goto, int] | None = None
-        """Where the drone was going when it was told to pause, and the vehicle's count of orders then."""
+        """Target of the drone when a pause was commanded, and the vehicle's `orders` count then."""
         self._mission_paused: int | None = None
-        """The vehicle's count of orders when a mission was paused."""
+        """The vehicle's `orders` count when a mission was paused."""
 
     def actions(self) -> Mapping[int, Action]:
         return {
@@ -152,7 +155,7 @@ class GuidedService(Service):
             self._paused = self._mission_paused = None  # the next flight's heights count from elsewhere
 
     def _item(self, inbound: Inbound) -> None:
-        """Carry out a MISSION_ITEM or MISSION_ITEM_INT that belongs to no mission; the MISSION_ACK says how it ended.
+        """Carry out a mission item that belongs to no mission, and acknowledge it with MISSION_ACK.
 
         ArduPilot's older way to send a goto or a height: dronekit's simple_goto, MAVProxy's and Mission Planner's
         change of altitude (conformance D1-D3, item 141).
@@ -161,20 +164,22 @@ class GuidedService(Service):
 
     @property
     def _interrupted(self) -> Goto | None:
-        """Where a pause stopped the drone; None when something else was ordered since."""
+        """Target of the move that a pause stopped; None when commanded otherwise since."""
         goto, orders = self._paused or (None, 0)
         return goto if orders == self.host.vehicle.orders else None
 
     @property
     def _mission_interrupted(self) -> bool:
-        """A pause stopped a mission, and nothing else was ordered since."""
+        """True when a pause stopped a mission, and nothing else was commanded since."""
         return self.host.vehicle.mission.paused and self._mission_paused == self.host.vehicle.orders
 
     async def _change_speed(self, command: Command) -> None:
-        """MAV_CMD_DO_CHANGE_SPEED: param1 SPEED_TYPE, param2 m/s. A move that is under way changes its speed at once.
+        """MAV_CMD_DO_CHANGE_SPEED: param1 SPEED_TYPE, param2 m/s.
 
-        -1 and unset change nothing, -2 gives the speed back to the drone. What is more than the drone can, it limits
-        itself. An ANAFI measures no airspeed: both horizontal types are over ground.
+        A move that is under way changes its speed at once.
+
+        Unset and -1 change nothing, -2 restores the drone's own speed. The drone itself limits a value above its
+        maximum. An ANAFI measures no airspeed: both horizontal types are over ground.
         """
         kind, speed, throttle = command.params[:3]
         if not (math.isnan(throttle) or throttle in (0.0, KEEP, DEFAULT)):
@@ -197,7 +202,10 @@ class GuidedService(Service):
             await vehicle.guided.go(goto)
 
     async def _change_altitude(self, command: Command) -> None:
-        """MAV_CMD_DO_CHANGE_ALTITUDE: param1 height in m, param2 MAV_FRAME. On the way to a place, there."""
+        """MAV_CMD_DO_CHANGE_ALTITUDE: param1 height in m, param2 MAV_FRAME.
+
+        During a move it changes the height of the move's target.
+        """
         vehicle = self.host.vehicle
         frame = command.params[1]
         if not math.isfinite(frame):
@@ -206,9 +214,10 @@ class GuidedService(Service):
         await change_altitude(vehicle, ato, command.flavour)
 
     async def _turn(self, command: Command) -> None:
-        """MAV_CMD_CONDITION_YAW: param1 deg, param2 deg/s (unset or 0: the drone's own), param3 way, param4 relative.
+        """Run MAV_CMD_CONDITION_YAW: turn to a heading or by an angle.
 
-        On the way to a place the drone turns while it flies on, the shorter way; else it turns where it hovers.
+        param1 deg, param2 deg/s (unset or 0: the drone's own), param3 direction, param4 relative. On the way to a
+        place the drone turns while it flies on, the shorter way; else it turns where it hovers.
         """
         angle, rate, way, relative = command.params
         if not math.isfinite(angle) or abs(angle) > DEG_PER_TURN:
@@ -231,9 +240,11 @@ class GuidedService(Service):
             )
 
     async def _pause_or_continue(self, command: Command) -> None:
-        """MAV_CMD_DO_PAUSE_CONTINUE: param1 0 hovers, 1 goes on to where the pause stopped it, or with its mission.
+        """Run MAV_CMD_DO_PAUSE_CONTINUE: param1 0 hovers, 1 continues.
 
-        Not after anybody has ordered anything else, or the drone has landed.
+        Continue means to fly on to the target of the move that the pause stopped, or to resume its mission. After a
+        pause that stopped neither, setpoints may fly the drone again. Refused when the vehicle was commanded
+        otherwise since, or the drone has landed.
         """
         vehicle = self.host.vehicle
         if command.params[0] == 0.0:
@@ -260,8 +271,11 @@ class GuidedService(Service):
     # Regions of interest.
 
     async def _look_at(self, command: Command) -> None:
-        """MAV_CMD_DO_SET_ROI_LOCATION: nose and camera follow the place until something else is flown (Parrot's
-        piloted POI, which needs a hovering drone and waits for it). An unset height is that of the take-off point."""
+        """Run MAV_CMD_DO_SET_ROI_LOCATION: nose and camera follow the place.
+
+        They do so until something else is flown (Parrot's piloted POI, which needs a hovering drone and waits for
+        it). An unset height is that of the take-off point.
+        """
         where = place(command)
         if where is None:
             raise Refused(texts.ROI, texts.NO_PLACE, lasting=True)
@@ -297,9 +311,10 @@ class GuidedService(Service):
             self.host.text(Severity.CRITICAL, texts.HOME_TYPE_KEPT.fill(error=error))
 
     async def _set_home(self, command: Command) -> None:
-        """MAV_CMD_DO_SET_HOME: param1 1 where the drone is, else the command's place.
+        """MAV_CMD_DO_SET_HOME: param1 1 takes the drone's position, else the command's place.
 
-        The drone's home becomes one of Parrot's type custom, and stays that until somebody changes it: a text says so.
+        The drone's home becomes one of Parrot's type custom, and stays that until a client changes it: a text reports
+        this.
         """
         vehicle, home = self.host.vehicle, self.host.drone.home
         if command.params[0] == 1.0:

@@ -1,4 +1,4 @@
-"""Standard modes: which modes there are, which one holds, and one way to choose them whatever the autopilot.
+"""MAVLink service for standard modes: available modes, current mode, selection.
 
 AVAILABLE_MODES, AVAILABLE_MODES_MONITOR, CURRENT_MODE, MAV_CMD_DO_SET_STANDARD_MODE (MAVLink standard_modes.md,
 conformance A2, A3, C10).
@@ -62,7 +62,10 @@ def available(vehicle: Vehicle, flavour: Flavour) -> list[dialect.MAVLink_messag
 
 
 def current_mode(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message:
-    """CURRENT_MODE. The intended mode is the one last asked for by a message that names modes; 0 before that."""
+    """CURRENT_MODE.
+
+    The intended mode is the one last asked for by a message that names modes; 0 before that.
+    """
     mode, intended, flavour = vehicle.mode, vehicle.intended, times.flavour
     return dialect.MAVLink_current_mode_message(
         STANDARD_MODES.get(mode, dialect.MAV_STANDARD_MODE_NON_STANDARD),
@@ -72,7 +75,7 @@ def current_mode(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message:
 
 
 class ModesService(Service):
-    """Tells and sets modes; what they do is the vehicle's business."""
+    """Reports and sets modes; their effect is in the vehicle."""
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)

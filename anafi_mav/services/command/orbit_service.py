@@ -1,4 +1,4 @@
-"""Orbits: MAV_CMD_DO_ORBIT flown by the gateway's loops, and ORBIT_EXECUTION_STATUS while it lasts.
+"""Orbits: MAV_CMD_DO_ORBIT flown by the gateway's loops, with ORBIT_EXECUTION_STATUS.
 
 An ANAFI has no orbit of its own: its point of interest turns the nose, the pilot flies the circle. So the sticks are
 held from here, and whatever ends the gateway ends them. Conformance A4, B1 and items 78, 79.
@@ -50,11 +50,14 @@ AS_IT_IS = 5.0
 """ORBIT_YAW_BEHAVIOUR_UNCHANGED; QGroundControl always sends it."""
 
 BY_STICKS = 4.0
-"""ORBIT_YAW_BEHAVIOUR_RC_CONTROLLED: nobody's sticks are heard during an orbit, so the nose stays free."""
+"""ORBIT_YAW_BEHAVIOUR_RC_CONTROLLED.
+
+Sticks are ignored during an orbit, so the nose stays free.
+"""
 
 
 class OrbitService(Service):
-    """Circles; the `Helm` of the vehicle while it does."""
+    """Flies circles; the vehicle's flight task while it does."""
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
@@ -67,7 +70,7 @@ class OrbitService(Service):
 
     @property
     def circle(self) -> Circle | None:
-        """What is being flown, or flown to; None when nothing is."""
+        """Return the circle that is flown, or flown to; None without one."""
         return None if self._lap is None else self._lap.circle
 
     def actions(self) -> Mapping[int, Action]:
@@ -81,7 +84,7 @@ class OrbitService(Service):
     # Helm.
 
     def end(self) -> list[asyncio.Task[None]]:
-        """Something else flies now."""
+        """End this flight task: something else flies the drone now."""
         lap, self._lap, self._controller = self._lap, None, None
         approaching, self._approaching = self._approaching, None
         if lap is None:
@@ -103,10 +106,11 @@ class OrbitService(Service):
     # The command.
 
     async def _orbit(self, command: Command) -> None:
-        """MAV_CMD_DO_ORBIT: param1 radius in m, + clockwise; param2 m/s; param3 yaw behaviour; param4 rad to fly.
+        """Fly MAV_CMD_DO_ORBIT: param1 radius in m, + clockwise; param2 m/s; param3 yaw; param4 rad.
 
-        The centre is where the drone is unless it is set, z is AMSL in every frame but ArduPilot's clients'. Accepted
-        when the drone is on its way to the circle, or on it.
+        param3 is the yaw behaviour, param4 the angle to fly. The centre is the drone's position unless it is set, z
+        is AMSL in every frame but ArduPilot's clients'. ACCEPTED when the drone is on its way to the circle, or on
+        it.
         """
         vehicle = self.host.vehicle
         circle = self._described(command)
@@ -186,7 +190,7 @@ class OrbitService(Service):
         )
 
     def _held_back(self, circle: Circle) -> Circle:
-        """The circle at a speed that the drone's tilt leaves room for; a text tells when that is another one."""
+        """Return the circle at a speed that the tilt limit allows; send a text if it is slower."""
         limits = self.host.drone.piloting.limits
         if limits is None:
             raise Refused(texts.ORBIT, texts.TILT_UNKNOWN)

@@ -1,6 +1,7 @@
-"""The EVENT interface of one vehicle: health and arming checks, and what happens to it, for those who read events.json.
+"""The EVENT interface of one vehicle, for clients that read events.json.
 
-Texts for people go by STATUSTEXT as ever; what is said here is not said there, but for the checks, which are asked for.
+It reports health and arming checks, and events of the vehicle. Texts for people are still sent as STATUSTEXT; an
+event is not repeated there, except for the checks, which are requested.
 """
 
 from __future__ import annotations
@@ -26,14 +27,19 @@ from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.vehicle import Landed, Vehicle
 
 RESET_FOR = 3.0
-"""s after the start for which CURRENT_EVENT_SEQUENCE says that the sequence began anew: three of them, one may be
-lost."""
+"""s after the start for which CURRENT_EVENT_SEQUENCE reports a restarted sequence.
+
+That makes three messages, of which one may be lost.
+"""
 
 LOOK_EVERY = 1.0
-"""s between looks at what no news of the drone tell of: a fence that changes, a place on the wrong side of it."""
+"""s between looks at causes without an update from the drone.
+
+For example a changed fence, or a place on the wrong side of it.
+"""
 
 PAUSE = 0.3
-"""s between two reports: what changes together is told together."""
+"""s between two reports, so that values that change together are reported together."""
 
 _RELEVANT = (
     parrot.AlertStateChanged,
@@ -46,11 +52,14 @@ _RELEVANT = (
     parrot.SensorsStatesListChanged,
     parrot.TakeoffChecklist,
 )
-"""What may change the report."""
+"""Messages of the drone that may change the report."""
 
 
 class EventService(Service):
-    """EVENT, CURRENT_EVENT_SEQUENCE, REQUEST_EVENT, RESPONSE_EVENT_ERROR and MAV_CMD_RUN_PREARM_CHECKS."""
+    """Service for EVENT, its sequence and requests, and MAV_CMD_RUN_PREARM_CHECKS.
+
+    Messages: EVENT, CURRENT_EVENT_SEQUENCE, REQUEST_EVENT, RESPONSE_EVENT_ERROR.
+    """
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
@@ -75,7 +84,7 @@ class EventService(Service):
         return {"/events.json": ServedFile(self._described, metadata=dialect.COMP_METADATA_TYPE_EVENTS)}
 
     def link_up(self) -> None:
-        """The sequence goes on over a loss of the link: a client that stayed has missed nothing."""
+        """Continue the sequence after a loss of the link: a client that stayed has missed nothing."""
         if self._reset_until is None:
             self._reset_until = self.host.clock.monotonic() + RESET_FOR
         self._armed, self._landed = self.host.vehicle.armed, self.host.vehicle.landed
@@ -88,7 +97,10 @@ class EventService(Service):
         self._stale = True
 
     def state_changed(self) -> None:
-        """The landing event leaves before the heartbeat that says disarmed: stations take it as an end of a flight."""
+        """Send the landing event before the heartbeat that reports the vehicle disarmed.
+
+        Stations take that heartbeat as the end of a flight.
+        """
         self._stale = True
         if self._armed and self.host.vehicle.landed is Landed.ON_GROUND:
             self._report_landed()
@@ -139,7 +151,7 @@ class EventService(Service):
             self.host.send(answer, inbound.channel)
 
     def _run_checks(self, inbound: Inbound, command: Command) -> int:
-        """MAV_CMD_RUN_PREARM_CHECKS: the report once more, and a text for each reason not to arm."""
+        """MAV_CMD_RUN_PREARM_CHECKS: send the report again, and a text for each reason not to arm."""
         vehicle = self.host.vehicle
         if vehicle.armed:
             return dialect.MAV_RESULT_TEMPORARILY_REJECTED

@@ -1,7 +1,8 @@
-"""The events of the EVENT interface: their numbers, texts and arguments, as events.json tells them to ground stations.
+"""The event definitions of events.json: numbers, texts and arguments.
 
-The format is libevents' (mavlink/libevents README.md, validation/schema.json), and the protocol of health and arming
-checks is the one that PX4 has: a summary of the arming checks, the checks that did not pass, a summary of the health.
+Ground stations read them there. The format is libevents' (mavlink/libevents README.md, validation/schema.json), and
+the protocol of health and arming checks is the one that PX4 has: a summary of the arming checks, the checks that did
+not pass, a summary of the health.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ VERSION = 2
 
 
 class Level(enum.IntEnum):
-    """Of an event: the same inside and outside."""
+    """Level of an event: the same internally and externally."""
 
     ERROR = 3
     WARNING = 4
@@ -38,7 +39,7 @@ class Level(enum.IntEnum):
 
 
 class Health(enum.IntFlag):
-    """Parts whose health is told, as bits. libevents wants the first to be none."""
+    """Components whose health is reported, as bits. libevents requires NONE as the first."""
 
     NONE = 1
     GPS = 2
@@ -139,10 +140,10 @@ _TYPES = {one.name: one.type for one in ENUMS} | {name: name for name in _BASIC}
 
 @dataclass(frozen=True)
 class Event:
-    """One event there can be. The fields but `number` are what events.json says of it."""
+    """Definition of one event; the fields except `number` are those of events.json."""
 
     number: int
-    """Lower 24 bits of its id; never used for another."""
+    """Lower 24 bits of its id; never used for another event."""
     name: str
     message: str
     level: Level
@@ -168,11 +169,14 @@ class Event:
 
 
 CHECK_ARGUMENTS = (("modes", "navigation_mode_group_t"), ("health_component_index", "uint8_t"))
-"""What every check has first (libevents)."""
+"""Arguments that every check has first (libevents)."""
 
 
 def _check(number: int, name: str, message: str, level: Level = Level.ERROR, value: str = "", text: str = "") -> Event:
-    """A check that did not pass; `value` is the type of what is told with it."""
+    """Return the event of a check that did not pass.
+
+    `value` is the type of the value that is reported with it.
+    """
     arguments = (*CHECK_ARGUMENTS, ("value", value)) if value else CHECK_ARGUMENTS
     return Event(number, name, message, level, "arming_check", arguments=arguments, description=text)
 
@@ -265,7 +269,7 @@ EVENTS: Sequence[Event] = (
 
 
 def events_file(flavour: Flavour) -> dict[str, Any]:
-    """events.json. Which numbers the modes have, a client learns in its flavour."""
+    """Return events.json, with the mode numbers of a client's flavour."""
     groups: dict[str, dict[str, Any]] = {}
     for event in EVENTS:
         entry: dict[str, Any] = {"name": event.name, "message": event.message}
@@ -291,7 +295,10 @@ def events_file(flavour: Flavour) -> dict[str, Any]:
 
 
 def mode_groups(flavour: Flavour) -> dict[str, list[int]]:
-    """Group -> the custom_modes in it. A number that means several modes stands in the first one's group."""
+    """Group -> the custom_modes in it.
+
+    A number that means several modes stands in the first one's group.
+    """
     taken: set[int] = set()
     groups = {}
     for index, mode in enumerate(MODE_GROUPS):

@@ -1,4 +1,4 @@
-"""The EVENT interface: the sequence of events with those that can be had again, and the health report. No I/O.
+"""The event interface: sequence of events, retransmission, and health report. No I/O.
 
 Protocol: MAVLink events.md, mavlink/libevents; conformance C12.
 """
@@ -17,13 +17,13 @@ from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.vehicle import Vehicle
 
 KEPT = 128
-"""Events that can be had again: a dozen reports of the health checks."""
+"""Number of events that can be requested again: a dozen reports of the health checks."""
 
 MAX_REQUEST = 64
-"""Events that one request is answered with; a client that missed more asks again."""
+"""Number of events sent for one request; a client that missed more requests again."""
 
 NEED_POSITION = frozenset({FlightMode.RETURN, FlightMode.MISSION, FlightMode.FOLLOW, FlightMode.ORBIT})
-"""Modes that are nothing without a GPS fix."""
+"""Modes that cannot be flown without a GPS fix."""
 
 
 class EventLog:
@@ -35,7 +35,7 @@ class EventLog:
         self._kept: deque[dialect.MAVLink_event_message] = deque(maxlen=KEPT)
 
     def add(self, event: Event, arguments: bytes, boot_ms: int) -> dialect.MAVLink_message:
-        """A new event: the message that tells everybody."""
+        """Add an event; return the message to send to all clients."""
         self.sequence = (self.sequence + 1) & 0xFFFF
         message = dialect.MAVLink_event_message(
             0, 0, event.id, boot_ms, self.sequence, event.log_levels, list(arguments)
@@ -44,7 +44,10 @@ class EventLog:
         return message
 
     def again(self, first: int, last: int, sysid: int, compid: int) -> Iterator[dialect.MAVLink_message]:
-        """The events from first to last, which may lie beyond the wrap; an error for each that is not kept."""
+        """Yield the events from `first` to `last`, and an error for each that is not kept.
+
+        `last` may lie beyond the wrap.
+        """
         kept = {message.sequence: message for message in self._kept}
         oldest = self._kept[0].sequence if self._kept else self.sequence
         for number in range(min((last - first & 0xFFFF) + 1, MAX_REQUEST)):
@@ -57,7 +60,10 @@ class EventLog:
 
 @dataclass(frozen=True)
 class Report:
-    """What keeps the vehicle on the ground, and how its parts are: events in the order they are to be sent."""
+    """The reasons that keep the vehicle on the ground, and the health of its components.
+
+    They are events, in the sequence in which they are sent.
+    """
 
     events: tuple[tuple[Event, bytes], ...]
 
@@ -89,14 +95,17 @@ _EVENTS = {
 
 
 def part_of(check: TakeoffChecklistType) -> Health:
-    """The part that a line of the checklist is about."""
+    """Return the component that a line of the checklist concerns."""
     if check.name.startswith("BATTERY_"):
         return Health.BATTERY
     return _PART_OF_CHECK.get(check, Health.SYSTEM)
 
 
 def _checks(vehicle: Vehicle) -> Iterator[tuple[Event, Health, int, tuple[int, ...]]]:
-    """What did not pass: (event, part, modes it concerns, its value if it has one)."""
+    """Yield the checks that did not pass: (event, component, modes it concerns, values).
+
+    The values are empty for a check that has none.
+    """
     if vehicle.flying_state is None:
         yield table.SILENT, Health.SYSTEM, ALL_MODES, ()
     if vehicle.flying_state == FlyingState.EMERGENCY:
@@ -117,7 +126,7 @@ def _checks(vehicle: Vehicle) -> Iterator[tuple[Event, Health, int, tuple[int, .
 
 
 def _present(vehicle: Vehicle) -> Health:
-    """The parts that the drone has said something about."""
+    """Return the components whose state the drone has reported."""
     drone = vehicle.drone
     present = Health.SYSTEM
     if drone.gps.state.fixed is not None:
@@ -134,7 +143,10 @@ def _present(vehicle: Vehicle) -> Health:
 
 
 def report(vehicle: Vehicle) -> Report:
-    """How things stand. The checks are `Vehicle.prearm_problems`, part by part; arming obeys the same."""
+    """Return the report for the present state.
+
+    The checks are `Vehicle.prearm_problems`, component by component; arming obeys the same.
+    """
     found = list(_checks(vehicle))
     if vehicle.prearm_problems() and all(event.level != Level.ERROR for event, *_ in found):
         found.append((table.OTHER, Health.SYSTEM, ALL_MODES, ()))  # what is not in the table keeps it down all the same

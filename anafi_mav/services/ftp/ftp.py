@@ -1,11 +1,13 @@
-"""MAVLink FTP: the server's side of the protocol, over files of which some can be replaced as a whole. No I/O.
+"""MAVLink FTP: the server's side of the protocol. No I/O.
 
-`FtpServer.receive` takes the payload of a FILE_TRANSFER_PROTOCOL and returns the payload of the answer; a burst is then
-taken part by part with `burst`. What files there are is asked of a `Files`. Protocol: MAVLink ftp.md.
+`FtpServer.receive` takes the payload of a FILE_TRANSFER_PROTOCOL and returns the payload of the answer; a burst is
+then
+taken part by part with `burst`. A `Files` lists the files; some can be replaced as a whole. Protocol: MAVLink ftp.md.
 
-Every answer follows from the request and the file alone, which stays as it was when it was opened. So an answer that
-was lost is simply made again when its request comes again. A file that is written becomes valid when its session is
-terminated, and not before.
+Every answer follows from the request and the file alone, which stays as it was when it was opened. So a lost answer
+is
+made again when its request is received again. A written file becomes valid when its session is terminated, and not
+before.
 """
 
 from __future__ import annotations
@@ -26,7 +28,10 @@ DATA = 239
 """Bytes of data behind the header of 12."""
 
 MAX_CLIENTS = 32
-"""Clients whose sessions are kept: as many as channels. More is made-up addresses; the one silent longest goes."""
+"""Clients whose sessions are kept: as many as channels.
+
+More would be made-up addresses; the one that has been silent longest is dropped.
+"""
 MAX_SESSIONS = 4
 """Files that one client may have open: MAVProxy's parameters, mission and a transfer by hand are three."""
 MAX_PATH = DATA
@@ -35,12 +40,17 @@ MAX_PATH = DATA
 SESSION_TIMEOUT = 20.0
 """s without a request after which a session is closed. MAVSDK gives up after 5 s, MAVProxy repeats within 10 s."""
 TAKEOVER = 1.0
-"""s that a session must have been silent before the same client may open another file under its number. Clients that
-number their sessions themselves (MAVSDK's is always 0) may have lost the end of a transfer, or have been started anew;
-a session that is being read is not pulled away from under its reader, who would get the wrong file."""
+"""s of silence after which the same client may open another file under a session's number.
+
+Clients that number their sessions themselves (MAVSDK's is always 0) may have lost the end of a transfer, or have been
+restarted; a session that is being read is not closed under its reader, which would get the wrong file.
+"""
 
 BURST_PARTS = 128
-"""Parts of one burst, some 30 KB: then the client says that it is still there."""
+"""Parts of one burst, some 30 KB.
+
+The client requests the next burst, which shows that it is still connected.
+"""
 
 _HEADER = struct.Struct("<HBBBBBBI")
 
@@ -141,8 +151,10 @@ TRANSITIONS: Mapping[State, Mapping[Event, State]] = {
         Event.EXPIRE: State.CLOSED,
     },
 }
-"""What is not here does not happen: reading a closed session is answered with INVALID_SESSION, and so is writing to one
-that was opened to read."""
+"""State transitions of a session; a missing pair cannot happen.
+
+Reading a closed session is answered with INVALID_SESSION, and so is writing to one that was opened to read.
+"""
 
 
 class Files(Protocol):
@@ -152,10 +164,10 @@ class Files(Protocol):
         """The content; None when there is no such file."""
 
     def list(self, path: str) -> list[Entry] | None:
-        """The entries, always in the same order; None when there is no such directory."""
+        """Return the entries, always in the same sequence; None when there is no such directory."""
 
     def room(self, path: str) -> int | None:
-        """Bytes that a client may write to a file; None when it can only be read, or there is none."""
+        """Return the bytes that a client may write to a file; None when it is read-only or missing."""
 
     def write(self, path: str, content: bytes) -> bool:
         """Replace a file that has `room`; False when the content cannot be used."""
@@ -167,13 +179,13 @@ class _Session:
     path: str = ""
     content: bytes = b""
     written: bytearray = field(default_factory=bytearray)
-    """What has arrived of a file that is being written."""
+    """Received content of a file that is being written."""
     room: int = 0
     """Bytes that it may have."""
     created: int = -1
-    """Sequence number of the request that created it."""
+    """Sequence number of the request that created its file."""
     used: float = 0.0
-    """When its client last asked for something."""
+    """Time of its client's last request."""
     burst_seq: int = 0
     """Sequence number of the next part."""
     burst_offset: int = 0
@@ -190,13 +202,13 @@ class _Client:
     sessions: dict[int, _Session] = field(default_factory=dict)
     """Those that are open."""
     terminated: tuple[int, int] | None = None
-    """Sequence number and session of the last TerminateSession: asked again, it is answered again."""
+    """Sequence number and session of the last TerminateSession: a repetition is answered again."""
     seen: float = 0.0
 
 
 @dataclass(frozen=True)
 class Request:
-    """A request as it stands in the payload."""
+    """A request, parsed from the payload."""
 
     seq: int
     session: int
@@ -204,16 +216,19 @@ class Request:
     size: int
     offset: int
     data: bytes
-    """All that follows the header; `size` says how much of it counts, except in a read, where it is what is wanted."""
+    """All bytes after the header; `size` is the number that counts.
+
+    Except in a read, where `size` is the number of requested bytes.
+    """
 
     @property
     def path(self) -> str:
-        """The path in the data: with or without a NUL at its end."""
+        """The path in the data, with or without a NUL at its end."""
         return self.data[: min(self.size, MAX_PATH)].split(b"\0", 1)[0].decode("ascii", errors="replace")
 
 
 def parse(payload: bytes) -> Request | None:
-    """The request in a payload; None when it is too short for one."""
+    """Return the request in a payload; None when the payload is too short."""
     if len(payload) < _HEADER.size:
         return None
     seq, session, opcode, size, _, _, _, offset = _HEADER.unpack_from(payload)
@@ -223,7 +238,7 @@ def parse(payload: bytes) -> Request | None:
 def format_reply(
     request: Request, opcode: int, data: bytes = b"", *, seq: int, session: int, offset: int, complete: bool = False
 ) -> bytes:
-    """The payload of a reply."""
+    """Return the payload of a reply."""
     header = _HEADER.pack(
         seq & 0xFFFF, session, opcode, len(data), request.opcode, int(complete), 0, offset & 0xFFFFFFFF
     )
@@ -231,19 +246,25 @@ def format_reply(
 
 
 class FtpServer:
-    """The sessions of all clients of one component. A client's sessions are its own: no other can reach them."""
+    """The sessions of all clients of one component.
+
+    A client's sessions are its own: no other can reach them.
+    """
 
     def __init__(self) -> None:
         self._clients: dict[Hashable, _Client] = {}
-        """In the order of their last request."""
+        """In the sequence of their last request."""
 
     @property
     def sessions(self) -> int:
-        """Open sessions of all clients."""
+        """Number of open sessions of all clients."""
         return sum(len(client.sessions) for client in self._clients.values())
 
     def receive(self, who: Hashable, payload: bytes, files: Files, now: float) -> bytes | None:
-        """The payload of the answer; None for what is no request. After a BurstReadFile, ask `burst` for more."""
+        """Return the payload of the answer; None when the payload is no request.
+
+        After a BurstReadFile, call `burst` for more.
+        """
         request = parse(payload)
         if request is None or request.opcode >= ACK:
             return None
@@ -256,7 +277,7 @@ class FtpServer:
         return self._nak(request, answer) if isinstance(answer, Error) else answer
 
     def burst(self, who: Hashable) -> bytes | None:
-        """The next part of a burst that this client asked for; None when none is due."""
+        """Return the next part of this client's burst; None when none is due."""
         client = self._clients.get(who)
         if client is None:
             return None
@@ -266,7 +287,7 @@ class FtpServer:
         return None
 
     def expire(self, now: float) -> None:
-        """Close the sessions that nobody has used for `SESSION_TIMEOUT`."""
+        """Close the sessions that no client has used for `SESSION_TIMEOUT`."""
         for who, client in list(self._clients.items()):
             for number, session in list(client.sessions.items()):
                 if now - session.used >= SESSION_TIMEOUT:
@@ -276,12 +297,12 @@ class FtpServer:
                 del self._clients[who]
 
     def forget(self, gone: Callable[[Hashable], bool]) -> None:
-        """These clients are gone."""
+        """Forget the disconnected clients, for which `gone` is true."""
         for who in [who for who in self._clients if gone(who)]:
             del self._clients[who]
 
     def bursting(self, who: Hashable) -> bool:
-        """Is a part of a burst due to this client?"""
+        """True when a part of a burst is due to this client."""
         client = self._clients.get(who)
         return client is not None and any(one.state is State.BURSTING for one in client.sessions.values())
 
@@ -335,7 +356,7 @@ class FtpServer:
         return self._ack(request)
 
     def _session_for(self, client: _Client, request: Request, now: float) -> _Session | Error:
-        """The session in which a file is to be opened or created."""
+        """Return the session in which a file is to be opened or created."""
         session = client.sessions.get(request.session)
         if session is None:
             if len(client.sessions) >= MAX_SESSIONS:
@@ -346,7 +367,10 @@ class FtpServer:
         return session
 
     def _create(self, client: _Client, request: Request, files: Files, now: float) -> bytes | Error:
-        """Begin to replace a file. A copy of the request that did so must not drop what has been written since."""
+        """Begin to replace a file.
+
+        A retransmission of the request must not drop what has been written since.
+        """
         room = files.room(request.path)
         if room is None:
             return Error.FILE_PROTECTED
@@ -361,7 +385,7 @@ class FtpServer:
         return self._ack(request)
 
     def _write(self, client: _Client, request: Request, now: float) -> bytes | Error:
-        """Take a part of a file, in any order and more than once."""
+        """Take a part of a file; parts may arrive in any sequence and more than once."""
         session = client.sessions.get(request.session)
         if session is None or session.state is not State.WRITING:
             return Error.INVALID_SESSION
@@ -412,7 +436,10 @@ class FtpServer:
         return self._part(request.session, session)
 
     def _part(self, number: int, session: _Session) -> bytes:
-        """The next part of a session's burst. The last one says so: at the end of the file, or after enough."""
+        """Return the next part of a session's burst.
+
+        The last one is marked as complete: at the end of the file, or after enough parts.
+        """
         offset, seq = session.burst_offset, session.burst_seq
         data = session.content[offset : offset + session.burst_size]
         session.burst_offset += len(data)
@@ -456,7 +483,10 @@ class FtpServer:
 
 
 def _line(entry: Entry, *, timed: bool) -> bytes:
-    """One entry as ListDirectory tells it; with time, which nothing here has: 0, not known."""
+    """Return one entry as ListDirectory sends it.
+
+    With time, which no file here has: 0, unknown.
+    """
     line = f"D{entry.name}" if entry.size is None else f"F{entry.name}\t{entry.size}"
     if timed:
         line += "\t0" if entry.size is not None else "\t0\t0"

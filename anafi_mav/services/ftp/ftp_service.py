@@ -1,6 +1,6 @@
-"""The vehicle's files: MAVLink FTP, and the messages that tell where the metadata among them are.
+"""The vehicle's files: MAVLink FTP, and the messages with the addresses of its metadata.
 
-The protocol is `ftp`; the files belong to the services that make them, but for general.json, which lists them.
+The protocol is `ftp`; the files belong to the services that make them, except general.json, which lists them.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from anafi_mav.services.paced_sender import Trickle
 from anafi_mav.services.service import Host, MessageHandler, Request, Service, client_of
 
 EXPIRE_EVERY = 1.0
-"""s between looks for sessions that nobody uses."""
+"""s between looks for unused sessions."""
 
 
 class FtpService(Service):
@@ -41,7 +41,7 @@ class FtpService(Service):
         """Metadata by flavour and path: the same for as long as the drone is connected."""
 
     def take_tables(self, files: Mapping[str, ServedFile]) -> None:
-        """The files of all services, by path."""
+        """Take the files of all services, by path."""
         self._files = files
         for flavour in FLAVOURS.values():
             makers = {
@@ -95,14 +95,14 @@ class FtpService(Service):
             self._trickle.start(inbound.channel, who, self._burst(who, inbound))
 
     def _burst(self, who: Hashable, inbound: Inbound) -> Iterator[dialect.MAVLink_message]:
-        """What is still to come of a burst."""
+        """Yield the remaining messages of a burst."""
         while (part := self._server.burst(who)) is not None:
             yield _message(part, inbound)
 
     # Metadata.
 
     def _content(self, path: str, flavour: Flavour, query: Query) -> bytes | None:
-        """A file's content; metadata are made once."""
+        """Return a file's content; metadata are made once."""
         if path.endswith(COMPRESSED):
             return self._once(path, flavour, lambda: _compressed(self._content(path[: -len(COMPRESSED)], flavour, {})))
         file = self._files[path]
@@ -134,7 +134,7 @@ class FtpService(Service):
         return self._made[key]
 
     def _where(self, inbound: Inbound) -> tuple[bytes, int]:
-        """URI and CRC of the general metadata file."""
+        """Return URI and CRC of the general metadata file."""
         content = self._general(GENERAL + COMPRESSED, flavour_of(inbound.channel), {})
         assert content is not None
         return component_metadata.uri(GENERAL + COMPRESSED).encode(), crc32(content)
@@ -144,12 +144,12 @@ class FtpService(Service):
         return dialect.MAVLink_component_metadata_message(self.host.times().boot_ms, crc, uri)
 
     def _component_information(self, inbound: Inbound, command: Command) -> dialect.MAVLink_message:
-        """Its predecessor, for clients of before."""
+        """Return the predecessor of that message, for older clients."""
         uri, crc = self._where(inbound)
         return dialect.MAVLink_component_information_message(self.host.times().boot_ms, crc, uri, 0, b"")
 
     def _component_basic(self, inbound: Inbound, command: Command) -> dialect.MAVLink_message:
-        """COMPONENT_INFORMATION_BASIC of the autopilot: who made the drone."""
+        """Return COMPONENT_INFORMATION_BASIC of the autopilot, which names the drone's maker."""
         identity = self.host.drone.identity
         return dialect.MAVLink_component_information_basic_message(
             self.host.times().boot_ms,
@@ -191,5 +191,5 @@ def _compressed(content: bytes | None) -> bytes | None:
 
 
 def _message(payload: bytes, inbound: Inbound) -> dialect.MAVLink_message:
-    """FILE_TRANSFER_PROTOCOL to whoever asked."""
+    """Return a FILE_TRANSFER_PROTOCOL to the sender of the request."""
     return dialect.MAVLink_file_transfer_protocol_message(0, inbound.sysid, inbound.compid, list(payload))

@@ -1,7 +1,8 @@
-"""LOG_REQUEST_*: an ANAFI's flight logs are not served over MAVLink, and whoever asks is told so at once.
+"""LOG_REQUEST_*: an ANAFI's flight logs are not served over MAVLink.
 
-MAVSDK waits five seconds for a first LOG_ENTRY and takes `num_logs` 0 for "none" (log_files_impl.cpp); Mission Planner
-and QGroundControl likewise. Erasing nothing needs no answer, nor does the end of a download.
+The client gets an empty list at once. MAVSDK waits five seconds for a first LOG_ENTRY and takes `num_logs` 0 for
+"none" (log_files_impl.cpp); Mission Planner and QGroundControl likewise. Erasing nothing needs no answer, nor does
+the end of a download.
 """
 
 from __future__ import annotations
@@ -29,6 +30,6 @@ class LogService(Service):
         self.host.send(dialect.MAVLink_log_entry_message(0, 0, 0, 0, 0), inbound.channel)
 
     def _data(self, inbound: Inbound) -> None:
-        """A log that does not exist is at its end wherever one reads: LOG_DATA with no bytes."""
+        """Answer with LOG_DATA without bytes: a missing log is at its end at any offset."""
         request = inbound.message
         self.host.send(dialect.MAVLink_log_data_message(request.id, request.ofs, 0, [0] * LOG_BYTES), inbound.channel)

@@ -1,1 +1,1 @@
-"""What a ground station expects of any vehicle: identity, banner, time, shell, tunes."""
+"""Services that a ground station expects: identity, banner, time, shell, tunes."""

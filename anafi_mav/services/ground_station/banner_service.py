@@ -1,6 +1,7 @@
-"""Gateway, drone and firmware as texts: to each client once after its first message, after a reconnection, on request.
+"""Gateway, drone and firmware as texts for each client.
 
-Mission Planner takes the firmware from a text that begins like ArduCopter's (conformance D3, F 149).
+Sent to each client once after its first message, after a reconnection, and on request. Mission Planner takes the
+firmware from a text that begins like ArduCopter's (conformance D3, F 149).
 """
 
 from __future__ import annotations
@@ -19,11 +20,13 @@ from anafi_mav.texts import Text
 from anafi_mav.vehicle.base.severity import Severity
 
 GONE = 30.0
-"""s of silence after which a client that speaks again is a new one: a ground station that was restarted."""
+"""s of silence after which a client counts as a new one, for example when restarted."""
 
 GREET_AFTER = 1.5
-"""s from a client's first message to its banner. QGroundControl makes its vehicle of the first heartbeat, and only then
-shows texts."""
+"""s from a client's first message to its banner.
+
+QGroundControl creates its vehicle on the first heartbeat, and shows texts only after that.
+"""
 
 MAX_CLIENTS = 64
 """Clients that are remembered; there are a handful."""
@@ -50,8 +53,10 @@ def banner(drone: Drone, flavour: Flavour) -> list[Text]:
 
 
 class BannerService(Service):
-    """Sends the banner to each client, once, and some time after its first message: a station that has just found a
-    vehicle does not show texts yet."""
+    """Sends the banner to each client once, some time after its first message.
+
+    A station that has just found a vehicle does not show texts yet.
+    """
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)

@@ -1,4 +1,4 @@
-"""Who a vehicle says it is: AUTOPILOT_VERSION and PROTOCOL_VERSION, and what its capability bits promise."""
+"""Identity of a vehicle: AUTOPILOT_VERSION, PROTOCOL_VERSION and its capability bits."""
 
 from __future__ import annotations
 
@@ -31,10 +31,11 @@ def _custom_version(firmware: str, flavour: Flavour) -> bytes:
 
 
 def autopilot_version(drone: Drone, flavour: Flavour, capabilities: int) -> dialect.MAVLink_message:
-    """AUTOPILOT_VERSION. The serial number is the unique id; its hash is the older 64-bit one.
+    """Return AUTOPILOT_VERSION.
 
-    flight_sw_version is the release that the flavour follows, middleware_sw_version is anafi-mav's own,
-    os_sw_version the ANAFI's firmware, and so is flight_custom_version, which ground stations show.
+    The serial number is the unique id; its hash is the older 64-bit one. flight_sw_version is the release that the
+    flavour follows, middleware_sw_version is anafi-mav's own, os_sw_version the ANAFI's firmware, and so is
+    flight_custom_version, which ground stations show.
     """
     identity = drone.identity
     serial = identity.serial.encode()
@@ -57,12 +58,12 @@ def autopilot_version(drone: Drone, flavour: Flavour, capabilities: int) -> dial
 
 
 def protocol_version() -> dialect.MAVLink_message:
-    """PROTOCOL_VERSION: MAVLink 1 is understood, 2 is spoken."""
+    """Return PROTOCOL_VERSION: MAVLink 1 is accepted, 2 is sent."""
     return dialect.MAVLink_protocol_version_message(200, 100, 200, bytes(8), bytes(8))
 
 
 class IdentityService(Service):
-    """Says who we are, to whoever asks."""
+    """Service that sends the vehicle's identity on request."""
 
     def requests(self) -> Mapping[int, Request]:
         return {
@@ -74,7 +75,10 @@ class IdentityService(Service):
         return {dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION_REQUEST: self._asked}
 
     def _asked(self, inbound: Inbound) -> None:
-        """AUTOPILOT_VERSION_REQUEST, of before MAV_CMD_REQUEST_MESSAGE: Mission Planner still sends it."""
+        """Answer AUTOPILOT_VERSION_REQUEST, which Mission Planner still sends.
+
+        It is older than MAV_CMD_REQUEST_MESSAGE.
+        """
         self.host.send(self._made(inbound), inbound.channel)
 
     def _version(self, inbound: Inbound, command: Command) -> dialect.MAVLink_message:

@@ -1,4 +1,7 @@
-"""LINK_NODE_STATUS on request: how the channel that the question came by is doing (conformance F 155)."""
+"""LINK_NODE_STATUS on request: the state of the channel that carried the request.
+
+Conformance F 155.
+"""
 
 from __future__ import annotations
 

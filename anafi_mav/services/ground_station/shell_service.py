@@ -1,7 +1,8 @@
-"""SERIAL_CONTROL's shell: a few words about the gateway for who has nothing but MAVLink (conformance F 153).
+"""SERIAL_CONTROL's shell: a few words about the gateway for clients that have only MAVLink.
 
-It answers questions and changes nothing. Lines come in pieces of up to 70 bytes; the answer goes back in such pieces
-to who asked. Other serial devices do not exist: nobody answers for them.
+Conformance F 153. It answers questions and changes nothing. Lines arrive in pieces of up to 70 bytes; the answer is
+sent in such pieces to the client of the request. Other serial devices do not exist: a request for them gets no
+answer.
 """
 
 from __future__ import annotations
@@ -67,7 +68,7 @@ COMMANDS: Mapping[str, tuple[str, Callable[[Host], list[str]]]] = {
 
 
 def answer(host: Host, line: str) -> str:
-    """What the shell says to a line."""
+    """Return the shell's answer to a line."""
     word = line.strip().lower()
     if not word:
         return PROMPT
@@ -82,7 +83,7 @@ class ShellService(Service):
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self._begun: dict[Hashable, bytes] = {}
-        """What each client has typed since its last newline."""
+        """Text of each client since its last newline."""
 
     def messages(self) -> Mapping[int, MessageHandler]:
         return {dialect.MAVLINK_MSG_ID_SERIAL_CONTROL: self._receive}

@@ -1,4 +1,7 @@
-"""Clocks and round trips: PING, TIMESYNC, SYSTEM_TIME (MAVLink ping.md, timesync.md; conformance C11)."""
+"""MAVLink service for clocks and round trips: PING, TIMESYNC, SYSTEM_TIME.
+
+MAVLink ping.md, timesync.md; conformance C11.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,10 @@ from anafi_mav.vehicle.vehicle import Vehicle
 
 
 class TimeService(Service):
-    """Answers whoever measures. One clock is in all our messages: the gateway's, from its start on."""
+    """Answers PING and TIMESYNC.
+
+    One clock is in all our messages: the gateway's, from its start on.
+    """
 
     def messages(self) -> Mapping[int, MessageHandler]:
         return {dialect.MAVLINK_MSG_ID_PING: self._ping, dialect.MAVLINK_MSG_ID_TIMESYNC: self._timesync}
@@ -21,7 +27,10 @@ class TimeService(Service):
         return {dialect.MAVLINK_MSG_ID_SYSTEM_TIME: Stream(self._system_time, every=1.0)}
 
     def _system_time(self, vehicle: Vehicle, times: Times) -> dialect.MAVLink_message:
-        """SYSTEM_TIME: the machine's clock, which the drone's was set by when it connected, beside our own."""
+        """Return SYSTEM_TIME: the clock of the host beside our own.
+
+        The drone's clock was set by the host's when it connected.
+        """
         return dialect.MAVLink_system_time_message(round(self.host.clock.time() * 1e6), times.boot_ms)
 
     def _ping(self, inbound: Inbound) -> None:

@@ -1,7 +1,7 @@
-"""PLAY_TUNE and PLAY_TUNE_V2: an ANAFI cannot play notes, it beeps with its motors so that it is found in the grass.
+"""PLAY_TUNE and PLAY_TUNE_V2: the drone beeps with its motors.
 
-A tune with notes is answered with a beep of a few seconds, one without ends it. It beeps on the ground only: in the air
-the motors have other things to do.
+An ANAFI cannot play notes; the beep is for finding it in the grass. A tune with notes starts a beep of a few seconds,
+one without notes ends it. It beeps on the ground only: in the air the motors have other things to do.
 """
 
 from __future__ import annotations

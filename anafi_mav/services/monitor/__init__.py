@@ -1,1 +1,1 @@
-"""Watches over the flight that act or warn by themselves: texts only, no message of a client."""
+"""Watches over the flight that act or warn without a client's message."""

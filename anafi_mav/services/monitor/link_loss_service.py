@@ -1,4 +1,4 @@
-"""Carries out what is to be done when no ground station is heard any more: see `link_loss`."""
+"""Runs the configured action when all ground stations are lost: see `link_loss`."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from anafi_mav.vehicle.vehicle import Landed
 
 
 class LinkLossService(Service):
-    """Watches the heartbeats of ground stations, on whatever channel they come."""
+    """Watches the heartbeats of ground stations on all channels."""
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self._watch = GcsWatch()
         self._ticked = math.inf
-        """When it was looked at last; infinite before the first look of a connection."""
+        """Time of the last check; infinite before the first one of a connection."""
 
     def link_up(self) -> None:
         self._watch.restart(self.host.clock.monotonic())

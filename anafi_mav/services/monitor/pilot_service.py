@@ -1,4 +1,4 @@
-"""Reports that the pilot at a Skycontroller acquired control: what a client had begun is over."""
+"""Reports that the pilot at a Skycontroller acquired control: actions of clients end then."""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Keeps what is known of the sign of a drone's roll, by its serial number and firmware, and reports it."""
+"""Stores and reports what is known of the sign of a drone's roll.
+
+The record holds for one serial number and firmware.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +26,10 @@ def written(firmware: str, sign: Sign) -> Mapping[str, Any]:
 
 
 def read(kept: Any, firmware: str | None) -> Sign:
-    """Return the verdict that a record holds for a firmware; UNKNOWN when it is of another, or no record."""
+    """Return the verdict that a record holds for a firmware.
+
+    Returns UNKNOWN for a record of another firmware, or an invalid one.
+    """
     if not isinstance(kept, dict) or not firmware or kept.get("firmware") != firmware:
         return Sign.UNKNOWN
     inverted = kept.get("inverted")
@@ -49,7 +55,10 @@ class RollSignService(Service):
         }
 
     def _motion(self) -> tuple[Attitude, Velocity] | None:
-        """Return how the drone flies; None when that is unknown or it does not fly, and earlier motion is discarded."""
+        """Return attitude and velocity of the drone; None if one is unknown or it does not fly.
+
+        Earlier motion is discarded then.
+        """
         vehicle, state = self.host.vehicle, self.host.drone.piloting.state
         if not vehicle.in_air or state.attitude is None or state.velocity is None:
             vehicle.roll.forget_motion()

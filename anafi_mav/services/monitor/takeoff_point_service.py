@@ -1,6 +1,7 @@
-"""Keeps the take-off point of the present flight, so that a restart of the gateway in the air loses no height.
+"""Stores the take-off point of the present flight for a restart of the gateway in the air.
 
-The file of a drone is found by its serial number, and the record in it counts for the flight that it names.
+So no height is lost. The file of a drone is found by its serial number, and the record in it is valid for the flight
+that it names.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
-"""What the drone warns about, as texts for people: said when it begins or changes, not again and again.
+"""Warnings of the drone as texts for operators, sent when a warning begins or changes.
 
-Parrot's three levels become severities: WARNING is a warning, CRITICAL is critical; what the drone is about to do by
-itself, and nobody can talk it out of, is an alert, motors that were cut in the air are an emergency.
+They are not repeated. Parrot's three levels become severities: WARNING is a warning, CRITICAL is critical; an action
+that the drone is about to take by itself, and that cannot be prevented, is an alert, motors that were cut in the air
+are an emergency.
 """
 
 from __future__ import annotations
@@ -109,7 +110,7 @@ _RELEVANT: frozenset[type[Message]] = frozenset(
 
 
 class WarningService(Service):
-    """Tells what is new among the warnings."""
+    """Sends a text for each new warning."""
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)

@@ -1,7 +1,10 @@
-"""What one parameter is: a name, a type, and where its value lives. The tables of them are `parameter_table*`.
+"""One parameter: its name, its type, and the place of its value.
 
-A value lives in one place: in the drone, in the gateway, or nowhere (a fact). Names are many: a native one that every
-client sees, and twins by which PX4's and ArduPilot's clients know the same thing. A twin converts; it keeps nothing.
+The tables of them are `parameter_table*`.
+
+A value is stored in one place: in the drone, in the gateway, or nowhere (a fact). Names are many: a native one that
+every client sees, and aliases by which PX4's and ArduPilot's clients know the same thing. An alias converts; it
+stores nothing.
 """
 
 from __future__ import annotations
@@ -32,15 +35,15 @@ class Parameter:
     name: str
     kind: Kind
     short: str
-    """What it is, for a line in a list."""
+    """Short description, for a line in a list."""
     read: Callable[[Host], float]
     """NaN: not known, and shown as `UNKNOWN`."""
     write: Callable[[Host, float], Awaitable[object]] | None = None
     """Sets it; returns when the drone confirmed, or raises an `AnafiMavError`. None: read only."""
     limits: Callable[[Host], Limits | None] | None = None
-    """None: as far as the type goes. Returns None while the drone has not told them."""
+    """None: the limits of the type. Returns None while the drone has not reported them."""
     values: Mapping[int, str] = field(default_factory=dict)
-    """What may be written and what it means, where only certain values mean something."""
+    """The values that may be written, with their meaning, for a parameter with a fixed choice."""
     news: tuple[type[Message], ...] = ()
     """The drone's events that may change it."""
     polled: bool = False
@@ -63,7 +66,7 @@ class Parameter:
     native: str = ""
     """The native name of the same value; empty for one that is native itself, or a fact."""
     source: str = ""
-    """Where value and range come from, for the docs."""
+    """Source of value and range, for the docs."""
     models: str = "all"
     """Which models have it, for the docs."""
 
@@ -82,7 +85,7 @@ class Parameter:
         return min(max(round(value), low), high)
 
     def accepts(self, host: Host, value: float) -> bool:
-        """May this be written, as far as can be told without asking the drone?"""
+        """Return True if the value may be written, as far as this is known without asking the drone."""
         low, high = self.kind.limits
         if not math.isfinite(value) or not low <= value <= high:
             return False
@@ -93,7 +96,7 @@ class Parameter:
 
 
 def own(put: Callable[[Host, float], None]) -> Callable[[Host, float], Awaitable[None]]:
-    """The `write` of a setting that takes nobody's consent."""
+    """Return the `write` of a setting that needs no consent of the drone."""
 
     async def write(host: Host, value: float) -> None:
         put(host, value)
@@ -147,7 +150,10 @@ def twin(native: Parameter, name: str, kind: Kind = Kind.REAL32, *, scale: float
 def mapped(
     native: Parameter, name: str, kind: Kind, values: Mapping[int, str], to_native: Mapping[int, int], **more: object
 ) -> Parameter:
-    """The same choice by another name and other numbers: `to_native` has the native number of each."""
+    """Return an alias of a choice with another name and other numbers.
+
+    `to_native` has the native number of each.
+    """
     from_native = {ours: theirs for theirs, ours in to_native.items()}
 
     def read(host: Host) -> float:
@@ -180,12 +186,12 @@ def limits_of(parameter: Parameter, host: Host) -> Limits | None:
 
 
 def current(setting: Range | None) -> float:
-    """The value of a drone's setting; NaN when it has not told it."""
+    """Return the value of a drone's setting; NaN while it is not reported."""
     return math.nan if setting is None else setting.current
 
 
 def bounds(setting: Range | None) -> Limits | None:
-    """The range that the drone told with its setting."""
+    """Return the range that the drone reported with its setting."""
     return None if setting is None else (setting.min, setting.max)
 
 

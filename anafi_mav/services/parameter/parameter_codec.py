@@ -1,6 +1,6 @@
-"""How parameters travel: the float field of PARAM_VALUE and PARAM_SET, QGroundControl's hash, ArduPilot's packed file.
+"""Encodings of parameters: PARAM_VALUE's float, QGroundControl's hash, packed files.
 
-No I/O, and without a word about what the parameters mean.
+No I/O. The meaning of the parameters is elsewhere.
 """
 
 from __future__ import annotations
@@ -54,7 +54,10 @@ class Kind(enum.Enum):
         return (0, 2**32 - 1) if self is Kind.UINT32 else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
 
     def to_bytes(self, value: float) -> bytes:
-        """The value as it lies in memory, little endian. Raises `struct.error` for one that does not fit."""
+        """The value as it lies in memory, little endian.
+
+        Raises `struct.error` for one that does not fit.
+        """
         return self._struct.pack(round(value) if self.whole else value)
 
     def from_bytes(self, data: bytes) -> float:
@@ -84,7 +87,10 @@ def carrier(value: float, kind: Kind, *, bytewise: bool) -> int:
 
 
 def carried(field: float, kind: Kind, *, bytewise: bool) -> float:
-    """The value in the float field of a PARAM_SET. NaN for a whole number that the field does not hold."""
+    """The value in the float field of a PARAM_SET.
+
+    NaN for a whole number that the field does not hold.
+    """
     if bytewise:
         return kind.from_bytes(struct.pack("<f", field))
     if kind.whole:
@@ -119,12 +125,13 @@ def hash_check(values: Iterable[tuple[str, float, Kind]]) -> int:
 
 
 def packed_file(values: Sequence[tuple[str, float, Kind]], start: int = 0, count: int | None = None) -> bytes:
-    """ArduPilot's `@PARAM/param.pck` of these values, or of `count` of them from `start` on, in their order.
+    """Return ArduPilot's `@PARAM/param.pck` of these values.
 
-    Header: magic, number of values in the file, number of all. Each value: type and flags, number of characters in
-    common with the name before (low nibble) and of others less one (high nibble), those others, the value
-    (AP_Filesystem README.md). ArduPilot pads, lest a value that changes between two reads of a block is torn; this file
-    is read as it was when it was opened, and needs no padding. Defaults are not told: a drone does not tell its own.
+    Of all, or of `count` of them from `start` on. The values keep their sequence. Header: magic, number of values in
+    the file, number of all. Each value: type and flags, number of characters in common with the name before (low
+    nibble) and of others less one (high nibble), those others, the value (AP_Filesystem README.md). ArduPilot pads,
+    lest a value that changes between two reads of a block is torn; this file is read as it was when it was opened,
+    and needs no padding. Defaults are not included: a drone does not report its own.
     """
     chosen = values[start:] if count is None else values[start : start + count]
     parts = [struct.pack("<HHH", PACKED_MAGIC, len(chosen), len(values))]

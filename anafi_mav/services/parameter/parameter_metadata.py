@@ -17,7 +17,7 @@ _TYPES = {Kind.INT8: "Int8", Kind.INT16: "Int16", Kind.INT32: "Int32", Kind.REAL
 
 
 def parameter_file(parameters: Sequence[Parameter], host: Host) -> dict[str, Any]:
-    """parameter.json: every parameter with its meaning; ranges as the drone has told them."""
+    """Return parameter.json: every parameter with its meaning; ranges as reported by the drone."""
     return {"version": PARAMETER_VERSION, "parameters": [_described(one, host) for one in parameters]}
 
 

@@ -1,8 +1,8 @@
-"""The parameter protocol: lists, reads and writes, and a word to everybody whenever a value has changed.
+"""MAVLink service for the parameter protocol: lists, reads, writes and changes.
 
-Which parameters there are is in `parameter_table*`; a channel sees the native ones and the twins of its flavour. The
-list of a flavour is made when the drone first connects and stays the same for as long as the vehicle exists. Rules:
-MAVLink parameter.md, conformance A5, C4, R12, R13.
+A changed value is sent to all clients. The parameters are in `parameter_table*`; a channel sees the native ones and
+the aliases of its flavour. The list of a flavour is made when the drone first connects and stays the same for as long
+as the vehicle exists. Rules: MAVLink parameter.md, conformance A5, C4, R12, R13.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ MAX_WAITING = 512
 
 
 NATIVE_NAMES: tuple[Parameter, ...] = (*NATIVE, *FENCE_NATIVE, *FOLLOW_NATIVE)
-"""What every client sees, whatever its flavour."""
+"""Parameters that every client sees, whatever its flavour."""
 
 NAME_TABLES: dict[str, tuple[Parameter, ...]] = {"px4": PX4_NAMES, "ardupilot": ARDUPILOT_NAMES}
 """By `Flavour.parameter_names`."""
@@ -74,7 +74,10 @@ KEPT = tuple(parameter for parameter in NATIVE_NAMES if parameter.put is not Non
 
 
 def parameters_of(flavour: Flavour) -> tuple[Parameter, ...]:
-    """All that clients of a flavour can be shown, sorted by name; which of them a drone has is another matter."""
+    """Return all parameters for clients of a flavour, sorted by name.
+
+    Which of them a drone has is another matter.
+    """
     return tuple(sorted((*NATIVE_NAMES, *NAME_TABLES[flavour.parameter_names]), key=lambda parameter: parameter.name))
 
 
@@ -87,9 +90,9 @@ class ParameterList:
         self.parameters = [one for one in parameters_of(flavour) if one.present(host.drone)]
         self.index = {parameter.name: index for index, parameter in enumerate(self.parameters)}
         self._told: list[bytes] = [self._raw(parameter) for parameter in self.parameters]
-        """The value of each as everybody was told it last."""
+        """The value of each that was last reported to all clients."""
         self.changes = [0] * len(self.parameters)
-        """How often everybody was told of each."""
+        """How often each was reported to all clients."""
         self.version = 0
         """How often any of them has changed."""
 
@@ -109,7 +112,7 @@ class ParameterList:
         )
 
     def values(self) -> list[tuple[str, float, Kind]]:
-        """Name, value and type of all, in their order."""
+        """Return name, value and type of all, in the sequence of the list."""
         return [(one.name, one.value(self._host), one.kind) for one in self.parameters]
 
     def hash_message(self) -> dialect.MAVLink_message:
@@ -118,7 +121,10 @@ class ParameterList:
         return param_value(HASH_NAME, hash_check(lasting), Kind.UINT32, count=len(self), index=NO_INDEX, bytewise=True)
 
     def changed(self, candidates: Iterable[int]) -> list[int]:
-        """Those of these that have another value than everybody was told; from now on they count as told."""
+        """Return the candidates whose value differs from the last reported one.
+
+        From now on they count as reported.
+        """
         found = []
         for index in candidates:
             raw = self._raw(self.parameters[index])
@@ -215,7 +221,7 @@ class ParameterService(Service):
     # What outlives the gateway.
 
     def _restore(self) -> None:
-        """What is remembered of this drone; the defaults for what is not, or makes no sense any more."""
+        """Restore the stored settings of this drone, and defaults for those absent or invalid."""
         serial = self.host.drone.identity.serial
         if serial == self._kept_of:
             return
@@ -245,8 +251,10 @@ class ParameterService(Service):
         return to_json(parameter_file(self._lists[flavour.name].parameters, self.host))
 
     def _packed(self, flavour: Flavour, query: Query) -> bytes | None:
-        """ArduPilot's file of all values, or of `count` from `start` on. PX4's clients do not look for it, and MAVProxy
-        takes its integers for floats."""
+        """ArduPilot's file of all values, or of `count` from `start` on.
+
+        PX4's clients do not look for it, and MAVProxy takes its integers for floats.
+        """
         if query.keys() - {"start", "count", "withdefaults"}:
             return None
         numbers = {name: text for name, text in query.items() if text.isascii() and text.isdigit() and len(text) < 6}
@@ -268,7 +276,10 @@ class ParameterService(Service):
     # Reading.
 
     def _request_list(self, inbound: Inbound) -> None:
-        """The list leaves bit by bit, before it the hash: who has it all in his cache stops us with it."""
+        """Send the list by the paced sender; PX4's clients get the hash before it.
+
+        A client that has the whole list in its cache stops the list when it has received the hash.
+        """
         flavour = flavour_of(inbound.channel)
         listed = self._lists[flavour.name]
 
@@ -335,7 +346,10 @@ class ParameterService(Service):
         self._queue(inbound, parameter, value)
 
     def _queue(self, inbound: Inbound, parameter: Parameter, value: float) -> None:
-        """Write when it is its turn. What a client says again while it still waits takes the old one's place."""
+        """Write when it is its turn.
+
+        What a client says again while it still waits takes the old one's place.
+        """
         client = client_of(inbound)
         for place, (waiting, other, _) in enumerate(self._waiting):
             if other is parameter and client_of(waiting) == client:
@@ -398,12 +412,15 @@ class ParameterService(Service):
                 self.host.send(self._lists[name].message(index), channels)
 
     def _answer(self, inbound: Inbound) -> None:
-        """The value that holds now, to the one who asked."""
+        """Send the value in effect to the client of the request."""
         listed = self._lists[flavour_of(inbound.channel).name]
         self.host.send(listed.message(listed.index[name_of(inbound.message.param_id)]), inbound.channel)
 
     def _refuse(self, inbound: Inbound, error: int, why: Text) -> None:
-        """PARAM_ERROR, which QGroundControl 4 does not know, the value that holds, and a text to the sender."""
+        """Refuse a write: send PARAM_ERROR, the value in effect and a text to the sender.
+
+        QGroundControl 4 does not know PARAM_ERROR.
+        """
         self._error(inbound, error)
         self._answer(inbound)
         now = self.host.clock.monotonic()

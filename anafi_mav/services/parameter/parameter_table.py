@@ -1,8 +1,8 @@
-"""The native parameters `ANF_*`: what every client sees, whatever autopilot it is shown.
+"""The native parameters `ANF_*`, which every client sees, whatever autopilot it is shown.
 
-Settings of the drone are written through it and read as it told them last; their ranges are the drone's own. Sources:
-ardrone3.xml, rth.xml, precise_home.xml, gimbal.xml, obstacle_avoidance.xml, and which of them the anafi_ros paper uses.
-Camera settings are no parameters: they travel by the camera's own protocol.
+Settings of the drone are written through to it and read as last reported; their ranges are the drone's own. Sources:
+ardrone3.xml, rth.xml, precise_home.xml, gimbal.xml, obstacle_avoidance.xml, and which of them the anafi_ros paper
+uses. Camera settings are no parameters: they travel by the camera's own protocol.
 """
 
 from __future__ import annotations
@@ -311,7 +311,10 @@ HOME_TYPE = Parameter(
 
 
 def _gimbal_speed(drone: Drone) -> Range | None:
-    """The main gimbal's; the drone has one number for all axes, and pitch is an axis of every model."""
+    """Return the speed range of the main gimbal's pitch axis, which stands for all axes.
+
+    The drone has one number for all axes, and pitch is an axis of every model.
+    """
     return drone.gimbal[0].max_speed.get(Axis.PITCH)
 
 
@@ -386,7 +389,7 @@ HAND_LAUNCH = Parameter(
 )
 
 MAX_CRUISE_SPEED = 15.0
-"""m/s: the fastest that anafi_ros allows (its max_horizontal_speed); no model tells its own limit."""
+"""m/s: the maximum of anafi_ros (its max_horizontal_speed); no model reports its own limit."""
 
 
 async def _set_cruise_speed(host: Host, value: float) -> None:

@@ -1,8 +1,8 @@
-"""What ArduPilot's clients know by ArduCopter's names: twins of the native parameters, and facts they want to see.
+"""Parameters by ArduCopter's names: aliases of the native ones, and facts for its clients.
 
 Names, types and units are ArduCopter 4.5's (centimetres and centidegrees where it has them). QGroundControl's setup
-pages, Mission Planner and MAVProxy look for these (conformance E3). As with PX4's names, none is inert: what cannot be
-followed cannot be written, what an ANAFI does not report reads -1.
+pages, Mission Planner and MAVProxy look for these (conformance E3). As with PX4's names, each has an effect or is a
+fact: a value that cannot be followed cannot be written, one that an ANAFI does not report reads -1.
 """
 
 from __future__ import annotations
@@ -62,7 +62,11 @@ def _final_limits(host: Host) -> Limits | None:
 
 
 async def _set_final_altitude(host: Host, value: float) -> None:
-    """Above 0 a return hovers at ANF_RTH_END_ALT, which is the drone's, whatever the number: a text says so."""
+    """Set the end of returns: 0 lands, a value above 0 hovers.
+
+    The hover is at ANF_RTH_END_ALT, which is the drone's, whatever the number. A text is sent when that height
+    differs from the number.
+    """
     put_end_of_return(host, EndOfReturn.LAND if value == 0.0 else EndOfReturn.HOVER)
     height = _final_altitude(host)
     if math.isfinite(height) and abs(value - height) >= 1.0:
@@ -135,7 +139,7 @@ def _compass_offset(host: Host) -> float:
 
 
 _CHANNELS = {"ROLL": 1, "PITCH": 2, "THROTTLE": 3, "YAW": 4}
-"""Where RC_CHANNELS_OVERRIDE has what."""
+"""Channel of each axis in RC_CHANNELS_OVERRIDE."""
 
 FACTS_ARDUPILOT: tuple[Parameter, ...] = (
     Parameter("SYSID_THISMAV", Kind.INT16, "System id", lambda host: float(host.sysid), group=FACTS, source="fleet"),

@@ -1,4 +1,7 @@
-"""Parameters of the fence and the rally points: the gateway's own settings, kept per drone, and their twins."""
+"""Parameters of the fence and the rally points, with their aliases.
+
+They are the gateway's own settings, stored per drone.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Parameters of mode Follow: the gateway's own settings, and their twins of PX4, which MAVSDK's follow me writes."""
+"""Parameters of mode Follow: the gateway's own settings, and their PX4 aliases.
+
+MAVSDK's follow me writes the aliases.
+"""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""What PX4's clients know by PX4's names: twins of the native parameters, and facts that they want to see.
+"""Parameters by PX4's names: aliases of the native ones, and facts for its clients.
 
-QGroundControl calls a vehicle without some of these not set up, and complains of others when it opens a page
-(conformance A5). None of them is inert: a value that nothing would follow is a fact and cannot be written, one that an
-ANAFI does not report reads -1. What only fills a page of QGroundControl is in `parameter_table_setup`.
+QGroundControl calls a vehicle without some of these not set up, and warns of others when it opens a page (conformance
+A5). Each has an effect or is a fact: a value that nothing would follow cannot be written, one that an ANAFI does not
+report reads -1. What only fills a page of QGroundControl is in `parameter_table_setup`.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""Parameters that QGroundControl's pages ask for and an ANAFI does not have: read-only constants.
+"""Read-only constants for parameters that QGroundControl's pages need and an ANAFI lacks.
 
 QGroundControl opens an error dialog for each name that a page of Vehicle Setup, or an indicator of its toolbar, does
-not find (FactPanelController::getParameterFact). The names are those of its releases 4.3 and 5.0 and of its sources of
-July 2026, for a multicopter; `tests/support/qgroundcontrol.json` has them page by page. Values are true where the drone
-has such a thing, otherwise neutral: nothing is mapped, nothing is offset, nothing is tuned.
+not find (FactPanelController::getParameterFact). The names are those of its releases 4.3 and 5.0 and of its sources
+of July 2026, for a multicopter; `tests/support/qgroundcontrol.json` has them page by page. Values are true where the
+drone has such a thing, otherwise neutral: nothing is mapped, nothing is offset, nothing is tuned.
 """
 
 from __future__ import annotations

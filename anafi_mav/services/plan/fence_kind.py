@@ -1,4 +1,4 @@
-"""The list of fence items that clients send: which of them are good, and a fence in words. No I/O."""
+"""Checks the fence items that clients send, and describes a fence in words. No I/O."""
 
 from __future__ import annotations
 
@@ -15,13 +15,19 @@ from anafi_mav.vehicle.fence.fence import CIRCLES, HOME_CIRCLE, POLYGONS, fence_
 from anafi_mav.vehicle.fence.plan_items import Fault, PlanItem, place_fault
 
 SMALLEST_AREA = 1.0
-"""m². A polygon that encloses less is a line or a point: a slip, and nobody can be in it."""
+"""m² that a polygon encloses at least.
+
+One with less is a line or a point: a mistake, and no vehicle can be in it.
+"""
 
 _RETURN_POINT = dialect.MAV_CMD_NAV_FENCE_RETURN_POINT
 
 
 def _is_void(item: PlanItem) -> bool:
-    """True for a circle of radius 0, in which no vehicle can be. Fence editors send it for a circle not yet drawn."""
+    """True for a circle of radius 0, in which no vehicle can be.
+
+    Fence editors send it for a circle not yet drawn.
+    """
     return (item.command in CIRCLES or item.command == HOME_CIRCLE) and item.params[0] == 0.0
 
 
@@ -74,7 +80,7 @@ class FenceKind(PlanKind):
 
 
 def summary(items: Sequence[PlanItem]) -> Text:
-    """A fence in a line, for people; what it asks for that is not done is told."""
+    """Describe a fence in one line for people, including requests of it that are not supported."""
     zones = fence_of(items).zones
     words = []
     for inclusion in (True, False):

@@ -1,9 +1,10 @@
-"""A circle that is handed to the drone as its own geofence: so it holds without the gateway, too.
+"""Sets a fence circle as the drone's own geofence, so that it holds without the gateway.
 
-An ANAFI knows one fence: not farther from its centre than MaxDistance, while NoFlyOverMaxDistance is on. The centre is
-the controller's GPS, or else the take-off point. The radius is set while a client's fence says the same, and the one
-from before is set again when that fence is gone or disabled or when the centre moves away from it, unless another
-controller has changed it meanwhile. Zones that the drone cannot express are the gateway's to watch; so is this one.
+An ANAFI knows one fence: not farther from its centre than MaxDistance, while NoFlyOverMaxDistance is on. The centre
+is the controller's GPS, or else the take-off point. The radius is set while a client's fence is the same circle. The
+previous radius is restored when that fence is removed or disabled, or when the centre moves away from it, unless
+another controller has changed it meanwhile. The gateway watches all zones: those that the drone cannot express, and
+this one, too.
 """
 
 from __future__ import annotations
@@ -22,30 +23,36 @@ from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.fence.fence_watch import Reaction
 
 NEAR, FAR = 5.0, 10.0
-"""m between the drone's centre and the middle of a circle that count as the same place. While the drone stands its
-centre is a reading of GPS that wanders by some metres, and FAR ends what NEAR began; later NEAR counts alone."""
+"""m between two centres, the drone's and a circle's, that count as the same place.
+
+While the drone stands its centre is a GPS reading that drifts by some metres: FAR ends what NEAR began; later NEAR
+counts alone.
+"""
 
 SETTLED = 30.0
-"""s that a centre has to be near again before the circle is handed over once more: a pilot who walks has GPS, too."""
+"""s that a centre must be near again before the circle is set once more.
+
+A pilot who walks has GPS, too.
+"""
 
 SAME = 0.5
 """m by which the drone's radius may differ from the one that was set."""
 
 RETRY = 30.0
-"""s until what the drone did not accept is tried again."""
+"""s until a value that the drone did not accept is set again."""
 
 KEY = "fence_mirror"
-"""In the drone's memory: what was set, and what had been set before."""
+"""Key in the drone's memory: the value that was set, and the one before."""
 
 
 class FenceMirror:
-    """The drone's own geofence as far as the uploaded fence goes."""
+    """Sets the drone's own geofence to the uploaded fence, as far as it can express it."""
 
     def __init__(self, host: Host) -> None:
         self._host = host
         self._task: asyncio.Task[None] | None = None
         self._failed: tuple[float | None, float] | None = None
-        """What was wanted when it failed, and when."""
+        """The wanted value that could not be set, and the time of the failure."""
         self._moved_at = -math.inf
         """When the centre was last seen elsewhere while the circle was the drone's."""
 
@@ -54,7 +61,7 @@ class FenceMirror:
         self._moved_at = -math.inf
 
     def update(self, now: float) -> None:
-        """See whether the drone's geofence has to change."""
+        """Check whether the drone's geofence must change."""
         if self._task is not None and not self._task.done():
             return
         known, wanted, away = self.wanted()
@@ -72,8 +79,11 @@ class FenceMirror:
         self._task = self._host.spawn(self._change(wanted, mirrored, now))
 
     def wanted(self) -> tuple[bool, float | None, float | None]:
-        """(known, radius, away): the radius that says what the fence says, None for none. Not known: leave all as it
-        is. `away` is how far the drone's centre is from the circle's (m), when that is why there is none."""
+        """Return (known, radius, away): the radius that equals the fence, None without one.
+
+        Not known: leave all as it is. `away` is the distance of the drone's centre from the circle's (m), when that
+        is why the radius is None.
+        """
         vehicle = self._host.vehicle
         watch, state = vehicle.fence, self._host.drone.piloting.state
         zones = [zone for zone in watch.zones.zones if zone.inclusion]

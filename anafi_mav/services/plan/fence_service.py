@@ -1,7 +1,7 @@
-"""The fence enforced: watches where the drone is, acts at the boundary, tells everybody (MAVLink FENCE_STATUS).
+"""Enforces the fence: watches the position, acts at the boundary, sends FENCE_STATUS.
 
-What is to be done is `fence_watch`'s to say; which zones there are, a client's upload (`plan_service`). Settings are
-parameters (`parameter_table_fence`).
+`fence_watch` decides on the action; the zones are a client's upload (`plan_service`). Settings are parameters
+(`parameter_table_fence`).
 """
 
 from __future__ import annotations
@@ -28,30 +28,30 @@ from anafi_mav.vehicle.fence.fence_watch import CEILING, EVERYTHING, FLOOR, Fenc
 from anafi_mav.vehicle.vehicle import Vehicle
 
 LOOK_EVERY = 0.5
-"""s between looks while the drone tells nothing new."""
+"""s between looks while the drone reports nothing new."""
 
 LOOK_SOONEST = 0.1
-"""s between looks for the sake of a new speed alone. An ANAFI tells it every 0.2 s."""
+"""s between looks for a new speed alone. An ANAFI reports its speed every 0.2 s."""
 
 MIRROR_EVERY = 1.0
-"""s between looks whether the drone's own geofence has to change."""
+"""s between checks whether the drone's own geofence must change."""
 
 DISABLE, ENABLE, DISABLE_FLOOR = 0.0, 1.0, 2.0
 """param1 of MAV_CMD_DO_FENCE_ENABLE."""
 
 
 class FenceService(Service):
-    """Where the drone may be."""
+    """Service for the region in which the drone may be."""
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self._mirror = FenceMirror(host)
         self._located = -math.inf
-        """When the drone last told its place."""
+        """When the drone last reported its position."""
         self._looked = self._mirrored = -math.inf
         self._breach_ms = 0
         self._told: tuple[Any, ...] | None = None
-        """What the newest FENCE_STATUS said."""
+        """Content of the newest FENCE_STATUS."""
 
     @property
     def _watch(self) -> FenceWatch:
@@ -189,7 +189,7 @@ class FenceService(Service):
     # Telling.
 
     def _status(self, vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
-        """FENCE_STATUS, while there is a fence in force or one was breached."""
+        """Return FENCE_STATUS, while a fence is in force or a boundary was breached."""
         watch = self._watch
         if not watch.in_force and watch.breaches == 0:
             return None
@@ -202,7 +202,7 @@ class FenceService(Service):
         )
 
     def _tell(self) -> None:
-        """Everybody hears of a breach at once."""
+        """Send FENCE_STATUS to all clients when a breach begins or ends."""
         watch = self._watch
         now = (watch.state is State.OUTSIDE, watch.breaches)
         if now != self._told:
@@ -214,7 +214,10 @@ class FenceService(Service):
     # Commands.
 
     async def _enable(self, command: Command) -> None:
-        """MAV_CMD_DO_FENCE_ENABLE: param1 0 disable, 1 enable, 2 disable the floor; param2 FENCE_TYPE bits, 0 all."""
+        """Run MAV_CMD_DO_FENCE_ENABLE.
+
+        param1 0 disable, 1 enable, 2 disable the floor; param2 FENCE_TYPE bits, 0 all.
+        """
         what, types = command.params[:2]
         watch = self._watch
         wanted = EVERYTHING if math.isnan(types) or types == 0.0 else types

@@ -24,7 +24,7 @@ def _integer(value: float, scale: float) -> int | None:
 
 
 def item_of(message: Any) -> PlanItem | Fault:
-    """What a client sent as MISSION_ITEM or MISSION_ITEM_INT."""
+    """Return the item of a MISSION_ITEM or MISSION_ITEM_INT, or its fault."""
     x: int | None = message.x
     y: int | None = message.y
     if message.get_msgId() == dialect.MAVLINK_MSG_ID_MISSION_ITEM:

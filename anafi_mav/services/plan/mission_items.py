@@ -1,8 +1,8 @@
-"""Items of a plan as MAVLink carries them, and back: between `plans.plan.Item` and `PlanItem`.
+"""Items of a plan on the wire: conversion between `plans.plan.Item` and `PlanItem`.
 
-A message has single precision and no word for "not set" but NaN, and INT32_MAX in x and y; places are kept to 1e-7
-degree, about a centimetre. What comes back from the wire is the shortest decimal number that means the same, so that
-a speed of 0.3 m/s is 0.3 again.
+A message has single precision, and only NaN, or INT32_MAX in x and y, means "not set"; places are kept to 1e-7
+degree, about a centimetre. A value from the wire becomes the shortest decimal number that means the same, so that a
+speed of 0.3 m/s is 0.3 again.
 """
 
 from __future__ import annotations
@@ -21,7 +21,10 @@ EXACT = 2.0**24
 
 
 def to_wire(item: Item) -> PlanItem:
-    """An item as it travels. Raises `ValueError` for a number that MISSION_ITEM_INT cannot carry."""
+    """An item as it travels.
+
+    Raises `ValueError` for a number that MISSION_ITEM_INT cannot carry.
+    """
     one, two, three, four, five, six, seven = item.params
     placed = has_place(item.command, item.frame)
     params = _single(one), _single(two), _single(three), _single(four)
@@ -45,7 +48,7 @@ def from_wire(item: PlanItem) -> Item:
 
 
 def as_carried(item: Item) -> Item:
-    """What is left of an item when it has been a message. Raises `ValueError`."""
+    """Return an item as it is after being carried in a message. Raises `ValueError`."""
     return from_wire(to_wire(item))
 
 

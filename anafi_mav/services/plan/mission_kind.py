@@ -1,7 +1,8 @@
-"""Missions as the transfer machine sees them: what is taken, and how each flavour's clients count their items. No I/O.
+"""Rules of missions for the plan transfer: valid items and their numbering. No I/O.
 
 A mission is kept verbatim, in one numbering: the first real item is 0. ArduPilot's clients count home as item 0, so
-their lists, the targets of their jumps and whatever names an item to them are one further (MAVLink mission.md).
+their lists, the targets of their jumps and every other number of an item are one higher for them (MAVLink
+mission.md).
 """
 
 from __future__ import annotations
@@ -77,7 +78,7 @@ class Examined:
     report: Report
 
     def words(self, first: int) -> Text:
-        """For people who call the first item `first`: what of it is flown, and how."""
+        """Return a text on how the mission is flown, with item numbers beginning at `first`."""
         if not self.items:
             return texts.NO_MISSION_STORED
         report = self.report
@@ -97,7 +98,10 @@ def _some(losses: Sequence[Loss], first: int) -> str:
 
 
 class MissionKind(PlanKind):
-    """The list of mission items. `home` makes ArduPilot's item 0, `version` is of the file that the drone flies."""
+    """The list of mission items.
+
+    `home` makes ArduPilot's item 0, `version` is of the file that the drone flies.
+    """
 
     mission_type = dialect.MAV_MISSION_TYPE_MISSION
     name = "mission"
@@ -108,9 +112,10 @@ class MissionKind(PlanKind):
         self._known = Examined((), (), _NOTHING)
 
     def examine(self, items: Sequence[PlanItem], flavour: Flavour = PX4) -> Fault | None:
-        """What is wrong with good items together; a reason numbers them as clients of this flavour do.
+        """Return the fault of a list whose items are valid by themselves.
 
-        This is no `check_plan`: 5 000 items take half a second, which is for a thread.
+        Its reason numbers items as clients of this flavour do. This is no `check_plan`: 5 000 items take half a
+        second, which is for a thread.
         """
         report = self.examined(items).report
         if not report.faults:
@@ -146,7 +151,10 @@ class MissionKind(PlanKind):
         return seq - offset(flavour) + FIRST_LABEL
 
     def always_shown(self, seq: int, flavour: Flavour) -> PlanItem | None:
-        """dronekit reads home as item 0, and waits for it when there is nothing else; ArduCopter always has it."""
+        """Return home as item 0, for ArduPilot's clients, also of an empty list.
+
+        dronekit reads home as item 0 and waits for it when the list is empty; ArduCopter always has it.
+        """
         return self._home() if flavour.zero_home and seq == 0 else None
 
 

@@ -1,4 +1,4 @@
-"""Missions as clients order and follow them: mode and commands, MISSION_CURRENT, MISSION_ITEM_REACHED.
+"""Missions of clients: mode, commands, MISSION_CURRENT, MISSION_ITEM_REACHED.
 
 The list itself is `plan_service`'s, how it is flown `vehicle.mission.flight`'s. Conformance A4, B2, C5 and items 49,
 72 to 74, 122. Commands: MAVLink common.xml MAV_CMD_MISSION_START, MAV_CMD_DO_SET_MISSION_CURRENT.
@@ -40,7 +40,7 @@ IN_MISSION_MODE, NOT_IN_MISSION_MODE = 1, 2
 """`mission_mode` of MISSION_CURRENT (common.xml)."""
 
 RECORD = "mission"
-"""What the record is called in the drone's file."""
+"""Name of the record in the drone's file."""
 
 
 class MissionService(Service):
@@ -58,7 +58,7 @@ class MissionService(Service):
         self._saved = -math.inf
         self._unsaved = False
         self._sent: Mapping[bool, tuple[int, ...]] = {}
-        """What `_fields` was when MISSION_CURRENT last announced a change; empty: the next one leaves anyway."""
+        """Value of `_fields` when MISSION_CURRENT last announced a change; empty: the next one is sent in any case."""
         self._sent_item: int | None = None
 
     def messages(self) -> Mapping[int, MessageHandler]:
@@ -108,13 +108,16 @@ class MissionService(Service):
     # Orders.
 
     async def _start(self, command: Command) -> None:
-        """MAV_CMD_MISSION_START: the mission begins or goes on, as by its mode. Only the whole of it."""
+        """MAV_CMD_MISSION_START: the mission begins or goes on, as by its mode.
+
+        Only the whole of it.
+        """
         if any(value not in (0.0, KEEP) and not math.isnan(value) for value in command.params[:2]):
             raise Refused(texts.MISSION, texts.MISSION_PART, lasting=True)
         await self.host.vehicle.set_mode(FlightMode.MISSION, command.right)
 
     async def _choose(self, command: Command) -> None:
-        """MAV_CMD_DO_SET_MISSION_CURRENT: param1 the item, -1 none; param2 1 with -1 resets, see `reset`."""
+        """MAV_CMD_DO_SET_MISSION_CURRENT: param1 the item or -1; -1 with param2 1 resets."""
         item, anew = command.params[:2]
         flight = self._flight
         await flight.storing.over()
@@ -141,10 +144,11 @@ class MissionService(Service):
         return dialect.MAVLink_mission_current_message(*_fields(vehicle)[times.flavour.zero_home])
 
     def _tell(self) -> None:
-        """Send MISSION_CURRENT to the clients for whom a field has changed; then, for a new item, a HEARTBEAT.
+        """Send MISSION_CURRENT to the clients for whom a field has changed.
 
-        QGroundControl takes an item for flown to when a HEARTBEAT in mode Mission follows it
-        (MissionManager::_handleHeartbeat). Without one it offers to resume a mission that is complete.
+        For a new item a HEARTBEAT follows. QGroundControl takes an item for flown to when a HEARTBEAT in mode Mission
+        follows
+        it (MissionManager::_handleHeartbeat). Without one it offers to resume a mission that is complete.
         """
         vehicle = self.host.vehicle
         fields, before = _fields(vehicle), self._sent
@@ -207,12 +211,15 @@ def _fields(vehicle: Vehicle) -> Mapping[bool, tuple[int, ...]]:
 
 
 def _first_number(client: Hashable) -> int:
-    """What a client calls the first item."""
+    """Return the number that a client gives the first item."""
     channel = client[0] if isinstance(client, tuple) else None
     return offset(flavour_of(channel)) if isinstance(channel, Channel) else 0
 
 
 def _ours(number: int, client: Hashable) -> int:
-    """An item by the number that a client gives it; ArduPilot's home, which it begins with, is the first."""
+    """Return our number of the item that a client calls `number`.
+
+    ArduPilot's home, with which its list begins, maps to the first item.
+    """
     first = _first_number(client)
     return max(number - first, 0) if number >= 0 else number

@@ -1,9 +1,8 @@
-"""Plans as ArduPilot's files "@MISSION/mission.dat", "fence.dat" and "rally.dat": MAVProxy's `wp ftp` and `wp ftpload`.
+"""Plans as ArduPilot's files "@MISSION/mission.dat", "fence.dat" and "rally.dat". No I/O.
 
-A header of five numbers (magic, MAV_MISSION_TYPE, options, first item, number of items), then the items as the payloads
-of MISSION_ITEM_INT in the order of the wire (ArduPilot AP_Filesystem_Mission, MAVProxy mission_item_protocol.py).
-
-No I/O.
+MAVProxy's `wp ftp` and `wp ftpload` transfer them. A header of five numbers (magic, MAV_MISSION_TYPE, options, first
+item, number of items), then the items as the payloads of MISSION_ITEM_INT in the order of the wire (ArduPilot
+AP_Filesystem_Mission, MAVProxy mission_item_protocol.py).
 """
 
 from __future__ import annotations

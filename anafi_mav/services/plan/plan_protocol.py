@@ -1,10 +1,10 @@
-"""The three lists of a vehicle at one desk: sorts the messages of the mission protocol to their transfers. No I/O.
+"""Sorts messages of the mission protocol to the transfers of the three lists. No I/O.
 
-    desk.receive(message, peer, now) -> effects;  desk.stored(commit, now) -> effects
-    desk.deadline() -> when to call desk.expire(now)
+    protocol.receive(message, peer, now) -> effects;  protocol.stored(commit, now) -> effects
+    protocol.deadline() -> when to call protocol.expire(now)
 
-What is about a list as a whole waits its turn while that list is being stored: clients say it once. dronekit does not
-wait for the acknowledgement of what it uploaded before it asks for the list, and must not be told of the old one.
+A message about a list as a whole waits while that list is being stored: clients send it once. dronekit does not wait
+for the acknowledgement of its upload before it requests the list, and must not receive the old one.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ MESSAGES = (
     dialect.MAVLINK_MSG_ID_MISSION_REQUEST_INT,
     dialect.MAVLINK_MSG_ID_MISSION_REQUEST_PARTIAL_LIST,
 )
-"""What belongs to a transfer."""
+"""Messages of a transfer."""
 
 
 class PlanDesk:
@@ -110,7 +110,7 @@ class PlanDesk:
         return [Commit(dict.fromkeys(self.transfers, ()), peer, ALL)]
 
     def stored(self, commit: Commit, now: float, fault: Fault | None = None) -> list[Effect]:
-        """What a `Commit` asked for is done; with a fault the plan turned out to be no good, and the old one stays."""
+        """Finish a `Commit`; with a fault the new plan is invalid and the old one stays."""
         effects: list[Effect] = []
         open_still = any(self.transfers[kind].state is State.STORING for kind in commit.plans)
         for kind, items in commit.plans.items():

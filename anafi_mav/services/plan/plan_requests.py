@@ -1,4 +1,4 @@
-"""What the receiver of a list of items asks its sender for, and when. No I/O.
+"""Requests of the receiver of a list of items, and their times. No I/O.
 
 Rules: MAVLink mission.md; conformance A7, C5.
 """
@@ -17,24 +17,28 @@ MAX_TRIES = 25
 """Requests of one item: five seconds. With a quarter lost each way it fails to come so often in a row once in 10^9."""
 
 PLAIN_TRIES, PLAIN_TRIES_OF_LAST = 2, 5
-"""Requests of an item that ask for nothing else. MAVSDK sends an item five times and gives the upload up at the sixth
-request, but counts anew when it is asked for the very item after the one that it has sent last. So further requests
-ask for items before the missing one, too (`AGAIN`), which any client says again. The last item is asked for alone for
-longer: where a message takes most of a second there and back, the acknowledgement would meet a client that is at an
-earlier item again."""
+"""Number of requests of an item that ask for nothing else.
+
+MAVSDK sends an item five times and aborts the upload at the sixth request, but its count restarts at a request of the
+very item after the one that it has sent last. So further requests ask for items before the missing one, too
+(`AGAIN`), which any client sends again. The last item is requested alone for longer: where a message takes most of a
+second there and back, the acknowledgement would reach a client that is at an earlier item again.
+"""
 
 AGAIN = ((-2, -1, 0), (-1, 0, 0))
-"""What further requests ask for, in turns, relative to the missing item: of short sequences of items that the client
-has sent already the one with which MAVSDK lasts longest (tests/bench/lossy_uploads.py). Items that it has not sent yet
-would do better still, but Mission Planner takes a request of the next item for the receipt of this one, and MAVProxy
-goes away after its last."""
+"""Items of further requests, in turns, relative to the missing item.
+
+Of short sequences of items that the client has sent already this is the one with which MAVSDK lasts longest
+(tests/bench/lossy_uploads.py). Items that it has not sent yet would do better still, but Mission Planner takes a
+request of the next item for the receipt of this one, and MAVProxy leaves after its last.
+"""
 
 AGAIN_EVERY = 0.02
 """s between the requests of one repetition, so that they do not overtake each other on their way."""
 
 
 def asked_for(tries: int, *, is_last: bool) -> Sequence[int]:
-    """What the so manieth try to get an item asks for, relative to it; the first one is 1."""
+    """Return the items to request at this try, relative to the missing item; the first try is 1."""
     plain = PLAIN_TRIES_OF_LAST if is_last else PLAIN_TRIES
     return (0,) if tries <= plain else AGAIN[(tries - plain - 1) % len(AGAIN)]
 
@@ -50,7 +54,7 @@ class Requests:
     due: float = 0.0
     """When to call `again`."""
     _wanted: list[int] = field(default_factory=list)
-    """What this try has not asked for yet."""
+    """Items of this try that are not requested yet."""
     _next_try: float = 0.0
 
     def __post_init__(self) -> None:
@@ -76,7 +80,10 @@ class Requests:
         return True
 
     def again(self, now: float) -> int:
-        """The number of the item to ask for now. Call it at the beginning, when an item has come, and when `due`."""
+        """The number of the item to ask for now.
+
+        Call it at the beginning, when an item has come, and when `due`.
+        """
         if not self._wanted:
             self.tries += 1
             steps = (0,) if self.expected == self.first else asked_for(self.tries, is_last=self.expected == self.last)

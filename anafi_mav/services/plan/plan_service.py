@@ -1,4 +1,4 @@
-"""The mission protocol on the wire: a desk of transfers (`plan_protocol`), its clock, its channels, its file.
+"""The mission protocol on the wire: the shell around `plan_protocol`.
 
 A plan is stored before its upload is acknowledged, and is what the vehicle goes by from then on: `Vehicle.fence` and
 `Vehicle.rally` take theirs.
@@ -87,7 +87,10 @@ class PlanService(Service):
         return plan_files.pack_plan(transfer.kind.shown(transfer.items, flavour), kind)
 
     def _written(self, kind: int, inbound: Inbound, content: bytes) -> bool:
-        """A client has written the file of a list. What is wrong with it is a text; the list then stays."""
+        """A client has written the file of a list.
+
+        What is wrong with it is a text; the list then stays.
+        """
         transfer = self._desk.transfers[kind]
         items = plan_files.unpack_plan(content, kind)
         if isinstance(items, Fault):
@@ -228,7 +231,7 @@ class PlanService(Service):
     # Plans in force.
 
     def _changed(self, kind: int) -> None:
-        """A plan was uploaded: the vehicle goes by it, everybody is told."""
+        """Put an uploaded plan in force and notify all clients."""
         mission = self.host.vehicle.mission
         if kind == MissionKind.mission_type and self._desk.transfers[kind].opaque_id == mission.identity:
             mission.taken_again()

@@ -1,4 +1,4 @@
-"""The transfer of one list of items, both ways, as a state machine: a mission, a fence or rally points. No I/O.
+"""The state machine of the transfer of one plan: mission, fence or rally points. No I/O.
 
 A client's upload replaces the plan as a whole, once all of it has arrived, was found good and is stored; whatever goes
 wrong before leaves the old plan as it was. A download is answered from the plan as it was when the client asked for
@@ -70,11 +70,11 @@ TRANSITIONS: dict[State, dict[Event, State]] = {
     },
     State.STORING: {Event.STORED: State.IDLE},
 }
-"""What is not here does not happen: `PlanTransfer` ignores, refuses or defers it."""
+"""A missing pair cannot occur: `PlanTransfer` ignores, refuses or defers the event."""
 
 
 class Peer(msgspec.Struct, frozen=True):
-    """A client, told apart from others by `client` and addressed exactly (conformance R11)."""
+    """A client, identified by `client` and addressed exactly (conformance R11)."""
 
     client: Hashable
     sysid: int
@@ -121,7 +121,10 @@ Effect: TypeAlias = Reply | Commit | Changed | Say
 
 
 class PlanKind:
-    """What one of the three lists is about: which items it takes. Subclasses override what differs."""
+    """Rules of one of the three lists: the items it accepts.
+
+    Subclasses override what differs.
+    """
 
     mission_type: int
     name: str
@@ -131,11 +134,14 @@ class PlanKind:
     """Why no plan of this kind is taken at all; None: they are."""
 
     def check_item(self, item: PlanItem) -> Fault | None:
-        """What is wrong with one item by itself."""
+        """Return the fault of one item by itself."""
         return None
 
     def check_plan(self, items: Sequence[PlanItem], flavour: Flavour = PX4) -> Fault | None:
-        """What is wrong with good items together; a reason numbers them as clients of this flavour do."""
+        """Return the fault of a list whose items are valid by themselves.
+
+        Its reason numbers items as clients of this flavour do.
+        """
         return None
 
     def shown(self, items: Sequence[PlanItem], flavour: Flavour) -> Sequence[PlanItem]:
@@ -147,7 +153,7 @@ class PlanKind:
         return items
 
     def remarks(self, items: Sequence[PlanItem]) -> Sequence[Text]:
-        """Warnings about a list that a client sent and that is accepted: items that `taken` leaves out."""
+        """Return warnings about an accepted list: items that `taken` leaves out."""
         return ()
 
     def label(self, seq: int, flavour: Flavour) -> int:
@@ -155,7 +161,7 @@ class PlanKind:
         return seq
 
     def always_shown(self, seq: int, flavour: Flavour) -> PlanItem | None:
-        """What stands at a place of the list even when it is empty; None: nothing."""
+        """Return the item at a place of the list that exists even when the list is empty, or None."""
         return None
 
 
@@ -181,7 +187,10 @@ class _Download:
 
     @property
     def under_way(self) -> bool:
-        """Some items were asked for, and others will be. Who asks for no more than their number keeps nobody away."""
+        """True after the first requested item and before the last one.
+
+        A client that requests only the count blocks no other client.
+        """
         return 0 < len(self.left) < len(self.items)
 
 
@@ -200,7 +209,10 @@ class _Done:
 
 
 class PlanTransfer:
-    """One list and the transfers of it. Every method returns what is to be done; messages of peers never raise."""
+    """One list and the transfers of it.
+
+    Every method returns what is to be done; messages of peers never raise.
+    """
 
     def __init__(self, kind: PlanKind) -> None:
         self.kind = kind
@@ -240,7 +252,9 @@ class PlanTransfer:
         return self._begin(_Upload(peer, [], Requests(0, count - 1), now), now)
 
     def partial(self, first: int, last: int, peer: Peer, now: float) -> list[Effect]:
-        """MISSION_WRITE_PARTIAL_LIST: some items are replaced, or one follows the last. ArduPilot has it, PX4 not.
+        """MISSION_WRITE_PARTIAL_LIST: some items are replaced, or one follows the last.
+
+        ArduPilot has it, PX4 not.
 
         MAVProxy names as `last` the one after it; it has no such item and never sends it.
         """
@@ -342,14 +356,14 @@ class PlanTransfer:
         return [*remarks, commit]
 
     def clear(self, peer: Peer, now: float) -> list[Effect]:
-        """MISSION_CLEAR_ALL, or MISSION_COUNT of 0: acknowledged also when there is nothing to clear."""
+        """Handle MISSION_CLEAR_ALL, or MISSION_COUNT of 0; an empty list is acknowledged, too."""
         if not self.may_clear(peer, now):
             return self._occupied(peer)
         self.begin_clear(peer, now)
         return [Commit({self.kind.mission_type: ()}, peer, self.kind.mission_type)]
 
     def may_clear(self, peer: Peer, now: float) -> bool:
-        """Nobody else transfers this list."""
+        """Return True if no other client transfers this list."""
         return not self._busy(peer, now)
 
     def begin_clear(self, peer: Peer, now: float) -> None:
@@ -361,7 +375,10 @@ class PlanTransfer:
         self._committing = _Done(peer, now, -1)
 
     def stored(self, items: tuple[PlanItem, ...], now: float, fault: Fault | None = None) -> list[Effect]:
-        """What a `Commit` asked for is done, or cannot be done. The acknowledgement is the caller's to send."""
+        """Finish a `Commit`: it is stored, or has a fault.
+
+        The caller sends the acknowledgement.
+        """
         if self.state is not State.STORING:
             return []  # the link was lost meanwhile
         self.state = TRANSITIONS[self.state][Event.STORED]
@@ -394,7 +411,10 @@ class PlanTransfer:
     # Downloads.
 
     def request_list(self, peer: Peer, now: float) -> list[Effect]:
-        """MISSION_REQUEST_LIST: how many items there are. Who asks while it uploads has given its upload up."""
+        """Answer MISSION_REQUEST_LIST with the number of items.
+
+        A client that requests the list during its own upload has aborted the upload.
+        """
         self.cancel(peer)
         items = self.kind.shown(self.items, peer.flavour)
         if items:
@@ -411,7 +431,7 @@ class PlanTransfer:
         ]
 
     def request(self, seq: int, as_float: bool, peer: Peer, now: float) -> list[Effect]:
-        """MISSION_REQUEST_INT or MISSION_REQUEST: in any order, again, and several at once."""
+        """Answer MISSION_REQUEST_INT or MISSION_REQUEST: in any sequence, repeated, several at once."""
         self._forget_done(peer)
         download = self._downloads.get(peer.client)
         if download is not None and now - download.asked > RECENT:
@@ -484,7 +504,7 @@ class PlanTransfer:
         )
 
     def _busy(self, peer: Peer, now: float) -> bool:
-        """Somebody else transfers this list, and was heard of late."""
+        """Return True if another client transfers this list and has sent something recently."""
         upload = self._upload
         if upload is not None and upload.peer.client != peer.client and now - upload.heard < PATIENCE:
             return True
@@ -517,7 +537,7 @@ class PlanTransfer:
             self._done = _Done(upload.peer, upload.heard, -1)
 
     def _late_item(self, seq: int, peer: Peer, now: float) -> list[Effect]:
-        """An item while nobody uploads: a copy of one that came, or nonsense."""
+        """Handle an item without an upload: a copy of a received item, or an error."""
         committing, done = self._committing, self._done
         if committing is not None and committing.peer.client == peer.client:
             return []
@@ -528,8 +548,10 @@ class PlanTransfer:
         return [self._ack(peer, done.result)]  # the client has not heard it: it says its last item again
 
     def gone_on(self, peer: Peer) -> None:
-        """The client begins with another list, so it has heard of this one. MAVSDK takes an acknowledgement of any list
-        for one of that which it transfers."""
+        """The client begins with another list, so it has heard of this one.
+
+        MAVSDK takes an acknowledgement of any list for one of that which it transfers.
+        """
         for done in (self._done, self._committing):
             if done is not None and done.peer.client == peer.client:
                 done.echoes = 0

@@ -1,7 +1,7 @@
-"""Rally points in use: while the drone flies, the chosen one is its custom home, so that a return needs no gateway.
+"""Rally points in use: while the drone flies, the chosen one is its custom home.
 
-Only where RTL_TYPE says so. What the drone preferred before comes back when it has landed, and when the rally points
-are gone. A custom home that somebody else chose is left alone.
+So a return needs no gateway. This applies only where RTL_TYPE is set to it. The drone's former preference is restored
+when it has landed, and when the rally points are removed. A custom home that another controller chose is left alone.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ MIRROR = "rally_home"
 
 
 class RallyService(Service):
-    """Where a return ends, as far as rally points decide it."""
+    """MAVLink service that sets the end of a return, as far as rally points decide it."""
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
@@ -41,7 +41,10 @@ class RallyService(Service):
         self._chosen: RallyPoint | None = None
         """The drone's custom home by our doing."""
         self._given: Position | None = None
-        """Where the drone's custom home was when we last gave it one: another place is somebody's choice since."""
+        """Custom home that was last set by us.
+
+        A different place is another controller's choice since.
+        """
         self._rejected: dict[RallyPoint, float] = {}
         """Until when they are not proposed again."""
 
@@ -92,7 +95,7 @@ class RallyService(Service):
         return self._rally.choose(vehicle.place.point, home, vehicle.height.takeoff_amsl, self._chosen, usable)
 
     def _may_choose(self) -> bool:
-        """The drone can have a custom home, and has none that somebody else chose."""
+        """Return True if the drone can have a custom home, and has none of another controller."""
         state = self.host.drone.home.state
         if state.preferred_type is None or state.types is None or RthHomeType.CUSTOM not in state.types:
             return False
@@ -102,7 +105,7 @@ class RallyService(Service):
         return True
 
     def _taken_over(self) -> bool:
-        """Somebody else has chosen a custom home since we did."""
+        """Return True if another controller has chosen a custom home since we did."""
         state, given = self.host.drone.home.state, self._given
         chosen = state.custom_location
         if self._before() is None or state.preferred_type != RthHomeType.CUSTOM or chosen is None:
@@ -140,7 +143,10 @@ class RallyService(Service):
             await self._restore()
 
     async def _restore(self) -> None:
-        """What the drone preferred before us counts again; a home that somebody has chosen since stays his."""
+        """Restore the home type that the drone preferred before us.
+
+        A home that another controller has chosen since is kept.
+        """
         home, before = self.host.drone.home, self._before()
         if before is None:
             return
@@ -157,7 +163,7 @@ class RallyService(Service):
             self.host.text(Severity.NOTICE, texts.RETURNS_TO_HOME)
 
     def _before(self) -> RthHomeType | None:
-        """What the drone preferred before we changed it; None: we have not."""
+        """Return the home type that the drone preferred before our change; None without one."""
         name = self.host.memory.settings.get(MIRROR)
         return RthHomeType.__members__.get(name) if isinstance(name, str) else None
 

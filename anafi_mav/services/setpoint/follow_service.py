@@ -1,4 +1,7 @@
-"""FOLLOW_TARGET as it arrives (conformance A10, B2). Where the drone belongs is in `vehicle.follow`."""
+"""Receives FOLLOW_TARGET (conformance A10, B2).
+
+`vehicle.follow` computes the drone's place.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +16,7 @@ from anafi_mav.vehicle.base.subscriptions import Subscriptions
 
 
 class FollowService(Service):
-    """The targets that this system may be told to follow."""
+    """Service for targets that this system can be commanded to follow."""
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)

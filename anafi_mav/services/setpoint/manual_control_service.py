@@ -1,6 +1,6 @@
-"""The sticks of ground stations as they arrive (MAVLink manual_control.md; conformance A10, C15).
+"""Receives ground stations' sticks (MAVLink manual_control.md; conformance A10, C15).
 
-What they mean is in `stick_messages`, when they fly the drone in `vehicle.manual_flight`.
+`stick_messages` decodes them, `vehicle.manual_flight` flies by them.
 """
 
 from __future__ import annotations

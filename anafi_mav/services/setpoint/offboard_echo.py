@@ -1,8 +1,8 @@
-"""What is being flown, told back: POSITION_TARGET_LOCAL_NED, POSITION_TARGET_GLOBAL_INT and ATTITUDE_TARGET.
+"""Messages that echo the flown setpoint: POSITION_TARGET_* and ATTITUDE_TARGET.
 
-They say what the vehicle makes of a setpoint: positions that count from the drone have become places, headings that
-count from the nose have become headings. A value that is not asked for is NaN, and its bit is set in the mask. While
-nothing is being flown there is nothing to tell, and no message.
+POSITION_TARGET_LOCAL_NED, POSITION_TARGET_GLOBAL_INT and ATTITUDE_TARGET hold the vehicle's interpretation of a
+setpoint: positions that count from the drone have become places, headings that count from the nose have become
+headings. A value that is not set is NaN, and its bit is set in the mask. While nothing is flown no message is sent.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _YAW_RATE_IGNORE = dialect.POSITION_TARGET_TYPEMASK_YAW_RATE_IGNORE
 
 
 class _Target:
-    """What the vehicle flies to, in north, east and down."""
+    """Target of the vehicle, in north, east and down."""
 
     def __init__(self) -> None:
         self.place: Place | None = None
@@ -72,7 +72,10 @@ def _target(vehicle: Vehicle) -> _Target | None:
 
 
 def _over_ground(vector: tuple[float | None, float | None, float | None], turn: float | None) -> list[float | None]:
-    """A vector of axes turned clockwise by `turn` in north, east, down. One without a horizontal half has none."""
+    """A vector of axes turned clockwise by `turn` in north, east, down.
+
+    One without a horizontal half has none.
+    """
     x, y, z = vector
     if x is None and y is None:
         return [None, None, z]
@@ -120,7 +123,7 @@ def global_target(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | N
 
 
 def attitude_target(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
-    """ATTITUDE_TARGET: the sticks that setpoints hold, whatever kind of setpoints; thrust 0.5 holds height."""
+    """Return ATTITUDE_TARGET: the sticks held by setpoints of any kind; thrust 0.5 holds height."""
     flight, limits = vehicle.offboard, vehicle.drone.piloting.limits
     sticks, heading = flight.flown, flight.motion.yaw
     if sticks is None or limits is None or heading is None:

@@ -1,6 +1,6 @@
-"""Setpoints of programs as they arrive, and what of them is being flown, told back (MAVLink offboard.md, C16).
+"""Receives setpoints of programs and sends back the flown ones (MAVLink offboard.md, C16).
 
-What the messages mean is in `setpoint_messages`, how they are flown in `vehicle.offboard.flight`.
+`setpoint_messages` decodes the messages, `vehicle.offboard.flight` flies them.
 """
 
 from __future__ import annotations
@@ -23,7 +23,10 @@ from anafi_mav.vehicle.offboard.setpoints import Setpoint
 
 
 class OffboardService(Service):
-    """SET_ATTITUDE_TARGET, SET_POSITION_TARGET_LOCAL_NED, SET_POSITION_TARGET_GLOBAL_INT and their echoes."""
+    """MAVLink service for SET_ATTITUDE_TARGET and SET_POSITION_TARGET_*, and their echoes.
+
+    The positions are those of SET_POSITION_TARGET_LOCAL_NED and SET_POSITION_TARGET_GLOBAL_INT.
+    """
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)

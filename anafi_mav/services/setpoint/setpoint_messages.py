@@ -1,4 +1,6 @@
-"""Reads setpoints from SET_ATTITUDE_TARGET and SET_POSITION_TARGET_*: units, frames, limits. No I/O.
+"""Reads setpoints from messages: units, frames, limits. No I/O.
+
+SET_ATTITUDE_TARGET and the two SET_POSITION_TARGET messages are read.
 
 SET_ATTITUDE_TARGET becomes the stick vector u = [vz, roll, pitch, yaw rate] of the anafi_ros paper, the only thing
 ARSDK has:
@@ -97,7 +99,10 @@ _TERRAIN_FRAMES = (dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT, dialect.MAV_FRAME_GLOBA
 
 
 def local_setpoint(message: dialect.MAVLink_set_position_target_local_ned_message) -> MotionSetpoint | Text:
-    """The setpoint of a SET_POSITION_TARGET_LOCAL_NED, or one sentence on why it cannot be flown."""
+    """Return the setpoint of a SET_POSITION_TARGET_LOCAL_NED.
+
+    Returns one sentence on the reason if it cannot be flown.
+    """
     frame = _LOCAL_FRAMES.get(message.coordinate_frame)
     if frame is None:
         return _no_frame(message.coordinate_frame)
@@ -105,7 +110,10 @@ def local_setpoint(message: dialect.MAVLink_set_position_target_local_ned_messag
 
 
 def global_setpoint(message: dialect.MAVLink_set_position_target_global_int_message) -> MotionSetpoint | Text:
-    """The setpoint of a SET_POSITION_TARGET_GLOBAL_INT, or one sentence on why it cannot be flown."""
+    """Return the setpoint of a SET_POSITION_TARGET_GLOBAL_INT.
+
+    Returns one sentence on the reason if it cannot be flown.
+    """
     origin = _GLOBAL_FRAMES.get(message.coordinate_frame)
     if origin is None:
         return _no_frame(message.coordinate_frame)
@@ -156,7 +164,10 @@ def _motion(
 
 
 def _wanted(values: tuple[float, float, float], mask: int, first: int) -> Vector:
-    """The values of three axes that are not ignored; `first` is the mask's bit of x, y and z have the next two."""
+    """Return the values of three axes, None for each that the mask ignores.
+
+    `first` is the mask's bit of x; y and z have the next two.
+    """
     x, y, z = (None if mask & first << i else value for i, value in enumerate(values))
     return x, y, z
 

@@ -29,7 +29,10 @@ SHORTEST, LONGEST = 800, 2200
 
 
 def manual_sticks(message: dialect.MAVLink_manual_control_message) -> Sticks | Text | None:
-    """The sticks of a MANUAL_CONTROL, or one sentence on why they are none; None: it has no axis at all."""
+    """Return the sticks of a MANUAL_CONTROL, or one sentence on why they are invalid.
+
+    Returns None if the message has no axis at all.
+    """
     axes = (message.x, message.y, message.r, message.z)
     if all(axis == NO_AXIS for axis in axes):
         return None
@@ -44,7 +47,7 @@ def manual_sticks(message: dialect.MAVLink_manual_control_message) -> Sticks | T
 
 @dataclass(frozen=True)
 class Channels:
-    """What a client has set of the four channels, us; None: released."""
+    """Values that a client has set on the four channels, us; None: released."""
 
     roll: int | None = None
     pitch: int | None = None
@@ -52,7 +55,10 @@ class Channels:
     yaw: int | None = None
 
     def after(self, message: dialect.MAVLink_rc_channels_override_message) -> Channels | Text:
-        """What they are after one more RC_CHANNELS_OVERRIDE, or one sentence on why that is none."""
+        """Return the channels after one more RC_CHANNELS_OVERRIDE.
+
+        Returns one sentence on the reason if the message is invalid.
+        """
         said = {
             "roll": message.chan1_raw,
             "pitch": message.chan2_raw,

@@ -11,7 +11,7 @@ from anafi_mav.vehicle.follow import FASTEST, Sighting
 
 
 def sighting(message: dialect.MAVLink_follow_target_message) -> Sighting | Text:
-    """What a FOLLOW_TARGET says, or one sentence on why it cannot be followed.
+    """Return the content of a FOLLOW_TARGET, or one sentence on why it cannot be followed.
 
     Bits of est_capabilities: 0 position, 1 velocity (MAVLink common.xml FOLLOW_TARGET).
     """

@@ -1,7 +1,7 @@
-"""ArduPilot's groups of streams: what REQUEST_DATA_STREAM means by a number. No I/O.
+"""ArduPilot's groups of streams, which REQUEST_DATA_STREAM selects by number. No I/O.
 
-ArduPilot's own clients ask for whole groups at a rate. A group here has those of our messages that ArduCopter has in it
-(ArduPilot GCS_MAVLINK_Copter.cpp STREAM_*_msgs), and the ones that PX4's clients use for the same.
+ArduPilot's own clients request whole groups at a rate. A group here has those of our messages that ArduCopter has in
+it (ArduPilot GCS_MAVLINK_Copter.cpp STREAM_*_msgs), and the ones that PX4's clients use for the same.
 """
 
 from __future__ import annotations
@@ -38,7 +38,10 @@ _GROUPS: Mapping[int, Sequence[int]] = {
 
 
 def members(group: int) -> Sequence[int]:
-    """Message ids of a group; of all groups for MAV_DATA_STREAM_ALL, of none for one that an ANAFI has nothing for."""
+    """Return the message ids of a group.
+
+    MAV_DATA_STREAM_ALL: those of all groups. Empty for a group that an ANAFI has no data for.
+    """
     if group == dialect.MAV_DATA_STREAM_ALL:
         return [id for ids in _GROUPS.values() for id in ids]
     return _GROUPS.get(group, ())

@@ -1,7 +1,7 @@
-"""FLIGHT_INFORMATION: which flight this is, and when it began (MAVLink common.xml 264; conformance F 132).
+"""FLIGHT_INFORMATION: number and start of the present flight (MAVLink common.xml 264).
 
-Times are in the clock of all our messages; what happened before we were connected is 0, MAVLink's "unknown". The
-flight's number is made of the id that the drone gives each of its flights.
+Conformance F 132. Times are in the clock of all our messages; events from before we were connected are 0, MAVLink's
+"unknown". The flight's number is made of the id that the drone gives each of its flights.
 """
 
 from __future__ import annotations
@@ -24,12 +24,15 @@ class FlightRecord:
     took_off_at: int = 0
     landed_at: int = 0
     number: int = 0
-    """0: no flight yet, or the drone has not said which."""
+    """0: no flight yet, or the drone has not reported its id."""
     _armed: bool | None = None
     _landed: Landed | None = None
 
     def look(self, *, armed: bool, landed: Landed, now: int) -> None:
-        """What the vehicle is now. The first look only compares: what it shows began before it."""
+        """Update from the vehicle's present state.
+
+        The first call only compares: the state that it sees began before it.
+        """
         if self._armed is False and armed:
             self.armed_at, self.took_off_at, self.landed_at, self.number = now, 0, 0, 0
         if self._landed is Landed.ON_GROUND and landed in (Landed.TAKEOFF, Landed.IN_AIR):
@@ -41,7 +44,7 @@ class FlightRecord:
             self._landed = landed
 
     def flight_id(self, id: str | None) -> None:
-        """The drone's id of its flight; empty on the ground, where the last flight's is kept."""
+        """Take the drone's id of its flight; empty on the ground, where the last number is kept."""
         if id:
             self.number = int.from_bytes(hashlib.sha256(id.encode()).digest()[:8], "little") or 1
 

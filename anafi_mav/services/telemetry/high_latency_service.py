@@ -1,8 +1,8 @@
-"""HIGH_LATENCY2 for links on which every byte costs (MAVLink high_latency.md; conformance C14).
+"""HIGH_LATENCY2 for links on which every byte costs (high_latency.md; conformance C14).
 
-MAV_CMD_CONTROL_HIGH_LATENCY holds for the channel that it comes by: no heartbeat, no stream and no text goes there any
-more, but HIGH_LATENCY2 every five seconds, and answers to commands, until the same command ends it or the channel
-closes.
+MAV_CMD_CONTROL_HIGH_LATENCY applies to the channel that it is received on. Until the same command ends it or the
+channel closes, no heartbeat, stream or text is sent there, but HIGH_LATENCY2 every five seconds, and answers to
+commands.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ _FAILURES: Mapping[int, int] = {
 
 
 def failures(vehicle: Vehicle) -> int:
-    """HL_FAILURE_FLAG of what is enabled and not healthy."""
+    """Return the HL_FAILURE_FLAG bits of components that are enabled and not healthy."""
     _, enabled, healthy = sensor_bits(vehicle)
     return sum(flag for bit, flag in _FAILURES.items() if enabled & bit and not healthy & bit)
 
@@ -53,7 +53,7 @@ def _half_degrees(radians: float) -> int:
 
 
 def _mode(vehicle: Vehicle, flavour: Flavour) -> int:
-    """The 16 bits that there are for custom_mode: of a packed number the upper half (px4_custom_mode.h)."""
+    """Return the 16 bits of custom_mode: of a packed number the upper half (px4_custom_mode.h)."""
     number = flavour.custom_mode(vehicle.mode)
     return number >> 16 if flavour.packed_modes else number
 
@@ -67,10 +67,10 @@ def _base_mode(vehicle: Vehicle) -> int:
 
 
 def high_latency(vehicle: Vehicle, times: Times, climb: float) -> dialect.MAVLink_message | None:
-    """HIGH_LATENCY2; `climb` is the fastest climb or descent since the last one (m/s). None before a first GPS fix.
+    """Return HIGH_LATENCY2; None before a first GPS fix.
 
-    Where nothing is flown to, the target is where the drone is. Throttle, airspeed and wind are not told and have no
-    "unknown": 0.
+    `climb` is the fastest climb or descent since the last message (m/s). Without a target the drone's own position is
+    sent as the target. Throttle, airspeed and wind are not reported and have no "unknown": 0.
     """
     place, state, height = vehicle.place, vehicle.drone.piloting.state, amsl(vehicle)
     if place is None or height is None or state.attitude is None or state.velocity is None:
@@ -112,12 +112,12 @@ def high_latency(vehicle: Vehicle, times: Times, climb: float) -> dialect.MAVLin
 
 
 class HighLatencyService(Service):
-    """Which channels are expensive, and the one message that they get."""
+    """Keeps the channels in high-latency mode, and sends HIGH_LATENCY2 on them."""
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self._next: dict[Channel, float] = {}
-        """When the next HIGH_LATENCY2 is due, for each expensive channel."""
+        """When the next HIGH_LATENCY2 is due, for each channel in high-latency mode."""
         self._climb = 0.0
         """Fastest climb or descent since the last message, m/s."""
 

@@ -1,6 +1,7 @@
-"""Messages on request and at intervals: MAV_CMD_REQUEST_MESSAGE and its older cousins, the streams of all services.
+"""MAVLink service for messages on request and for the streams of all services.
 
-Rules: conformance R7, R8, B1, C3.
+MAV_CMD_REQUEST_MESSAGE and the older commands that request one message are here, too. Rules: conformance R7, R8, B1,
+C3.
 """
 
 from __future__ import annotations
@@ -40,13 +41,13 @@ FASTEST = 0.1
 """s between looks at messages that are repeated without news: a shorter interval is no shorter for them."""
 
 LONGEST = 2**31 - 1
-"""us. An interval is told as an INT32; one that is longer is as long as that can say."""
+"""us. An interval is reported as an INT32; a longer one is reported as the largest INT32."""
 
 
 class MessageService(Service):
-    """What leaves by itself, and what leaves because somebody asked.
+    """Sends messages by their intervals and on request.
 
-    What is new is gathered until the end of the loop's turn (see `update_tracker`).
+    Updates are gathered until the end of the event-loop iteration (see `update_tracker`).
     """
 
     def __init__(self, host: Host) -> None:
@@ -66,7 +67,7 @@ class MessageService(Service):
         """When it was last logged that a message cannot be made."""
 
     def take_tables(self, streams: Mapping[int, Stream], requests: Mapping[int, Request]) -> None:
-        """What all services of the system send by themselves, and what they can be asked for."""
+        """Adopt the streams and the request handlers of all services of the system."""
         self._table, self._requests = streams, requests
         defaults = {id: stream.every for id, stream in streams.items() if stream.every is not None}
         self._intervals = Streams(defaults, without=lambda channel: flavour_of(channel).unstreamed)
@@ -139,7 +140,10 @@ class MessageService(Service):
             self._leave(id, channels, self._stamp(id, at))
 
     def _times(self, id: int) -> Times:
-        """When the newest of the fields of a message was true. A state that has not changed is true now."""
+        """When the newest of the fields of a message was true.
+
+        A state that has not changed is true now.
+        """
         if self._table[id].is_repeated:
             return self._stamp(id, self.host.clock.monotonic())
         return self._stamp(id, self._news.at(id) or self._linked_at)
@@ -227,9 +231,10 @@ class MessageService(Service):
         return dialect.MAV_RESULT_ACCEPTED
 
     def _interval(self, inbound: Inbound, id: float) -> dialect.MAVLink_message | int:
-        """MESSAGE_INTERVAL: what leaves on this channel, which is no more than was asked for and no more than there is.
+        """Return MESSAGE_INTERVAL with the real interval on this channel.
 
-        0 for what we do not send at all, as common.xml wants it.
+        It is neither shorter than requested nor shorter than the interval of the drone's updates. 0 for a message
+        that is never sent, as common.xml demands it.
         """
         if not 0 <= id <= 0xFFFF or id != int(id):
             return dialect.MAV_RESULT_DENIED
@@ -240,7 +245,10 @@ class MessageService(Service):
         return dialect.MAVLink_message_interval_message(int(id), microseconds)
 
     def _source(self, id: int) -> float:
-        """The mean time (s) between two pieces of news for this message, as far as is known; 0: not by news alone."""
+        """Return the mean time (s) between updates for this message, as far as it is known.
+
+        Returns 0 when the message is also repeated without updates.
+        """
         if self._table[id].is_repeated:
             return 0.0
         return self._news.interval(id, self.host.clock.monotonic()) or 0.0

@@ -1,6 +1,7 @@
-"""The messages of our own dialect (dialect/anafi.xml): what an ANAFI tells and MAVLink has no field for.
+"""Messages of our own dialect: reports of an ANAFI that MAVLink has no field for.
 
-They are streamed to who asks for them. Enums keep Parrot's numbers; 255 is "not told".
+The dialect is dialect/anafi.xml. They are streamed to clients that request them. Enums keep Parrot's numbers; 255 is
+"not reported".
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ NO_AXIS = -128
 
 
 def _u8(value: int | None) -> int:
-    """A number of Parrot's, or 255; one that no byte can hold is none that we know."""
+    """Return a number of Parrot's, or 255 when it is unknown or does not fit into a byte."""
     return value if value is not None and 0 <= value < UNKNOWN_U8 else UNKNOWN_U8
 
 
@@ -152,7 +153,7 @@ def controller_status(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message
 
 
 def camera_intrinsics(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
-    """ANAFI_CAMERA_INTRINSICS; none for a model that nobody has measured."""
+    """Return ANAFI_CAMERA_INTRINSICS; None for a model without measured values."""
     lens = vehicle.drone.identity.model.lens
     if lens is None:
         return None
@@ -174,7 +175,7 @@ def camera_intrinsics(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message
 
 
 def _state(build: Callable[[Vehicle, Times], dialect.MAVLink_message | None], *tables: Iterable[type]) -> Stream:
-    """A message that is new with whatever these elements are told."""
+    """Return the stream of a state message that any event of these tables updates."""
     return Stream(build, tuple(dict.fromkeys(event for table in tables for event in table)), repeated=True)
 
 
@@ -184,7 +185,7 @@ _MOTION = (
     events.AltitudeChanged,
     events.AltitudeAboveGroundChanged,
 )
-"""Told all the time; nothing of it is in ANAFI_FLIGHT_STATUS."""
+"""Reported all the time; nothing of it is in ANAFI_FLIGHT_STATUS."""
 
 _INPUT = (events.GrabState, events.GrabAxisEvent, events.GrabButtonEvent, events.PilotingSource)
 

@@ -1,7 +1,7 @@
-"""Where the drone is and how it moves, as messages.
+"""Position and motion of the drone, as messages.
 
-A builder returns None while the drone has not told what its message is about; single unknown fields carry MAVLink's own
-"unknown" (NaN, UINT16_MAX, -1, 255).
+A builder returns None while the drone has not reported the subject of its message; single unknown fields carry
+MAVLink's own "unknown" (NaN, UINT16_MAX, -1, 255).
 
 Frames and units: ARSDK attitude is rad in FRD/NED like MAVLink's, speeds are NED m/s, heights above take-off.
 """
@@ -32,7 +32,7 @@ MOVING = 0.5
 
 
 def _attitude(vehicle: Vehicle) -> Attitude | None:
-    """Attitude with the right wing down +, also of a drone that is known to report roll the other way."""
+    """Return the attitude with right wing down +, also of a drone known to report roll inverted."""
     state = vehicle.drone.piloting.state.attitude
     if state is None or not vehicle.roll.inverted:
         return state
@@ -59,7 +59,10 @@ def attitude_quaternion(vehicle: Vehicle, times: Times) -> dialect.MAVLink_messa
 
 
 def amsl(vehicle: Vehicle) -> float | None:
-    """Height above sea level (m): ATO over the latched take-off point, without a latch the plain GPS altitude."""
+    """Return the height above sea level, m.
+
+    It is ATO over the latched take-off point, without a latch the plain GPS altitude.
+    """
     ato = vehicle.drone.piloting.state.altitude
     height = None if ato is None else vehicle.height.amsl(ato)
     if height is None and (location := vehicle.drone.gps.state.location) is not None:
@@ -68,7 +71,12 @@ def amsl(vehicle: Vehicle) -> float | None:
 
 
 def global_position_int(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
-    """GLOBAL_POSITION_INT; only with a GPS fix, for 0/0 is a place, and in flight with a location that is not old."""
+    """Return GLOBAL_POSITION_INT; None without position, height or speed.
+
+    The position is unknown without a GPS fix, and in flight while the newest location is old.
+
+    0/0 is no substitute for an unknown position: it is a place.
+    """
     place, state, height = vehicle.place, vehicle.drone.piloting.state, amsl(vehicle)
     if place is None or height is None or state.altitude is None or state.velocity is None:
         return None
@@ -110,8 +118,10 @@ def _to_body(velocity: Velocity, attitude: Attitude) -> tuple[float, float, floa
 
 
 def odometry(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
-    """ODOMETRY: LOCAL_POSITION_NED and the attitude in one, the velocity along the drone's axes. Rates and covariances
-    are not told: NaN."""
+    """Return ODOMETRY: LOCAL_POSITION_NED and the attitude in one.
+
+    The velocity is along the drone's axes. Rates and covariances are not reported: NaN.
+    """
     place, origin, state = vehicle.place, vehicle.origin, vehicle.drone.piloting.state
     leaning = _attitude(vehicle)
     if place is None or origin is None:
@@ -148,7 +158,10 @@ def altitude(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
 
 
 def vfr_hud(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
-    """VFR_HUD. No airspeed is measured: NaN. Nor does an ANAFI report its throttle, but that field knows only 0."""
+    """VFR_HUD.
+
+    No airspeed is measured: NaN. Nor does an ANAFI report its throttle, but that field knows only 0.
+    """
     state, height = vehicle.drone.piloting.state, amsl(vehicle)
     if state.velocity is None or state.attitude is None:
         return None
@@ -191,7 +204,10 @@ def gps_raw_int(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | Non
 
 
 def distance_sensor(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
-    """DISTANCE_SENSOR of the ground below. The drone makes it of several sensors and tells no limits of it."""
+    """Return DISTANCE_SENSOR of the ground below.
+
+    The drone derives it from several sensors and reports no limits of it.
+    """
     height = vehicle.drone.piloting.state.height
     if height is None:
         return None
@@ -214,7 +230,7 @@ def rangefinder(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | Non
 
 
 class Goal(NamedTuple):
-    """Where a running moveTo goes, seen from the drone."""
+    """Target of a running moveTo, seen from the drone."""
 
     bearing: float
     """deg, clockwise from north, -180..180."""
@@ -225,7 +241,7 @@ class Goal(NamedTuple):
 
 
 def target(vehicle: Vehicle) -> Goal | None:
-    """What is flown to now; None while nothing is, or the drone does not know where it is."""
+    """Return the present target; None without one, or while the drone's position is unknown."""
     place, state = vehicle.place, vehicle.drone.piloting.state
     if place is None or state.move_target is None or state.move_to != MoveToStatus.RUNNING:
         return None
@@ -235,7 +251,10 @@ def target(vehicle: Vehicle) -> Goal | None:
 
 
 def nav_controller_output(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
-    """NAV_CONTROLLER_OUTPUT: how far and where the target of a running moveTo is; without one distance 0, ahead."""
+    """Return NAV_CONTROLLER_OUTPUT: distance and direction of the target of a running moveTo.
+
+    Without a target: distance 0, ahead.
+    """
     state, goal = vehicle.drone.piloting.state, target(vehicle)
     if vehicle.place is None or state.attitude is None:
         return None
@@ -255,7 +274,10 @@ def extended_sys_state(vehicle: Vehicle, times: Times) -> dialect.MAVLink_messag
 
 
 def home_position(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
-    """HOME_POSITION. Its altitude is the take-off point's, whatever the home type; x and y are in the local frame."""
+    """HOME_POSITION.
+
+    Its altitude is the take-off point's, whatever the home type; x and y are in the local frame.
+    """
     home, origin = vehicle.home or vehicle.origin, vehicle.origin
     ground = vehicle.height.takeoff_amsl
     if home is None or ground is None:

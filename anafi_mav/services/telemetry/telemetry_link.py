@@ -1,7 +1,7 @@
-"""How good the links are: the drone's radio, the client's channel, the machine that the gateway runs on.
+"""Quality of the links: the drone's radio, the client's channel, and the gateway's host.
 
-The drone tells a quality from 1 (a disconnection is highly probable) to 5 (very good), and the strength of the signal
-in dBm. MAVLink's fields have the scale of the device, and each family of clients reads another one into them.
+The drone reports a quality from 1 (a disconnection is highly probable) to 5 (very good), and the strength of the
+signal in dBm. MAVLink's fields have the scale of the device, and each family of clients reads another one into them.
 """
 
 from __future__ import annotations
@@ -25,8 +25,10 @@ MEMINFO = Path("/proc/meminfo")
 
 
 def rc_channels(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
-    """RC_CHANNELS for its rssi: the quality of the drone's radio, behind a Skycontroller. An ANAFI has no channels to
-    show, and without sticks there is no radio of theirs: unknown."""
+    """RC_CHANNELS for its rssi: the quality of the drone's radio, behind a Skycontroller.
+
+    An ANAFI has no channels to show, and without sticks there is no radio of theirs: unknown.
+    """
     quality = vehicle.drone.link.state.quality if vehicle.drone.controller.present else None
     rssi = UNKNOWN_U8 if quality is None else round(times.flavour.rssi_full * quality / BEST_QUALITY)
     channels = {f"chan{number}_raw": UNUSED_CHANNEL for number in range(1, 19)}
@@ -41,9 +43,12 @@ def _signal(dbm: int, times: Times) -> int:
 
 
 def radio_status(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
-    """RADIO_STATUS: what the drone receives. What its controller receives, noise and errors are not reported.
+    """RADIO_STATUS: what the drone receives.
 
-    MAVLink's unknown is 255, which QGroundControl shows as -1 dBm, as if a strong signal had been measured. Its clients
+    What its controller receives, noise and errors are not reported.
+
+    MAVLink's unknown is 255, which QGroundControl shows as -1 dBm, as if a strong signal had been measured. Its
+    clients
     get 0: no signal is 0 dBm, and it is what QGroundControl shows before a radio has reported. There is no buffer on
     the way that clients could overfill, hence 100 % free.
     """
@@ -55,7 +60,10 @@ def radio_status(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | No
 
 
 def memory_mib(meminfo: Path = MEMINFO) -> tuple[int, int] | None:
-    """MiB of memory, and of it what programs can still get, page cache included; None where no kernel reports it."""
+    """Return MiB of memory and of available memory, or None where no kernel reports it.
+
+    Available is what programs can still get, page cache included.
+    """
     try:
         fields = dict(line.split(":", 1) for line in meminfo.read_text("ascii").splitlines())
         total, available = (int(fields[name].split()[0]) >> 10 for name in ("MemTotal", "MemAvailable"))
@@ -65,7 +73,7 @@ def memory_mib(meminfo: Path = MEMINFO) -> tuple[int, int] | None:
 
 
 def onboard_computer_status(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
-    """ONBOARD_COMPUTER_STATUS of the machine that the gateway runs on, as far as every system tells it."""
+    """Return ONBOARD_COMPUTER_STATUS of the gateway's host, as far as every system reports it."""
     unknown_i8, unknown_i16, unknown_u32 = 127, 0x7FFF, 0xFFFFFFFF
     total = used = unknown_u32
     if (memory := memory_mib()) is not None:

@@ -1,9 +1,9 @@
-"""What a vehicle reports, as one table of streams: message → builder and the drone's events that make it new.
+"""The table of telemetry streams: message → builder and the drone's events that update it.
 
-A stream message leaves when one of its fields is new, never to fill a rate: an ANAFI's attitude comes five times a
-second, and so do the messages built from it, at most. State messages (battery, system status, home) repeat at their
-interval because a client that just connected needs them; a time in one that is repeated is that of its sending, for
-what has not changed is still true, and an old time looks like a restart (MAVProxy: "Time has wrapped").
+A stream message is sent when one of its fields is updated, never to fill a rate: an ANAFI's attitude arrives five
+times a second, and so do the messages built from it, at most. State messages (battery, system status, home) repeat at
+their interval because a client that just connected needs them; the time in a repeated one is that of its sending, for
+an unchanged state is still true, and an old time looks like a restart (MAVProxy: "Time has wrapped").
 """
 
 from __future__ import annotations
@@ -47,7 +47,10 @@ class TelemetryService(Service):
         self._position_is_old = False
 
     def tick(self, now: float) -> None:
-        """Say when positions stop, which leaves the station with the last one, and when they continue."""
+        """Send a text when positions stop, and when they continue.
+
+        Without positions a station keeps showing the last one.
+        """
         is_old = self.host.vehicle.position_is_old
         if is_old != self._position_is_old:
             self._position_is_old = is_old

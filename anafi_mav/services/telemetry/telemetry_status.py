@@ -32,12 +32,15 @@ BAD_LINK = 1
 
 
 def percent(charge: int | None) -> int:
-    """Charge left; -1 for what the drone has not said, or cannot mean."""
+    """Return the remaining charge, %; -1 if it is unknown or out of range."""
     return charge if charge is not None and 0 <= charge <= 100 else -1
 
 
 def _voltages(state: BatteryState) -> tuple[list[int], list[int]]:
-    """The two voltage fields of BATTERY_STATUS, mV: the cells where the drone tells each, or the pack in the first."""
+    """Return the two voltage fields of BATTERY_STATUS, mV.
+
+    They hold the cells where the drone reports each, else the pack in the first.
+    """
     known = [voltage for _, voltage in sorted(state.cell_voltages_mv.items())]
     if not known or len(known) != (state.cell_count or len(known)):
         known = [] if state.voltage_mv is None else [state.voltage_mv]
@@ -60,7 +63,10 @@ _FAULTS = {
 
 
 def battery_status(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
-    """BATTERY_STATUS. An ANAFI tells no current; the Ai tells its cells, its temperature and its charge in mAh."""
+    """Return BATTERY_STATUS.
+
+    An ANAFI reports no current; the Ai reports its cells, its temperature and its charge in mAh.
+    """
     state = vehicle.drone.battery.state
     if state.percent is None:
         return None
@@ -86,7 +92,10 @@ def battery_status(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | 
 
 
 def battery_info(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
-    """BATTERY_INFO: what does not change in flight. The Ai alone tells more than health, cycles and serial number."""
+    """Return BATTERY_INFO: the values that do not change in flight.
+
+    Only the Ai reports more than health, cycles and serial number.
+    """
     state = vehicle.drone.battery.state
     if state.health_percent is None and state.serial is None:
         return None
@@ -129,8 +138,10 @@ _SENSOR_BITS: dict[Sensor, int] = {
 
 
 def sensor_bits(vehicle: Vehicle) -> tuple[int, int, int]:
-    """(present, enabled, healthy) bits of MAV_SYS_STATUS_SENSOR by the drone's own sensor list. What is present is
-    enabled, but for a fence that is not."""
+    """(present, enabled, healthy) bits of MAV_SYS_STATUS_SENSOR by the drone's own sensor list.
+
+    What is present is enabled, but for a fence that is not.
+    """
     drone, fence = vehicle.drone, vehicle.fence
     present = dialect.MAV_SYS_STATUS_PREARM_CHECK | (dialect.MAV_SYS_STATUS_GEOFENCE if fence.present else 0)
     # MAVProxy calls a fence that is not healthy a breach, whether it is present or not.
@@ -183,10 +194,10 @@ def sys_status(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None
 
 
 def ekf_flags(vehicle: Vehicle) -> int:
-    """EKF_STATUS_FLAGS by what the drone tells and knows: dronekit arms on them, MAVProxy shows them.
+    """Return EKF_STATUS_FLAGS by the drone's reports.
 
-    Without GPS an ANAFI holds its place by its vertical camera, relative to where it was; it does not when it says that
-    it is too dark or too high for that.
+    dronekit arms on them, MAVProxy shows them. Without GPS an ANAFI holds its place by its vertical camera, relative
+    to where it was; it does not when it reports that it is too dark or too high for that.
     """
     drone = vehicle.drone
     state, alerts = drone.piloting.state, drone.alerts.state
@@ -210,14 +221,14 @@ def ekf_flags(vehicle: Vehicle) -> int:
 
 
 def ekf_status_report(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
-    """EKF_STATUS_REPORT (ArduPilot's). The drone tells no variances: NaN."""
+    """Return EKF_STATUS_REPORT (ArduPilot's). The drone reports no variances: NaN."""
     return dialect.MAVLink_ekf_status_report_message(ekf_flags(vehicle), NAN, NAN, NAN, NAN, NAN, NAN)
 
 
 def estimator_status(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
-    """ESTIMATOR_STATUS (PX4's): the same flags as far as it has them, and GPS accuracies (m, one standard deviation).
+    """Return ESTIMATOR_STATUS (PX4's): the same flags as far as it has them, and accuracies.
 
-    Test ratios are not told: NaN.
+    GPS accuracies are m, one standard deviation. Test ratios are not reported: NaN.
     """
     gps = vehicle.drone.gps.state
     accuracies = [a for a in (gps.latitude_accuracy, gps.longitude_accuracy) if a is not None]

@@ -1,7 +1,9 @@
-"""What is new for which message, since when, and how often that happens. No I/O; time is handed in.
+"""Tracks for each message whether it has updates, since when, and how often. No I/O.
 
-An ANAFI tells attitude, speed and height in one datagram: what it tells in one turn of the loop is one bundle of news,
-so that a message made of all three leaves once, with all three.
+Time is a parameter.
+
+An ANAFI sends attitude, speed and height in one datagram: all updates of one event-loop iteration form one bundle, so
+that a message made of all three is sent once, with all three.
 """
 
 from __future__ import annotations
@@ -12,11 +14,11 @@ WINDOW = 10.0
 """s. How often something is news is counted over the present window and the one before."""
 
 MAX_BUNDLES = 256
-"""Different bundles that are remembered; a drone at work tells a dozen."""
+"""Different bundles that are remembered; a drone in operation sends a dozen."""
 
 
 class _Bundle:
-    """Sources that had news in one turn."""
+    """Sources that were updated in one event-loop iteration."""
 
     __slots__ = ("at", "before", "count", "ids")
 
@@ -32,7 +34,10 @@ class _Bundle:
 
 
 class News:
-    """The news of one drone's messages. A source is anything hashable: a kind of event, the number of a message."""
+    """Updates of one drone's messages.
+
+    A source is anything hashable: a kind of event, the number of a message.
+    """
 
     def __init__(self) -> None:
         self._ids: dict[Hashable, tuple[int, ...]] = {}
@@ -46,7 +51,7 @@ class News:
         """When the window before this one began, and this one."""
 
     def register(self, source: Hashable, ids: Iterable[int]) -> None:
-        """News from this source makes these messages new."""
+        """Register the messages that an update from this source affects."""
         self._ids[source] = tuple(dict.fromkeys((*self._ids.get(source, ()), *ids)))
 
     @property
@@ -54,21 +59,27 @@ class News:
         return self._ids.keys()
 
     def reset(self, now: float) -> None:
-        """Nothing has been told yet."""
+        """Forget all updates and intervals."""
         self._fresh = {}
         self._bundles.clear()
         self._of.clear()
         self._since = self._window = now
 
     def note(self, source: Hashable, at: float) -> bool:
-        """A registered source has news. True: the first in this turn, `take` is to be called at its end."""
+        """Record an update of a registered source.
+
+        Returns True for the first update of an event-loop iteration: `take` is to be called at its end.
+        """
         first = not self._fresh
         self._fresh[source] = None
         self._at = at
         return first
 
     def take(self) -> tuple[tuple[int, ...], float]:
-        """The messages that have become new in this turn, and when; none if it was all forgotten meanwhile."""
+        """Return the messages updated in this event-loop iteration, and when.
+
+        They are empty if `reset` was called meanwhile.
+        """
         if not self._fresh:
             return (), self._at
         key = tuple(self._fresh)
@@ -83,7 +94,7 @@ class News:
         return max((bundle.at for bundle in self._of.get(id, ())), default=None)
 
     def interval(self, id: int, now: float) -> float | None:
-        """Mean time (s) between two pieces of news for this message; None before there are two."""
+        """Return the mean time (s) between two updates for this message; None before two."""
         count = sum(bundle.count + bundle.before for bundle in self._of.get(id, ()))
         return (now - self._since) / count if count > 1 and now > self._since else None
 

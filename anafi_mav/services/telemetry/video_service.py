@@ -1,7 +1,8 @@
-"""What is told in the live video only: exposure, gains, white balance, fields of view, goodput.
+"""Telemetry that only the live video has.
 
-The video costs the radio some Mbit/s, so it runs while a client has a stream of ANAFI_CAMERA_EXPOSURE and not longer.
-When it runs for another reason, e.g. because somebody looks at it, what it says is told all the same.
+Exposure, gains, white balance, fields of view, goodput. The video costs the radio some Mbit/s, so it runs while a
+client has a stream of ANAFI_CAMERA_EXPOSURE and not longer. When it runs for another reason, e.g. because a viewer
+watches it, its telemetry is sent all the same.
 """
 
 from __future__ import annotations
@@ -32,7 +33,10 @@ def _number(value: float | None, factor: float = 1.0) -> float:
 
 
 def camera_exposure(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
-    """ANAFI_CAMERA_EXPOSURE of the main camera: by the newest picture, without pictures by the camera's state."""
+    """Return ANAFI_CAMERA_EXPOSURE of the main camera.
+
+    By the newest picture, without pictures by the camera's state.
+    """
     camera, frame = vehicle.drone.camera[0], vehicle.drone.video.state.frame
     if camera.mode is None:
         return None
@@ -70,7 +74,10 @@ def _link_flags(state: LinkState) -> int:
 
 
 def link(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
-    """ANAFI_LINK. The drone's events come first: the video tells the same, and goodput besides."""
+    """Return ANAFI_LINK.
+
+    The drone's events have priority: the video reports the same, and goodput besides.
+    """
     state, frame = vehicle.drone.link.state, vehicle.drone.video.state.frame
     wifi = None if frame is None else frame.metadata.wifi
     starfish = None if frame is None else frame.metadata.starfish

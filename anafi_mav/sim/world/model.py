@@ -129,7 +129,7 @@ class Model:
 
     @property
     def record(self) -> models.Model:
-        """What is known of it apart from the simulation."""
+        """Record of the model in `anafi_mav.models`."""
         return models.MODELS[self.name]
 
     @property

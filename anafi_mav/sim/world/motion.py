@@ -202,7 +202,9 @@ class _Orders:
 
 
 class Motion:
-    """The fleet's motion. `step()` advances all of it; `airframe.Body` is the handle of one drone."""
+    """The fleet's motion.
+
+    `step()` advances all of it; `airframe.Body` is the handle of one drone."""
 
     def __init__(self, airframes: Sequence[Airframe]) -> None:
         count = len(airframes)

@@ -1,1 +1,1 @@
-"""What all flight tasks stand on: the aircraft, modes, heights, bounds, and the velocity loop."""
+"""Shared base of all flight tasks: aircraft, modes, heights, bounds, velocity loop."""

@@ -1,7 +1,9 @@
-"""The drone as those see it who fly it: what it does, where it is, what it was last told. No flavour, no message.
+"""The drone as seen by the modules that fly it: state, position and selected mode.
 
-They build on this floor. `Vehicle` stands above them: it is an `Aircraft` and knows all who can fly it, while none of
-them needs to know the others.
+No flavour, no message.
+
+These modules build on this layer. `Vehicle` stands above them: it is an `Aircraft` and knows all of them, while none
+of them needs to know the others.
 """
 
 from __future__ import annotations
@@ -25,7 +27,10 @@ from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.fence.fence_watch import FenceWatch, OutsideFence
 
 STOP_WAIT = 0.5
-"""s that a command that stops something waits for what it replaces. What has not ended by then can send nothing."""
+"""s that a stopping command waits for the action that it replaces.
+
+An action that has not ended by then can send nothing.
+"""
 
 
 _ACTIVITIES: Mapping[FlyingState | None, Text] = {
@@ -57,14 +62,17 @@ class Aircraft(ABC):
         """Origin of the local frame: where the drone last took off, or first stood with a fix."""
         self.fence = FenceWatch()
         self.home_choice = asyncio.Lock()
-        """Held by who chooses the drone's home, which is a type and a place: two choices at once would mix."""
+        """Lock held while the drone's home is chosen.
+
+        A home is a type and a place: two choices at once would mix.
+        """
         self.text = text
         self.changed = changed
-        """Says that mode, armed state or health may be others now."""
+        """Notifies that mode, armed state or health may have changed."""
         self.helms: tuple[Helm, ...] = ()
-        """Who can fly the drone for as long as somebody keeps telling them how; one of them at a time."""
+        """Flight tasks that need continuous setpoints or stick input; at most one is active."""
         self.mode_client: Hashable = None
-        """Client that chose the selected mode by name or number; None for modes that something else led to."""
+        """Client that chose the selected mode by name or number; None for modes selected otherwise."""
         self.paused = False
         """A client has paused: setpoints of every client are ignored until a command or another mode ends it."""
         self._selected = FlightMode.HOLD
@@ -73,7 +81,7 @@ class Aircraft(ABC):
 
     @property
     def flying_state(self) -> FlyingState | None:
-        """Parrot's word for it; None until reported."""
+        """Parrot's flying state; None until reported."""
         return self.drone.piloting.state.flying
 
     @property
@@ -82,42 +90,51 @@ class Aircraft(ABC):
 
     @property
     def in_air(self) -> bool:
-        """Flying, and not on its way down or up by itself."""
+        """True when flying, and neither taking off nor landing by itself."""
         return self.flying_state in AIRBORNE
 
     @property
     @abstractmethod
     def armed(self) -> bool:
-        """Motors may turn: the drone is off the ground, or arming was accepted and has not lapsed."""
+        """True when motors may turn.
+
+        The drone is off the ground, or arming was accepted and has not expired.
+        """
 
     @property
     def returning(self) -> bool:
-        """The drone flies home, whoever began it."""
+        """True while the drone flies home, whether a client, the pilot or the drone began it."""
         return self.drone.home.state.returning and not self.on_ground
 
     @property
     def returning_by_itself(self) -> bool:
-        """Nobody asked for this return: battery, lost link, ... It is not ours to stop."""
+        """True when the drone began this return by itself: battery, lost link, ...
+
+        It is not the gateway's to stop.
+        """
         return self.drone.home.state.returning_by_itself and not self.on_ground
 
     @property
     @abstractmethod
     def descent(self) -> Text | None:
-        """The reason to refuse what may not end a landing or return: the drone does either, or was commanded to."""
+        """The reason to refuse a command that may not end a landing or return; None without either.
+
+        The drone lands or returns, or was commanded to.
+        """
 
     @property
     @abstractmethod
     def mode(self) -> FlightMode:
-        """What the drone does now."""
+        """The present flight mode of the drone."""
 
     @property
     def selected(self) -> FlightMode:
-        """What was chosen to be done; `mode` tells what the drone makes of it."""
+        """The mode that was selected; `mode` is the one that the drone flies."""
         return self._selected
 
     @property
     def place(self) -> Place | None:
-        """Where the drone is by its newest GPS location; None without a fix."""
+        """Position of the drone by its newest GPS location; None without a fix."""
         gps = self.drone.gps.state
         if not gps.fixed or gps.location is None:
             return None
@@ -125,7 +142,10 @@ class Aircraft(ABC):
 
     @property
     def home(self) -> Place | None:
-        """Where a return ends: what the drone reports, before its first take-off where it stands."""
+        """Place at which a return ends, as the drone reports it.
+
+        Without a report and on the ground it is the drone's position; None without either.
+        """
         home = self.drone.home.state.location
         if home is not None:
             return Place(home.latitude, home.longitude)
@@ -133,9 +153,10 @@ class Aircraft(ABC):
 
     @property
     def geofence_centre(self) -> Place | None:
-        """Middle of the drone's own geofence: a controller's GPS, else the take-off point (ardrone3.xml 1-2-4).
+        """Centre of the drone's own geofence: a controller's GPS, else the take-off point.
 
-        On the ground without such a controller it is where the drone stands: the drone still reports its last flight's.
+        Source: ardrone3.xml 1-2-4. On the ground without such a controller it is the drone's position: the drone
+        still reports that of its last flight.
         """
         reported, takeoff = self.drone.piloting.state.geofence_centre, self.drone.home.state.takeoff_location
         if self.on_ground and self.drone.controller.state.position is None:
@@ -146,18 +167,21 @@ class Aircraft(ABC):
 
     @property
     def activity(self) -> Text:
-        """What the drone does now, as the reason of a refusal."""
+        """Activity of the drone, as the reason of a refusal."""
         if self.returning:
             return texts.RETURNS
         return _ACTIVITIES.get(self.flying_state, texts.FLYING_STATE_UNKNOWN)
 
     @property
     def sticks_follow_camera(self) -> bool:
-        """What sticks mean depends on where the camera looks (piloting_style.xml): no loop closes over that."""
+        """True when stick input is relative to the camera's direction (piloting_style.xml).
+
+        No control loop works with that.
+        """
         return self.drone.piloting.state.style == PilotingStyleStyle.CAMERA_OPERATED
 
     def prearm_problems(self) -> list[Text]:
-        """Why the drone would not take off, in sentences; empty when it would."""
+        """Return the reasons why the drone would not take off, in sentences; empty without any."""
         problems: list[Text] = []
         if self.flying_state is None:
             problems.append(texts.FLYING_STATE_UNKNOWN)
@@ -170,7 +194,7 @@ class Aircraft(ABC):
 
     @property
     def fence_problem(self) -> Text | None:
-        """Why the fence keeps the drone on the ground, in a sentence; None when it does not."""
+        """The reason why the fence keeps the drone on the ground, in a sentence; None without one."""
         if self.on_ground:
             try:
                 self.fence.check_place(point_of(self.place), point_of(self.home))
@@ -182,32 +206,41 @@ class Aircraft(ABC):
 
     @abstractmethod
     async def take_over(self, limit: float | None = None) -> None:
-        """Replace whatever was going on, and wait for its end: `limit` s at most.
+        """Replace the action under way, and wait for its end: `limit` s at most.
 
-        From now on what is replaced sends nothing but what stops something, and after the wait nothing at all. Without
-        the wait a move that is given up could cancel the one that follows it. Raises `Refused` while the motors are
+        From now on the replaced action sends only commands that stop something, and after the wait nothing at all.
+        Without the wait an aborted move could cancel the one that follows it. Raises `Refused` while the motors are
         being cut.
         """
 
     @abstractmethod
     async def hold(self, mode: FlightMode = FlightMode.HOLD, by: Right | None = None) -> None:
-        """Stop and hover, in mode Hold, Guided or Position. A landing or return goes on unless `by` ends it."""
+        """Stop and hover, in mode Hold, Guided or Position.
+
+        A landing or return continues unless `by` ends it.
+        """
 
     @abstractmethod
     async def terminate(self) -> None:
         """Cut the motors, if the configuration allows it at all."""
 
     def select(self, mode: FlightMode, helm: Helm | None = None) -> None:
-        """This is what the vehicle does from now on. Whoever flew it by setpoints or sticks ends, but for `helm`."""
+        """Select a mode; it stays selected until the next selection.
+
+        Ends every flight task that flies by setpoints or stick input, except the one passed.
+        """
         self.end_helms(helm)
         self._selected, self.mode_client = mode, None
         self.paused = False
         self.changed()
 
     def forget_mode(self) -> None:
-        """What was chosen is over: until something else is, the vehicle holds."""
+        """Forget the selected mode: until another one is selected, the vehicle holds."""
         self._selected, self.mode_client = FlightMode.HOLD, None
 
     def end_helms(self, helm: Helm | None = None) -> list[asyncio.Task[None]]:
-        """Nobody flies by setpoints or sticks any more, but for `helm`; tasks that are about to end."""
+        """End every flight task (setpoints, stick input) except the one passed.
+
+        Returns the tasks that are about to end.
+        """
         return [task for one in self.helms if one is not helm for task in one.end()]

@@ -1,6 +1,7 @@
-"""Where a vehicle may be sent: the checks of heights, places and speeds that every order passes before it is flown.
+"""Checks of heights, places and speeds that every command passes before it is flown.
 
-What is out of bounds is refused, never clamped: by the numbers themselves, by the drone's own limits, by the fence.
+A value out of bounds is refused, never clamped. Bounds are those of the numbers themselves, of the drone's own limits
+and of the fence.
 """
 
 from __future__ import annotations
@@ -16,14 +17,22 @@ from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.fence.fence_watch import OutsideFence
 
 SLOWEST, FASTEST = 0.1, 100.0
-"""m/s. A speed beyond these is a number in the wrong place, or in another unit. Within them the drone limits itself."""
+"""m/s. A speed beyond these is a number in the wrong field, or in another unit.
+
+Within them the drone limits itself.
+"""
 
 NOWHERE = 1e-5
-"""deg. A place that is so near to 0/0 is no place but numbers that were not set, or integers in the place of floats."""
+"""deg. A place so near to 0/0 is refused.
+
+Its numbers were not set, or are integers in the place of floats.
+"""
 
 LOWEST = 1.0
-"""m above take-off: where an ANAFI hovers by itself after take-off. Lower targets are refused, never clamped, unless
-the drone is as low already (`lowest_height`)."""
+"""m above take-off: height at which an ANAFI hovers by itself after take-off.
+
+Lower targets are refused, never clamped, unless the drone is as low already (`lowest_height`).
+"""
 
 FARTHEST = 4000.0
 """m from the drone's centre. No setting of an ANAFI reaches farther (maximum of its MaxDistance); a place beyond is a
@@ -33,20 +42,23 @@ mistake, also while the drone's own geofence is off."""
 def lowest_height(vehicle: Aircraft) -> float:
     """Return the lowest height (m above take-off) of a target.
 
-    Over a slope that falls away, sticks, velocities and missions lead below the take-off point; there the drone may be
-    sent anywhere that is not lower than it flies. A lower target is refused: of the ground there nothing is known, and
-    the height above ground that the drone reports may be an old one.
+    Over a slope that falls away, sticks, velocities and missions lead below the take-off point; there the drone may
+    be commanded to any height that is not lower than its own. A lower target is refused: nothing is known of the
+    ground there, and the height above ground that the drone reports may be an old one.
     """
     altitude = vehicle.drone.piloting.state.altitude
     return LOWEST if altitude is None or not vehicle.in_air else min(LOWEST, altitude)
 
 
 class TooLow(Refused):
-    """A target below `lowest_height`. A drone that has not taken off yet is lifted above it anyway."""
+    """Refusal of a target below `lowest_height`.
+
+    A drone that has not taken off yet is lifted above it anyway.
+    """
 
 
 def check_height(vehicle: Aircraft, ato: float) -> None:
-    """Raise `Refused` unless a target height (m above take-off) is one the drone may go to."""
+    """Raise `Refused` unless the drone may fly to a target height (m above take-off)."""
     ceiling = vehicle.drone.piloting.state.max_altitude
     if not math.isfinite(ato):
         raise Refused(texts.HEIGHT, texts.NOT_A_NUMBER, lasting=True)
@@ -65,7 +77,7 @@ def check_height(vehicle: Aircraft, ato: float) -> None:
 
 
 def amsl_to_ato(vehicle: Aircraft, amsl: float) -> float:
-    """Height above take-off (m) of an AMSL height; raises `Refused` when no bridge is known."""
+    """Return the height above take-off (m) of an AMSL height; raises `Refused` without a bridge."""
     ato = vehicle.height.ato(amsl)
     if ato is None:
         raise Refused(texts.HEIGHT, texts.AMSL_UNKNOWN)
@@ -73,13 +85,16 @@ def amsl_to_ato(vehicle: Aircraft, amsl: float) -> float:
 
 
 def check_estimate(vehicle: Aircraft, ato: float) -> None:
-    """Raise `Refused` for an AMSL target that may be the ground because the bridge to AMSL is an estimate."""
+    """Raise `Refused` for an AMSL target that may be the ground.
+
+    The bridge to AMSL may be an estimate.
+    """
     if vehicle.height.estimated and ato < ESTIMATE_FLOOR:
         raise Refused(texts.HEIGHT, texts.NEAR_ESTIMATE.fill(height=ato, lowest=ESTIMATE_FLOOR))
 
 
 def check_on_earth(place: Place, what: Text) -> None:
-    """Raise `Refused` unless this is a place."""
+    """Raise `Refused` unless the numbers are a place on earth."""
     if not (abs(place.latitude) <= 90.0 and abs(place.longitude) <= 180.0):
         raise Refused(what, texts.NOT_ON_EARTH, lasting=True)
     if abs(place.latitude) < NOWHERE and abs(place.longitude) < NOWHERE:
@@ -87,7 +102,10 @@ def check_on_earth(place: Place, what: Text) -> None:
 
 
 def check_place(vehicle: Aircraft, place: Place, *, start: Place | None = None) -> None:
-    """Raise `Refused` unless the drone may fly there, and the straight way from `start` if that is given."""
+    """Raise `Refused` unless the drone may fly to `place`.
+
+    With `start` the straight way from there is checked, too.
+    """
     check_on_earth(place, texts.GOTO)
     centre, home = vehicle.geofence_centre, vehicle.home
     around = centre or vehicle.place
@@ -104,7 +122,10 @@ def check_place(vehicle: Aircraft, place: Place, *, start: Place | None = None) 
 
 
 def _check_geofence(vehicle: Aircraft, distance: float) -> None:
-    """Raise `Refused` for a place so far (m) from the geofence's centre when the drone's own geofence ends before."""
+    """Raise `Refused` for a place beyond the drone's own geofence.
+
+    `distance` is that of the place from the geofence's centre (m).
+    """
     state = vehicle.drone.piloting.state
     if state.geofence and state.max_distance is not None and distance > state.max_distance.current:
         raise Refused(

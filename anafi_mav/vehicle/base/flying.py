@@ -11,4 +11,4 @@ TAKING_OFF = (FlyingState.MOTOR_RAMPING, FlyingState.TAKINGOFF, FlyingState.USER
 LANDING = (FlyingState.LANDING, FlyingState.EMERGENCY_LANDING)
 
 AIRBORNE = (FlyingState.HOVERING, FlyingState.FLYING)
-"""Flying, and not on the way down or up by itself."""
+"""Flying, and neither taking off nor landing by itself."""

@@ -7,7 +7,7 @@ number. GPS altitude drifts by metres, so in flight the number is not corrected 
 A gateway that finds the drone in the air has not seen it stand. It uses the number that it kept from before, if that
 belongs to the same flight. Otherwise it takes GPS AMSL minus ATO once, and the number counts as an estimate.
 
-The drone counts ATO anew from each take-off. After a landing elsewhere it stands at an ATO that is not 0, so the point
+The drone counts ATO again from each take-off. After a landing elsewhere it stands at an ATO that is not 0, so the point
 of the next take-off is another one than that of the last: its AMSL height is what GPS says there.
 """
 
@@ -20,14 +20,17 @@ import msgspec
 from typing_extensions import Self
 
 ESTIMATE_ERROR = 10.0
-"""m by which an estimate may be wrong: GPS altitude of some minutes against GPS altitude at the take-off."""
+"""m by which an estimate may be wrong.
+
+GPS altitude now is compared with GPS altitude some minutes earlier, at the take-off.
+"""
 
 ESTIMATE_FLOOR = 15.0
 """m above the estimated ground below which no AMSL target is flown to."""
 
 
 class TakeoffRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The take-off point of one flight, as it is kept for the next connection and the next run of the gateway."""
+    """The take-off point of one flight, kept for the next connection or run of the gateway."""
 
     flight_id: str
     amsl: float
@@ -39,7 +42,7 @@ class TakeoffRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     @classmethod
     def read(cls, kept: Any) -> Self | None:
-        """Return the record that `written` made, or None when it cannot be one: people can write files."""
+        """Return the record that `written` made, or None when it is invalid: people can edit files."""
         try:
             record = msgspec.convert(kept, cls)
         except msgspec.ValidationError:
@@ -65,10 +68,10 @@ class HeightReference:
         self._takeoff_amsl: float | None = None
         self._estimated = False
         self._standing_amsl: float | None = None
-        """Where the drone stands, which is where it will take off."""
+        """AMSL height (m) at which the drone stands, which is where it will take off."""
         self._flight_id = ""
         self._kept: TakeoffRecord | None = None
-        """From an earlier connection; counts for the flight that it names only."""
+        """From an earlier connection; counts only for the flight that it names."""
 
     @property
     def takeoff_amsl(self) -> float | None:
@@ -82,11 +85,11 @@ class HeightReference:
 
     @property
     def flight_id(self) -> str:
-        """Id of the flight that the number belongs to; empty on the ground and when the drone reports none."""
+        """Id of the flight that the number belongs to; empty on the ground or when unreported."""
         return self._flight_id
 
     def on_ground(self, gps_amsl: float | None, ato: float | None) -> None:
-        """The drone stands: latch the newest readings (m)."""
+        """Latch the newest readings (m) while the drone stands."""
         if gps_amsl is not None:
             self._takeoff_amsl, self._estimated = gps_amsl - (ato or 0.0), False
             self._standing_amsl = gps_amsl
@@ -95,19 +98,24 @@ class HeightReference:
         self._flight_id, self._kept = "", None
 
     def take_off(self) -> None:
-        """The drone leaves the ground, and counts its height from there."""
+        """Note that the drone leaves the ground, and counts its height from there."""
         if self._standing_amsl is not None:
             self._takeoff_amsl = self._standing_amsl
             self._standing_amsl = None
 
     def recall(self, kept: TakeoffRecord | None) -> None:
-        """Take what was kept of this drone's last flight; it counts once the drone names the same flight."""
+        """Take the record of this drone's last flight.
+
+        It is used once the drone reports the same flight.
+        """
         self._kept = kept
 
     def in_flight(self, flight_id: str | None, gps_amsl: float | None, ato: float | None) -> bool:
-        """The drone flies the flight with this id, at these readings (m). Return True when an estimate was made.
+        """Note that the drone flies the flight with this id, at these readings (m).
 
-        The id is compared with what was kept only: within one connection every landing is seen, and a firmware may
+        Return True when an estimate was made.
+
+        The id is only compared with the kept one: within one connection every landing is seen, and a firmware may
         report the id of a new flight some seconds late.
         """
         self._flight_id = flight_id or self._flight_id
@@ -121,15 +129,18 @@ class HeightReference:
         return True
 
     def link_down(self) -> None:
-        """Forget the number: in a silence the drone may have landed elsewhere and taken off again."""
+        """Forget the number: without a link the drone may have landed elsewhere and taken off again."""
         self._takeoff_amsl = self._standing_amsl = self._kept = None
         self._estimated, self._flight_id = False, ""
 
     def ato(self, amsl: float) -> float | None:
-        """Height (m) above the take-off point, on the ground the next one, of an AMSL height; None without a latch."""
+        """Return the height (m) above the take-off point of an AMSL height; None without a latch.
+
+        On the ground it is that of the next take-off.
+        """
         reference = self._takeoff_amsl if self._standing_amsl is None else self._standing_amsl
         return None if reference is None else amsl - reference
 
     def amsl(self, ato: float) -> float | None:
-        """AMSL height (m) of a height above take-off; None without a latch."""
+        """Return the AMSL height (m) of a height above take-off; None without a latch."""
         return None if self._takeoff_amsl is None else ato + self._takeoff_amsl

@@ -1,4 +1,7 @@
-"""Who flies the drone for as long as somebody keeps telling them how: a program, a joystick, a target to follow."""
+"""Interface of a flight task: flies the drone by continuous setpoints or stick input.
+
+Their source is a program, a joystick, or a target to follow.
+"""
 
 from __future__ import annotations
 
@@ -7,13 +10,15 @@ from typing import Protocol
 
 
 class Helm(Protocol):
-    """One way to be flown."""
+    """A flight task."""
 
     def end(self) -> list[asyncio.Task[None]]:
-        """Something else flies now: nothing of what was said before goes on. Returns tasks that are about to end.
+        """End this flight task, because something else flies now; earlier setpoints no longer count.
 
-        Never waits, never raises, and does nothing when it does not fly.
+        Returns tasks that are about to end.
+
+        Never waits, never raises, and does nothing when the task is not active.
         """
 
     def link_down(self) -> None:
-        """The drone's link is gone: what was said before counts for nothing."""
+        """Forget all earlier setpoints: the drone's link is lost."""

@@ -1,7 +1,8 @@
-"""What is done when no ground station is heard any more: the policy, and the watch over their heartbeats. No I/O.
+"""The policy for a lost ground station, and the watch over heartbeats. No I/O.
 
-Only heartbeats of type GCS count: a program that flies setpoints is no ground station, and its own silence has its own
-consequence. The policy is off unless somebody sets it (conformance E11).
+Only heartbeats of type GCS count: a program that flies setpoints is no ground station, and its own silence has its
+own
+consequence. The policy is off unless a user sets it (conformance E11).
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from dataclasses import dataclass
 
 
 class LossAction(enum.IntEnum):
-    """What to do; the numbers are PX4's of NAV_DLL_ACT."""
+    """Action on the loss of the last ground station; the numbers are those of PX4's NAV_DLL_ACT."""
 
     NOTHING = 0
     HOLD = 1
@@ -21,7 +22,7 @@ class LossAction(enum.IntEnum):
 
 @dataclass
 class LossPolicy:
-    """What one vehicle does when its ground stations are gone."""
+    """Policy of one vehicle for the loss of its ground stations."""
 
     action: LossAction = LossAction.NOTHING
     after: float = 10.0
@@ -29,35 +30,35 @@ class LossPolicy:
 
 
 class GcsWatch:
-    """Tells the moment at which the last ground station is lost, once for each loss."""
+    """Detects the moment at which the last ground station is lost, once for each loss."""
 
     def __init__(self) -> None:
         self._heard: float | None = None
-        """When a ground station was heard last; None: none yet, so that none can be lost."""
+        """Time of the last heartbeat of a ground station; None: none yet, so that none can be lost."""
         self.lost = False
 
     def heard(self, now: float) -> bool:
-        """A ground station's heartbeat; True when it ends a loss."""
+        """Note a ground station's heartbeat; True when it ends a loss."""
         self._heard = now
         back, self.lost = self.lost, False
         return back
 
     def restart(self, now: float) -> None:
-        """They can be heard again: that nobody was listening in between is no silence of theirs.
+        """Restart the watch: the time without reception is no silence of the ground stations.
 
-        Who was there before is expected again, and a loss of before counts anew.
+        Stations that were present before are expected again, and a loss from before is forgotten.
         """
         if self._heard is not None:
             self._heard = now
         self.lost = False
 
     def stalled(self, seconds: float) -> None:
-        """Leave out a time in which the host could not hear them."""
+        """Leave out a time in which the host could not receive heartbeats."""
         if self._heard is not None:
             self._heard += seconds
 
     def expire(self, now: float, after: float) -> bool:
-        """True at the first look after they have been silent for so long."""
+        """True at the first call after the ground stations have been silent for `after` s."""
         if self._heard is None or self.lost or now - self._heard < after:
             return False
         self.lost = True

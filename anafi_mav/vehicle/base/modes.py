@@ -1,6 +1,8 @@
-"""Flight modes: one neutral enum. How an autopilot numbers them is its flavour's business. No I/O.
+"""Flight modes: one neutral enum. No I/O.
 
-The mode of a system is what the drone does, not what somebody asked for; `Vehicle.mode` decides it.
+A flavour holds an autopilot's numbers for them. The mode of a system is the drone's behaviour, not a client's
+request;
+`Vehicle.mode` decides it.
 """
 
 from __future__ import annotations
@@ -9,12 +11,12 @@ import enum
 
 
 class FlightMode(enum.Enum):
-    """What a vehicle can be doing, in words that belong to no autopilot."""
+    """Flight mode of a vehicle, in words that belong to no autopilot."""
 
     POSITION = "Position"
-    """Flown by the sticks of a ground station; hovers while nobody touches them."""
+    """Flown by the sticks of a ground station; hovers while all sticks are centred."""
     HOLD = "Hold"
-    """Hovers, or goes where it was told to go."""
+    """Hovers, or flies to the position of a goto command."""
     GUIDED = "Guided"
     """As Hold, and setpoints of the program that chose it fly the drone without another word (ArduPilot's way)."""
     TAKEOFF = "Takeoff"

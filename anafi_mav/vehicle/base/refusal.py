@@ -1,4 +1,4 @@
-"""What we do not do, and why: the error of a request that was understood."""
+"""Refusals with their reason: the error of a request that was understood."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ from anafi_mav.texts import Template, Text
 
 
 class Refused(AnafiMavError):
-    """We do not do this. `lasting` tells a request that is wrong in itself from one that comes at a bad moment.
+    """The gateway refuses a request.
+
+    `lasting`: the request is wrong in itself, not only at this moment.
 
     The text is `{what} refused: {reason}`, unless `form` is another one of these two fields.
     """
@@ -47,7 +49,7 @@ class Unsupported(Refused):
 
 
 class Rejected(CommandRejected):
-    """What the gateway flies itself cannot go on; the reason is one of the table."""
+    """A flight task of the gateway cannot continue; the reason is one of the table."""
 
     def __init__(self, reason: Text) -> None:
         super().__init__(reason)

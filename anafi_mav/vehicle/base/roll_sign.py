@@ -1,6 +1,9 @@
-"""Verifies the sign of AttitudeChanged.roll against how the drone's speed changes. No I/O; time is handed in.
+"""Verifies the sign of AttitudeChanged.roll against how the drone's speed changes.
 
-arsdk.md and anafi_ros have roll positive with the right wing down, GroundSDK's documentation says left. A velocity loop
+No I/O; time is handed in.
+
+arsdk.md and anafi_ros have roll positive with the right wing down, GroundSDK's documentation says left. A velocity
+loop
 that believes the wrong one pushes the drone the wrong way. A multicopter that leans more to one side accelerates more
 to that side. Wind and drag push as well, and can outweigh the lean while it slows down or holds its place, but they
 change slowly: so a sample is the change of lean and of acceleration within little more than half a second.
@@ -49,7 +52,7 @@ G = 9.81
 
 
 class Sign(enum.Enum):
-    """What is known of the sign of AttitudeChanged.roll."""
+    """Knowledge of the sign of AttitudeChanged.roll."""
 
     UNKNOWN = "unknown"
     RIGHT = "positive with the right wing down, as assumed"

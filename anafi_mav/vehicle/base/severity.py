@@ -11,7 +11,7 @@ class Severity(enum.IntEnum):
     EMERGENCY = 0
     """The motors were cut in the air."""
     ALERT = 1
-    """The drone does something by itself that nobody can stop."""
+    """The drone does something by itself that cannot be stopped."""
     CRITICAL = 2
     """Something fails that flight depends on."""
     ERROR = 3

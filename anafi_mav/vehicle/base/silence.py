@@ -3,4 +3,4 @@
 from __future__ import annotations
 
 SILENCE = 0.45
-"""s without a setpoint until the drone is told to hover, so that it has been told within half a second."""
+"""s without a setpoint until a hover is commanded: the drone receives it within 0.5 s."""

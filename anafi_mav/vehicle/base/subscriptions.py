@@ -14,7 +14,7 @@ Subscriptions = Mapping[type[Message], EventHandler]
 
 
 def in_order(tables: Iterable[Subscriptions]) -> dict[type[Message], tuple[EventHandler, ...]]:
-    """Join tables into one: the handlers of an event are called in the order of their tables."""
+    """Join tables into one; handlers of an event are called in the sequence of their tables."""
     handlers: dict[type[Message], tuple[EventHandler, ...]] = {}
     for table in tables:
         for kind, handler in table.items():

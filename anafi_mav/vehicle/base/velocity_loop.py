@@ -1,19 +1,21 @@
-"""Velocities, accelerations and positions as sticks: the loops that an ANAFI does not have. No I/O; time is handed in.
+"""Velocities, accelerations and positions as sticks: the loops that an ANAFI does not have.
+
+No I/O; time is a parameter.
 
 ARSDK knows tilt, climb rate and turn rate (PCMD), and nothing in between these and a whole move. So the loop over the
-horizontal velocity is closed here, on the drone's own speed, which it tells five times a second:
+horizontal velocity is closed here, on the drone's own speed, which it reports five times a second:
 
-- the push (m/s2) that the drone's tilt gives is known from its attitude, so what it accelerates beyond that is what the
-  air does to it: drag and wind. `Motion` keeps that estimate all the time, in a hover as well, so that a loop that
-  begins in wind does not have to learn it first, and one that runs into the limit of its tilt does not wind up;
-- a velocity is asked for by a push in proportion to the error, against the air's, and on top of it the acceleration
-  that the setpoint names. The error is the one that will be left when the tilt has followed: it lags by `TILT_LAG`;
-- a position asks for a velocity; where the drone is, is its GPS location carried on by its speed;
+- the push (m/s2) that the drone's tilt gives is known from its attitude; any further acceleration is the air's: drag
+  and wind. `Motion` keeps that estimate all the time, in a hover as well, so that a loop that begins in wind does not
+  have to learn it first, and one that runs into the limit of its tilt does not wind up;
+- a velocity needs a push in proportion to the error, against the air's, and on top of it the acceleration that the
+  setpoint names. The error is the one that will be left when the tilt has followed: it lags by `TILT_LAG`;
+- a position needs a velocity; the position of the drone is its GPS location carried on by its speed;
 - until the sign of the reported roll is verified (`roll_sign`) nothing is derived from the tilt: the loop knows the
   last speed alone, counts with calm air, and leans by `CAUTIOUS_TILT` at most.
 
-The climb rate loop is the drone's own, heights ask for one by their error. Nothing here limits more than the drone's
-own MaxTilt, MaxVerticalSpeed and MaxRotationSpeed do.
+The climb rate loop is the drone's own; heights command a rate by their error. Nothing here limits more than the
+drone's own MaxTilt, MaxVerticalSpeed and MaxRotationSpeed do.
 
 Axes: north, east, down over ground; x front, y right in the body's; rad, m, m/s, m/s2. Heights above take-off.
 """
@@ -41,8 +43,10 @@ AIR_GAIN = 0.5
 second, and one odd report does not tilt the drone."""
 
 LOOK = 0.15
-"""s at least between two looks at what the air does: an ANAFI tells its speed every 0.2 s. The difference of two speeds
-that come faster is noise."""
+"""s, minimum between two updates of the air estimate.
+
+An ANAFI reports its speed every 0.2 s. The difference of two speeds that arrive faster is noise.
+"""
 
 MOST_AIR = 8.0
 """m/s2 that the air may seem to push: as much as full tilt. More is a mistake of the estimate."""
@@ -103,7 +107,7 @@ def tilt_for(speed: float, wind: float = WIND) -> float:
 
 @dataclass(frozen=True)
 class Axis:
-    """What is wanted along one axis. None: nothing is said about it."""
+    """Setpoint along one axis; None: unset."""
 
     velocity: float | None = None
     acceleration: float | None = None
@@ -113,7 +117,7 @@ class Axis:
 
 @dataclass(frozen=True)
 class Demand:
-    """What the sticks are to achieve. An axis of which nothing is said holds still."""
+    """Goal of the stick control. An axis without a setpoint holds still."""
 
     x: Axis = Axis()
     y: Axis = Axis()
@@ -136,14 +140,14 @@ class Demand:
 
 
 class Motion:
-    """How the drone moves, as far as its reports tell, and what the air does to it."""
+    """Estimated motion of the drone, from its reports, and the effect of the air on it."""
 
     def __init__(self, roll: RollCheck | None = None) -> None:
         self._roll = roll or RollCheck(Sign.RIGHT)
         self.yaw: float | None = None
-        """rad, clockwise from north, as last told; None: unknown."""
+        """rad, clockwise from north, as last reported; None: unknown."""
         self.height: float | None = None
-        """m above take-off, as last told."""
+        """m above take-off, as last reported."""
         self.north = self.east = 0.0
         """m from `reference`, carried on by speed between GPS locations."""
         self.reference: tuple[float, float] | None = None
@@ -156,7 +160,7 @@ class Motion:
         self._attitude_at = self._velocity_at = self._height_at = -math.inf
         self._velocity = (0.0, 0.0, 0.0)
         self._push_then = (0.0, 0.0)
-        """The push when the speed was last told."""
+        """The push when the speed was last reported."""
         self._looked = (0.0, 0.0)
         self._looked_at = -math.inf
         self._pushed_north = self._pushed_east = 0.0
@@ -188,7 +192,7 @@ class Motion:
         self._velocity, self._velocity_at, self._push_then = (north, east, down), now, push
 
     def _look(self, north: float, east: float, now: float) -> None:
-        """What the speed has become beyond what the tilt made of it, the air has done."""
+        """Update the air estimate: change of the speed beyond the change caused by the tilt."""
         elapsed = now - self._looked_at
         air_north, air_east = self.air
         air_north += AIR_GAIN * ((north - self._looked[0] - self._pushed_north) / elapsed - air_north)
@@ -225,10 +229,10 @@ class Motion:
         self.east += trust * (east - self.east)
 
     def air_at(self, north: float, east: float) -> tuple[float, float]:
-        """What the air would do at another speed over ground (m/s): drag grows with the square of that through the air.
+        """Return the acceleration (m/s2) that the air would cause at another ground speed (m/s).
 
-        The estimate tells how fast the drone is through the air now; only the difference is the model's. Without a
-        roll to trust there is no estimate, and the air counts as calm.
+        Drag grows with the square of the speed through the air. The estimate gives the present speed through the air;
+        only the difference is the model's. Without a roll to trust there is no estimate, and the air counts as calm.
         """
         if not self.trusts_tilt:
             speed = math.hypot(north, east)
@@ -265,7 +269,10 @@ class Motion:
         return (self.yaw or 0.0) + self.turning * min(now - self._attitude_at, STALE)
 
     def velocity(self, at: float) -> tuple[float, float]:
-        """m/s north and east, carried on to a moment by tilt and air; as last reported while roll is not verified."""
+        """Return m/s north and east, extrapolated to a moment by tilt and air.
+
+        As last reported while roll is not verified.
+        """
         if not self.trusts_tilt:
             return self._velocity[0], self._velocity[1]
         ahead = max(0.0, min(at - self._velocity_at, STALE))
@@ -290,7 +297,7 @@ class Controller:
         """m/s of horizontal velocity that the tilt limit has been costing for a while; None: it does not."""
 
     def sticks(self, demand: Demand, limits: Limits, now: float) -> PilotingCommand | None:
-        """The sticks for this moment; None when they would need what the drone has stopped telling."""
+        """Return the sticks for this moment; None if they need a value that is no longer reported."""
         roll, pitch = 0.0, 0.0
         if not self._stands(demand):
             if not self.motion.knows_velocity(now):
@@ -400,7 +407,7 @@ def turn_towards(yaw: float, heading: float, feed_forward: float = 0.0) -> float
 
 
 def _turned(x: float, y: float, angle: float) -> tuple[float, float]:
-    """A vector of axes that are turned clockwise by `angle`, in the axes they are turned against."""
+    """Rotate a vector from axes that are turned clockwise by `angle` into the unturned axes."""
     cos, sin = math.cos(angle), math.sin(angle)
     return x * cos - y * sin, x * sin + y * cos
 

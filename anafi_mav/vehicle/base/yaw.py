@@ -8,9 +8,10 @@ DEG_PER_TURN = 360.0
 
 
 def heading_of(angle: float, way: float, relative: bool, now: float) -> float:
-    """How far to turn (deg, clockwise +) for a MAV_CMD_CONDITION_YAW, from a heading of `now` (deg).
+    """Return the angle to turn for a MAV_CMD_CONDITION_YAW from heading `now`.
 
-    `way` is 1 clockwise, -1 counter-clockwise, 0 the shorter one; a relative angle turns by `angle` that way.
+    All in deg, clockwise +. `way` is 1 clockwise, -1 counter-clockwise, 0 the shorter one; a relative angle turns by
+    `angle` that way.
     """
     if relative:
         return -angle if way < 0 else angle

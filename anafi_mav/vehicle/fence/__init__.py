@@ -1,1 +1,1 @@
-"""Bounds of a flight: the fence, rally points, and the items of a plan that they are made of. No I/O."""
+"""Bounds of a flight: fence, rally points, and the plan items that define them. No I/O."""

@@ -1,4 +1,7 @@
-"""A fence: where the vehicle may be, from MAVLink's fence items; its geometry is `plans.zones`. No I/O, no clock."""
+"""A fence from MAVLink's fence items: the region in which the vehicle may be.
+
+Its geometry is `plans.zones`. No I/O, no clock.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +24,7 @@ HOME_CIRCLE = mav_enums.MAV_CMD_NAV_FENCE_HOME_CIRCLE_INCLUSION
 
 
 def fence_of(items: Iterable[PlanItem]) -> Fence:
-    """The fence in items that `FenceKind` found good."""
+    """Return the fence in items that `FenceKind` accepted."""
     zones: list[Zone] = []
     polygon: list[PlanItem] = []
     for number, item in enumerate(items):

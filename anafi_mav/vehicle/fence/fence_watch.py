@@ -1,10 +1,12 @@
-"""The fence in force, and what is to be done when the vehicle leaves it or is about to. No I/O.
+"""The fence in force, and the action when the vehicle leaves it or is about to.
+
+No I/O.
 
     watch.look(sight, now) -> the action to carry out now, or None
 
-An action is carried out once for each time that the vehicle comes to a boundary; who takes it over then is let fly
-back. Zones, floor and ceiling are boundaries of their own: beyond one of them the others hold. A vehicle that returns
-or lands, whoever told it to, is warned about and nothing more.
+An action is carried out once each time the vehicle reaches a boundary; a client that then acquires the vehicle may
+fly it back. Zones, floor and ceiling are separate boundaries: beyond one of them the others hold. For a vehicle that
+returns or lands, commanded or not, there is a warning and nothing else.
 """
 
 from __future__ import annotations
@@ -24,34 +26,45 @@ from anafi_mav.vehicle.fence.fence import fence_of
 from anafi_mav.vehicle.fence.plan_items import PlanItem
 
 REACTION = 0.6
-"""s from a motion to the drone's answer to what we make of it: telemetry comes five times a second, a stick takes 0.1 s
-to be obeyed, and radio takes the rest."""
+"""s from a motion to the drone's response to our action.
+
+Telemetry is received five times a second, a stick takes 0.1 s to be obeyed, and radio takes the rest.
+"""
 
 BRAKING = 2.5
-"""m/s², what a drone brakes with at least: 15° of tilt."""
+"""m/s², lowest deceleration of a braking drone: 15° of tilt."""
 
 BACK_INSIDE = 2.0
-"""m inside the boundary from where the vehicle counts as back: two readings of GPS differ by a metre."""
+"""m inside the boundary from which the vehicle counts as back.
+
+Two readings of GPS differ by a metre.
+"""
 
 STALE = 3.0
-"""s after which a position is not known any more: it comes once a second."""
+"""s after which a position counts as unknown: it is reported once a second."""
 
 HIGHEST_FLOOR = 1000.0
 """m above take-off."""
 
 SLACK = 1.0
-"""m beyond floor or ceiling that are no breach yet: the barometer drifts, and climbs overshoot."""
+"""m beyond floor or ceiling that are no breach yet.
+
+The barometer drifts, and climbs overshoot.
+"""
 
 CALM = 2.0
-"""s without danger until a vehicle that left, or was about to, is inside again. Where it is between two positions is an
-estimate, which each position corrects; and what a busy machine reads late looks like a way back."""
+"""s without danger until a vehicle that left, or was about to, counts as inside again.
+
+Its position between two reports is an estimate, which each report corrects; and values that a busy host reads late
+look like a way back.
+"""
 
 RETRY = 2.0
 """s until an action that was not carried out is tried again."""
 
 
 class Reaction(enum.Enum):
-    """What happens at the boundary."""
+    """Action at the boundary."""
 
     NONE = "nothing"
     WARN = "warning"
@@ -87,7 +100,7 @@ NO_NUMBER = -1
 
 
 class Breach(enum.Enum):
-    """Which boundary (MAVLink FENCE_BREACH)."""
+    """Kind of boundary (MAVLink FENCE_BREACH)."""
 
     NONE = mav_enums.FENCE_BREACH_NONE
     FLOOR = mav_enums.FENCE_BREACH_MINALT
@@ -123,22 +136,27 @@ TRANSITIONS: dict[State, dict[Event, State]] = {
     State.LEAVING: {Event.AHEAD: State.LEAVING, Event.BREACH: State.OUTSIDE, Event.SAFE: State.INSIDE},
     State.OUTSIDE: {Event.SAFE: State.INSIDE},
 }
-"""Of zones, floor and ceiling, each for itself. What is not here changes nothing: outside, the vehicle is let fly
-however it will until it is back."""
+"""State transitions of zones, floor and ceiling, each for itself.
+
+A missing pair changes nothing: outside, the vehicle may fly freely until it is back.
+"""
 
 
 class OutsideFence(AnafiMavError):
-    """A place, a height or the way to a place is not inside the fence. The text is a clause: "12 m beyond …"."""
+    """A place, a height or the way to a place is not inside the fence.
+
+    The text is a clause: "12 m beyond …".
+    """
 
     def __init__(self, reason: Text, *, lasting: bool = True) -> None:
         super().__init__(reason)
         self.reason = reason
         self.lasting = lasting
-        """It will still be so when somebody asks again."""
+        """True when the same request would be refused again."""
 
 
 class Sight(msgspec.Struct, frozen=True):
-    """What the vehicle is seen to do."""
+    """Observed state of the vehicle."""
 
     place: LatLon | None
     """By the newest position, however old; None without a GPS fix."""
@@ -154,16 +172,22 @@ class Sight(msgspec.Struct, frozen=True):
     airborne: bool
     """Off the ground."""
     flying: bool
-    """And neither taking off nor landing nor returning: whatever it does may be stopped."""
+    """Neither taking off nor landing nor returning, so that its motion may be stopped."""
     steering: bool
-    """Somebody flies it by sticks or setpoints, so that it goes on as it goes. A move stops where it was told to."""
+    """Flown by sticks or setpoints, so that its motion continues.
+
+    A move stops at its commanded target.
+    """
     orders: int
-    """Counts who took the vehicle over: an action of ours that is still the newest order need not be given again."""
+    """The vehicle's `orders` count, which each new action raises.
+
+    An action of ours that is still the newest need not be repeated.
+    """
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a look found out, other than that all is well."""
+    """Problem found by a look."""
 
     breach: Breach
     text: Text
@@ -173,27 +197,27 @@ class Verdict:
 
 
 Finding = tuple[Event | None, Verdict | None]
-"""What there is to see of a boundary; no event when nothing can be said."""
+"""Observation of one boundary; the event is None when nothing can be concluded."""
 
 SAFE: Finding = (Event.SAFE, None)
 
 
 class _Side:
-    """Where the vehicle is in relation to one kind of boundary, and what was done about it."""
+    """State of the vehicle relative to one kind of boundary, and the action taken."""
 
     def __init__(self) -> None:
         self.state = State.INSIDE
         self.verdict: Verdict | None = None
-        """Why the state is what it is; None when all is well."""
+        """Reason of the state; None when all is well."""
         self.orders: int | None = None
-        """The vehicle's count of orders when our action was carried out."""
+        """The vehicle's `orders` count when our action was carried out."""
         self.retry_at: float | None = None
         """When an action that failed is tried again."""
         self._calm_since: float | None = None
-        """Since when nothing ahead was seen."""
+        """Time since when nothing ahead was seen."""
 
     def see(self, event: Event | None, verdict: Verdict | None, now: float) -> State:
-        """Something is seen, or nothing can be; returns the state before."""
+        """Take an observation, or None without one; return the state before."""
         before = self.state
         if event is not Event.SAFE:
             self._calm_since = None
@@ -211,7 +235,7 @@ class _Side:
 
 
 class FenceWatch:
-    """The fence of one vehicle: its zones, its settings, and where the vehicle is in relation to it."""
+    """The fence of one vehicle: its zones, settings, and the vehicle's state relative to it."""
 
     def __init__(self) -> None:
         self.action = Reaction.HOLD
@@ -221,28 +245,28 @@ class FenceWatch:
         self.predict = True
         """Act when the vehicle is too fast to stop before the boundary, not only when it is beyond."""
         self.floor = 0.0
-        """m above the take-off point; counts once the vehicle has been above it. 0: there is none."""
+        """m above the take-off point; counts once the vehicle has been above it. 0: no floor."""
         self.items: tuple[PlanItem, ...] = ()
         self.fence = Fence()
         self.verdict: Verdict | None = None
-        """What the action is about that `look` returned; without one, why the state is what it is."""
+        """Reason of the action that `look` returned; without an action, of the present state."""
         self.breach = Breach.NONE
         """The last one."""
         self.breaches = 0
         self.breached_at = 0.0
         """By the clock that `look` is given."""
         self.blind = False
-        """In the air with a fence and without knowing where."""
+        """True in the air with a fence and without a position."""
         self._above_floor = False
         self._sides = _sides()
-        """In the order in which they are looked at: an action at the zones says most."""
+        """In the sequence in which they are checked: an action at the zones is the most informative."""
         self._acting: _Side | None = None
-        """For whose sake an action is being carried out."""
+        """Boundary for which an action is being carried out."""
 
     # Settings.
 
     def take(self, items: Sequence[PlanItem]) -> None:
-        """Another fence is in force."""
+        """Set the fence in force."""
         self.items, self.fence = tuple(items), fence_of(items)
         self._sides, self.verdict = _sides(), None
 
@@ -256,28 +280,31 @@ class FenceWatch:
 
     @property
     def enabled(self) -> bool:
-        """Some kind of boundary is enabled, besides the ceiling: the drone keeps to that one whatever is enabled."""
+        """True when some kind of boundary is enabled besides the ceiling.
+
+        The drone enforces the ceiling by itself, whatever is enabled.
+        """
         return bool(self.types & ~CEILING)
 
     @property
     def present(self) -> bool:
-        """There is a boundary of ours that could be enabled."""
+        """True when a boundary of ours exists that could be enabled."""
         return bool(self.fence.zones) or self.floor > 0.0
 
     @property
     def in_force(self) -> bool:
-        """There is a boundary of ours, and it is enabled."""
+        """True when a boundary of ours exists and is enabled."""
         return bool(self.zones.zones) or self._has_floor
 
     @property
     def state(self) -> State:
-        """The worst of zones, floor and ceiling."""
+        """The worst state of zones, floor and ceiling."""
         states = {side.state for side in self._sides.values()}
         return next(state for state in (State.OUTSIDE, State.LEAVING, State.INSIDE) if state in states)
 
     @property
     def healthy(self) -> bool:
-        """Not breached, and known not to be."""
+        """True when no boundary is breached, and this is known."""
         return self.state is not State.OUTSIDE and not self.blind
 
     @property
@@ -305,7 +332,7 @@ class FenceWatch:
     def check_place(self, place: LatLon | None, home: LatLon | None, start: LatLon | None = None) -> None:
         """Raise `OutsideFence` unless a place is inside, and the straight way to it from `start`.
 
-        From outside every way is good that ends inside. Of no place nothing can be said, so it is not inside either.
+        From outside every way that ends inside is allowed. An unknown place counts as not inside.
         """
         zones = self.zones
         if not zones.zones or self.action is Reaction.NONE:
@@ -323,7 +350,10 @@ class FenceWatch:
     # Watching.
 
     def look(self, sight: Sight, now: float) -> Reaction | None:
-        """The vehicle was seen; what is to be done about it now. `done` or `failed` is to be told how that went."""
+        """Evaluate the observed state of the vehicle; return the action to carry out now, or None.
+
+        Call `done` or `failed` with its outcome.
+        """
         zones = self.zones
         if not sight.airborne:
             self._above_floor = False
@@ -344,7 +374,7 @@ class FenceWatch:
         return None
 
     def _answer(self, side: _Side, before: State, verdict: Verdict, sight: Sight, now: float) -> Reaction | None:
-        """What is to be done about what is seen of one boundary."""
+        """Return the action for an observation of one boundary, or None."""
         if self.action is Reaction.NONE:
             return None
         if self._acting is not None:
@@ -369,13 +399,13 @@ class FenceWatch:
         return self.action
 
     def done(self, orders: int) -> None:
-        """The action was carried out; `orders` is the vehicle's count after it."""
+        """Note that the action was carried out; `orders` is the vehicle's count after it."""
         self._acting = None
         for side in self._sides.values():
             side.orders, side.retry_at = orders, None
 
     def failed(self, now: float, *, replaced: bool = False) -> None:
-        """The action was not carried out: it is tried again, unless the vehicle comes back inside before.
+        """The action was not carried out: it is tried again while the vehicle is outside.
 
         `replaced`: a client's order has ended it. Beyond a boundary it is not tried again then.
         """
@@ -385,12 +415,12 @@ class FenceWatch:
                 side.retry_at = now + RETRY
 
     def link_down(self) -> None:
-        """Nothing is known any more of what the vehicle does. The fence and its settings stay."""
+        """Forget the vehicle's state relative to the fence; the fence and its settings stay."""
         self._sides, self._acting, self.verdict = _sides(), None, None
         self.blind = self._above_floor = False
 
     def _judge(self, breach: Breach, zones: Fence, sight: Sight) -> Finding:
-        """What there is to see of one kind of boundary."""
+        """Return the observation of one kind of boundary."""
         if not sight.airborne:
             return SAFE
         if breach is Breach.BOUNDARY:

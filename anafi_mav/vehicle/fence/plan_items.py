@@ -41,7 +41,10 @@ class Fault:
 
 
 class PlanItem(msgspec.Struct, frozen=True):
-    """The fields of a MISSION_ITEM_INT that say something by themselves; its place in the list is its number."""
+    """Fields of a MISSION_ITEM_INT that belong to the item itself.
+
+    Its number is its place in the list.
+    """
 
     command: int
     frame: int
@@ -75,9 +78,10 @@ def has_place(command: int, frame: int) -> bool:
 
 
 def opaque_id(items: Iterable[PlanItem]) -> int:
-    """A number for a list of items: the same for the same list, another for another; 0 for an empty one.
+    """Return a number that identifies a list of items by its content; 0 for an empty list.
 
-    A checksum, as PX4 does it, so that it outlives the gateway. Which item is current does not count: it is progress.
+    A checksum, as PX4 does it, so that it outlives the gateway: the same for the same list, another for another.
+    Which item is current does not count: it is progress.
     """
     checksum, empty = 0, True
     for item in items:
@@ -89,7 +93,7 @@ def opaque_id(items: Iterable[PlanItem]) -> int:
 
 
 def place_fault(item: PlanItem) -> Fault | None:
-    """What is wrong with the place of an item that needs one."""
+    """Return the fault of an item's place, for an item that needs one."""
     if item.frame not in (*AMSL_FRAMES, *RELATIVE_FRAMES):
         return Fault(mav_enums.MAV_MISSION_UNSUPPORTED_FRAME, texts.FRAME_UNSUPPORTED.fill(frame=item.frame))
     if not abs(item.latitude) <= 90.0:
@@ -102,7 +106,10 @@ def place_fault(item: PlanItem) -> Fault | None:
 
 
 def height_ato(item: PlanItem, takeoff_amsl: float | None) -> float | None:
-    """Height of an item above the take-off point, m; None for an AMSL height while that point's own is not known."""
+    """Return the height of an item, m above take-off.
+
+    Returns None for an AMSL height while that of the take-off point is unknown.
+    """
     if item.frame in RELATIVE_FRAMES:
         return item.z
     return None if takeoff_amsl is None else item.z - takeoff_amsl

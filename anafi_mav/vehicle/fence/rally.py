@@ -19,7 +19,7 @@ otherwise change with every reading."""
 
 
 class Return(enum.Enum):
-    """Where a return ends."""
+    """End of a return."""
 
     HOME = "home"
     CLOSEST = "home or a rally point, whichever is closest"
@@ -60,7 +60,7 @@ class RallyPoints:
 
     @property
     def purpose(self) -> Return:
-        """What a return does with them."""
+        """Return the use that a return makes of the rally points."""
         return RTL_TYPES[self.rtl_type]
 
     def take(self, items: Sequence[PlanItem]) -> None:
@@ -83,7 +83,10 @@ class RallyPoints:
         present: RallyPoint | None,
         usable: Callable[[RallyPoint], bool],
     ) -> RallyPoint | None:
-        """Where a return that began at `place` should end; None: at home. `present` is what was chosen last."""
+        """Return the rally point for a return that began at `place`; None: home.
+
+        `present` is the point that was chosen last.
+        """
         if self.purpose is Return.HOME:
             return None
 

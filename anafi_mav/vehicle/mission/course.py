@@ -1,4 +1,4 @@
-"""What of a mission is flown now, and what follows. No I/O."""
+"""The part of a mission that is flown now, and the remaining parts. No I/O."""
 
 from __future__ import annotations
 
@@ -8,7 +8,10 @@ from anafi_mav.plans.translation.translate import Cursor, Leg, Step
 
 
 class Course:
-    """The parts of a mission from the one that is flown on, and the rest that was too long to be laid out at once."""
+    """The remaining parts of a mission, beginning with the one that is flown.
+
+    The rest that was too long to be laid out at once follows them.
+    """
 
     def __init__(self, parts: Iterable[Leg | Step] = (), rest: Cursor | None = None, later: int | None = None) -> None:
         self.parts = [*parts]

@@ -16,7 +16,7 @@ MAX_FILES = 16
 
 
 class FilesOnDrone:
-    """What was uploaded to one drone."""
+    """The flight-plan files that were uploaded to one drone."""
 
     def __init__(self, plan: FlightPlan) -> None:
         self._plan = plan
@@ -26,11 +26,12 @@ class FilesOnDrone:
         """With the mission that it was made of."""
 
     async def beginning_with(self, leg: Leg, mission: Sequence[Item]) -> tuple[Leg, str, int]:
-        """The file on the drone that goes on with this leg of a mission, its name, and the line before the leg.
+        """Return the file on the drone that continues with this leg of a mission.
 
-        An Ai begins in the middle of the newest file, where the leg is the end of that; the others, and where something
-        was set before that holds still, get one of their own. `mission` is the very object that the leg is of: the
-        file of another mission says the same lines of other items, so it is never gone on with in its middle.
+        Returns the file, its name, and the line before the leg. It is uploaded if needed. An Ai can begin in the
+        middle of the newest file, when the leg is the end of that file. The other models, and legs before which a
+        setting was changed that still holds, get a file of their own. `mission` is the very object that the leg is
+        of: the file of another mission has the same lines for other items, so it is never continued in its middle.
         """
         if self._newest is not None and self._plan.starts_anywhere:
             whole, name, of = self._newest

@@ -37,7 +37,7 @@ _LANDING = (FlyingState.LANDING, FlyingState.EMERGENCY_LANDING)
 
 
 class MissionFlight:
-    """The mission of one vehicle; its `Helm` while it is flown."""
+    """Flies the mission of one vehicle; its flight task in mode Mission."""
 
     def __init__(self, vehicle: Aircraft) -> None:
         self.progress = Progress()
@@ -50,7 +50,7 @@ class MissionFlight:
         self.say: Callable[[Severity, Callable[[int], Text]], None] = lambda severity, text: None
         """A text to everybody; it is made from what they call item 0."""
         self.first_number: Callable[[Hashable], int] = lambda client: 0
-        """What a client calls item 0."""
+        """Returns the number that a client gives item 0."""
         self.spawn: Callable[[Coroutine[Any, Any, None]], asyncio.Task[None]] | None = None
         """Runs something until the link goes down."""
         self.keeper = Keeper()
@@ -62,7 +62,7 @@ class MissionFlight:
         self._left: tuple[Leg, int, dict[int, int]] | None = None
         """The drone has it paused, and the mission is to begin elsewhere next: file, last line, jumps."""
         self._starting: tuple[Leg, int] | None = None
-        """What the drone is asked to begin, and after which line; None also when that is not wanted any more."""
+        """File that the drone is commanded to begin, and the line before; None also once withdrawn."""
         self._taken_meanwhile = False
         """While it was asked, the same mission was uploaded again."""
         self._files = FilesOnDrone(vehicle.drone.flight_plan)
@@ -71,7 +71,7 @@ class MissionFlight:
         self._beginning = False
         """Taken over by ourselves."""
         self._running: asyncio.Task[None] | None = None
-        """What the gateway does between two files."""
+        """Task of the gateway between two files."""
         self._end_watch = EndWatch(vehicle, self.progress, self._ended)
         self._may_end_late = False
         """True while a report of the last line completes a mission that was paused because the drone stopped its plan.
@@ -82,7 +82,10 @@ class MissionFlight:
     # What clients ask for.
 
     def take(self, items: Sequence[Item], identity: int) -> None:
-        """Another mission was uploaded, or none any more. One that is flown is stopped: it is not the mission now."""
+        """Another mission was uploaded, or none any more.
+
+        One that is flown is stopped: it is not the mission now.
+        """
         if identity == self.identity:
             return
         known, self.identity = self.identity != 0, identity
@@ -102,7 +105,10 @@ class MissionFlight:
             self.keeper.forget()
 
     def taken_again(self) -> None:
-        """The same mission was uploaded once more. One that is flown goes on undisturbed; else it is a new one."""
+        """The same mission was uploaded once more.
+
+        One that is flown goes on undisturbed; else it is a new one.
+        """
         starting, current = self._starting, self.progress.current
         if starting is not None:
             leg, line = starting
@@ -119,15 +125,19 @@ class MissionFlight:
         self.keeper.forget()
 
     def _leave(self) -> None:
-        """It begins elsewhere next; somebody else may still let the drone go on with what it has."""
+        """Remember the paused file before the mission begins elsewhere.
+
+        Another controller may still let the drone resume it.
+        """
         progress = self.progress
         if progress.state is State.PAUSED and progress.leg is not None:
             self._left = progress.leg, progress.line, dict(progress.jumps)
 
     async def engage(self, client: Hashable, item: int | None = None) -> None:
-        """Mode Mission begins, or goes on where it was stopped, or at an item; returns when the drone flies it.
+        """Begin mode Mission, resume it or fly it from an item on; returns when the drone flies it.
 
-        On the ground and disarmed it waits until this client arms. Raises `Refused`, or what the drone refused.
+        On the ground and disarmed it waits until this client arms. Raises `Refused`, or the error by which the drone
+        refused.
         """
         await self.storing.over()
         progress, vehicle = self.progress, self._vehicle
@@ -163,7 +173,10 @@ class MissionFlight:
             self.news()
 
     async def reset(self, client: Hashable) -> None:
-        """Give every loop all its turns again. The current item stays; after the end the mission begins anew."""
+        """Reset every jump counter; the current item stays.
+
+        After the end the mission begins again.
+        """
         progress = self.progress
         if progress.state is State.COMPLETE:
             await self.choose(client, 0)
@@ -224,10 +237,13 @@ class MissionFlight:
         return same and whole and paused and self._vehicle.in_air
 
     async def _begin(self, item: int, number: int, *, anew: bool = False, waited: bool = False) -> None:
-        """Fly from an item on. Nothing is disturbed before all is known to be good. `number` is of the first item.
+        """Fly from an item on.
 
-        `anew`: loops have all their turns before them, else those that were not flown when it was stopped.
-        `waited`: the drone was taken over when the mode was chosen, and has stood since.
+        Nothing is disturbed before all is known to be good. `number` is that of the first item.
+
+        With the loop reset (keyword) every loop has all its repetitions before it, else those that were left when the
+        mission was stopped. `waited`: the flight task was acquired when the mode was chosen, and the drone has stood
+        since.
         """
         vehicle, progress, plan = self._vehicle, self.progress, self._vehicle.drone.flight_plan
         items, resumes, uid = progress.items, self._resumes(item), self._uid
@@ -301,7 +317,10 @@ class MissionFlight:
         self.news()
 
     async def _begin_and_report(self, number: int) -> None:
-        """The beginning that waited for arming: its command was answered long ago, so failures are texts."""
+        """Begin the mission after the wait for arming; failures are sent as texts.
+
+        The command that chose it was answered long ago.
+        """
         try:
             await self.storing.over()
             await self._begin(self.progress.first, number, waited=True)
@@ -316,7 +335,7 @@ class MissionFlight:
         return self._vehicle.selected is FlightMode.MISSION and not self.flying
 
     def _announce(self, resumes: bool) -> None:
-        """What is flown, and what happens to it without the gateway."""
+        """Announce the item that is flown, and the drone's behaviour without the gateway."""
         current, stepped = self.progress.current, self._course.stepped
         returns = self._vehicle.drone.flight_plan.state.returns_on_disconnect
         self.say(Severity.INFO, lambda first: beginning(current + first, resumes, stepped=stepped, returns=returns))
@@ -367,7 +386,10 @@ class MissionFlight:
             self._finish()
 
     def _part_over(self) -> None:
-        """What follows is the current item from now on: paused before it begins, the last one is not flown again."""
+        """Make the following part the current item.
+
+        When the mission is paused before that part begins, the part before is not flown again.
+        """
         following = self._course.part_over()
         if following is not None:
             self.progress.fly(following)
@@ -392,7 +414,7 @@ class MissionFlight:
         self._may_end_late = stopped and self._course.following is None
 
     def _break_off(self, why: Text) -> None:
-        """It does not go on, and nobody asked for that."""
+        """Stop the mission for a reason that no client has commanded."""
         if self.progress.state is State.ACTIVE:
             self._stop(why)
             self._vehicle.select(FlightMode.HOLD)
@@ -482,7 +504,10 @@ class MissionFlight:
                 self._stopped_by_drone()
 
     def _last_way_point(self, leg: Leg) -> WayPoint | None:
-        """Return the way point that a file ends at; None while others are left, or when it lands or returns."""
+        """Return the way point that a file ends at.
+
+        Returns None while other way points are left, or when the file ends with a landing or a return.
+        """
         progress = self.progress
         points, left = [*way_points(leg)], [*way_points(leg, progress.line)]
         if progress.items[leg.origins[-1]].command in ENDINGS or len(left) > 1 or not points:
@@ -513,7 +538,10 @@ class MissionFlight:
         self._end_watch.look()
 
     def _ended(self, begun: bool) -> None:
-        """The drone has stopped its plan without reporting its last line; `begun`: it has been flown all the same."""
+        """Handle a plan that the drone has stopped without reporting its last line.
+
+        `begun`: the plan has been flown all the same.
+        """
         if begun:
             if (leg := self.progress.leg) is not None:
                 self._executed(len(leg.origins) - 1)
@@ -539,9 +567,12 @@ class MissionFlight:
         return ended
 
     def _suspend(self, *, starting: bool = False) -> None:
-        """The drone is not to fly its file any more. A landing or a return of its own is not disturbed.
+        """The drone is not to fly its file any more.
 
-        `starting`: it has been asked to begin it and has not said that it does, so no landing or return is that file's.
+        A landing or a return of its own is not disturbed.
+
+        `starting`: it has been asked to begin it and has not said that it does, so no landing or return is that
+        file's.
         """
         vehicle = self._vehicle
         if starting or (vehicle.flying_state not in _LANDING and not vehicle.returning):
@@ -555,7 +586,7 @@ class MissionFlight:
         )
 
     def _drop_pending(self) -> None:
-        """What waits to be armed will not begin: the mode must not say that it does."""
+        """Withdraw a mission that waits for arming, so that the mode no longer shows it."""
         if self._arming.end():
             self._vehicle.forget_mode()
 

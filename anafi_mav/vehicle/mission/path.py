@@ -1,6 +1,6 @@
-"""From a mission to the files that are flown from where the drone is, and whether it may fly where they lead.
+"""Turns a mission into files, from the drone's position on, and checks their path.
 
-What is judged is what is flown: the lines of the files.
+The check reads the lines of the files, because those are flown.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class WayPoint:
 
 
 def _start(vehicle: Aircraft) -> Start:
-    """Where the flight begins."""
+    """Return the state of the drone at the start of the flight."""
     state, place, amsl = vehicle.drone.piloting.state, vehicle.place, vehicle.height.ato(0.0)
     if place is None:
         raise Refused(texts.MISSION, texts.NO_FIX)
@@ -65,10 +65,12 @@ def _start(vehicle: Aircraft) -> Start:
 async def lay_out(
     vehicle: Aircraft, items: Sequence[Item], first: int | Cursor, number: int, jumps: Mapping[int, int] | None = None
 ) -> tuple[list[Leg | Step], Cursor | None]:
-    """What is flown from an item on, from where the drone is, and how it goes on after that. Raises `Refused`.
+    """Return the parts flown from an item on, starting at the drone's position, and the rest.
 
-    `number` is what the first item is called, `jumps` how often which jump was taken before. In a thread: 5 000 items
-    take half a second.
+    Raises `Refused`.
+
+    `number` is the client's number of the first item, `jumps` how often which jump was taken before. In a thread: 5
+    000 items take half a second.
     """
     start, version = _start(vehicle), vehicle.drone.flight_plan.version
     try:
@@ -83,7 +85,7 @@ async def lay_out(
 
 
 def _check_estimates(vehicle: Aircraft, items: Sequence[Item], parts: Sequence[Leg | Step], number: int) -> None:
-    """Raise `Refused` when the bridge to AMSL is an estimate and an item's AMSL height may be the ground."""
+    """Raise `Refused` if an item's AMSL height may be below ground because AMSL is an estimate."""
     if not vehicle.height.estimated:
         return
     for part in parts:
@@ -101,7 +103,10 @@ def lines_of(leg: Leg) -> list[str]:
 
 
 def way_points(leg: Leg, after: int = -1) -> Iterator[WayPoint]:
-    """Where the lines after one of them lead to. All heights are above take-off: the translation writes no others."""
+    """Yield the way points of the lines after one of them.
+
+    All heights are above take-off: the translation writes no others.
+    """
     lines = leg.content.decode().splitlines()[1:]
     for line, item in zip(lines[after + 1 :], leg.origins[after + 1 :], strict=False):
         columns = line.split("\t")
@@ -112,9 +117,9 @@ def way_points(leg: Leg, after: int = -1) -> Iterator[WayPoint]:
 
 
 async def check_path(vehicle: Aircraft, parts: Sequence[Leg | Step], after: int, number: int) -> None:
-    """Raise `Refused` when a way point, or the straight way to it, is where the drone may not be.
+    """Raise `Refused` if a way point, or the straight way to it, is where the drone may not be.
 
-    `after` is the line of the first file after which it is flown, `number` what the first item is called.
+    `after` is the line of the first file after which it is flown, `number` the client's number of the first item.
     """
     where, seen = vehicle.place, 0
     for part in parts:

@@ -1,7 +1,8 @@
-"""How far a mission is: which item is flown, which are done, and whether it goes on. No I/O.
+"""Progress of a mission: current item, finished items and state. No I/O.
 
-The drone tells the lines of its file that it has executed; a `Leg` says which items of the mission these are. An item
-is done when the drone said so, or the gateway has flown it itself, and never because time or other items went by.
+The drone reports the lines of its file that it has executed; a `Leg` maps them to items of the mission. An item is
+done when the drone has reported it, or when the gateway has flown it itself, and never because time or other items
+passed.
 """
 
 from __future__ import annotations
@@ -62,7 +63,7 @@ TRANSITIONS: dict[State, dict[Event, State]] = {
         Event.BEGIN: State.ACTIVE,
     },
 }
-"""What is not here does not happen: an active mission is stopped before another item of it is begun."""
+"""A missing pair cannot occur: an active mission is stopped before another item begins."""
 
 MAVLINK_STATES = {
     State.NONE: mav_enums.MISSION_STATE_NO_MISSION,
@@ -136,9 +137,11 @@ class Progress:
         self.current, self.jumps, self._chosen = 0, {}, False
 
     def choose(self, item: int, *, anew: bool = True) -> None:
-        """Begin there next time, with loops that have all their turns before them unless it goes on like that anyway.
+        """Select the item at which the mission begins next.
 
-        Our own wrong arguments raise: `item` is one of the mission's, which does not fly.
+        Loop counters restart, unless the keyword argument is False (the mission continues at this item anyway).
+
+        Raises `ValueError` on wrong arguments of ours: `item` must be one of the mission's, which does not fly.
         """
         if not 0 <= item < len(self.items):
             raise ValueError(f"the mission has no item {item}")
@@ -149,7 +152,10 @@ class Progress:
             self.jumps = {}
 
     def begin(self, leg: Leg | None, line: int = -1) -> None:
-        """It is flown: by this file, of which `line` was executed last, or (None) by the gateway for now."""
+        """Record that the mission is flown, by a file or (None) by the gateway for now.
+
+        `line` is the line of the file that was executed last.
+        """
         self.state = TRANSITIONS[self.state][Event.BEGIN]
         if leg is not self.leg:
             self._skipped.clear()
@@ -186,10 +192,10 @@ class Progress:
         return leg.origins[line]
 
     def executed(self, line: int) -> tuple[int, ...]:
-        """The drone has executed a line; the items that are done with it.
+        """Record that the drone has executed a line; returns the items that are done with it.
 
-        A line that was told before, or that the file does not have, says nothing. Lines between that were never told,
-        for the link was away, may have been flown: that they were is not claimed.
+        A line that was reported before, or that the file does not have, is ignored. Lines in between that were never
+        reported, because the link was lost, may have been flown: that they were is not claimed.
         """
         leg = self.leg
         if self.state is not State.ACTIVE or leg is None or not self.line < line < len(leg.origins):

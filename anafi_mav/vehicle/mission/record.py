@@ -1,4 +1,4 @@
-"""What is kept of a mission that is flown, so that another run of the gateway knows the drone's plan again."""
+"""Record of a flown mission, by which a restarted gateway recognises the drone's plan."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     mission: int
     """Opaque id."""
     uid: str
-    """What the drone calls the file."""
+    """The drone's name of the file."""
     content: str
     origins: tuple[int, ...]
     done: tuple[tuple[int, ...], ...]
@@ -43,7 +43,10 @@ class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     @classmethod
     def read(cls, kept: Any, items: Sequence[Item]) -> Self | None:
-        """What `written` made of a flight of this mission; None when it cannot be that: people can write files."""
+        """Return the record that `written` made for this mission; None if it is invalid.
+
+        It may be invalid because people can write files.
+        """
         try:
             record = msgspec.convert(kept, cls)
         except msgspec.ValidationError:
@@ -68,7 +71,10 @@ class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Keeper:
-    """Sees to it that what the drone flies is remembered, or that the gateway is at an item behind the drone's file."""
+    """Keeps an up-to-date record of the plan that the drone flies.
+
+    Also while the gateway is at an item behind the drone's file.
+    """
 
     def __init__(self) -> None:
         self.write: Callable[[Record | None], None] = lambda record: None
@@ -85,7 +91,10 @@ class Keeper:
         self.write(None)
 
     def keep(self, mission: int, uid: str, progress: Progress, following: int | None) -> None:
-        """Remember how far a mission is. `following` is the item behind the file that the drone flies."""
+        """Remember how far a mission is.
+
+        `following` is the item behind the file that the drone flies.
+        """
         if progress.leg is not None:
             self._kept = Record.of(mission, uid, progress.leg, progress.line, following, progress.jumps)
         elif self._kept is not None:

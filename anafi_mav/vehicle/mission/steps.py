@@ -1,4 +1,7 @@
-"""Items of a mission that the gateway flies itself, between two files: what no flight plan of Parrot's can say."""
+"""Mission items that the gateway flies itself between two files.
+
+A flight plan of Parrot's cannot express them.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +32,11 @@ async def fly_step(vehicle: Aircraft, item: Item) -> None:
 
 
 async def _turn(vehicle: Aircraft, item: Item) -> None:
-    """param1 deg, param2 deg/s (unset or 0: the drone's own), param3 way, param4 not 0: from the present heading."""
+    """Turn by MAV_CMD_CONDITION_YAW.
+
+    param1 deg, param2 deg/s, param3 direction, param4 not 0: relative to the present heading. param2 unset or 0: the
+    drone's own rate.
+    """
     angle, rate, way, reference = item.params[:4]
     attitude = vehicle.drone.piloting.state.attitude
     if attitude is None:

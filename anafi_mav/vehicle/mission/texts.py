@@ -1,4 +1,4 @@
-"""What is said to people when a mission begins, or does not."""
+"""Texts for operators when a mission begins, or does not."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _REASONS = {
 """Parrot's components of a flight plan that keep it from being begun (arsdk.md §3.1)."""
 
 _INPUTS = {Input.DRONE_GPS: _REASONS[Part.GPS], Input.DRONE_MAGNETO: _REASONS[Part.CALIBRATION]}
-"""What an Ai lacks and tells twice: as a missing input, and as one of the components."""
+"""Faults that an Ai reports twice: as a missing input, and as one of the components."""
 
 
 def refusal(state: FlightPlanState, error: CommandRejected) -> Text:
@@ -34,9 +34,9 @@ def refusal(state: FlightPlanState, error: CommandRejected) -> Text:
 
 
 def beginning(item: int, resumes: bool, *, stepped: bool, returns: bool | None) -> Text:
-    """Where a mission begins or goes on, and what becomes of it without the gateway.
+    """Return the text of a beginning or resumed mission, with the behaviour without the gateway.
 
-    `stepped`: the drone has a part of it only. `returns`: what its ReturnHomeOnDisconnect is set to.
+    `stepped`: the drone has a part of the mission only. `returns`: the value of its ReturnHomeOnDisconnect.
     """
     alone = {None: texts.LINK_LOSS_UNKNOWN, True: texts.LINK_LOSS_RETURNS, False: texts.LINK_LOSS_CONTINUES}[returns]
     if stepped and returns is not True:

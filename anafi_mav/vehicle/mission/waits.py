@@ -1,5 +1,7 @@
-"""What a mission waits for without being flown: that it is stored, that somebody arms, and what a drone does that has
-stopped its plan."""
+"""Waits of a mission that is not being flown: for storage, for arming, and after a stop.
+
+After a stop of its plan by the drone: for the drone's state that shows whether the plan is complete.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,10 @@ from anafi_mav.vehicle.mission.path import WayPoint
 from anafi_mav.vehicle.mission.progress import Progress
 
 ARM_WAIT = 10.0
-"""s that a mission waits for somebody to arm: QGroundControl chooses the mode first and arms when it is shown."""
+"""s that a mission waits for arming.
+
+QGroundControl chooses the mode first and arms when it is shown.
+"""
 
 END_WAIT = 2.0
 """s within which a drone whose plan has ended has reported the last line, or begun its landing or return."""
@@ -48,9 +53,10 @@ STORE_WAIT = 5.0
 
 
 class StoreWait:
-    """A mission has come and is being stored: what its client orders meanwhile is meant for it, not for the old one.
+    """Delays the commands of a client while its new mission is being stored.
 
-    Clients like dronekit do not wait for the acknowledgement of their last item.
+    They are meant for that mission, not for the old one: clients like dronekit do not wait for the acknowledgement of
+    their last item.
     """
 
     def __init__(self) -> None:
@@ -68,7 +74,10 @@ class StoreWait:
                 self._stored = None
 
     async def over(self) -> None:
-        """Return when no mission is being stored: at once if that is so. Raises `Refused` when it takes too long."""
+        """Return when no mission is being stored: at once if that is so.
+
+        Raises `Refused` when it takes too long.
+        """
         while self._stored is not None:
             try:
                 await asyncio.wait_for(self._stored.wait(), STORE_WAIT)
@@ -86,7 +95,7 @@ class ArmWait:
         self._alarm = Alarm(self._lapse)
 
     def begin(self, client: Hashable) -> None:
-        """It has been chosen; whoever was waited for before is not any more."""
+        """Start waiting until this client arms; an earlier wait for another client ends."""
         self.end()
         self._client = client
         self._alarm.set_in(ARM_WAIT)
@@ -96,7 +105,7 @@ class ArmWait:
         return self._client == client and self.end()
 
     def end(self) -> bool:
-        """Wait no more; whether anybody was waited for."""
+        """Stop waiting for arming; returns True if a wait was active."""
         waited, self._client = self._alarm.is_set, None
         self._alarm.cancel()
         return waited
@@ -107,7 +116,7 @@ class ArmWait:
 
 
 class EndWatch:
-    """Decides whether a plan that the drone has stopped without reporting its last line is complete.
+    """Decides whether a plan that stopped without a report of its last line is complete.
 
     Parrot does not document whether the last MissionItemExecuted precedes the state stopped. A last line that lands or
     returns is done when the drone has begun that; one of another cause is not the mission's. Any other last line is
@@ -134,8 +143,10 @@ class EndWatch:
         return self._running
 
     def begin(self, target: WayPoint | None = None) -> None:
-        """The drone has stopped its plan before the last line. `target`: the last way point of a plan that ends there,
-        None when the last line lands or returns."""
+        """The drone has stopped its plan before the last line.
+
+        `target`: the last way point of a plan that ends there, None when the last line lands or returns.
+        """
         self.end()
         self._target = target
         self._running = True

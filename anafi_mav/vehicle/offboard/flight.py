@@ -1,6 +1,6 @@
-"""Flies the drone by the pilot's setpoints: the shell around the cores `stream` and `base.velocity_loop`.
+"""Flies the drone by setpoints: the shell around `stream` and `base.velocity_loop`.
 
-An attitude or a velocity reaches the sticks the moment it arrives, and again whenever the drone tells how it moves. A
+An attitude or a velocity reaches the sticks the moment it arrives, and again whenever the drone reports its motion. A
 position is a move that the drone makes by itself (`moves`). A timer turns the pilot's silence into a hover,
 which ends a move as well. On the ground a setpoint that climbs takes the drone off (`takeoff`); nothing is
 flown before it hovers.
@@ -71,7 +71,7 @@ class OffboardFlight:
         self.guided_timeout = GUIDED_TIMEOUT
         """s that a velocity lasts in ArduPilot's Guided (a parameter)."""
         self.motion = Motion(vehicle.roll)
-        """How the drone moves; whoever else flies it by sticks uses it too."""
+        """Motion of the drone; other flight tasks that fly by sticks use it too."""
         self.warn_throttled: Callable[[Text], None] = lambda text: vehicle.text(Severity.WARNING, text)
         """Says what is wrong with something that arrives many times a second."""
         self.run_action: Callable[[Hashable, Coroutine[Any, Any, None]], asyncio.Task[None]] = _at_once
@@ -88,7 +88,7 @@ class OffboardFlight:
         """The silence that the alarm is set for."""
         self._engaging: asyncio.Task[None] | None = None
         self._alone = False
-        """What is being engaged is a single setpoint."""
+        """True while a single setpoint is being engaged."""
         self._afterwards = FlightMode.HOLD
         """The mode that silence ends in."""
         self._controller = Controller(self.motion)
@@ -105,7 +105,7 @@ class OffboardFlight:
 
     @property
     def setpoint(self) -> Setpoint | None:
-        """What is being flown; None when no setpoint is."""
+        """Return the setpoint that is flown; None without one."""
         return self._stream.setpoint
 
     @property
@@ -121,10 +121,10 @@ class OffboardFlight:
     # What programs ask for.
 
     def receive(self, sender: Hashable, setpoint: Setpoint, *, guided: bool = False) -> Text | None:
-        """A program's newest setpoint; flies the drone at once when this program is the pilot.
+        """Take a program's newest setpoint; fly it at once when this program is the pilot.
 
         `guided`: the program is of the family whose setpoints fly the drone in mode Guided, without engagement.
-        Returns None, or one sentence on why nobody listens.
+        Returns None, or one sentence on why the setpoint is ignored.
         """
         now = self._clock.monotonic()
         stands = self._stands
@@ -158,9 +158,10 @@ class OffboardFlight:
         return self._vehicle.flying_state == FlyingState.LANDED
 
     def _on_ground(self, sender: Hashable, setpoint: Setpoint, now: float, *, guided: bool) -> Text | None:
-        """A setpoint for a drone that stands: only a climb of the client that armed and engaged is anything to it.
+        """Handle a setpoint on the ground: only a climb of the client that armed and engaged counts.
 
-        Returns why a setpoint that climbs takes nothing off, or None. ArduCopter flies attitudes alone from the ground.
+        Returns why a setpoint that climbs takes nothing off, or None. ArduCopter flies attitudes alone from the
+        ground.
         """
         vehicle, lift = self._vehicle, self._lift
         if guided and isinstance(setpoint, MotionSetpoint):
@@ -208,7 +209,7 @@ class OffboardFlight:
             self._vehicle.text(Severity.NOTICE, texts.SETPOINT_TAKEOFF_NO_CLIMB)
 
     async def _take_off(self, sender: Hashable) -> None:
-        """The second is over: the drone takes off, and the newest setpoint is flown from its first hover on."""
+        """Take off after a second of climbing setpoints; the newest is flown from the first hover."""
         vehicle, lift = self._vehicle, self._lift
         afterwards = FlightMode.GUIDED if vehicle.selected is FlightMode.GUIDED else FlightMode.HOLD
         try:
@@ -244,7 +245,10 @@ class OffboardFlight:
             self._lift.stop()
 
     def left_ground(self) -> None:
-        """The drone takes off. A session that stands by on the ground flies only a take-off that is its own."""
+        """The drone takes off.
+
+        A session that stands by on the ground flies only a take-off that is its own.
+        """
         if self.engaged and self._lift.phase not in (Phase.LIFTING, Phase.JOINED):
             self.end()
             self._vehicle.text(Severity.WARNING, texts.OFFBOARD_ENDED.fill(reason=texts.NOT_ITS_TAKEOFF))
@@ -270,7 +274,10 @@ class OffboardFlight:
         return self._stream.candidate(client, self._clock.monotonic()) is not None
 
     async def engage(self, client: Hashable) -> None:
-        """Mode Offboard begins for this client; returns when its setpoints fly the drone, or raises `Refused`."""
+        """Engage mode Offboard for this client; returns when its setpoints fly the drone.
+
+        Raises `Refused`.
+        """
         self._require_freedom(texts.OFFBOARD)
         candidate = self._stream.candidate(client, self._clock.monotonic())
         if candidate is None:
@@ -354,7 +361,10 @@ class OffboardFlight:
     # Ending.
 
     def end(self) -> list[asyncio.Task[None]]:
-        """Whoever flew by setpoints flies no more, and the last one does not fly on. Tasks that are about to end."""
+        """End the flight by setpoints; the last one is not flown on.
+
+        Returns tasks that are about to end.
+        """
         if self._lift.stop() is Phase.COUNTING:
             self._vehicle.mode_client = None  # who counted has to choose the mode once more, and does not count on
             self._vehicle.text(Severity.NOTICE, texts.SETPOINT_TAKEOFF_CANCELLED)
@@ -382,7 +392,7 @@ class OffboardFlight:
     # What the drone reports.
 
     def subscriptions(self) -> Subscriptions:
-        """Return the handlers of what reports how the drone moves, and that it hovers after a take-off."""
+        """Return the handlers of the events on motion, and on the hover after a take-off."""
         return {
             events.FlyingStateChanged: lambda message, now: self.after_takeoff(),
             events.AttitudeChanged: self._on_attitude,
@@ -498,7 +508,7 @@ class OffboardFlight:
         return sticks
 
     def _resolved(self, setpoint: MotionSetpoint) -> Goal | None:
-        """Where the setpoint's position is: what it meant when it first arrived."""
+        """Return the setpoint's position as it was resolved when the setpoint first arrived."""
         if setpoint.position == NOTHING:
             return None
         if self._goal is not None and self._goal.is_of(setpoint):
@@ -506,7 +516,7 @@ class OffboardFlight:
         return resolve(setpoint, self._vehicle, self.motion)
 
     def _turned_to(self, setpoint: MotionSetpoint) -> _Course:
-        """Where the setpoint's heading is: what it meant when it first arrived."""
+        """Return the setpoint's heading as it was resolved when the setpoint first arrived."""
         if self._course[:2] == (setpoint.body, setpoint.yaw):
             return self._course
         yaw = setpoint.yaw
@@ -539,7 +549,10 @@ class OffboardFlight:
         self._watch()
 
     def _stopped(self, *, joined: bool) -> None:
-        """The pilot's silence has lasted too long. `joined`: a take-off that is not the pilot's setpoints' goes on."""
+        """The pilot's silence has lasted too long.
+
+        `joined`: a take-off that is not the pilot's setpoints' goes on.
+        """
         vehicle = self._vehicle
         self._lift.stop()
         self.flown = None

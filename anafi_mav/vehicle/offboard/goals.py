@@ -1,7 +1,7 @@
-"""Where a setpoint's position is, resolved when it first arrives, and what the control loop is to make of it.
+"""Positions of setpoints, resolved at their first arrival, and the resulting control demand.
 
-A position may count from where the drone is or from where its nose points. It is resolved once: the same setpoint said
-again means the same place, for it is repeated so that none gets lost, not so that the drone flies on for ever.
+A position may count from the drone's position or from its heading. It is resolved once: the same setpoint again means
+the same place, for it is repeated in case one gets lost, not to make the drone fly on for ever.
 """
 
 from __future__ import annotations
@@ -27,7 +27,10 @@ class Goal:
     position: Vector
     """As the setpoint said it."""
     place: Place | None = None
-    """On the map; None when only one horizontal part was said, or none, or nobody knows where the drone is."""
+    """Place on the map.
+
+    None without both horizontal parts, or while the drone's position is unknown.
+    """
     x: float | None = None
     """m along the first axis, as `Motion.north` counts; None: not said, or no GPS location has come."""
     y: float | None = None
@@ -44,7 +47,10 @@ class Goal:
 
 
 def resolve(setpoint: MotionSetpoint, vehicle: Aircraft, motion: Motion) -> Goal:
-    """The goal of a setpoint that has a position. Raises `Refused` for one that the drone may not or cannot fly to."""
+    """The goal of a setpoint that has a position.
+
+    Raises `Refused` for one that the drone may not or cannot fly to.
+    """
     if setpoint.origin is Origin.VEHICLE:
         return _from_vehicle(setpoint, vehicle, motion)
     x, y, z = setpoint.position
@@ -128,7 +134,7 @@ def _from_vehicle(setpoint: MotionSetpoint, vehicle: Aircraft, motion: Motion) -
 
 
 def demand(setpoint: MotionSetpoint, goal: Goal | None, yaw: float | None, *, located: bool) -> Demand:
-    """What the sticks are to achieve for a setpoint with this goal and heading.
+    """Return the control demand of a setpoint with this goal and heading.
 
     Raises `Refused` for a horizontal position while the drone is not `located` by GPS.
     """

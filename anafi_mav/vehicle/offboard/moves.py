@@ -1,7 +1,7 @@
-"""Positions that the drone flies to by itself, one after the other: moveTo for places, moveBy for offsets.
+"""Flies to positions by the drone's own moves: moveTo for places, moveBy for offsets.
 
-The newest goal wins. One that is repeated is not begun again, for a moveTo that is restarted all the time never gets
-anywhere; one that changes faster than `MOVE_EVERY` is followed in steps.
+One move at a time; the newest goal wins. A repeated one is not begun again, for a moveTo that is restarted all the
+time never arrives; one that changes faster than `MOVE_EVERY` is followed in steps.
 """
 
 from __future__ import annotations
@@ -21,8 +21,11 @@ from anafi_mav.vehicle.base.refusal import Rejected, reason_of
 from anafi_mav.vehicle.offboard.goals import Goal
 
 MOVE_EVERY = 0.2
-"""s between two moves: a program may change its target with every setpoint, but each move has to be acknowledged by
-the drone, and one that begins while the last one has hardly been heard helps nobody."""
+"""s between two moves: a program may change its target with every setpoint.
+
+But each move has to be acknowledged by the drone, and a move that begins just after the last one was received is of
+no use.
+"""
 
 RETRY = 2.0
 """s until a moveTo that the drone refused or gave up is tried again, if it is still asked for. A moveBy never is: it
@@ -30,7 +33,7 @@ may have flown a part of its way."""
 
 
 _Wanted: TypeAlias = "tuple[Goal, float | None]"
-"""Where to, and the heading there (rad from north); None keeps what is."""
+"""Goal, and the heading there (rad from north); None keeps the present heading."""
 
 
 class OffboardMoves:
@@ -40,7 +43,7 @@ class OffboardMoves:
         self._vehicle = vehicle
         self._warn_throttled = warn_throttled
         self._wanted: _Wanted | None = None
-        """What is asked for and has not been begun."""
+        """Requested move that has not begun."""
         self._begun: _Wanted | None = None
         self._retry_at = math.inf
         self._starter: asyncio.Task[None] | None = None
@@ -53,9 +56,9 @@ class OffboardMoves:
         return self._begun is not None
 
     def go(self, goal: Goal, yaw: float | None, now: float, *, asked: bool) -> None:
-        """Fly to a goal, and turn to a heading (rad from north) on the way; None keeps what is.
+        """Fly to a goal and turn to a heading (rad from north) on the way; None keeps the heading.
 
-        `asked`: somebody still says so, again and again. What was said once is tried once.
+        `asked`: the client still repeats the goal. A goal that was sent once is tried once.
         """
         wanted = (goal, yaw)
         if wanted == self._begun and (not asked or now < self._retry_at):
@@ -66,7 +69,10 @@ class OffboardMoves:
             self._starter = asyncio.get_running_loop().create_task(self._start())
 
     def stop(self) -> list[asyncio.Task[None]]:
-        """End what has been begun: the drone hovers, unless it lands or returns. Tasks that are about to end."""
+        """End what has been begun: the drone hovers, unless it lands or returns.
+
+        Tasks that are about to end.
+        """
         if self._begun is not None and self._vehicle.drone.piloting.sticks_blocked is None:
             # Before the waiting ends: a relative move whose waiting is given up would be ended a second time.
             with contextlib.suppress(LinkLost):

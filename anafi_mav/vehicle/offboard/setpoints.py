@@ -12,7 +12,7 @@ from typing import TypeAlias
 
 @dataclass(frozen=True)
 class AttitudeSetpoint:
-    """What one SET_ATTITUDE_TARGET asks for."""
+    """Setpoint of one SET_ATTITUDE_TARGET."""
 
     roll: float
     """rad, right wing down +."""
@@ -27,7 +27,7 @@ class AttitudeSetpoint:
 
 
 class Origin(enum.Enum):
-    """What positions count from."""
+    """Origin of positions."""
 
     LOCAL = "the origin of the local frame"
     VEHICLE = "where the drone is"
@@ -43,7 +43,7 @@ NOTHING: Vector = (None, None, None)
 
 @dataclass(frozen=True)
 class MotionSetpoint:
-    """What one SET_POSITION_TARGET_* asks for."""
+    """Setpoint of one SET_POSITION_TARGET_*."""
 
     origin: Origin
     body: bool = False

@@ -1,13 +1,13 @@
-"""Offboard: setpoints of a program fly the drone for as long as they keep coming, and not a moment longer.
+"""Offboard: a program's setpoints fly the drone while they keep arriving. No I/O.
 
-No I/O: `OffboardStream` keeps whose setpoints there are and whether they fly the drone; what they ask for is in
-`setpoints`, and `OffboardFlight` flies it.
+`OffboardStream` stores the sender of the setpoints and whether they fly the drone; their content is in `setpoints`, and
+`OffboardFlight` flies it.
 
-A session has one pilot: whoever engages it. Setpoints of others change nothing while it lasts. PX4's way to engage is
-mode Offboard, refused without setpoints. ArduPilot's way is to send setpoints in mode Guided, and there a single
-position is a move of its own, which nothing but its end or another order ends; a second setpoint of the same program
-within `TOGETHER` makes a stream of it, whose end is silence. After that end a position of the same program is a part of
-the stream for `STRAGGLING` longer: what a bad link delivers late must not send the drone off for good.
+A session has one pilot: the client that engages it. Setpoints of others change nothing while it lasts. PX4's way to
+engage is mode Offboard, refused without setpoints. ArduPilot's way is to send setpoints in mode Guided, and there a
+single position is a move of its own, which nothing but its end or another order ends; a second setpoint of the same
+program within `TOGETHER` makes a stream of it, whose end is silence. After that end a position of the same program is
+a part of the stream for `STRAGGLING` longer: what a bad link delivers late must not send the drone off for good.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ MAX_PILOTS = 8
 
 
 class State(enum.Enum):
-    """Where an offboard session stands."""
+    """State of an offboard session."""
 
     IDLE = "no setpoints"
     STREAMING = "setpoints come, another mode flies"
@@ -50,7 +50,7 @@ class State(enum.Enum):
 
 
 class Event(enum.Enum):
-    """What can happen to it."""
+    """Event that changes the state."""
 
     SETPOINT = "a usable setpoint of the pilot arrived"
     ENGAGE = "mode Offboard asked for, or a stream in mode Guided"
@@ -91,7 +91,9 @@ def ends(setpoint: Setpoint) -> bool:
 
 
 def lasts(setpoint: Setpoint, guided_timeout: float | None) -> float:
-    """Return the s of silence after which a setpoint is over. `guided_timeout`: of ArduPilot's Guided; None elsewhere.
+    """Return the s of silence after which a setpoint is over.
+
+    `guided_timeout`: of ArduPilot's Guided; None elsewhere.
 
     It counts for velocities and yaw rates alone: a tilt or an acceleration that outlives its sender gains speed.
     """
@@ -143,7 +145,10 @@ class OffboardStream:
         return now - self._heard[self.pilot].at if self.flying else 0.0
 
     def stick_age(self, now: float) -> float:
-        """`age` for sticks, which are over `SILENCE` after it is 0: a setpoint that lasts longer stays young longer."""
+        """Return `age` for the sticks: 0 for longer when the setpoint lasts longer than `SILENCE`.
+
+        Sticks expire `SILENCE` after an age of 0.
+        """
         return max(0.0, self.age(now) - (self._heard[self.pilot].lasts - SILENCE)) if self.flying else 0.0
 
     def follows(self, sender: Hashable, now: float) -> bool:
@@ -152,13 +157,16 @@ class OffboardStream:
         return heard is not None and now - heard.at < TOGETHER
 
     def straggles(self, sender: Hashable, now: float) -> bool:
-        """A position of this program may be one of a stream that has ended: it is flown as a part of it."""
+        """Return True if a position of this program may be a late one of a stream that has ended.
+
+        It is then flown as a part of that stream.
+        """
         return (
             self._fell_silent is not None and self._fell_silent[0] == sender and now < self._fell_silent[1] + STRAGGLING
         )
 
     def newest(self, sender: Hashable) -> Setpoint | None:
-        """What this program asked for last."""
+        """Return the last setpoint of this program."""
         heard = self._heard.get(sender)
         return None if heard is None else heard.setpoint
 
@@ -178,9 +186,10 @@ class OffboardStream:
         return True
 
     def candidate(self, client: Hashable, now: float) -> Hashable | None:
-        """Whose setpoints mode Offboard would fly if this client asked for it: its own, else the newest of all.
+        """Return the client whose setpoints mode Offboard would fly if this client chose it.
 
-        None: nobody's are fresh, mode Offboard is to be refused.
+        Its own have priority, then the newest of all. Returns None if no client has fresh setpoints: mode Offboard is
+        to be refused.
         """
         fresh = {sender: heard for sender, heard in self._heard.items() if self._is_fresh(heard, now)}
         if client in fresh:
@@ -192,7 +201,7 @@ class OffboardStream:
         self.state, self.pilot = TRANSITIONS[self.state][Event.ENGAGE], pilot
 
     def engage_single(self, pilot: Hashable, setpoint: Setpoint, said: float) -> None:
-        """This one setpoint of a program is flown to its end, however old it has become until its turn came."""
+        """Start to fly this one setpoint of a program to its end, whatever its age is by now."""
         self._heard[pilot] = _Heard(setpoint, said)
         if self.state is State.IDLE:
             self.state = TRANSITIONS[self.state][Event.SETPOINT]
@@ -226,7 +235,7 @@ class OffboardStream:
         return engaged
 
     def _prune(self, now: float) -> None:
-        """Forget who has fallen silent, but for the author of a single setpoint that is being flown."""
+        """Forget clients that have fallen silent, but not the one whose single setpoint is flown."""
         self._heard = {
             sender: heard
             for sender, heard in self._heard.items()

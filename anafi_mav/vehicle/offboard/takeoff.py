@@ -1,8 +1,10 @@
-"""Take-off by setpoints: which setpoints climb, and for how long a client has to ask for it. No I/O.
+"""Take-off by setpoints: the climbing setpoints, and how long they must last. No I/O.
 
-Programs of both families begin on the ground: they arm, engage, and send a setpoint that climbs. PX4 then takes off in
-Offboard for any setpoint, ArduCopter in Guided for an attitude with thrust (mode_guided.cpp, `set_angle`). Only a climb
-that one and the same client asks for without a gap for `CLIMB_FOR` takes the drone off, and every client is warned in
+Programs of both families begin on the ground: they arm, engage, and send a setpoint that climbs. PX4 then takes off
+in
+Offboard for any setpoint, ArduCopter in Guided for an attitude with thrust (mode_guided.cpp, `set_angle`). Only a
+climb
+that one and the same client requests without a gap for `CLIMB_FOR` takes the drone off, and every client is warned in
 that time: one packet, or the setpoint of a client that did not arm, starts no motor. `OffboardFlight` is the shell.
 """
 
@@ -22,7 +24,9 @@ LEAST_CLIMB = 0.05
 
 
 def climbs(setpoint: Setpoint, ato: Callable[[float], float | None]) -> bool:
-    """Does a setpoint ask a drone that stands to climb? `ato` converts AMSL heights to heights above it (m).
+    """Does a setpoint ask a drone that stands to climb?
+
+    `ato` converts AMSL heights to heights above it (m).
 
     A position, velocity or acceleration that leads upward, none of them downward; of an attitude a thrust above 0.5.
     """
@@ -57,7 +61,7 @@ class Launcher(Protocol):
 
 
 class Phase(enum.Enum):
-    """Where a take-off by setpoints stands."""
+    """State of a take-off by setpoints."""
 
     IDLE = "none"
     COUNTING = "a client asks to climb, every client is warned"
@@ -66,7 +70,7 @@ class Phase(enum.Enum):
 
 
 class Step(enum.Enum):
-    """What follows from a setpoint that climbs."""
+    """Consequence of a setpoint that climbs."""
 
     WARN = "the second has begun"
     WAIT = "it lasts"
@@ -83,7 +87,10 @@ class SetpointTakeoff:
         self._last = 0.0
 
     def climb(self, client: Hashable, now: float, gap: float) -> Step:
-        """A setpoint that climbs has arrived. `gap`: s between two of them that begin the second again."""
+        """A setpoint that climbs has arrived.
+
+        `gap`: s between two of them that begin the second again.
+        """
         if self.phase is not Phase.COUNTING or now - self._last >= gap:
             self.phase, self.client, self._since, self._last = Phase.COUNTING, client, now, now
             return Step.WARN
