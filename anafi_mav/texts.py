@@ -247,7 +247,7 @@ CEILING_STAYS = Reason("ceiling cannot be disabled")
 CEILING_BIT = Reason("bit 0 stays set (ceiling)")
 FENCE_RADIUS = ReasonTemplate("radius below {radius:g} m", radius=10)
 LAND_DELAY = Reason("must be -1, 0 or more")
-KILL_FENCE = Reason("motor cut needs allow_kill: true")
+KILL_FENCE = Reason("needs allow_kill: true")
 
 # == Takeoff ==
 
@@ -454,7 +454,7 @@ FENCE_NO_RETURN = Template("Fence: no return, hold: {error}", error=BELOW)
 FENCE_NO_MOTOR_CUT = Text("Fence action is now hold: motor cut not allowed")
 GEOFENCE_SET = Template("Drone geofence set: {radius:g} m", radius=4000.5)
 GEOFENCE_RESTORED = Template("Drone geofence restored: {radius:g} m, {state}", radius=4000.5, state="off")
-GEOFENCE_KEPT = Text("Drone geofence kept: changed by another controller")
+GEOFENCE_KEPT = Text("Drone geofence kept: changed meanwhile")
 GEOFENCE_ENDS = Template("Drone geofence ends: centre is {distance:.0f} m off", distance=99999)
 GEOFENCE_FAILED = Template("Drone geofence not changed: {error}", error=BELOW)
 ON = Reason("on")
@@ -504,7 +504,7 @@ MEMORY_UNWRITABLE = NoticeTemplate("{path}: {error}; changes end with gateway", 
 # == Rally points and home ==
 
 RALLY_BY_TYPE = Template("Rally points not used: RTL_TYPE is home ({count})", count=999)
-RALLY_HOME_SET = Text("Rally points not used: home was set by a client")
+RALLY_HOME_SET = Text("Rally points not used: another home is set")
 RALLY_FAILED = Template("Rally point {number} not used: {error}", number=255, error=BELOW)
 RETURNS_TO_RALLY = Template("Returns end at rally point {number}", number=255)
 RETURNS_TO_HOME = Text("Returns end at home")

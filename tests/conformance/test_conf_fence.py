@@ -319,7 +319,7 @@ async def test_conf_076_no_takeoff_outside(flavour: str) -> None:
         )
         mark = w.client.mark()
         assert (await w.client.command(mav_enums.MAV_CMD_COMPONENT_ARM_DISARM, 1)).result == REJECTED
-        await said(w.client, "beyond the inclusion circle", since=mark)
+        await said(w.client, " m beyond inclusion", since=mark)
         assert (await w.client.command(mav_enums.MAV_CMD_NAV_TAKEOFF, x=0.0, y=0.0, z=5.0)).result in (DENIED, REJECTED)
         assert w.commands("ardrone3.Piloting.TakeOff") == []
         assert (await w.client.command(ENABLE, 0)).result == ACCEPTED
@@ -421,7 +421,7 @@ async def test_a_circle_around_the_start_is_the_drones_own_too(flavour: str, ite
         assert before == (100.0, 0)
         assert (await upload(w.client, [item], FENCE)).type == TAKEN
         await until(lambda: own_fence(w) == (60.0, 1))
-        await said(w.client, "the drone keeps to 60 m", since=0)
+        await said(w.client, "Drone geofence set: 60 m", since=0)
         await w.take_off()
         assert own_fence(w) == (60.0, 1)
         # Another one: what was before all of them is what comes back.
@@ -458,7 +458,7 @@ async def test_a_geofence_that_somebody_changed_meanwhile_stays() -> None:
         await put(w, "ANF_MAX_DIST", 90.0, 9)
         assert own_fence(w) == (90.0, 1)
         assert (await clear(w.client, FENCE)).type == TAKEN
-        await said(w.client, "changed by another controller")
+        await said(w.client, "changed meanwhile")
         assert own_fence(w) == (90.0, 1)
 
 
@@ -649,7 +649,7 @@ async def test_conf_077_a_home_that_is_set_while_a_rally_point_counts_stays() ->
         await said(w.client, "Returns end at rally point 0", since=0, timeout=10.0)
         await set_home(w, 10.0)
         assert (await upload(w.client, [rally(around(PLACE, (0.0, 20.0))[0], 20.0)], RALLY)).type == TAKEN
-        await said(w.client, "Rally points not used: home was set by a client", timeout=10.0)
+        await said(w.client, "Rally points not used: another home is set", timeout=10.0)
         assert (await w.client.command(mav_enums.MAV_CMD_NAV_LAND)).result == ACCEPTED
         await w.client.heartbeat(lambda beat: not beat.base_mode & 128, timeout=60.0)
         await looked(w)

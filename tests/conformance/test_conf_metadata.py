@@ -219,7 +219,7 @@ async def test_conf_126_the_fence_is_a_check() -> None:
         elsewhere = geo.destination(HOME[0], HOME[1], 800.0, 800.0)
         assert (await upload(w.client, [circle(elsewhere, 100.0)], dialect.MAV_MISSION_TYPE_FENCE)).type == 0
         wrong = await w.client.wait("EVENT", lambda m: events.read(m)[0] == "check_fence", since=mark)
-        assert events.text(wrong) == "Drone is outside the fence"
+        assert events.text(wrong) == "Fence does not allow takeoff here"
         await w.client.wait("EVENT", lambda m: events.read(m)[0] == "health_summary", since=mark)
         assert (await w.client.command(ARM, 1)).result == TEMPORARILY_REJECTED
 

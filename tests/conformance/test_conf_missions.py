@@ -55,7 +55,7 @@ async def test_conf_049_073_a_mission_from_the_ground_to_its_end(flavour: str) -
         await mode(w, MISSION_MODE[flavour], since=mark)
         for seq in (1, 2):
             await state(w, ACTIVE, seq=seq, since=mark)
-        await said(w, "returns home", since=mark)  # what becomes of it without the gateway
+        await said(w, "link loss: return home", since=mark)  # what becomes of it without the gateway
         end = await state(w, COMPLETE, since=mark)
         assert whole(end).total == len(ROUND)
         assert reached(w) == [0, 1, 2, 3, 4]

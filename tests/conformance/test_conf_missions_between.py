@@ -158,7 +158,7 @@ async def test_conf_074_the_same_mission_before_the_drone_has_begun_disturbs_not
         turned = [way(14.0, 0.0, 6.0), TURN, way(14.0, 10.0, 6.0)]
         mark = await asked_for(w, turned)
         await put(w, turned)
-        await said(w, "the same again, it goes on at item 1", since=mark)
+        await said(w, "continues at item 1", since=mark)
         tells_of_its_plan(w)
         ack = await w.client.wait(
             "COMMAND_ACK", lambda m: m.command == dialect.MAV_CMD_MISSION_START and m.result != 5, since=mark
@@ -186,7 +186,7 @@ async def test_conf_074_the_same_mission_while_a_start_fails_is_a_new_one(flavou
         w.client.send_command(dialect.MAV_CMD_MISSION_START, 0, 0)
         await w.drone.wait_log(lambda e: e.name == "plan" and e.args["state"] == "playing", 10.0)
         await put(w, CORNERS)
-        await said(w, "the same again, it goes on at item 3"[:40], since=mark)
+        await said(w, "continues at item 3", since=mark)
         assert (await w.client.command(mav_enums.MAV_CMD_DO_REPOSITION, -1, 1, 0)).result == dialect.MAV_RESULT_ACCEPTED
         await state(w, NOT_STARTED, seq=0, since=mark)
         await mode(w, w.modes.hold, since=mark)

@@ -138,7 +138,7 @@ async def test_conf_074_the_same_mission_again_disturbs_nothing(flavour: str) ->
         for client in (w.client, other):
             listed = [Item(mav_enums.MAV_CMD_NAV_WAYPOINT, *HOME), *CORNERS] if first(w) else CORNERS
             assert (await upload(client, listed, MISSION)).type == ACCEPTED
-            await said(w, "the same again, it goes on at item 3"[:40], since=mark)
+            await said(w, "continues at item 3", since=mark)
         assert pauses(w) == before
         told = await state(w, ACTIVE, seq=2, since=w.client.mark())
         await state(w, COMPLETE, since=mark)
@@ -181,13 +181,13 @@ async def test_conf_074_another_mission_stops_the_one_that_is_flown(flavour: str
         mark = w.client.mark()
         if how == "cleared":
             assert (await clear(w.client, MISSION)).type == ACCEPTED
-            await said(w, "it was cleared", since=mark)
+            await said(w, "mission was cleared", since=mark)
             await state(w, NO_MISSION, since=mark)
         else:
             await put(
                 w, [takeoff(6.0), way(0.0, 9.0, 6.0)] if how == "another" else [*CORNERS[:-1], way(0.0, 9.0, 6.0)]
             )
-            await said(w, "Mission paused at item 3: another mission"[:50], since=mark)
+            await said(w, "Mission paused at item 3: another was uploaded", since=mark)
             await state(w, NOT_STARTED, seq=0, since=mark)
         await mode(w, w.modes.idle, since=mark)
         (paused,) = w.commands("common.Mavlink.Pause")

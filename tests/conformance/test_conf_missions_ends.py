@@ -123,7 +123,7 @@ async def test_conf_074_a_plan_that_is_stopped_before_its_landing_is_paused(flav
         stop = w.drone.firmware.flight_plan.stop
         mark, entry = await to_the_last_line(w, last, lambda: stop(hover=True))
         await state(w, PAUSED, seq=3, since=mark)
-        await said(w, "Mission paused at item 4: the drone has stopped"[:50], since=mark)
+        await said(w, "Mission paused at item 4: stopped by the drone", since=mark)
         await mode(w, w.modes.idle, since=mark)
         assert reached(w) == [0, 1, 2]
         assert told_after(w, entry) == []

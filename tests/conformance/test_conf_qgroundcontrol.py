@@ -260,7 +260,7 @@ async def test_item_numbers_in_texts_are_those_of_the_map() -> None:
             mark = w.client.mark()
             await put(w, ROUND)
             await start(w)
-            await said(w, "Mission begins at item 1", since=mark)
+            await said(w, "Mission starts: item 1", since=mark)
 
 
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])

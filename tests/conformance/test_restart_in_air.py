@@ -172,6 +172,6 @@ async def test_restart_in_flight_without_takeoff_location_keeps_the_local_frame(
 async def test_restart_in_flight_with_no_takeoff_place_refuses_the_local_frame(tmp_path: Path) -> None:
     async with flying(tmp_path, 6.0, Quirk.NO_FLIGHT_ID, untold=(rth.TakeoffLocation, rth.HomeType)) as w:
         async with streaming(w.client, local(POSITION_ONLY, at=(8.0, 0.0, -7.0))):
-            await w.client.wait("STATUSTEXT", lambda m: m.text == "Setpoint refused: take-off place unknown", since=0)
+            await w.client.wait("STATUSTEXT", lambda m: m.text == "Setpoint refused: take-off point unknown", since=0)
         assert w.client.since(0, "LOCAL_POSITION_NED") == []
         assert w.commands("ardrone3.Piloting.moveTo") == []

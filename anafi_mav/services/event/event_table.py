@@ -238,7 +238,7 @@ NO_FIX = _check(
 )
 
 CALIBRATING = _check(19, "check_calibrating", "Magnetometer calibration in progress")
-FENCE = _check(20, "check_fence", "Drone is outside the fence")
+FENCE = _check(20, "check_fence", "Fence does not allow takeoff here")
 OTHER = _check(21, "check_other", "Takeoff not possible", text="A message gives the reason when a client arms.")
 
 ARMED = Event(100, "armed", "Armed", Level.INFO)

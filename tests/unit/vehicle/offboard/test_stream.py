@@ -66,7 +66,7 @@ def test_thrust_is_vertical_speed(mask: int, thrust: float, climb: float) -> Non
 @pytest.mark.parametrize(
     ("mask", "q", "reason"),
     [
-        (128, (1, 0, 0, 0), "body rates alone"),
+        (128, (1, 0, 0, 0), "body rates without attitude"),
         (7, (0, 0, 0, 0), "not a rotation"),
         (7, (NAN, 0, 0, 0), "not a rotation"),
         (7, (0, 1, 0, 0), "upside down"),
