@@ -221,7 +221,7 @@ async def quiet(w: Any) -> None:
 
 async def reposition(w: Any) -> Walk:
     """Walk 2: DO_REPOSITION until its acknowledgement."""
-    from support.trouble import goto
+    from support.fault_scenarios import goto
 
     await quiet(w)
     iterations = await traced(lambda: goto(w, 20.0, 8.0))
@@ -300,7 +300,7 @@ async def reached(w: Any) -> Walk:
 
 async def all_walks() -> dict[str, Walk]:
     """Return every walk by its title."""
-    from support.trouble import goto
+    from support.fault_scenarios import goto
     from support.world import world
 
     walks: dict[str, Walk] = {}

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support.flown import MAVSDKS_JUMPS, Log
+from support.flight_checks import MAVSDKS_JUMPS, Log
 from support.product import product, program
 from support.samples import SAMPLES, ZOOMS, judge, path_of
 from support.world import HOME, loopback

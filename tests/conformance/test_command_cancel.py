@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from support.mav import NAN, Client
-from support.trouble import (
+from support.fault_scenarios import (
     ACCEPTED,
     ARM,
     CANCELLED,
@@ -22,6 +21,7 @@ from support.trouble import (
     until,
     watched,
 )
+from support.mav import NAN, Client
 from support.world import HOME, RETURN, world
 
 from anafi_mav import geo

@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.fault_scenarios import return_by_itself
 from support.flavours import both
 from support.mav import Client
 from support.missions import (
@@ -36,7 +37,6 @@ from support.missions import (
     whole,
 )
 from support.plans import ACCEPTED, FENCE, MISSION, UNSUPPORTED_FRAME, Item, around, square, upload
-from support.trouble import return_by_itself
 from support.world import ARMED, world
 
 from anafi_mav.arsdk.messages import ardrone3

@@ -13,6 +13,7 @@ import time
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.fault_scenarios import somebody_else
 from support.flavours import both
 from support.missions import (
     ACTIVE,
@@ -36,7 +37,6 @@ from support.missions import (
     whole,
 )
 from support.plans import ACCEPTED, MISSION, Item, clear
-from support.trouble import somebody_else
 from support.world import World, world
 
 from anafi_mav import mav_enums

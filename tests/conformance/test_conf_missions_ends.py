@@ -11,6 +11,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from support.fault_scenarios import return_by_itself
 from support.flavours import both
 from support.missions import (
     ACTIVE,
@@ -30,7 +31,6 @@ from support.missions import (
     way,
 )
 from support.plans import Item
-from support.trouble import return_by_itself
 from support.world import ARMED, World, world
 
 from anafi_mav import mav_enums

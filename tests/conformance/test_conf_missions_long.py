@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.fault_scenarios import somebody_else
 from support.missions import (
     ACTIVE,
     COMPLETE,
@@ -26,7 +27,6 @@ from support.missions import (
     way,
 )
 from support.plans import Item
-from support.trouble import somebody_else
 from support.world import World, world
 
 from anafi_mav import mav_enums

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import msgspec
 import pytest
-from support.flown import Log
+from support.flight_checks import Log
 from support.missions import COMPLETE, put, start, state
 from support.plans import Item
 from support.samples import SAMPLES, ZOOMS, judge, path_of

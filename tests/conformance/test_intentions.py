@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from support.mav import NAN
-from support.trouble import (
+from support.fault_scenarios import (
     ACCEPTED,
     CANCELLED,
     GOTO,
@@ -20,6 +19,7 @@ from support.trouble import (
     somebody_else,
     until,
 )
+from support.mav import NAN
 from support.world import HOME, World, world
 
 from anafi_mav import geo

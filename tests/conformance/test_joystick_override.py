@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.fault_scenarios import ACCEPTED, LAND_CMD, PX4_OFFBOARD, RTL, SET_MODE, goto, heard, return_by_itself
 from support.missions import CORNERS, put, start
 from support.params import write
-from support.trouble import ACCEPTED, LAND_CMD, PX4_OFFBOARD, RTL, SET_MODE, goto, heard, return_by_itself
 from support.world import HOLD, LAND, POSITION, RETURN, World, world
 
 from anafi_mav.units import quaternion_from_euler

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
-from support.trouble import ACCEPTED, FAILED, GOTO, RTL, goto, results
+from support.fault_scenarios import ACCEPTED, FAILED, GOTO, RTL, goto, results
 from support.world import HOME, RETURN, World, world
 
 from anafi_mav import geo

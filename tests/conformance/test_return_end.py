@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.fault_scenarios import return_by_itself, somebody_else
 from support.flavours import both
 from support.mav import NAN, Client
 from support.missions import RTL as RTL_ITEM
@@ -19,7 +20,6 @@ from support.missions import put, start, takeoff, way
 from support.params import read, value_of, write
 from support.plans import RALLY, Item, upload
 from support.setpoints import texts
-from support.trouble import return_by_itself, somebody_else
 from support.world import ARMED, HOLD, HOME, World, world
 
 from anafi_mav import geo

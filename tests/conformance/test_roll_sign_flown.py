@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
-from support.roll import remember_roll
+from support.roll_records import remember_roll
 from support.setpoints import POSITION_ONLY, VELOCITY_ONLY, allow_speed, engage, local, streaming
 from support.world import HOLD, HOME, World, loopback, world
 

@@ -13,8 +13,7 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
-from support.mav import NAN, Client
-from support.trouble import (
+from support.fault_scenarios import (
     ACCEPTED,
     ARM,
     CANCELLED,
@@ -38,6 +37,7 @@ from support.trouble import (
     until,
     watched,
 )
+from support.mav import NAN, Client
 from support.world import HOLD, HOME, LAND, OFFBOARD, RETURN, World, world
 
 from anafi_mav import geo, mav_enums

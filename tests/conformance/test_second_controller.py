@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.fault_scenarios import GOTO, goto
 from support.mav import Client
-from support.trouble import GOTO, goto
 from support.world import World, loopback, world
 
 from anafi_mav.arsdk.link import controller

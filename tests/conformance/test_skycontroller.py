@@ -6,11 +6,11 @@ import asyncio
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.fault_scenarios import ACCEPTED, REJECTED, RTL, goto, heard
 from support.missions import CORNERS, put, start
 from support.params import write
 from support.plans import ACCEPTED as TAKEN
 from support.plans import FENCE, square, upload
-from support.trouble import ACCEPTED, REJECTED, RTL, goto, heard
 from support.world import HOME, World, world
 
 from anafi_mav.arsdk.messages.skyctrl import Source

@@ -12,10 +12,10 @@ from typing import Any, cast
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.fault_scenarios import ACCEPTED, GOTO, PX4_OFFBOARD, goto, heard
 from support.missions import CORNERS, put, start
 from support.plans import around
 from support.process import gateway_process
-from support.trouble import ACCEPTED, GOTO, PX4_OFFBOARD, goto, heard
 from support.world import HOLD, HOME, WEB_PORT, World, loopback
 
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState

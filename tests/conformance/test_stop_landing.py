@@ -10,11 +10,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.callers import CALLERS, system_of
-from support.mav import NAN, Client
-from support.missions import LAND as LAND_ITEM
-from support.missions import put, start, takeoff, way
-from support.setpoints import local, streaming
-from support.trouble import (
+from support.fault_scenarios import (
     ACCEPTED,
     LAND_CMD,
     PX4_HOLD,
@@ -28,6 +24,10 @@ from support.trouble import (
     somebody_else,
     watched,
 )
+from support.mav import NAN, Client
+from support.missions import LAND as LAND_ITEM
+from support.missions import put, start, takeoff, way
+from support.setpoints import local, streaming
 from support.world import HOLD, LAND, POSITION, RETURN, World, world
 
 from anafi_mav.arsdk.messages import ardrone3

@@ -11,8 +11,7 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
-from support.mav import NAN, Client
-from support.trouble import (
+from support.fault_scenarios import (
     ACCEPTED,
     ARM,
     CANCELLED,
@@ -25,6 +24,7 @@ from support.trouble import (
     heard,
     watched,
 )
+from support.mav import NAN, Client
 from support.world import ARMED, World, world
 
 from anafi_mav.arsdk.messages import ardrone3, rth

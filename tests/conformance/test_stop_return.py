@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.callers import CALLERS, system_of
+from support.fault_scenarios import ACCEPTED, LAND_CMD, PX4_HOLD, REJECTED, RTL, SET_MODE, goto, heard, watched
 from support.mav import NAN, Client
-from support.trouble import ACCEPTED, LAND_CMD, PX4_HOLD, REJECTED, RTL, SET_MODE, goto, heard, watched
 from support.world import HOLD, RETURN, World, world
 
 from anafi_mav.arsdk.messages import ardrone3, rth

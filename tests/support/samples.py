@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from anafi_mav.plans.formats import files
-from support.flown import Log, check, looked, photos, tilts
+from support.flight_checks import Log, check, looked, photos, tilts
 
 FOLDER = Path(__file__).parents[2] / "missions"
 

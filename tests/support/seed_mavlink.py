@@ -86,7 +86,7 @@ REACHED: dict[str, Reach] = {
     ),
     "skycontroller/rpy": Reach("`ANAFI_CONTROLLER_ATTITUDE`", _ANAFI + "test_where_the_skycontroller_points"),
     "storage/available": Reach("", waits=PAYLOAD),
-    "time": Reach("`SYSTEM_TIME`", "conformance/test_conf_talk.py::test_conf_111_system_time"),
+    "time": Reach("`SYSTEM_TIME`", "conformance/test_conf_ground_station.py::test_conf_111_system_time"),
     "camera/photo/stop": Reach("", waits=PAYLOAD),
     "camera/photo/take": Reach("", waits=PAYLOAD),
     "camera/recording/start": Reach("", waits=PAYLOAD),
@@ -150,7 +150,7 @@ REACHED: dict[str, Reach] = {
     "drone/max_vertical_speed": Reach("`ANF_VERT_SPEED`", _TWIN),
     "drone/max_yaw_rate": Reach("`ANF_YAW_RATE`", _TWIN),
     "drone/model": Reach(
-        "`ANF_MODEL`, `AUTOPILOT_VERSION`", "conformance/test_conf_talk.py::test_conf_149_banner_and_version"
+        "`ANF_MODEL`, `AUTOPILOT_VERSION`", "conformance/test_conf_ground_station.py::test_conf_149_banner_and_version"
     ),
     "gimbal/max_speed": Reach("`ANF_GMB_SPEED`", _PARAMETER),
     "home/autotrigger": Reach("`ANF_RTH_AUTO`", _TWIN),

@@ -24,13 +24,13 @@ from anafi_mav import geo
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.mavlink import dialect as newer
 from anafi_mav.sim.world.faults import CLEAR, Impairment
+from support.fault_scenarios import watched
 from support.mav import NAN, Client
 from support.missions import ACTIVE, CORNERS, put, start, state, way
 from support.missions import RTL as ITEM_RTL
 from support.missions import takeoff as item_takeoff
 from support.plans import MISSION, Item, upload
 from support.setpoints import EVERY, POSITION_ONLY, VELOCITY_ONLY, earth, local
-from support.trouble import watched
 from support.world import HOME, TAKE_OFF_SPEED, World, world
 
 MODELS = ("4k", "usa", "thermal", "ai")

@@ -19,7 +19,7 @@ from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
 from anafi_mav.sim.world.model import MODELS
 from anafi_mav.sim.world.wind import WindSpec
 from support.mav import Client
-from support.roll import remember_roll
+from support.roll_records import remember_roll
 from support.world import HOLD, HOME, TAKE_OFF_SPEED, TAKEOFF, loopback
 
 VELOCITY_ONLY = 0x9C7

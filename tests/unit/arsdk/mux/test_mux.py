@@ -9,7 +9,7 @@ import tracemalloc
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support.ear import Ear, Listener
+from support.listener import Ear, Listener
 
 from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
 from anafi_mav.arsdk.link.handshake import DeviceInfo

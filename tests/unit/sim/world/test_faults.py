@@ -7,7 +7,7 @@ from collections.abc import AsyncIterator, Callable
 from dataclasses import replace
 
 import pytest
-from support.ear import Ear
+from support.listener import Ear
 from support.sim_bench import Bench
 
 from anafi_mav.arsdk.link.controller import ControllerSession, connect

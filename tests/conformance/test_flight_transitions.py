@@ -10,12 +10,7 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
-from support.mav import NAN
-from support.params import write
-from support.plans import ACCEPTED as TAKEN
-from support.plans import FENCE, circle, upload
-from support.setpoints import POSITION_ONLY, VELOCITY_ONLY, attitude, engage, heard, local, said, streaming, texts
-from support.trouble import (
+from support.fault_scenarios import (
     ACCEPTED,
     CANCELLED,
     DENIED,
@@ -27,6 +22,11 @@ from support.trouble import (
     somebody_else,
     watched,
 )
+from support.mav import NAN
+from support.params import write
+from support.plans import ACCEPTED as TAKEN
+from support.plans import FENCE, circle, upload
+from support.setpoints import POSITION_ONLY, VELOCITY_ONLY, attitude, engage, heard, local, said, streaming, texts
 from support.world import HOLD, HOME, OFFBOARD, World, world
 
 from anafi_mav import geo

@@ -6,6 +6,7 @@ import asyncio
 from typing import Any
 
 import pytest
+from support.fault_scenarios import ACCEPTED, ARM, LAND_CMD, RTL, SET_MODE, deaf, goto, watched
 from support.flavours import both
 from support.missions import ROUND, put
 from support.setpoints import (
@@ -22,7 +23,6 @@ from support.setpoints import (
     streaming,
     texts,
 )
-from support.trouble import ACCEPTED, ARM, LAND_CMD, RTL, SET_MODE, deaf, goto, watched
 from support.world import ARMED, HOME, World, world
 
 from anafi_mav import geo
