@@ -467,7 +467,7 @@ Rules for all of them:
 def plan_translation() -> str:
     """docs/plan-translation.md."""
     from anafi_mav.plans.rules import flight_plan_writer, rules
-    from anafi_mav.plans.rules.row import Verdict
+    from anafi_mav.plans.rules.rule import Verdict
     from anafi_mav.plans.translation import translate
 
     meanings = {verdict.name.lower(): verdict.value for verdict in Verdict}

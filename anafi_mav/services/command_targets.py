@@ -11,7 +11,7 @@ from anafi_mav import texts
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.commands import Altitude, Command
 from anafi_mav.vehicle.base.bounds import amsl_to_ato, check_estimate
-from anafi_mav.vehicle.base.place import Place
+from anafi_mav.vehicle.base.geo_point import Place
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.vehicle import Vehicle
 

@@ -14,7 +14,7 @@ import math
 from dataclasses import dataclass
 
 from anafi_mav import geo, units
-from anafi_mav.vehicle.base.place import Place
+from anafi_mav.vehicle.base.geo_point import Place
 from anafi_mav.vehicle.base.velocity_loop import Axis, Demand, G, Motion
 
 SMALLEST = 2.0

@@ -17,8 +17,8 @@ from anafi_mav.errors import LinkLost
 from anafi_mav.texts import Text
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.bounds import LOWEST, amsl_to_ato, check_estimate, check_height, check_on_earth, check_place
+from anafi_mav.vehicle.base.geo_point import Place
 from anafi_mav.vehicle.base.modes import FlightMode
-from anafi_mav.vehicle.base.place import Place
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions

@@ -14,8 +14,8 @@ from anafi_mav.drone import MoveEnd, Position
 from anafi_mav.texts import Text
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.bounds import check_height, check_place
+from anafi_mav.vehicle.base.geo_point import Place
 from anafi_mav.vehicle.base.modes import FlightMode
-from anafi_mav.vehicle.base.place import Place
 from anafi_mav.vehicle.base.refusal import Refused
 
 SAME_HEIGHT = 0.1

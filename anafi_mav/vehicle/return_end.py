@@ -35,7 +35,7 @@ from anafi_mav.errors import AnafiMavError, LinkLost
 from anafi_mav.texts import Text
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.flying import LANDING
-from anafi_mav.vehicle.base.place import Place
+from anafi_mav.vehicle.base.geo_point import Place
 from anafi_mav.vehicle.base.severity import Severity
 
 logger = logging.getLogger(__name__)

@@ -43,11 +43,11 @@ from anafi_mav.vehicle.aborted_return import AbortedReturn
 from anafi_mav.vehicle.base.aircraft import STOP_WAIT, Aircraft
 from anafi_mav.vehicle.base.clients import system_of
 from anafi_mav.vehicle.base.flying import AIRBORNE, LANDING, ON_GROUND, TAKING_OFF
+from anafi_mav.vehicle.base.geo_point import Place
 from anafi_mav.vehicle.base.height import ESTIMATE_ERROR, TakeoffRecord
 from anafi_mav.vehicle.base.helm import Helm
 from anafi_mav.vehicle.base.link_loss import LossPolicy
 from anafi_mav.vehicle.base.modes import FlightMode
-from anafi_mav.vehicle.base.place import Place
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.right import Extent, Right
 from anafi_mav.vehicle.base.severity import Severity

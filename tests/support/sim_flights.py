@@ -25,7 +25,7 @@ from anafi_mav.arsdk.messages.ardrone3 import PCMD, OrientationMode
 from anafi_mav.drone import Limits
 from anafi_mav.drone.piloting.sticks import percent
 from anafi_mav.sim.world.motion import STEP
-from anafi_mav.vehicle.base.place import Place
+from anafi_mav.vehicle.base.geo_point import Place
 from anafi_mav.vehicle.base.velocity_loop import Controller, Motion
 from anafi_mav.vehicle.circle import Circle, Lap
 from support.sim_bench import HOME, Bench

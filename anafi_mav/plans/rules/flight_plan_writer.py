@@ -29,7 +29,7 @@ from anafi_mav.plans.plan import (
     Plan,
     Point,
 )
-from anafi_mav.plans.rules.legs import Fault, FaultKind, Leg, Refused, Settings, Start, Step, UnknownHeight
+from anafi_mav.plans.rules.parts import Fault, FaultKind, Leg, Refused, Settings, Start, Step, UnknownHeight
 from anafi_mav.units import DEG_PER_RAD, wrap_360
 
 ACCEPTANCE = 1.0

@@ -6,7 +6,7 @@ MAVLink's common.xml; the meaning of a line is from Parrot's flight plan page. A
 
 from __future__ import annotations
 
-from anafi_mav.plans.rules.row import Row, Verdict
+from anafi_mav.plans.rules.rule import Row, Verdict
 from anafi_mav.plans.rules.rules_camera import CAMERA
 from anafi_mav.plans.rules.rules_flight import FLIGHT
 

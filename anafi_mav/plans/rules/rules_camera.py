@@ -6,7 +6,7 @@ from anafi_mav import mav_enums
 from anafi_mav.plans.formats.parrot import SET_STILL_MODE, SET_VIEW_MODE
 from anafi_mav.plans.plan import Item, Point
 from anafi_mav.plans.rules.flight_plan_writer import SHORTEST_INTERVAL, SHORTEST_STEP, Pen
-from anafi_mav.plans.rules.row import Row, Verdict, only
+from anafi_mav.plans.rules.rule import Row, Verdict, only
 
 _CAMERAS = frozenset({None, 0.0, 1.0, 100.0})
 """Camera ids that mean the one of the flight plan: all, the first, and its component."""

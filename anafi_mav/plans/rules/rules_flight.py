@@ -7,7 +7,7 @@ from dataclasses import replace
 from anafi_mav import mav_enums
 from anafi_mav.plans.plan import DO_JUMP, WAYPOINT, Item, Point
 from anafi_mav.plans.rules.flight_plan_writer import Pen
-from anafi_mav.plans.rules.row import Row, Verdict
+from anafi_mav.plans.rules.rule import Row, Verdict
 
 # What flies.
 

@@ -17,8 +17,8 @@ from anafi_mav.errors import PlanError
 from anafi_mav.plans.formats.parrot import Version
 from anafi_mav.plans.plan import DO_JUMP, Item, Loss
 from anafi_mav.plans.rules.flight_plan_writer import Pen
-from anafi_mav.plans.rules.legs import Fault, FaultKind, Leg, Refused, Settings, Start, Step
-from anafi_mav.plans.rules.row import Row, Verdict
+from anafi_mav.plans.rules.parts import Fault, FaultKind, Leg, Refused, Settings, Start, Step
+from anafi_mav.plans.rules.rule import Row, Verdict
 from anafi_mav.plans.rules.rules import TABLE
 
 __all__ = [

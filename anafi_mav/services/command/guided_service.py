@@ -20,8 +20,8 @@ from anafi_mav.services.commands import Action, Altitude, Command, Effect
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
 from anafi_mav.vehicle.base.bounds import FASTEST, SLOWEST, check_height, check_on_earth
+from anafi_mav.vehicle.base.geo_point import Place
 from anafi_mav.vehicle.base.modes import FlightMode
-from anafi_mav.vehicle.base.place import Place
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions

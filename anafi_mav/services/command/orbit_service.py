@@ -23,8 +23,8 @@ from anafi_mav.services.service import Host, Service
 from anafi_mav.services.stream import Stream, Times
 from anafi_mav.texts import Text
 from anafi_mav.vehicle.base.bounds import SLOWEST, check_height, check_on_earth, check_place
+from anafi_mav.vehicle.base.geo_point import Place
 from anafi_mav.vehicle.base.modes import FlightMode
-from anafi_mav.vehicle.base.place import Place
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions

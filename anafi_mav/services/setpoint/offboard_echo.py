@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from anafi_mav import geo, units
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.stream import Stream, Times
-from anafi_mav.vehicle.base.place import Place
+from anafi_mav.vehicle.base.geo_point import Place
 from anafi_mav.vehicle.offboard.setpoints import MotionSetpoint
 from anafi_mav.vehicle.vehicle import Vehicle
 

@@ -17,10 +17,10 @@ from anafi_mav.drone import Drone
 from anafi_mav.drone.events import FlyingState, PilotingStyleStyle
 from anafi_mav.texts import Text
 from anafi_mav.vehicle.base.flying import AIRBORNE, ON_GROUND
+from anafi_mav.vehicle.base.geo_point import Place, point_of
 from anafi_mav.vehicle.base.height import HeightReference
 from anafi_mav.vehicle.base.helm import Helm
 from anafi_mav.vehicle.base.modes import FlightMode
-from anafi_mav.vehicle.base.place import Place, point_of
 from anafi_mav.vehicle.base.right import Right
 from anafi_mav.vehicle.base.roll_sign import RollCheck
 from anafi_mav.vehicle.base.severity import Severity

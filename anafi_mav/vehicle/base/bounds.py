@@ -11,8 +11,8 @@ import math
 from anafi_mav import geo, texts
 from anafi_mav.texts import Text
 from anafi_mav.vehicle.base.aircraft import Aircraft
+from anafi_mav.vehicle.base.geo_point import Place, point_of
 from anafi_mav.vehicle.base.height import ESTIMATE_FLOOR
-from anafi_mav.vehicle.base.place import Place, point_of
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.fence.fence_watch import OutsideFence
 

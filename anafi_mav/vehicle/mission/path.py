@@ -16,7 +16,7 @@ from anafi_mav.plans.translation.translate import Cursor, Leg, Start, Step, tran
 from anafi_mav.units import DEG_PER_RAD
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.bounds import check_estimate, check_place
-from anafi_mav.vehicle.base.place import Place
+from anafi_mav.vehicle.base.geo_point import Place
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.fence.fence_watch import OutsideFence
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from anafi_mav import geo, texts
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.bounds import amsl_to_ato, check_estimate, check_height, check_place
-from anafi_mav.vehicle.base.place import Place
+from anafi_mav.vehicle.base.geo_point import Place
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.velocity_loop import Axis, Demand, Motion
 from anafi_mav.vehicle.offboard.setpoints import MotionSetpoint, Origin, Vector

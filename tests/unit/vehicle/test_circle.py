@@ -7,7 +7,7 @@ import math
 import pytest
 
 from anafi_mav import geo
-from anafi_mav.vehicle.base.place import Place
+from anafi_mav.vehicle.base.geo_point import Place
 from anafi_mav.vehicle.base.velocity_loop import Motion
 from anafi_mav.vehicle.circle import Circle, Facing, Lap, entry, fastest, heading_at, outline
 

@@ -16,7 +16,7 @@ from anafi_mav import mav_enums
 from anafi_mav.errors import PlanError
 from anafi_mav.plans.formats.parrot import Version
 from anafi_mav.plans.plan import DO_JUMP, GLOBAL, RELATIVE, TERRAIN, Item, Loss
-from anafi_mav.plans.rules.row import Verdict
+from anafi_mav.plans.rules.rule import Verdict
 from anafi_mav.plans.rules.rules import TABLE
 from anafi_mav.plans.translation.translate import (
     MAX_LINES,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from anafi_mav.plans.rules.legs import Leg, Settings, Step
+from anafi_mav.plans.rules.parts import Leg, Settings, Step
 from anafi_mav.plans.translation.translate import Cursor
 from anafi_mav.vehicle.mission.course import Course
 
