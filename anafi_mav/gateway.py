@@ -33,7 +33,7 @@ from anafi_mav.services.flavours import FLAVOURS
 from anafi_mav.services.system import System
 from anafi_mav.state_lock import FILE, NO_LOCKS, HeldDrone, Holder, StateLock, state_folder
 from anafi_mav.subject import DRONE
-from anafi_mav.texts import Text
+from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.flying import ON_GROUND
 from anafi_mav.vehicle.base.severity import Severity
 
@@ -148,7 +148,7 @@ class _Supervised:
         if asked.done():
             self._report(Severity.NOTICE, texts.RECONNECTING_BY.fill(system=asked.result()))
 
-    def _report(self, severity: Severity, text: Text) -> None:
+    def _report(self, severity: Severity, text: OperatorText) -> None:
         logger.log(logging.WARNING, "%s: %s", self.config.name, text)
         self.system.announce(severity, text)
 

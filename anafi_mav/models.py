@@ -13,7 +13,7 @@ from typing import Literal
 import msgspec
 
 
-class Payload(enum.Enum):
+class PayloadSensor(enum.Enum):
     """A sensor besides the main camera."""
 
     THERMAL = "thermal camera"
@@ -66,7 +66,7 @@ class Model(msgspec.Struct, frozen=True, kw_only=True):
     """True for models that report some of their states in protobuf only, on request."""
     lens: Intrinsics | None
     """Lens of its main camera; None when no calibration is known."""
-    payloads: tuple[Payload, ...]
+    payloads: tuple[PayloadSensor, ...]
     """Its sensors besides the main camera."""
     battery_cells: int | None
     """Cells in series, where the drone does not report them; None when unknown."""
@@ -165,7 +165,7 @@ for _model in (
         title="ANAFI Thermal",
         protobuf=False,
         lens=Intrinsics(1280, 720, 947.10, 949.49, 649.16, 365.35, 0.003086, 0.018344, 0.000088, 0.004435, 0.0),
-        payloads=(Payload.THERMAL,),
+        payloads=(PayloadSensor.THERMAL,),
         battery_cells=2,
         plan_figures=PlanFigures(version=1, max_speed=15.0, ceiling=4500.0, flight_time=26 * 60.0),
         skycontrollers=(3, 4),
@@ -178,7 +178,7 @@ for _model in (
         title="ANAFI USA",
         protobuf=False,
         lens=Intrinsics(1280, 720, 927.10, 923.18, 646.77, 362.74, 0.006502, -0.012889, -0.001738, 0.002491, -0.01654),
-        payloads=(Payload.THERMAL,),
+        payloads=(PayloadSensor.THERMAL,),
         battery_cells=3,
         plan_figures=PlanFigures(version=1, max_speed=14.7, ceiling=6000.0, flight_time=32 * 60.0),
         skycontrollers=(3, 4),
@@ -191,7 +191,7 @@ for _model in (
         title="ANAFI Ai",
         protobuf=True,
         lens=Intrinsics(1920, 1080, 1505.94, 1492.49, 997.28, 504.10, 0.05074, -0.046698, 0.001345, 0.007041, 0.0),
-        payloads=(Payload.STEREO,),
+        payloads=(PayloadSensor.STEREO,),
         battery_cells=3,
         plan_figures=PlanFigures(version=2, max_speed=16.0, ceiling=5000.0, flight_time=32 * 60.0),
         skycontrollers=(4,),

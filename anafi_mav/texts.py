@@ -1,8 +1,8 @@
 """The texts that a pilot reads: STATUSTEXT and the reasons of refusals.
 
 A text is `Subject state: reason (number)`, in the present tense, and at most 50 bytes with its longest values, so that
-one STATUSTEXT carries it. A test fills each. Only this module makes a `Text`: mypy finds a literal elsewhere. Texts
-from below (the reason of a drone's verb, of the operating system) are values that are filled in.
+one STATUSTEXT carries it. A test fills each. Only this module makes a `OperatorText`: mypy finds a literal elsewhere.
+Texts from below (the reason of a drone's verb, of the operating system) are values that are filled in.
 """
 
 from __future__ import annotations
@@ -16,25 +16,25 @@ REASON_BYTES = 32
 """Of a reason with its longest values: it fits behind `Setpoint refused: `."""
 
 
-class Text(str):
+class OperatorText(str):
     """A finished text."""
 
     __slots__ = ()
 
 
-class Subject(Text):
+class Subject(OperatorText):
     """The subject of a refusal."""
 
     __slots__ = ()
 
 
-class Reason(Text):
+class Reason(OperatorText):
     """A clause for the end of another text."""
 
     __slots__ = ()
 
 
-class Notice(Text):
+class Notice(OperatorText):
     """A text without a limit of length: it names a file or a key."""
 
     __slots__ = ()
@@ -43,13 +43,13 @@ class Notice(Text):
 class Template:
     """A text with fields; `longest` holds the longest expected value of each field."""
 
-    kind: type[Text] = Text
+    kind: type[OperatorText] = OperatorText
 
     def __init__(self, pattern: str, **longest: object) -> None:
         self.pattern = pattern
         self.longest = longest
 
-    def fill(self, **values: object) -> Text:
+    def fill(self, **values: object) -> OperatorText:
         """Return the text with these values."""
         return self.kind(self.pattern.format(**values))
 
@@ -85,12 +85,12 @@ class Below:
 BELOW = Below("no answer in 5 s")
 
 
-def from_below(text: object) -> Text:
+def from_below(text: object) -> OperatorText:
     """Return the text of a lower layer: an error of the drone or of the operating system."""
     return Reason(text)
 
 
-def joined(reasons: Iterable[Text]) -> Text:
+def joined(reasons: Iterable[OperatorText]) -> OperatorText:
     """Return several reasons as one."""
     return Reason("; ".join(reasons))
 
@@ -256,11 +256,11 @@ TAKEOFF_FAILED = Template("Takeoff failed: {error}", error=BELOW)
 TAKEOFF_UNFINISHED = ReasonTemplate("takeoff not over after {seconds:.0f} s", seconds=99)
 TAKEOFF_TOO_LOW = Reason("takeoff ended below its height")
 CLIMB_ABORTED = Template("Climb to {height:g} m aborted: {error}", height=99.5, error=BELOW)
-DISARMED = Text("Disarmed: no takeoff")
+DISARMED = OperatorText("Disarmed: no takeoff")
 MODE_MAY_RISE = Template("{mode}: takeoff possible, to 1 m", mode="Position")
 SETPOINT_TAKEOFF_SOON = Template("Takeoff by setpoints of system {system} in 1 s", system=255)
-SETPOINT_TAKEOFF_NO_CLIMB = Text("Takeoff by setpoints cancelled: no climb")
-SETPOINT_TAKEOFF_CANCELLED = Text("Takeoff by setpoints cancelled")
+SETPOINT_TAKEOFF_NO_CLIMB = OperatorText("Takeoff by setpoints cancelled: no climb")
+SETPOINT_TAKEOFF_CANCELLED = OperatorText("Takeoff by setpoints cancelled")
 SETPOINT_TAKEOFF_FAILED = Template("Takeoff by setpoints failed: {error}", error=BELOW)
 TAKEOFF_AMSL_ESTIMATED = Template("Take-off altitude estimated: GPS only (+-{error:g} m)", error=10)
 TAKEOFF_AMSL_INACCURATE = Template("Take-off altitude inaccurate: GPS +-{error} m", error=9999)
@@ -276,10 +276,10 @@ RETURN_BEGUN = Reason("it has started")
 RETURN_UNAVAILABLE = Reason("unavailable, landing continues")
 RETURN_BY = Template("Return by system {system}: {end}", system=255, end="lands at take-off point")
 RETURN_STARTED = Template("Return: {end}", end="hovers, home is first fix")
-RETURN_LINK_LOSS = Text("Link loss during return: drone hovers at home")
-HOME_LANDING_CANCELLED = Text("Landing at home cancelled")
+RETURN_LINK_LOSS = OperatorText("Link loss during return: drone hovers at home")
+HOME_LANDING_CANCELLED = OperatorText("Landing at home cancelled")
 RETURN_LANDING_IN = Template("Return ended: landing in {seconds:.0f} s", seconds=999)
-HOME_LANDING_FAILED = Text("Landing at home failed, hovering")
+HOME_LANDING_FAILED = OperatorText("Landing at home failed, hovering")
 LANDING_SOON = Template("Landing in {seconds:.0f} s, Hold cancels", seconds=5)
 LANDING_SOON_AT = Template(
     "Landing in {seconds:.0f} s, Hold cancels: {distance:.0f} m from take-off", seconds=5, distance=999
@@ -291,8 +291,8 @@ AT_HOME = Reason("at home")
 AT_HEIGHT = ReasonTemplate("at {height:.0f} m", height=9999)
 RETURN_ABORTED = Template("Return aborted by system {system}: {reason}", system=255, reason="battery too hot")
 NO_AUTOMATIC_RETURN = Template("No automatic return: battery {percent} %", percent=100)
-HOME_HARDLY_REACHABLE = Text("Home hardly reachable: land now")
-HOME_UNREACHABLE = Text("Home not reachable: land now")
+HOME_HARDLY_REACHABLE = OperatorText("Home hardly reachable: land now")
+HOME_UNREACHABLE = OperatorText("Home not reachable: land now")
 
 TAKEOFF_POINT = Reason("take-off point")
 SET_HOME = Reason("set home")
@@ -323,8 +323,8 @@ HOVER_BY_SETTING = Reason("ANF_RTL_END is 1")
 
 # == Roll sign ==
 
-ROLL_SIGN_INVERTED = Text("Roll sign inverted: velocity control refused")
-ROLL_SIGN_VERIFIED = Text("Roll sign verified")
+ROLL_SIGN_INVERTED = OperatorText("Roll sign inverted: velocity control refused")
+ROLL_SIGN_VERIFIED = OperatorText("Roll sign verified")
 
 # == Follow ==
 
@@ -345,7 +345,7 @@ FOLLOW_HEIGHT_KEPT = Template("Follow height kept: target asks for {height:.0f} 
 JOYSTICK_OVERRIDE = Template("Joystick override by system {system}: Position", system=255)
 STICKS_IGNORED = Template("Sticks ignored: {reason}", reason="r" * REASON_BYTES)
 STICKS_IGNORED_MODE = ReasonTemplate("mode {mode}, not Position", mode="Terminated")
-STICKS_SILENT = Text("Sticks silent: hovering")
+STICKS_SILENT = OperatorText("Sticks silent: hovering")
 MANUAL_CONTROL_IGNORED = Template("MANUAL_CONTROL ignored: {reason}", reason="axis beyond 1000")
 RC_OVERRIDE_IGNORED = Template("RC_CHANNELS_OVERRIDE ignored: {reason}", reason="not 800-2200 us")
 AXIS_RANGE = Reason("axis beyond 1000")
@@ -359,10 +359,10 @@ MOVE_CANCELLED = Reason("move cancelled elsewhere")
 MOVE_FAILED = Reason("drone aborted the move")
 OFFBOARD_ENDED = Template("Offboard ended: {reason}", reason="r" * REASON_BYTES)
 NOT_ITS_TAKEOFF = Reason("takeoff of another client")
-GROUND_SETPOINTS_STOPPED = Text("Setpoints stopped on the ground: disarming")
-OFFBOARD_STOPPED_ON_GROUND = Text("Offboard setpoints stopped: on the ground")
-OFFBOARD_STOPPED_TAKEOFF = Text("Offboard setpoints stopped: takeoff continues")
-OFFBOARD_STOPPED_HOVER = Text("Offboard setpoints stopped: hovering")
+GROUND_SETPOINTS_STOPPED = OperatorText("Setpoints stopped on the ground: disarming")
+OFFBOARD_STOPPED_ON_GROUND = OperatorText("Offboard setpoints stopped: on the ground")
+OFFBOARD_STOPPED_TAKEOFF = OperatorText("Offboard setpoints stopped: takeoff continues")
+OFFBOARD_STOPPED_HOVER = OperatorText("Offboard setpoints stopped: hovering")
 TILT_HELD = Template("Tilt limit {tilt:.0f} deg: roll sign not verified", tilt=99)
 TILT_WIND = Template(  #
     "MaxTilt {tilt:.0f}: {speed:.1f} m/s at {wind:g} m/s wind needs {needed}", tilt=40, speed=99.9, wind=10, needed=89
@@ -415,7 +415,7 @@ LINK_LOSS_UNKNOWN = Reason("unknown")
 LINK_LOSS_RETURNS = Reason("return home")
 LINK_LOSS_CONTINUES = Reason("continue")
 LINK_LOSS_FILE = Reason("finish file")
-MISSION_COMPLETE = Text("Mission complete")
+MISSION_COMPLETE = OperatorText("Mission complete")
 MISSION_PAUSED = Template("Mission paused at item {item}", item=9999)
 MISSION_PAUSED_REASON = Template("Mission paused at item {item}: {reason}", item=999, reason="stopped by the drone")
 MISSION_PILOT = Reason("pilot in control")
@@ -423,8 +423,8 @@ MISSION_STOPPED = Reason("stopped by the drone")
 MISSION_OTHER_PLAN = Reason("other plan is flown")
 MISSION_LINK_LOST = Reason("link was lost")
 MISSION_OUT_OF_REACH = Template("Mission item {item} skipped: out of reach", item=9999)
-OTHER_PLAN = Text("Drone flies a plan that is not this mission")
-MISSION_RESUMED_ELSEWHERE = Text("Mission resumed by another controller")
+OTHER_PLAN = OperatorText("Drone flies a plan that is not this mission")
+MISSION_RESUMED_ELSEWHERE = OperatorText("Mission resumed by another controller")
 MISSION_FOUND_FLYING = Template("Mission flying: at item {item} or later", item=9999)
 MISSION_FOUND_PAUSED = Template("Mission not flying: paused at item {item}", item=9999)
 STEP_ZOOM_KIND = Reason("zoom is not a share in %")
@@ -447,14 +447,14 @@ FENCE_PILOT = Template("Fence, pilot flies: {reason}", reason="999 m beyond incl
 FENCE_TOO_FAST = ReasonTemplate("too fast for {zone}", zone="inclusion 120-123")
 FENCE_UNDER_FLOOR = ReasonTemplate("{distance:.0f} m below floor {floor:g} m", distance=999, floor=999)
 FENCE_OVER_CEILING = ReasonTemplate("{distance:.0f} m above ceiling {ceiling:g} m", distance=999, ceiling=4000)
-FENCE_BLIND = Text("Fence not watched: position unknown")
-FENCE_INSIDE = Text("Inside the fence again")
+FENCE_BLIND = OperatorText("Fence not watched: position unknown")
+FENCE_INSIDE = OperatorText("Inside the fence again")
 FENCE_ACTION_FAILED = Template("Fence {action} failed: {error}", action="motor cut", error=BELOW)
 FENCE_NO_RETURN = Template("Fence: no return, hold: {error}", error=BELOW)
-FENCE_NO_MOTOR_CUT = Text("Fence action is now hold: motor cut not allowed")
+FENCE_NO_MOTOR_CUT = OperatorText("Fence action is now hold: motor cut not allowed")
 GEOFENCE_SET = Template("Drone geofence set: {radius:g} m", radius=4000.5)
 GEOFENCE_RESTORED = Template("Drone geofence restored: {radius:g} m, {state}", radius=4000.5, state="off")
-GEOFENCE_KEPT = Text("Drone geofence kept: changed meanwhile")
+GEOFENCE_KEPT = OperatorText("Drone geofence kept: changed meanwhile")
 GEOFENCE_ENDS = Template("Drone geofence ends: centre is {distance:.0f} m off", distance=99999)
 GEOFENCE_FAILED = Template("Drone geofence not changed: {error}", error=BELOW)
 ON = Reason("on")
@@ -480,15 +480,15 @@ FILE_OTHER_KIND = Reason("file of another kind")
 FILE_PART = Reason("file holds part of a list")
 FILE_ITEMS = ReasonTemplate("file lacks its {count} items", count=65535)
 FILE_NUMBER = ReasonTemplate("item {number} has number {seq}", number=5000, seq=65535)
-PLANS_NOT_CLEARED = Text("Plans not cleared: another client transfers")
+PLANS_NOT_CLEARED = OperatorText("Plans not cleared: another client transfers")
 UPLOAD_ABORTED = Template("{kind} upload aborted: no item {number}", kind="Mission", number=5000)
 FENCE_CIRCLE_IGNORED = Template("Fence circle {number} ignored: radius 0", number=5000)
-NO_FENCE = Text("No fence")
+NO_FENCE = OperatorText("No fence")
 NO_ZONES = Reason("no zones")
 FENCE_SUMMARY = NoticeTemplate("Fence: {zones}", zones="12 inclusion polygons, 12 exclusion circles")
 FENCE_GROUPS = NoticeTemplate("{fence}; zones of a group: overlap counts", fence="Fence: 2 inclusion circles")
 FENCE_RETURN_POINT = NoticeTemplate("{fence}; return point unused", fence="Fence: 2 inclusion circles")
-NO_MISSION_STORED = Text("No mission")
+NO_MISSION_STORED = OperatorText("No mission")
 MISSION_ITEMS = Template("Mission: {count} items", count=5000)
 MISSION_STEPS = NoticeTemplate(
     "{mission}; flown by gateway: {steps}; link loss ends them", mission="Mission: 9 items", steps="item 3"
@@ -496,7 +496,7 @@ MISSION_STEPS = NoticeTemplate(
 MISSION_APPROXIMATE = NoticeTemplate("{mission}; approximated: {losses}", mission="Mission: 9 items", losses="item 3")
 MISSION_RECORD_IGNORED = NoticeTemplate("Mission record in {path} ignored: other mission", path="PI040.json")
 PLAN_IGNORED = NoticeTemplate("{kind} in {path} ignored: {reason}", kind="Mission", path="PI040.json", reason="no file")
-PLANS_NOT_KEPT = Text("Plans not kept: state folder cannot be used")
+PLANS_NOT_KEPT = OperatorText("Plans not kept: state folder cannot be used")
 MEMORY_UNREADABLE = NoticeTemplate("{path}: {error}; no plans, new ones not kept", path="PI040.json", error="denied")
 MEMORY_INVALID = NoticeTemplate("{path}: {error}; put aside as {aside}", path="PI040.json", error="bad", aside="file")
 MEMORY_UNWRITABLE = NoticeTemplate("{path}: {error}; changes end with gateway", path="PI040.json", error="no space")
@@ -504,51 +504,51 @@ MEMORY_UNWRITABLE = NoticeTemplate("{path}: {error}; changes end with gateway", 
 # == Rally points and home ==
 
 RALLY_BY_TYPE = Template("Rally points not used: RTL_TYPE is home ({count})", count=999)
-RALLY_HOME_SET = Text("Rally points not used: another home is set")
+RALLY_HOME_SET = OperatorText("Rally points not used: another home is set")
 RALLY_FAILED = Template("Rally point {number} not used: {error}", number=255, error=BELOW)
 RETURNS_TO_RALLY = Template("Returns end at rally point {number}", number=255)
-RETURNS_TO_HOME = Text("Returns end at home")
+RETURNS_TO_HOME = OperatorText("Returns end at home")
 HOME_TYPE_NOT_RESTORED = Template("Home type not restored: {error}", error=BELOW)
 HOME_TYPE_KEPT = Template("Home stays custom: {error}", error=BELOW)
-HOME_SET = Text("Home set: in force until home type changes")
+HOME_SET = OperatorText("Home set: in force until home type changes")
 
 # == Calibration and restart ==
 
 CAL_STARTED = Template("[cal] calibration started: {version} {name}", version=2, name="level")
 CAL_DONE = Template("[cal] calibration done: {name}", name="level")
-CAL_CANCELLED = Text("[cal] calibration cancelled")
+CAL_CANCELLED = OperatorText("[cal] calibration cancelled")
 CAL_FAILED = Template("[cal] calibration failed: {error}", error=BELOW)
 CAL_SIDE_DONE = Template("[cal] {side} side done, rotate to a different side", side="front")
 CAL_PROGRESS = Template("[cal] progress <{percent}>", percent=100)
 CAL_ORIENTATION = Template("[cal] {side} orientation detected", side="front")
-CAL_ROLL = Text("[cal] roll: turn it about its long axis")
-CAL_PITCH = Text("[cal] pitch: turn it nose over tail")
-CAL_YAW = Text("[cal] yaw: turn it about its vertical axis")
-COMPASS_CANCELLED = Text("Compass calibration cancelled")
+CAL_ROLL = OperatorText("[cal] roll: turn it about its long axis")
+CAL_PITCH = OperatorText("[cal] pitch: turn it nose over tail")
+CAL_YAW = OperatorText("[cal] yaw: turn it about its vertical axis")
+COMPASS_CANCELLED = OperatorText("Compass calibration cancelled")
 COMPASS_FAILED = Template("Compass calibration failed: {error}", error=BELOW)
-COMPASS_DONE = Text("Compass calibration done")
+COMPASS_DONE = OperatorText("Compass calibration done")
 COMPASS_TURN = Template("Compass: turn the drone {axis}", axis="about its vertical axis")
 AXIS_ROLL = Reason("about its long axis")
 AXIS_PITCH = Reason("nose over tail")
 AXIS_YAW = Reason("about its vertical axis")
-DRONE_RESTARTS = Text("Drone is restarting")
-RESTART_FAILED = Text("Restart failed: drone is still connected")
+DRONE_RESTARTS = OperatorText("Drone is restarting")
+RESTART_FAILED = OperatorText("Restart failed: drone is still connected")
 
 # == Ground stations ==
 
-STATION_BACK = Text("Ground station is back")
+STATION_BACK = OperatorText("Ground station is back")
 STATION_LOST = Template("No ground station for {seconds:g} s", seconds=999.5)
 STATION_LOST_STATE = Template("No ground station for {seconds:g} s: {state}", seconds=99.5, state=RETURNS)
 STATION_LOST_FAILED = Template("Station loss: {action} failed: {error}", action="return", error=BELOW)
-SKYCONTROLLER_IN_CONTROL = Text("Skycontroller in control until a client flies")
-SKYCONTROLLER_WARNS_ONLY = Text("Until then station loss and fence only warn")
+SKYCONTROLLER_IN_CONTROL = OperatorText("Skycontroller in control until a client flies")
+SKYCONTROLLER_WARNS_ONLY = OperatorText("Until then station loss and fence only warn")
 PILOT_HAS_CONTROL = Template("Skycontroller pilot has control: {reason}", reason="moved")
 BANNER = Template("anafi-mav {version}", version="10.10.10")
 BANNER_FLAVOUR = Template("{title} (anafi-mav {version})", title="ArduCopter V4.5.7", version="10.10.10")
 BANNER_DRONE = Template(
     "{model} {serial} firmware {firmware}", model="ANAFI USA", serial="P" * 18, firmware="1.10.10"
 )  # fmt: skip
-TUNE_REFUSED = Text("Tune refused: drone is not on the ground")
+TUNE_REFUSED = OperatorText("Tune refused: drone is not on the ground")
 TUNE_FAILED = Template("Tune not played: {error}", error=BELOW)
 NO_EXPOSURE = Template("Exposure unknown: no video: {error}", error=BELOW)
 
@@ -571,20 +571,20 @@ LANDS_BY_ITSELF = Template("Drone lands {when}: {reason}", when="in 999 s", reas
 RETURNS_HOME_BY_ITSELF = Template("Drone returns home {when}: {reason}", when="in 999 s", reason="battery critical")
 HOME_REACH = Template("Home: {reachability}", reachability="not reachable")
 CONDITION = Template("{name}: {degree}", name="Vibration", degree="critical")
-TOO_DARK = Text("Too dark to hold the position without GPS")
-TOO_HIGH = Text("Too high to hold the position without GPS")
+TOO_DARK = OperatorText("Too dark to hold the position without GPS")
+TOO_HIGH = OperatorText("Too high to hold the position without GPS")
 MOTOR_ERROR = Template("Motor: {error}", error="error battery voltage")
 ALERT = Template("Alert: {alert}", alert="magneto pertubation")
 ALARM = Template("Alarm: {alarm}", alarm="magneto pertubation")
 SENSOR_FAILED = Template("Sensor failed: {sensor}", sensor="vertical camera")
-CALIBRATE_MAGNETOMETER = Text("Magnetometer calibration required")
-MOTORS_CUT = Text("Motors cut")
+CALIBRATE_MAGNETOMETER = OperatorText("Magnetometer calibration required")
+MOTORS_CUT = OperatorText("Motors cut")
 POSITION_LOST = Template("Position unknown: no GPS location for {seconds:g} s", seconds=3)
-POSITION_FOUND = Text("Position known again")
+POSITION_FOUND = OperatorText("Position known again")
 
 # == Link to the drone ==
 
 CONNECTION_REFUSED = Template("Connection refused by drone (status {status})", status=-99)
-OTHER_CONTROLLER = Text("Drone connected to another controller")
+OTHER_CONTROLLER = OperatorText("Drone connected to another controller")
 RECONNECTING_IN = Template("Reconnecting in {seconds:.0f} s, or on a command", seconds=999)
 RECONNECTING_BY = Template("Reconnecting: command of system {system}", system=255)

@@ -467,10 +467,10 @@ Rules for all of them:
 def plan_translation() -> str:
     """docs/plan-translation.md."""
     from anafi_mav.plans.rules import flight_plan_writer, rules
-    from anafi_mav.plans.rules.rule import Verdict
+    from anafi_mav.plans.rules.rule import Fidelity
     from anafi_mav.plans.translation import translate
 
-    meanings = {verdict.name.lower(): verdict.value for verdict in Verdict}
+    meanings = {verdict.name.lower(): verdict.value for verdict in Fidelity}
     parts = [PLAN_TRANSLATION.format(**meanings, acceptance=flight_plan_writer.ACCEPTANCE, lines=translate.MAX_LINES)]
     for row in rules.TABLE.values():
         parts.append(f"| {row.command} {row.name} | {row.verdict.name.lower()} | {row.how} |\n")
@@ -565,8 +565,10 @@ def operator_texts() -> str:
             page += f"\n## {heading[1]}\n\n| text | severity |\n|---|---|\n"
         elif assigned := re.match(r"([A-Z]\w+) = ", line):
             entry = getattr(texts, assigned[1])
-            if isinstance(entry, texts.Text | texts.Template):
-                text = entry if isinstance(entry, texts.Text) else re.sub(r"(\{\w+)[^}]*\}", r"\1}", entry.pattern)
+            if isinstance(entry, texts.OperatorText | texts.Template):
+                text = (
+                    entry if isinstance(entry, texts.OperatorText) else re.sub(r"(\{\w+)[^}]*\}", r"\1}", entry.pattern)
+                )
                 page += f"| `{text}` | {', '.join(sorted(severities.get(assigned[1], ())))} |\n"
     return page
 

@@ -30,7 +30,7 @@ COMMANDS = {
 """Name of a command, which is the name of its module in this folder, and what it does."""
 
 
-class Command(Protocol):
+class Subcommand(Protocol):
     """Interface of each subcommand's module."""
 
     def add_arguments(self, parser: argparse.ArgumentParser) -> None:
@@ -49,11 +49,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="anafi-mav", description="Parrot ANAFI drones as MAVLink systems.")
     parser.add_argument("--version", action="version", version=f"anafi-mav {__version__}")
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    command: Command | None = None
+    command: Subcommand | None = None
     for name, purpose in COMMANDS.items():
         subparser = subparsers.add_parser(name, help=purpose, description=purpose[0].upper() + purpose[1:] + ".")
         if name == words[0]:
-            command = cast(Command, importlib.import_module(f"{__name__}.{name}"))
+            command = cast(Subcommand, importlib.import_module(f"{__name__}.{name}"))
             command.add_arguments(subparser)
     arguments = parser.parse_args(words)
     assert command is not None, "argparse has ended the program"

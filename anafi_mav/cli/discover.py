@@ -39,7 +39,7 @@ MAX_NAME = 32
 
 
 @dataclass(frozen=True)
-class Place:
+class SearchAddress:
     """An address to try, through one interface or as the routes say."""
 
     address: str
@@ -53,7 +53,7 @@ class Place:
 class Find:
     """Device that answered, and its place."""
 
-    place: Place
+    place: SearchAddress
     device: DeviceInfo
 
 
@@ -112,8 +112,8 @@ def _timeout(text: str) -> float:
     return timeout
 
 
-def _place(text: str) -> Place:
-    place = Place(**spot(text))
+def _place(text: str) -> SearchAddress:
+    place = SearchAddress(**spot(text))
     try:
         ipaddress.IPv4Address(place.address)
     except ValueError:
@@ -121,7 +121,7 @@ def _place(text: str) -> Place:
     return place
 
 
-def places(wanted: Sequence[Place], here: Sequence[tuple[str, ipaddress.IPv4Network]]) -> list[Place]:
+def places(wanted: Sequence[SearchAddress], here: Sequence[tuple[str, ipaddress.IPv4Network]]) -> list[SearchAddress]:
     """Return the places to try: the requested ones, and each address on its interfaces.
 
     Those are the interfaces that are in the network of the address.
@@ -129,13 +129,13 @@ def places(wanted: Sequence[Place], here: Sequence[tuple[str, ipaddress.IPv4Netw
     result = list(wanted)
     for address in [*USUAL, *(place.address for place in wanted if place.interface is None)]:
         on = [interface for interface, network in here if ipaddress.IPv4Address(address) in network]
-        result += [Place(address, interface) for interface in on]
+        result += [SearchAddress(address, interface) for interface in on]
         if address in USUAL and not here:  # not Linux: no way to know
-            result.append(Place(address))
+            result.append(SearchAddress(address))
     return list(dict.fromkeys(result))
 
 
-async def discover(where: Collection[Place], timeout: float) -> list[Find]:
+async def discover(where: Collection[SearchAddress], timeout: float) -> list[Find]:
     """Try all these places at once and return each device once.
 
     It is listed with its interface if known, since two devices may answer to one address.
@@ -151,7 +151,7 @@ async def discover(where: Collection[Place], timeout: float) -> list[Find]:
     return sorted(finds.values(), key=lambda find: str(find.place))
 
 
-async def _look(place: Place, timeout: float) -> Find | None:
+async def _look(place: SearchAddress, timeout: float) -> Find | None:
     try:
         device = await look_either(place.address, interface=place.interface, timeout=timeout)
     except (AnafiMavError, OSError):

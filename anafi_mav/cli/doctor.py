@@ -62,7 +62,7 @@ def wrong(check: str, fact: str, mend: str) -> Finding:
     return Finding(check, True, fact, mend)
 
 
-class Place(NamedTuple):
+class DroneAddress(NamedTuple):
     """Address, interface and ports that are examined."""
 
     address: str
@@ -85,7 +85,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Examine, print a line for each check; 1 when one of them is wrong."""
     log.set_up()
-    place = Place(
+    place = DroneAddress(
         **spot(arguments.address),
         http_port=_port("--http-port", arguments.http_port),
         rtsp_port=_port("--rtsp-port", arguments.rtsp_port),
@@ -133,7 +133,7 @@ def _port(flag: str, text: str) -> int:
 # Before the handshake.
 
 
-async def before_handshake(place: Place) -> tuple[list[Finding], DeviceInfo | None]:
+async def before_handshake(place: DroneAddress) -> tuple[list[Finding], DeviceInfo | None]:
     """Examine what no other controller notices; also the device's introduction, if it gave one."""
     findings = [adapter(place), route(place)]
     if any(finding.wrong for finding in findings):
@@ -152,7 +152,7 @@ async def before_handshake(place: Place) -> tuple[list[Finding], DeviceInfo | No
     return [*findings, *ports(place, states, device), *model(device, problem)], device
 
 
-def adapter(place: Place) -> Finding:
+def adapter(place: DroneAddress) -> Finding:
     """Is this machine in the network of that address?"""
     there = [name for _, name in socket.if_nameindex()]
     if place.interface is not None:
@@ -181,7 +181,7 @@ def adapter(place: Place) -> Finding:
     return ok("adapter", f"none is in the network of {address}: through a router")
 
 
-def route(place: Place) -> Finding:
+def route(place: DroneAddress) -> Finding:
     """Can a packet leave for that address?"""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
@@ -198,7 +198,7 @@ def route(place: Place) -> Finding:
 OPEN, REFUSED, SILENT = "open", "refused", "no answer"
 
 
-async def _try_port(place: Place, port: int) -> str:
+async def _try_port(place: DroneAddress, port: int) -> str:
     """Open a TCP connection and close it again; nothing is sent."""
     try:
         connection = open_connection(place.address, port, interface=place.interface)
@@ -216,7 +216,7 @@ async def _try_port(place: Place, port: int) -> str:
 _RESTART = "restart the drone and wait until its light is steady"
 
 
-def ports(place: Place, states: dict[int, str], device: DeviceInfo | None) -> Iterator[Finding]:
+def ports(place: DroneAddress, states: dict[int, str], device: DeviceInfo | None) -> Iterator[Finding]:
     """Judge the ports by the kind of device.
 
     A Skycontroller 4 has everything behind its mux.
@@ -265,7 +265,7 @@ def model(device: DeviceInfo | None, problem: str) -> Iterator[Finding]:
 # With the handshake.
 
 
-async def with_handshake(place: Place) -> list[Finding]:
+async def with_handshake(place: DroneAddress) -> list[Finding]:
     """Connect as the gateway does, and look at what the drone reports."""
     drone = Drone(place.address, interface=place.interface, http_port=place.http_port, rtsp_port=place.rtsp_port)
     try:

@@ -14,7 +14,7 @@ from typing import NamedTuple, cast
 from anafi_mav.cli import interrupts, log, plan_options
 
 
-class Action(NamedTuple):
+class PlanAction(NamedTuple):
     """One thing to do with a plan: the function of its name in a module of this folder."""
 
     purpose: str
@@ -23,17 +23,17 @@ class Action(NamedTuple):
 
 
 ACTIONS = {
-    "check": Action("say what would go wrong with a plan on a drone", plan_options.check_arguments, "plan_files"),
-    "show": Action("print a plan as a table", plan_options.show_arguments, "plan_files"),
-    "convert": Action(
+    "check": PlanAction("say what would go wrong with a plan on a drone", plan_options.check_arguments, "plan_files"),
+    "show": PlanAction("print a plan as a table", plan_options.show_arguments, "plan_files"),
+    "convert": PlanAction(
         "write a plan in another format and tell what that cannot hold", plan_options.convert_arguments, "plan_files"
     ),
-    "plot": Action("draw a plan: a map, and its heights", plan_options.plot_arguments, "plan_files"),
-    "upload": Action("hand a plan to a vehicle", plan_options.upload_arguments, "plan_link"),
-    "download": Action(
+    "plot": PlanAction("draw a plan: a map, and its heights", plan_options.plot_arguments, "plan_files"),
+    "upload": PlanAction("hand a plan to a vehicle", plan_options.upload_arguments, "plan_link"),
+    "download": PlanAction(
         "fetch mission, fence and rally points of a vehicle", plan_options.download_arguments, "plan_link"
     ),
-    "fly": Action(
+    "fly": PlanAction(
         "hand a plan to a vehicle, begin it and follow it; starts the motors", plan_options.upload_arguments, "plan_fly"
     ),
 }

@@ -18,8 +18,8 @@ from anafi_mav.plans import plot as drawing
 from anafi_mav.plans import table
 from anafi_mav.plans.formats import files
 from anafi_mav.plans.formats.files import Format
-from anafi_mav.plans.plan import Circle, Plan
-from anafi_mav.plans.translation.check import Findings, Severity
+from anafi_mav.plans.plan import FenceCircle, Plan
+from anafi_mav.plans.translation.check import Findings, FindingSeverity
 from anafi_mav.plans.translation.check import check as lint
 from anafi_mav.plans.translation.parrot_export import twin
 
@@ -52,7 +52,9 @@ def _facts(plan: Plan) -> dict[str, Any]:
             for number, item in enumerate(plan.items)
         ],
         "home": None if plan.home is None else asdict(plan.home),
-        "fence": [{"kind": "circle" if isinstance(zone, Circle) else "polygon", **asdict(zone)} for zone in plan.zones],
+        "fence": [
+            {"kind": "circle" if isinstance(zone, FenceCircle) else "polygon", **asdict(zone)} for zone in plan.zones
+        ],
         "breach_return": None if plan.breach_return is None else asdict(plan.breach_return),
         "rally": [asdict(point) for point in plan.rally],
         "drawn": [{"kind": block.kind, "first": block.first, "count": block.count} for block in plan.blocks],
@@ -124,7 +126,7 @@ def _tell(name: str, findings: dict[Model, Findings]) -> None:
     for problem in sorted(problems, key=lambda one: (one.item is None, one.item or 0)):
         having = [model.title for model, found in findings.items() if problem in found.problems]
         which = "" if len(having) == len(findings) else f"{', '.join(having)}: "
-        style = "red" if problem.severity is Severity.ERROR else "yellow"
+        style = "red" if problem.severity is FindingSeverity.ERROR else "yellow"
         say(f"{name}: {which}{problem.severity.value}: {problem}", style)
     for model, found in findings.items():
         if not found.errors:

@@ -25,7 +25,7 @@ class Ended(AnafiMavError):
 
 
 def fly(arguments: argparse.Namespace) -> int:
-    """Fly it. Raises `Refused`, `CommandRejected`, `LinkLost` and `Ended`."""
+    """Fly it. Raises `TransferRefused`, `CommandRejected`, `LinkLost` and `Ended`."""
     plan, sysid = plan_options.load(arguments), plan_options.sysid_of(arguments)
     if not plan.items:
         raise PlanError(arguments.file.name, "it has no mission: nothing to fly")
@@ -36,7 +36,7 @@ def fly(arguments: argparse.Namespace) -> int:
 async def _fly(arguments: argparse.Namespace, sysid: int | None, plan: Plan) -> None:
     async with connected(arguments.endpoint, sysid) as ground:
         await give(ground, plan, arguments.file.name)
-        follower = Follower(ground, plan)
+        follower = MissionFollower(ground, plan)
         if not ground.heartbeat.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED:
             say("arming")
             await ground.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
@@ -50,7 +50,7 @@ async def _fly(arguments: argparse.Namespace, sysid: int | None, plan: Plan) -> 
             raise
 
 
-class Follower:
+class MissionFollower:
     """Reads the mission progress that the vehicle reports, and prints it."""
 
     def __init__(self, ground: Ground, plan: Plan) -> None:

@@ -21,7 +21,7 @@ from anafi_mav.plans.plan import GLOBAL, WAYPOINT, Item, Plan, Point, counted, s
 from anafi_mav.services.memory import NOT_KEPT
 from anafi_mav.services.plan.item_messages import item_int, item_of
 from anafi_mav.services.plan.mission_items import from_wire, to_wire
-from anafi_mav.vehicle.fence.plan_items import Fault, PlanItem
+from anafi_mav.vehicle.fence.plan_items import PlanFault, PlanItem
 
 MISSION, FENCE, RALLY = (
     dialect.MAV_MISSION_TYPE_MISSION,
@@ -31,7 +31,7 @@ MISSION, FENCE, RALLY = (
 NAMES = {MISSION: "mission", FENCE: "fence", RALLY: "rally points"}
 
 
-class Refused(AnafiMavError):
+class TransferRefused(AnafiMavError):
     """The vehicle did not take a list, or did not give it."""
 
 
@@ -93,7 +93,7 @@ def _without_heading(item: Item) -> Item:
 def upload(arguments: argparse.Namespace) -> int:
     """Hand it over; 1 when the gateway took it and cannot store it.
 
-    Raises `Refused` with the vehicle's reason.
+    Raises `TransferRefused` with the vehicle's reason.
     """
     plan, sysid = plan_options.load(arguments), plan_options.sysid_of(arguments)
     texts = interrupts.run(_upload(arguments, sysid, plan))
@@ -108,7 +108,7 @@ async def _upload(arguments: argparse.Namespace, sysid: int | None, plan: Plan) 
 async def give(ground: Ground, plan: Plan, source: str) -> list[str]:
     """Upload the lists that a plan has and return the vehicle's texts.
 
-    Other lists stay as the vehicle has them. Raises `Refused` and `PlanError`.
+    Other lists stay as the vehicle has them. Raises `TransferRefused` and `PlanError`.
     """
     lists = Lists.of(plan)
     parts = {kind: lists.wire(kind, source, with_home=ground.first_item_is_home) for kind in NAMES}
@@ -143,7 +143,7 @@ def told(ground: Ground) -> Iterator[list[str]]:
 
 
 async def give_list(ground: Ground, kind: int, items: Sequence[PlanItem], said: Sequence[str] = ()) -> None:
-    """Upload one list. Raises `Refused`."""
+    """Upload one list. Raises `TransferRefused`."""
     sysid, compid = ground.target
     transfer = Upload(
         [lambda seq, item=item: item_int(item, seq, sysid, compid, kind) for item in items],  # type: ignore[misc]
@@ -159,7 +159,7 @@ async def give_list(ground: Ground, kind: int, items: Sequence[PlanItem], said: 
         say(f"{NAMES[kind]}: {count} on system {sysid}", "green")
     else:
         why = f"; system {sysid} said: {said[-1]}" if said else ""
-        raise Refused(f"{NAMES[kind]} not taken: {transfer.result.reason}{why}")
+        raise TransferRefused(f"{NAMES[kind]} not taken: {transfer.result.reason}{why}")
 
 
 async def _has(ground: Ground, kind: int, items: Sequence[PlanItem]) -> bool:
@@ -170,9 +170,9 @@ async def _has(ground: Ground, kind: int, items: Sequence[PlanItem]) -> bool:
     return transfer.result is not None and transfer.result.outcome is Outcome.DONE and _same(items, there)
 
 
-def _same(wanted: Sequence[PlanItem], there: Sequence[PlanItem | Fault]) -> bool:
-    def content(item: PlanItem | Fault) -> Any:
-        if isinstance(item, Fault):
+def _same(wanted: Sequence[PlanItem], there: Sequence[PlanItem | PlanFault]) -> bool:
+    def content(item: PlanItem | PlanFault) -> Any:
+        if isinstance(item, PlanFault):
             return None
         return from_wire(item)
 
@@ -180,7 +180,7 @@ def _same(wanted: Sequence[PlanItem], there: Sequence[PlanItem | Fault]) -> bool
 
 
 def download(arguments: argparse.Namespace) -> int:
-    """Fetch mission, fence and rally points into one file. Raises `Refused`."""
+    """Fetch mission, fence and rally points into one file. Raises `TransferRefused`."""
     sysid = plan_options.sysid_of(arguments)
     plan_options.target_format(arguments.out, arguments.model)
     plan_files.may_replace(arguments.out, force=arguments.force)
@@ -198,7 +198,7 @@ async def _download(arguments: argparse.Namespace, sysid: int | None) -> Plan:
 async def take(ground: Ground) -> Plan:
     """Download the plan of a vehicle.
 
-    Raises `Refused` when it does not send its mission; fence and rally points may be missing.
+    Raises `TransferRefused` when it does not send its mission; fence and rally points may be missing.
     """
     source = f"system {ground.target[0]}"
     items = await _take_list(ground, MISSION, needed=True)
@@ -223,10 +223,10 @@ async def _take_list(ground: Ground, kind: int, *, needed: bool = False) -> list
     if transfer.result.outcome is Outcome.DONE:
         items = [item_of(message) for message in transfer.items]
         for number, item in enumerate(items):
-            if isinstance(item, Fault):
-                raise Refused(f"{NAMES[kind]} of system {sysid}, item {number}: {item.reason}")
+            if isinstance(item, PlanFault):
+                raise TransferRefused(f"{NAMES[kind]} of system {sysid}, item {number}: {item.reason}")
         return [from_wire(item) for item in items if isinstance(item, PlanItem)]
     if needed:
-        raise Refused(f"{NAMES[kind]} of system {sysid}: {transfer.result.reason}")
+        raise TransferRefused(f"{NAMES[kind]} of system {sysid}: {transfer.result.reason}")
     say(f"no {NAMES[kind]} from system {sysid}: {transfer.result.reason}", "yellow")
     return []

@@ -16,7 +16,7 @@ from anafi_mav.plans.formats import files
 from anafi_mav.plans.formats.files import Format
 from anafi_mav.plans.formats.parrot import Version
 from anafi_mav.plans.plan import Plan
-from anafi_mav.plans.translation.check import Limits
+from anafi_mav.plans.translation.check import FlightLimits
 
 PARROT = ".mavlink"
 
@@ -105,7 +105,7 @@ def target_format(path: Path, model: str | None) -> Format:
 
 def check_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `anafi-mav plan check`."""
-    usual = Limits()
+    usual = FlightLimits()
     source_arguments(parser)
     parser.add_argument(
         "-c", "--config", type=Path, metavar="FILE", help="check for the models of this fleet; left out: for all"
@@ -126,7 +126,7 @@ def check_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def limits(arguments: argparse.Namespace) -> Limits:
+def limits(arguments: argparse.Namespace) -> FlightLimits:
     """Return the limits that are set on the drone. Raises `ConfigError`."""
 
     def metres(flag: str, text: str) -> float:
@@ -136,7 +136,7 @@ def limits(arguments: argparse.Namespace) -> Limits:
             raise ConfigError(flag, f"expected {wanted}, got {text}")
         return value
 
-    return Limits(
+    return FlightLimits(
         metres("--max-altitude", arguments.max_altitude),
         None if arguments.max_distance is None else metres("--max-distance", arguments.max_distance),
         metres("--return-height", arguments.return_height),

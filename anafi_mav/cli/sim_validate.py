@@ -35,9 +35,9 @@ from anafi_mav.sim.validation import (
     HOLD,
     SPIN,
     TILT,
-    Result,
+    Comparison,
+    MeasuredTrack,
     Series,
-    Track,
     climb_results,
     gimbal_results,
     tilt_results,
@@ -145,7 +145,7 @@ class StoodStill(Exception):
     """The machine was too slow for a test, as often as it was flown."""
 
 
-class Flight:
+class ValidationFlight:
     """Flight of one model: its controller and the measured values.
 
     All times are seconds of the drone's own clock.
@@ -154,7 +154,7 @@ class Flight:
     def __init__(self, real: SimulatedDrone, speed: float) -> None:
         self.real = real
         self.model = real.spec.model
-        self.results: list[Result] = []
+        self.results: list[Comparison] = []
         self.series: dict[str, tuple[Series, Series]] = {}
         """By figure: what was commanded, what was measured."""
         self._speed = speed
@@ -207,7 +207,7 @@ class Flight:
         span = self._frames[-1].taken - self._frames[0].taken
         return (len(self._frames) - 1) / span
 
-    async def _watch(self, zero: float, until: float, each: Callable[[float], None] = lambda t: None) -> Track:
+    async def _watch(self, zero: float, until: float, each: Callable[[float], None] = lambda t: None) -> MeasuredTrack:
         """Return the metadata of the pictures until `until` s after `zero`.
 
         `each` is called with the time of every picture. Raises `CommandTimeout` when the pictures stop arriving.
@@ -221,7 +221,7 @@ class Flight:
             except asyncio.TimeoutError:
                 raise CommandTimeout("a picture", PATIENCE) from None
             t = self._frames[-1].taken - zero
-        track = Track()
+        track = MeasuredTrack()
         for frame in self._frames:
             track.add(frame.taken - zero, frame.metadata)
         return track
@@ -243,7 +243,7 @@ class Flight:
         await coming
         return moments[0]
 
-    async def _test(self, stick: PilotingCommand) -> Track:
+    async def _test(self, stick: PilotingCommand) -> MeasuredTrack:
         """Full stick one way, the other way, nothing; what the pictures said meanwhile."""
         piloting = self._drone.piloting
         back = PilotingCommand(-stick.roll_deg, -stick.pitch_deg, -stick.yaw_rate_dps, -stick.climb_mps)
@@ -290,7 +290,7 @@ class Flight:
             self.series[f"gimbal {name} by orientation, deg"] = (wanted, position)
             self.series[f"gimbal {name} by velocity, deg"] = (wanted, velocity)
 
-    async def _turn_from(self, begin: Aim, send: Callable[..., None], axis: str, aim: Aim) -> Track:
+    async def _turn_from(self, begin: Aim, send: Callable[..., None], axis: str, aim: Aim) -> MeasuredTrack:
         for _ in range(TRIES):
             await self._turn(self._drone.gimbal.aim, axis, begin)
             track = await self._turn(send, axis, aim)
@@ -305,7 +305,7 @@ class Flight:
         gap = max((after - before for before, after in pairwise(times)), default=math.inf)
         return None if gap < RARE else f"this machine was too slow for them, two pictures were {gap:.2f} s apart"
 
-    async def _turn(self, send: Callable[..., None], axis: str, aim: Aim) -> Track:
+    async def _turn(self, send: Callable[..., None], axis: str, aim: Aim) -> MeasuredTrack:
         zero = await self._order(lambda entry: entry.name == gimbal.SetTarget.NAME, partial(send, **{axis: aim}))
         return await self._watch(zero, GIMBAL_TIME)
 
@@ -316,7 +316,7 @@ def _standstill(arrivals: list[float]) -> str | None:
     return None if wait < STANDSTILL else f"this machine was too slow for them and stood still for {wait:.1f} s"
 
 
-async def _fly_all(models: list[str], speed: float) -> list[Flight]:
+async def _fly_all(models: list[str], speed: float) -> list[ValidationFlight]:
     """Each model in the air at the same time."""
     specs = [
         DroneSpec(
@@ -331,7 +331,7 @@ async def _fly_all(models: list[str], speed: float) -> list[Flight]:
         for model in models
     ]
     async with Simulator(specs, speed=speed, seed=1, remember=False) as simulator:
-        flights = [Flight(drone, speed) for drone in simulator.drones]
+        flights = [ValidationFlight(drone, speed) for drone in simulator.drones]
         tasks = [asyncio.create_task(flight.fly()) for flight in flights]
         try:
             await asyncio.gather(*tasks)
@@ -347,7 +347,7 @@ def _is_deflected(entry: LogEntry) -> bool:
     return entry.name == ardrone3.PCMD.NAME and any(entry.args[stick] for stick in sticks)
 
 
-def _column(track: Track, column: int) -> Series:
+def _column(track: MeasuredTrack, column: int) -> Series:
     return [(sample[0], sample[column]) for sample in track.gimbal]
 
 
@@ -365,7 +365,7 @@ def _plotter() -> Any:
         raise ConfigError("--plots", "expected matplotlib to be installed: pip install 'anafi-mav[plots]'") from error
 
 
-def _plot(flights: list[Flight], folder: Path) -> Iterable[Path]:
+def _plot(flights: list[ValidationFlight], folder: Path) -> Iterable[Path]:
     """The paper's figures, a file each, all models in one."""
     plotter = _plotter()
     names = dict.fromkeys(name for flight in flights for name in flight.series)

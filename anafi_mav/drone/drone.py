@@ -56,7 +56,7 @@ from anafi_mav.drone.status.home import Home, modern
 from anafi_mav.drone.status.link import Link
 from anafi_mav.drone.status.product import MODELS, Identity, Product
 from anafi_mav.drone.status.sound import Sound
-from anafi_mav.drone.video.route import Direct, Mux, Route
+from anafi_mav.drone.video.route import Direct, Mux, VideoRoute
 from anafi_mav.drone.video.video import Video
 from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, LocalProtocolError
 
@@ -413,7 +413,7 @@ class Drone:
             shift = CONTROLLER_PORTS if self.controller.present else 0
             await self._rest.aim(self.address, self._http_port + shift)
 
-    def _video_route(self, session: ControllerSession) -> Route:
+    def _video_route(self, session: ControllerSession) -> VideoRoute:
         """The drone's own video server, or that of its Skycontroller, which hands it on."""
         if isinstance(session, mux_link.MuxControllerSession):
             return Mux(session, self._rtsp_port)

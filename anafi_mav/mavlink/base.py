@@ -18,7 +18,7 @@ from typing import Protocol
 
 from anafi_mav.clock import Clock
 from anafi_mav.mavlink.channel import QUEUE_BYTES, Channel
-from anafi_mav.mavlink.frames import Received
+from anafi_mav.mavlink.frames import ReceivedFrame
 
 logger = logging.getLogger(__name__)
 
@@ -66,7 +66,7 @@ class Sink(Protocol):
 
     def closed(self, channel: Channel) -> None: ...
 
-    def received(self, channel: Channel, frames: list[Received]) -> None: ...
+    def received(self, channel: Channel, frames: list[ReceivedFrame]) -> None: ...
 
 
 class Endpoint(ABC):

@@ -12,7 +12,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterable
 
 from anafi_mav.mavlink import dialect
-from anafi_mav.mavlink.frames import Packed, Parser, Received, frame, pack
+from anafi_mav.mavlink.frames import Packed, Parser, ReceivedFrame, frame, pack
 
 QUEUE_BYTES = 64 * 1024
 """Bytes that may wait for a slow peer: some seconds of a small fleet. A serial line, being slow, gets less."""
@@ -73,7 +73,7 @@ class Channel:
         """
         return self.is_open and not self._paused
 
-    def receive(self, data: bytes) -> list[Received]:
+    def receive(self, data: bytes) -> list[ReceivedFrame]:
         """Return the frames in received bytes; the parser counts other bytes."""
         self.received_bytes += len(data)
         return self.parser.receive_datagram(data) if self._datagrams else self.parser.receive(data)

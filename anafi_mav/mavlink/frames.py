@@ -165,7 +165,7 @@ def _reader(id: int) -> _Reader:
     return _readers[id]
 
 
-class Received(msgspec.Struct, frozen=True):
+class ReceivedFrame(msgspec.Struct, frozen=True):
     """One frame that arrived whole."""
 
     message: Any
@@ -206,14 +206,14 @@ class Parser:
         self._sources: dict[tuple[int, int], int] = {}
         """(system, component) that has sent a good frame -> sequence number of its last one."""
 
-    def receive(self, data: bytes) -> list[Received]:
+    def receive(self, data: bytes) -> list[ReceivedFrame]:
         """The frames that end in `data`; the beginning of another is kept for the next call."""
         buffer = self._pending + data
         found, end = self._scan(buffer, whole=False)
         self._pending = buffer[end:]
         return found
 
-    def receive_datagram(self, data: bytes) -> list[Received]:
+    def receive_datagram(self, data: bytes) -> list[ReceivedFrame]:
         """Return the frames in a whole datagram; a frame that does not end in it is invalid."""
         self._pending = b""
         found, end = self._scan(data, whole=True)
@@ -225,12 +225,12 @@ class Parser:
             found += more
         return found
 
-    def _scan(self, buffer: bytes, *, whole: bool) -> tuple[list[Received], int]:
+    def _scan(self, buffer: bytes, *, whole: bool) -> tuple[list[ReceivedFrame], int]:
         """Return the frames in `buffer` and the start of the incomplete one.
 
         Without an incomplete frame the second value is the buffer's length.
         """
-        found: list[Received] = []
+        found: list[ReceivedFrame] = []
         position, size = 0, len(buffer)
         while position < size:
             if buffer[position] not in _MAGICS:
@@ -284,7 +284,7 @@ class Parser:
             return 0
         return HEADER_2 + buffer[position + 1] + CHECKSUM + (SIGNATURE if flags else 0)
 
-    def _decode(self, raw: bytes) -> Received | None:
+    def _decode(self, raw: bytes) -> ReceivedFrame | None:
         """Return the message in a frame of the right length, or None if its checksum is wrong."""
         if raw[0] == MAGIC_1:
             _, size, seq, sysid, compid, id = raw[:HEADER_1]
@@ -294,7 +294,7 @@ class Parser:
             begin, id = HEADER_2, low | middle << 8 | high << 16
         extra = _EXTRA.get(id)
         if extra is None:
-            return Received(None, id, sysid, compid, raw)
+            return ReceivedFrame(None, id, sysid, compid, raw)
         end = begin + size
         if _crc(raw[1:end] + extra) != raw[end] | raw[end + 1] << 8:
             self.counters["bad_checksums"] += 1
@@ -308,7 +308,7 @@ class Parser:
             self.counters["lost_frames"] += gap
         if last is not None or len(self._sources) < MAX_SOURCES:
             self._sources[source] = seq
-        return Received(message, id, sysid, compid, raw)
+        return ReceivedFrame(message, id, sysid, compid, raw)
 
 
 def _base_length(kind: type[dialect.MAVLink_message]) -> int:

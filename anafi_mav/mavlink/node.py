@@ -22,7 +22,7 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.base import Endpoint, reason
 from anafi_mav.mavlink.channel import Channel, total
 from anafi_mav.mavlink.endpoint import make_endpoint, parse_endpoint
-from anafi_mav.mavlink.frames import Received, pack
+from anafi_mav.mavlink.frames import ReceivedFrame, pack
 from anafi_mav.mavlink.router import Router
 from anafi_mav.mavlink.stall import StallWatch
 
@@ -175,7 +175,7 @@ class Node:
         if self.on_channel is not None:
             self._guarded(self.on_channel, channel, False)
 
-    def received(self, channel: Channel, frames: list[Received]) -> None:
+    def received(self, channel: Channel, frames: list[ReceivedFrame]) -> None:
         now, old = self._clock.monotonic(), self._stalls is not None and self._stalls.old
         for received in frames:
             route = self._router.route(channel, received, now)

@@ -44,7 +44,7 @@ class Outcome(enum.Enum):
 
 
 @dataclass(frozen=True)
-class Result:
+class TransferResult:
     """The end of a transfer."""
 
     outcome: Outcome
@@ -66,7 +66,7 @@ class Transfer:
     def __init__(self, sysid: int, compid: int, mission_type: int) -> None:
         self.sysid, self.compid = sysid, compid
         self.mission_type = mission_type
-        self.result: Result | None = None
+        self.result: TransferResult | None = None
         self.total = 0
         self.done = 0
         """Items that have been transferred."""
@@ -85,7 +85,7 @@ class Transfer:
         )
 
     def _end(self, outcome: Outcome, code: int = dialect.MAV_MISSION_ACCEPTED) -> list[Message]:
-        self.result = Result(outcome, code)
+        self.result = TransferResult(outcome, code)
         return []
 
     def _ack(self, code: int) -> Message:
@@ -158,7 +158,7 @@ class Upload(Transfer):
         """Give it up: the vehicle keeps what it had."""
         if self.result is not None:
             return []
-        self.result = Result(Outcome.REFUSED, dialect.MAV_MISSION_OPERATION_CANCELLED)
+        self.result = TransferResult(Outcome.REFUSED, dialect.MAV_MISSION_OPERATION_CANCELLED)
         return [self._ack(dialect.MAV_MISSION_OPERATION_CANCELLED)]
 
 
@@ -223,5 +223,5 @@ class Download(Transfer):
         """Give it up."""
         if self.result is not None:
             return []
-        self.result = Result(Outcome.REFUSED, dialect.MAV_MISSION_OPERATION_CANCELLED)
+        self.result = TransferResult(Outcome.REFUSED, dialect.MAV_MISSION_OPERATION_CANCELLED)
         return [self._ack(dialect.MAV_MISSION_OPERATION_CANCELLED)]

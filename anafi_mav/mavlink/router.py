@@ -14,7 +14,7 @@ from typing import Generic, TypeVar
 import msgspec
 
 from anafi_mav.mavlink import dialect
-from anafi_mav.mavlink.frames import MAX_SOURCES, Received
+from anafi_mav.mavlink.frames import MAX_SOURCES, ReceivedFrame
 
 KeyT = TypeVar("KeyT", bound=Hashable)
 HostT = TypeVar("HostT")
@@ -96,7 +96,7 @@ class Router(Generic[KeyT, HostT]):
             return [channel for channel, sources in channels if (sysid, compid) in sources]
         return [channel for channel, sources in channels if any(source[0] == sysid for source in sources)]
 
-    def route(self, channel: KeyT, received: Received, now: float) -> Route[KeyT, HostT]:
+    def route(self, channel: KeyT, received: ReceivedFrame, now: float) -> Route[KeyT, HostT]:
         """Return the destinations of a frame from this channel, and learn its source."""
         source = (received.sysid, received.compid)
         if source in self._spoken:

@@ -58,7 +58,7 @@ class Point:
 
 
 @dataclass(frozen=True)
-class Polygon:
+class FencePolygon:
     """A zone of a fence."""
 
     inclusion: bool
@@ -69,7 +69,7 @@ class Polygon:
 
 
 @dataclass(frozen=True)
-class Circle:
+class FenceCircle:
     """A zone of a fence."""
 
     inclusion: bool
@@ -99,7 +99,7 @@ class Plan:
     items: tuple[Item, ...] = ()
     home: Point | None = None
     """Planned start; height above mean sea level."""
-    zones: tuple[Polygon | Circle, ...] = ()
+    zones: tuple[FencePolygon | FenceCircle, ...] = ()
     breach_return: Point | None = None
     """Height above home."""
     rally: tuple[Point, ...] = ()
@@ -115,7 +115,7 @@ class Plan:
 
     def __post_init__(self) -> None:
         # The order of zones means nothing, and QGroundControl keeps polygons and circles apart.
-        ordered = sorted(self.zones, key=lambda zone: isinstance(zone, Circle))
+        ordered = sorted(self.zones, key=lambda zone: isinstance(zone, FenceCircle))
         object.__setattr__(self, "zones", tuple(ordered))
 
 

@@ -16,8 +16,8 @@ from anafi_mav import geo, mav_enums
 from anafi_mav.errors import PlanError
 from anafi_mav.plans import path
 from anafi_mav.plans.path import Stop
-from anafi_mav.plans.plan import Circle, Plan, counted
-from anafi_mav.plans.shots import Kind, shots
+from anafi_mav.plans.plan import FenceCircle, Plan, counted
+from anafi_mav.plans.shots import ShotKind, shots
 
 Point2 = tuple[float, float]
 """East and north in m on the map; way and height in m in the profile."""
@@ -134,7 +134,7 @@ def _camera(axes: Any, plan: Plan, plane: Callable[[tuple[float, float]], Point2
         axes.plot(*zip(plane(one), plane(two), strict=True), **_WAYS[kind], label=kind.value)
     if found.photos:
         places = [plane(place) for place in dict.fromkeys(found.photos)]
-        axes.plot(*zip(*places, strict=True), "D", color="tab:red", markersize=6, label=Kind.PHOTO.value)
+        axes.plot(*zip(*places, strict=True), "D", color="tab:red", markersize=6, label=ShotKind.PHOTO.value)
     for here, target in found.looks:
         if here is not None:
             axes.plot(*zip(plane(here), plane(target), strict=True), ":", color="tab:orange", linewidth=1.0)
@@ -143,9 +143,9 @@ def _camera(axes: Any, plan: Plan, plane: Callable[[tuple[float, float]], Point2
         axes.plot(*zip(*seen, strict=True), "*", color="tab:orange", markersize=10, label="looked at")
 
 
-_WAYS: dict[Kind, dict[str, Any]] = {
-    Kind.PHOTOS: {"color": "tab:red", "linewidth": 5.0, "alpha": 0.3, "solid_capstyle": "butt"},
-    Kind.VIDEO: {"color": "tab:pink", "linewidth": 9.0, "alpha": 0.25, "solid_capstyle": "butt"},
+_WAYS: dict[ShotKind, dict[str, Any]] = {
+    ShotKind.PHOTOS: {"color": "tab:red", "linewidth": 5.0, "alpha": 0.3, "solid_capstyle": "butt"},
+    ShotKind.VIDEO: {"color": "tab:pink", "linewidth": 9.0, "alpha": 0.25, "solid_capstyle": "butt"},
 }
 
 
@@ -186,7 +186,7 @@ def returns(plan: Plan) -> bool:
 
 
 def _outline(zone: Any, origin: tuple[float, float], plane: Any) -> list[tuple[float, float]]:
-    if not isinstance(zone, Circle):
+    if not isinstance(zone, FenceCircle):
         return [plane(corner) for corner in (*zone.corners, zone.corners[0])]
     east, north = plane(zone.centre or origin)
     turns = [math.radians(angle) for angle in range(0, 361, 5)]

@@ -14,7 +14,7 @@ Place = tuple[float, float]
 """Latitude and longitude, deg."""
 
 
-class Kind(enum.Enum):
+class ShotKind(enum.Enum):
     """Activity of the camera."""
 
     PHOTO = "photo"
@@ -30,12 +30,12 @@ class Shots:
     """
 
     photos: tuple[Place, ...]
-    ways: tuple[tuple[Kind, Place, Place], ...]
+    ways: tuple[tuple[ShotKind, Place, Place], ...]
     looks: tuple[tuple[Place | None, Place], ...]
     """From where, None: not known; and at what."""
 
 
-_STOPS = {mav_enums.MAV_CMD_IMAGE_STOP_CAPTURE: Kind.PHOTOS, mav_enums.MAV_CMD_VIDEO_STOP_CAPTURE: Kind.VIDEO}
+_STOPS = {mav_enums.MAV_CMD_IMAGE_STOP_CAPTURE: ShotKind.PHOTOS, mav_enums.MAV_CMD_VIDEO_STOP_CAPTURE: ShotKind.VIDEO}
 _TRIGGERS = (mav_enums.MAV_CMD_DO_SET_CAM_TRIGG_DIST, mav_enums.MAV_CMD_DO_SET_CAM_TRIGG_INTERVAL)
 
 
@@ -43,16 +43,16 @@ def shots(plan: Plan) -> Shots:
     """Follow the items in sequence and return their photos and videos."""
     stops = {stop.item: stop for stop in path.way(plan)}
     here: Place | None = None if plan.home is None else (plan.home.latitude, plan.home.longitude)
-    running: set[Kind] = set()
+    running: set[ShotKind] = set()
     photos: list[Place] = []
-    ways: list[tuple[Kind, Place, Place]] = []
+    ways: list[tuple[ShotKind, Place, Place]] = []
     looks: list[tuple[Place | None, Place]] = []
     for number, item in enumerate(plan.items):
         stop = stops.get(number)
         if stop is not None:
             there = _place(stop)
             if here is not None and here != there:
-                ways += [(kind, here, there) for kind in Kind if kind in running]
+                ways += [(kind, here, there) for kind in ShotKind if kind in running]
             here = there
         elif item.command in path.LOOKS:
             target = path.place_of(item)
@@ -69,16 +69,16 @@ def _place(stop: Stop) -> Place:
     return stop.latitude, stop.longitude
 
 
-def _camera(item: Item, running: set[Kind]) -> None:
+def _camera(item: Item, running: set[ShotKind]) -> None:
     """Begin or end photos on the way, or a video."""
     value = item.params[0] or 0.0
     match item.command:
         case mav_enums.MAV_CMD_VIDEO_START_CAPTURE:
-            running.add(Kind.VIDEO)
+            running.add(ShotKind.VIDEO)
         case mav_enums.MAV_CMD_IMAGE_START_CAPTURE if not item.params[2]:
-            running.add(Kind.PHOTOS)
+            running.add(ShotKind.PHOTOS)
         case command if command in _TRIGGERS:
-            (running.add if value > 0.0 else running.discard)(Kind.PHOTOS)
+            (running.add if value > 0.0 else running.discard)(ShotKind.PHOTOS)
         case command if command in _STOPS:
             running.discard(_STOPS[command])
 

@@ -54,7 +54,7 @@ _OWN_NAMES = {SET_VIEW_MODE: "SET_VIEW_MODE", SET_STILL_MODE: "SET_STILL_CAPTURE
 
 
 @dataclass(frozen=True)
-class Row:
+class ItemRow:
     """An item in words."""
 
     number: str
@@ -69,7 +69,7 @@ class Row:
         return self.number, self.command, self.place, self.height, self.leg, self.words
 
 
-HEAD = Row("item", "command", "latitude, longitude", "height", "leg", "")
+HEAD = ItemRow("item", "command", "latitude, longitude", "height", "leg", "")
 
 NUMBERS = (0, 3, 4)
 """Columns of numbers, aligned to the right."""
@@ -100,7 +100,7 @@ def summary(plan: Plan) -> str:
     return ", ".join(parts)
 
 
-def rows_of(plan: Plan) -> Iterator[Row]:
+def rows_of(plan: Plan) -> Iterator[ItemRow]:
     """Each item in words."""
     stops = {stop.item: stop for stop in path.way(plan)}
     before: path.Stop | None = None
@@ -113,7 +113,7 @@ def rows_of(plan: Plan) -> Iterator[Row]:
         place = path.place_of(item)
         height = item.params[6]
         placed = place is not None and height is not None
-        yield Row(
+        yield ItemRow(
             str(number),
             name_of(item.command),
             "" if place is None else _place(place),

@@ -29,7 +29,7 @@ SHORTEST = 0.01
 
 
 @dataclass(frozen=True)
-class Circle:
+class CircleZone:
     """Circular zone around a point, or around home when `centre` is None."""
 
     name: str
@@ -62,7 +62,7 @@ class Circle:
         return [t for t in ((-b - math.sqrt(root)) / a, (-b + math.sqrt(root)) / a) if 0.0 < t < 1.0]
 
 
-class Polygon:
+class PolygonZone:
     """A zone with straight sides."""
 
     def __init__(self, name: str, inclusion: bool, group: int, corners: Sequence[LatLon]) -> None:
@@ -111,7 +111,7 @@ class Polygon:
         return [float(t) for t in along[meets]]
 
 
-Zone = Circle | Polygon
+Zone = CircleZone | PolygonZone
 
 
 @dataclass(frozen=True)

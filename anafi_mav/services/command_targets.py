@@ -11,7 +11,7 @@ from anafi_mav import texts
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.commands import Altitude, Command
 from anafi_mav.vehicle.base.bounds import amsl_to_ato, check_estimate
-from anafi_mav.vehicle.base.geo_point import Place
+from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.vehicle import Vehicle
 
@@ -57,10 +57,10 @@ def height_in_frame(vehicle: Vehicle, z: float, frame: int | None, *, amsl: bool
     raise UnsupportedFrame(frame)
 
 
-def place(command: Command) -> Place | None:
+def place(command: Command) -> GeoPoint | None:
     """The command's position; None when it is unset. Half a position is refused."""
     if math.isnan(command.x) and math.isnan(command.y):
         return None
     if not (math.isfinite(command.x) and math.isfinite(command.y)):
         raise Refused(texts.POSITION, texts.LATITUDE_LONGITUDE_NUMBERS, lasting=True)
-    return Place(command.x, command.y)
+    return GeoPoint(command.x, command.y)

@@ -101,7 +101,7 @@ class Altitude(enum.Enum):
     AMSL = "as BY_FRAME; in relative frames above mean sea level too, where the flavour's `relative_frames_are_amsl`"
 
 
-class Progress(enum.Enum):
+class ProgressPolicy(enum.Enum):
     """When IN_PROGRESS is sent."""
 
     PROMPT = "after `PROGRESS_AFTER`"
@@ -122,7 +122,7 @@ class Definition:
     """One for all, or by the command's parameters."""
     mode: Callable[[Command], FlightMode | None] | None = None
     """The mode that it names, None for one that we do not have. Only for commands that name modes."""
-    progress: Progress = Progress.PROMPT
+    progress: ProgressPolicy = ProgressPolicy.PROMPT
 
     def check(self, id: int) -> None:
         """Raise `ValueError` when this contradicts MAVLink's definition of the MAV_CMD, or itself."""
@@ -189,10 +189,10 @@ class Command:
         return None if self.definition.mode is None else self.definition.mode(self)
 
     @property
-    def progress(self) -> Progress | None:
+    def progress(self) -> ProgressPolicy | None:
         """When IN_PROGRESS is sent to its client; None: never."""
         progress = self.definition.progress
-        return None if progress is Progress.FINAL_ONLY and self.flavour.first_answer_as_final else progress
+        return None if progress is ProgressPolicy.FINAL_ONLY and self.flavour.first_answer_as_final else progress
 
     def same_as(self, other: Command) -> bool:
         """True when both commands are equal, with NaN equal to NaN."""

@@ -23,7 +23,7 @@ import msgspec
 from msgspec import Meta
 
 from anafi_mav import texts
-from anafi_mav.texts import Text
+from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.fence.plan_items import MAX_ITEMS, PlanItem
 
 logger = logging.getLogger(__name__)
@@ -107,7 +107,7 @@ class Memory:
         """By MAV_MISSION_TYPE."""
         self.settings: dict[str, Any] = {}
         """Plain JSON values by name. Who reads one looks whether it makes sense: people can write files."""
-        self.problem: Text | None = None
+        self.problem: OperatorText | None = None
         """Why what is here could not be read or written; None while all is well."""
         self._folder = folder
         self._serial = ""
@@ -121,7 +121,7 @@ class Memory:
             return None
         return self._folder / f"{self._serial}.json"
 
-    def load(self, serial: str) -> Text | None:
+    def load(self, serial: str) -> OperatorText | None:
         """Read what is remembered of a drone. Returns a line for people when that could not be read.
 
         Of a drone that is back after a loss of the link there is nothing to read: what is here is as new as its file,
@@ -161,7 +161,7 @@ class Memory:
         """Remember a plan; `save` writes it."""
         self.plans[mission_type] = tuple(items)
 
-    async def save(self) -> Text | None:
+    async def save(self) -> OperatorText | None:
         """Write the file as things are now. Returns a line for people when that failed."""
         path = self.path
         if path is None:

@@ -19,8 +19,8 @@ from anafi_mav.services.commands import Action, Command
 from anafi_mav.services.files import ServedFile
 from anafi_mav.services.flavours import Flavour
 from anafi_mav.services.memory import Memory
-from anafi_mav.services.stream import Stream, Times
-from anafi_mav.texts import Text
+from anafi_mav.services.stream import MessageStream, Times
+from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.vehicle import Vehicle
@@ -68,10 +68,10 @@ class Host(Protocol):
         If `build` returns None, nothing is sent.
         """
 
-    def text(self, severity: Severity, text: Text, to: Channel | None = None) -> None:
+    def text(self, severity: Severity, text: OperatorText, to: Channel | None = None) -> None:
         """A STATUSTEXT to everybody, and a line in the log; or to one channel alone."""
 
-    def warn_throttled(self, text: Text) -> None:
+    def warn_throttled(self, text: OperatorText) -> None:
         """Send a warning on a frequent event, at most once per five seconds.
 
         Such an event arrives many times a second.
@@ -147,7 +147,7 @@ class Service:
         """By message id. A stream can be requested without standing here."""
         return {}
 
-    def streams(self) -> Mapping[int, Stream]:
+    def streams(self) -> Mapping[int, MessageStream]:
         """By message id."""
         return {}
 

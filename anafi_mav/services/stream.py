@@ -43,7 +43,7 @@ Builder = Callable[[Vehicle, Times], "dialect.MAVLink_message | None"]
 
 
 @dataclass(frozen=True)
-class Stream:
+class MessageStream:
     """One message that a vehicle sends by itself.
 
     When a channel is full it gives way to answers.

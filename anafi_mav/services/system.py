@@ -61,7 +61,7 @@ from anafi_mav.services.telemetry.high_latency_service import HighLatencyService
 from anafi_mav.services.telemetry.message_service import MessageService
 from anafi_mav.services.telemetry.telemetry_service import CHANGES, TelemetryService
 from anafi_mav.services.telemetry.video_service import VideoTelemetryService
-from anafi_mav.texts import Text
+from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.height import TakeoffRecord
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.severity import Severity
@@ -316,7 +316,7 @@ class System:
             if message is not None:
                 self.send(message, channels)
 
-    def text(self, severity: Severity, text: Text, to: Channel | None = None) -> None:
+    def text(self, severity: Severity, text: OperatorText, to: Channel | None = None) -> None:
         """A STATUSTEXT to everybody, and a line in the log; or to one channel alone."""
         if to is None:
             logger.log(
@@ -326,12 +326,12 @@ class System:
             for message in self._texts.messages(severity, text):
                 self.send(message, to)
 
-    def announce(self, severity: Severity, text: Text) -> None:
+    def announce(self, severity: Severity, text: OperatorText) -> None:
         """Send a STATUSTEXT about the drone's link to every client, also while that link is down."""
         for message in self._texts.messages(severity, text):
             self._node.send(message, sysid=self.sysid, compid=AUTOPILOT, to=self.channels)
 
-    def warn_throttled(self, text: Text) -> None:
+    def warn_throttled(self, text: OperatorText) -> None:
         """Send a warning on a frequent event, at most every `STATUS_EVERY` seconds.
 
         Such an event arrives many times a second.

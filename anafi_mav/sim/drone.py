@@ -36,7 +36,7 @@ from anafi_mav.sim.world.faults import Faults
 from anafi_mav.sim.world.link_emulation import Air
 from anafi_mav.sim.world.model import model_of
 from anafi_mav.sim.world.motion import Pose
-from anafi_mav.sim.world.place import Origin
+from anafi_mav.sim.world.place import WorldOrigin
 from anafi_mav.sim.world.quirks import Quirk
 from anafi_mav.sim.world.wind import CALM, Wind, WindSpec
 
@@ -152,7 +152,9 @@ class SimulatedDrone:
         """The same of the video."""
         self._clock = clock
         self._body = body
-        self.firmware = Firmware(model, identity, body, Origin(*spec.home), self._emit, self._note, self.faults, chance)
+        self.firmware = Firmware(
+            model, identity, body, WorldOrigin(*spec.home), self._emit, self._note, self.faults, chance
+        )
         self.firmware.payload.calendar.begin(time.time())
         if spec.storage is not None:
             self.firmware.payload.storage.place.capacity = spec.storage

@@ -15,7 +15,7 @@ from typing import Any
 from aiohttp import WSCloseCode, web
 from aiohttp.typedefs import Handler
 
-from anafi_mav.sim.payload.media import Kind, MediaStore
+from anafi_mav.sim.payload.media import MediaKind, MediaStore
 from anafi_mav.sim.plan.plan_store import FlightPlanStore
 
 MAX_BODY = 1 << 20
@@ -33,7 +33,7 @@ SHUTDOWN = 1.0
 NOT_INDEXED = 541
 """Parrot's status for a question about media while there is no index."""
 
-_TYPES = {Kind.JPG: "image/jpeg", Kind.DNG: "image/x-adobe-dng", Kind.MP4: "video/mp4"}
+_TYPES = {MediaKind.JPG: "image/jpeg", MediaKind.DNG: "image/x-adobe-dng", MediaKind.MP4: "video/mp4"}
 
 _ORDERS = {"oldest": False, "newest": True}
 

@@ -55,7 +55,7 @@ class When(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     battery_below: Percent | None = None
 
 
-class Direction(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class LinkDirection(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     loss: Share = 0.0
     delay: Annotated[float, Meta(ge=0.0, le=10.0)] = 0.0
     jitter: Annotated[float, Meta(ge=0.0, le=10.0)] = 0.0
@@ -66,11 +66,11 @@ class Direction(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return Impairment(self.loss, self.delay, self.jitter, self.duplicate, self.reorder)
 
 
-class Link(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    up: Direction | None = None
+class LinkConditions(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    up: LinkDirection | None = None
     """From the controller to the drone."""
-    down: Direction | None = None
-    both: Direction | None = None
+    down: LinkDirection | None = None
+    both: LinkDirection | None = None
 
 
 class Blow(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -79,7 +79,7 @@ class Blow(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     gusts: Share = GUSTS
 
 
-class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True, rename={"for_": "for"}):
+class ScenarioStep(msgspec.Struct, frozen=True, forbid_unknown_fields=True, rename={"for_": "for"}):
     at: Seconds | None = None
     when: str | When | None = None
     after: Seconds = 0.0
@@ -87,7 +87,7 @@ class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True, rename={"for
     drone: str | None = None
     gps: bool | UnsetType = UNSET
     silence: bool | UnsetType = UNSET
-    link: Link | UnsetType = UNSET
+    link: LinkConditions | UnsetType = UNSET
     battery: Percent | UnsetType | None = UNSET
     motor_error: str | UnsetType = UNSET
     motors: list[Motor] | UnsetType = UNSET
@@ -102,7 +102,7 @@ class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True, rename={"for
 
 
 class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    steps: Annotated[list[Step], Meta(min_length=1, max_length=MAX_STEPS)]
+    steps: Annotated[list[ScenarioStep], Meta(min_length=1, max_length=MAX_STEPS)]
 
 
 class Actor(Protocol):
@@ -136,7 +136,7 @@ class _Cue:
     """One step for one drone."""
 
     index: int
-    step: Step
+    step: ScenarioStep
     due: float | None = None
     """When it happens, once its trigger is met."""
     undo: list[Callable[[], None]] | None = None
@@ -147,7 +147,7 @@ class _Cue:
 class Scenario:
     """The steps, and how far each drone has come in them."""
 
-    def __init__(self, steps: Iterable[Step]) -> None:
+    def __init__(self, steps: Iterable[ScenarioStep]) -> None:
         """Raises `ConfigError` for steps that make no sense."""
         self.steps = tuple(steps)
         for index, step in enumerate(self.steps):
@@ -197,7 +197,7 @@ class Scenario:
             cue.undo, cue.undo_at = undo, drone.time + step.for_
 
 
-def _triggered(step: Step, drone: Actor) -> bool:
+def _triggered(step: ScenarioStep, drone: Actor) -> bool:
     if step.at is not None:
         return drone.time >= step.at
     when = When(state=step.when) if isinstance(step.when, str) else step.when
@@ -211,7 +211,7 @@ def _triggered(step: Step, drone: Actor) -> bool:
     )
 
 
-def _apply(step: Step, drone: Actor) -> list[Callable[[], None]]:
+def _apply(step: ScenarioStep, drone: Actor) -> list[Callable[[], None]]:
     """Do it; how to undo it."""
     undo: list[Callable[[], None]] = []
 
@@ -229,7 +229,7 @@ def _apply(step: Step, drone: Actor) -> list[Callable[[], None]]:
     return undo
 
 
-def _changes(step: Step) -> Iterable[tuple[str, Any]]:
+def _changes(step: ScenarioStep) -> Iterable[tuple[str, Any]]:
     """The attributes of `Faults` that a step sets."""
     plain = {
         "gps": step.gps,
@@ -266,7 +266,7 @@ _PARTS = {part.name.lower(): part for part in FlightPlanComponent}
 _TRIGGERS = ("at", "when", "after", "for_", "drone")
 
 
-def _check(path: str, step: Step) -> None:
+def _check(path: str, step: ScenarioStep) -> None:
     if (step.at is None) == (step.when is None):
         raise ConfigError(path, "expected one trigger, at or when")
     if step.at is not None and step.after:

@@ -31,7 +31,7 @@ _REST = (2 * HOLD + AFTER - 1.0, 2 * HOLD + AFTER)
 
 
 @dataclass
-class Track:
+class MeasuredTrack:
     """Video metadata of one test, against seconds since its first command."""
 
     attitude: list[tuple[float, float, float, float]] = field(default_factory=list)
@@ -139,7 +139,7 @@ def at(series: Series, time: float) -> float:
 
 
 @dataclass(frozen=True)
-class Result:
+class Comparison:
     """One number beside what the paper says."""
 
     what: str
@@ -163,40 +163,40 @@ def _rest(series: Series) -> float:
     return max(map(abs, values)) if values else math.nan
 
 
-def tilt_results(name: str, angle: Series, track: Track, fastest: float) -> Iterable[Result]:
+def tilt_results(name: str, angle: Series, track: MeasuredTrack, fastest: float) -> Iterable[Comparison]:
     """Pitch or roll: both ways to 40 deg, a top speed, and level in the end."""
     one = max(between(angle, 0.0, HOLD + 0.3), default=math.nan)
     other = min(between(angle, HOLD, 2 * HOLD + 0.3), default=math.nan)
-    yield Result(f"{name} reached", one, "deg", f"{TILT:g}", TILT - 1.0, TILT + 3.0)
-    yield Result(f"{name} reached the other way", other, "deg", f"-{TILT:g}", -TILT - 3.0, -TILT + 1.0)
-    yield Result(f"{name}: top speed", _peak(track.ground_speed()), "m/s", f"> {fastest:g}", fastest, math.inf)
-    yield Result(f"{name} in the end", _rest(angle), "deg", "around 0", 0.0, 1.0)
+    yield Comparison(f"{name} reached", one, "deg", f"{TILT:g}", TILT - 1.0, TILT + 3.0)
+    yield Comparison(f"{name} reached the other way", other, "deg", f"-{TILT:g}", -TILT - 3.0, -TILT + 1.0)
+    yield Comparison(f"{name}: top speed", _peak(track.ground_speed()), "m/s", f"> {fastest:g}", fastest, math.inf)
+    yield Comparison(f"{name} in the end", _rest(angle), "deg", "around 0", 0.0, 1.0)
 
 
-def climb_results(track: Track) -> Iterable[Result]:
+def climb_results(track: MeasuredTrack) -> Iterable[Comparison]:
     climb, start = track.climb(), at(track.height, 0.0)
     # 2.5 % of the step: above what a hover does, below what a human eye takes for motion in a figure.
-    yield Result("climb: delay", passes(climb, 0.1), "s", "0.1 to 0.2", 0.1, 0.2)
+    yield Comparison("climb: delay", passes(climb, 0.1), "s", "0.1 to 0.2", 0.1, 0.2)
     up = max(between(climb, 0.0, HOLD + 0.3), default=math.nan)
     down = min(between(climb, HOLD, 2 * HOLD + 0.3), default=math.nan)
-    yield Result("climb: speed up", up, "m/s", f"{CLIMB:g}", CLIMB - 0.2, CLIMB + 0.4)
-    yield Result("climb: speed down", down, "m/s", f"-{CLIMB:g}", -CLIMB - 0.4, -CLIMB + 0.2)
-    yield Result("climb: height in 2 s", at(track.height, HOLD) - start, "m", "almost 7", 6.5, 7.5)
-    yield Result("climb in the end", _rest(climb), "m/s", "around 0", 0.0, 0.1)
+    yield Comparison("climb: speed up", up, "m/s", f"{CLIMB:g}", CLIMB - 0.2, CLIMB + 0.4)
+    yield Comparison("climb: speed down", down, "m/s", f"-{CLIMB:g}", -CLIMB - 0.4, -CLIMB + 0.2)
+    yield Comparison("climb: height in 2 s", at(track.height, HOLD) - start, "m", "almost 7", 6.5, 7.5)
+    yield Comparison("climb in the end", _rest(climb), "m/s", "around 0", 0.0, 0.1)
 
 
-def yaw_results(track: Track, delay: float) -> Iterable[Result]:
+def yaw_results(track: MeasuredTrack, delay: float) -> Iterable[Comparison]:
     rate, turned = track.yaw_rate(), track.turned()
-    yield Result("yaw: delay", passes(turned, 1.0), "s", f"about {delay:g}", delay - 0.05, delay + 0.07)
+    yield Comparison("yaw: delay", passes(turned, 1.0), "s", f"about {delay:g}", delay - 0.05, delay + 0.07)
     fast = (at(turned, HOLD) - at(turned, HOLD - 1.0)) / 1.0
-    yield Result("yaw: rate", fast, "deg/s", f"{SPIN:g}", SPIN - 5.0, SPIN + 5.0)
-    yield Result("yaw: one turn", passes([(t, a) for t, a in turned], 360.0), "s", "< 2.5", 0.0, 2.5)
-    yield Result("yaw rate in the end", _rest(rate), "deg/s", "around 0", 0.0, 2.0)
+    yield Comparison("yaw: rate", fast, "deg/s", f"{SPIN:g}", SPIN - 5.0, SPIN + 5.0)
+    yield Comparison("yaw: one turn", passes([(t, a) for t, a in turned], 360.0), "s", "< 2.5", 0.0, 2.5)
+    yield Comparison("yaw rate in the end", _rest(rate), "deg/s", "around 0", 0.0, 2.0)
 
 
 def gimbal_results(
     name: str, position: Series, velocity: Series, span: tuple[float, float], speed: float
-) -> Iterable[Result]:
+) -> Iterable[Comparison]:
     """Yield the results of turning the gimbal from limit to limit in both modes.
 
     The paper gives figures and no numbers, the limit is the aircraft's.
@@ -204,11 +204,11 @@ def gimbal_results(
     low, high = span
     way = high - low
     reached = max(between(position, 0.0, math.inf), default=math.nan)
-    yield Result(f"gimbal {name}: position reached", reached, "deg", f"limit {high:g}", high - 1.0, high + 1.0)
+    yield Comparison(f"gimbal {name}: position reached", reached, "deg", f"limit {high:g}", high - 1.0, high + 1.0)
     ideal = way / speed
     took = passes([(t, value - low) for t, value in position], 0.99 * way)
-    yield Result(f"gimbal {name}: limit to limit", took, "s", f"{ideal:.2f} at the limit", 0.9 * ideal, ideal + 0.3)
+    yield Comparison(f"gimbal {name}: limit to limit", took, "s", f"{ideal:.2f} at the limit", 0.9 * ideal, ideal + 0.3)
     # Between a tenth and nine tenths of the way.
     turned = [(t, value - low) for t, value in velocity]
     rate = 0.8 * way / max(passes(turned, 0.9 * way) - passes(turned, 0.1 * way), 1e-6)
-    yield Result(f"gimbal {name}: velocity", rate, "deg/s", f"limit {speed:g}", 0.9 * speed, 1.1 * speed)
+    yield Comparison(f"gimbal {name}: velocity", rate, "deg/s", f"limit {speed:g}", 0.9 * speed, 1.1 * speed)

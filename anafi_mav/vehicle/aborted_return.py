@@ -11,7 +11,7 @@ import math
 from anafi_mav import texts
 from anafi_mav.drone.events import HomeReachability, ReturnReason, WarningLevel
 from anafi_mav.drone.status.alerts import spoken
-from anafi_mav.texts import Text
+from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.flying import LANDING
 from anafi_mav.vehicle.base.severity import Severity
@@ -60,7 +60,7 @@ class AbortedReturn:
         for text in self.reports(vehicle):
             vehicle.text(Severity.CRITICAL, text)
 
-    def reports(self, vehicle: Aircraft) -> list[Text]:
+    def reports(self, vehicle: Aircraft) -> list[OperatorText]:
         """Return the texts for the present state of the drone."""
         reason = "unknown" if self._reason is None else _SHORT.get(self._reason, spoken(self._reason))
         said = [texts.RETURN_ABORTED.fill(system=self._system, reason=reason)]

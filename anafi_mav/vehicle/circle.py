@@ -14,8 +14,8 @@ import math
 from dataclasses import dataclass
 
 from anafi_mav import geo, units
-from anafi_mav.vehicle.base.geo_point import Place
-from anafi_mav.vehicle.base.velocity_loop import Axis, Demand, G, Motion
+from anafi_mav.vehicle.base.geo_point import GeoPoint
+from anafi_mav.vehicle.base.velocity_loop import Axis, Demand, G, MotionEstimate
 
 SMALLEST = 2.0
 """m of radius. On a smaller circle GPS cannot tell on which side of it the drone is."""
@@ -61,7 +61,7 @@ class Facing(enum.Enum):
 class Circle:
     """An orbit in the values that are flown."""
 
-    centre: Place
+    centre: GeoPoint
     radius: float
     """m."""
     direction: int
@@ -87,7 +87,7 @@ def fastest(radius: float, tilt_deg: float) -> float:
     return math.sqrt(SHARE_OF_TILT * G * math.tan(tilt_deg * units.RAD_PER_DEG) * radius)
 
 
-def entry(circle: Circle, here: Place) -> Place:
+def entry(circle: Circle, here: GeoPoint) -> GeoPoint:
     """Return the point of the circle that is nearest to a place.
 
     From the centre itself it is the point north of the centre.
@@ -95,10 +95,10 @@ def entry(circle: Circle, here: Place) -> Place:
     north, east = geo.offset(*circle.centre.point, *here.point)
     distance = math.hypot(north, east)
     north, east = (1.0, 0.0) if distance < 1e-3 else (north / distance, east / distance)
-    return Place(*geo.destination(*circle.centre.point, north * circle.radius, east * circle.radius))
+    return GeoPoint(*geo.destination(*circle.centre.point, north * circle.radius, east * circle.radius))
 
 
-def outline(circle: Circle, here: Place) -> list[Place]:
+def outline(circle: Circle, here: GeoPoint) -> list[GeoPoint]:
     """Return the points of the circle to check before it is flown.
 
     The first is the entry from `here`.
@@ -107,7 +107,7 @@ def outline(circle: Circle, here: Place) -> list[Place]:
     centre, radius = circle.centre.point, circle.radius
     return [
         entry(circle, here),
-        *(Place(*geo.destination(*centre, math.cos(a) * radius, math.sin(a) * radius)) for a in corners),
+        *(GeoPoint(*geo.destination(*centre, math.cos(a) * radius, math.sin(a) * radius)) for a in corners),
     ]
 
 
@@ -133,7 +133,7 @@ class Lap:
     def done(self) -> bool:
         return self.circle.angle is not None and self.flown >= self.circle.angle
 
-    def demand(self, motion: Motion) -> Demand | None:
+    def demand(self, motion: MotionEstimate) -> Demand | None:
         """Return the present demand for the loops; None while the drone's position is unknown."""
         circle = self.circle
         if motion.reference is None:

@@ -124,7 +124,7 @@ class Sighting:
     """m/s north and east; None: not reported."""
 
 
-class Follower:
+class TargetFollower:
     """The target of one vehicle, in metres north and east of the reference of `Motion`."""
 
     def __init__(self, settings: FollowSettings) -> None:

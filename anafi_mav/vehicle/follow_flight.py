@@ -14,15 +14,15 @@ from anafi_mav import geo, texts
 from anafi_mav.clock import Alarm, Clock
 from anafi_mav.drone import PilotingCommand, events
 from anafi_mav.errors import LinkLost
-from anafi_mav.texts import Text
+from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.bounds import LOWEST, amsl_to_ato, check_estimate, check_height, check_on_earth, check_place
-from anafi_mav.vehicle.base.geo_point import Place
+from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
-from anafi_mav.vehicle.base.velocity_loop import Controller, Motion
+from anafi_mav.vehicle.base.velocity_loop import MotionEstimate, VelocityController
 from anafi_mav.vehicle.follow import (
     PATIENCE,
     REACH,
@@ -30,28 +30,28 @@ from anafi_mav.vehicle.follow import (
     TRANSITIONS,
     AltitudeMode,
     Event,
-    Follower,
     FollowSettings,
     Sighting,
     State,
+    TargetFollower,
 )
 
 
 class FollowFlight:
     """Mode Follow of one vehicle."""
 
-    def __init__(self, vehicle: Aircraft, motion: Callable[[], Motion], clock: Clock) -> None:
+    def __init__(self, vehicle: Aircraft, motion: Callable[[], MotionEstimate], clock: Clock) -> None:
         self.settings = FollowSettings()
         self.state = State.OFF
-        self.warn_throttled: Callable[[Text], None] = lambda text: vehicle.text(Severity.WARNING, text)
+        self.warn_throttled: Callable[[OperatorText], None] = lambda text: vehicle.text(Severity.WARNING, text)
         self._vehicle = vehicle
         self._motion = motion
         self._clock = clock
         self._leader: Hashable = None
         self._heard_at = 0.0
         self._silence = Alarm(self._expired)
-        self._follower = Follower(self.settings)
-        self._controller = Controller(self._motion())
+        self._follower = TargetFollower(self.settings)
+        self._controller = VelocityController(self._motion())
         self._kept_height: float | None = None
         """m above take-off, kept while the target asks for a height that is too low."""
 
@@ -88,9 +88,9 @@ class FollowFlight:
         vehicle.select(FlightMode.FOLLOW, self)
         self.state = TRANSITIONS[self.state][Event.ENGAGE]
         self._leader = None
-        self._follower = Follower(self.settings)
+        self._follower = TargetFollower(self.settings)
         self._kept_height = None
-        self._controller = Controller(self._motion())
+        self._controller = VelocityController(self._motion())
         self._heard_at = self._clock.monotonic()
         self._watch(PATIENCE)
 
@@ -114,12 +114,12 @@ class FollowFlight:
         self._watch(SILENCE)
         self._fly(now)
 
-    def _objection(self, seen: Sighting) -> Text | None:
+    def _objection(self, seen: Sighting) -> OperatorText | None:
         here = self._vehicle.place
         if here is None:
             return texts.NO_FIX
         try:
-            check_on_earth(Place(seen.latitude, seen.longitude), texts.TARGET)
+            check_on_earth(GeoPoint(seen.latitude, seen.longitude), texts.TARGET)
         except Refused as refusal:
             return refusal.reason
         distance = geo.distance(here.latitude, here.longitude, seen.latitude, seen.longitude)
@@ -170,7 +170,9 @@ class FollowFlight:
             motion = self._motion()
             wanted = self._follower.aim(motion.north, motion.east, self._height(), now)
             if wanted is not None and vehicle.place is not None and motion.reference is not None:
-                place = Place(*geo.destination(*motion.reference, wanted.x.position or 0.0, wanted.y.position or 0.0))
+                place = GeoPoint(
+                    *geo.destination(*motion.reference, wanted.x.position or 0.0, wanted.y.position or 0.0)
+                )
                 check_place(vehicle, place)
                 sticks = self._controller.sticks(wanted, limits, now) or sticks
         except Refused as refusal:

@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 
 from anafi_mav import texts, units
 from anafi_mav.drone import MoveEnd, Position
-from anafi_mav.texts import Text
+from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.bounds import check_height, check_place
-from anafi_mav.vehicle.base.geo_point import Place
+from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
 
@@ -29,7 +29,7 @@ Some millimetres distinguish two of them.
 class Goto:
     """Target of a guided move."""
 
-    place: Place
+    place: GeoPoint
     ato: float
     """m above take-off."""
     yaw: float | None
@@ -60,7 +60,7 @@ class GuidedFlight:
     def __init__(self, vehicle: Aircraft) -> None:
         self._vehicle = vehicle
         self._goto: Goto | None = None
-        self._arrived: tuple[Place, Position | None] | None = None
+        self._arrived: tuple[GeoPoint, Position | None] | None = None
         """Target of the last completed move, and the drone's newest GPS location then."""
 
     @property
@@ -74,9 +74,9 @@ class GuidedFlight:
         if vehicle.selected is not FlightMode.GUIDED:
             return None
         target = move.target
-        return Goto(Place(target.latitude, target.longitude), target.altitude, None, None, FlightMode.GUIDED)
+        return Goto(GeoPoint(target.latitude, target.longitude), target.altitude, None, None, FlightMode.GUIDED)
 
-    def check(self, place: Place | None, ato: float | None) -> None:
+    def check(self, place: GeoPoint | None, ato: float | None) -> None:
         """Raise `Refused` for a place or height (m, above take-off) that cannot be flown to now.
 
         None is not checked.
@@ -88,7 +88,7 @@ class GuidedFlight:
 
     async def reposition(
         self,
-        place: Place | None,
+        place: GeoPoint | None,
         ato: float | None,
         yaw: float | None,
         speed: float | None = None,
@@ -165,7 +165,7 @@ class GuidedFlight:
         turn = 0.0 if yaw is None or state.attitude is None else units.wrap_pi(yaw - state.attitude.yaw)
         await vehicle.drone.piloting.move_by(0.0, 0.0, state.altitude - ato, turn)
 
-    async def _begin(self, what: Text, mode: FlightMode) -> None:
+    async def _begin(self, what: OperatorText, mode: FlightMode) -> None:
         """Stop the drone for a moveBy. Raises `Refused`, with `what` for the text."""
         vehicle = self._vehicle
         if (descent := vehicle.descent) is not None:
@@ -192,7 +192,7 @@ class GuidedFlight:
         self._arrived = None
 
     @property
-    def _standing(self) -> Place | None:
+    def _standing(self) -> GeoPoint | None:
         """Target of the last move while the drone's GPS location is still from before the arrival.
 
         A location is reported once a second only, and to use it would fly the drone back by some metres.
@@ -201,6 +201,6 @@ class GuidedFlight:
             return None
         return self._arrived[0]
 
-    def _on_arrival(self, place: Place, ended: asyncio.Future[MoveEnd]) -> None:
+    def _on_arrival(self, place: GeoPoint, ended: asyncio.Future[MoveEnd]) -> None:
         if not ended.cancelled() and ended.result() is MoveEnd.DONE:
             self._arrived = place, self._vehicle.drone.gps.state.location

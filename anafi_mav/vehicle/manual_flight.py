@@ -22,7 +22,7 @@ from anafi_mav import texts
 from anafi_mav.clock import Alarm, Clock
 from anafi_mav.drone import PilotingCommand
 from anafi_mav.errors import LinkLost
-from anafi_mav.texts import Text
+from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.clients import system_of
 from anafi_mav.vehicle.base.modes import FlightMode
@@ -94,7 +94,7 @@ class ManualFlight:
         self.override = JoystickOverride()
         self._overridable = overridable
         self._overriding = False
-        self.warn_throttled: Callable[[Text], None] = lambda text: vehicle.text(Severity.WARNING, text)
+        self.warn_throttled: Callable[[OperatorText], None] = lambda text: vehicle.text(Severity.WARNING, text)
         self.state = State.IDLE
         self._vehicle = vehicle
         self._clock = clock
@@ -171,7 +171,7 @@ class ManualFlight:
         """
         vehicle, mode = self._vehicle, self._vehicle.mode
         meant = max(abs(sticks.forward), abs(sticks.right), abs(sticks.turn)) >= MEANT
-        reason: Text | None = None
+        reason: OperatorText | None = None
         if vehicle.on_ground:
             if sticks.climb <= -GESTURE and sticks.turn >= GESTURE:
                 reason = texts.STICKS_DO_NOT_ARM

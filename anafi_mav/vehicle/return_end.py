@@ -32,10 +32,10 @@ from anafi_mav.drone.events import (
     RthState,
 )
 from anafi_mav.errors import AnafiMavError, LinkLost
-from anafi_mav.texts import Text
+from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.flying import LANDING
-from anafi_mav.vehicle.base.geo_point import Place
+from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.severity import Severity
 
 logger = logging.getLogger(__name__)
@@ -107,7 +107,7 @@ class _GivenHome:
     """A home that a client chose through this gateway, or a rally point."""
 
     place: Position
-    label: Text
+    label: OperatorText
     flight_id: str | None
     """Of the flight in which it was chosen; None where the drone reports none."""
 
@@ -136,7 +136,7 @@ class ReturnEnd:
         """The mode is Return though the drone reports none: it waits above home, or lands."""
         return self._attempt is not None and self._attempt.phase in (_Phase.WAITING, _Phase.LANDING)
 
-    def set_home(self, place: Position, label: Text) -> None:
+    def set_home(self, place: Position, label: OperatorText) -> None:
         """A client has set the drone's custom home, or a rally point has become it."""
         if not self._vehicle.on_ground:
             self._given = _GivenHome(place, label, self._vehicle.drone.product.state.flight_id)
@@ -302,7 +302,7 @@ class ReturnEnd:
         accuracy = texts.PRECISE if precise else texts.GPS_ONLY
         vehicle.text(Severity.NOTICE, texts.LANDING_PLACE.fill(place=self._label, accuracy=accuracy))
 
-    def _hover(self, reason: Text | None) -> None:
+    def _hover(self, reason: OperatorText | None) -> None:
         """The return is over, and the drone stays in the air.
 
         `reason`: why it does not land, where it was to.
@@ -346,7 +346,7 @@ class ReturnEnd:
 
     # Where and how.
 
-    def objection(self, *, arrived: bool = False) -> Text | None:
+    def objection(self, *, arrived: bool = False) -> OperatorText | None:
         """Return why the gateway leaves the drone hovering at home, in a few words; None: it lands.
 
         `arrived`: also compare the drone's place with home.
@@ -373,7 +373,7 @@ class ReturnEnd:
         metres = max(_metres(vehicle.place, target) or 0.0, _metres(vehicle.place, home.location) or 0.0)
         return texts.HOVER_FROM_HOME.fill(distance=metres) if metres > NEAR_HOME else None
 
-    def _late_objection(self) -> Text | None:
+    def _late_objection(self) -> OperatorText | None:
         """`objection`, and what may have happened while the drone waited above home."""
         vehicle = self._vehicle
         if not vehicle.in_air or vehicle.returning:
@@ -394,7 +394,7 @@ class ReturnEnd:
         return given if apart < SAME_PLACE else None
 
     @property
-    def _label(self) -> Text:
+    def _label(self) -> OperatorText:
         chosen = self._chosen
         if self._vehicle.drone.home.state.type == RthHomeType.CUSTOM and chosen is not None:
             return chosen.label
@@ -417,7 +417,7 @@ class ReturnEnd:
         return self._drone_lands or (self.ending is EndOfReturn.LAND and self.objection() is None)
 
     @property
-    def _prospect(self) -> Text:
+    def _prospect(self) -> OperatorText:
         """The end of a return that begins now, as the end of a text."""
         if self._drone_lands:
             return texts.LANDS_BY_SETTING
@@ -435,7 +435,7 @@ _UNCERTAIN_HOMES = {
 """Homes that move, or that no client chose in this flight: the drone is left hovering there."""
 
 
-def _metres(place: Place | None, other: Position | None) -> float | None:
+def _metres(place: GeoPoint | None, other: Position | None) -> float | None:
     """The distance over ground, m; None when one of the places is unknown."""
     if place is None or other is None:
         return None

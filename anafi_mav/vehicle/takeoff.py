@@ -15,7 +15,7 @@ from anafi_mav import texts
 from anafi_mav.clock import Alarm
 from anafi_mav.drone.events import AltitudeChanged, FlyingState, FlyingStateChanged
 from anafi_mav.errors import AnafiMavError
-from anafi_mav.texts import Text
+from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.aircraft import STOP_WAIT, Aircraft
 from anafi_mav.vehicle.base.bounds import check_height
 from anafi_mav.vehicle.base.flying import AIRBORNE
@@ -213,7 +213,7 @@ class Takeoff:
         self._armed = False
         self._vehicle.changed()
 
-    async def over(self, what: Text) -> None:
+    async def over(self, what: OperatorText) -> None:
         """Wait until an accepted take-off has reached its height.
 
         Returns at once when the drone does not rise. When a Hold has ended the climb, the drone still rises to its

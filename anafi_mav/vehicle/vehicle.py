@@ -38,12 +38,12 @@ from anafi_mav.drone.events import (
     TakeoffLocation,
 )
 from anafi_mav.errors import CommandRejected
-from anafi_mav.texts import Text
+from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.aborted_return import AbortedReturn
 from anafi_mav.vehicle.base.aircraft import STOP_WAIT, Aircraft
 from anafi_mav.vehicle.base.clients import system_of
 from anafi_mav.vehicle.base.flying import AIRBORNE, LANDING, ON_GROUND, TAKING_OFF
-from anafi_mav.vehicle.base.geo_point import Place
+from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.height import ESTIMATE_ERROR, TakeoffRecord
 from anafi_mav.vehicle.base.helm import Helm
 from anafi_mav.vehicle.base.link_loss import LossPolicy
@@ -124,7 +124,7 @@ class Vehicle(Aircraft):
         clock: Clock,
         *,
         allow_kill: bool,
-        text: Callable[[Severity, Text], None],
+        text: Callable[[Severity, OperatorText], None],
         changed: Callable[[], None],
         end_others: Callable[[], list[asyncio.Task[None]]],
     ) -> None:
@@ -199,7 +199,7 @@ class Vehicle(Aircraft):
         return self._clock.monotonic() - self._located_at > patience
 
     @property
-    def place(self) -> Place | None:
+    def place(self) -> GeoPoint | None:
         """Return the drone's position; None without a fix, and in flight while the newest is old."""
         return None if self.position_is_old else super().place
 
@@ -425,7 +425,7 @@ class Vehicle(Aircraft):
         return self.landing or self.returning or self._returns_sent > 0
 
     @property
-    def descent(self) -> Text | None:
+    def descent(self) -> OperatorText | None:
         return texts.LANDS if self.landing else texts.RETURNS if self.descends else None
 
     @property
@@ -435,7 +435,7 @@ class Vehicle(Aircraft):
         forced = alerts.forced_landing not in (None, ForcedLandingReason.NONE) and not alerts.forced_landing_delay_s
         return self.flying_state == FlyingState.EMERGENCY_LANDING or (forced and self.flying_state in LANDING)
 
-    def _require_endable(self, what: Text, by: Right | None) -> None:
+    def _require_endable(self, what: OperatorText, by: Right | None) -> None:
         """Raise `Refused` when the drone lands or returns, and `by` may not end that."""
         all_of_them = by is not None and by.extent is Extent.ALL
         if self.landing:
@@ -457,7 +457,7 @@ class Vehicle(Aircraft):
         elif by is None and self._returns_sent > 0:
             raise Refused(what, texts.RETURNS)
 
-    def _require_own_endable(self, what: Text, by: Right | None) -> None:
+    def _require_own_endable(self, what: OperatorText, by: Right | None) -> None:
         if by is None:
             raise Refused(what, texts.RETURNS_BY_ITSELF)
         if self.drone.home.state.reason == ReturnReason.MOTOR_DOWN:
@@ -465,7 +465,7 @@ class Vehicle(Aircraft):
         if not by.counted:
             raise Refused(what, NOT_COUNTED)
 
-    async def _free(self, what: Text, by: Right) -> None:
+    async def _free(self, what: OperatorText, by: Right) -> None:
         """End a landing or return that `by` may end; returns when the drone hovers.
 
         Returns at once when the drone neither lands nor returns.
@@ -476,7 +476,7 @@ class Vehicle(Aircraft):
             with self._selected_no_more(FlightMode.HOLD):
                 await self._stop(what, by)
 
-    async def _stop(self, what: Text, by: Right | None, *, own: bool = False) -> None:
+    async def _stop(self, what: OperatorText, by: Right | None, *, own: bool = False) -> None:
         """Hover, and end the landing or return that `by` may end.
 
         `own`: the drone returned by itself when the command arrived. A return that it begins afterwards goes on.
@@ -536,7 +536,7 @@ class Vehicle(Aircraft):
         self.aborted_return = AbortedReturn(by.system, reason)
         self.aborted_return.report(self, self._clock.monotonic())
 
-    async def _end_landing(self, what: Text, by: Right | None, *, take_off: bool = False) -> None:
+    async def _end_landing(self, what: OperatorText, by: Right | None, *, take_off: bool = False) -> None:
         """End the landing that the drone flies; at once when it flies none."""
         if self.flying_state not in LANDING:
             return
@@ -629,7 +629,7 @@ class Vehicle(Aircraft):
         """
         location = self.drone.home.state.takeoff_location
         if location is not None and self.flying_state is not None and not self.on_ground:
-            self.origin = Place(location.latitude, location.longitude)
+            self.origin = GeoPoint(location.latitude, location.longitude)
 
     def link_up(self, kept: TakeoffRecord | None) -> None:
         """Begin with a drone that has reported all its states.
@@ -642,19 +642,19 @@ class Vehicle(Aircraft):
         if self.flying_state is not None and not self.on_ground:
             self.origin = self._origin_in_flight(kept)
 
-    def _origin_in_flight(self, kept: TakeoffRecord | None) -> Place | None:
+    def _origin_in_flight(self, kept: TakeoffRecord | None) -> GeoPoint | None:
         """Return where a drone took off that was found in the air; None when nothing reports it."""
         home, flight = self.drone.home.state, self.drone.product.state.flight_id
         if (location := home.takeoff_location) is not None:
-            return Place(location.latitude, location.longitude)
+            return GeoPoint(location.latitude, location.longitude)
         if kept is not None and kept.flight_id == flight and kept.latitude is not None and kept.longitude is not None:
-            return Place(kept.latitude, kept.longitude)
+            return GeoPoint(kept.latitude, kept.longitude)
         if home.type == RthHomeType.TAKEOFF and home.location is not None:
-            return Place(home.location.latitude, home.location.longitude)
+            return GeoPoint(home.location.latitude, home.location.longitude)
         return None
 
     @property
-    def standing_warnings(self) -> list[Text]:
+    def standing_warnings(self) -> list[OperatorText]:
         """Texts that stay true for a while: a client that connects later gets them with its banner."""
         warnings = [ESTIMATED] if self.height.estimated and not self.on_ground else []
         return [*warnings, texts.ROLL_SIGN_INVERTED] if self.roll.inverted else warnings

@@ -12,7 +12,7 @@ from support.world import world
 
 from anafi_mav.drone.events import AttitudeChanged
 from anafi_mav.mavlink import dialect as newer
-from anafi_mav.services.stream import Stream, Times
+from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.services.telemetry import telemetry_flight
 from anafi_mav.vehicle.vehicle import Vehicle
 
@@ -152,7 +152,7 @@ async def test_message_added_by_one_row_leaves_at_its_default_interval(monkeypat
             None if attitude is None else newer.MAVLink_named_value_float_message(times.boot_ms, b"yaw", attitude.yaw)
         )
 
-    row = Stream(heading, (AttitudeChanged,), every=0.5)
+    row = MessageStream(heading, (AttitudeChanged,), every=0.5)
     monkeypatch.setitem(telemetry_flight.STREAMS, newer.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT, row)
     async with world(speed=1.0) as w:
         assert await rates(w.client, ["NAMED_VALUE_FLOAT"], 6.0) == {"NAMED_VALUE_FLOAT": pytest.approx(2.0, rel=0.2)}

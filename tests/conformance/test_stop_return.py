@@ -19,7 +19,7 @@ from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.messages.rth import RthHomeReachability, StateReason
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.sim.autopilot import power
-from anafi_mav.sim.autopilot.homing import Phase
+from anafi_mav.sim.autopilot.homing import ReturnPhase
 from anafi_mav.sim.world.faults import Impairment
 from anafi_mav.sim.world.quirks import Quirk
 from anafi_mav.vehicle.hold_rule import APART
@@ -45,7 +45,7 @@ async def hold(client: Client) -> int:
     return int((await client.command(SET_MODE, *PX4_HOLD, timeout=12.0)).result)
 
 
-async def in_phase(w: World, phase: Phase) -> None:
+async def in_phase(w: World, phase: ReturnPhase) -> None:
     """Wait until the return of the simulated drone has come to this phase."""
 
     await w.drone.wait_log(lambda entry: w.drone.firmware.homing.phase is phase, 60.0)
@@ -64,25 +64,25 @@ async def away(w: World) -> None:
     w.simulator.speed = speed
 
 
-PHASES = [Phase.PENDING, Phase.CLIMB, Phase.CRUISE, Phase.DESCEND]
+PHASES = [ReturnPhase.PENDING, ReturnPhase.CLIMB, ReturnPhase.CRUISE, ReturnPhase.DESCEND]
 
 
 @pytest.mark.parametrize("phase", PHASES)
 @pytest.mark.parametrize("own", [False, True])
-async def test_second_clients_hold_ends_a_return_in_each_phase(phase: Phase, own: bool) -> None:
+async def test_second_clients_hold_ends_a_return_in_each_phase(phase: ReturnPhase, own: bool) -> None:
     """200 ms each way, a quarter lost."""
     async with world(speed=1.0) as w:
         other = await w.connect(sysid=250)
         await away(w)
-        if phase is Phase.PENDING:  # a firmware that never hovers keeps the return waiting
+        if phase is ReturnPhase.PENDING:  # a firmware that never hovers keeps the return waiting
             w.drone.faults.quirks = frozenset({Quirk.FLAG_REMEMBERED})
             flag_sticks(w)
             await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "flying", 5.0)
         if own:
-            by_itself(w, StateReason.ICING if phase is Phase.PENDING else StateReason.LOW_BATTERY)
+            by_itself(w, StateReason.ICING if phase is ReturnPhase.PENDING else StateReason.LOW_BATTERY)
         else:
             w.client.send_command(RTL)
-            if phase is Phase.PENDING:
+            if phase is ReturnPhase.PENDING:
                 flag_sticks(w)
         await in_phase(w, phase)
         await w.client.heartbeat(lambda beat: beat.custom_mode == RETURN)
@@ -91,11 +91,11 @@ async def test_second_clients_hold_ends_a_return_in_each_phase(phase: Phase, own
         assert await hold(other) == ACCEPTED
         assert heard(w, "abort") != []
         await other.heartbeat(lambda beat: beat.custom_mode == HOLD, since=mark)
-        assert w.drone.firmware.homing.phase is Phase.IDLE
+        assert w.drone.firmware.homing.phase is ReturnPhase.IDLE
         where = w.drone.pose
         await watched(3.0)
         assert abs(w.drone.pose.north - where.north) < 10.0
-        assert w.drone.firmware.homing.phase is Phase.IDLE
+        assert w.drone.firmware.homing.phase is ReturnPhase.IDLE
         if own:
             await text(w.client, "Return aborted by system 250: ")
 

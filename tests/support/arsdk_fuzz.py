@@ -13,7 +13,16 @@ import anafi_mav.arsdk.messages as tables
 from anafi_mav.arsdk.codec import wire
 from anafi_mav.arsdk.codec.wire import Bits, Blob, Buffer, Message, MessageId, Scalar, Text, UnknownMessage
 from anafi_mav.arsdk.link.frame import FrameType, encode_frame
-from anafi_mav.arsdk.link.transport import MAX_QUEUED, Delivered, Event, Garbage, Received, Role, Transport, Undelivered
+from anafi_mav.arsdk.link.transport import (
+    MAX_QUEUED,
+    Delivered,
+    Event,
+    Garbage,
+    ReceivedMessage,
+    Role,
+    Transport,
+    Undelivered,
+)
 from anafi_mav.arsdk.messages import ardrone3
 
 WARM_UP = 20_000
@@ -57,8 +66,8 @@ def throw(role: Role, version: int, count: int, seed: str) -> Outcome:
         victim.outgoing(now)
         events += victim.expire(now)
         for event in events:
-            assert isinstance(event, Received | Delivered | Undelivered | Garbage), event
-            messages += isinstance(event, Received)
+            assert isinstance(event, ReceivedMessage | Delivered | Undelivered | Garbage), event
+            messages += isinstance(event, ReceivedMessage)
             garbage += isinstance(event, Garbage)
     end = _memory(victim)
     # It is as it was: it answers a ping.

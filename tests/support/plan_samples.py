@@ -16,11 +16,11 @@ from anafi_mav.plans.plan import (
     MISSION,
     RELATIVE,
     WAYPOINT,
-    Circle,
+    FenceCircle,
+    FencePolygon,
     Item,
     Plan,
     Point,
-    Polygon,
 )
 
 T = TypeVar("T")
@@ -67,8 +67,8 @@ FLIGHT = Plan(
     ),
     home=Point(LAT, LON, 35.0),
     zones=(
-        Polygon(True, ((LAT + 0.01, LON + 0.01), (LAT - 0.01, LON + 0.01), (LAT, LON - 0.01))),
-        Circle(False, (LAT + 0.002, LON), 12.5),
+        FencePolygon(True, ((LAT + 0.01, LON + 0.01), (LAT - 0.01, LON + 0.01), (LAT, LON - 0.01))),
+        FenceCircle(False, (LAT + 0.002, LON), 12.5),
     ),
     breach_return=Point(LAT, LON, 30.0),
     rally=(Point(LAT + 0.001, LON, 20.0), Point(LAT, LON + 0.001, 25.5)),
@@ -187,12 +187,12 @@ def _item(random: Random, size: int) -> Item:
     return Item(random.choice(_COMMANDS), random.choice([2, 3, 0]), (one, two, three, four, five, six, seven), go)
 
 
-def _zone(random: Random) -> Polygon | Circle:
+def _zone(random: Random) -> FencePolygon | FenceCircle:
     inclusion, group = random.random() < 0.5, random.randrange(4)
     if random.random() < 0.5:
-        return Polygon(inclusion, tuple(_place(random) for _ in range(random.randint(3, 6))), group)
+        return FencePolygon(inclusion, tuple(_place(random) for _ in range(random.randint(3, 6))), group)
     centre = None if inclusion and random.random() < 0.3 else _place(random)
-    return Circle(inclusion, centre, random.choice([0.5, 1e5, random.uniform(0.5, 1e5)]), group)
+    return FenceCircle(inclusion, centre, random.choice([0.5, 1e5, random.uniform(0.5, 1e5)]), group)
 
 
 def plan_of(seed: int) -> Plan:

@@ -12,7 +12,7 @@ from anafi_mav.services.flavours import PX4, Flavour
 from anafi_mav.services.plan.item_messages import item_float, item_int, item_of
 from anafi_mav.services.plan.plan_protocol import PlanDesk
 from anafi_mav.services.plan.plan_transfer import Changed, Commit, Effect, Peer, PlanKind, Reply, Say
-from anafi_mav.vehicle.fence.plan_items import Fault, PlanItem
+from anafi_mav.vehicle.fence.plan_items import PlanFault, PlanItem
 
 MISSION, FENCE, RALLY = range(3)
 
@@ -24,10 +24,10 @@ class Kind(PlanKind):
         self.mission_type, self.name = mission_type, name
 
     def check_item(self, item: PlanItem) -> Any:
-        return Fault(dialect.MAV_MISSION_UNSUPPORTED, "nobody wants it") if item.command == 666 else None
+        return PlanFault(dialect.MAV_MISSION_UNSUPPORTED, "nobody wants it") if item.command == 666 else None
 
     def check_plan(self, items: Any, flavour: Any = None) -> Any:
-        return Fault(dialect.MAV_MISSION_INVALID, "it ends badly") if items and items[-1].command == 667 else None
+        return PlanFault(dialect.MAV_MISSION_INVALID, "it ends badly") if items and items[-1].command == 667 else None
 
 
 def desk() -> PlanDesk:

@@ -28,7 +28,7 @@ from anafi_mav.arsdk.link.handshake import DeviceInfo
 from anafi_mav.arsdk.messages import animation, ardrone3, common, follow_me, rth
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState, MoveToStatus, PoiMode
 from anafi_mav.sim.skycontroller import Skycontroller
-from anafi_mav.sim.world.place import Origin
+from anafi_mav.sim.world.place import WorldOrigin
 from support.sim_bench import HOME, Bench
 
 MODELS = ("4k", "thermal", "usa", "ai")
@@ -88,7 +88,7 @@ def _idling(model: str) -> Bench:
 
 def _moving(model: str) -> Bench:
     bench = _flying(model)
-    place = Origin(*HOME).place(80.0, 0.0)
+    place = WorldOrigin(*HOME).place(80.0, 0.0)
     bench.send(ardrone3.MoveTo(*place, 10.0, ardrone3.OrientationMode.NONE, 0.0))
     bench.run(0.5)
     return bench
@@ -96,7 +96,7 @@ def _moving(model: str) -> Bench:
 
 def _looking(model: str) -> Bench:
     bench = _flying(model)
-    place = Origin(*HOME).place(20.0, 0.0)
+    place = WorldOrigin(*HOME).place(20.0, 0.0)
     bench.send(ardrone3.StartPilotedPOIV2(*place, 0.0, PoiMode.LOCKED_GIMBAL))
     bench.run(0.5)
     return bench

@@ -8,7 +8,7 @@ from contextlib import asynccontextmanager
 
 from anafi_mav.arsdk.video import rtcp, rtsp
 from anafi_mav.arsdk.video.rtp_h264 import Picture, PictureReceiver
-from anafi_mav.arsdk.video.rtsp import MessageReader, Request, Response
+from anafi_mav.arsdk.video.rtsp import MessageReader, Response, RtspRequest
 from anafi_mav.arsdk.video.sdp import SessionDescription, parse_description
 
 LIMIT = 10.0
@@ -98,7 +98,7 @@ class Viewer:
         lines = [("CSeq", str(self._cseq)), *((name.replace("_", "-"), value) for name, value in headers.items())]
         if self.session and "Session" not in headers:
             lines.append(("Session", self.session))
-        self.writer.write(rtsp.encode(Request(method, self.base + path, tuple(lines))))
+        self.writer.write(rtsp.encode(RtspRequest(method, self.base + path, tuple(lines))))
         response = await self.answer()
         assert response.cseq == self._cseq
         return response

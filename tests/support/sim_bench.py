@@ -14,7 +14,7 @@ from anafi_mav.sim.world.airframe import Body
 from anafi_mav.sim.world.faults import Faults
 from anafi_mav.sim.world.model import MODELS
 from anafi_mav.sim.world.motion import STEP, Motion, Pose
-from anafi_mav.sim.world.place import Origin
+from anafi_mav.sim.world.place import WorldOrigin
 
 HOME = (48.8789, 2.3677, 35.0)
 
@@ -36,7 +36,7 @@ class Bench:
             model,
             Identity("PI040416DA9H000001", "ANAFI-H000001", "boot", "run"),
             self.body,
-            Origin(*HOME),
+            WorldOrigin(*HOME),
             self._hear,
             lambda name, args: self.notes.append(args),
             self.faults,

@@ -25,8 +25,8 @@ from anafi_mav.arsdk.messages.ardrone3 import PCMD, OrientationMode
 from anafi_mav.drone import Limits
 from anafi_mav.drone.piloting.sticks import percent
 from anafi_mav.sim.world.motion import STEP
-from anafi_mav.vehicle.base.geo_point import Place
-from anafi_mav.vehicle.base.velocity_loop import Controller, Motion
+from anafi_mav.vehicle.base.geo_point import GeoPoint
+from anafi_mav.vehicle.base.velocity_loop import MotionEstimate, VelocityController
 from anafi_mav.vehicle.circle import Circle, Lap
 from support.sim_bench import HOME, Bench
 
@@ -98,9 +98,9 @@ def _sticks(*parts: tuple[float, float, tuple[int, int, int, int]]) -> Callable[
 
 def _orbit() -> Pilot:
     """The gateway's orbit from 12 s on: clockwise, 20 m around a place, 4 m/s, with the aircraft's report rates."""
-    motion, limits = Motion(), Limits(tilt_deg=25.0, yaw_rate_dps=90.0, climb_mps=3.0)
-    lap = Lap(Circle(Place(*_place(20.0, 0.0)), 20.0, 1, 4.0, 15.0))
-    controller = Controller(motion)
+    motion, limits = MotionEstimate(), Limits(tilt_deg=25.0, yaw_rate_dps=90.0, climb_mps=3.0)
+    lap = Lap(Circle(GeoPoint(*_place(20.0, 0.0)), 20.0, 1, 4.0, 15.0))
+    controller = VelocityController(motion)
     last: list[PCMD] = []
 
     def pilot(bench: Bench, t: float) -> PCMD | None:

@@ -17,19 +17,19 @@ from anafi_mav.texts import (
     STATUSTEXT_BYTES,
     Notice,
     NoticeTemplate,
+    OperatorText,
     Reason,
     ReasonTemplate,
     Template,
-    Text,
 )
 
 PACKAGE = Path(texts.__file__).parent
-TABLE = {name: value for name, value in vars(texts).items() if isinstance(value, Text | Template)}
+TABLE = {name: value for name, value in vars(texts).items() if isinstance(value, OperatorText | Template)}
 RELATIVE = re.compile(r"\b(who|whom|whose|which)\b")
 
 
-def longest(entry: Text | Template) -> str:
-    return entry if isinstance(entry, Text) else entry.fill(**entry.longest)
+def longest(entry: OperatorText | Template) -> str:
+    return entry if isinstance(entry, OperatorText) else entry.fill(**entry.longest)
 
 
 def refusals() -> Iterator[tuple[str, str]]:
@@ -85,6 +85,6 @@ def test_texts_of_the_table_are_used() -> None:
 
 
 def test_texts_are_different() -> None:
-    values = [entry if isinstance(entry, Text) else entry.pattern for entry in TABLE.values()]
+    values = [entry if isinstance(entry, OperatorText) else entry.pattern for entry in TABLE.values()]
     same = {value for value in values if values.count(value) > 1}
     assert sorted(same) == []

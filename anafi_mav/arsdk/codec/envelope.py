@@ -3,7 +3,7 @@
 Feature 133, generic, carries them. It has four messages of the form ``service id u16, number u16, payload binary``:
 commands and events, with and without acknowledgement. The service id is a hash of the service's name; the payload is
 the service's own message, a oneof of all its alternatives, with the one field `number` set (Olympe,
-olympe/messaging/arsdk_messages.py). A declared message is a `Record` and a `wire.Message` at once, and is sent and
+olympe/messaging/arsdk_messages.py). A declared message is a `Submessage` and a `wire.Message` at once, and is sent and
 received as any other::
 
     COMMAND = Service("arsdk.camera.Command", "camera2.Command")
@@ -22,7 +22,7 @@ from functools import cached_property
 from typing import ClassVar, TypeVar
 
 from anafi_mav.arsdk.codec import wire
-from anafi_mav.arsdk.codec.protobuf import Malformed, Record, chunk, parse, serialize, walk
+from anafi_mav.arsdk.codec.protobuf import MalformedProtobuf, Submessage, chunk, parse, serialize, walk
 from anafi_mav.arsdk.codec.wire import HEADER, Buffer, Direction, Message, MessageId, UnknownMessage
 from anafi_mav.errors import LocalProtocolError
 
@@ -33,10 +33,10 @@ ENVELOPE = struct.Struct("<HHI")
 """service id, number, length of the payload."""
 
 
-class ProtobufMessage(Message, Record, frozen=True):
+class ProtobufMessage(Message, Submessage, frozen=True):
     """Base of the messages of a service."""
 
-    SERVICE: ClassVar[Service]
+    SERVICE: ClassVar[ProtobufEnvelope]
     NUMBER: ClassVar[int]
     """The field of the service's message that this one is."""
 
@@ -45,7 +45,7 @@ ProtobufMessageT = TypeVar("ProtobufMessageT", bound=ProtobufMessage)
 
 
 @dataclass(frozen=True)
-class Service:
+class ProtobufEnvelope:
     """One of the two top-level messages of a .proto file, `Command` or `Event`.
 
     It carries all other messages. Named by its full name: "arsdk.camera.Command".
@@ -131,7 +131,7 @@ def _open(declared: type[ProtobufMessage], payload: bytes) -> ProtobufMessage | 
     """
     try:
         parts = [raw for number, _, raw in walk(payload) if number == declared.NUMBER and isinstance(raw, bytes)]
-    except Malformed:
+    except MalformedProtobuf:
         return None
     return parse(declared, b"".join(parts)) if parts else None
 

@@ -34,7 +34,7 @@ MAX_NESTING = 16
 _VARINT, _FIXED64, _BYTES, _FIXED32 = 0, 1, 2, 5
 
 
-class Kind(enum.Enum):
+class FieldType(enum.Enum):
     """The type of a field, by its name in a .proto file; all messages are RECORD."""
 
     INT32 = "int32"
@@ -57,40 +57,40 @@ class Kind(enum.Enum):
 
 
 INT32, INT64, UINT32, UINT64, SINT32, SINT64 = (
-    Kind.INT32,
-    Kind.INT64,
-    Kind.UINT32,
-    Kind.UINT64,
-    Kind.SINT32,
-    Kind.SINT64,
+    FieldType.INT32,
+    FieldType.INT64,
+    FieldType.UINT32,
+    FieldType.UINT64,
+    FieldType.SINT32,
+    FieldType.SINT64,
 )
 BOOL, ENUM, FLOAT, DOUBLE, STRING, BYTES, RECORD = (
-    Kind.BOOL,
-    Kind.ENUM,
-    Kind.FLOAT,
-    Kind.DOUBLE,
-    Kind.STRING,
-    Kind.BYTES,
-    Kind.RECORD,
+    FieldType.BOOL,
+    FieldType.ENUM,
+    FieldType.FLOAT,
+    FieldType.DOUBLE,
+    FieldType.STRING,
+    FieldType.BYTES,
+    FieldType.RECORD,
 )
 
 _FIXED = {
-    Kind.FIXED32: struct.Struct("<I"),
-    Kind.SFIXED32: struct.Struct("<i"),
-    Kind.FLOAT: struct.Struct("<f"),
-    Kind.FIXED64: struct.Struct("<Q"),
-    Kind.SFIXED64: struct.Struct("<q"),
-    Kind.DOUBLE: struct.Struct("<d"),
+    FieldType.FIXED32: struct.Struct("<I"),
+    FieldType.SFIXED32: struct.Struct("<i"),
+    FieldType.FLOAT: struct.Struct("<f"),
+    FieldType.FIXED64: struct.Struct("<Q"),
+    FieldType.SFIXED64: struct.Struct("<q"),
+    FieldType.DOUBLE: struct.Struct("<d"),
 }
 _RANGES = {
-    Kind.INT32: (-(1 << 31), (1 << 31) - 1),
-    Kind.SINT32: (-(1 << 31), (1 << 31) - 1),
-    Kind.ENUM: (-(1 << 31), (1 << 31) - 1),
-    Kind.INT64: (-(1 << 63), (1 << 63) - 1),
-    Kind.SINT64: (-(1 << 63), (1 << 63) - 1),
-    Kind.UINT32: (0, (1 << 32) - 1),
-    Kind.UINT64: (0, (1 << 64) - 1),
-    Kind.BOOL: (0, 1),
+    FieldType.INT32: (-(1 << 31), (1 << 31) - 1),
+    FieldType.SINT32: (-(1 << 31), (1 << 31) - 1),
+    FieldType.ENUM: (-(1 << 31), (1 << 31) - 1),
+    FieldType.INT64: (-(1 << 63), (1 << 63) - 1),
+    FieldType.SINT64: (-(1 << 63), (1 << 63) - 1),
+    FieldType.UINT32: (0, (1 << 32) - 1),
+    FieldType.UINT64: (0, (1 << 64) - 1),
+    FieldType.BOOL: (0, 1),
 }
 
 
@@ -99,7 +99,7 @@ class Field:
     """Number and type of a field, and the oneof it belongs to if any."""
 
     number: int
-    kind: Kind
+    kind: FieldType
     oneof: str = ""
 
 
@@ -108,7 +108,7 @@ class Wrapped:
     """A google.protobuf wrapper (DoubleValue, StringValue, …): a scalar whose presence shows."""
 
     number: int
-    kind: Kind
+    kind: FieldType
     oneof: ClassVar[str] = ""
 
 
@@ -117,23 +117,23 @@ class Map:
     """A map field: the types of its key and of its value."""
 
     number: int
-    key: Kind
-    kind: Kind
+    key: FieldType
+    kind: FieldType
     oneof: ClassVar[str] = ""
 
 
-class Record(msgspec.Struct, frozen=True):
+class Submessage(msgspec.Struct, frozen=True):
     """Base of the messages that stand inside others."""
 
     SELECTED: ClassVar[int] = 0
     """Number of the field `selected_fields`; 0: the message has none."""
 
 
-class Empty(Record, frozen=True):
+class Empty(Submessage, frozen=True):
     """google.protobuf.Empty."""
 
 
-RecordT = TypeVar("RecordT", bound=Record)
+RecordT = TypeVar("RecordT", bound=Submessage)
 
 
 # ------------------------------------------------------------------------------------------------ how a class is laid
@@ -163,22 +163,22 @@ class _Plan:
     oneofs: dict[str, tuple[str, ...]]
 
 
-def record_fields(record: type[Record]) -> tuple[FieldPlan, ...]:
+def record_fields(record: type[Submessage]) -> tuple[FieldPlan, ...]:
     """The fields of a record class by rising number."""
     return _plan(record).fields
 
 
-_PLANS: dict[type[Record], _Plan] = {}
+_PLANS: dict[type[Submessage], _Plan] = {}
 
 
-def _plan(record: type[Record]) -> _Plan:
+def _plan(record: type[Submessage]) -> _Plan:
     plan = _PLANS.get(record)
     if plan is None:
         plan = _PLANS[record] = _make_plan(record)
     return plan
 
 
-def _make_plan(record: type[Record]) -> _Plan:
+def _make_plan(record: type[Submessage]) -> _Plan:
     hints = get_type_hints(record, include_extras=True)
     fields = []
     for name in record.__struct_fields__:
@@ -214,7 +214,7 @@ def _field_plan(name: str, annotation: Field | Wrapped | Map, hint: Any) -> Fiel
 # ------------------------------------------------------------------------------------------------------ to bytes
 
 
-def serialize(record: Record) -> bytes:
+def serialize(record: Submessage) -> bytes:
     """The bytes of a record. Raises `LocalProtocolError` when a value does not fit its field."""
     try:
         return _serialize(record, 0)
@@ -222,7 +222,7 @@ def serialize(record: Record) -> bytes:
         raise LocalProtocolError(f"cannot encode {record!r}: {error}") from error
 
 
-def _serialize(record: Record, depth: int) -> bytes:
+def _serialize(record: Submessage, depth: int) -> bytes:
     if depth > MAX_NESTING:
         raise ValueError(f"more than {MAX_NESTING} messages in one another")
     plan = _plan(type(record))
@@ -257,7 +257,7 @@ def _field_bytes(field: FieldPlan, value: Any, selected: bool, depth: int) -> by
             for key, one in value.items()
         )
     if field.repeated:
-        if kind in (Kind.STRING, Kind.BYTES, Kind.RECORD):
+        if kind in (FieldType.STRING, FieldType.BYTES, FieldType.RECORD):
             return b"".join(_element(number, kind, one, field.python, depth) for one in value)
         packed = b"".join(_scalar(kind, one) for one in value)
         return chunk(number, packed) if packed else b""
@@ -265,36 +265,36 @@ def _field_bytes(field: FieldPlan, value: Any, selected: bool, depth: int) -> by
         inner = _element(1, kind, value, field.python, depth)
         return chunk(number, b"" if _is_default(kind, value) else inner)
     # A scalar at its default stays away, except where its being there is what it says.
-    if kind is not Kind.RECORD and (selected or not field.optional) and _is_default(kind, value):
+    if kind is not FieldType.RECORD and (selected or not field.optional) and _is_default(kind, value):
         _scalar(kind, value)
         return b""
     return _element(number, kind, value, field.python, depth)
 
 
-def _is_default(kind: Kind, value: Any) -> bool:
+def _is_default(kind: FieldType, value: Any) -> bool:
     if kind in _FIXED:
         return not any(_FIXED[kind].pack(value))  # minus zero is no default
     return not value
 
 
-def _element(number: int, kind: Kind, value: Any, python: type, depth: int) -> bytes:
-    if kind is Kind.RECORD:
-        if not isinstance(value, python) or not isinstance(value, Record):
+def _element(number: int, kind: FieldType, value: Any, python: type, depth: int) -> bytes:
+    if kind is FieldType.RECORD:
+        if not isinstance(value, python) or not isinstance(value, Submessage):
             raise TypeError(f"{value!r} is no {python.__name__}")
         return chunk(number, _serialize(value, depth + 1))
-    if kind in (Kind.STRING, Kind.BYTES):
+    if kind in (FieldType.STRING, FieldType.BYTES):
         return chunk(number, _scalar(kind, value))
     return _varint(number << 3 | _wire_type(kind)) + _scalar(kind, value)
 
 
-def _scalar(kind: Kind, value: Any) -> bytes:
+def _scalar(kind: FieldType, value: Any) -> bytes:
     if kind in _FIXED:
         return _FIXED[kind].pack(value)
-    if kind is Kind.STRING:
+    if kind is FieldType.STRING:
         if not isinstance(value, str):
             raise TypeError(f"{value!r} is no text")
         return value.encode()
-    if kind is Kind.BYTES:
+    if kind is FieldType.BYTES:
         if not isinstance(value, bytes | bytearray | memoryview):
             raise TypeError(f"{value!r} is no bytes")
         return bytes(value)
@@ -302,13 +302,13 @@ def _scalar(kind: Kind, value: Any) -> bytes:
     low, high = _RANGES[kind]
     if not low <= number <= high:
         raise ValueError(f"{number} is no {kind.value}")
-    if kind in (Kind.SINT32, Kind.SINT64):
+    if kind in (FieldType.SINT32, FieldType.SINT64):
         number = number << 1 if number >= 0 else ~(number << 1)
     return _varint(number & (1 << 64) - 1)
 
 
-def _wire_type(kind: Kind) -> int:
-    if kind in (Kind.STRING, Kind.BYTES, Kind.RECORD):
+def _wire_type(kind: FieldType) -> int:
+    if kind in (FieldType.STRING, FieldType.BYTES, FieldType.RECORD):
         return _BYTES
     fixed = _FIXED.get(kind)
     if fixed is None:
@@ -333,7 +333,7 @@ def _varint(value: int) -> bytes:
 # ---------------------------------------------------------------------------------------------------- from bytes
 
 
-class Malformed(Exception):
+class MalformedProtobuf(Exception):
     """Bytes that are no protocol buffer. It never leaves this package."""
 
 
@@ -344,13 +344,13 @@ def parse(record: type[RecordT], data: bytes) -> RecordT | None:
     """
     try:
         return _parse(record, data, 0)
-    except Malformed:
+    except MalformedProtobuf:
         return None
 
 
 def _parse(record: type[RecordT], data: bytes, depth: int) -> RecordT:
     if depth > MAX_NESTING:
-        raise Malformed
+        raise MalformedProtobuf
     plan = _plan(record)
     values: dict[str, Any] = {}
     parts: dict[str, bytes] = {}
@@ -359,7 +359,7 @@ def _parse(record: type[RecordT], data: bytes, depth: int) -> RecordT:
         field = plan.by_number.get(number)
         if field is None:
             if number == record.SELECTED and record.SELECTED and isinstance(raw, bytes):
-                selected.add(_entry(raw, Kind.UINT32)[0])
+                selected.add(_entry(raw, FieldType.UINT32)[0])
             continue
         spec, kind, name = field.wire, field.wire.kind, field.name
         if field.repeated:
@@ -368,7 +368,7 @@ def _parse(record: type[RecordT], data: bytes, depth: int) -> RecordT:
             elif isinstance(raw, bytes):
                 values.setdefault(name, []).extend(_value(kind, one, field.python, depth) for one in _packed(kind, raw))
             continue
-        whole = isinstance(spec, Wrapped | Map) or kind is Kind.RECORD
+        whole = isinstance(spec, Wrapped | Map) or kind is FieldType.RECORD
         if wire_type != (_BYTES if whole else _wire_type(kind)):
             continue
         if isinstance(spec, Map):
@@ -411,7 +411,7 @@ def _absent(field: FieldPlan) -> Any:
         return ()
     if isinstance(field.wire, Map):
         return {}
-    if isinstance(field.wire, Wrapped) or field.wire.kind is Kind.RECORD or field.wire.oneof:
+    if isinstance(field.wire, Wrapped) or field.wire.kind is FieldType.RECORD or field.wire.oneof:
         return None
     return field.python(0) if issubclass(field.python, int | float) else field.python()
 
@@ -425,22 +425,24 @@ def _unwrap(field: FieldPlan, data: bytes) -> Any:
     return value
 
 
-def _entry(data: bytes, key_kind: Kind, value_kind: Kind = Kind.RECORD) -> tuple[Any, int | bytes | None]:
+def _entry(
+    data: bytes, key_kind: FieldType, value_kind: FieldType = FieldType.RECORD
+) -> tuple[Any, int | bytes | None]:
     """Key and raw value of an entry of a map; a missing key is its type's default."""
-    key: Any = "" if key_kind is Kind.STRING else 0
+    key: Any = "" if key_kind is FieldType.STRING else 0
     value: int | bytes | None = None
     for number, wire_type, raw in walk(data):
         if number == 1 and wire_type == _wire_type(key_kind):
-            key = _value(key_kind, raw, str if key_kind is Kind.STRING else int, 0)
+            key = _value(key_kind, raw, str if key_kind is FieldType.STRING else int, 0)
         elif number == 2 and wire_type == _wire_type(value_kind):
             value = raw
     return key, value
 
 
-def _packed(kind: Kind, data: bytes) -> Iterator[int | bytes]:
+def _packed(kind: FieldType, data: bytes) -> Iterator[int | bytes]:
     wire_type = _wire_type(kind)
     if wire_type == _BYTES:
-        raise Malformed
+        raise MalformedProtobuf
     position = 0
     while position < len(data):
         if wire_type == _VARINT:
@@ -449,41 +451,41 @@ def _packed(kind: Kind, data: bytes) -> Iterator[int | bytes]:
         else:
             size = 4 if wire_type == _FIXED32 else 8
             if position + size > len(data):
-                raise Malformed
+                raise MalformedProtobuf
             yield data[position : position + size]
             position += size
 
 
-def _value(kind: Kind, raw: int | bytes, python: type, depth: int) -> Any:
+def _value(kind: FieldType, raw: int | bytes, python: type, depth: int) -> Any:
     if isinstance(raw, bytes):
         if kind in _FIXED:
             return _FIXED[kind].unpack(raw)[0]
-        if kind is Kind.STRING:
+        if kind is FieldType.STRING:
             return raw.decode(errors="replace")
-        return raw if kind is Kind.BYTES else _parse(python, raw, depth + 1)
-    if kind is Kind.BOOL:
+        return raw if kind is FieldType.BYTES else _parse(python, raw, depth + 1)
+    if kind is FieldType.BOOL:
         return bool(raw)
-    if kind in (Kind.INT32, Kind.ENUM):
+    if kind in (FieldType.INT32, FieldType.ENUM):
         number = (raw & 0xFFFFFFFF ^ 1 << 31) - (1 << 31)
-        return python(number) if kind is Kind.ENUM else number
-    if kind is Kind.INT64:
+        return python(number) if kind is FieldType.ENUM else number
+    if kind is FieldType.INT64:
         return (raw ^ 1 << 63) - (1 << 63)
-    if kind in (Kind.UINT32, Kind.SINT32):
+    if kind in (FieldType.UINT32, FieldType.SINT32):
         raw &= 0xFFFFFFFF
-    return raw >> 1 ^ -(raw & 1) if kind in (Kind.SINT32, Kind.SINT64) else raw
+    return raw >> 1 ^ -(raw & 1) if kind in (FieldType.SINT32, FieldType.SINT64) else raw
 
 
 def walk(data: bytes) -> Iterator[tuple[int, int, int | bytes]]:
     """(number, wire type, value) of each field: an integer of a varint, else the bytes.
 
-    Raises `Malformed`.
+    Raises `MalformedProtobuf`.
     """
     position, end = 0, len(data)
     while position < end:
         tag, position = _read_varint(data, position)
         number, wire_type = tag >> 3, tag & 7
         if not 0 < number < 1 << 29:
-            raise Malformed
+            raise MalformedProtobuf
         if wire_type == _VARINT:
             value, position = _read_varint(data, position)
             yield number, wire_type, value
@@ -493,9 +495,9 @@ def walk(data: bytes) -> Iterator[tuple[int, int, int | bytes]]:
         elif wire_type in (_FIXED32, _FIXED64):
             size = 4 if wire_type == _FIXED32 else 8
         else:
-            raise Malformed  # groups are of proto2, the others of nobody
+            raise MalformedProtobuf  # groups are of proto2, the others of nobody
         if size > end - position:
-            raise Malformed
+            raise MalformedProtobuf
         yield number, wire_type, data[position : position + size]
         position += size
 
@@ -504,10 +506,10 @@ def _read_varint(data: bytes, position: int) -> tuple[int, int]:
     value = 0
     for shift in range(0, 70, 7):
         if position >= len(data):
-            raise Malformed
+            raise MalformedProtobuf
         byte = data[position]
         position += 1
         value |= (byte & 0x7F) << shift
         if byte < 0x80:
             return value & (1 << 64) - 1, position
-    raise Malformed
+    raise MalformedProtobuf

@@ -23,7 +23,7 @@ from anafi_mav.arsdk.link.transport import (
     Event,
     Garbage,
     LinkDown,
-    Received,
+    ReceivedMessage,
     Silent,
     Speaks,
     Transport,
@@ -202,7 +202,7 @@ class Session(asyncio.DatagramProtocol):
         for event in events:
             if self.lost.done():
                 return
-            if type(event) is Received:
+            if type(event) is ReceivedMessage:
                 try:
                     self.on_message(event.message, now)
                 except Exception as error:
@@ -211,7 +211,7 @@ class Session(asyncio.DatagramProtocol):
                     )
                 continue
             match event:
-                case Received():
+                case ReceivedMessage():
                     pass
                 case Delivered(token):
                     self.on_delivered(token, True)

@@ -72,7 +72,7 @@ class Role(enum.Enum):
     DEVICE = "device"
 
 
-class Received(msgspec.Struct, frozen=True):
+class ReceivedMessage(msgspec.Struct, frozen=True):
     """The peer sent a message; each acknowledged one arrives once and in order."""
 
     message: Message | UnknownMessage
@@ -119,7 +119,7 @@ class LinkDown(msgspec.Struct, frozen=True):
     reason: str
 
 
-Event: TypeAlias = Received | Delivered | Undelivered | Garbage | Silent | Speaks | LinkDown
+Event: TypeAlias = ReceivedMessage | Delivered | Undelivered | Garbage | Silent | Speaks | LinkDown
 
 _ACK, _NOACK, _WITHACK = int(FrameType.ACK), int(FrameType.NOACK), int(FrameType.WITHACK)
 
@@ -271,7 +271,7 @@ class Transport:
             self._garbage("command", events)
         else:
             self.counters["received"] += 1
-            events.append(Received(message))
+            events.append(ReceivedMessage(message))
 
     def _acknowledge(self, id: int, seq: int) -> None:
         self._ack_seq = (self._ack_seq + 1) & self._seq_mask

@@ -51,7 +51,7 @@ _MAX_TEXT = 0xFFFF
 Argument: TypeAlias = int | str
 
 
-class Frame(NamedTuple):
+class MuxFrame(NamedTuple):
     """One frame of the mux."""
 
     channel: int
@@ -95,11 +95,11 @@ class Decoder:
         self.skipped = 0
         """Bytes that belonged to no frame."""
 
-    def feed(self, data: bytes) -> list[Frame]:
+    def feed(self, data: bytes) -> list[MuxFrame]:
         """The frames that are complete with these bytes."""
         buffer = self._buffer
         buffer += data
-        frames: list[Frame] = []
+        frames: list[MuxFrame] = []
         position = 0
         while True:
             found = buffer.find(_MAGIC, position)
@@ -120,7 +120,7 @@ class Decoder:
                 continue
             if len(buffer) - position < size:
                 break
-            frames.append(Frame(channel, bytes(buffer[position + _HEADER.size : position + size])))
+            frames.append(MuxFrame(channel, bytes(buffer[position + _HEADER.size : position + size])))
             position += size
         del buffer[:position]
         return frames

@@ -35,7 +35,7 @@ MAX_WAITING = 1 << 18
 transport repeats those that count."""
 
 
-class Stream:
+class MuxStream:
     """A TCP connection with frames on it. Handshakes are answered here."""
 
     def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -69,7 +69,7 @@ class Stream:
         """One frame."""
         self.write_raw(mux.encode_frame(channel, payload))
 
-    async def read(self) -> list[mux.Frame] | None:
+    async def read(self) -> list[mux.MuxFrame] | None:
         """Frames of channels that are not the mux's own; None at the end of the connection.
 
         Raises `OSError`.
@@ -99,7 +99,7 @@ class Stream:
 class _Endpoint:
     """The transport channel, where a session has a UDP socket."""
 
-    def __init__(self, stream: Stream, closed: Callable[[Exception | None], None]) -> None:
+    def __init__(self, stream: MuxStream, closed: Callable[[Exception | None], None]) -> None:
         self._stream = stream
         self._closed = closed
         self._aborted = False
@@ -120,7 +120,12 @@ class MuxControllerSession(ControllerSession):
     """A connection to a Skycontroller over the mux."""
 
     def __init__(
-        self, transport: Transport, on_message: OnMessage, device: DeviceInfo, stream: Stream, early: list[mux.Frame]
+        self,
+        transport: Transport,
+        on_message: OnMessage,
+        device: DeviceInfo,
+        stream: MuxStream,
+        early: list[mux.MuxFrame],
     ) -> None:
         self._stream = stream
         self._early = early
@@ -168,7 +173,7 @@ class MuxControllerSession(ControllerSession):
         await self._proxy.close()
 
     async def _watch_discovery(self, reader: asyncio.StreamReader) -> None:
-        frames: list[mux.Frame] | None = self._early
+        frames: list[mux.MuxFrame] | None = self._early
         with contextlib.suppress(OSError):
             while frames is not None:
                 for frame in frames:
@@ -200,7 +205,7 @@ async def connect(
     except OSError as error:
         raise LinkLost(f"cannot connect to {host}:{port}: {reason_of(error)}") from error
     try:
-        stream = Stream(reader, writer)
+        stream = MuxStream(reader, writer)
         device = await _introduced(stream, port)
         request = json.dumps({"proto_v_min": versions[0], "proto_v_max": versions[1]})
         texts = (CONTROLLER_NAME, CONTROLLER_TYPE, device.serial, request)
@@ -238,7 +243,7 @@ async def look(host: str, *, port: int = mux.PORT, interface: str | None = None)
     except OSError as error:
         raise LinkLost(f"cannot connect to {host}:{port}: {reason_of(error)}") from error
     try:
-        return await _introduced(Stream(reader, writer), port)
+        return await _introduced(MuxStream(reader, writer), port)
     finally:
         writer.close()
 
@@ -261,7 +266,7 @@ async def look_either(
         raise LinkLost(f"no answer from {host}:{mux_port} within {timeout:g} s") from None
 
 
-async def _introduced(stream: Stream, port: int) -> DeviceInfo:
+async def _introduced(stream: MuxStream, port: int) -> DeviceInfo:
     stream.write(mux.DISCOVERY, mux.encode_pomp(mux.DISCOVER))
     (name, model_id, serial), _ = await _answer(stream, mux.DISCOVERY, mux.DEVICE_ADDED, (str, int, str))
     return DeviceInfo(model_id, serial, port, name)
@@ -308,7 +313,9 @@ async def connect_either(
         raise (refused if isinstance(error.__cause__, ConnectionRefusedError) else error) from None
 
 
-async def _answer(stream: Stream, channel: int, id: int, types: tuple[type, ...]) -> tuple[list[Any], list[mux.Frame]]:
+async def _answer(
+    stream: MuxStream, channel: int, id: int, types: tuple[type, ...]
+) -> tuple[list[Any], list[mux.MuxFrame]]:
     """The arguments of the awaited message, and the frames behind it.
 
     Raises `LinkLost` at the connection's end.
@@ -342,7 +349,7 @@ def _version(text: str) -> int:
 class MuxDeviceSession(DeviceSession):
     """A connection from a controller over the mux."""
 
-    def __init__(self, transport: Transport, request: ConnectRequest, peer: str, stream: Stream) -> None:
+    def __init__(self, transport: Transport, request: ConnectRequest, peer: str, stream: MuxStream) -> None:
         super().__init__(transport, request, peer)
         self._peer = PEER
         self.stream = stream
@@ -378,7 +385,7 @@ class MuxServer(Mutable):
         self._on_session = on_session
         self._ping_after = ping_after
         self._server: asyncio.AbstractServer | None = None
-        self._streams: dict[Stream, asyncio.Task[None]] = {}
+        self._streams: dict[MuxStream, asyncio.Task[None]] = {}
 
     @classmethod
     async def start(
@@ -425,7 +432,7 @@ class MuxServer(Mutable):
         if len(self._streams) >= MAX_CONNECTIONS:
             writer.close()
             return
-        stream = Stream(reader, writer)
+        stream = MuxStream(reader, writer)
         self._streams[stream] = cast("asyncio.Task[None]", asyncio.current_task())
         proxy = stream.proxy = mux_proxy.Slave(stream, self._resolve, self._tcp_port)
         session: MuxDeviceSession | None = None
@@ -451,7 +458,7 @@ class MuxServer(Mutable):
         return self._address if host in ("drone", "skycontroller") else None
 
     async def _hear(
-        self, stream: Stream, frame: mux.Frame, session: MuxDeviceSession | None
+        self, stream: MuxStream, frame: mux.MuxFrame, session: MuxDeviceSession | None
     ) -> MuxDeviceSession | None:
         """A message on one of the channels before the session."""
         message = mux.decode_pomp(frame.payload)
@@ -481,11 +488,11 @@ class MuxServer(Mutable):
             before.stream.writer.close()
         return self._accept(stream, cast("list[str]", arguments))
 
-    def _refuse(self, stream: Stream) -> None:
+    def _refuse(self, stream: MuxStream) -> None:
         refusal: list[tuple[str, mux.Argument]] = [("%d", handshake.REJECTED), ("%s", "")]
         stream.write(mux.BACKEND, mux.encode_pomp(mux.CONN_RESP, refusal))
 
-    def _accept(self, stream: Stream, arguments: list[str]) -> MuxDeviceSession | None:
+    def _accept(self, stream: MuxStream, arguments: list[str]) -> MuxDeviceSession | None:
         name, kind, serial, text = arguments[:4]
         low, high = 1, 1
         with contextlib.suppress(ValueError, RecursionError):

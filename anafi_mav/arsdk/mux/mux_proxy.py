@@ -46,7 +46,7 @@ TIMEOUT = 5.0
 """s to wait for a resolution or an acknowledgement."""
 
 
-class Carrier(Protocol):
+class StreamCarrier(Protocol):
     """The mux below; `write_raw` may drop when it is full, so `drained` is awaited before."""
 
     def write_raw(self, frame: bytes) -> None: ...
@@ -65,7 +65,9 @@ def _text(address: int) -> str:
 class _Channel:
     """One connection: a TCP stream at one side, a channel at the other."""
 
-    def __init__(self, carrier: Carrier, own: int, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    def __init__(
+        self, carrier: StreamCarrier, own: int, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
+    ) -> None:
         self.own = own
         self.writer = writer
         self.acknowledged = asyncio.Event()
@@ -99,7 +101,9 @@ class _Channel:
 class Slave:
     """The device's end: connects where it is asked to."""
 
-    def __init__(self, carrier: Carrier, resolve: Callable[[str], str | None], port: Callable[[int], int]) -> None:
+    def __init__(
+        self, carrier: StreamCarrier, resolve: Callable[[str], str | None], port: Callable[[int], int]
+    ) -> None:
         """Store the resolvers of hosts and ports.
 
         `resolve` gives a host's address (None: unknown), `port` the real port for a port of a host.
@@ -219,7 +223,7 @@ class Slave:
 class Master:
     """The controller's end: passes each local connection to a port behind the mux."""
 
-    def __init__(self, carrier: Carrier) -> None:
+    def __init__(self, carrier: StreamCarrier) -> None:
         self._carrier = carrier
         self._channels: dict[int, _Channel | UdpTunnel] = {}
         self._connected: dict[int, asyncio.Future[int]] = {}

@@ -24,7 +24,7 @@ MAX_DATAGRAM = 0xFFFF
 """Bytes; what UDP can carry."""
 
 
-class Carrier(Protocol):
+class DatagramCarrier(Protocol):
     """The mux below; `write_raw` may drop when it is full, as the air drops datagrams."""
 
     def write_raw(self, frame: bytes) -> None: ...
@@ -34,7 +34,12 @@ class UdpTunnel:
     """The controller's end: a UDP socket of the Skycontroller's that is ours."""
 
     def __init__(
-        self, carrier: Carrier, own: int, address: int, on_datagram: Callable[[bytes], None], end: Callable[[], None]
+        self,
+        carrier: DatagramCarrier,
+        own: int,
+        address: int,
+        on_datagram: Callable[[bytes], None],
+        end: Callable[[], None],
     ) -> None:
         self.port = 0
         """Of the socket, at the Skycontroller."""
@@ -89,7 +94,7 @@ class UdpTunnel:
 class UdpSocket(asyncio.DatagramProtocol):
     """The device's end: the socket. It hears one host only, from any port, as libmux does."""
 
-    def __init__(self, carrier: Carrier, own: int, host: str) -> None:
+    def __init__(self, carrier: DatagramCarrier, own: int, host: str) -> None:
         self._carrier = carrier
         self._own = own
         self._host = host
@@ -97,7 +102,7 @@ class UdpSocket(asyncio.DatagramProtocol):
         self._transport: asyncio.DatagramTransport | None = None
 
     @classmethod
-    async def bind(cls, carrier: Carrier, own: int, host: str) -> UdpSocket:
+    async def bind(cls, carrier: DatagramCarrier, own: int, host: str) -> UdpSocket:
         """Raises `OSError`."""
         loop = asyncio.get_running_loop()
         _, self = await loop.create_datagram_endpoint(lambda: cls(carrier, own, host), local_addr=("0.0.0.0", 0))

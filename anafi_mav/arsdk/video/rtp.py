@@ -105,7 +105,7 @@ def sequence_distance(from_sequence: int, to_sequence: int) -> int:
     return (to_sequence - from_sequence + 0x8000 & 0xFFFF) - 0x8000
 
 
-class Received(NamedTuple):
+class ReceivedPacket(NamedTuple):
     """A packet in its place."""
 
     packet: Packet
@@ -128,7 +128,7 @@ class ReorderWindow:
         """(sender, number) that would confirm a new beginning."""
         self._gap = False
 
-    def receive(self, packet: Packet, now: float) -> list[Received]:
+    def receive(self, packet: Packet, now: float) -> list[ReceivedPacket]:
         """Add a packet; return the packets that are in sequence now."""
         if self.ssrc is None:
             self._begin(packet)
@@ -155,9 +155,9 @@ class ReorderWindow:
     def _begin(self, packet: Packet) -> None:
         self.ssrc, self._next = packet.ssrc, packet.sequence
 
-    def expire(self, now: float) -> list[Received]:
+    def expire(self, now: float) -> list[ReceivedPacket]:
         """Return the packets that are in sequence, or have waited for `MAX_WAIT`."""
-        ready: list[Received] = []
+        ready: list[ReceivedPacket] = []
         while self._held:
             held = self._held.pop(self._next, None)
             if held is None:
@@ -169,7 +169,7 @@ class ReorderWindow:
                 self.counts["lost"] += sequence_distance(self._next, oldest)
                 self._next, self._gap = oldest, True
                 continue
-            ready.append(Received(held[0], self._gap))
+            ready.append(ReceivedPacket(held[0], self._gap))
             self._next, self._gap = self._next + 1 & 0xFFFF, False
         return ready
 

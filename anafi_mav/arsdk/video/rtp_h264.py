@@ -15,7 +15,15 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from anafi_mav.arsdk.video.rtp import HEADER, Extension, Packet, Received, ReorderWindow, decode_packet, encode_packet
+from anafi_mav.arsdk.video.rtp import (
+    HEADER,
+    Extension,
+    Packet,
+    ReceivedPacket,
+    ReorderWindow,
+    decode_packet,
+    encode_packet,
+)
 from anafi_mav.arsdk.video.video_metadata import PROTO_PROFILE, V3_PROFILE, FrameMetadata, decode_v3, encode_v3
 from anafi_mav.arsdk.video.video_metadata_proto import decode_proto, encode_proto
 from anafi_mav.errors import LocalProtocolError
@@ -251,7 +259,7 @@ class PictureReceiver:
     def deadline(self) -> float | None:
         return self.window.deadline()
 
-    def _take(self, received: list[Received]) -> list[Picture]:
+    def _take(self, received: list[ReceivedPacket]) -> list[Picture]:
         pictures: list[Picture] = []
         for packet, gap in received:
             if self._gathering and packet.timestamp != self._timestamp:

@@ -1,7 +1,7 @@
 """RTSP 1.0 (RFC 2326), as far as a drone's video needs it: requests, responses, headers.
 
 No I/O. Both ends may send requests: a drone announces a changed description and ends sessions itself. Bytes of a
-peer never raise: `MessageReader` answers with a `Malformed` that has the status to send before hanging up.
+peer never raise: `MessageReader` answers with a `MalformedRtsp` that has the status to send before hanging up.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ def _number(text: str | None) -> int | None:
 
 
 @dataclass(frozen=True)
-class Request:
+class RtspRequest:
     method: str
     uri: str
     headers: Headers = ()
@@ -112,15 +112,15 @@ class Response:
 
 
 @dataclass(frozen=True)
-class Malformed:
+class MalformedRtsp:
     """Input that is not RTSP; nothing behind it is read."""
 
     status: Status
     reason: str
 
 
-Message = Request | Response
-Event = Request | Response | Malformed
+Message = RtspRequest | Response
+Event = RtspRequest | Response | MalformedRtsp
 
 
 def encode(message: Message) -> bytes:
@@ -128,7 +128,7 @@ def encode(message: Message) -> bytes:
 
     Raises `LocalProtocolError` when a line holds a line end.
     """
-    if isinstance(message, Request):
+    if isinstance(message, RtspRequest):
         first = f"{message.method} {message.uri} {VERSION}"
     else:
         reason = REASONS.get(message.status) or message.reason or "Unknown"  # type: ignore[call-overload]
@@ -151,14 +151,14 @@ class MessageReader:
         self._dead = False
 
     def feed(self, data: bytes) -> list[Event]:
-        """The messages that are whole now; behind a `Malformed` nothing comes any more."""
+        """The messages that are whole now; behind a `MalformedRtsp` nothing comes any more."""
         if self._dead:
             return []
         self._buffer += data
         events: list[Event] = []
         while (event := self._next()) is not None:
             events.append(event)
-            if isinstance(event, Malformed):
+            if isinstance(event, MalformedRtsp):
                 self._dead = True
                 self._buffer.clear()
                 break
@@ -169,23 +169,23 @@ class MessageReader:
             # Empty lines between messages are to be ignored (RFC 2326 4.1).
             self._buffer = self._buffer.lstrip(b"\r\n")
             if self._buffer and not 0x41 <= self._buffer[0] <= 0x5A:
-                return Malformed(Status.BAD_REQUEST, "no message begins so")
+                return MalformedRtsp(Status.BAD_REQUEST, "no message begins so")
             end = re.search(rb"\r?\n\r?\n", self._buffer[: MAX_HEAD + 4])
             if end is None:
                 if len(self._buffer) > MAX_HEAD:
-                    return Malformed(Status.ENTITY_TOO_LARGE, f"more than {MAX_HEAD} bytes without an empty line")
+                    return MalformedRtsp(Status.ENTITY_TOO_LARGE, f"more than {MAX_HEAD} bytes without an empty line")
                 return None
             head = bytes(self._buffer[: end.start()])
             del self._buffer[: end.end()]
             message = parse_head(head)
-            if isinstance(message, Malformed):
+            if isinstance(message, MalformedRtsp):
                 return message
             length = message.header("Content-Length")
             size = 0 if length is None else _number(length)
             if size is None:
-                return Malformed(Status.BAD_REQUEST, "Content-Length is no number")
+                return MalformedRtsp(Status.BAD_REQUEST, "Content-Length is no number")
             if size > MAX_BODY:
-                return Malformed(Status.ENTITY_TOO_LARGE, f"a body of {size} bytes")
+                return MalformedRtsp(Status.ENTITY_TOO_LARGE, f"a body of {size} bytes")
             self._head = (message, size)
         message, size = self._head
         if len(self._buffer) < size:
@@ -196,16 +196,16 @@ class MessageReader:
         return replace(message, body=body)
 
 
-def parse_head(head: bytes) -> Message | Malformed:
+def parse_head(head: bytes) -> Message | MalformedRtsp:
     """A message without its body, from its lines."""
     try:
         lines = head.decode().replace("\r\n", "\n").split("\n")
     except UnicodeDecodeError:
-        return Malformed(Status.BAD_REQUEST, "not UTF-8")
+        return MalformedRtsp(Status.BAD_REQUEST, "not UTF-8")
     if re.search(r"[\x00-\x08\x0a-\x1f\x7f]", "".join(lines)):
-        return Malformed(Status.BAD_REQUEST, "control characters")
+        return MalformedRtsp(Status.BAD_REQUEST, "control characters")
     if len(lines) > MAX_HEADERS + 1:
-        return Malformed(Status.ENTITY_TOO_LARGE, f"more than {MAX_HEADERS} headers")
+        return MalformedRtsp(Status.ENTITY_TOO_LARGE, f"more than {MAX_HEADERS} headers")
     headers: list[tuple[str, str]] = []
     for line in lines[1:]:
         if line[:1] in (" ", "\t") and headers:  # folded
@@ -213,26 +213,26 @@ def parse_head(head: bytes) -> Message | Malformed:
             continue
         name, colon, value = line.partition(":")
         if not colon or not re.fullmatch(r"[!-9;-~]+", name):
-            return Malformed(Status.BAD_REQUEST, "a header without a name")
+            return MalformedRtsp(Status.BAD_REQUEST, "a header without a name")
         headers.append((name, value.strip()))
     words = lines[0].split(" ", 2)
     if len(words) == 3 and words[0].startswith("RTSP/"):
         status = _number(words[1])
         if words[0] != VERSION or status is None or not 100 <= status <= 999:
-            return Malformed(Status.BAD_REQUEST, "no status line")
+            return MalformedRtsp(Status.BAD_REQUEST, "no status line")
         return Response(status, tuple(headers), reason=words[2])
     if len(words) != 3 or not re.fullmatch(r"[A-Z_]{1,20} [!-~]+", f"{words[0]} {words[1]}"):
-        return Malformed(Status.BAD_REQUEST, "no request line")
+        return MalformedRtsp(Status.BAD_REQUEST, "no request line")
     if words[2] != VERSION:
-        return Malformed(Status.VERSION_NOT_SUPPORTED, "another version")
-    return Request(words[0], words[1], tuple(headers))
+        return MalformedRtsp(Status.VERSION_NOT_SUPPORTED, "another version")
+    return RtspRequest(words[0], words[1], tuple(headers))
 
 
 # ------------------------------------------------------------------------------------------------------- headers
 
 
 @dataclass(frozen=True)
-class Transport:
+class RtspTransport:
     """How a stream travels (header Transport)."""
 
     lower: str = "UDP"
@@ -246,7 +246,7 @@ class Transport:
     """Further parameters: "destination", "source", "mode", …"""
 
 
-def format_transport(transport: Transport) -> str:
+def format_transport(transport: RtspTransport) -> str:
     pieces = [f"RTP/AVP/{transport.lower}", "unicast" if transport.unicast else "multicast"]
     pieces += [f"{key}={value}" if value else key for key, value in transport.others]
     if transport.client_ports:
@@ -258,7 +258,7 @@ def format_transport(transport: Transport) -> str:
     return ";".join(pieces)
 
 
-def parse_transport(value: str) -> list[Transport]:
+def parse_transport(value: str) -> list[RtspTransport]:
     """Return the transports that a header Transport offers, best first.
 
     Those that are not RTP/AVP are left out.
@@ -269,7 +269,7 @@ def parse_transport(value: str) -> list[Transport]:
         spec = first.upper().split("/")
         if spec[:2] != ["RTP", "AVP"] or len(spec) > 3:
             continue
-        transport = Transport(lower=spec[2] if len(spec) == 3 else "UDP", unicast=False)
+        transport = RtspTransport(lower=spec[2] if len(spec) == 3 else "UDP", unicast=False)
         others: list[tuple[str, str]] = []
         for parameter in parameters:
             key, _, text = parameter.strip().partition("=")

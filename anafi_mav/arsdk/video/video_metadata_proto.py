@@ -19,7 +19,7 @@ from anafi_mav.arsdk.codec.protobuf import (
     UINT32,
     UINT64,
     Field,
-    Record,
+    Submessage,
     parse,
     serialize,
 )
@@ -42,14 +42,14 @@ from anafi_mav.arsdk.video.video_metadata import (
 )
 
 
-class _Quaternion(Record, frozen=True):
+class _Quaternion(Submessage, frozen=True):
     w: Annotated[float, Field(1, FLOAT)] = 0.0
     x: Annotated[float, Field(2, FLOAT)] = 0.0
     y: Annotated[float, Field(3, FLOAT)] = 0.0
     z: Annotated[float, Field(4, FLOAT)] = 0.0
 
 
-class _Triple(Record, frozen=True):
+class _Triple(Submessage, frozen=True):
     """NED and Vector3 look alike on the wire."""
 
     first: Annotated[float, Field(1, FLOAT)] = 0.0
@@ -57,7 +57,7 @@ class _Triple(Record, frozen=True):
     third: Annotated[float, Field(3, FLOAT)] = 0.0
 
 
-class _Location(Record, frozen=True, kw_only=True):
+class _Location(Submessage, frozen=True, kw_only=True):
     latitude: Annotated[float, Field(1, DOUBLE)] = 0.0
     longitude: Annotated[float, Field(2, DOUBLE)] = 0.0
     altitude_wgs84: Annotated[float, Field(3, DOUBLE)] = 0.0
@@ -67,7 +67,7 @@ class _Location(Record, frozen=True, kw_only=True):
     altitude_amsl: Annotated[float, Field(7, DOUBLE)] = 0.0
 
 
-class _Drone(Record, frozen=True, kw_only=True):
+class _Drone(Submessage, frozen=True, kw_only=True):
     quat: Annotated[_Quaternion | None, Field(1, RECORD)] = None
     location: Annotated[_Location | None, Field(2, RECORD)] = None
     ground_distance: Annotated[float, Field(3, DOUBLE)] = 0.0
@@ -81,7 +81,7 @@ class _Drone(Record, frozen=True, kw_only=True):
     altitude_ato: Annotated[float, Field(13, DOUBLE)] = 0.0
 
 
-class _Camera(Record, frozen=True, kw_only=True):
+class _Camera(Submessage, frozen=True, kw_only=True):
     timestamp: Annotated[int, Field(1, UINT64)] = 0
     base_quat: Annotated[_Quaternion | None, Field(2, RECORD)] = None
     quat: Annotated[_Quaternion | None, Field(3, RECORD)] = None
@@ -94,30 +94,30 @@ class _Camera(Record, frozen=True, kw_only=True):
     zoom_level: Annotated[float, Field(16, FLOAT)] = 0.0
 
 
-class _Wifi(Record, frozen=True, kw_only=True):
+class _Wifi(Submessage, frozen=True, kw_only=True):
     goodput: Annotated[int, Field(1, UINT32)] = 0
     quality: Annotated[int, Field(2, UINT32)] = 0
     rssi: Annotated[int, Field(3, SINT32)] = 0
 
 
-class _LinkInfo(Record, frozen=True, kw_only=True):
+class _LinkInfo(Submessage, frozen=True, kw_only=True):
     type: Annotated[LinkType, Field(1, ENUM)] = LinkType.UNKNOWN
     status: Annotated[LinkStatus, Field(2, ENUM)] = LinkStatus.DOWN
     quality: Annotated[int, Field(3, INT32)] = 0
     active: Annotated[bool, Field(4, BOOL)] = False
 
 
-class _Starfish(Record, frozen=True, kw_only=True):
+class _Starfish(Submessage, frozen=True, kw_only=True):
     links: Annotated[tuple[_LinkInfo, ...], Field(1, RECORD)] = ()
     quality: Annotated[int, Field(2, INT32)] = 0
 
 
-class _Link(Record, frozen=True, kw_only=True):
+class _Link(Submessage, frozen=True, kw_only=True):
     wifi: Annotated[_Wifi | None, Field(1, RECORD, "protocol")] = None
     starfish: Annotated[_Starfish | None, Field(2, RECORD, "protocol")] = None
 
 
-class _TimedMetadata(Record, frozen=True, kw_only=True):
+class _TimedMetadata(Submessage, frozen=True, kw_only=True):
     drone: Annotated[_Drone | None, Field(1, RECORD)] = None
     camera: Annotated[_Camera | None, Field(2, RECORD)] = None
     links: Annotated[tuple[_Link, ...], Field(3, RECORD)] = ()

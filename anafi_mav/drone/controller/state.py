@@ -26,7 +26,7 @@ MAX_AXIS = 5
 """Highest number of an axis."""
 
 
-class Attitude(msgspec.Struct, frozen=True):
+class ControllerAttitude(msgspec.Struct, frozen=True):
     """A unit quaternion from the controller's axes (forward, right, down) to North-East-Down."""
 
     w: float
@@ -58,7 +58,7 @@ class ControllerState(msgspec.Struct, frozen=True):
     battery_percent: int | None = None
     """None while it is charging, too."""
     battery: BatteryStatus | None = None
-    attitude: Attitude | None = None
+    attitude: ControllerAttitude | None = None
     position: Position | None = None
     """Place of the controller; altitude above mean sea level."""
     magnetometer: CalibrationStatus | None = None
@@ -91,7 +91,7 @@ def _attitude(state: ControllerState, message: skyctrl.AttitudeChanged) -> Contr
     if not math.isfinite(norm) or norm < 0.5:
         return state
     parts = (message.q0, message.q1, message.q2, message.q3)
-    return replace(state, attitude=Attitude(*(part / norm for part in parts)))
+    return replace(state, attitude=ControllerAttitude(*(part / norm for part in parts)))
 
 
 def _battery(state: ControllerState, message: skyctrl.BatteryChanged) -> ControllerState:

@@ -23,10 +23,10 @@ from anafi_mav.drone.payload.camera_modern import Modern
 from anafi_mav.drone.payload.camera_state import (
     CamerasState,
     CameraState,
+    CaptureProgress,
+    CaptureUpdate,
     ExposureSettings,
-    News,
     PhotoSettings,
-    Progress,
     RecordingSettings,
 )
 from anafi_mav.drone.settings import Commanding, Question, number
@@ -95,12 +95,12 @@ class Camera(Commanding[CamerasState]):
             raise CommandRejected("the camera cannot take a photo now")
         series = now.photo is not None and now.photo.mode in SERIES
 
-        def judge(news: News) -> str | bool | AnafiMavError | None:
-            if news.progress is Progress.SAVED:
+        def judge(news: CaptureUpdate) -> str | bool | AnafiMavError | None:
+            if news.progress is CaptureProgress.SAVED:
                 return news.media
-            if news.progress is Progress.FAILED:
+            if news.progress is CaptureProgress.FAILED:
                 return CommandRejected(f"photo: {news.reason}")
-            return True if series and news.progress is Progress.STARTED else None
+            return True if series and news.progress is CaptureProgress.STARTED else None
 
         result = await self._capture(
             id, speech.take_photo(id), speech.photo_events, speech.photo_news, judge, ANSWER_TIMEOUT, timeout
@@ -117,14 +117,14 @@ class Camera(Commanding[CamerasState]):
             raise CommandRejected("no photo is being taken")
         saved: str | None = None
 
-        def judge(news: News) -> str | bool | AnafiMavError | None:
+        def judge(news: CaptureUpdate) -> str | bool | AnafiMavError | None:
             nonlocal saved
-            if news.progress is Progress.SAVED:
+            if news.progress is CaptureProgress.SAVED:
                 saved = news.media
                 return saved if speech is Modern else None
-            if news.progress is Progress.FAILED:
+            if news.progress is CaptureProgress.FAILED:
                 return CommandRejected(f"photo: {news.reason}")
-            return True if news.progress is Progress.ENDED else None
+            return True if news.progress is CaptureProgress.ENDED else None
 
         await self._capture(
             id, speech.stop_photo(id), speech.photo_events, speech.photo_news, judge, ANSWER_TIMEOUT, timeout
@@ -145,10 +145,10 @@ class Camera(Commanding[CamerasState]):
         if now.recording_available is False:
             raise CommandRejected("the camera cannot record now")
 
-        def judge(news: News) -> bool | AnafiMavError | None:
-            if news.progress is Progress.STARTED:
+        def judge(news: CaptureUpdate) -> bool | AnafiMavError | None:
+            if news.progress is CaptureProgress.STARTED:
                 return True
-            return CommandRejected(f"recording: {news.reason}") if news.progress is Progress.FAILED else None
+            return CommandRejected(f"recording: {news.reason}") if news.progress is CaptureProgress.FAILED else None
 
         command = speech.start_recording(id)
         await self._capture(id, command, speech.recording_events, speech.recording_news, judge, ANSWER_TIMEOUT, None)
@@ -159,10 +159,10 @@ class Camera(Commanding[CamerasState]):
         if now.recording_now is False:
             raise CommandRejected("the camera does not record")
 
-        def judge(news: News) -> str | AnafiMavError | None:
-            if news.progress is Progress.ENDED:
+        def judge(news: CaptureUpdate) -> str | AnafiMavError | None:
+            if news.progress is CaptureProgress.ENDED:
                 return news.media
-            return CommandRejected(f"recording: {news.reason}") if news.progress is Progress.FAILED else None
+            return CommandRejected(f"recording: {news.reason}") if news.progress is CaptureProgress.FAILED else None
 
         command = speech.stop_recording(id)
         return str(
@@ -375,8 +375,8 @@ class Camera(Commanding[CamerasState]):
         id: int,
         command: Message,
         events: tuple[type[Message], ...],
-        read: Callable[[Any], News | None],
-        judge: Callable[[News], Any],
+        read: Callable[[Any], CaptureUpdate | None],
+        judge: Callable[[CaptureUpdate], Any],
         first: float,
         next: float | None,
     ) -> Any:

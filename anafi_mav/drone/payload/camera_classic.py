@@ -64,11 +64,11 @@ from anafi_mav.drone.payload.camera_state import (
     MAX_OPTIONS,
     CamerasState,
     CameraState,
+    CaptureProgress,
+    CaptureUpdate,
     ExposureSettings,
-    News,
     PhotoOption,
     PhotoSettings,
-    Progress,
     RecordingOption,
     RecordingSettings,
     StyleSettings,
@@ -286,31 +286,31 @@ PHOTO_EVENTS: tuple[type[Message], ...] = (wire.PhotoProgress, wire.PhotoState)
 RECORDING_EVENTS: tuple[type[Message], ...] = (wire.RecordingProgress, wire.RecordingState)
 
 
-def photo_news(m: Any) -> News | None:
+def photo_news(m: Any) -> CaptureUpdate | None:
     """Return the progress that a photo event reports."""
     if isinstance(m, wire.PhotoState):
-        return News(m.cam_id, Progress.STARTED if m.state == State.ACTIVE else Progress.ENDED)
+        return CaptureUpdate(m.cam_id, CaptureProgress.STARTED if m.state == State.ACTIVE else CaptureProgress.ENDED)
     if m.result == PhotoResult.PHOTO_SAVED:
-        return News(m.cam_id, Progress.SAVED, m.media_id)
+        return CaptureUpdate(m.cam_id, CaptureProgress.SAVED, m.media_id)
     if m.result in (PhotoResult.TAKING_PHOTO, PhotoResult.PHOTO_TAKEN):
-        return News(m.cam_id, Progress.STARTED)
-    return News(m.cam_id, Progress.FAILED, reason=spoken(m.result))
+        return CaptureUpdate(m.cam_id, CaptureProgress.STARTED)
+    return CaptureUpdate(m.cam_id, CaptureProgress.FAILED, reason=spoken(m.result))
 
 
-def recording_news(m: Any) -> News | None:
+def recording_news(m: Any) -> CaptureUpdate | None:
     """Return the progress that a recording event reports, or None.
 
     The state alone ends nothing: the media id arrives with the progress.
     """
     if isinstance(m, wire.RecordingState):
-        return News(m.cam_id, Progress.STARTED) if m.state == State.ACTIVE else None
+        return CaptureUpdate(m.cam_id, CaptureProgress.STARTED) if m.state == State.ACTIVE else None
     if m.result == RecordingResult.STARTED:
-        return News(m.cam_id, Progress.STARTED)
+        return CaptureUpdate(m.cam_id, CaptureProgress.STARTED)
     if m.result in _STORED:
-        return News(
-            m.cam_id, Progress.ENDED, m.media_id, "" if m.result == RecordingResult.STOPPED else spoken(m.result)
+        return CaptureUpdate(
+            m.cam_id, CaptureProgress.ENDED, m.media_id, "" if m.result == RecordingResult.STOPPED else spoken(m.result)
         )
-    return News(m.cam_id, Progress.FAILED, reason=spoken(m.result))
+    return CaptureUpdate(m.cam_id, CaptureProgress.FAILED, reason=spoken(m.result))
 
 
 def camera_of(m: Any) -> int:

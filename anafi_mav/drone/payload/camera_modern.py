@@ -45,11 +45,11 @@ from anafi_mav.drone.payload.camera_state import (
     MAX_OPTIONS,
     CamerasState,
     CameraState,
+    CaptureProgress,
+    CaptureUpdate,
     ExposureSettings,
-    News,
     PhotoOption,
     PhotoSettings,
-    Progress,
     RecordingOption,
     RecordingSettings,
     StyleSettings,
@@ -291,32 +291,34 @@ REDUCERS: Mapping[type[Message], Reducer] = {
 _DONE = (wire.PhotoStopReason.USER_REQUEST, wire.PhotoStopReason.CAPTURE_DONE)
 
 
-def photo_news(m: Any) -> News | None:
+def photo_news(m: Any) -> CaptureUpdate | None:
     """Return the progress that a photo event reports, or None.
 
     The events are START, then STOP with the media id, once for a series as for a single picture.
     """
     if m.type in (wire.PhotoEvent.START, wire.PhotoEvent.TAKING_PHOTO):
-        return News(m.camera_id, Progress.STARTED)
+        return CaptureUpdate(m.camera_id, CaptureProgress.STARTED)
     if m.type != wire.PhotoEvent.STOP:
         return None
     if m.media_id:
-        return News(m.camera_id, Progress.SAVED, m.media_id, "" if m.stop_reason in _DONE else spoken(m.stop_reason))
+        return CaptureUpdate(
+            m.camera_id, CaptureProgress.SAVED, m.media_id, "" if m.stop_reason in _DONE else spoken(m.stop_reason)
+        )
     if m.stop_reason in _DONE:
-        return News(m.camera_id, Progress.ENDED)
-    return News(m.camera_id, Progress.FAILED, reason=spoken(m.stop_reason))
+        return CaptureUpdate(m.camera_id, CaptureProgress.ENDED)
+    return CaptureUpdate(m.camera_id, CaptureProgress.FAILED, reason=spoken(m.stop_reason))
 
 
-def recording_news(m: Any) -> News | None:
+def recording_news(m: Any) -> CaptureUpdate | None:
     """Return the progress that a recording event reports, or None."""
     if m.type == wire.RecordingEvent.START:
-        return News(m.camera_id, Progress.STARTED)
+        return CaptureUpdate(m.camera_id, CaptureProgress.STARTED)
     if m.type != wire.RecordingEvent.STOP:
         return None
     asked = m.stop_reason == wire.RecordingStopReason.USER_REQUEST
     if m.media_id or asked:
-        return News(m.camera_id, Progress.ENDED, m.media_id, "" if asked else spoken(m.stop_reason))
-    return News(m.camera_id, Progress.FAILED, reason=spoken(m.stop_reason))
+        return CaptureUpdate(m.camera_id, CaptureProgress.ENDED, m.media_id, "" if asked else spoken(m.stop_reason))
+    return CaptureUpdate(m.camera_id, CaptureProgress.FAILED, reason=spoken(m.stop_reason))
 
 
 def camera_of(m: Any) -> int:

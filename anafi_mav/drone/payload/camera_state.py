@@ -202,7 +202,7 @@ def changed(state: CamerasState, id: int, **changes: Any) -> CamerasState:
     return replace(state, cameras=with_item(state.cameras, id, camera, 0))
 
 
-class Progress(enum.Enum):
+class CaptureProgress(enum.Enum):
     """Progress of a requested photo or recording."""
 
     STARTED = enum.auto()
@@ -213,11 +213,11 @@ class Progress(enum.Enum):
     FAILED = enum.auto()
 
 
-class News(msgspec.Struct, frozen=True):
+class CaptureUpdate(msgspec.Struct, frozen=True):
     """One event about a picture or a film."""
 
     camera: int
-    progress: Progress
+    progress: CaptureProgress
     media: str = ""
     """Media id, of SAVED and ENDED."""
     reason: str = ""

@@ -14,7 +14,7 @@ from anafi_mav.clock import Alarm
 from anafi_mav.drone.element import Element
 from anafi_mav.drone.expectation import Commander, loop_time
 from anafi_mav.drone.piloting.state import PilotingState, in_state
-from anafi_mav.drone.piloting.sticks import CENTRED, Percent, Sticks, is_deflected
+from anafi_mav.drone.piloting.sticks import CENTRED, Percent, StickSchedule, is_deflected
 from anafi_mav.drone.status.alerts import spoken
 from anafi_mav.drone.status.home import Home
 from anafi_mav.errors import CommandRejected, LinkLost
@@ -51,7 +51,7 @@ class StickStream:
         self._pilot_has_source = pilot_has_source
         self._flight = flight
         self._home = home
-        self._sticks = Sticks()
+        self._sticks = StickSchedule()
         self._next = Alarm(self.pump)
         self._after_gaz = False
         """The centred PCMDs that follow the gaz against a landing are sent although the drone is said to land."""

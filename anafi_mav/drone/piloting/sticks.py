@@ -100,7 +100,7 @@ def is_deflected(pcmd: PCMD) -> bool:
     return bool(pcmd.roll or pcmd.pitch or pcmd.yaw or pcmd.gaz)
 
 
-class Sticks:
+class StickSchedule:
     """When to send which stick position.
 
     `deadline` says when `due` has something, `due` hands it out once.

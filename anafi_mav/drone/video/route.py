@@ -23,7 +23,7 @@ SOCKET_BUFFER = 1 << 20
 OnDatagram = Callable[[bytes], None]
 
 
-class Channels(Protocol):
+class DatagramPair(Protocol):
     """Two ways for datagrams: RTP and, beside it, RTCP."""
 
     ports: tuple[int, int]
@@ -43,7 +43,7 @@ class Channels(Protocol):
         """Idempotent."""
 
 
-class Route(Protocol):
+class VideoRoute(Protocol):
     """Location of a video server, and the route of its datagrams."""
 
     HEADERS: tuple[tuple[str, str], ...]
@@ -52,7 +52,7 @@ class Route(Protocol):
     async def connect(self) -> RtspClient:
         """Raises `LinkLost`."""
 
-    async def channels(self, client: RtspClient, on_rtp: OnDatagram, on_rtcp: OnDatagram) -> Channels:
+    async def channels(self, client: RtspClient, on_rtp: OnDatagram, on_rtcp: OnDatagram) -> DatagramPair:
         """Raises `LinkLost`."""
 
 
@@ -162,7 +162,7 @@ class Direct:
             self._address, self._port, local_address=self._local_address, interface=self._interface
         )
 
-    async def channels(self, client: RtspClient, on_rtp: OnDatagram, on_rtcp: OnDatagram) -> Channels:
+    async def channels(self, client: RtspClient, on_rtp: OnDatagram, on_rtcp: OnDatagram) -> DatagramPair:
         try:
             return _UdpChannels(client, self._interface, on_rtp, on_rtcp)
         except OSError as error:
@@ -206,7 +206,7 @@ class Mux:
         address, port = await self._session.open_tcp("skycontroller", self._port)
         return await RtspClient.connect(address, port)
 
-    async def channels(self, client: RtspClient, on_rtp: OnDatagram, on_rtcp: OnDatagram) -> Channels:
+    async def channels(self, client: RtspClient, on_rtp: OnDatagram, on_rtcp: OnDatagram) -> DatagramPair:
         rtp = await self._session.open_udp("skycontroller", on_rtp)
         try:
             rtcp = await self._session.open_udp("skycontroller", on_rtcp)

@@ -14,7 +14,7 @@ from collections.abc import Iterable
 from anafi_mav.arsdk.link.interface import open_connection
 from anafi_mav.arsdk.link.session import reason_of
 from anafi_mav.arsdk.video import rtsp
-from anafi_mav.arsdk.video.rtsp import Malformed, Request, Response, Status
+from anafi_mav.arsdk.video.rtsp import MalformedRtsp, Response, RtspRequest, Status
 from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, RemoteProtocolError
 
 log = logging.getLogger("anafi_mav")
@@ -80,7 +80,7 @@ class RtspClient:
                 raise LinkLost(self.ended.result())
             self._asked = self._number, answer
             try:
-                self._send(Request(method, uri, (("CSeq", str(self._number)), *headers)))
+                self._send(RtspRequest(method, uri, (("CSeq", str(self._number)), *headers)))
                 done, _ = await asyncio.wait({answer}, timeout=timeout)
             finally:
                 self._asked = None
@@ -111,7 +111,7 @@ class RtspClient:
                 for event in messages.feed(data):
                     if message_log.isEnabledFor(logging.DEBUG):
                         message_log.debug("RTSP from %s: %r", self.there, event)
-                    if isinstance(event, Malformed):
+                    if isinstance(event, MalformedRtsp):
                         self._end(RemoteProtocolError(f"the drone's video server talks no RTSP: {event.reason}"))
                         return
                     if isinstance(event, Response):
@@ -128,7 +128,7 @@ class RtspClient:
         elif response.status >= 200:  # below: there is more to come
             self._asked[1].set_result(response)
 
-    def _asks(self, request: Request) -> None:
+    def _asks(self, request: RtspRequest) -> None:
         if self._writer.transport.get_write_buffer_size() > MAX_WAITING:
             self._end(RemoteProtocolError("the drone's video server asks and does not listen"))
             return

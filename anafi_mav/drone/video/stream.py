@@ -19,9 +19,9 @@ from anafi_mav.arsdk.video import rtsp, sdp
 from anafi_mav.arsdk.video.rtcp import ReceiverReport, SenderReport, decode_reports, encode_receiver_report
 from anafi_mav.arsdk.video.rtp_h264 import CLOCK_RATE, Picture, PictureReceiver
 from anafi_mav.arsdk.video.rtp_reception import Reception
-from anafi_mav.arsdk.video.rtsp import Response, Transport
+from anafi_mav.arsdk.video.rtsp import Response, RtspTransport
 from anafi_mav.arsdk.video.sdp import MediaDescription, SessionDescription
-from anafi_mav.drone.video.route import Channels, Route
+from anafi_mav.drone.video.route import DatagramPair, VideoRoute
 from anafi_mav.drone.video.rtsp_client import RtspClient
 from anafi_mav.errors import AnafiMavError, CommandTimeout, LinkLost, NotSupported, RemoteProtocolError
 
@@ -70,12 +70,12 @@ class Shown(msgspec.Struct, frozen=True):
     """H.264 picture parameter set."""
 
 
-class Stream:
+class VideoStream:
     """A stream of a route. `run` it in a task and cancel that to end it."""
 
     def __init__(
         self,
-        route: Route,
+        route: VideoRoute,
         title: str | None,
         on_picture: Callable[[Picture, float], None],
         wanted: Callable[[], bool],
@@ -107,7 +107,7 @@ class Stream:
         `CommandRejected`, `NotSupported`, `RemoteProtocolError`.
         """
         client = await self._route.connect()
-        channels: Channels | None = None
+        channels: DatagramPair | None = None
         goodbye: tuple[str, str] | None = None
         try:
             url = f"{client.url}/{LIVE}"
@@ -116,7 +116,7 @@ class Stream:
             media = _chosen(description, self._title)
             self.shown = _shown(description, media)
             channels = await self._route.channels(client, self._receive, self._hear)
-            offer = Transport(client_ports=channels.ports)
+            offer = RtspTransport(client_ports=channels.ports)
             response = await client.ask(
                 "SETUP",
                 rtsp.join_url(url, media.control),
@@ -186,7 +186,7 @@ class Stream:
             if isinstance(report, SenderReport) and self._reception is not None:
                 self._reception.hear(report, self._loop.time())
 
-    async def _report(self, channels: Channels) -> None:
+    async def _report(self, channels: DatagramPair) -> None:
         while True:
             await asyncio.sleep(REPORT_PERIOD)
             block = None if self._reception is None else self._reception.block(self._loop.time())

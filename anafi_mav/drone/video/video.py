@@ -22,8 +22,8 @@ from anafi_mav.arsdk.video.rtp_h264 import CLOCK_RATE, Picture
 from anafi_mav.arsdk.video.video_metadata import FrameMetadata
 from anafi_mav.drone.element import Element, Reducer
 from anafi_mav.drone.piloting.state import Attitude
-from anafi_mav.drone.video.route import Route
-from anafi_mav.drone.video.stream import Shown, Stream
+from anafi_mav.drone.video.route import VideoRoute
+from anafi_mav.drone.video.stream import Shown, VideoStream
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost
 from anafi_mav.units import euler_from_quaternion
 
@@ -111,11 +111,11 @@ class Video(Element[VideoState]):
         super().__init__()
         self.counters: Counter[str] = Counter()
         """Pictures, packets and what became of them, since this was made."""
-        self._route: Route | None = None
+        self._route: VideoRoute | None = None
         self._users = 0
         self._wanted: str | None = None
         self._task: asyncio.Task[None] | None = None
-        self._stream: Stream | None = None
+        self._stream: VideoStream | None = None
         self._ending: set[asyncio.Task[None]] = set()
         """Tasks that only say goodbye."""
         self._firsts: set[asyncio.Future[None]] = set()
@@ -129,7 +129,7 @@ class Video(Element[VideoState]):
 
     # -- the connection
 
-    def link_up(self, route: Route) -> None:
+    def link_up(self, route: VideoRoute) -> None:
         """Note that the drone is connected and its video is reached by `route`.
 
         Users that watched before continue to watch.
@@ -254,18 +254,18 @@ class Video(Element[VideoState]):
         if self._ending:
             await asyncio.wait(tuple(self._ending))
 
-    async def _run(self, route: Route) -> None:
+    async def _run(self, route: VideoRoute) -> None:
         """One stream after the other."""
         await self._ended()  # a drone is not asked for two at once
         task, loop = asyncio.current_task(), asyncio.get_running_loop()
         delay = RETRY / 2.0
         while self._task is task:
             begun = loop.time()
-            played = await self._play(Stream(route, self._wanted, self._take, lambda: self._task is task))
+            played = await self._play(VideoStream(route, self._wanted, self._take, lambda: self._task is task))
             delay = RETRY if played and loop.time() - begun > HEALTHY else min(2.0 * delay, MAX_RETRY)
             await asyncio.sleep(delay)
 
-    async def _play(self, stream: Stream) -> bool:
+    async def _play(self, stream: VideoStream) -> bool:
         """One stream to its end; whether there were pictures at last."""
         self._stream = stream
         problem: AnafiMavError | None = None
@@ -285,7 +285,7 @@ class Video(Element[VideoState]):
         self._fail(problem)
         return played
 
-    def _count(self, stream: Stream) -> None:
+    def _count(self, stream: VideoStream) -> None:
         self.counters.update(stream.counters)
         self.counters.update(stream.receiver.counts)
         self.counters.update(stream.receiver.window.counts)

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from anafi_mav import mav_enums
 from anafi_mav.errors import PlanError
-from anafi_mav.plans.plan import GLOBAL, RELATIVE, Circle, Item, Plan, Point, Polygon
+from anafi_mav.plans.plan import GLOBAL, RELATIVE, FenceCircle, FencePolygon, Item, Plan, Point
 
 RETURN_POINT = mav_enums.MAV_CMD_NAV_FENCE_RETURN_POINT
 HOME_CIRCLE = 5005
@@ -29,7 +29,7 @@ def fence_items(plan: Plan) -> list[Item]:
     """The fence as a list of items."""
     items = []
     for zone in plan.zones:
-        if isinstance(zone, Polygon):
+        if isinstance(zone, FencePolygon):
             command = next(command for command, inclusion in _POLYGONS.items() if inclusion is zone.inclusion)
             for latitude, longitude in zone.corners:
                 count = float(len(zone.corners))
@@ -60,9 +60,9 @@ def rally_items(plan: Plan) -> list[Item]:
     ]
 
 
-def zones_of(items: Sequence[Item], source: str) -> tuple[tuple[Polygon | Circle, ...], Point | None]:
+def zones_of(items: Sequence[Item], source: str) -> tuple[tuple[FencePolygon | FenceCircle, ...], Point | None]:
     """The zones and the return point that items describe. Raises `PlanError`."""
-    zones: list[Polygon | Circle] = []
+    zones: list[FencePolygon | FenceCircle] = []
     back: Point | None = None
     number = 0
     while number < len(items):
@@ -75,14 +75,14 @@ def zones_of(items: Sequence[Item], source: str) -> tuple[tuple[Polygon | Circle
             if count < 3 or len(same) < count or any(one.command != item.command for one in same):
                 raise PlanError(source, f"the polygon that begins here has not its {count} corners", number)
             corners = tuple(_place(number + offset, one, source) for offset, one in enumerate(same))
-            zones.append(Polygon(_POLYGONS[item.command], corners, group))
+            zones.append(FencePolygon(_POLYGONS[item.command], corners, group))
             number += count
             continue
         if item.command in _CIRCLES:
             if first is None or first <= 0.0:
                 raise PlanError(source, "a circle without a radius", number)
             centre = None if item.command == HOME_CIRCLE else _place(number, item, source)
-            zones.append(Circle(_CIRCLES[item.command], centre, first, group))
+            zones.append(FenceCircle(_CIRCLES[item.command], centre, first, group))
         elif item.command == RETURN_POINT:
             back = Point(*_place(number, item, source), item.params[6] or 0.0)
         else:

@@ -27,13 +27,13 @@ from anafi_mav.plans.plan import (
     TERRAIN,
     TERRAIN_INT,
     Block,
-    Circle,
+    FenceCircle,
+    FencePolygon,
     Item,
     Loss,
     Params,
     Plan,
     Point,
-    Polygon,
 )
 
 FILE_TYPE = "Plan"
@@ -184,25 +184,27 @@ class _Reader:
         params: Params = (float(place), two, three, four, five, six, seven)
         return Item(item.command, item.frame, params, item.autocontinue, item.extra)
 
-    def _fence(self, stored: Any) -> tuple[tuple[Polygon | Circle, ...], Point | None]:
+    def _fence(self, stored: Any) -> tuple[tuple[FencePolygon | FenceCircle, ...], Point | None]:
         if stored is None:
             return (), None
         fence = _mapping(stored, "geoFence")
         _version(fence, LIST_VERSION, "the fence")
-        zones: list[Polygon | Circle] = []
+        zones: list[FencePolygon | FenceCircle] = []
         for one in _sequence(fence.get("polygons", []), "geoFence.polygons"):
             polygon = _mapping(one, "a polygon")
             corners = tuple(_place(corner, "a corner") for corner in _sequence(polygon.get("polygon"), "polygon"))
             if len(corners) < 3:
                 raise _Trouble(f"a polygon of the fence has {len(corners)} corners")
-            zones.append(Polygon(polygon.get("inclusion") is not False, corners))
+            zones.append(FencePolygon(polygon.get("inclusion") is not False, corners))
         for one in _sequence(fence.get("circles", []), "geoFence.circles"):
             circle = _mapping(one, "a circle")
             drawn = _mapping(circle.get("circle"), "circle")
             radius = _number(drawn.get("radius"), "radius")
             if radius <= 0.0:
                 raise _Trouble(f"a circle of the fence has a radius of {radius:g} m")
-            zones.append(Circle(circle.get("inclusion") is not False, _place(drawn.get("center"), "center"), radius))
+            zones.append(
+                FenceCircle(circle.get("inclusion") is not False, _place(drawn.get("center"), "center"), radius)
+            )
         back = fence.get("breachReturn")
         return tuple(zones), None if back is None else _point(back, "breachReturn")
 
@@ -361,7 +363,7 @@ def _stored_fence(plan: Plan, losses: list[Loss]) -> dict[str, Any]:
     for zone in plan.zones:
         if zone.inclusion and zone.group != 0:
             losses.append(Loss(f"an inclusion zone of the fence is of group {zone.group}: there are no groups"))
-        if isinstance(zone, Polygon):
+        if isinstance(zone, FencePolygon):
             corners = [list(corner) for corner in zone.corners]
             polygons.append({"inclusion": zone.inclusion, "polygon": corners, "version": 1})
         elif zone.centre is None:

@@ -1,7 +1,7 @@
 """Flight-plan writer: `rules` use it to write the lines of the drone's files.
 
-A `Leg` is one file. Settings made before its start that still hold (speed, region of interest, gimbal) are written
-again at its beginning, because no setting of one file holds in the next.
+A `FlightPlanFile` is one file. Settings made before its start that still hold (speed, region of interest, gimbal) are
+written again at its beginning, because no setting of one file holds in the next.
 """
 
 from __future__ import annotations
@@ -29,7 +29,16 @@ from anafi_mav.plans.plan import (
     Plan,
     Point,
 )
-from anafi_mav.plans.rules.parts import Fault, FaultKind, Leg, Refused, Settings, Start, Step, UnknownHeight
+from anafi_mav.plans.rules.parts import (
+    FaultKind,
+    FlightPlanFile,
+    GatewayStep,
+    ItemSettings,
+    Start,
+    TranslationFault,
+    TranslationRefused,
+    UnknownHeight,
+)
 from anafi_mav.units import DEG_PER_RAD, wrap_360
 
 ACCEPTANCE = 1.0
@@ -72,11 +81,11 @@ class Pen:
     """Writes legs; knows where the drone will be."""
 
     def __init__(
-        self, version: Version, start: Start, items: Sequence[Item] = (), settings: Settings | None = None
+        self, version: Version, start: Start, items: Sequence[Item] = (), settings: ItemSettings | None = None
     ) -> None:
         """`items` is the whole mission, whose regions of interest are numbered."""
         self.version = version
-        self.settings = settings or Settings()
+        self.settings = settings or ItemSettings()
         self.films_again = False
         """The first file begins the photos or the video that the settings have."""
         self.regions = tuple(item for item in items if item.command == _SET_ROI and item.params[0] == _ROI_PLACE)
@@ -90,7 +99,7 @@ class Pen:
         """Number of the item that is being written."""
         self.muted = False
         """Only settings are taken; nothing is flown."""
-        self.parts: list[Leg | Step] = []
+        self.parts: list[FlightPlanFile | GatewayStep] = []
         self.notes: dict[Loss, None] = {}
         """A set that keeps its order: an item that is flown again says the same again."""
         self.written = 0
@@ -125,7 +134,7 @@ class Pen:
     def refuse(self, reason: str, param: int | None = None, kind: FaultKind | None = None) -> NoReturn:
         """The item cannot be flown."""
         kind = kind or (FaultKind.COMMAND if param is None else FaultKind.PARAM)
-        raise Refused(Fault(self.item, reason, kind, param))
+        raise TranslationRefused(TranslationFault(self.item, reason, kind, param))
 
     # -- parts
 
@@ -139,7 +148,7 @@ class Pen:
             self.waiting.append(self.item)
         else:
             last = self.parts[-1]
-            if isinstance(last, Step):
+            if isinstance(last, GatewayStep):
                 self.parts[-1] = replace(last, done=(*last.done, self.item))
             else:
                 self.parts[-1] = replace(last, done=(*last.done[:-1], (*last.done[-1], self.item)))
@@ -150,7 +159,7 @@ class Pen:
             return
         self.close()
         self.written += 1
-        self.parts.append(Step(self.item, tuple(self.waiting)))
+        self.parts.append(GatewayStep(self.item, tuple(self.waiting)))
         self.waiting.clear()
 
     def close(self) -> None:
@@ -160,7 +169,7 @@ class Pen:
             content, lost = parrot.write(Plan(tuple(self._lines)), self.version)
             if lost or len(self._lines) != len(content.splitlines()) - 1:
                 raise AssertionError(f"lines that version {self.version} cannot hold: {lost}")
-            self.parts.append(Leg(content, tuple(self._origins), tuple(map(tuple, self._done))))
+            self.parts.append(FlightPlanFile(content, tuple(self._origins), tuple(map(tuple, self._done))))
         self._lines, self._origins, self._done = [], [], []
         self._rois, self._still = [], None
 
@@ -351,7 +360,7 @@ class Pen:
         values = (mode, 0.0, gimbal)
         self._set(lambda: self._put_view(values), replace(self.settings, roi=None, view=values))
 
-    def _set(self, put: Callable[[], None], settings: Settings) -> None:
+    def _set(self, put: Callable[[], None], settings: ItemSettings) -> None:
         """Set something; at the beginning of a file that is what `_open` does."""
         if not self.muted and not self._lines:
             self.settings = settings

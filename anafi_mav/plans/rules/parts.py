@@ -22,7 +22,7 @@ class FaultKind(enum.Enum):
 
 
 @dataclass(frozen=True)
-class Fault:
+class TranslationFault:
     """Why a mission is refused."""
 
     item: int
@@ -36,10 +36,10 @@ class Fault:
         return f"item {self.item}: {self.reason}"
 
 
-class Refused(Exception):
+class TranslationRefused(Exception):
     """Raised by a rule; `fault` is why."""
 
-    def __init__(self, fault: Fault) -> None:
+    def __init__(self, fault: TranslationFault) -> None:
         super().__init__(str(fault))
         self.fault = fault
 
@@ -64,7 +64,7 @@ class Start:
 
 
 @dataclass(frozen=True)
-class Leg:
+class FlightPlanFile:
     """A file that the drone flies by itself."""
 
     content: bytes
@@ -79,7 +79,7 @@ class Leg:
 
 
 @dataclass(frozen=True)
-class Step:
+class GatewayStep:
     """An item that the gateway flies."""
 
     item: int
@@ -88,7 +88,7 @@ class Step:
 
 
 @dataclass(frozen=True)
-class Settings:
+class ItemSettings:
     """Settings made by items, which hold until other items change them."""
 
     speed: tuple[float, float] | None = None

@@ -12,7 +12,7 @@ from anafi_mav.plans.plan import Item
 from anafi_mav.plans.rules.flight_plan_writer import Pen
 
 
-class Verdict(enum.Enum):
+class Fidelity(enum.Enum):
     """How a mission's item is flown."""
 
     EXACT = "as the mission has it; a value that is left out is named in the row, and said at upload"
@@ -27,11 +27,11 @@ _NOTHING = frozenset({None, 0.0})
 
 
 @dataclass(frozen=True)
-class Row:
+class Rule:
     """One command."""
 
     command: int
-    verdict: Verdict
+    verdict: Fidelity
     how: str
     """Lines that it becomes and values that are refused; or the reason for its verdict."""
     write: Write | None = None

@@ -6,14 +6,14 @@ MAVLink's common.xml; the meaning of a line is from Parrot's flight plan page. A
 
 from __future__ import annotations
 
-from anafi_mav.plans.rules.rule import Row, Verdict
+from anafi_mav.plans.rules.rule import Fidelity, Rule
 from anafi_mav.plans.rules.rules_camera import CAMERA
 from anafi_mav.plans.rules.rules_flight import FLIGHT
 
 _NO_ACTUATOR = "The drone has no actuator that a flight plan could move."
 
 _REFUSED = tuple(
-    Row(command, Verdict.REFUSED, why)
+    Rule(command, Fidelity.REFUSED, why)
     for command, why in {
         82: "The drone flies straight lines: draw the curve as way points.",
         114: "A flight plan cannot begin something on the way to a way point: draw one there.",
@@ -29,4 +29,6 @@ _REFUSED = tuple(
     }.items()
 )
 
-TABLE: dict[int, Row] = {row.command: row for row in sorted((*FLIGHT, *CAMERA, *_REFUSED), key=lambda row: row.command)}
+TABLE: dict[int, Rule] = {
+    row.command: row for row in sorted((*FLIGHT, *CAMERA, *_REFUSED), key=lambda row: row.command)
+}

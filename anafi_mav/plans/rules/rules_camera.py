@@ -6,7 +6,7 @@ from anafi_mav import mav_enums
 from anafi_mav.plans.formats.parrot import SET_STILL_MODE, SET_VIEW_MODE
 from anafi_mav.plans.plan import Item, Point
 from anafi_mav.plans.rules.flight_plan_writer import SHORTEST_INTERVAL, SHORTEST_STEP, Pen
-from anafi_mav.plans.rules.rule import Row, Verdict, only
+from anafi_mav.plans.rules.rule import Fidelity, Rule, only
 
 _CAMERAS = frozenset({None, 0.0, 1.0, 100.0})
 """Camera ids that mean the one of the flight plan: all, the first, and its component."""
@@ -266,44 +266,44 @@ def _zoom(pen: Pen, item: Item) -> None:
         pen.refuse("a zoom range is from 0 to 100 %", 2)
 
 
-_EXACT, _NEARLY, _STEPPED = Verdict.EXACT, Verdict.APPROXIMATED, Verdict.STEPPED
+_EXACT, _NEARLY, _STEPPED = Fidelity.EXACT, Fidelity.APPROXIMATED, Fidelity.STEPPED
 
 _ONE_CAMERA = "Another camera than the main one (0, 1 or 100) is refused."
 _ONE_GIMBAL = "Another gimbal than the one (0, 1 or 154) is refused."
 
 CAMERA = (
-    Row(195, _EXACT, "Version 1: a numbered region of interest, and the view mode that looks at it. Version 2: itself. "
-        f"Headings of way points count for nothing meanwhile. {_ONE_GIMBAL}", _roi_location),
-    Row(196, _EXACT, "Gimbal to param5, and each way point's heading is the way to it and param7 more. A roll is "
+    Rule(195, _EXACT, "Version 1: a numbered region of interest, and the view mode that looks at it. "
+        f"Version 2: itself. Headings of way points count for nothing meanwhile. {_ONE_GIMBAL}", _roi_location),
+    Rule(196, _EXACT, "Gimbal to param5, and each way point's heading is the way to it and param7 more. A roll is "
         f"refused. {_ONE_GIMBAL}", _roi_beside),
-    Row(197, _EXACT, "Version 1: the view mode of way points. Version 2: itself. The camera looks ahead again if "
+    Rule(197, _EXACT, "Version 1: the view mode of way points. Version 2: itself. The camera looks ahead again if "
         f"something was looked at. {_ONE_GIMBAL}", _roi_none),
-    Row(201, _EXACT, "As 195 with a place, also with param1 = 0, as ArduPilot has it; as 197 without. Way points and "
+    Rule(201, _EXACT, "As 195 with a place, also with param1 = 0, as ArduPilot has it; as 197 without. Way points and "
         "targets are refused. Where SET_VIEW_MODE numbers them, it only numbers.", _roi),
-    Row(203, _EXACT, "One photo with param5 = 1, nothing with 0. Lens, zoom and focus are refused.", _digicam),
-    Row(204, _EXACT, "Nothing, for the gimbal is always aimed by angles; param1 = 1 looks ahead. Other modes are "
+    Rule(203, _EXACT, "One photo with param5 = 1, nothing with 0. Lens, zoom and focus are refused.", _digicam),
+    Rule(204, _EXACT, "Nothing, for the gimbal is always aimed by angles; param1 = 1 looks ahead. Other modes are "
         "refused.", _mount_mode),
-    Row(205, _EXACT, "Gimbal. Version 1 refuses roll and yaw. Angles beyond -90 to 90 deg (Ai: -116 to 176) and "
+    Rule(205, _EXACT, "Gimbal. Version 1 refuses roll and yaw. Angles beyond -90 to 90 deg (Ai: -116 to 176) and "
         "modes 3 to 6 are refused; param7 = 0 aims too, which is said.", _mount),
-    Row(206, _NEARLY, "Photos by distance (GPS lapse), which begin with one: said if param3 is 0. With 0 m they end, "
+    Rule(206, _NEARLY, "Photos by distance (GPS lapse), which begin with one: said if param3 is 0. With 0 m they end, "
         "and param3 = 1 then takes one more. Less than 1 m is refused; a shutter time is left out and said. "
         f"{_ONE_CAMERA}", _trigger_distance),
-    Row(214, _EXACT, "Photos by time, which begin with one. Less than 2000 ms is refused; a shutter time is left out "
+    Rule(214, _EXACT, "Photos by time, which begin with one. Less than 2000 ms is refused; a shutter time is left out "
         f"and said. {_ONE_CAMERA}", _trigger_interval),
-    Row(530, _NEARLY, "Nothing: photos and videos of a plan set the mode themselves; it is said where none comes after "
-        f"it. {_ONE_CAMERA}", _camera_mode),
-    Row(531, _STEPPED, "The gateway zooms: a flight plan cannot. Other types than a range (2) are refused. "
+    Rule(530, _NEARLY, "Nothing: photos and videos of a plan set the mode themselves; it is said where none comes "
+        f"after it. {_ONE_CAMERA}", _camera_mode),
+    Rule(531, _STEPPED, "The gateway zooms: a flight plan cannot. Other types than a range (2) are refused. "
         f"{_ONE_CAMERA}", _zoom, moves=True),
-    Row(1000, _EXACT, "Gimbal. Speeds, a yaw from north and, in version 1, any yaw are refused; putting it away looks "
+    Rule(1000, _EXACT, "Gimbal. Speeds, a yaw from north and, in version 1, any yaw are refused; putting it away looks "
         f"ahead, which is said. {_ONE_GIMBAL}", _pitch_yaw),
-    Row(1001, _EXACT, f"Nothing: the flight plan aims the gimbal itself. {_ONE_GIMBAL}", _gimbal_owner),
-    Row(2000, _EXACT, "Photos, with the still mode before them: one (param3 = 1), or every param2 s. Less than 2 s is "
+    Rule(1001, _EXACT, f"Nothing: the flight plan aims the gimbal itself. {_ONE_GIMBAL}", _gimbal_owner),
+    Rule(2000, _EXACT, "Photos, with the still mode before them: one (param3 = 1), or every param2 s. Less than 2 s is "
         f"refused. {_ONE_CAMERA}", _photos),
-    Row(2001, _EXACT, f"Itself. {_ONE_CAMERA}", _stop_photos),
-    Row(2500, _EXACT, "Itself. Photos while it runs, and video while photos are taken without end, are refused: the "
+    Rule(2001, _EXACT, f"Itself. {_ONE_CAMERA}", _stop_photos),
+    Rule(2500, _EXACT, "Itself. Photos while it runs, and video while photos are taken without end, are refused: the "
         f"camera does one of them. {_ONE_CAMERA}", _video),
-    Row(2501, _EXACT, f"Itself. {_ONE_CAMERA}", _stop_video),
-    Row(2800, _EXACT, "Itself.", _panorama, moves=True),
-    Row(SET_VIEW_MODE, _EXACT, "Itself, or with param1 = 2 as 195 with the 201 of that number.", _view_mode),
-    Row(SET_STILL_MODE, _EXACT, "Put in front of the next photos.", _still_mode),
+    Rule(2501, _EXACT, f"Itself. {_ONE_CAMERA}", _stop_video),
+    Rule(2800, _EXACT, "Itself.", _panorama, moves=True),
+    Rule(SET_VIEW_MODE, _EXACT, "Itself, or with param1 = 2 as 195 with the 201 of that number.", _view_mode),
+    Rule(SET_STILL_MODE, _EXACT, "Put in front of the next photos.", _still_mode),
 )  # fmt: skip

@@ -7,7 +7,7 @@ from dataclasses import replace
 from anafi_mav import mav_enums
 from anafi_mav.plans.plan import DO_JUMP, WAYPOINT, Item, Point
 from anafi_mav.plans.rules.flight_plan_writer import Pen
-from anafi_mav.plans.rules.rule import Row, Verdict
+from anafi_mav.plans.rules.rule import Fidelity, Rule
 
 # What flies.
 
@@ -149,34 +149,34 @@ def _nothing(pen: Pen, item: Item) -> None:
     """No line."""
 
 
-_EXACT, _NEARLY, _STEPPED, _REFUSED = Verdict.EXACT, Verdict.APPROXIMATED, Verdict.STEPPED, Verdict.REFUSED
+_EXACT, _NEARLY, _STEPPED, _REFUSED = Fidelity.EXACT, Fidelity.APPROXIMATED, Fidelity.STEPPED, Fidelity.REFUSED
 
 FLIGHT = (
-    Row(WAYPOINT, _EXACT, "Way point, and a delay of param1 s. A param3 is left out and said: it is flown over. No "
+    Rule(WAYPOINT, _EXACT, "Way point, and a delay of param1 s. A param3 is left out and said: it is flown over. No "
         "place, or 0, 0, is where the drone is then, which is said; half a place is refused.", _waypoint, moves=True,
         place=True),
-    Row(17, _EXACT, "Way point, with which the plan ends: the drone hovers there.", _loiter, moves=True, place=True,
+    Rule(17, _EXACT, "Way point, with which the plan ends: the drone hovers there.", _loiter, moves=True, place=True,
         ends=True),
-    Row(18, _REFUSED, "The drone flies straight lines: draw the circle as way points."),
-    Row(19, _EXACT, "Way point, and a delay of param1 s. A multicopter needs no radius to wait.", _loiter_time,
+    Rule(18, _REFUSED, "The drone flies straight lines: draw the circle as way points."),
+    Rule(19, _EXACT, "Way point, and a delay of param1 s. A multicopter needs no radius to wait.", _loiter_time,
         moves=True, place=True),
-    Row(20, _EXACT, "Return, with which the plan ends.", _return, moves=True, ends=True),
-    Row(21, _EXACT, "Way point over its place at the height that the drone has there, if it names one, and landing, "
+    Rule(20, _EXACT, "Return, with which the plan ends.", _return, moves=True, ends=True),
+    Rule(21, _EXACT, "Way point over its place at the height that the drone has there, if it names one, and landing, "
         "with which the plan ends. param2 = 2 is refused, 1 is left out and said; so is a heading without a place.",
         _land, moves=True, ends=True),
-    Row(22, _EXACT, "Take-off (nothing when it flies already), way point straight above at its height, and one at its "
+    Rule(22, _EXACT, "Take-off (nothing when it flies already), way point straight above at its height, and one at its "
         "place if it names another. Without a height the drone rises as it does by itself, which is said.", _take_off,
         moves=True),
-    Row(31, _EXACT, "Way point.", _loiter_to_height, moves=True, place=True),
-    Row(93, _EXACT, "Delay: CONDITION_DELAY in version 1. Waiting for a time of day is refused.", _delay, moves=True),
-    Row(112, _NEARLY, "Delay: the drone waits where it is, not on the way.", _condition_delay, moves=True),
-    Row(115, _STEPPED, "The gateway turns the drone: a flight plan turns on the way only.", _turn, moves=True),
-    Row(DO_JUMP, _EXACT, "Written out as often as it jumps; what becomes too long, or has no end, is flown file after "
+    Rule(31, _EXACT, "Way point.", _loiter_to_height, moves=True, place=True),
+    Rule(93, _EXACT, "Delay: CONDITION_DELAY in version 1. Waiting for a time of day is refused.", _delay, moves=True),
+    Rule(112, _NEARLY, "Delay: the drone waits where it is, not on the way.", _condition_delay, moves=True),
+    Rule(115, _STEPPED, "The gateway turns the drone: a flight plan turns on the way only.", _turn, moves=True),
+    Rule(DO_JUMP, _EXACT, "Written out as often as it jumps; what becomes too long, or has no end, is flown file after "
         "file by the gateway (stepped). Its count is that of the whole mission: a loop in a loop is flown so often, "
         "not so often each time, as in PX4 and ArduPilot. One without end in which the drone neither goes to another "
         "place, nor waits, turns or makes a panorama, is refused: photos are not waited for; so is one that goes round "
         "very often for nothing."),
-    Row(178, _EXACT, "Speed. Other types than air and ground speed, -2 (the default) and differences are refused; a "
+    Rule(178, _EXACT, "Speed. Other types than air and ground speed, -2 (the default) and differences are refused; a "
         "throttle is left out and said.", _speed),
-    Row(189, _EXACT, "Nothing: a mark for aeroplanes that break off a landing.", _nothing),
+    Rule(189, _EXACT, "Nothing: a mark for aeroplanes that break off a landing.", _nothing),
 )  # fmt: skip

@@ -16,9 +16,17 @@ from anafi_mav.errors import PlanError
 from anafi_mav.models import Model
 from anafi_mav.plans import zones
 from anafi_mav.plans.formats.waypoints import rows
-from anafi_mav.plans.plan import WAYPOINT, Circle, Item, Plan, Point
+from anafi_mav.plans.plan import WAYPOINT, FenceCircle, Item, Plan, Point
 from anafi_mav.plans.rules.parts import UnknownHeight
-from anafi_mav.plans.translation.translate import Fault, Flight, Leg, Start, Step, examine, translate
+from anafi_mav.plans.translation.translate import (
+    FlightPlanFile,
+    GatewayStep,
+    Start,
+    TranslatedMission,
+    TranslationFault,
+    examine,
+    translate,
+)
 
 CRUISE = 5.0
 """m/s without a speed of the mission's or the planner's. Assumed: Parrot publishes none."""
@@ -40,7 +48,7 @@ RESERVE = 0.2
 """Part of the battery that a plan should leave."""
 
 
-class Severity(enum.Enum):
+class FindingSeverity(enum.Enum):
     ERROR = "error"
     """It would be refused, end before its end, or break a limit."""
     WARNING = "warning"
@@ -51,7 +59,7 @@ class Severity(enum.Enum):
 class Problem:
     """One of them."""
 
-    severity: Severity
+    severity: FindingSeverity
     what: str
     """A clause."""
     item: int | None = None
@@ -62,7 +70,7 @@ class Problem:
 
 
 @dataclass(frozen=True)
-class Limits:
+class FlightLimits:
     """Settings of the drone that a plan has to keep; defaults are the firmware's."""
 
     max_altitude: float = 150.0
@@ -86,10 +94,10 @@ class Findings:
 
     @property
     def errors(self) -> bool:
-        return any(problem.severity is Severity.ERROR for problem in self.problems)
+        return any(problem.severity is FindingSeverity.ERROR for problem in self.problems)
 
 
-def check(plan: Plan, model: Model, limits: Limits | None = None) -> Findings:
+def check(plan: Plan, model: Model, limits: FlightLimits | None = None) -> Findings:
     """Find all faults of a plan.
 
     Raises `ValueError` for a model whose plans are not known.
@@ -119,7 +127,7 @@ def check(plan: Plan, model: Model, limits: Limits | None = None) -> Findings:
     except PlanError as error:
         problems.append(_error(error.problem, error.item))
         return Findings(_ordered(problems))
-    follower = _Follower(plan, model, limits or Limits(), start)
+    follower = _Follower(plan, model, limits or FlightLimits(), start)
     problems += follower.follow(flight)
     if flight.rest is not None:
         problems.append(_warning("it is flown until the battery is low"))
@@ -129,14 +137,14 @@ def check(plan: Plan, model: Model, limits: Limits | None = None) -> Findings:
 
 
 def _error(what: str, item: int | None = None) -> Problem:
-    return Problem(Severity.ERROR, what, item)
+    return Problem(FindingSeverity.ERROR, what, item)
 
 
 def _warning(what: str, item: int | None = None) -> Problem:
-    return Problem(Severity.WARNING, what, item)
+    return Problem(FindingSeverity.WARNING, what, item)
 
 
-def _fault(fault: Fault) -> Problem:
+def _fault(fault: TranslationFault) -> Problem:
     return _error(fault.reason, fault.item)
 
 
@@ -150,18 +158,18 @@ def fence_of(plan: Plan) -> zones.Fence:
     found: list[zones.Zone] = []
     for number, zone in enumerate(plan.zones):
         kind = f"{'inclusion' if zone.inclusion else 'exclusion'}"
-        if isinstance(zone, Circle):
+        if isinstance(zone, FenceCircle):
             name = f"{kind} circle {number}"
-            found.append(zones.Circle(name, zone.inclusion, zone.group, zone.centre, zone.radius))
+            found.append(zones.CircleZone(name, zone.inclusion, zone.group, zone.centre, zone.radius))
         else:
-            found.append(zones.Polygon(f"{kind} polygon {number}", zone.inclusion, zone.group, zone.corners))
+            found.append(zones.PolygonZone(f"{kind} polygon {number}", zone.inclusion, zone.group, zone.corners))
     return zones.Fence(found)
 
 
 class _Follower:
     """Follows a flight."""
 
-    def __init__(self, plan: Plan, model: Model, limits: Limits, start: Start) -> None:
+    def __init__(self, plan: Plan, model: Model, limits: FlightLimits, start: Start) -> None:
         self._model, self._figures, self._limits = model, model.plans(), limits
         self._planned = plan.home is not None
         self._home = (start.latitude, start.longitude)
@@ -174,11 +182,11 @@ class _Follower:
         self.distance = 0.0
         self.seconds = 0.0
 
-    def follow(self, flight: Flight) -> Iterator[Problem]:
+    def follow(self, flight: TranslatedMission) -> Iterator[Problem]:
         if self._fence.margin(self._home, self._home).metres < 0.0:
             yield _error("it begins outside the fence")
         for part in flight.parts:
-            if isinstance(part, Step):
+            if isinstance(part, GatewayStep):
                 self.seconds += STEP_TIME
                 continue
             lines = rows(part.content.decode(), "translation")
@@ -189,7 +197,7 @@ class _Follower:
         if not self._landed:
             yield _warning("it ends in the air: the drone hovers there until the battery is low")
 
-    def _way_in(self, lines: list[Item], leg: Leg) -> Iterator[Problem]:
+    def _way_in(self, lines: list[Item], leg: FlightPlanFile) -> Iterator[Problem]:
         """Up here, and over to above the first way point (Parrot's flight plan page)."""
         found = next(((number, line) for number, line in enumerate(lines) if line.command == WAYPOINT), None)
         if found is None:

@@ -9,7 +9,7 @@ from anafi_mav.plans.formats import parrot
 from anafi_mav.plans.formats.parrot import Version
 from anafi_mav.plans.path import place_of
 from anafi_mav.plans.plan import Loss, Plan
-from anafi_mav.plans.translation.translate import Leg, Start, Step, examine, translate
+from anafi_mav.plans.translation.translate import FlightPlanFile, GatewayStep, Start, examine, translate
 
 
 def start_of(plan: Plan) -> Start:
@@ -35,11 +35,11 @@ def twin(plan: Plan, version: Version, source: str) -> tuple[bytes, list[Loss]]:
         flight = translate(plan.items, version, start_of(plan))
     except PlanError as error:
         raise PlanError(source, error.problem, error.item) from error
-    step = next((part for part in flight.parts if isinstance(part, Step)), None)
+    step = next((part for part in flight.parts if isinstance(part, GatewayStep)), None)
     if step is not None:
         raise PlanError(source, "a gateway has to fly it: no file for the drone alone", step.item)
     if flight.rest is not None:
         raise PlanError(source, "it is too long for one file", flight.rest.item)
-    content = b"".join(part.content for part in flight.parts if isinstance(part, Leg))
+    content = b"".join(part.content for part in flight.parts if isinstance(part, FlightPlanFile))
     _, lost = parrot.write(replace(plan, items=()), version)
     return content, [*flight.notes, *lost]

@@ -17,20 +17,28 @@ from anafi_mav.errors import PlanError
 from anafi_mav.plans.formats.parrot import Version
 from anafi_mav.plans.plan import DO_JUMP, Item, Loss
 from anafi_mav.plans.rules.flight_plan_writer import Pen
-from anafi_mav.plans.rules.parts import Fault, FaultKind, Leg, Refused, Settings, Start, Step
-from anafi_mav.plans.rules.rule import Row, Verdict
+from anafi_mav.plans.rules.parts import (
+    FaultKind,
+    FlightPlanFile,
+    GatewayStep,
+    ItemSettings,
+    Start,
+    TranslationFault,
+    TranslationRefused,
+)
+from anafi_mav.plans.rules.rule import Fidelity, Rule
 from anafi_mav.plans.rules.rules import TABLE
 
 __all__ = [
     "Cursor",
-    "Fault",
     "FaultKind",
-    "Flight",
-    "Leg",
-    "Report",
+    "Fidelity",
+    "FlightPlanFile",
+    "GatewayStep",
     "Start",
-    "Step",
-    "Verdict",
+    "TranslatedMission",
+    "TranslationFault",
+    "TranslationReport",
     "examine",
     "translate",
 ]
@@ -51,10 +59,10 @@ MAX_JUMPS = 0xFFFF
 
 
 @dataclass(frozen=True)
-class Report:
+class TranslationReport:
     """Result of examining a mission for a drone when it is uploaded."""
 
-    faults: tuple[Fault, ...]
+    faults: tuple[TranslationFault, ...]
     """Not empty: it is refused."""
     approximations: tuple[Loss, ...]
     stepped: tuple[Loss, ...]
@@ -68,16 +76,16 @@ class Cursor:
     item: int
     jumps: tuple[tuple[int, int], ...]
     """Item of a jump, and how often it was taken."""
-    settings: Settings
+    settings: ItemSettings
     anew: bool = False
     """Photos and videos that the settings have are begun."""
 
 
 @dataclass(frozen=True)
-class Flight:
+class TranslatedMission:
     """Translated flight: its parts and its remaining items."""
 
-    parts: tuple[Leg | Step, ...]
+    parts: tuple[FlightPlanFile | GatewayStep, ...]
     """Empty when nothing is to be done, such as a take-off in the air."""
     notes: tuple[Loss, ...]
     """Differences from the mission."""
@@ -87,28 +95,28 @@ class Flight:
     """The items that are done before anything is flown; only where there are no parts, which else tell it."""
 
 
-def examine(items: Sequence[Item], version: Version) -> Report:
+def examine(items: Sequence[Item], version: Version) -> TranslationReport:
     """Can a drone of this version fly the mission?"""
     faults, said = _judged(items, version)
     faults = faults or _wrong_ways(items, version)
     if faults:
-        return Report(tuple(faults), (), ())
+        return TranslationReport(tuple(faults), (), ())
     place = next((item.params for item in items if TABLE[item.command].place and item.params[4]), None)
     latitude, longitude = (0.0, 0.0) if place is None else (place[4] or 0.0, place[5] or 0.0)
     start = Start(latitude, longitude, 0.0, flying=_way_up(items, 0) is None, takeoff_amsl=0.0)
     try:
-        flight = _fly(items, version, start, Cursor(0, (), Settings()))
-    except Refused as error:  # by what came before it on the way, which is not what stands before it
-        return Report((error.fault,), (), ())
+        flight = _fly(items, version, start, Cursor(0, (), ItemSettings()))
+    except TranslationRefused as error:  # by what came before it on the way, which is not what stands before it
+        return TranslationReport((error.fault,), (), ())
     flown = _reached(items) if flight.rest else {*flight.done, *chain(*map(_done, flight.parts))}
     never = [Loss("it is never reached", number) for number in range(len(items)) if number not in flown]
     # Of a long mission, only the beginning has been flown here.
     notes = dict.fromkeys([*flight.notes, *(loss for loss in said if flight.rest and loss.item in flown), *never])
-    return Report((), tuple(notes), tuple(_stepped(items, flown, flight)))
+    return TranslationReport((), tuple(notes), tuple(_stepped(items, flown, flight)))
 
 
-def _done(part: Leg | Step) -> Iterator[int]:
-    return chain(*part.done) if isinstance(part, Leg) else iter(part.done)
+def _done(part: FlightPlanFile | GatewayStep) -> Iterator[int]:
+    return chain(*part.done) if isinstance(part, FlightPlanFile) else iter(part.done)
 
 
 def translate(
@@ -117,7 +125,7 @@ def translate(
     start: Start,
     first: int | Cursor = 0,
     jumps: Mapping[int, int] | None = None,
-) -> Flight:
+) -> TranslatedMission:
     """Write what is flown from an item on, or from where another flight ended.
 
     `jumps` are items that jump, and how often they have when it begins at an item.
@@ -131,14 +139,14 @@ def translate(
     cursor = first if isinstance(first, Cursor) else _cursor(items, version, start, first, jumps or {})
     try:
         return _fly(items, version, start, cursor)
-    except Refused as error:
+    except TranslationRefused as error:
         raise PlanError("mission", error.fault.reason, error.fault.item) from None
 
 
 # What is wrong with it.
 
 
-def _judged(items: Sequence[Item], version: Version) -> tuple[list[Fault], list[Loss]]:
+def _judged(items: Sequence[Item], version: Version) -> tuple[list[TranslationFault], list[Loss]]:
     """Judge each item by itself, after the items before it in the list.
 
     Returns at most one fault of each item, and the parts that are left out.
@@ -154,21 +162,21 @@ def _judged(items: Sequence[Item], version: Version) -> tuple[list[Fault], list[
     return faults, list(pen.notes)
 
 
-def _wrong_item(pen: Pen, item: Item, count: int) -> Fault | None:
+def _wrong_item(pen: Pen, item: Item, count: int) -> TranslationFault | None:
     row = TABLE.get(item.command)
-    if row is None or row.verdict is Verdict.REFUSED:
-        name = Row(item.command, Verdict.REFUSED, "").name
-        return Fault(pen.item, f"{name}: {row.why if row else 'no flight plan has it'}", FaultKind.COMMAND)
+    if row is None or row.verdict is Fidelity.REFUSED:
+        name = Rule(item.command, Fidelity.REFUSED, "").name
+        return TranslationFault(pen.item, f"{name}: {row.why if row else 'no flight plan has it'}", FaultKind.COMMAND)
     for number, value in enumerate(item.params, 1):
         if value is not None and not math.isfinite(value):
-            return Fault(pen.item, f"{value} is no number", FaultKind.PARAM, number)
+            return TranslationFault(pen.item, f"{value} is no number", FaultKind.PARAM, number)
     if not item.autocontinue:
-        return Fault(pen.item, "it waits to be continued, which the drone does not", FaultKind.COMMAND)
+        return TranslationFault(pen.item, "it waits to be continued, which the drone does not", FaultKind.COMMAND)
     if item.command == DO_JUMP:
         return _wrong_jump(pen.item, item, count)
     try:
         _write(pen, item)
-    except Refused as error:
+    except TranslationRefused as error:
         return error.fault
     return None
 
@@ -178,21 +186,21 @@ def _write(pen: Pen, item: Item) -> None:
     assert row.write is not None, "what is not refused is written"
     try:
         row.write(pen, item)
-    except Refused as error:
-        raise Refused(replace(error.fault, reason=f"{row.name}: {error.fault.reason}")) from None
+    except TranslationRefused as error:
+        raise TranslationRefused(replace(error.fault, reason=f"{row.name}: {error.fault.reason}")) from None
 
 
-def _wrong_jump(number: int, item: Item, count: int) -> Fault | None:
+def _wrong_jump(number: int, item: Item, count: int) -> TranslationFault | None:
     target, often = item.params[:2]
     if target is None or not target.is_integer() or not 0 <= target < count:
-        return Fault(number, "it jumps to an item that is not there", FaultKind.PARAM, 1)
+        return TranslationFault(number, "it jumps to an item that is not there", FaultKind.PARAM, 1)
     if often is None or not often.is_integer() or not _ENDLESS <= often <= MAX_JUMPS:
         times = "nobody knows how often" if often is None else f"{often:g} times"
-        return Fault(number, f"it jumps {times}", FaultKind.PARAM, 2)
+        return TranslationFault(number, f"it jumps {times}", FaultKind.PARAM, 2)
     return None
 
 
-def _wrong_ways(items: Sequence[Item], version: Version) -> list[Fault]:
+def _wrong_ways(items: Sequence[Item], version: Version) -> list[TranslationFault]:
     """Return the faults that no single item has by itself."""
     if not items:
         return []
@@ -200,19 +208,21 @@ def _wrong_ways(items: Sequence[Item], version: Version) -> list[Fault]:
     faults = []
     if sum(max(item.params[1] or 0.0, 0.0) for item in items if item.command == DO_JUMP) > MAX_JUMPS:
         last = max(number for number, item in enumerate(items) if item.command == DO_JUMP)
-        faults.append(Fault(last, f"the mission jumps more than {MAX_JUMPS} times", FaultKind.PARAM, 2))
+        faults.append(TranslationFault(last, f"the mission jumps more than {MAX_JUMPS} times", FaultKind.PARAM, 2))
     for number, item in enumerate(items):
         if item.command == mav_enums.MAV_CMD_NAV_LAND and number in ways:
             after = next((other for other in range(number + 1, len(items)) if other not in ways), None)
             if after is not None:
-                faults.append(Fault(after, "a landing stands before it, which ends the plan", FaultKind.PLAN))
+                faults.append(
+                    TranslationFault(after, "a landing stands before it, which ends the plan", FaultKind.PLAN)
+                )
                 break
     if not any(TABLE[items[number].command].moves for number in ways):
-        faults.append(Fault(0, "nothing of the mission flies", FaultKind.PLAN))
+        faults.append(TranslationFault(0, "nothing of the mission flies", FaultKind.PLAN))
     for loop in _endless(items, ways):
         if not _flies(items, version, loop):
             last = max(number for number in loop if items[number].command == DO_JUMP)
-            faults.append(Fault(last, "it goes round for ever and flies nowhere", FaultKind.PLAN))
+            faults.append(TranslationFault(last, "it goes round for ever and flies nowhere", FaultKind.PLAN))
     return faults
 
 
@@ -276,10 +286,10 @@ def _reached(items: Sequence[Item]) -> set[int]:
     return reached
 
 
-def _stepped(items: Sequence[Item], flown: set[int], flight: Flight) -> Iterator[Loss]:
+def _stepped(items: Sequence[Item], flown: set[int], flight: TranslatedMission) -> Iterator[Loss]:
     for number in sorted(flown):
         row = TABLE[items[number].command]
-        if row.verdict is Verdict.STEPPED:
+        if row.verdict is Fidelity.STEPPED:
             yield Loss(f"{row.name}: {row.why}", number)
     if flight.rest is not None:
         jumps = [number for number, item in enumerate(items) if item.command == DO_JUMP and item.params[1]]
@@ -302,7 +312,7 @@ def _cursor(items: Sequence[Item], version: Version, start: Start, first: int, j
     return Cursor(first, tuple(sorted(jumps.items())), pen.settings, anew=True)
 
 
-def _fly(items: Sequence[Item], version: Version, start: Start, cursor: Cursor) -> Flight:
+def _fly(items: Sequence[Item], version: Version, start: Start, cursor: Cursor) -> TranslatedMission:
     pen = Pen(version, start, items, cursor.settings)
     pen.films_again = cursor.anew
     jumps = dict(cursor.jumps)
@@ -326,7 +336,7 @@ def _fly(items: Sequence[Item], version: Version, start: Start, cursor: Cursor) 
                     pen.refuse("it goes round and round and flies nowhere", kind=FaultKind.PLAN)
                 jumps[index], following = jumps.get(index, 0) + 1, target
         else:
-            if row.verdict is Verdict.STEPPED:
+            if row.verdict is Fidelity.STEPPED:
                 pen.step()
             _write(pen, item)
         pen.finish()
@@ -335,7 +345,7 @@ def _fly(items: Sequence[Item], version: Version, start: Start, cursor: Cursor) 
     if index >= len(items):
         pen.end_modes()
     rest = Cursor(index, tuple(sorted(jumps.items())), pen.settings) if index < len(items) else None
-    return Flight(tuple(pen.parts), tuple(pen.notes), rest, () if pen.parts else tuple(pen.waiting))
+    return TranslatedMission(tuple(pen.parts), tuple(pen.notes), rest, () if pen.parts else tuple(pen.waiting))
 
 
 def _way_up(items: Sequence[Item], first: int) -> int | None:

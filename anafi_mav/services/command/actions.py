@@ -12,7 +12,7 @@ from anafi_mav import texts
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.command.guided_service import guided_mode
 from anafi_mav.services.command_targets import height, place
-from anafi_mav.services.commands import Action, Altitude, Command, Effect, Progress, effect_of_mode
+from anafi_mav.services.commands import Action, Altitude, Command, Effect, ProgressPolicy, effect_of_mode
 from anafi_mav.vehicle.base.bounds import FASTEST, SLOWEST
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused, Unsupported
@@ -162,7 +162,7 @@ def flight_actions(vehicle: Vehicle) -> dict[int, Action]:
             location=True,
             altitude=Altitude.BY_FRAME,
             effect=_effect_of_reposition,
-            progress=Progress.EARLY,
+            progress=ProgressPolicy.EARLY,
         ),
         dialect.MAV_CMD_DO_SET_MODE: Action(
             partial(set_mode, vehicle),
@@ -170,7 +170,7 @@ def flight_actions(vehicle: Vehicle) -> dict[int, Action]:
             altitude=Altitude.UNUSED,
             effect=effect_of_mode,
             mode=lambda command: command.flavour.mode_of_parameters(command.params[1], command.params[2]),
-            progress=Progress.LATE,
+            progress=ProgressPolicy.LATE,
         ),
         dialect.MAV_CMD_DO_FLIGHTTERMINATION: Action(
             partial(terminate, vehicle), location=False, altitude=Altitude.UNUSED, effect=Effect.STOP

@@ -14,9 +14,9 @@ from anafi_mav import texts
 from anafi_mav.drone.events import CalibrationAxis, MagnetoCalibrationStateChanged, Message
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.commands import Action, Altitude, Command, Effect, Progress
+from anafi_mav.services.commands import Action, Altitude, Command, Effect, ProgressPolicy
 from anafi_mav.services.service import Service
-from anafi_mav.texts import Text
+from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.severity import Severity
 
@@ -32,7 +32,7 @@ RESTART_WAIT = 15.0
 _RESTART = 1.0
 """param1 of MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN."""
 
-_SIDES: dict[CalibrationAxis | None, tuple[str, Text]] = {
+_SIDES: dict[CalibrationAxis | None, tuple[str, OperatorText]] = {
     CalibrationAxis.X_AXIS: ("front", texts.CAL_ROLL),
     CalibrationAxis.Y_AXIS: ("left", texts.CAL_PITCH),
     CalibrationAxis.Z_AXIS: ("down", texts.CAL_YAW),
@@ -54,7 +54,7 @@ class MaintenanceService(Service):
                 location=False,
                 altitude=Altitude.UNUSED,
                 effect=Effect.CHANGE,
-                progress=Progress.FINAL_ONLY,
+                progress=ProgressPolicy.FINAL_ONLY,
             ),
             dialect.MAV_CMD_GIMBAL_REQUEST_AXIS_CALIBRATION: Action(
                 lambda command: self._on_ground(texts.CALIBRATION, self._gimbal),
@@ -67,7 +67,7 @@ class MaintenanceService(Service):
                 location=False,
                 altitude=Altitude.UNUSED,
                 effect=Effect.IRREVOCABLE,
-                progress=Progress.FINAL_ONLY,
+                progress=ProgressPolicy.FINAL_ONLY,
             ),
         }
 
@@ -90,7 +90,7 @@ class MaintenanceService(Service):
             self.host.text(Severity.ERROR, texts.CAL_FAILED.fill(error=texts.CALIBRATIONS))
             raise Refused(texts.CALIBRATION, texts.CALIBRATIONS, lasting=True)
 
-    async def _on_ground(self, what: Text, work: Work) -> None:
+    async def _on_ground(self, what: OperatorText, work: Work) -> None:
         vehicle = self.host.vehicle
         if not vehicle.on_ground or vehicle.drone.piloting.about_to_fly:
             raise Refused(what, texts.NOT_ON_GROUND)
@@ -195,5 +195,5 @@ class MaintenanceService(Service):
         await asyncio.sleep(RESTART_WAIT)
         self.host.text(Severity.ERROR, texts.RESTART_FAILED)
 
-    def _say(self, text: Text) -> None:
+    def _say(self, text: OperatorText) -> None:
         self.host.text(Severity.INFO, text)

@@ -30,7 +30,7 @@ from anafi_mav.services.commands import (
     Definition,
     Effect,
     Execution,
-    Progress,
+    ProgressPolicy,
     from_int,
     from_long,
 )
@@ -192,7 +192,7 @@ class CommandService(Service):
         ended_at = self.host.vehicle.landing_ended_at
         repeated = self._desk.retransmission(command.client, command, now, mode, ended_at)
         if repeated is not None:
-            quiet = command.progress in (Progress.LATE, None)  # IN_PROGRESS is sent later, or not at all
+            quiet = command.progress in (ProgressPolicy.LATE, None)  # IN_PROGRESS is sent later, or not at all
             if not (quiet and repeated == dialect.MAV_RESULT_IN_PROGRESS):
                 self._acknowledge(inbound, command.id, repeated)
             return
@@ -201,7 +201,7 @@ class CommandService(Service):
 
     async def _execute(self, inbound: Inbound, execution: Execution) -> None:
         command = execution.command
-        if command.progress is Progress.EARLY and self.host.vehicle.takeoff.rises:
+        if command.progress is ProgressPolicy.EARLY and self.host.vehicle.takeoff.rises:
             self._acknowledge(inbound, command.id, dialect.MAV_RESULT_IN_PROGRESS)  # it waits for the climb's end
         progress = self.host.spawn(self._report_progress(inbound, command))
         result = dialect.MAV_RESULT_FAILED
@@ -273,7 +273,7 @@ class CommandService(Service):
     async def _report_progress(self, inbound: Inbound, command: Command) -> None:
         if command.progress is None:
             return
-        await asyncio.sleep(MODE_PROGRESS_AFTER if command.progress is Progress.LATE else PROGRESS_AFTER)
+        await asyncio.sleep(MODE_PROGRESS_AFTER if command.progress is ProgressPolicy.LATE else PROGRESS_AFTER)
         while True:
             self._acknowledge(inbound, command.id, dialect.MAV_RESULT_IN_PROGRESS)
             await asyncio.sleep(PROGRESS_EVERY)

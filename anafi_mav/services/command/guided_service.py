@@ -20,7 +20,7 @@ from anafi_mav.services.commands import Action, Altitude, Command, Effect
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
 from anafi_mav.vehicle.base.bounds import FASTEST, SLOWEST, check_height, check_on_earth
-from anafi_mav.vehicle.base.geo_point import Place
+from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.severity import Severity
@@ -63,7 +63,7 @@ async def _fly_item(host: Host, inbound: Inbound) -> None:
         if item.current == _ITEM_GOTO:
             if item.command != dialect.MAV_CMD_NAV_WAYPOINT:
                 raise Refused(texts.GOTO, texts.NOT_A_WAY_POINT, lasting=True)
-            where = Place(item.x / scale, item.y / scale)
+            where = GeoPoint(item.x / scale, item.y / scale)
             check_on_earth(where, texts.GOTO)
             if vehicle.takeoff.rises:
                 vehicle.guided.check(where, ato)
@@ -295,7 +295,7 @@ class GuidedService(Service):
         else:
             raise Refused(texts.ROI, texts.ROI_KINDS, lasting=True)
 
-    async def _look(self, where: Place, ato: float) -> None:
+    async def _look(self, where: GeoPoint, ato: float) -> None:
         vehicle = self.host.vehicle
         check_on_earth(where, texts.ROI)
         if not vehicle.in_air:

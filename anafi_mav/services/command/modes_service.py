@@ -15,7 +15,7 @@ from anafi_mav.services.command.actions import change_mode
 from anafi_mav.services.commands import Action, Altitude, Command, effect_of_mode
 from anafi_mav.services.flavours import STANDARD_MODES, Flavour, flavour_of, mode_of_standard
 from anafi_mav.services.service import Answer, Host, Request, Service
-from anafi_mav.services.stream import Stream, Times
+from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.vehicle import Vehicle
 
@@ -98,11 +98,11 @@ class ModesService(Service):
             )
         }
 
-    def streams(self) -> Mapping[int, Stream]:
+    def streams(self) -> Mapping[int, MessageStream]:
         return {
             # Both leave at each change, and stations of before 2024, whose dialect lacks them, count them as lost.
-            dialect.MAVLINK_MSG_ID_CURRENT_MODE: Stream(current_mode, every=5.0, flavoured=True),
-            dialect.MAVLINK_MSG_ID_AVAILABLE_MODES_MONITOR: Stream(self._monitor, every=10.0),
+            dialect.MAVLINK_MSG_ID_CURRENT_MODE: MessageStream(current_mode, every=5.0, flavoured=True),
+            dialect.MAVLINK_MSG_ID_AVAILABLE_MODES_MONITOR: MessageStream(self._monitor, every=10.0),
         }
 
     def link_up(self) -> None:

@@ -20,15 +20,15 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.services.command_targets import height, place
 from anafi_mav.services.commands import Action, Altitude, Command, Effect
 from anafi_mav.services.service import Host, Service
-from anafi_mav.services.stream import Stream, Times
-from anafi_mav.texts import Text
+from anafi_mav.services.stream import MessageStream, Times
+from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.bounds import SLOWEST, check_height, check_on_earth, check_place
-from anafi_mav.vehicle.base.geo_point import Place
+from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
-from anafi_mav.vehicle.base.velocity_loop import Controller, tilt_limit
+from anafi_mav.vehicle.base.velocity_loop import VelocityController, tilt_limit
 from anafi_mav.vehicle.circle import (
     DEFAULT_RADIUS,
     DEFAULT_SPEED,
@@ -63,7 +63,7 @@ class OrbitService(Service):
         super().__init__(host)
         self._lap: Lap | None = None
         self._approaching: asyncio.Task[None] | None = None
-        self._controller: Controller | None = None
+        self._controller: VelocityController | None = None
         self._cruise: float | None = None
         """The vehicle's cruise speed when the orbit's was last decided: a change of it changes the orbit's."""
         host.vehicle.helms = (*host.vehicle.helms, self)
@@ -78,8 +78,8 @@ class OrbitService(Service):
             dialect.MAV_CMD_DO_ORBIT: Action(self._orbit, location=True, altitude=Altitude.AMSL, effect=Effect.CHANGE)
         }
 
-    def streams(self) -> Mapping[int, Stream]:
-        return {dialect.MAVLINK_MSG_ID_ORBIT_EXECUTION_STATUS: Stream(self._status, every=0.8)}
+    def streams(self) -> Mapping[int, MessageStream]:
+        return {dialect.MAVLINK_MSG_ID_ORBIT_EXECUTION_STATUS: MessageStream(self._status, every=0.8)}
 
     # Helm.
 
@@ -216,7 +216,7 @@ class OrbitService(Service):
             self.host.vehicle.select(FlightMode.HOLD)
 
     def _begin(self) -> None:
-        self._controller = Controller(self.host.vehicle.offboard.motion)
+        self._controller = VelocityController(self.host.vehicle.offboard.motion)
         self._fly(self.host.clock.monotonic())
 
     # Flying.
@@ -247,7 +247,7 @@ class OrbitService(Service):
         else:
             vehicle.drone.piloting.pilot(sticks)
 
-    def _give_up(self, why: Text, severity: Severity) -> None:
+    def _give_up(self, why: OperatorText, severity: Severity) -> None:
         self.host.vehicle.select(FlightMode.HOLD)
         with contextlib.suppress(LinkLost):
             self.host.drone.piloting.hover()
@@ -280,7 +280,7 @@ def _facing(behaviour: float) -> Facing:
         raise Refused(texts.ORBIT, texts.PARAM3_ORBIT, lasting=True) from None
 
 
-def _bearing(centre: Place, place: Place) -> float:
+def _bearing(centre: GeoPoint, place: GeoPoint) -> float:
     """rad, clockwise from north, of a place seen from a centre."""
     north, east = geo.offset(*centre.point, *place.point)
     return math.atan2(east, north)

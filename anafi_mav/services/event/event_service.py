@@ -16,12 +16,12 @@ from anafi_mav.services.commands import Command
 from anafi_mav.services.component_metadata import to_json
 from anafi_mav.services.event import event_table as table
 from anafi_mav.services.event.event_table import Event, events_file
-from anafi_mav.services.event.events import EventLog, Report, report
+from anafi_mav.services.event.events import EventLog, HealthReport, report
 from anafi_mav.services.files import Query as FileQuery
 from anafi_mav.services.files import ServedFile
 from anafi_mav.services.flavours import Flavour
 from anafi_mav.services.service import Host, MessageHandler, Query, Service
-from anafi_mav.services.stream import Stream, Times
+from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.vehicle import Landed, Vehicle
@@ -64,7 +64,7 @@ class EventService(Service):
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self._log = EventLog()
-        self._report: Report | None = None
+        self._report: HealthReport | None = None
         self._stale = False
         self._next_report = 0.0
         self._armed: bool | None = None
@@ -77,8 +77,8 @@ class EventService(Service):
     def queries(self) -> Mapping[int, Query]:
         return {dialect.MAV_CMD_RUN_PREARM_CHECKS: self._run_checks}
 
-    def streams(self) -> Mapping[int, Stream]:
-        return {dialect.MAVLINK_MSG_ID_CURRENT_EVENT_SEQUENCE: Stream(self._current, every=1.0)}
+    def streams(self) -> Mapping[int, MessageStream]:
+        return {dialect.MAVLINK_MSG_ID_CURRENT_EVENT_SEQUENCE: MessageStream(self._current, every=1.0)}
 
     def files(self) -> Mapping[str, ServedFile]:
         return {"/events.json": ServedFile(self._described, metadata=dialect.COMP_METADATA_TYPE_EVENTS)}
@@ -113,7 +113,7 @@ class EventService(Service):
             if found != self._report:
                 self._tell(found)
 
-    def _tell(self, found: Report) -> None:
+    def _tell(self, found: HealthReport) -> None:
         self._report = found
         for event, arguments in found.events:
             self._send(event, arguments)

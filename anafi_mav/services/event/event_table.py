@@ -38,7 +38,7 @@ class Level(enum.IntEnum):
     """Not to be shown: part of a protocol."""
 
 
-class Health(enum.IntFlag):
+class HealthComponent(enum.IntFlag):
     """Components whose health is reported, as bits. libevents requires NONE as the first."""
 
     NONE = 1
@@ -56,13 +56,13 @@ class Health(enum.IntFlag):
 
 
 _HEALTH_NAMES = {
-    Health.NONE: "None",
-    Health.GPS: "GPS",
-    Health.BATTERY: "Battery",
-    Health.MAGNETOMETER: "Magnetometer",
-    Health.MOTORS: "Motors",
-    Health.SENSORS: "Sensors",
-    Health.SYSTEM: "System",
+    HealthComponent.NONE: "None",
+    HealthComponent.GPS: "GPS",
+    HealthComponent.BATTERY: "Battery",
+    HealthComponent.MAGNETOMETER: "Magnetometer",
+    HealthComponent.MOTORS: "Motors",
+    HealthComponent.SENSORS: "Sensors",
+    HealthComponent.SYSTEM: "System",
 }
 
 MODE_GROUPS = (
@@ -119,7 +119,7 @@ ENUMS = (
     Enum(
         "health_component_t",
         "uint32_t",
-        {part.value: (str(part.name).lower(), _HEALTH_NAMES[part]) for part in Health},
+        {part.value: (str(part.name).lower(), _HEALTH_NAMES[part]) for part in HealthComponent},
         bits=True,
     ),
     Enum(

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from anafi_mav.drone.events import BlockerKind, FlyingState, TakeoffChecklistType
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.event import event_table as table
-from anafi_mav.services.event.event_table import ALL_MODES, Event, Health, Level, mode_bits
+from anafi_mav.services.event.event_table import ALL_MODES, Event, HealthComponent, Level, mode_bits
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.vehicle import Vehicle
 
@@ -59,7 +59,7 @@ class EventLog:
 
 
 @dataclass(frozen=True)
-class Report:
+class HealthReport:
     """The reasons that keep the vehicle on the ground, and the health of its components.
 
     They are events, in the sequence in which they are sent.
@@ -69,47 +69,47 @@ class Report:
 
 
 _PART_OF_CHECK = {
-    TakeoffChecklistType.GYRO: Health.SENSORS,
-    TakeoffChecklistType.MAGNETO: Health.MAGNETOMETER,
-    TakeoffChecklistType.BARO: Health.SENSORS,
-    TakeoffChecklistType.GPS: Health.GPS,
-    TakeoffChecklistType.ULTRASOUND: Health.SENSORS,
-    TakeoffChecklistType.VCAM: Health.SENSORS,
-    TakeoffChecklistType.VERTICAL_TOF: Health.SENSORS,
-    TakeoffChecklistType.MAGNETO_CALIBRATION: Health.MAGNETOMETER,
-    TakeoffChecklistType.MOTOR_DOWN: Health.MOTORS,
-    TakeoffChecklistType.NO_SMARTBATTERY: Health.BATTERY,
-    TakeoffChecklistType.TAKEOFF_FORBIDDEN_BY_BATTERY: Health.BATTERY,
-    TakeoffChecklistType.PITOT: Health.SENSORS,
+    TakeoffChecklistType.GYRO: HealthComponent.SENSORS,
+    TakeoffChecklistType.MAGNETO: HealthComponent.MAGNETOMETER,
+    TakeoffChecklistType.BARO: HealthComponent.SENSORS,
+    TakeoffChecklistType.GPS: HealthComponent.GPS,
+    TakeoffChecklistType.ULTRASOUND: HealthComponent.SENSORS,
+    TakeoffChecklistType.VCAM: HealthComponent.SENSORS,
+    TakeoffChecklistType.VERTICAL_TOF: HealthComponent.SENSORS,
+    TakeoffChecklistType.MAGNETO_CALIBRATION: HealthComponent.MAGNETOMETER,
+    TakeoffChecklistType.MOTOR_DOWN: HealthComponent.MOTORS,
+    TakeoffChecklistType.NO_SMARTBATTERY: HealthComponent.BATTERY,
+    TakeoffChecklistType.TAKEOFF_FORBIDDEN_BY_BATTERY: HealthComponent.BATTERY,
+    TakeoffChecklistType.PITOT: HealthComponent.SENSORS,
 }
 
 _EVENTS = {
-    BlockerKind.CHECK: (table.CHECKLIST, Health.SYSTEM),
-    BlockerKind.MAGNETOMETER: (table.MAGNETOMETER, Health.MAGNETOMETER),
-    BlockerKind.CALIBRATING: (table.CALIBRATING, Health.MAGNETOMETER),
-    BlockerKind.SENSOR: (table.SENSOR, Health.SENSORS),
-    BlockerKind.BATTERY: (table.BATTERY, Health.BATTERY),
-    BlockerKind.ALERT: (table.ALERT, Health.SYSTEM),
-    BlockerKind.MOTOR: (table.MOTOR, Health.MOTORS),
+    BlockerKind.CHECK: (table.CHECKLIST, HealthComponent.SYSTEM),
+    BlockerKind.MAGNETOMETER: (table.MAGNETOMETER, HealthComponent.MAGNETOMETER),
+    BlockerKind.CALIBRATING: (table.CALIBRATING, HealthComponent.MAGNETOMETER),
+    BlockerKind.SENSOR: (table.SENSOR, HealthComponent.SENSORS),
+    BlockerKind.BATTERY: (table.BATTERY, HealthComponent.BATTERY),
+    BlockerKind.ALERT: (table.ALERT, HealthComponent.SYSTEM),
+    BlockerKind.MOTOR: (table.MOTOR, HealthComponent.MOTORS),
 }
 
 
-def part_of(check: TakeoffChecklistType) -> Health:
+def part_of(check: TakeoffChecklistType) -> HealthComponent:
     """Return the component that a line of the checklist concerns."""
     if check.name.startswith("BATTERY_"):
-        return Health.BATTERY
-    return _PART_OF_CHECK.get(check, Health.SYSTEM)
+        return HealthComponent.BATTERY
+    return _PART_OF_CHECK.get(check, HealthComponent.SYSTEM)
 
 
-def _checks(vehicle: Vehicle) -> Iterator[tuple[Event, Health, int, tuple[int, ...]]]:
+def _checks(vehicle: Vehicle) -> Iterator[tuple[Event, HealthComponent, int, tuple[int, ...]]]:
     """Yield the checks that did not pass: (event, component, modes it concerns, values).
 
     The values are empty for a check that has none.
     """
     if vehicle.flying_state is None:
-        yield table.SILENT, Health.SYSTEM, ALL_MODES, ()
+        yield table.SILENT, HealthComponent.SYSTEM, ALL_MODES, ()
     if vehicle.flying_state == FlyingState.EMERGENCY:
-        yield table.EMERGENCY, Health.SYSTEM, ALL_MODES, ()
+        yield table.EMERGENCY, HealthComponent.SYSTEM, ALL_MODES, ()
     for blocker in vehicle.drone.blockers():
         event, part = _EVENTS[blocker.kind]
         if isinstance(blocker.value, TakeoffChecklistType):
@@ -120,37 +120,39 @@ def _checks(vehicle: Vehicle) -> Iterator[tuple[Event, Health, int, tuple[int, .
         # A value that is newer than our tables may not fit into a byte; 255 reads as unknown, too.
         yield event, part, ALL_MODES, (min(max(int(blocker.value or 0), 0), 255),) if told else ()
     if vehicle.fence_problem is not None:
-        yield table.FENCE, Health.SYSTEM, ALL_MODES, ()
+        yield table.FENCE, HealthComponent.SYSTEM, ALL_MODES, ()
     if vehicle.place is None:
-        yield table.NO_FIX, Health.GPS, mode_bits(NEED_POSITION), ()
+        yield table.NO_FIX, HealthComponent.GPS, mode_bits(NEED_POSITION), ()
 
 
-def _present(vehicle: Vehicle) -> Health:
+def _present(vehicle: Vehicle) -> HealthComponent:
     """Return the components whose state the drone has reported."""
     drone = vehicle.drone
-    present = Health.SYSTEM
+    present = HealthComponent.SYSTEM
     if drone.gps.state.fixed is not None:
-        present |= Health.GPS
+        present |= HealthComponent.GPS
     if drone.battery.state.percent is not None:
-        present |= Health.BATTERY
+        present |= HealthComponent.BATTERY
     if drone.calibration.state.magneto_required is not None:
-        present |= Health.MAGNETOMETER
+        present |= HealthComponent.MAGNETOMETER
     if drone.alerts.state.motor_error is not None:
-        present |= Health.MOTORS
+        present |= HealthComponent.MOTORS
     if drone.calibration.state.sensors:
-        present |= Health.SENSORS
+        present |= HealthComponent.SENSORS
     return present
 
 
-def report(vehicle: Vehicle) -> Report:
+def report(vehicle: Vehicle) -> HealthReport:
     """Return the report for the present state.
 
     The checks are `Vehicle.prearm_problems`, component by component; arming obeys the same.
     """
     found = list(_checks(vehicle))
     if vehicle.prearm_problems() and all(event.level != Level.ERROR for event, *_ in found):
-        found.append((table.OTHER, Health.SYSTEM, ALL_MODES, ()))  # what is not in the table keeps it down all the same
-    errors = warnings = Health(0)
+        found.append(
+            (table.OTHER, HealthComponent.SYSTEM, ALL_MODES, ())
+        )  # what is not in the table keeps it down all the same
+    errors = warnings = HealthComponent(0)
     for event, part, _, _ in found:
         if event.level == Level.ERROR:
             errors |= part
@@ -163,7 +165,7 @@ def report(vehicle: Vehicle) -> Report:
         can_run &= ~mode_bits(NEED_POSITION)
     can_arm = 0 if errors else can_run
     checks = [(event, event.pack(modes, part.index, *value)) for event, part, modes, value in found]
-    return Report(
+    return HealthReport(
         (
             (table.ARMING_SUMMARY, table.ARMING_SUMMARY.pack(0, errors, warnings, can_arm, can_run)),
             *checks,

@@ -207,7 +207,7 @@ class _Client:
 
 
 @dataclass(frozen=True)
-class Request:
+class FtpRequest:
     """A request, parsed from the payload."""
 
     seq: int
@@ -227,16 +227,16 @@ class Request:
         return self.data[: min(self.size, MAX_PATH)].split(b"\0", 1)[0].decode("ascii", errors="replace")
 
 
-def parse(payload: bytes) -> Request | None:
+def parse(payload: bytes) -> FtpRequest | None:
     """Return the request in a payload; None when the payload is too short."""
     if len(payload) < _HEADER.size:
         return None
     seq, session, opcode, size, _, _, _, offset = _HEADER.unpack_from(payload)
-    return Request(seq, session, opcode, size, offset, payload[_HEADER.size :])
+    return FtpRequest(seq, session, opcode, size, offset, payload[_HEADER.size :])
 
 
 def format_reply(
-    request: Request, opcode: int, data: bytes = b"", *, seq: int, session: int, offset: int, complete: bool = False
+    request: FtpRequest, opcode: int, data: bytes = b"", *, seq: int, session: int, offset: int, complete: bool = False
 ) -> bytes:
     """Return the payload of a reply."""
     header = _HEADER.pack(
@@ -308,7 +308,7 @@ class FtpServer:
 
     # One request.
 
-    def _answer(self, client: _Client, request: Request, files: Files, now: float) -> bytes | Error:
+    def _answer(self, client: _Client, request: FtpRequest, files: Files, now: float) -> bytes | Error:
         if request.size > DATA:
             return Error.INVALID_DATA_SIZE
         match request.opcode:
@@ -342,7 +342,7 @@ class FtpServer:
                 return Error.FILE_PROTECTED
         return Error.UNKNOWN_COMMAND
 
-    def _terminate(self, client: _Client, request: Request, files: Files) -> bytes | Error:
+    def _terminate(self, client: _Client, request: FtpRequest, files: Files) -> bytes | Error:
         session = client.sessions.pop(request.session, None)
         this = (request.seq, request.session)
         if session is None and client.terminated != this:
@@ -355,7 +355,7 @@ class FtpServer:
         client.terminated = this
         return self._ack(request)
 
-    def _session_for(self, client: _Client, request: Request, now: float) -> _Session | Error:
+    def _session_for(self, client: _Client, request: FtpRequest, now: float) -> _Session | Error:
         """Return the session in which a file is to be opened or created."""
         session = client.sessions.get(request.session)
         if session is None:
@@ -366,7 +366,7 @@ class FtpServer:
             return Error.NO_SESSIONS_AVAILABLE
         return session
 
-    def _create(self, client: _Client, request: Request, files: Files, now: float) -> bytes | Error:
+    def _create(self, client: _Client, request: FtpRequest, files: Files, now: float) -> bytes | Error:
         """Begin to replace a file.
 
         A retransmission of the request must not drop what has been written since.
@@ -384,7 +384,7 @@ class FtpServer:
         session.used = now
         return self._ack(request)
 
-    def _write(self, client: _Client, request: Request, now: float) -> bytes | Error:
+    def _write(self, client: _Client, request: FtpRequest, now: float) -> bytes | Error:
         """Take a part of a file; parts may arrive in any sequence and more than once."""
         session = client.sessions.get(request.session)
         if session is None or session.state is not State.WRITING:
@@ -399,7 +399,7 @@ class FtpServer:
         session.written[request.offset : end] = data
         return self._ack(request)
 
-    def _open(self, client: _Client, request: Request, files: Files, now: float) -> bytes | Error:
+    def _open(self, client: _Client, request: FtpRequest, files: Files, now: float) -> bytes | Error:
         path = request.path
         content = files.read(path)
         if content is None:
@@ -411,7 +411,7 @@ class FtpServer:
         session.path, session.content, session.used = path, content, now
         return self._ack(request, struct.pack("<I", len(content)))
 
-    def _read(self, client: _Client, request: Request, now: float) -> bytes | Error:
+    def _read(self, client: _Client, request: FtpRequest, now: float) -> bytes | Error:
         session = client.sessions.get(request.session)
         if session is None or session.state is State.WRITING:
             return Error.INVALID_SESSION
@@ -420,7 +420,7 @@ class FtpServer:
         data = session.content[request.offset : request.offset + (request.size or DATA)]
         return self._ack(request, data) if data else Error.EOF
 
-    def _begin_burst(self, client: _Client, request: Request, now: float) -> bytes | Error:
+    def _begin_burst(self, client: _Client, request: FtpRequest, now: float) -> bytes | Error:
         session = client.sessions.get(request.session)
         if session is None or session.state is State.WRITING:
             return Error.INVALID_SESSION
@@ -449,7 +449,7 @@ class FtpServer:
         if complete:
             session.step(Event.BURST_ENDS)
         return format_reply(
-            Request(0, number, Opcode.BURST_READ_FILE, 0, 0, b""),
+            FtpRequest(0, number, Opcode.BURST_READ_FILE, 0, 0, b""),
             ACK,
             data,
             seq=seq,
@@ -458,7 +458,7 @@ class FtpServer:
             complete=complete,
         )
 
-    def _list(self, request: Request, files: Files) -> bytes | Error:
+    def _list(self, request: FtpRequest, files: Files) -> bytes | Error:
         entries = files.list(request.path)
         if entries is None:
             return Error.FILE_NOT_FOUND
@@ -472,11 +472,11 @@ class FtpServer:
         return self._ack(request, data) if data else Error.EOF
 
     @staticmethod
-    def _ack(request: Request, data: bytes = b"") -> bytes:
+    def _ack(request: FtpRequest, data: bytes = b"") -> bytes:
         return format_reply(request, ACK, data, seq=request.seq + 1, session=request.session, offset=request.offset)
 
     @staticmethod
-    def _nak(request: Request, error: Error) -> bytes:
+    def _nak(request: FtpRequest, error: Error) -> bytes:
         return format_reply(
             request, NAK, bytes((error,)), seq=request.seq + 1, session=request.session, offset=request.offset
         )

@@ -16,7 +16,7 @@ from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import Command
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.service import Host, Query, Service, client_of
-from anafi_mav.texts import Text
+from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.severity import Severity
 
 GONE = 30.0
@@ -41,7 +41,7 @@ PILOT_IN_CONTROL = (
 """First texts behind a Skycontroller: what a client must not rely on."""
 
 
-def banner(drone: Drone, flavour: Flavour) -> list[Text]:
+def banner(drone: Drone, flavour: Flavour) -> list[OperatorText]:
     """The texts: the gateway, and the drone with its firmware."""
     identity = drone.identity
     return [

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.service import MessageHandler, Service
-from anafi_mav.services.stream import Stream, Times
+from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.vehicle.vehicle import Vehicle
 
 
@@ -23,8 +23,8 @@ class TimeService(Service):
     def messages(self) -> Mapping[int, MessageHandler]:
         return {dialect.MAVLINK_MSG_ID_PING: self._ping, dialect.MAVLINK_MSG_ID_TIMESYNC: self._timesync}
 
-    def streams(self) -> Mapping[int, Stream]:
-        return {dialect.MAVLINK_MSG_ID_SYSTEM_TIME: Stream(self._system_time, every=1.0)}
+    def streams(self) -> Mapping[int, MessageStream]:
+        return {dialect.MAVLINK_MSG_ID_SYSTEM_TIME: MessageStream(self._system_time, every=1.0)}
 
     def _system_time(self, vehicle: Vehicle, times: Times) -> dialect.MAVLink_message:
         """Return SYSTEM_TIME: the clock of the host beside our own.

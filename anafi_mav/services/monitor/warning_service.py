@@ -29,7 +29,7 @@ from anafi_mav.drone.status.alerts import Alerts, spoken
 from anafi_mav.drone.status.calibration import Calibration
 from anafi_mav.drone.status.home import Home
 from anafi_mav.services.service import Host, Service
-from anafi_mav.texts import Text
+from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 
@@ -40,11 +40,11 @@ _COVERED = (AlertState.NONE, AlertState.CRITICAL_BATTERY, AlertState.LOW_BATTERY
 """Alerts that say nothing, or what the battery's own alerts say."""
 
 
-def _when(seconds: int | None) -> Text:
+def _when(seconds: int | None) -> OperatorText:
     return texts.IN_SECONDS.fill(seconds=seconds) if seconds else texts.NOW
 
 
-def _battery(alert: BatteryAlert, level: AlertLevel, percent: int | None) -> Text:
+def _battery(alert: BatteryAlert, level: AlertLevel, percent: int | None) -> OperatorText:
     if alert != BatteryAlert.POWER_LEVEL:
         return texts.BATTERY_ALERT.fill(alert=spoken(alert), level=spoken(level))
     word = "low" if level == AlertLevel.WARNING else spoken(level)
@@ -53,7 +53,7 @@ def _battery(alert: BatteryAlert, level: AlertLevel, percent: int | None) -> Tex
     return texts.BATTERY_PERCENT.fill(level=word, percent=percent)
 
 
-def standing(drone: Drone) -> Iterator[tuple[Hashable, Severity, Text]]:
+def standing(drone: Drone) -> Iterator[tuple[Hashable, Severity, OperatorText]]:
     """(what about, how serious, the text) of each warning that holds."""
     alerts, battery, home = drone.alerts.state, drone.battery.state, drone.home.state
     if alerts.forced_landing not in (None, ForcedLandingReason.NONE):

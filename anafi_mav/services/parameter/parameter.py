@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 
 from anafi_mav.drone import Drone, Range
 from anafi_mav.drone.events import Message
-from anafi_mav.services.parameter.parameter_codec import NAME_LENGTH, Kind
+from anafi_mav.services.parameter.parameter_codec import NAME_LENGTH, ParamType
 from anafi_mav.services.service import Host
 
 Limits = tuple[float, float]
@@ -33,7 +33,7 @@ class Parameter:
     """One named value. `read` never fails."""
 
     name: str
-    kind: Kind
+    kind: ParamType
     short: str
     """Short description, for a line in a list."""
     read: Callable[[Host], float]
@@ -104,12 +104,14 @@ def own(put: Callable[[Host, float], None]) -> Callable[[Host, float], Awaitable
     return write
 
 
-def fact(name: str, value: float, short: str, kind: Kind = Kind.INT32, **more: object) -> Parameter:
+def fact(name: str, value: float, short: str, kind: ParamType = ParamType.INT32, **more: object) -> Parameter:
     """Something that is so and does not change."""
     return Parameter(name, kind, short, lambda host: value, **more)  # type: ignore[arg-type]
 
 
-def twin(native: Parameter, name: str, kind: Kind = Kind.REAL32, *, scale: float = 1.0, **more: object) -> Parameter:
+def twin(
+    native: Parameter, name: str, kind: ParamType = ParamType.REAL32, *, scale: float = 1.0, **more: object
+) -> Parameter:
     """The same value by another name, `scale` times the native one (cm for m: 100)."""
 
     def read(host: Host) -> float:
@@ -148,7 +150,12 @@ def twin(native: Parameter, name: str, kind: Kind = Kind.REAL32, *, scale: float
 
 
 def mapped(
-    native: Parameter, name: str, kind: Kind, values: Mapping[int, str], to_native: Mapping[int, int], **more: object
+    native: Parameter,
+    name: str,
+    kind: ParamType,
+    values: Mapping[int, str],
+    to_native: Mapping[int, int],
+    **more: object,
 ) -> Parameter:
     """Return an alias of a choice with another name and other numbers.
 

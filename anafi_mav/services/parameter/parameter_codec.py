@@ -25,7 +25,7 @@ PACKED_MAGIC = 0x671B
 """First word of a packed parameter file without defaults (ArduPilot AP_Filesystem README.md)."""
 
 
-class Kind(enum.Enum):
+class ParamType(enum.Enum):
     """The type of a value: MAV_PARAM_TYPE, its struct code, and its number in a packed file."""
 
     INT8 = (dialect.MAV_PARAM_TYPE_INT8, "b", 1)
@@ -43,7 +43,7 @@ class Kind(enum.Enum):
     @property
     def whole(self) -> bool:
         """Values are integers."""
-        return self is not Kind.REAL32
+        return self is not ParamType.REAL32
 
     @property
     def limits(self) -> tuple[float, float]:
@@ -51,7 +51,7 @@ class Kind(enum.Enum):
         if not self.whole:
             return -math.inf, math.inf
         bits = 8 * self._struct.size
-        return (0, 2**32 - 1) if self is Kind.UINT32 else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
+        return (0, 2**32 - 1) if self is ParamType.UINT32 else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
 
     def to_bytes(self, value: float) -> bytes:
         """The value as it lies in memory, little endian.
@@ -76,7 +76,7 @@ class ParamValue(dialect.MAVLink_param_value_message):
     unpacker = struct.Struct("<IHH16sB")
 
 
-def carrier(value: float, kind: Kind, *, bytewise: bool) -> int:
+def carrier(value: float, kind: ParamType, *, bytewise: bool) -> int:
     """The 32 bits of the float field that carries a value.
 
     Bytewise (PX4): the value's own bytes. Otherwise (ArduPilot) the float of equal value. MAVLink parameter.md
@@ -86,7 +86,7 @@ def carrier(value: float, kind: Kind, *, bytewise: bool) -> int:
     return int.from_bytes(data, "little")
 
 
-def carried(field: float, kind: Kind, *, bytewise: bool) -> float:
+def carried(field: float, kind: ParamType, *, bytewise: bool) -> float:
     """The value in the float field of a PARAM_SET.
 
     NaN for a whole number that the field does not hold.
@@ -99,7 +99,7 @@ def carried(field: float, kind: Kind, *, bytewise: bool) -> float:
 
 
 def param_value(
-    name: str, value: float, kind: Kind, *, count: int, index: int, bytewise: bool
+    name: str, value: float, kind: ParamType, *, count: int, index: int, bytewise: bool
 ) -> dialect.MAVLink_message:
     """A PARAM_VALUE."""
     bits = carrier(value, kind, bytewise=bytewise)
@@ -112,7 +112,7 @@ def name_of(param_id: str | bytes) -> str:
     return text.split("\0", 1)[0]
 
 
-def hash_check(values: Iterable[tuple[str, float, Kind]]) -> int:
+def hash_check(values: Iterable[tuple[str, float, ParamType]]) -> int:
     """The hash by which QGroundControl knows that its cache is still true.
 
     CRC-32 over name and raw value of one parameter after the other, sorted by name; those whose metadata calls them
@@ -124,7 +124,7 @@ def hash_check(values: Iterable[tuple[str, float, Kind]]) -> int:
     return crc
 
 
-def packed_file(values: Sequence[tuple[str, float, Kind]], start: int = 0, count: int | None = None) -> bytes:
+def packed_file(values: Sequence[tuple[str, float, ParamType]], start: int = 0, count: int | None = None) -> bytes:
     """Return ArduPilot's `@PARAM/param.pck` of these values.
 
     Of all, or of `count` of them from `start` on. The values keep their sequence. Header: magic, number of values in

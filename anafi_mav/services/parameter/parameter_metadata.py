@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from typing import Any
 
 from anafi_mav.services.parameter.parameter import Parameter, limits_of
-from anafi_mav.services.parameter.parameter_codec import Kind
+from anafi_mav.services.parameter.parameter_codec import ParamType
 from anafi_mav.services.service import Host
 
 PARAMETER_VERSION = 1
 """Of the file's format. The schema says 3, QGroundControl reads 1 and nothing else (CompInfoParam.cc)."""
 
-_TYPES = {Kind.INT8: "Int8", Kind.INT16: "Int16", Kind.INT32: "Int32", Kind.REAL32: "Float"}
+_TYPES = {ParamType.INT8: "Int8", ParamType.INT16: "Int16", ParamType.INT32: "Int32", ParamType.REAL32: "Float"}
 
 
 def parameter_file(parameters: Sequence[Parameter], host: Host) -> dict[str, Any]:

@@ -28,7 +28,7 @@ from anafi_mav.services.parameter.parameter import Parameter
 from anafi_mav.services.parameter.parameter_codec import (
     HASH_NAME,
     NO_INDEX,
-    Kind,
+    ParamType,
     carried,
     hash_check,
     name_of,
@@ -42,7 +42,7 @@ from anafi_mav.services.parameter.parameter_table_fence import FENCE_NATIVE
 from anafi_mav.services.parameter.parameter_table_follow import FOLLOW_NATIVE
 from anafi_mav.services.parameter.parameter_table_px4 import PX4_NAMES
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
-from anafi_mav.texts import Text
+from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.refusal import reason_of
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
@@ -111,14 +111,16 @@ class ParameterList:
             bytewise=self._flavour.bytewise,
         )
 
-    def values(self) -> list[tuple[str, float, Kind]]:
+    def values(self) -> list[tuple[str, float, ParamType]]:
         """Return name, value and type of all, in the sequence of the list."""
         return [(one.name, one.value(self._host), one.kind) for one in self.parameters]
 
     def hash_message(self) -> dialect.MAVLink_message:
         """PARAM_VALUE of the hash over all that do not change by themselves."""
         lasting = [(one.name, one.value(self._host), one.kind) for one in self.parameters if not one.volatile]
-        return param_value(HASH_NAME, hash_check(lasting), Kind.UINT32, count=len(self), index=NO_INDEX, bytewise=True)
+        return param_value(
+            HASH_NAME, hash_check(lasting), ParamType.UINT32, count=len(self), index=NO_INDEX, bytewise=True
+        )
 
     def changed(self, candidates: Iterable[int]) -> list[int]:
         """Return the candidates whose value differs from the last reported one.
@@ -416,7 +418,7 @@ class ParameterService(Service):
         listed = self._lists[flavour_of(inbound.channel).name]
         self.host.send(listed.message(listed.index[name_of(inbound.message.param_id)]), inbound.channel)
 
-    def _refuse(self, inbound: Inbound, error: int, why: Text) -> None:
+    def _refuse(self, inbound: Inbound, error: int, why: OperatorText) -> None:
         """Refuse a write: send PARAM_ERROR, the value in effect and a text to the sender.
 
         QGroundControl 4 does not know PARAM_ERROR.

@@ -15,7 +15,7 @@ from anafi_mav.drone import MODELS, Drone, Range, events
 from anafi_mav.drone.events import Axis, PreciseHomeMode, RthEndingBehavior, RthHomeType
 from anafi_mav.drone.events import ObstacleAvoidanceMode as AvoidanceMode
 from anafi_mav.services.parameter.parameter import Limits, Parameter, bounds, current, number, own
-from anafi_mav.services.parameter.parameter_codec import Kind
+from anafi_mav.services.parameter.parameter_codec import ParamType
 from anafi_mav.services.service import Host
 from anafi_mav.vehicle.base.bounds import LOWEST
 from anafi_mav.vehicle.base.link_loss import LossAction
@@ -43,7 +43,7 @@ def _range(
     """A setting that the drone reports with its range."""
     return Parameter(
         name,
-        Kind.REAL32,
+        ParamType.REAL32,
         short,
         read=lambda host: current(setting(host.drone)),
         write=lambda host, value: verb(host.drone)(value),
@@ -74,7 +74,7 @@ def _switch(
     """A setting of the drone's that is on or off."""
     return Parameter(
         name,
-        Kind.INT32,
+        ParamType.INT32,
         short,
         read=lambda host: number(state(host.drone)),
         write=lambda host, value: verb(host.drone)(value == 1),
@@ -225,7 +225,7 @@ RETURN_END_ALTITUDE = _range(
 )
 RETURN_ENDING = Parameter(
     "ANF_RTH_END",
-    Kind.INT32,
+    ParamType.INT32,
     "End of the drone's own returns",
     read=lambda host: number(host.drone.home.state.ending),
     write=lambda host, value: host.drone.home.set_ending(RthEndingBehavior(int(value))),
@@ -245,7 +245,7 @@ def _delay_limits(host: Host) -> Limits | None:
 
 RETURN_DELAY = Parameter(
     "ANF_RTH_DELAY",
-    Kind.INT32,
+    ParamType.INT32,
     "Time from the loss of the drone's link to its return",
     read=lambda host: number(host.drone.home.state.delay_s),
     write=lambda host, value: host.drone.home.set_delay(int(value)),
@@ -292,7 +292,7 @@ PRECISE_HOME = _switch(
 )
 HOME_TYPE = Parameter(
     "ANF_HOME_TYPE",
-    Kind.INT32,
+    ParamType.INT32,
     "Where home shall be",
     read=lambda host: number(host.drone.home.state.preferred_type),
     write=lambda host, value: host.drone.home.set_preferred_type(RthHomeType(int(value))),
@@ -330,7 +330,7 @@ GIMBAL_SPEED = _range(
 )
 MODEL = Parameter(
     "ANF_MODEL",
-    Kind.INT32,
+    ParamType.INT32,
     "Model of the drone",
     read=lambda host: float(host.drone.identity.model.id),
     values={model.id: model.title for model in MODELS.values()},
@@ -353,7 +353,7 @@ def _takeoff_limits(host: Host) -> Limits:
 
 TAKEOFF_HEIGHT = Parameter(
     "ANF_TKOFF_ALT",
-    Kind.REAL32,
+    ParamType.REAL32,
     "Height of a take-off that names none",
     read=lambda host: host.vehicle.takeoff.height,
     write=own(_put_takeoff_height),
@@ -375,7 +375,7 @@ async def _set_hand_launch(host: Host, value: float) -> None:
 
 HAND_LAUNCH = Parameter(
     "ANF_HAND_LAUNCH",
-    Kind.INT32,
+    ParamType.INT32,
     "Arming starts the motors",
     read=lambda host: number(host.vehicle.takeoff.hand_launch),
     write=_set_hand_launch,
@@ -415,7 +415,7 @@ def _climb_limits(host: Host) -> Limits | None:
 
 CRUISE_SPEED = Parameter(
     "ANF_CRUISE_SPEED",
-    Kind.REAL32,
+    ParamType.REAL32,
     "Speed over ground that moves keep to",
     read=lambda host: host.vehicle.cruise_speed or 0.0,
     write=_set_cruise_speed,
@@ -431,7 +431,7 @@ CRUISE_SPEED = Parameter(
 )
 CLIMB_SPEED = Parameter(
     "ANF_CLIMB_SPEED",
-    Kind.REAL32,
+    ParamType.REAL32,
     "Vertical speed that moves keep to",
     read=lambda host: host.vehicle.climb_speed or 0.0,
     write=_set_climb_speed,
@@ -457,7 +457,7 @@ def _put_loss_time(host: Host, value: float) -> None:
 
 GCS_LOSS = Parameter(
     "ANF_GCS_LOSS",
-    Kind.INT32,
+    ParamType.INT32,
     "What to do in the air when no ground station is heard any more",
     read=lambda host: float(host.vehicle.gcs_loss.action),
     write=own(_put_loss_action),
@@ -472,7 +472,7 @@ GCS_LOSS = Parameter(
 )
 GCS_LOSS_TIME = Parameter(
     "ANF_GCS_LOSS_T",
-    Kind.REAL32,
+    ParamType.REAL32,
     "Silence of all ground stations that counts as their loss",
     read=lambda host: host.vehicle.gcs_loss.after,
     write=own(_put_loss_time),
@@ -500,7 +500,7 @@ def put_return_wait(host: Host, value: float) -> None:
 
 RETURN_LANDING = Parameter(
     "ANF_RTL_END",
-    Kind.INT32,
+    ParamType.INT32,
     "End of a return that a client or the gateway commanded",
     read=lambda host: float(host.vehicle.return_end.ending),
     write=own(put_end_of_return),
@@ -515,7 +515,7 @@ RETURN_LANDING = Parameter(
 )
 RETURN_WAIT = Parameter(
     "ANF_RTL_WAIT",
-    Kind.REAL32,
+    ParamType.REAL32,
     "Wait above home before the landing of ANF_RTL_END",
     read=lambda host: host.vehicle.return_end.wait,
     write=own(put_return_wait),
@@ -538,7 +538,7 @@ def _put_guided_time(host: Host, value: float) -> None:
 
 GUIDED_TIME = Parameter(
     "ANF_GUIDED_T",
-    Kind.REAL32,
+    ParamType.REAL32,
     "Silence after which a velocity of ArduPilot's Guided ends in a hover",
     read=lambda host: host.vehicle.offboard.guided_timeout,
     write=own(_put_guided_time),
@@ -565,7 +565,7 @@ def _put_override_stick(host: Host, value: float) -> None:
 
 RC_OVERRIDE = Parameter(
     "ANF_RC_OVERRIDE",
-    Kind.INT32,
+    ParamType.INT32,
     "What a joystick of PX4's clients takes the drone over from",
     read=lambda host: float(host.vehicle.manual.override.sources),
     write=own(_put_override),
@@ -580,7 +580,7 @@ RC_OVERRIDE = Parameter(
 )
 RC_OVERRIDE_STICK = Parameter(
     "ANF_RC_STICK_OV",
-    Kind.REAL32,
+    ParamType.REAL32,
     "Deflection from which a joystick takes over",
     read=lambda host: host.vehicle.manual.override.threshold * 100.0,
     write=own(_put_override_stick),

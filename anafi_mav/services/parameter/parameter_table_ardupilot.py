@@ -12,7 +12,7 @@ import math
 from anafi_mav import texts
 from anafi_mav.drone import events
 from anafi_mav.services.parameter.parameter import Limits, Parameter, current, fact, mapped, number, twin
-from anafi_mav.services.parameter.parameter_codec import Kind
+from anafi_mav.services.parameter.parameter_codec import ParamType
 from anafi_mav.services.parameter.parameter_table import (
     CLIMB_SPEED,
     CRUISE_SPEED,
@@ -75,7 +75,7 @@ async def _set_final_altitude(host: Host, value: float) -> None:
 
 FINAL_ALTITUDE = Parameter(
     "RTL_ALT_FINAL",
-    Kind.INT16,
+    ParamType.INT16,
     "Height at which a commanded return ends, 0: it lands",
     read=_final_altitude,
     write=_set_final_altitude,
@@ -93,31 +93,31 @@ FINAL_ALTITUDE = Parameter(
 )
 
 TWINS: tuple[Parameter, ...] = (
-    twin(MAX_TILT, "ANGLE_MAX", Kind.INT16, scale=CM, unit="centi-degrees"),
+    twin(MAX_TILT, "ANGLE_MAX", ParamType.INT16, scale=CM, unit="centi-degrees"),
     twin(TILT_RATE, "ATC_RATE_R_MAX"),
     twin(TILT_RATE, "ATC_RATE_P_MAX"),
     twin(YAW_RATE, "PILOT_Y_RATE"),
-    twin(VERTICAL_SPEED, "PILOT_SPEED_UP", Kind.INT16, scale=CM, unit="cm/s", decimals=0),
-    twin(VERTICAL_SPEED, "PILOT_SPEED_DN", Kind.INT16, scale=CM, unit="cm/s", decimals=0),
+    twin(VERTICAL_SPEED, "PILOT_SPEED_UP", ParamType.INT16, scale=CM, unit="cm/s", decimals=0),
+    twin(VERTICAL_SPEED, "PILOT_SPEED_DN", ParamType.INT16, scale=CM, unit="cm/s", decimals=0),
     twin(CRUISE_SPEED, "WPNAV_SPEED", scale=CM, unit="cm/s", decimals=0),
     twin(CLIMB_SPEED, "WPNAV_SPEED_UP", scale=CM, unit="cm/s", decimals=0),
     twin(CLIMB_SPEED, "WPNAV_SPEED_DN", scale=CM, unit="cm/s", decimals=0),
     twin(MAX_ALTITUDE, "FENCE_ALT_MAX"),
     twin(MAX_DISTANCE, "FENCE_RADIUS"),
-    twin(RETURN_ALTITUDE, "RTL_ALT", Kind.INT32, scale=CM, unit="cm", decimals=0),
+    twin(RETURN_ALTITUDE, "RTL_ALT", ParamType.INT32, scale=CM, unit="cm", decimals=0),
     FINAL_ALTITUDE,
-    twin(RETURN_WAIT, "RTL_LOIT_TIME", Kind.INT32, scale=1000.0, unit="ms", decimals=0),
+    twin(RETURN_WAIT, "RTL_LOIT_TIME", ParamType.INT32, scale=1000.0, unit="ms", decimals=0),
     mapped(
         RETURN_BY_ITSELF,
         "BATT_FS_LOW_ACT",
-        Kind.INT8,
+        ParamType.INT8,
         {0: "None", 2: "RTL"},
         {0: 0, 2: 1},
     ),
     mapped(
         GCS_LOSS,
         "FS_GCS_ENABLE",
-        Kind.INT8,
+        ParamType.INT8,
         {0: "Disabled", 1: "RTL", 5: "Land", 7: "Brake"},
         {0: LossAction.NOTHING, 1: LossAction.RETURN, 5: LossAction.LAND, 7: LossAction.HOLD},
     ),
@@ -126,11 +126,11 @@ TWINS: tuple[Parameter, ...] = (
 )
 
 
-def _fact(name: str, value: float, short: str, kind: Kind = Kind.INT8, **more: object) -> Parameter:
+def _fact(name: str, value: float, short: str, kind: ParamType = ParamType.INT8, **more: object) -> Parameter:
     return fact(name, value, short, kind, group=FACTS, source="fact", **more)
 
 
-def _untold(name: str, short: str, kind: Kind = Kind.REAL32, **more: object) -> Parameter:
+def _untold(name: str, short: str, kind: ParamType = ParamType.REAL32, **more: object) -> Parameter:
     return _fact(name, math.nan, short, kind, long=UNTOLD, **more)
 
 
@@ -142,18 +142,20 @@ _CHANNELS = {"ROLL": 1, "PITCH": 2, "THROTTLE": 3, "YAW": 4}
 """Channel of each axis in RC_CHANNELS_OVERRIDE."""
 
 FACTS_ARDUPILOT: tuple[Parameter, ...] = (
-    Parameter("SYSID_THISMAV", Kind.INT16, "System id", lambda host: float(host.sysid), group=FACTS, source="fleet"),
+    Parameter(
+        "SYSID_THISMAV", ParamType.INT16, "System id", lambda host: float(host.sysid), group=FACTS, source="fleet"
+    ),
     _fact("FRAME_CLASS", 1, "Frame: a quadrotor"),
     _fact("FRAME_TYPE", 1, "Frame: X"),
-    _fact("ARMING_CHECK", 1, "Checks before arming: all", Kind.INT32),
+    _fact("ARMING_CHECK", 1, "Checks before arming: all", ParamType.INT32),
     _fact("DISARM_DELAY", AUTO_DISARM, "Disarms when no take-off follows", unit="s"),
     _untold("FENCE_MARGIN", "Distance to the fence that it keeps", unit="m"),
     _fact("FS_THR_ENABLE", 7, "Sticks lost: brake", values={7: "Brake"}),
-    _fact("FS_THR_VALUE", -1, "Throttle that means loss: none", Kind.INT16),
+    _fact("FS_THR_VALUE", -1, "Throttle that means loss: none", ParamType.INT16),
     _fact("BATT_MONITOR", 7, "The battery is watched: it tells its charge itself"),
     Parameter(
         "BATT_CAPACITY",
-        Kind.INT32,
+        ParamType.INT32,
         "Charge of the full battery",
         lambda host: number(host.drone.battery.state.full_charge_mah),
         news=(events.BatteryCapacity,),
@@ -163,21 +165,21 @@ FACTS_ARDUPILOT: tuple[Parameter, ...] = (
     ),
     _fact("BATT_FS_CRT_ACT", 1, "Battery almost empty: the drone lands", values={1: "Land"}),
     *(
-        _fact(f"BATT_{level}_{unit}", 0.0, "Threshold: none", Kind.REAL32, unit=name, long=DRONE_WARNS)
+        _fact(f"BATT_{level}_{unit}", 0.0, "Threshold: none", ParamType.REAL32, unit=name, long=DRONE_WARNS)
         for level in ("LOW", "CRT")
         for unit, name in (("VOLT", "V"), ("MAH", "mAh"))
     ),
-    _untold("LAND_SPEED", "Speed of a landing", Kind.INT16, unit="cm/s"),
-    _fact("COMPASS_DEV_ID", 1, "Compass: the drone has one", Kind.INT32),
-    _fact("COMPASS_DEV_ID2", 0, "Second compass: none", Kind.INT32),
-    _fact("COMPASS_DEV_ID3", 0, "Third compass: none", Kind.INT32),
+    _untold("LAND_SPEED", "Speed of a landing", ParamType.INT16, unit="cm/s"),
+    _fact("COMPASS_DEV_ID", 1, "Compass: the drone has one", ParamType.INT32),
+    _fact("COMPASS_DEV_ID2", 0, "Second compass: none", ParamType.INT32),
+    _fact("COMPASS_DEV_ID3", 0, "Third compass: none", ParamType.INT32),
     _fact("COMPASS_USE", 1, "The compass is used"),
     _fact("COMPASS_USE2", 0, "Second compass: none"),
     _fact("COMPASS_USE3", 0, "Third compass: none"),
     *(
         Parameter(
             f"COMPASS_OFS_{axis}",
-            Kind.REAL32,
+            ParamType.REAL32,
             "Compass offset: 0 while the drone demands a calibration",
             _compass_offset,
             news=(events.MagnetoCalibrationRequiredState,),
@@ -188,14 +190,14 @@ FACTS_ARDUPILOT: tuple[Parameter, ...] = (
         for axis in "XYZ"
     ),
     *(
-        _fact(f"COMPASS_OFS{number}_{axis}", 0.0, "Compass offset: no such compass", Kind.REAL32)
+        _fact(f"COMPASS_OFS{number}_{axis}", 0.0, "Compass offset: no such compass", ParamType.REAL32)
         for number in (2, 3)
         for axis in "XYZ"
     ),
     *(_untold(f"INS_ACCOFFS_{axis}", "Accelerometer offset") for axis in "XYZ"),
     *(_fact(f"RCMAP_{axis}", channel, "Channel of RC_CHANNELS_OVERRIDE") for axis, channel in _CHANNELS.items()),
     *(
-        _fact(f"RC{channel}_{what}", value, "Of RC_CHANNELS_OVERRIDE", Kind.INT16, unit="PWM")
+        _fact(f"RC{channel}_{what}", value, "Of RC_CHANNELS_OVERRIDE", ParamType.INT16, unit="PWM")
         for channel in _CHANNELS.values()
         for what, value in (("MIN", 1000), ("TRIM", 1500), ("MAX", 2000))
     ),
@@ -206,7 +208,7 @@ FACTS_ARDUPILOT: tuple[Parameter, ...] = (
     _fact("SUPER_SIMPLE", 0, "Super simple mode: none"),
     Parameter(
         "STAT_FLTTIME",
-        Kind.INT32,
+        ParamType.INT32,
         "Total flight time",
         lambda host: number(host.drone.product.state.total_flight_s),
         news=(events.MotorFlightsStatusChanged,),

@@ -8,7 +8,7 @@ from __future__ import annotations
 from anafi_mav import texts
 from anafi_mav.drone import events
 from anafi_mav.services.parameter.parameter import Parameter, mapped, own, twin
-from anafi_mav.services.parameter.parameter_codec import Kind
+from anafi_mav.services.parameter.parameter_codec import ParamType
 from anafi_mav.services.parameter.parameter_table import GEOFENCE, OFF_ON
 from anafi_mav.services.service import Host
 from anafi_mav.vehicle.base.refusal import Refused
@@ -47,7 +47,7 @@ async def _set_action(host: Host, value: float) -> None:
 
 FENCE_ACTION = Parameter(
     "ANF_FENCE_ACTION",
-    Kind.INT32,
+    ParamType.INT32,
     "What happens at the fence",
     read=lambda host: float(_NUMBERS[host.vehicle.fence.action]),
     write=_set_action,
@@ -70,7 +70,7 @@ async def _enable(host: Host, value: float) -> None:
 
 FENCE_ENABLED = Parameter(
     "ANF_FENCE_ON",
-    Kind.INT32,
+    ParamType.INT32,
     "The fence is in force when there is one",
     read=lambda host: float(host.vehicle.fence.enabled),
     write=_enable,
@@ -89,7 +89,7 @@ def _put_types(host: Host, value: float) -> None:
 
 FENCE_TYPES = Parameter(
     "ANF_FENCE_TYPES",
-    Kind.INT32,
+    ParamType.INT32,
     "Kinds of boundaries that are in force",
     read=lambda host: float(host.vehicle.fence.types),
     write=own(_put_types),
@@ -110,7 +110,7 @@ def _put_predict(host: Host, value: float) -> None:
 
 FENCE_AHEAD = Parameter(
     "ANF_FENCE_AHEAD",
-    Kind.INT32,
+    ParamType.INT32,
     "Act when the drone is too fast to stop before the fence",
     read=lambda host: float(host.vehicle.fence.predict),
     write=own(_put_predict),
@@ -130,7 +130,7 @@ def _put_floor(host: Host, value: float) -> None:
 
 FENCE_FLOOR = Parameter(
     "ANF_FENCE_FLOOR",
-    Kind.REAL32,
+    ParamType.REAL32,
     "Lowest height of the fence above the take-off point, 0: none",
     read=lambda host: host.vehicle.fence.floor,
     write=own(_put_floor),
@@ -153,7 +153,7 @@ def _put_rtl_type(host: Host, value: float) -> None:
 
 RTL_TYPE = Parameter(
     "ANF_RTL_TYPE",
-    Kind.INT32,
+    ParamType.INT32,
     "Where a return ends",
     read=lambda host: float(host.vehicle.rally.rtl_type),
     write=own(_put_rtl_type),
@@ -169,9 +169,9 @@ RTL_TYPE = Parameter(
 FENCE_NATIVE: tuple[Parameter, ...] = (FENCE_ACTION, FENCE_ENABLED, FENCE_TYPES, FENCE_AHEAD, FENCE_FLOOR, RTL_TYPE)
 
 FENCE_PX4: tuple[Parameter, ...] = (
-    mapped(FENCE_ACTION, "GF_ACTION", Kind.INT32, FENCE_ACTION.values, {number: number for number in PX4_ACTIONS}),
-    mapped(FENCE_AHEAD, "GF_PREDICT", Kind.INT32, OFF_ON, {0: 0, 1: 1}),
-    mapped(RTL_TYPE, "RTL_TYPE", Kind.INT32, RTL_TYPE.values, {number: number for number in RTL_TYPES}),
+    mapped(FENCE_ACTION, "GF_ACTION", ParamType.INT32, FENCE_ACTION.values, {number: number for number in PX4_ACTIONS}),
+    mapped(FENCE_AHEAD, "GF_PREDICT", ParamType.INT32, OFF_ON, {0: 0, 1: 1}),
+    mapped(RTL_TYPE, "RTL_TYPE", ParamType.INT32, RTL_TYPE.values, {number: number for number in RTL_TYPES}),
 )
 
 _ARDUPILOT_WORDS = {0: "Report only", 1: "RTL", 2: "Land", 3: "SmartRTL: RTL", 4: "Brake", 5: "SmartRTL: RTL"}
@@ -199,7 +199,7 @@ _TYPE_WORDS = {CEILING: "ceiling", HOME_CIRCLE: "circle", ZONES: "polygon", FLOO
 
 FENCE_TYPE = Parameter(
     "FENCE_TYPE",
-    Kind.INT8,
+    ParamType.INT8,
     "Kinds of boundaries that are enabled",
     read=_types,
     write=_set_types,
@@ -219,12 +219,12 @@ FENCE_ARDUPILOT: tuple[Parameter, ...] = (
     mapped(
         FENCE_ACTION,
         "FENCE_ACTION",
-        Kind.INT8,
+        ParamType.INT8,
         _ARDUPILOT_WORDS,
         # Of several numbers with one meaning the last is the one that is read: the plain RTL.
         {number: _NUMBERS[ARDUPILOT_ACTIONS[number]] for number in (0, 2, 3, 4, 5, 1)},
     ),
-    mapped(FENCE_ENABLED, "FENCE_ENABLE", Kind.INT8, OFF_ON, {0: 0, 1: 1}),
+    mapped(FENCE_ENABLED, "FENCE_ENABLE", ParamType.INT8, OFF_ON, {0: 0, 1: 1}),
     twin(FENCE_FLOOR, "FENCE_ALT_MIN"),
     FENCE_TYPE,
 )

@@ -6,7 +6,7 @@ MAVSDK's follow me writes the aliases.
 from __future__ import annotations
 
 from anafi_mav.services.parameter.parameter import Parameter, mapped, own, twin
-from anafi_mav.services.parameter.parameter_codec import Kind
+from anafi_mav.services.parameter.parameter_codec import ParamType
 from anafi_mav.services.service import Host
 from anafi_mav.vehicle.follow import AltitudeMode
 
@@ -24,7 +24,7 @@ def _number(
 
     return Parameter(
         name,
-        Kind.REAL32,
+        ParamType.REAL32,
         short,
         read=read,
         write=own(put),
@@ -64,7 +64,7 @@ def _put_altitude(host: Host, value: float) -> None:
 
 ALTITUDE = Parameter(
     "ANF_FOLLOW_ALT",
-    Kind.INT32,
+    ParamType.INT32,
     "What the height counts from",
     read=lambda host: float(host.vehicle.follow.settings.altitude_mode),
     write=own(_put_altitude),
@@ -84,6 +84,6 @@ FOLLOW_PX4: tuple[Parameter, ...] = (
     twin(DISTANCE, "FLW_TGT_DST"),
     twin(ANGLE, "FLW_TGT_FA"),
     twin(RESPONSIVENESS, "FLW_TGT_RS"),
-    mapped(ALTITUDE, "FLW_TGT_ALT_M", Kind.INT32, ALTITUDE.values, {0: 0, 1: 1, 2: 2}),
+    mapped(ALTITUDE, "FLW_TGT_ALT_M", ParamType.INT32, ALTITUDE.values, {0: 0, 1: 1, 2: 2}),
     twin(TANGENTIAL, "FLW_TGT_MAX_VEL"),
 )

@@ -12,7 +12,7 @@ import math
 from anafi_mav import texts
 from anafi_mav.drone import events
 from anafi_mav.services.parameter.parameter import Limits, Parameter, current, fact, mapped, number, twin
-from anafi_mav.services.parameter.parameter_codec import Kind
+from anafi_mav.services.parameter.parameter_codec import ParamType
 from anafi_mav.services.parameter.parameter_table import (
     AVOIDANCE,
     CLIMB_SPEED,
@@ -80,7 +80,7 @@ async def _set_fence_radius(host: Host, value: float) -> None:
 
 FENCE_RADIUS = Parameter(
     "GF_MAX_HOR_DIST",
-    Kind.REAL32,
+    ParamType.REAL32,
     "Radius of the drone's own geofence, 0: off",
     read=_fence_radius,
     write=_set_fence_radius,
@@ -117,7 +117,7 @@ async def _set_land_delay(host: Host, value: float) -> None:
 
 LAND_DELAY = Parameter(
     "RTL_LAND_DELAY",
-    Kind.REAL32,
+    ParamType.REAL32,
     "Wait above home before landing, -1: a commanded return ends hovering",
     read=_land_delay,
     write=_set_land_delay,
@@ -173,17 +173,17 @@ TWINS: tuple[Parameter, ...] = (
     mapped(
         RETURN_BY_ITSELF,
         "COM_LOW_BAT_ACT",
-        Kind.INT32,
+        ParamType.INT32,
         {2: "Land at the emergency level", 3: "Return at the critical, land at the emergency level"},
         {2: 0, 3: 1},
     ),
-    mapped(AVOIDANCE, "COM_OBS_AVOID", Kind.INT32, {0: "Off", 1: "On"}, {0: 0, 1: 1}),
-    mapped(GCS_LOSS, "NAV_DLL_ACT", Kind.INT32, GCS_LOSS.values, {number: number for number in GCS_LOSS.values}),
-    twin(GCS_LOSS_TIME, "COM_DL_LOSS_T", Kind.INT32, decimals=0),
+    mapped(AVOIDANCE, "COM_OBS_AVOID", ParamType.INT32, {0: "Off", 1: "On"}, {0: 0, 1: 1}),
+    mapped(GCS_LOSS, "NAV_DLL_ACT", ParamType.INT32, GCS_LOSS.values, {number: number for number in GCS_LOSS.values}),
+    twin(GCS_LOSS_TIME, "COM_DL_LOSS_T", ParamType.INT32, decimals=0),
     mapped(
         RC_OVERRIDE,
         "COM_RC_OVERRIDE",
-        Kind.INT32,
+        ParamType.INT32,
         RC_OVERRIDE.values,
         {number: number for number in RC_OVERRIDE.values},
     ),
@@ -191,12 +191,12 @@ TWINS: tuple[Parameter, ...] = (
 )
 
 
-def _fact(name: str, value: float, short: str, kind: Kind = Kind.INT32, **more: object) -> Parameter:
+def _fact(name: str, value: float, short: str, kind: ParamType = ParamType.INT32, **more: object) -> Parameter:
     return fact(name, value, short, kind, group=FACTS, source="fact", **more)
 
 
 FACTS_PX4: tuple[Parameter, ...] = (
-    Parameter("MAV_SYS_ID", Kind.INT32, "System id", lambda host: float(host.sysid), group=FACTS, source="fleet"),
+    Parameter("MAV_SYS_ID", ParamType.INT32, "System id", lambda host: float(host.sysid), group=FACTS, source="fleet"),
     _fact("SYS_AUTOSTART", 4001, "Airframe: a quadrotor"),
     _fact("SYS_HITL", 0, "Simulation inside the autopilot: none"),
     _fact("SYS_HAS_MAG", 1, "The drone has a magnetometer"),
@@ -205,7 +205,7 @@ FACTS_PX4: tuple[Parameter, ...] = (
     _fact("CAL_ACC0_ID", 1, "Accelerometer: calibrated by its maker"),
     Parameter(
         "CAL_MAG0_ID",
-        Kind.INT32,
+        ParamType.INT32,
         "Magnetometer: 0 while the drone demands its calibration",
         _calibrated,
         news=(events.MagnetoCalibrationRequiredState,),
@@ -215,19 +215,21 @@ FACTS_PX4: tuple[Parameter, ...] = (
     _fact("CAL_MAG1_ID", 0, "Second magnetometer: none"),
     _fact("CAL_MAG2_ID", 0, "Third magnetometer: none"),
     _fact("COM_RC_IN_MODE", 1, "Sticks come by MAVLink"),
-    _fact("COM_RC_LOSS_T", SILENCE, "Silence of the sticks until the drone hovers", Kind.REAL32, unit="s", decimals=2),
+    _fact(
+        "COM_RC_LOSS_T", SILENCE, "Silence of the sticks until the drone hovers", ParamType.REAL32, unit="s", decimals=2
+    ),
     _fact(
         "COM_OF_LOSS_T",
         0.5,
         "Silence of setpoints until the drone hovers",
-        Kind.REAL32,
+        ParamType.REAL32,
         unit="s",
         decimals=1,
         long="Stricter than PX4's 1.0 s.",
     ),
     _fact("NAV_RCL_ACT", 1, "Sticks lost: hold", values={1: "Hold"}),
-    _fact("COM_DISARM_PRFLT", AUTO_DISARM, "Disarms when no take-off follows", Kind.REAL32, unit="s", decimals=0),
-    _fact("COM_DISARM_LAND", 0, "Disarmed the moment it has landed", Kind.REAL32, unit="s"),
+    _fact("COM_DISARM_PRFLT", AUTO_DISARM, "Disarms when no take-off follows", ParamType.REAL32, unit="s", decimals=0),
+    _fact("COM_DISARM_LAND", 0, "Disarmed the moment it has landed", ParamType.REAL32, unit="s"),
     *(
         _fact(name, 0, "Radio channel: none")
         for name in (
@@ -243,15 +245,22 @@ FACTS_PX4: tuple[Parameter, ...] = (
     ),
     *(_fact(f"COM_FLTMODE{slot}", -1, "Mode switch: none") for slot in range(1, 7)),
     *(
-        _fact(name, math.nan, f"Battery: {what} level", Kind.REAL32, long=UNTOLD)
+        _fact(name, math.nan, f"Battery: {what} level", ParamType.REAL32, long=UNTOLD)
         for name, what in (("BAT_LOW_THR", "low"), ("BAT_CRIT_THR", "critical"), ("BAT_EMERGEN_THR", "emergency"))
     ),
-    _fact("CP_DIST", -1, "Collision prevention by distance: none", Kind.REAL32),
-    _fact("MPC_LAND_SPEED", math.nan, "Speed of a landing", Kind.REAL32, unit="m/s", long=UNTOLD),
-    _fact("MPC_XY_VEL_MAX", MAX_CRUISE_SPEED, "The fastest that may be asked for", Kind.REAL32, unit="m/s", decimals=1),
+    _fact("CP_DIST", -1, "Collision prevention by distance: none", ParamType.REAL32),
+    _fact("MPC_LAND_SPEED", math.nan, "Speed of a landing", ParamType.REAL32, unit="m/s", long=UNTOLD),
+    _fact(
+        "MPC_XY_VEL_MAX",
+        MAX_CRUISE_SPEED,
+        "The fastest that may be asked for",
+        ParamType.REAL32,
+        unit="m/s",
+        decimals=1,
+    ),
     Parameter(
         "LND_FLIGHT_T_HI",
-        Kind.INT32,
+        ParamType.INT32,
         "Total flight time, high word of microseconds",
         _high_word,
         news=(events.MotorFlightsStatusChanged,),
@@ -261,7 +270,7 @@ FACTS_PX4: tuple[Parameter, ...] = (
     ),
     Parameter(
         "LND_FLIGHT_T_LO",
-        Kind.INT32,
+        ParamType.INT32,
         "Total flight time, low word of microseconds",
         _low_word,
         news=(events.MotorFlightsStatusChanged,),

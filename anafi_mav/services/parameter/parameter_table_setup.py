@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from anafi_mav.drone import events
 from anafi_mav.services.parameter.parameter import Parameter, fact, number
-from anafi_mav.services.parameter.parameter_codec import Kind
+from anafi_mav.services.parameter.parameter_codec import ParamType
 from anafi_mav.services.parameter.parameter_table import AVOIDANCE
 from anafi_mav.services.service import Host
 
@@ -26,11 +26,11 @@ An ANAFI is turned about each of its three axes (arsdk common.xml 0-14-2), and e
 """
 
 
-def _px4(name: str, value: float, short: str, kind: Kind = Kind.INT32, **more: object) -> Parameter:
+def _px4(name: str, value: float, short: str, kind: ParamType = ParamType.INT32, **more: object) -> Parameter:
     return fact(name, value, short, kind, **{"group": PX4_SETUP, "source": "fact", "long": NOT_AVAILABLE, **more})
 
 
-def _ardupilot(name: str, value: float, short: str, kind: Kind = Kind.INT8, **more: object) -> Parameter:
+def _ardupilot(name: str, value: float, short: str, kind: ParamType = ParamType.INT8, **more: object) -> Parameter:
     return fact(name, value, short, kind, **{"group": ARDUPILOT_SETUP, "source": "fact", "long": NOT_AVAILABLE, **more})
 
 
@@ -47,7 +47,7 @@ _BATTERY: tuple[Parameter, ...] = (
     _px4("BAT1_SOURCE", 1, "Battery: it reports its charge itself", values={1: "External"}, long=""),
     Parameter(
         "BAT1_N_CELLS",
-        Kind.INT32,
+        ParamType.INT32,
         "Battery: cells in series",
         _cells,
         news=(events.BatteryDescription,),
@@ -56,7 +56,7 @@ _BATTERY: tuple[Parameter, ...] = (
     ),
     Parameter(
         "BAT1_V_CHARGED",
-        Kind.REAL32,
+        ParamType.REAL32,
         "Battery: voltage of a full cell",
         lambda host: _volts(host.drone.battery.state.cell_max_mv),
         news=(events.BatteryDescription,),
@@ -68,7 +68,7 @@ _BATTERY: tuple[Parameter, ...] = (
     ),
     Parameter(
         "BAT1_V_EMPTY",
-        Kind.REAL32,
+        ParamType.REAL32,
         "Battery: voltage of an empty cell",
         lambda host: _volts(host.drone.battery.state.cell_min_mv),
         news=(events.BatteryDescription,),
@@ -78,7 +78,7 @@ _BATTERY: tuple[Parameter, ...] = (
         long="Reported by the Ai only; -1: not available.",
         source=events.BatteryDescription.NAME,
     ),
-    _px4("BAT1_V_LOAD_DROP", 0.0, "Battery: voltage drop under load", Kind.REAL32, unit="V"),
+    _px4("BAT1_V_LOAD_DROP", 0.0, "Battery: voltage drop under load", ParamType.REAL32, unit="V"),
 )
 
 _SWITCHES = {"ARM": "ARMSWITCH", "GEAR": "GEAR", "KILL": "KILLSWITCH", "LOITER": "LOITER", "OFFB": "OFFB"} | {
@@ -100,13 +100,16 @@ SETUP_PX4: tuple[Parameter, ...] = (
     _px4("SYS_AUTOCONFIG", 0, "Airframe: reset to its defaults"),
     *_BATTERY,
     _px4("SENS_BOARD_ROT", 0, "Autopilot: orientation on the frame"),
-    *(_px4(f"SENS_BOARD_{axis}_OFF", 0.0, "Autopilot: offset of its level", Kind.REAL32, unit="deg") for axis in "XYZ"),
-    _px4("SENS_DPRES_OFF", 0.0, "Airspeed sensor: offset", Kind.REAL32),
+    *(
+        _px4(f"SENS_BOARD_{axis}_OFF", 0.0, "Autopilot: offset of its level", ParamType.REAL32, unit="deg")
+        for axis in "XYZ"
+    ),
+    _px4("SENS_DPRES_OFF", 0.0, "Airspeed sensor: offset", ParamType.REAL32),
     *(_px4(f"CAL_MAG{index}_ROT", -1, "Magnetometer: orientation", values={-1: "Internal"}) for index in range(3)),
     _px4("CAL_MAG_SIDES", COMPASS_SIDES, "Magnetometer: positions of its calibration", long=""),
     *(_px4(f"RC_MAP_PARAM{index}", 0, "Radio channel: none") for index in range(1, 4)),
     *(_px4(f"RC_MAP_{name}_SW", 0, "Radio channel: none") for name in _SWITCHES),
-    *(_px4(f"RC_{name}_TH", 0.0, "Radio channel: threshold", Kind.REAL32) for name in _SWITCHES.values()),
+    *(_px4(f"RC_{name}_TH", 0.0, "Radio channel: threshold", ParamType.REAL32) for name in _SWITCHES.values()),
     _px4("SDLOG_MODE", -1, "Log: none", values={-1: "Disabled"}),
     _px4(
         "COM_OBS_AVOID",
@@ -115,26 +118,26 @@ SETUP_PX4: tuple[Parameter, ...] = (
         values={0: "Off"},
         present=lambda drone: not AVOIDANCE.present(drone),
     ),
-    *(_px4(name, 0.0, "Gain of the drone's own controller", Kind.REAL32) for name in _GAINS),
+    *(_px4(name, 0.0, "Gain of the drone's own controller", ParamType.REAL32) for name in _GAINS),
 )
 
 SETUP_ARDUPILOT: tuple[Parameter, ...] = (
     _ardupilot("AHRS_ORIENTATION", 0, "Autopilot: orientation on the frame"),
-    _ardupilot("COMPASS_DEC", 0.0, "Compass: declination", Kind.REAL32, unit="rad"),
+    _ardupilot("COMPASS_DEC", 0.0, "Compass: declination", ParamType.REAL32, unit="rad"),
     _ardupilot("COMPASS_AUTODEC", 1, "Compass: declination by place"),
-    _ardupilot("COMPASS_CAL_FIT", 0.0, "Compass: strictness of its calibration", Kind.REAL32),
-    _ardupilot("COMPASS_PRIO1_ID", 1, "First compass: COMPASS_DEV_ID", Kind.INT32, long=""),
-    _ardupilot("COMPASS_PRIO2_ID", 0, "Second compass: none", Kind.INT32, long=""),
-    _ardupilot("COMPASS_PRIO3_ID", 0, "Third compass: none", Kind.INT32, long=""),
-    *(_ardupilot(f"RC{channel}_OPTION", 0, "Radio channel: no function", Kind.INT16) for channel in range(6, 17)),
+    _ardupilot("COMPASS_CAL_FIT", 0.0, "Compass: strictness of its calibration", ParamType.REAL32),
+    _ardupilot("COMPASS_PRIO1_ID", 1, "First compass: COMPASS_DEV_ID", ParamType.INT32, long=""),
+    _ardupilot("COMPASS_PRIO2_ID", 0, "Second compass: none", ParamType.INT32, long=""),
+    _ardupilot("COMPASS_PRIO3_ID", 0, "Third compass: none", ParamType.INT32, long=""),
+    *(_ardupilot(f"RC{channel}_OPTION", 0, "Radio channel: no function", ParamType.INT16) for channel in range(6, 17)),
     _ardupilot("TUNE", 0, "Tuning by a knob: none"),
-    _ardupilot("TUNE_MIN", 0.0, "Tuning by a knob: lowest", Kind.REAL32),
-    _ardupilot("TUNE_MAX", 0.0, "Tuning by a knob: highest", Kind.REAL32),
+    _ardupilot("TUNE_MIN", 0.0, "Tuning by a knob: lowest", ParamType.REAL32),
+    _ardupilot("TUNE_MAX", 0.0, "Tuning by a knob: highest", ParamType.REAL32),
     _ardupilot("AUTOTUNE_AXES", 0, "Autotune: no axis"),
-    _ardupilot("MOT_SPIN_ARM", 0.0, "Motors: throttle when armed", Kind.REAL32),
-    _ardupilot("MOT_SPIN_MIN", 0.0, "Motors: lowest throttle in flight", Kind.REAL32),
+    _ardupilot("MOT_SPIN_ARM", 0.0, "Motors: throttle when armed", ParamType.REAL32),
+    _ardupilot("MOT_SPIN_MIN", 0.0, "Motors: lowest throttle in flight", ParamType.REAL32),
     *(
-        _ardupilot(name, 0.0, "Gain of the drone's own controller", Kind.REAL32)
+        _ardupilot(name, 0.0, "Gain of the drone's own controller", ParamType.REAL32)
         for name in (
             *(f"ATC_ANG_{axis}_P" for axis in ("RLL", "PIT", "YAW")),
             *(f"ATC_RAT_{axis}_{gain}" for axis in ("RLL", "PIT", "YAW") for gain in "PID"),
@@ -142,8 +145,8 @@ SETUP_ARDUPILOT: tuple[Parameter, ...] = (
             "PSC_ACCZ_I",
         )
     ),
-    _ardupilot("FS_OPTIONS", 0, "Failsafe: exceptions", Kind.INT32),
+    _ardupilot("FS_OPTIONS", 0, "Failsafe: exceptions", ParamType.INT32),
     _ardupilot("FS_CRASH_CHECK", 0, "Failsafe: crash check"),
     _ardupilot("FS_EKF_ACTION", 0, "Failsafe: position estimate"),
-    _ardupilot("FS_EKF_THRESH", 0.0, "Failsafe: threshold of the position estimate", Kind.REAL32),
+    _ardupilot("FS_EKF_THRESH", 0.0, "Failsafe: threshold of the position estimate", ParamType.REAL32),
 )

@@ -17,7 +17,7 @@ from typing import Any
 from anafi_mav import geo, texts
 from anafi_mav.drone import Range
 from anafi_mav.errors import AnafiMavError
-from anafi_mav.plans.zones import Circle
+from anafi_mav.plans.zones import CircleZone
 from anafi_mav.services.service import Host
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.fence.fence_watch import Reaction
@@ -88,7 +88,7 @@ class FenceMirror:
         watch, state = vehicle.fence, self._host.drone.piloting.state
         zones = [zone for zone in watch.zones.zones if zone.inclusion]
         circle = zones[0] if len(zones) == 1 else None
-        if not isinstance(circle, Circle) or watch.action is Reaction.NONE:
+        if not isinstance(circle, CircleZone) or watch.action is Reaction.NONE:
             return True, None, None
         setting = state.max_distance
         if setting is None or state.geofence is None or not setting.min <= circle.radius <= setting.max:

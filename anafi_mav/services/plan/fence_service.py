@@ -19,7 +19,7 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.services.commands import Action, Altitude, Command, Effect
 from anafi_mav.services.plan.fence_mirror import FenceMirror
 from anafi_mav.services.service import Host, Service
-from anafi_mav.services.stream import Stream, Times
+from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused, reason_of
 from anafi_mav.vehicle.base.severity import Severity
@@ -65,8 +65,8 @@ class FenceService(Service):
             )
         }
 
-    def streams(self) -> Mapping[int, Stream]:
-        return {dialect.MAVLINK_MSG_ID_FENCE_STATUS: Stream(self._status, every=1.0, on_change=True)}
+    def streams(self) -> Mapping[int, MessageStream]:
+        return {dialect.MAVLINK_MSG_ID_FENCE_STATUS: MessageStream(self._status, every=1.0, on_change=True)}
 
     def link_up(self) -> None:
         self._located = -math.inf if self.host.vehicle.place is None else self.host.clock.monotonic()

@@ -11,7 +11,7 @@ from typing import Any
 
 from anafi_mav import texts
 from anafi_mav.mavlink import dialect
-from anafi_mav.vehicle.fence.plan_items import DEGREES, UNSET, Fault, PlanItem, has_place
+from anafi_mav.vehicle.fence.plan_items import DEGREES, UNSET, PlanFault, PlanItem, has_place
 
 
 def _integer(value: float, scale: float) -> int | None:
@@ -23,7 +23,7 @@ def _integer(value: float, scale: float) -> int | None:
     return round(value * scale)
 
 
-def item_of(message: Any) -> PlanItem | Fault:
+def item_of(message: Any) -> PlanItem | PlanFault:
     """Return the item of a MISSION_ITEM or MISSION_ITEM_INT, or its fault."""
     x: int | None = message.x
     y: int | None = message.y
@@ -31,9 +31,9 @@ def item_of(message: Any) -> PlanItem | Fault:
         scale = DEGREES if has_place(message.command, message.frame) else 1.0
         x, y = _integer(message.x, scale), _integer(message.y, scale)
     if x is None:
-        return Fault(dialect.MAV_MISSION_INVALID_PARAM5_X, texts.BAD_LATITUDE)
+        return PlanFault(dialect.MAV_MISSION_INVALID_PARAM5_X, texts.BAD_LATITUDE)
     if y is None:
-        return Fault(dialect.MAV_MISSION_INVALID_PARAM6_Y, texts.BAD_LONGITUDE)
+        return PlanFault(dialect.MAV_MISSION_INVALID_PARAM6_Y, texts.BAD_LONGITUDE)
     params = (message.param1, message.param2, message.param3, message.param4)
     return PlanItem(message.command, message.frame, params, x, y, message.z, message.autocontinue, message.current)
 

@@ -17,12 +17,12 @@ from anafi_mav import texts
 from anafi_mav.mavlink import dialect
 from anafi_mav.plans.formats.parrot import Version
 from anafi_mav.plans.plan import Item, Loss
-from anafi_mav.plans.translation.translate import FaultKind, Report, examine
+from anafi_mav.plans.translation.translate import FaultKind, TranslationReport, examine
 from anafi_mav.services.flavours import PX4, Flavour
 from anafi_mav.services.plan.mission_items import from_wire
 from anafi_mav.services.plan.plan_transfer import PlanKind
-from anafi_mav.texts import Text
-from anafi_mav.vehicle.fence.plan_items import Fault, PlanItem
+from anafi_mav.texts import OperatorText
+from anafi_mav.vehicle.fence.plan_items import PlanFault, PlanItem
 
 _HEADED = frozenset(
     {
@@ -42,7 +42,7 @@ _RESULTS = {
     FaultKind.PLAN: dialect.MAV_MISSION_INVALID,
 }
 
-_NOTHING = Report((), (), ())
+_NOTHING = TranslationReport((), (), ())
 
 
 FIRST_LABEL = 1
@@ -75,9 +75,9 @@ class Examined:
 
     items: Sequence[PlanItem]
     neutral: tuple[Item, ...]
-    report: Report
+    report: TranslationReport
 
-    def words(self, first: int) -> Text:
+    def words(self, first: int) -> OperatorText:
         """Return a text on how the mission is flown, with item numbers beginning at `first`."""
         if not self.items:
             return texts.NO_MISSION_STORED
@@ -111,7 +111,7 @@ class MissionKind(PlanKind):
         self._version = version
         self._known = Examined((), (), _NOTHING)
 
-    def examine(self, items: Sequence[PlanItem], flavour: Flavour = PX4) -> Fault | None:
+    def examine(self, items: Sequence[PlanItem], flavour: Flavour = PX4) -> PlanFault | None:
         """Return the fault of a list whose items are valid by themselves.
 
         Its reason numbers items as clients of this flavour do. This is no `check_plan`: 5 000 items take half a
@@ -124,7 +124,7 @@ class MissionKind(PlanKind):
         result = _RESULTS.get(fault.kind)
         if result is None:
             result = dialect.MAV_MISSION_INVALID_PARAM1 - 1 + (fault.param or 1)
-        return Fault(result, texts.ITEM_REASON.fill(number=fault.item + FIRST_LABEL, reason=fault.reason))
+        return PlanFault(result, texts.ITEM_REASON.fill(number=fault.item + FIRST_LABEL, reason=fault.reason))
 
     def examined(self, items: Sequence[PlanItem]) -> Examined:
         """A mission, and what it is to the drone; the last one is known, whichever thread asked."""

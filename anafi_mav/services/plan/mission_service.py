@@ -17,14 +17,14 @@ from anafi_mav.services.commands import Action, Altitude, Command, Effect, effec
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.plan.mission_kind import FIRST_LABEL, offset
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
-from anafi_mav.services.stream import Stream, Times
-from anafi_mav.texts import Text
+from anafi_mav.services.stream import MessageStream, Times
+from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.mission.progress import MAVLINK_STATES, State
-from anafi_mav.vehicle.mission.record import Record
+from anafi_mav.vehicle.mission.record import MissionRecord
 from anafi_mav.vehicle.vehicle import Vehicle
 
 NO_TOTAL = 0xFFFF
@@ -78,13 +78,13 @@ class MissionService(Service):
             ),
         }
 
-    def streams(self) -> Mapping[int, Stream]:
-        return {dialect.MAVLINK_MSG_ID_MISSION_CURRENT: Stream(self._current, every=1.0, flavoured=True)}
+    def streams(self) -> Mapping[int, MessageStream]:
+        return {dialect.MAVLINK_MSG_ID_MISSION_CURRENT: MessageStream(self._current, every=1.0, flavoured=True)}
 
     def link_up(self) -> None:
         memory = self.host.memory
         kept = memory.settings.get(RECORD)
-        record = Record.read(kept, self._flight.progress.items)
+        record = MissionRecord.read(kept, self._flight.progress.items)
         if kept is not None and record is None:
             self.host.text(Severity.WARNING, texts.MISSION_RECORD_IGNORED.fill(path=memory.path))
         self._flight.link_up(record)
@@ -169,13 +169,13 @@ class MissionService(Service):
     def _tell_reached(self, item: int) -> None:
         self.host.send_by_flavour(lambda flavour: dialect.MAVLink_mission_item_reached_message(item + offset(flavour)))
 
-    def _say(self, severity: Severity, text: Callable[[int], Text]) -> None:
+    def _say(self, severity: Severity, text: Callable[[int], OperatorText]) -> None:
         """A text to all, with the items' numbers as maps show them."""
         self.host.text(severity, text(FIRST_LABEL))
 
     # What outlives the gateway.
 
-    def _remember(self, record: Record | None) -> None:
+    def _remember(self, record: MissionRecord | None) -> None:
         settings = self.host.memory.settings
         if record is None:
             if settings.pop(RECORD, None) is None:

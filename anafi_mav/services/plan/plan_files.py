@@ -13,8 +13,8 @@ from collections.abc import Mapping, Sequence
 from anafi_mav import texts
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.plan.item_messages import item_int, item_of
-from anafi_mav.texts import Text
-from anafi_mav.vehicle.fence.plan_items import Fault, PlanItem
+from anafi_mav.texts import OperatorText
+from anafi_mav.vehicle.fence.plan_items import PlanFault, PlanItem
 
 PATHS: Mapping[int, str] = {
     dialect.MAV_MISSION_TYPE_MISSION: "/@MISSION/mission.dat",
@@ -44,7 +44,7 @@ def pack_plan(items: Sequence[PlanItem], mission_type: int) -> bytes:
     return b"".join(parts)
 
 
-def unpack_plan(content: bytes, mission_type: int) -> list[PlanItem] | Fault:
+def unpack_plan(content: bytes, mission_type: int) -> list[PlanItem] | PlanFault:
     """Return the list in a file, or why it holds none."""
     if len(content) < _HEADER.size:
         return _invalid(texts.FILE_NO_HEADER)
@@ -60,13 +60,13 @@ def unpack_plan(content: bytes, mission_type: int) -> list[PlanItem] | Fault:
     for seq, values in enumerate(_ITEM.iter_unpack(content[_HEADER.size :])):
         message = dialect.MAVLink_mission_item_int_message(**dict(zip(names, values, strict=True)))
         item = item_of(message)
-        if isinstance(item, Fault):
-            return Fault(item.result, texts.ITEM_REASON.fill(number=seq, reason=item.reason))
+        if isinstance(item, PlanFault):
+            return PlanFault(item.result, texts.ITEM_REASON.fill(number=seq, reason=item.reason))
         if message.seq != seq:
             return _invalid(texts.FILE_NUMBER.fill(number=seq, seq=message.seq))
         items.append(item)
     return items
 
 
-def _invalid(reason: Text) -> Fault:
-    return Fault(dialect.MAV_MISSION_INVALID, reason)
+def _invalid(reason: OperatorText) -> PlanFault:
+    return PlanFault(dialect.MAV_MISSION_INVALID, reason)

@@ -17,7 +17,7 @@ from anafi_mav import texts
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.plan.plan_transfer import Commit, Effect, Peer, PlanKind, PlanTransfer, Reply, Say, State
 from anafi_mav.vehicle.base.severity import Severity
-from anafi_mav.vehicle.fence.plan_items import Fault
+from anafi_mav.vehicle.fence.plan_items import PlanFault
 
 ALL = dialect.MAV_MISSION_TYPE_ALL
 
@@ -109,7 +109,7 @@ class PlanDesk:
             transfer.begin_clear(peer, now)
         return [Commit(dict.fromkeys(self.transfers, ()), peer, ALL)]
 
-    def stored(self, commit: Commit, now: float, fault: Fault | None = None) -> list[Effect]:
+    def stored(self, commit: Commit, now: float, fault: PlanFault | None = None) -> list[Effect]:
         """Finish a `Commit`; with a fault the new plan is invalid and the old one stays."""
         effects: list[Effect] = []
         open_still = any(self.transfers[kind].state is State.STORING for kind in commit.plans)

@@ -28,9 +28,9 @@ from anafi_mav.services.plan.plan_protocol import MESSAGES, PlanDesk
 from anafi_mav.services.plan.plan_transfer import Changed, Commit, Effect, Peer, PlanKind, Reply, Say
 from anafi_mav.services.plan.rally_kind import RallyKind
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
-from anafi_mav.texts import Text
+from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.severity import Severity
-from anafi_mav.vehicle.fence.plan_items import MAX_ITEMS, Fault, PlanItem
+from anafi_mav.vehicle.fence.plan_items import MAX_ITEMS, PlanFault, PlanItem
 from anafi_mav.vehicle.fence.rally import Return
 
 logger = logging.getLogger(__name__)
@@ -93,11 +93,11 @@ class PlanService(Service):
         """
         transfer = self._desk.transfers[kind]
         items = plan_files.unpack_plan(content, kind)
-        if isinstance(items, Fault):
-            outcome: list[Effect] | Fault = items
+        if isinstance(items, PlanFault):
+            outcome: list[Effect] | PlanFault = items
         else:
             outcome = transfer.replace(items, self._peer(inbound), self.host.clock.monotonic())
-        if isinstance(outcome, Fault):
+        if isinstance(outcome, PlanFault):
             self.host.warn_throttled(texts.REFUSED.fill(what=transfer.kind.name.capitalize(), reason=outcome.reason))
             return False
         self._perform(outcome)
@@ -121,7 +121,7 @@ class PlanService(Service):
             transfer.put(() if wrong is not None else items)
             self._take(kind)
 
-    def _wrong(self, kind: PlanKind, items: Sequence[PlanItem]) -> Text | None:
+    def _wrong(self, kind: PlanKind, items: Sequence[PlanItem]) -> OperatorText | None:
         """Why a plan that was kept is not taken."""
         for number, item in enumerate(items):
             if (fault := kind.check_item(item)) is not None:
@@ -174,14 +174,14 @@ class PlanService(Service):
             except Exception:
                 # Whatever went wrong, clients must not wait for ever for what comes after it.
                 logger.exception("%s: a plan could not be stored", self.host.drone.name)
-                fault = Fault(dialect.MAV_MISSION_ERROR, texts.NOT_STORED)
+                fault = PlanFault(dialect.MAV_MISSION_ERROR, texts.NOT_STORED)
             if fault is not None:
                 transfer = self._desk.transfers.get(commit.mission_type)
                 what = "Plans" if transfer is None else transfer.kind.name.capitalize()
                 self.host.warn_throttled(texts.REFUSED.fill(what=what, reason=fault.reason))
             self._perform(self._desk.stored(commit, self.host.clock.monotonic(), fault))
 
-    async def _put(self, commit: Commit) -> Fault | None:
+    async def _put(self, commit: Commit) -> PlanFault | None:
         """Keep plans; what is wrong with the mission, if anything is."""
         mission = commit.plans.get(self._mission.mission_type)
         if mission:

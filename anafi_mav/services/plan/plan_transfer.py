@@ -21,9 +21,9 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.services.flavours import PX4, Flavour
 from anafi_mav.services.plan.item_messages import item_float, item_int, item_of
 from anafi_mav.services.plan.plan_requests import REQUEST_EVERY, Requests
-from anafi_mav.texts import Text
+from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.severity import Severity
-from anafi_mav.vehicle.fence.plan_items import MAX_ITEMS, Fault, PlanItem, opaque_id
+from anafi_mav.vehicle.fence.plan_items import MAX_ITEMS, PlanFault, PlanItem, opaque_id
 
 PATIENCE = 1.5
 """s of silence after which a client no longer keeps others away (the "1500 ms others" of conformance C5)."""
@@ -114,7 +114,7 @@ class Say:
     """A text to everybody."""
 
     severity: Severity
-    text: Text
+    text: OperatorText
 
 
 Effect: TypeAlias = Reply | Commit | Changed | Say
@@ -130,14 +130,14 @@ class PlanKind:
     name: str
     """For people: "fence"."""
     capacity = MAX_ITEMS
-    refusal: Fault | None = None
+    refusal: PlanFault | None = None
     """Why no plan of this kind is taken at all; None: they are."""
 
-    def check_item(self, item: PlanItem) -> Fault | None:
+    def check_item(self, item: PlanItem) -> PlanFault | None:
         """Return the fault of one item by itself."""
         return None
 
-    def check_plan(self, items: Sequence[PlanItem], flavour: Flavour = PX4) -> Fault | None:
+    def check_plan(self, items: Sequence[PlanItem], flavour: Flavour = PX4) -> PlanFault | None:
         """Return the fault of a list whose items are valid by themselves.
 
         Its reason numbers items as clients of this flavour do.
@@ -152,7 +152,7 @@ class PlanKind:
         """The plan in a list that a client of this flavour sent; the inverse of `shown`."""
         return items
 
-    def remarks(self, items: Sequence[PlanItem]) -> Sequence[Text]:
+    def remarks(self, items: Sequence[PlanItem]) -> Sequence[OperatorText]:
         """Return warnings about an accepted list: items that `taken` leaves out."""
         return ()
 
@@ -244,7 +244,7 @@ class PlanTransfer:
             return self._deny(self.kind.refusal, peer)
         if count > self.kind.capacity:
             return self._deny(
-                Fault(
+                PlanFault(
                     dialect.MAV_MISSION_NO_SPACE, texts.TOO_MANY_ITEMS.fill(count=count, capacity=self.kind.capacity)
                 ),
                 peer,
@@ -266,10 +266,12 @@ class PlanTransfer:
         if last == len(items) > first:
             last -= 1
         if not 0 <= first <= last < max(len(items), first + 1) or first > len(items):
-            fault = Fault(dialect.MAV_MISSION_INVALID_SEQUENCE, texts.NO_ITEMS_TO_REPLACE.fill(first=first, last=last))
+            fault = PlanFault(
+                dialect.MAV_MISSION_INVALID_SEQUENCE, texts.NO_ITEMS_TO_REPLACE.fill(first=first, last=last)
+            )
             return self._deny(fault, peer)
         if first >= self.kind.capacity:
-            return self._deny(Fault(dialect.MAV_MISSION_NO_SPACE, texts.LIST_FULL.fill(count=first)), peer)
+            return self._deny(PlanFault(dialect.MAV_MISSION_NO_SPACE, texts.LIST_FULL.fill(count=first)), peer)
         return self._begin(_Upload(peer, items, Requests(first, last), now), now)
 
     def _begin(self, upload: _Upload, now: float) -> list[Effect]:
@@ -315,10 +317,12 @@ class PlanTransfer:
             upload.lossy = True
             return []
         item = item_of(message)
-        fault = item if isinstance(item, Fault) else self.kind.check_item(item)
+        fault = item if isinstance(item, PlanFault) else self.kind.check_item(item)
         if fault is not None:
             number = self.kind.label(message.seq, peer.flavour)
-            return self._refuse(Fault(fault.result, texts.ITEM_REASON.fill(number=number, reason=fault.reason)), now)
+            return self._refuse(
+                PlanFault(fault.result, texts.ITEM_REASON.fill(number=number, reason=fault.reason)), now
+            )
         assert isinstance(item, PlanItem)
         upload.items[message.seq : message.seq + 1] = [item]
         if upload.requests.came():
@@ -334,19 +338,19 @@ class PlanTransfer:
         remarks = [Say(Severity.WARNING, text) for text in self.kind.remarks(upload.items)]
         return [*remarks, Commit({self.kind.mission_type: items}, peer, self.kind.mission_type)]
 
-    def replace(self, sent: Sequence[PlanItem], peer: Peer, now: float) -> list[Effect] | Fault:
+    def replace(self, sent: Sequence[PlanItem], peer: Peer, now: float) -> list[Effect] | PlanFault:
         """A client has sent the whole list at once, as a file: what to do, or why it is refused."""
         if self.kind.refusal is not None:
             return self.kind.refusal
         if self.state is State.STORING or self._busy(peer, now):
-            return Fault(dialect.MAV_MISSION_DENIED, texts.ANOTHER_CLIENT_TRANSFERS)
+            return PlanFault(dialect.MAV_MISSION_DENIED, texts.ANOTHER_CLIENT_TRANSFERS)
         if len(sent) > self.kind.capacity:
-            return Fault(
+            return PlanFault(
                 dialect.MAV_MISSION_NO_SPACE, texts.TOO_MANY_ITEMS.fill(count=len(sent), capacity=self.kind.capacity)
             )
         for seq, item in enumerate(sent):
             if (fault := self.kind.check_item(item)) is not None:
-                return Fault(fault.result, texts.ITEM_REASON.fill(number=seq, reason=fault.reason))
+                return PlanFault(fault.result, texts.ITEM_REASON.fill(number=seq, reason=fault.reason))
         items = tuple(self.kind.taken(sent, peer.flavour))
         if (fault := self.kind.check_plan(items, peer.flavour)) is not None:
             return fault
@@ -374,7 +378,7 @@ class PlanTransfer:
         self.state = TRANSITIONS[self.state][Event.CLEAR]
         self._committing = _Done(peer, now, -1)
 
-    def stored(self, items: tuple[PlanItem, ...], now: float, fault: Fault | None = None) -> list[Effect]:
+    def stored(self, items: tuple[PlanItem, ...], now: float, fault: PlanFault | None = None) -> list[Effect]:
         """Finish a `Commit`: it is stored, or has a fault.
 
         The caller sends the acknowledgement.
@@ -514,14 +518,14 @@ class PlanTransfer:
         )
 
     def _occupied(self, peer: Peer) -> list[Effect]:
-        return self._deny(Fault(dialect.MAV_MISSION_DENIED, texts.ANOTHER_CLIENT_TRANSFERS), peer)
+        return self._deny(PlanFault(dialect.MAV_MISSION_DENIED, texts.ANOTHER_CLIENT_TRANSFERS), peer)
 
-    def _deny(self, fault: Fault, peer: Peer) -> list[Effect]:
+    def _deny(self, fault: PlanFault, peer: Peer) -> list[Effect]:
         """No transfer begins."""
         text = texts.REFUSED.fill(what=self.kind.name.capitalize(), reason=fault.reason)
         return [self._ack(peer, fault.result), Say(Severity.WARNING, text)]
 
-    def _refuse(self, fault: Fault, now: float) -> list[Effect]:
+    def _refuse(self, fault: PlanFault, now: float) -> list[Effect]:
         """The upload ends, the old plan stays."""
         upload = self._upload
         assert upload is not None

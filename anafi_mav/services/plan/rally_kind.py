@@ -5,7 +5,7 @@ from __future__ import annotations
 from anafi_mav import texts
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.plan.plan_transfer import PlanKind
-from anafi_mav.vehicle.fence.plan_items import Fault, PlanItem, place_fault
+from anafi_mav.vehicle.fence.plan_items import PlanFault, PlanItem, place_fault
 
 
 class RallyKind(PlanKind):
@@ -14,9 +14,9 @@ class RallyKind(PlanKind):
     mission_type = dialect.MAV_MISSION_TYPE_RALLY
     name = "rally points"
 
-    def check_item(self, item: PlanItem) -> Fault | None:
+    def check_item(self, item: PlanItem) -> PlanFault | None:
         if item.command != dialect.MAV_CMD_NAV_RALLY_POINT:
-            return Fault(dialect.MAV_MISSION_UNSUPPORTED, texts.COMMAND_UNSUPPORTED.fill(command=item.command))
+            return PlanFault(dialect.MAV_MISSION_UNSUPPORTED, texts.COMMAND_UNSUPPORTED.fill(command=item.command))
         if not abs(item.z) <= 10_000.0:
-            return Fault(dialect.MAV_MISSION_INVALID_PARAM7, texts.NOT_HEIGHT.fill(value=item.z))
+            return PlanFault(dialect.MAV_MISSION_INVALID_PARAM7, texts.NOT_HEIGHT.fill(value=item.z))
         return place_fault(item)

@@ -13,7 +13,7 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.flavours import flavour_of
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
-from anafi_mav.services.setpoint.stick_messages import Channels, manual_sticks
+from anafi_mav.services.setpoint.stick_messages import RcChannels, manual_sticks
 from anafi_mav.vehicle.base.silence import SILENCE
 
 MAX_CLIENTS = 8
@@ -28,7 +28,7 @@ class ManualControlService(Service):
         self._flight = host.vehicle.manual
         self._flight.warn_throttled = host.warn_throttled
         self._flight.run_action = host.run_action
-        self._channels: dict[Hashable, tuple[Channels, float]] = {}
+        self._channels: dict[Hashable, tuple[RcChannels, float]] = {}
         """By client, and when they were last said."""
 
     def messages(self) -> Mapping[int, MessageHandler]:
@@ -49,8 +49,8 @@ class ManualControlService(Service):
 
     def _override(self, inbound: Inbound) -> None:
         client, now = client_of(inbound), self.host.clock.monotonic()
-        before, at = self._channels.pop(client, (Channels(), -math.inf))
-        channels = (before if now - at < SILENCE else Channels()).after(inbound.message)
+        before, at = self._channels.pop(client, (RcChannels(), -math.inf))
+        channels = (before if now - at < SILENCE else RcChannels()).after(inbound.message)
         if isinstance(channels, str):
             self.host.warn_throttled(texts.RC_OVERRIDE_IGNORED.fill(reason=channels))
         elif channels.released:

@@ -12,8 +12,8 @@ from collections.abc import Mapping
 
 from anafi_mav import geo, units
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.stream import Stream, Times
-from anafi_mav.vehicle.base.geo_point import Place
+from anafi_mav.services.stream import MessageStream, Times
+from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.offboard.setpoints import MotionSetpoint
 from anafi_mav.vehicle.vehicle import Vehicle
 
@@ -30,7 +30,7 @@ class _Target:
     """Target of the vehicle, in north, east and down."""
 
     def __init__(self) -> None:
-        self.place: Place | None = None
+        self.place: GeoPoint | None = None
         self.height: float | None = None
         self.velocity: list[float | None] = [None, None, None]
         self.acceleration: list[float | None] = [None, None, None]
@@ -66,7 +66,7 @@ def _target(vehicle: Vehicle) -> _Target | None:
         return target
     piloting = vehicle.drone.piloting
     if setpoint is None and piloting.move is not None and (to := piloting.move.target) is not None:
-        target.place, target.height = Place(to.latitude, to.longitude), to.altitude
+        target.place, target.height = GeoPoint(to.latitude, to.longitude), to.altitude
         return target
     return None
 
@@ -143,8 +143,8 @@ def attitude_target(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message |
 
 
 # Each is sent only while setpoints or moves are flown.
-STREAMS: Mapping[int, Stream] = {
-    dialect.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: Stream(local_target, every=0.5),
-    dialect.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT: Stream(global_target, every=0.5),
-    dialect.MAVLINK_MSG_ID_ATTITUDE_TARGET: Stream(attitude_target, every=0.5),
+STREAMS: Mapping[int, MessageStream] = {
+    dialect.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: MessageStream(local_target, every=0.5),
+    dialect.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT: MessageStream(global_target, every=0.5),
+    dialect.MAVLINK_MSG_ID_ATTITUDE_TARGET: MessageStream(attitude_target, every=0.5),
 }

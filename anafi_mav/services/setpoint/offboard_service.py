@@ -16,8 +16,8 @@ from anafi_mav.services.flavours import flavour_of
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
 from anafi_mav.services.setpoint.offboard_echo import STREAMS
 from anafi_mav.services.setpoint.setpoint_messages import attitude_setpoint, global_setpoint, local_setpoint
-from anafi_mav.services.stream import Stream
-from anafi_mav.texts import Text
+from anafi_mav.services.stream import MessageStream
+from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.offboard.setpoints import Setpoint
 
@@ -48,17 +48,17 @@ class OffboardService(Service):
             dialect.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT: self._takes(global_setpoint),
         }
 
-    def streams(self) -> Mapping[int, Stream]:
+    def streams(self) -> Mapping[int, MessageStream]:
         return STREAMS
 
     def subscriptions(self) -> Subscriptions:
         return self._flight.subscriptions()
 
-    def _takes(self, read: Callable[[Any], Setpoint | Text]) -> MessageHandler:
+    def _takes(self, read: Callable[[Any], Setpoint | OperatorText]) -> MessageHandler:
         def take(inbound: Inbound) -> None:
             setpoint = read(inbound.message)
-            if isinstance(setpoint, Text):
-                objection: Text | None = setpoint
+            if isinstance(setpoint, OperatorText):
+                objection: OperatorText | None = setpoint
             else:
                 guided = flavour_of(inbound.channel).guided_setpoints
                 objection = self._flight.receive(client_of(inbound), setpoint, guided=guided)

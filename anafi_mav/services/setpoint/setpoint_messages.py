@@ -34,8 +34,8 @@ from collections.abc import Sequence
 
 from anafi_mav import texts, units
 from anafi_mav.mavlink import dialect
-from anafi_mav.texts import Text
-from anafi_mav.vehicle.offboard.setpoints import NOTHING, AttitudeSetpoint, MotionSetpoint, Origin, Vector
+from anafi_mav.texts import OperatorText
+from anafi_mav.vehicle.offboard.setpoints import NOTHING, AttitudeSetpoint, MotionSetpoint, PositionReference, Vector
 
 UNIT_TOLERANCE = 0.1
 """How far a quaternion's length may be from 1: single precision and sloppy sums, not garbage."""
@@ -56,7 +56,7 @@ FARTHEST = 1e6
 """m beyond which a coordinate is a mistake."""
 
 
-def attitude_setpoint(message: dialect.MAVLink_set_attitude_target_message) -> AttitudeSetpoint | Text:
+def attitude_setpoint(message: dialect.MAVLink_set_attitude_target_message) -> AttitudeSetpoint | OperatorText:
     """The setpoint in a message, or one sentence on why it cannot be flown."""
     mask = message.type_mask
     if mask & dialect.ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE:
@@ -80,25 +80,25 @@ def attitude_setpoint(message: dialect.MAVLink_set_attitude_target_message) -> A
     return AttitudeSetpoint(roll, pitch, yaw, yaw_rate, 2.0 * thrust - 1.0)
 
 
-_LOCAL_FRAMES: dict[int, tuple[Origin, bool]] = {
-    dialect.MAV_FRAME_LOCAL_NED: (Origin.LOCAL, False),
-    dialect.MAV_FRAME_LOCAL_OFFSET_NED: (Origin.VEHICLE, False),
-    dialect.MAV_FRAME_BODY_NED: (Origin.VEHICLE, True),
-    dialect.MAV_FRAME_BODY_OFFSET_NED: (Origin.VEHICLE, True),
-    dialect.MAV_FRAME_BODY_FRD: (Origin.VEHICLE, True),
+_LOCAL_FRAMES: dict[int, tuple[PositionReference, bool]] = {
+    dialect.MAV_FRAME_LOCAL_NED: (PositionReference.LOCAL, False),
+    dialect.MAV_FRAME_LOCAL_OFFSET_NED: (PositionReference.VEHICLE, False),
+    dialect.MAV_FRAME_BODY_NED: (PositionReference.VEHICLE, True),
+    dialect.MAV_FRAME_BODY_OFFSET_NED: (PositionReference.VEHICLE, True),
+    dialect.MAV_FRAME_BODY_FRD: (PositionReference.VEHICLE, True),
 }
 
 
-_GLOBAL_FRAMES: dict[int, Origin] = {
-    dialect.MAV_FRAME_GLOBAL_INT: Origin.SEA,
-    dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT: Origin.TAKEOFF,
+_GLOBAL_FRAMES: dict[int, PositionReference] = {
+    dialect.MAV_FRAME_GLOBAL_INT: PositionReference.SEA,
+    dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT: PositionReference.TAKEOFF,
 }
 
 
 _TERRAIN_FRAMES = (dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT, dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT)
 
 
-def local_setpoint(message: dialect.MAVLink_set_position_target_local_ned_message) -> MotionSetpoint | Text:
+def local_setpoint(message: dialect.MAVLink_set_position_target_local_ned_message) -> MotionSetpoint | OperatorText:
     """Return the setpoint of a SET_POSITION_TARGET_LOCAL_NED.
 
     Returns one sentence on the reason if it cannot be flown.
@@ -109,7 +109,7 @@ def local_setpoint(message: dialect.MAVLink_set_position_target_local_ned_messag
     return _motion(message, *frame, (message.x, message.y, message.z))
 
 
-def global_setpoint(message: dialect.MAVLink_set_position_target_global_int_message) -> MotionSetpoint | Text:
+def global_setpoint(message: dialect.MAVLink_set_position_target_global_int_message) -> MotionSetpoint | OperatorText:
     """Return the setpoint of a SET_POSITION_TARGET_GLOBAL_INT.
 
     Returns one sentence on the reason if it cannot be flown.
@@ -124,7 +124,7 @@ def global_setpoint(message: dialect.MAVLink_set_position_target_global_int_mess
     return setpoint
 
 
-def _no_frame(frame: int) -> Text:
+def _no_frame(frame: int) -> OperatorText:
     if frame in _TERRAIN_FRAMES:
         return texts.TERRAIN_UNSUPPORTED.fill(frame=frame)
     return texts.FRAME_UNSUPPORTED.fill(frame=frame)
@@ -133,10 +133,10 @@ def _no_frame(frame: int) -> Text:
 def _motion(
     message: dialect.MAVLink_set_position_target_local_ned_message
     | dialect.MAVLink_set_position_target_global_int_message,
-    origin: Origin,
+    origin: PositionReference,
     body: bool,
     coordinates: tuple[float, float, float],
-) -> MotionSetpoint | Text:
+) -> MotionSetpoint | OperatorText:
     mask = message.type_mask
     position = _wanted(coordinates, mask, dialect.POSITION_TARGET_TYPEMASK_X_IGNORE)
     velocity = _wanted((message.vx, message.vy, message.vz), mask, dialect.POSITION_TARGET_TYPEMASK_VX_IGNORE)

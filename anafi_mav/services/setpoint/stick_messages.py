@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 from anafi_mav import texts
 from anafi_mav.mavlink import dialect
-from anafi_mav.texts import Text
+from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.manual_flight import Sticks
 
 DEAD_ZONE = 0.03
@@ -28,7 +28,7 @@ SHORTEST, LONGEST = 800, 2200
 """us that a channel may be: what transmitters send, with their trims."""
 
 
-def manual_sticks(message: dialect.MAVLink_manual_control_message) -> Sticks | Text | None:
+def manual_sticks(message: dialect.MAVLink_manual_control_message) -> Sticks | OperatorText | None:
     """Return the sticks of a MANUAL_CONTROL, or one sentence on why they are invalid.
 
     Returns None if the message has no axis at all.
@@ -46,7 +46,7 @@ def manual_sticks(message: dialect.MAVLink_manual_control_message) -> Sticks | T
 
 
 @dataclass(frozen=True)
-class Channels:
+class RcChannels:
     """Values that a client has set on the four channels, us; None: released."""
 
     roll: int | None = None
@@ -54,7 +54,7 @@ class Channels:
     throttle: int | None = None
     yaw: int | None = None
 
-    def after(self, message: dialect.MAVLink_rc_channels_override_message) -> Channels | Text:
+    def after(self, message: dialect.MAVLink_rc_channels_override_message) -> RcChannels | OperatorText:
         """Return the channels after one more RC_CHANNELS_OVERRIDE.
 
         Returns one sentence on the reason if the message is invalid.

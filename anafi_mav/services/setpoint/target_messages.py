@@ -6,11 +6,11 @@ import math
 
 from anafi_mav import texts
 from anafi_mav.mavlink import dialect
-from anafi_mav.texts import Text
+from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.follow import FASTEST, Sighting
 
 
-def sighting(message: dialect.MAVLink_follow_target_message) -> Sighting | Text:
+def sighting(message: dialect.MAVLink_follow_target_message) -> Sighting | OperatorText:
     """Return the content of a FOLLOW_TARGET, or one sentence on why it cannot be followed.
 
     Bits of est_capabilities: 0 position, 1 velocity (MAVLink common.xml FOLLOW_TARGET).

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.service import Host, Service
-from anafi_mav.services.stream import Stream, Times
+from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.vehicle.vehicle import Landed, Vehicle
 
 
@@ -56,8 +56,8 @@ class FlightRecordService(Service):
         super().__init__(host)
         self._record = FlightRecord()
 
-    def streams(self) -> Mapping[int, Stream]:
-        return {dialect.MAVLINK_MSG_ID_FLIGHT_INFORMATION: Stream(self._build)}
+    def streams(self) -> Mapping[int, MessageStream]:
+        return {dialect.MAVLINK_MSG_ID_FLIGHT_INFORMATION: MessageStream(self._build)}
 
     def link_up(self) -> None:
         self._record = FlightRecord()

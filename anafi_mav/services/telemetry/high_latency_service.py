@@ -18,7 +18,7 @@ from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import Command
 from anafi_mav.services.flavours import Flavour
 from anafi_mav.services.service import Host, Query, Service
-from anafi_mav.services.stream import Stream, Times
+from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.services.telemetry.telemetry_flight import amsl, target
 from anafi_mav.services.telemetry.telemetry_status import percent, sensor_bits
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
@@ -124,8 +124,8 @@ class HighLatencyService(Service):
     def queries(self) -> Mapping[int, Query]:
         return {dialect.MAV_CMD_CONTROL_HIGH_LATENCY: self._control}
 
-    def streams(self) -> Mapping[int, Stream]:
-        return {dialect.MAVLINK_MSG_ID_HIGH_LATENCY2: Stream(self._build, flavoured=True)}
+    def streams(self) -> Mapping[int, MessageStream]:
+        return {dialect.MAVLINK_MSG_ID_HIGH_LATENCY2: MessageStream(self._build, flavoured=True)}
 
     def subscriptions(self) -> Subscriptions:
         return {events.SpeedChanged: self._on_speed}

@@ -19,7 +19,7 @@ from anafi_mav.mavlink.streams import Streams
 from anafi_mav.services.commands import Command
 from anafi_mav.services.flavours import flavour_of
 from anafi_mav.services.service import Answer, Host, MessageHandler, Query, Request, Service
-from anafi_mav.services.stream import Stream, Times
+from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.services.telemetry import data_streams
 from anafi_mav.services.telemetry.update_tracker import News
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
@@ -53,7 +53,7 @@ class MessageService(Service):
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self._intervals: Streams[Channel] = Streams({})
-        self._table: Mapping[int, Stream] = {}
+        self._table: Mapping[int, MessageStream] = {}
         self._requests: Mapping[int, Request] = {}
         self._news = News()
         self._events: set[type[Message]] = set()
@@ -66,7 +66,7 @@ class MessageService(Service):
         self._failed: dict[int, float] = {}
         """When it was last logged that a message cannot be made."""
 
-    def take_tables(self, streams: Mapping[int, Stream], requests: Mapping[int, Request]) -> None:
+    def take_tables(self, streams: Mapping[int, MessageStream], requests: Mapping[int, Request]) -> None:
         """Adopt the streams and the request handlers of all services of the system."""
         self._table, self._requests = streams, requests
         defaults = {id: stream.every for id, stream in streams.items() if stream.every is not None}

@@ -18,7 +18,7 @@ from anafi_mav.drone.piloting.state import REDUCERS as PILOTING
 from anafi_mav.drone.status.alerts import Alerts
 from anafi_mav.drone.status.home import Home
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.stream import Stream, Times
+from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.vehicle.vehicle import Vehicle
 
 NAN = math.nan
@@ -174,9 +174,9 @@ def camera_intrinsics(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message
     )
 
 
-def _state(build: Callable[[Vehicle, Times], dialect.MAVLink_message | None], *tables: Iterable[type]) -> Stream:
+def _state(build: Callable[[Vehicle, Times], dialect.MAVLink_message | None], *tables: Iterable[type]) -> MessageStream:
     """Return the stream of a state message that any event of these tables updates."""
-    return Stream(build, tuple(dict.fromkeys(event for table in tables for event in table)), repeated=True)
+    return MessageStream(build, tuple(dict.fromkeys(event for table in tables for event in table)), repeated=True)
 
 
 _MOTION = (
@@ -189,17 +189,19 @@ _MOTION = (
 
 _INPUT = (events.GrabState, events.GrabAxisEvent, events.GrabButtonEvent, events.PilotingSource)
 
-STREAMS: Mapping[int, Stream] = {
+STREAMS: Mapping[int, MessageStream] = {
     dialect.MAVLINK_MSG_ID_ANAFI_FLIGHT_STATUS: _state(
         flight_status, [event for event in PILOTING if event not in _MOTION], Alerts.REDUCERS
     ),
     dialect.MAVLINK_MSG_ID_ANAFI_HOME: _state(home, Home.REDUCERS),
     dialect.MAVLINK_MSG_ID_ANAFI_CHECKLIST: _state(checklist, Alerts.REDUCERS),
     dialect.MAVLINK_MSG_ID_ANAFI_CONTROLLER_INPUT: _state(controller_input, _INPUT),
-    dialect.MAVLINK_MSG_ID_ANAFI_CONTROLLER_ATTITUDE: Stream(controller_attitude, (events.ControllerAttitudeChanged,)),
+    dialect.MAVLINK_MSG_ID_ANAFI_CONTROLLER_ATTITUDE: MessageStream(
+        controller_attitude, (events.ControllerAttitudeChanged,)
+    ),
     dialect.MAVLINK_MSG_ID_ANAFI_CONTROLLER_STATUS: _state(
         controller_status,
         [e for e in Controller.REDUCERS if e not in (events.ControllerAttitudeChanged, *_INPUT)],
     ),
-    dialect.MAVLINK_MSG_ID_ANAFI_CAMERA_INTRINSICS: Stream(camera_intrinsics),
+    dialect.MAVLINK_MSG_ID_ANAFI_CAMERA_INTRINSICS: MessageStream(camera_intrinsics),
 }

@@ -19,7 +19,7 @@ from anafi_mav.drone import events
 from anafi_mav.drone.events import MoveToStatus
 from anafi_mav.drone.piloting.state import Attitude, Velocity
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.stream import Stream, Times
+from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.vehicle.vehicle import Vehicle
 
 NAN = math.nan
@@ -229,7 +229,7 @@ def rangefinder(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | Non
     return None if height is None else dialect.MAVLink_rangefinder_message(height, 0.0)
 
 
-class Goal(NamedTuple):
+class MoveTarget(NamedTuple):
     """Target of a running moveTo, seen from the drone."""
 
     bearing: float
@@ -240,14 +240,14 @@ class Goal(NamedTuple):
     """m above the take-off point."""
 
 
-def target(vehicle: Vehicle) -> Goal | None:
+def target(vehicle: Vehicle) -> MoveTarget | None:
     """Return the present target; None without one, or while the drone's position is unknown."""
     place, state = vehicle.place, vehicle.drone.piloting.state
     if place is None or state.move_target is None or state.move_to != MoveToStatus.RUNNING:
         return None
     goal = state.move_target
     north, east = geo.offset(place.latitude, place.longitude, goal.latitude, goal.longitude)
-    return Goal(math.degrees(math.atan2(east, north)), math.hypot(north, east), goal.altitude)
+    return MoveTarget(math.degrees(math.atan2(east, north)), math.hypot(north, east), goal.altitude)
 
 
 def nav_controller_output(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
@@ -312,23 +312,27 @@ def gps_global_origin(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message
 
 _POSITION = (events.GpsLocationChanged, events.AltitudeChanged, events.SpeedChanged)
 
-STREAMS: Mapping[int, Stream] = {
-    dialect.MAVLINK_MSG_ID_ATTITUDE: Stream(attitude, (events.AttitudeChanged,), every=0.1),
-    dialect.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: Stream(attitude_quaternion, (events.AttitudeChanged,), every=0.1),
-    dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: Stream(global_position_int, _POSITION, every=0.2),
-    dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED: Stream(local_position_ned, _POSITION, every=0.2),
-    dialect.MAVLINK_MSG_ID_ODOMETRY: Stream(odometry, (events.AttitudeChanged, *_POSITION)),
-    dialect.MAVLINK_MSG_ID_ALTITUDE: Stream(
+STREAMS: Mapping[int, MessageStream] = {
+    dialect.MAVLINK_MSG_ID_ATTITUDE: MessageStream(attitude, (events.AttitudeChanged,), every=0.1),
+    dialect.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: MessageStream(
+        attitude_quaternion, (events.AttitudeChanged,), every=0.1
+    ),
+    dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: MessageStream(global_position_int, _POSITION, every=0.2),
+    dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED: MessageStream(local_position_ned, _POSITION, every=0.2),
+    dialect.MAVLINK_MSG_ID_ODOMETRY: MessageStream(odometry, (events.AttitudeChanged, *_POSITION)),
+    dialect.MAVLINK_MSG_ID_ALTITUDE: MessageStream(
         altitude, (events.AltitudeChanged, events.AltitudeAboveGroundChanged), every=0.2
     ),
-    dialect.MAVLINK_MSG_ID_VFR_HUD: Stream(vfr_hud, (events.SpeedChanged, events.AltitudeChanged), every=0.2),
-    dialect.MAVLINK_MSG_ID_GPS_RAW_INT: Stream(
+    dialect.MAVLINK_MSG_ID_VFR_HUD: MessageStream(vfr_hud, (events.SpeedChanged, events.AltitudeChanged), every=0.2),
+    dialect.MAVLINK_MSG_ID_GPS_RAW_INT: MessageStream(
         gps_raw_int, (events.GpsLocationChanged, events.NumberOfSatelliteChanged, events.GPSFixStateChanged), every=0.5
     ),
-    dialect.MAVLINK_MSG_ID_DISTANCE_SENSOR: Stream(distance_sensor, (events.AltitudeAboveGroundChanged,), every=0.2),
-    dialect.MAVLINK_MSG_ID_RANGEFINDER: Stream(rangefinder, (events.AltitudeAboveGroundChanged,)),
-    dialect.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT: Stream(nav_controller_output),
-    dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: Stream(extended_sys_state, every=0.5, on_change=True),
-    dialect.MAVLINK_MSG_ID_HOME_POSITION: Stream(home_position, every=2.0, on_change=True),
-    dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: Stream(gps_global_origin),
+    dialect.MAVLINK_MSG_ID_DISTANCE_SENSOR: MessageStream(
+        distance_sensor, (events.AltitudeAboveGroundChanged,), every=0.2
+    ),
+    dialect.MAVLINK_MSG_ID_RANGEFINDER: MessageStream(rangefinder, (events.AltitudeAboveGroundChanged,)),
+    dialect.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT: MessageStream(nav_controller_output),
+    dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: MessageStream(extended_sys_state, every=0.5, on_change=True),
+    dialect.MAVLINK_MSG_ID_HOME_POSITION: MessageStream(home_position, every=2.0, on_change=True),
+    dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: MessageStream(gps_global_origin),
 }

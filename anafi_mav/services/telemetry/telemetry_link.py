@@ -12,7 +12,7 @@ from pathlib import Path
 from anafi_mav import units
 from anafi_mav.drone.status.link import Link
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.stream import Stream, Times
+from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.vehicle.vehicle import Vehicle
 
 UNKNOWN_U8 = 255
@@ -105,8 +105,10 @@ def onboard_computer_status(vehicle: Vehicle, times: Times) -> dialect.MAVLink_m
 
 _UPDATES = tuple(Link.REDUCERS)
 
-STREAMS: Mapping[int, Stream] = {
-    dialect.MAVLINK_MSG_ID_RC_CHANNELS: Stream(rc_channels, _UPDATES, every=1.0, repeated=True, flavoured=True),
-    dialect.MAVLINK_MSG_ID_RADIO_STATUS: Stream(radio_status, _UPDATES, every=1.0, repeated=True, flavoured=True),
-    dialect.MAVLINK_MSG_ID_ONBOARD_COMPUTER_STATUS: Stream(onboard_computer_status),
+STREAMS: Mapping[int, MessageStream] = {
+    dialect.MAVLINK_MSG_ID_RC_CHANNELS: MessageStream(rc_channels, _UPDATES, every=1.0, repeated=True, flavoured=True),
+    dialect.MAVLINK_MSG_ID_RADIO_STATUS: MessageStream(
+        radio_status, _UPDATES, every=1.0, repeated=True, flavoured=True
+    ),
+    dialect.MAVLINK_MSG_ID_ONBOARD_COMPUTER_STATUS: MessageStream(onboard_computer_status),
 }

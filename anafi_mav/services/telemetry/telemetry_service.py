@@ -14,7 +14,7 @@ from anafi_mav import texts
 from anafi_mav.drone import events
 from anafi_mav.drone.events import Message
 from anafi_mav.services.service import Host, Service
-from anafi_mav.services.stream import Stream
+from anafi_mav.services.stream import MessageStream
 from anafi_mav.services.telemetry import telemetry_anafi, telemetry_flight, telemetry_link, telemetry_status
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.vehicle import POSITION_OLD
@@ -59,7 +59,7 @@ class TelemetryService(Service):
             else:
                 self.host.text(Severity.NOTICE, texts.POSITION_FOUND)
 
-    def streams(self) -> Mapping[int, Stream]:
+    def streams(self) -> Mapping[int, MessageStream]:
         return {
             **telemetry_flight.STREAMS,
             **telemetry_status.STREAMS,

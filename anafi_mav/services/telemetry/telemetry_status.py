@@ -14,7 +14,7 @@ from anafi_mav.drone import events
 from anafi_mav.drone.events import AlertLevel, BatteryAlert, MotorError, Sensor
 from anafi_mav.drone.status.battery import BatteryState
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.stream import Stream, Times
+from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.vehicle.vehicle import Vehicle
 
 NAN = math.nan
@@ -239,12 +239,12 @@ def estimator_status(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message 
     )
 
 
-STREAMS: Mapping[int, Stream] = {
-    dialect.MAVLINK_MSG_ID_SYS_STATUS: Stream(sys_status, every=1.0, on_change=True),
-    dialect.MAVLINK_MSG_ID_BATTERY_STATUS: Stream(battery_status, every=1.0),
-    dialect.MAVLINK_MSG_ID_BATTERY_INFO: Stream(battery_info),
-    dialect.MAVLINK_MSG_ID_EKF_STATUS_REPORT: Stream(ekf_status_report, every=1.0),
-    dialect.MAVLINK_MSG_ID_ESTIMATOR_STATUS: Stream(
+STREAMS: Mapping[int, MessageStream] = {
+    dialect.MAVLINK_MSG_ID_SYS_STATUS: MessageStream(sys_status, every=1.0, on_change=True),
+    dialect.MAVLINK_MSG_ID_BATTERY_STATUS: MessageStream(battery_status, every=1.0),
+    dialect.MAVLINK_MSG_ID_BATTERY_INFO: MessageStream(battery_info),
+    dialect.MAVLINK_MSG_ID_EKF_STATUS_REPORT: MessageStream(ekf_status_report, every=1.0),
+    dialect.MAVLINK_MSG_ID_ESTIMATOR_STATUS: MessageStream(
         estimator_status, (events.GpsLocationChanged, events.HoveringWarning), repeated=True
     ),
 }

@@ -18,7 +18,7 @@ from anafi_mav.drone.video.video import VideoFrame
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.service import Host, Service
-from anafi_mav.services.stream import Stream, Times
+from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.vehicle.vehicle import Vehicle
 
 NAN = math.nan
@@ -104,12 +104,12 @@ class VideoTelemetryService(Service):
         self._watch: asyncio.Task[None] | None = None
         self._retry_at = 0.0
 
-    def streams(self) -> Mapping[int, Stream]:
+    def streams(self) -> Mapping[int, MessageStream]:
         return {
-            dialect.MAVLINK_MSG_ID_ANAFI_CAMERA_EXPOSURE: Stream(
+            dialect.MAVLINK_MSG_ID_ANAFI_CAMERA_EXPOSURE: MessageStream(
                 camera_exposure, tuple(Camera.REDUCERS), repeated=True
             ),
-            dialect.MAVLINK_MSG_ID_ANAFI_LINK: Stream(link, tuple(Link.REDUCERS), repeated=True),
+            dialect.MAVLINK_MSG_ID_ANAFI_LINK: MessageStream(link, tuple(Link.REDUCERS), repeated=True),
         }
 
     def link_up(self) -> None:

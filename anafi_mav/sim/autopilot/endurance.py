@@ -14,8 +14,8 @@ from anafi_mav.arsdk.messages import ardrone3, rth
 from anafi_mav.arsdk.messages.ardrone3 import BatteryCapacityStatus, ForcedLandingReason
 from anafi_mav.arsdk.messages.rth import AutoTriggerReason, RthAutoTriggerMode, RthHomeReachability
 from anafi_mav.sim.autopilot import homing, power
-from anafi_mav.sim.features.settings import Settings
-from anafi_mav.sim.world.model import Model
+from anafi_mav.sim.features.settings import DroneSettings
+from anafi_mav.sim.world.model import AircraftModel
 from anafi_mav.sim.world.motion import Pose
 
 PERIOD = 1.0
@@ -55,7 +55,7 @@ class Endurance:
     `return_due` and `landing_due` are for the firmware to act on.
     """
 
-    def __init__(self, model: Model, settings: Settings) -> None:
+    def __init__(self, model: AircraftModel, settings: DroneSettings) -> None:
         self._settings = settings
         self.rate = 100.0 / model.airframe.flight_time
         """Percent per second."""

@@ -14,7 +14,7 @@ from anafi_mav.arsdk.messages import animation, ardrone3, common, flight_plan, f
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.messages.rth import StateReason
 from anafi_mav.sim.autopilot.animation_paths import STARTS as ANIMATIONS
-from anafi_mav.sim.autopilot.flight import Flight
+from anafi_mav.sim.autopilot.flight import Autopilot
 from anafi_mav.sim.autopilot.flight import Identity as Identity
 from anafi_mav.sim.autopilot.follow_me import COMMANDS as FOLLOW_ME
 from anafi_mav.sim.autopilot.machine import AIRBORNE, GUIDED, LANDED, Event
@@ -25,7 +25,7 @@ LATE_TAKE_OFF = 1.0
 """s by which a firmware with the quirk `takeoff-from-ground-late` executes a TakeOff late."""
 
 
-class Firmware(Flight):
+class Firmware(Autopilot):
     """One drone's brain."""
 
     # -- commands

@@ -31,7 +31,7 @@ from anafi_mav.sim.autopilot.machine import AIRBORNE, GUIDED, LANDED, Event, nex
 from anafi_mav.sim.autopilot.poi import Poi
 from anafi_mav.sim.autopilot.power import Battery
 from anafi_mav.sim.autopilot.safety import Alarms, Warnings, check_changed, checklist
-from anafi_mav.sim.features.settings import Settings
+from anafi_mav.sim.features.settings import DroneSettings
 from anafi_mav.sim.payload.camera_operator import Operator
 from anafi_mav.sim.payload.gimbal import Gimbals
 from anafi_mav.sim.payload.jpeg_scene import Scene
@@ -39,9 +39,9 @@ from anafi_mav.sim.payload.payload import Payload
 from anafi_mav.sim.plan.plan_store import FlightPlanStore
 from anafi_mav.sim.world.airframe import Body
 from anafi_mav.sim.world.faults import Faults
-from anafi_mav.sim.world.model import Model
+from anafi_mav.sim.world.model import AircraftModel
 from anafi_mav.sim.world.motion import Pose
-from anafi_mav.sim.world.place import Origin
+from anafi_mav.sim.world.place import WorldOrigin
 from anafi_mav.sim.world.quirks import Quirk
 from anafi_mav.sim.world.wind import WindWatch
 
@@ -66,15 +66,15 @@ class Identity:
     run_id: str
 
 
-class Flight:
+class Autopilot:
     """One drone's autopilot."""
 
     def __init__(
         self,
-        model: Model,
+        model: AircraftModel,
         identity: Identity,
         body: Body,
-        origin: Origin,
+        origin: WorldOrigin,
         emit: Callable[[Message], None],
         note: Callable[[str, dict[str, Any]], None],
         faults: Faults,
@@ -83,7 +83,7 @@ class Flight:
         self.model = model
         self.identity = identity
         self.faults = faults
-        self.settings = Settings(model, identity.name)
+        self.settings = DroneSettings(model, identity.name)
         self.battery = Battery(model)
         self.payload = Payload(model, identity.name, identity.run_id, emit, self._scene)
         self.plans = FlightPlanStore()

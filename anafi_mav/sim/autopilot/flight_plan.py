@@ -16,16 +16,16 @@ from anafi_mav.arsdk.messages import common, flight_plan
 from anafi_mav.arsdk.messages.common import FlightPlanComponent as Part
 from anafi_mav.arsdk.messages.common import MavlinkType, PlayError, PlayingState
 from anafi_mav.sim.autopilot.poi import look
-from anafi_mav.sim.features.settings import Settings
+from anafi_mav.sim.features.settings import DroneSettings
 from anafi_mav.sim.payload.camera_operator import Operator
 from anafi_mav.sim.plan.panorama import Panorama
 from anafi_mav.sim.plan.plan_camera import COMMANDS, PlanCamera
-from anafi_mav.sim.plan.plan_file import Command, Item, PlanFileError, read
+from anafi_mav.sim.plan.plan_file import PlanCommand, PlanFileError, PlanLine, read
 from anafi_mav.sim.world.airframe import Body
 from anafi_mav.sim.world.faults import Faults
-from anafi_mav.sim.world.model import Model
+from anafi_mav.sim.world.model import AircraftModel
 from anafi_mav.sim.world.motion import Pose, Turn
-from anafi_mav.sim.world.place import Origin
+from anafi_mav.sim.world.place import WorldOrigin
 from anafi_mav.sim.world.quirks import Quirk
 from anafi_mav.units import DEG_PER_RAD, RAD_PER_DEG
 
@@ -72,10 +72,10 @@ class FlightPlan:
 
     def __init__(
         self,
-        model: Model,
+        model: AircraftModel,
         body: Body,
-        origin: Origin,
-        settings: Settings,
+        origin: WorldOrigin,
+        settings: DroneSettings,
         pilot: Pilot,
         operator: Operator,
         emit: Callable[[Message], None],
@@ -97,7 +97,7 @@ class FlightPlan:
         self._name = ""
         """Name in events: the uid, or the custom id of start_at."""
         self._type = MavlinkType.FLIGHT_PLAN_V2 if model.plan_version == 2 else MavlinkType.FLIGHT_PLAN
-        self._items: tuple[Item, ...] = ()
+        self._items: tuple[PlanLine, ...] = ()
         self._index = 0
         self._parts = dict.fromkeys(Part, True)
         self._goes_on: bool | None = None
@@ -123,7 +123,7 @@ class FlightPlan:
         return self.state is PlayingState.PLAYING
 
     @property
-    def items(self) -> tuple[Item, ...]:
+    def items(self) -> tuple[PlanLine, ...]:
         """Return the items of the plan that plays, or played last.
 
         Their index is that of MissionItemExecuted.
@@ -220,14 +220,14 @@ class FlightPlan:
         self._begun, self._progress, self._began, self._time = False, None, time, time
         self._speed, self._roi = CRUISE, None
         self._camera.start(type)
-        self._rois = [self._point(found) for found in items if found.command is Command.SET_ROI and found.p1 == 3]
+        self._rois = [self._point(found) for found in items if found.command is PlanCommand.SET_ROI and found.p1 == 3]
         self._legs = self._way_in(pose) if self._model.modern and not on_ground else []
         self._set(PlayingState.PLAYING)
         if on_ground:
             self._pilot.plan_take_off()
         return True
 
-    def _read(self, data: bytes | None, type: MavlinkType) -> tuple[Item, ...] | None:
+    def _read(self, data: bytes | None, type: MavlinkType) -> tuple[PlanLine, ...] | None:
         known = (MavlinkType.FLIGHT_PLAN,) if self._model.plan_version == 1 else tuple(MavlinkType)
         if data is None or type not in known or type is MavlinkType.MAP_MY_HOUSE:
             self._note("plan", {"refused": "no such file" if data is None else f"type {int(type)}"})
@@ -311,7 +311,7 @@ class FlightPlan:
             self._stare(pose)
             if not self._done(item, pose, arrived, time):
                 return
-            if item.command is Command.LAND:  # the way point before it has been reached
+            if item.command is PlanCommand.LAND:  # the way point before it has been reached
                 self._finish(self._pilot.plan_land)
                 return
             self._next()
@@ -339,8 +339,8 @@ class FlightPlan:
         if reported and late:
             self._emit(report)
 
-    def _done(self, item: Item, pose: Pose, arrived: bool, time: float) -> bool:
-        if self._target is not None and item.command in _MOVING and item.command is not Command.PANORAMA:
+    def _done(self, item: PlanLine, pose: Pose, arrived: bool, time: float) -> bool:
+        if self._target is not None and item.command in _MOVING and item.command is not PlanCommand.PANORAMA:
             if self._near(item, pose):
                 return True
             if not self._stalled(pose, time):
@@ -348,19 +348,19 @@ class FlightPlan:
             if self._model.modern:
                 self._emit(flight_plan.WaypointSkipped(self._index))
             return True
-        if item.command is Command.PANORAMA:
+        if item.command is PlanCommand.PANORAMA:
             assert self._panning is not None, "begun with the item"
             over = self._panning.tick(time, arrived)
             if over:
                 self._stop_panning()
             return over
-        if item.command is Command.START_PHOTO and self._camera.count(item) == 1:
+        if item.command is PlanCommand.START_PHOTO and self._camera.count(item) == 1:
             return not self._operator.camera_busy or time >= self._due + CAMERA_LIMIT
         return time >= self._due
 
-    def _near(self, item: Item, pose: Pose) -> bool:
+    def _near(self, item: PlanLine, pose: Pose) -> bool:
         assert self._target is not None
-        radius = item.p2 if item.command is Command.WAYPOINT and item.p2 > 0.0 else ACCEPTANCE
+        radius = item.p2 if item.command is PlanCommand.WAYPOINT and item.p2 > 0.0 else ACCEPTANCE
         return math.dist((pose.north, pose.east, pose.up), self._target) <= radius
 
     def _stalled(self, pose: Pose, time: float) -> bool:
@@ -370,12 +370,12 @@ class FlightPlan:
 
     # -- places
 
-    def _point(self, item: Item) -> tuple[float, float, float]:
+    def _point(self, item: PlanLine) -> tuple[float, float, float]:
         return (*self._origin.offset(item.latitude, item.longitude), item.up(self._origin.altitude))
 
-    def _within(self, item: Item) -> bool:
+    def _within(self, item: PlanLine) -> bool:
         """Inside the fence and under the ceiling."""
-        if item.command is not Command.WAYPOINT:
+        if item.command is not PlanCommand.WAYPOINT:
             return True
         north, east, up = self._point(item)
         if up > self._settings.number("max_altitude"):
@@ -384,7 +384,7 @@ class FlightPlan:
 
     def _way_in(self, pose: Pose) -> list[tuple[float, float, float]]:
         """Up here, then over to above the first way point (Parrot's flight plan page, for the Ai)."""
-        first = next((item for item in self._items[self._index :] if item.command is Command.WAYPOINT), None)
+        first = next((item for item in self._items[self._index :] if item.command is PlanCommand.WAYPOINT), None)
         if first is None:
             return []
         north, east, up = self._point(first)
@@ -435,24 +435,24 @@ class FlightPlan:
 
     # -- items
 
-    def _waypoint(self, item: Item, pose: Pose, time: float) -> None:
+    def _waypoint(self, item: PlanLine, pose: Pose, time: float) -> None:
         # In "continue" the nose turns to the way point's heading on the way, which is what a move does anyway.
         self._go(self._point(item), pose, item.p4)
 
-    def _take_off(self, item: Item, pose: Pose, time: float) -> None:
+    def _take_off(self, item: PlanLine, pose: Pose, time: float) -> None:
         # Version 1 ignores all parameters; 2 flies to the position, if there is one.
         self._target = None
         if self._type is MavlinkType.FLIGHT_PLAN_V2 and item.placed:
             self._go(self._point(item), pose, item.p4)
 
-    def _land(self, item: Item, pose: Pose, time: float) -> bool | None:
+    def _land(self, item: PlanLine, pose: Pose, time: float) -> bool | None:
         if self._type is not MavlinkType.FLIGHT_PLAN_V2 or not item.placed:
             return self._finish(self._pilot.plan_land)
         north, east, up = self._point(item)
         self._go((north, east, max(up, _LAND_SAFE)), pose, item.p4)
         return None
 
-    def _return(self, item: Item, pose: Pose, time: float) -> bool:
+    def _return(self, item: PlanLine, pose: Pose, time: float) -> bool:
         return self._finish(self._pilot.plan_return)
 
     def _finish(self, then: Callable[[], None]) -> bool:
@@ -460,35 +460,35 @@ class FlightPlan:
         then()
         return False
 
-    def _delay(self, item: Item, pose: Pose, time: float) -> None:
+    def _delay(self, item: PlanLine, pose: Pose, time: float) -> None:
         self._due = time + (item.p1 if item.p1 > 0.0 else 0.0)
 
-    def _change_speed(self, item: Item, pose: Pose, time: float) -> None:
+    def _change_speed(self, item: PlanLine, pose: Pose, time: float) -> None:
         if item.p2 > 0.0:
             self._speed = item.p2
             if self._target is not None:
                 self._go(self._target, pose, pose.yaw * DEG_PER_RAD)
 
-    def _set_roi(self, item: Item, pose: Pose, time: float) -> None:
-        if item.command is Command.SET_ROI and self._type is not MavlinkType.FLIGHT_PLAN_V2:
+    def _set_roi(self, item: PlanLine, pose: Pose, time: float) -> None:
+        if item.command is PlanCommand.SET_ROI and self._type is not MavlinkType.FLIGHT_PLAN_V2:
             return  # version 1 only numbers them; SET_VIEW_MODE looks at one
-        wanted = item.command is Command.SET_ROI_LOCATION or item.p1 == 3
+        wanted = item.command is PlanCommand.SET_ROI_LOCATION or item.p1 == 3
         self._look_at(self._point(item) if wanted else None, pose)
 
-    def _view_mode(self, item: Item, pose: Pose, time: float) -> None:
+    def _view_mode(self, item: PlanLine, pose: Pose, time: float) -> None:
         index = int(item.p2) if item.p2 == item.p2 else -1
         looks = item.p1 == 2 and 0 <= index < len(self._rois)
         self._look_at(self._rois[index] if looks else None, pose)
 
-    def _mount(self, item: Item, pose: Pose, time: float) -> None:
+    def _mount(self, item: PlanLine, pose: Pose, time: float) -> None:
         neutral = self._type is MavlinkType.FLIGHT_PLAN_V2 and item.altitude == 1
         if neutral or math.isfinite(item.p1):
             self._operator.aim(0.0 if neutral else item.p1)
 
-    def _photograph(self, item: Item, pose: Pose, time: float) -> None:
+    def _photograph(self, item: PlanLine, pose: Pose, time: float) -> None:
         self._camera.carry_out(item)
 
-    def _panorama(self, item: Item, pose: Pose, time: float) -> None:
+    def _panorama(self, item: PlanLine, pose: Pose, time: float) -> None:
         self._target = (pose.north, pose.east, pose.up)
         self._panning = Panorama(item, self._body, self._operator, pose, time, CRUISE)
 
@@ -498,29 +498,29 @@ class FlightPlan:
             self._panning = None
 
 
-def _lifts(items: tuple[Item, ...]) -> bool:
-    return bool(items) and items[0].command is Command.TAKEOFF
+def _lifts(items: tuple[PlanLine, ...]) -> bool:
+    return bool(items) and items[0].command is PlanCommand.TAKEOFF
 
 
 def _way(pose: Pose, before: Pose) -> float:
     return math.dist((pose.north, pose.east, pose.up), (before.north, before.east, before.up))
 
 
-_MOVING = frozenset({Command.WAYPOINT, Command.TAKEOFF, Command.LAND, Command.PANORAMA})
+_MOVING = frozenset({PlanCommand.WAYPOINT, PlanCommand.TAKEOFF, PlanCommand.LAND, PlanCommand.PANORAMA})
 
-_BEGIN: dict[Command, Callable[[FlightPlan, Item, Pose, float], bool | None]] = {
-    Command.WAYPOINT: FlightPlan._waypoint,
-    Command.RETURN_TO_LAUNCH: FlightPlan._return,
-    Command.LAND: FlightPlan._land,
-    Command.TAKEOFF: FlightPlan._take_off,
-    Command.DELAY: FlightPlan._delay,
-    Command.CONDITION_DELAY: FlightPlan._delay,
-    Command.CHANGE_SPEED: FlightPlan._change_speed,
-    Command.SET_ROI_LOCATION: FlightPlan._set_roi,
-    Command.SET_ROI_NONE: FlightPlan._set_roi,
-    Command.SET_ROI: FlightPlan._set_roi,
-    Command.MOUNT_CONTROL: FlightPlan._mount,
-    Command.PANORAMA: FlightPlan._panorama,
-    Command.SET_VIEW_MODE: FlightPlan._view_mode,
+_BEGIN: dict[PlanCommand, Callable[[FlightPlan, PlanLine, Pose, float], bool | None]] = {
+    PlanCommand.WAYPOINT: FlightPlan._waypoint,
+    PlanCommand.RETURN_TO_LAUNCH: FlightPlan._return,
+    PlanCommand.LAND: FlightPlan._land,
+    PlanCommand.TAKEOFF: FlightPlan._take_off,
+    PlanCommand.DELAY: FlightPlan._delay,
+    PlanCommand.CONDITION_DELAY: FlightPlan._delay,
+    PlanCommand.CHANGE_SPEED: FlightPlan._change_speed,
+    PlanCommand.SET_ROI_LOCATION: FlightPlan._set_roi,
+    PlanCommand.SET_ROI_NONE: FlightPlan._set_roi,
+    PlanCommand.SET_ROI: FlightPlan._set_roi,
+    PlanCommand.MOUNT_CONTROL: FlightPlan._mount,
+    PlanCommand.PANORAMA: FlightPlan._panorama,
+    PlanCommand.SET_VIEW_MODE: FlightPlan._view_mode,
     **dict.fromkeys(COMMANDS, FlightPlan._photograph),
 }

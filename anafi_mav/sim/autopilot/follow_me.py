@@ -17,10 +17,10 @@ from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import controller_info, follow_me
 from anafi_mav.arsdk.messages.follow_me import Animation, Behavior, GeoRelConfigureParam, Input, Mode
 from anafi_mav.sim.autopilot.poi import look
-from anafi_mav.sim.features.settings import Settings
+from anafi_mav.sim.features.settings import DroneSettings
 from anafi_mav.sim.world.airframe import Body
 from anafi_mav.sim.world.motion import Pose
-from anafi_mav.sim.world.place import Origin
+from anafi_mav.sim.world.place import WorldOrigin
 from anafi_mav.units import DEG_PER_RAD, RAD_PER_DEG, clip, wrap_pi
 
 MODES = (Mode.LOOK_AT, Mode.GEOGRAPHIC, Mode.RELATIVE)
@@ -113,8 +113,8 @@ class FollowMe:
     def __init__(
         self,
         body: Body,
-        origin: Origin,
-        settings: Settings,
+        origin: WorldOrigin,
+        settings: DroneSettings,
         emit: Callable[[Message], None],
         aim: Callable[[float], None],
         top_speed: float,

@@ -15,12 +15,12 @@ from anafi_mav.arsdk.messages.ardrone3 import MoveByError, MoveToStatus
 from anafi_mav.arsdk.messages.rth import RthEndingBehavior
 from anafi_mav.sim.autopilot.homing import Homing
 from anafi_mav.sim.autopilot.moves import MoveBy, MoveTo, asked_speeds, own_speeds
-from anafi_mav.sim.features.settings import Settings
+from anafi_mav.sim.features.settings import DroneSettings
 from anafi_mav.sim.world.airframe import Body
 from anafi_mav.sim.world.faults import Faults
-from anafi_mav.sim.world.model import Model
+from anafi_mav.sim.world.model import AircraftModel
 from anafi_mav.sim.world.motion import Pose
-from anafi_mav.sim.world.place import Origin
+from anafi_mav.sim.world.place import WorldOrigin
 from anafi_mav.sim.world.quirks import Quirk
 from anafi_mav.units import RAD_PER_DEG, clip
 
@@ -36,10 +36,10 @@ class Guidance:
 
     def __init__(
         self,
-        model: Model,
+        model: AircraftModel,
         body: Body,
-        origin: Origin,
-        settings: Settings,
+        origin: WorldOrigin,
+        settings: DroneSettings,
         homing: Homing,
         emit: Callable[[Message], None],
         faults: Faults,

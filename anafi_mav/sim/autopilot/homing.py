@@ -16,11 +16,11 @@ from typing import NamedTuple
 from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import ardrone3, rth
 from anafi_mav.arsdk.messages.rth import RthEndingBehavior, RthHomeType, RthState, StateReason
-from anafi_mav.sim.features.settings import HOME_TYPES, Settings
+from anafi_mav.sim.features.settings import HOME_TYPES, DroneSettings
 from anafi_mav.sim.world.airframe import Body
 from anafi_mav.sim.world.faults import Faults
 from anafi_mav.sim.world.motion import Pose, Turn
-from anafi_mav.sim.world.place import Origin
+from anafi_mav.sim.world.place import WorldOrigin
 from anafi_mav.sim.world.quirks import Quirk
 from anafi_mav.units import RAD_PER_DEG
 
@@ -38,7 +38,7 @@ _TOO_NEAR_TO_TURN = 1.0
 """m from home below which the nose stays where it is."""
 
 
-class Location(NamedTuple):
+class HomePosition(NamedTuple):
     """deg, deg, m above take-off."""
 
     latitude: float
@@ -46,7 +46,7 @@ class Location(NamedTuple):
     altitude: float
 
 
-class Phase(enum.Enum):
+class ReturnPhase(enum.Enum):
     IDLE = "idle"
     PENDING = "waiting to hover"
     CLIMB = "climbing to the return height"
@@ -60,8 +60,8 @@ class Homing:
     def __init__(
         self,
         body: Body,
-        origin: Origin,
-        settings: Settings,
+        origin: WorldOrigin,
+        settings: DroneSettings,
         emit: Callable[[Message], None],
         faults: Faults,
     ) -> None:
@@ -70,11 +70,11 @@ class Homing:
         self._origin = origin
         self._settings = settings
         self._emit = emit
-        self.phase = Phase.IDLE
-        self.takeoff: Location | None = None
+        self.phase = ReturnPhase.IDLE
+        self.takeoff: HomePosition | None = None
         self.fixed_before_takeoff = False
-        self.custom: Location | None = None
-        self.pilot: Location | None = None
+        self.custom: HomePosition | None = None
+        self.pilot: HomePosition | None = None
         self._fix = False
         self._height = 0.0
         self._state = (RthState.UNAVAILABLE, StateReason.DISABLED)
@@ -91,7 +91,7 @@ class Homing:
         return RthHomeType.TAKEOFF if known is None else preferred
 
     @property
-    def home(self) -> Location | None:
+    def home(self) -> HomePosition | None:
         """The place a return would go to; None: not known."""
         places = {RthHomeType.CUSTOM: self.custom, RthHomeType.PILOT: self.pilot}
         return places.get(self.type, self.takeoff)
@@ -127,7 +127,7 @@ class Homing:
             north, east = self._origin.offset(latitude, longitude)
             reach = self._settings.number("max_distance")
             if (north - pose.north) ** 2 + (east - pose.east) ** 2 <= reach**2:
-                self.custom = Location(latitude, longitude, altitude)
+                self.custom = HomePosition(latitude, longitude, altitude)
         self._emit(rth.HomeType(self.type))
         self._emit(rth.CustomLocation(*(self.custom or (UNKNOWN, UNKNOWN, UNKNOWN))))
         self._emit(self._home_changed())
@@ -136,7 +136,7 @@ class Homing:
         """GPSSettings.SendControllerGPS. What is no place is not heard."""
         if not _somewhere(latitude, longitude, altitude):
             return
-        before, self.pilot = self.geofence_centre, Location(latitude, longitude, altitude)
+        before, self.pilot = self.geofence_centre, HomePosition(latitude, longitude, altitude)
         self._emit(ardrone3.GPSFixStateChanged(int(self._fix)))
         if self.geofence_centre != before:
             self._emit(ardrone3.GeofenceCenterChanged(*self.pilot[:2]))
@@ -150,8 +150,8 @@ class Homing:
         self._emit(ardrone3.HomeTypeChosenChanged(_chosen(self.type)))
         self._emit(self._home_changed())
 
-    def _here(self, pose: Pose) -> Location:
-        return Location(*self._origin.place(pose.north, pose.east), pose.up)
+    def _here(self, pose: Pose) -> HomePosition:
+        return HomePosition(*self._origin.place(pose.north, pose.east), pose.up)
 
     def _home_changed(self) -> Message:
         return ardrone3.HomeChanged(*(self.home or (UNKNOWN, UNKNOWN, UNKNOWN)))
@@ -191,12 +191,12 @@ class Homing:
     @property
     def active(self) -> bool:
         """A return flies the drone (it may still be waiting to begin: see `flying`)."""
-        return self.phase is not Phase.IDLE
+        return self.phase is not ReturnPhase.IDLE
 
     @property
     def flying(self) -> bool:
         """A return has taken the sticks."""
-        return self.phase not in (Phase.IDLE, Phase.PENDING)
+        return self.phase not in (ReturnPhase.IDLE, ReturnPhase.PENDING)
 
     @property
     def reason(self) -> StateReason:
@@ -235,7 +235,7 @@ class Homing:
         if self.flying:
             self._set(RthState.IN_PROGRESS, reason)
             return True
-        self.phase = Phase.PENDING
+        self.phase = ReturnPhase.PENDING
         # Nobody flies on while the battery decides.
         if hovering or reason is StateReason.LOW_BATTERY:
             self._begin(reason, pose)
@@ -255,21 +255,21 @@ class Homing:
     def _stop_body(self) -> None:
         if self.flying:
             self._body.hover()
-        self.phase = Phase.IDLE
+        self.phase = ReturnPhase.IDLE
 
     def _begin(self, reason: StateReason, pose: Pose) -> None:
         self._set(RthState.IN_PROGRESS, reason)
         ceiling = self._settings.number("max_altitude")
         self._height = max(pose.up, min(self._settings.number("rth_min_altitude"), ceiling))
-        self.phase = Phase.CLIMB
+        self.phase = ReturnPhase.CLIMB
         self._go(pose.north, pose.east, self._height)
 
     def tick(self, pose: Pose, arrived: bool, hovering: bool) -> RthEndingBehavior | None:
         """Go on with the return; at its end what is to be done there."""
-        if self.phase is Phase.PENDING:
+        if self.phase is ReturnPhase.PENDING:
             if hovering:
                 self._begin(self._state[1], pose)
-        elif self.phase is not Phase.IDLE and arrived:
+        elif self.phase is not ReturnPhase.IDLE and arrived:
             return self._next_phase(pose)
         return None
 
@@ -279,11 +279,11 @@ class Homing:
             self.abort()
             return None
         north, east = self._origin.offset(home.latitude, home.longitude)
-        if self.phase is Phase.CLIMB:
-            self.phase = Phase.CRUISE
+        if self.phase is ReturnPhase.CLIMB:
+            self.phase = ReturnPhase.CRUISE
             self._go(north, east, self._height, face=_far(pose, north, east))
-        elif self.phase is Phase.CRUISE:
-            self.phase = Phase.DESCEND
+        elif self.phase is ReturnPhase.CRUISE:
+            self.phase = ReturnPhase.DESCEND
             self._go(north, east, min(self._settings.number("rth_hovering_altitude"), self._height))
         else:
             self._stop_body()

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from anafi_mav.arsdk.messages import ardrone3, move
 from anafi_mav.arsdk.messages.ardrone3 import MoveByError, MoveToStatus, OrientationMode
-from anafi_mav.sim.features.settings import Settings
+from anafi_mav.sim.features.settings import DroneSettings
 from anafi_mav.sim.world.airframe import Body
 from anafi_mav.sim.world.model import Airframe
 from anafi_mav.sim.world.motion import FLOOR, Pose, Turn
@@ -39,12 +39,14 @@ class Speeds:
         return all(math.isfinite(value) and value >= 0.0 for value in values) and any(values)
 
 
-def own_speeds(settings: Settings) -> Speeds:
+def own_speeds(settings: DroneSettings) -> Speeds:
     """Return the speeds of a command that contains no speeds."""
     return Speeds(CRUISE, settings.number("max_vertical_speed"), settings.number("max_rotation_speed") * RAD_PER_DEG)
 
 
-def asked_speeds(command: move.ExtendedMoveBy | move.ExtendedMoveTo, airframe: Airframe, settings: Settings) -> Speeds:
+def asked_speeds(
+    command: move.ExtendedMoveBy | move.ExtendedMoveTo, airframe: Airframe, settings: DroneSettings
+) -> Speeds:
     """The speeds of a command, within what the aircraft can do."""
     _, _, climb = settings.limits("max_vertical_speed")
     _, _, turn = settings.limits("max_rotation_speed")

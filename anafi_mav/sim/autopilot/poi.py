@@ -16,7 +16,7 @@ from anafi_mav.arsdk.messages import ardrone3, poi
 from anafi_mav.arsdk.messages.ardrone3 import PoiMode, PoiStatus
 from anafi_mav.arsdk.messages.poi import Indicator
 from anafi_mav.sim.world.motion import Pose
-from anafi_mav.sim.world.place import Origin
+from anafi_mav.sim.world.place import WorldOrigin
 from anafi_mav.units import DEG_PER_RAD, RAD_PER_DEG, clip, wrap_pi
 
 PENDING_LIMIT = 10.0
@@ -62,7 +62,7 @@ class Poi:
 
     def __init__(
         self,
-        origin: Origin,
+        origin: WorldOrigin,
         emit: Callable[[Message], None],
         aim: Callable[[float], None],
         fastest: Callable[[], float],

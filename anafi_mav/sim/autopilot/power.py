@@ -12,7 +12,7 @@ from anafi_mav.arsdk.messages import battery, common
 from anafi_mav.arsdk.messages.ardrone3 import AlertState
 from anafi_mav.arsdk.messages.battery import AlertLevel, BatteryAlert
 from anafi_mav.arsdk.messages.generic import ListFlags
-from anafi_mav.sim.world.model import Model
+from anafi_mav.sim.world.model import AircraftModel
 
 LOW, CRITICAL, EMPTY = 20, 10, 4
 """Percent: warning, no take-off any more, forced landing."""
@@ -26,7 +26,7 @@ HEALTH = 97
 class Battery:
     """Charge in percent and what follows from it."""
 
-    def __init__(self, model: Model) -> None:
+    def __init__(self, model: AircraftModel) -> None:
         self._model = model
         self.charge = 100.0
         self._reported = 100

@@ -14,7 +14,7 @@ from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import ardrone3, common, piloting_style, precise_home, rth, wifi
 from anafi_mav.arsdk.messages.ardrone3 import HomeTypeSetting
 from anafi_mav.arsdk.messages.rth import RthHomeType
-from anafi_mav.sim.world.model import Model, Range
+from anafi_mav.sim.world.model import AircraftModel, SettingRange
 from anafi_mav.units import RAD_PER_DEG
 
 MAX_NAME = 64
@@ -44,10 +44,10 @@ DEFAULTS: dict[str, Any] = {
 """Settings without a range, as the drone leaves the factory (assumed where Parrot does not say)."""
 
 
-class Settings:
+class DroneSettings:
     """Values by key; ranges come from the model."""
 
-    def __init__(self, model: Model, name: str) -> None:
+    def __init__(self, model: AircraftModel, name: str) -> None:
         self._ranges = model.settings
         self._values: dict[str, Any] = {}
         self._name = name
@@ -94,23 +94,23 @@ class Settings:
         return [event for row in ROWS for event in row.report(self)]
 
 
-def _clip(limits: Range, value: float, current: float) -> float:
+def _clip(limits: SettingRange, value: float, current: float) -> float:
     return current if value != value else limits.clip(value)
 
 
-class Row(NamedTuple):
+class SettingRow(NamedTuple):
     key: str
     commands: dict[type[Message], Callable[[Any], Any]]
     """Commands that set it, and where they carry the value."""
-    report: Callable[[Settings], Iterable[Message]]
+    report: Callable[[DroneSettings], Iterable[Message]]
 
 
-def _delay(settings: Settings) -> Iterable[Message]:
+def _delay(settings: DroneSettings) -> Iterable[Message]:
     current, low, high = (int(value) for value in settings.limits("rth_delay"))
     return rth.Delay(current, low, high), ardrone3.ReturnHomeDelayChanged(current)
 
 
-def _home_type(settings: Settings) -> Iterable[Message]:
+def _home_type(settings: DroneSettings) -> Iterable[Message]:
     preferred = settings["home_type"]
     # The old event has no word for a custom place; it keeps to the drone's own choice then.
     legacy = next((old for old, new in _LEGACY_HOME.items() if new is preferred), HomeTypeSetting.TAKEOFF)
@@ -130,48 +130,48 @@ CHOICES: dict[str, tuple[Any, ...]] = {
 }
 """Values that are taken; anything else leaves the setting as it is."""
 
-ROWS: tuple[Row, ...] = (
-    Row(
+ROWS: tuple[SettingRow, ...] = (
+    SettingRow(
         "max_altitude",
         {ardrone3.MaxAltitude: lambda m: m.current},
         lambda s: [ardrone3.MaxAltitudeChanged(*s.limits("max_altitude"))],
     ),
-    Row(
+    SettingRow(
         "max_tilt",
         {ardrone3.MaxTilt: lambda m: m.current},
         lambda s: [ardrone3.MaxTiltChanged(*s.limits("max_tilt"))],
     ),
-    Row(
+    SettingRow(
         "max_distance",
         {ardrone3.MaxDistance: lambda m: m.value},
         lambda s: [ardrone3.MaxDistanceChanged(*s.limits("max_distance"))],
     ),
-    Row(
+    SettingRow(
         "geofence",
         {ardrone3.NoFlyOverMaxDistance: lambda m: m.shouldNotFlyOver},
         lambda s: [ardrone3.NoFlyOverMaxDistanceChanged(s["geofence"])],
     ),
-    Row(
+    SettingRow(
         "banked_turn",
         {ardrone3.BankedTurn: lambda m: m.value},
         lambda s: [ardrone3.BankedTurnChanged(s["banked_turn"])],
     ),
-    Row(
+    SettingRow(
         "max_vertical_speed",
         {ardrone3.MaxVerticalSpeed: lambda m: m.current},
         lambda s: [ardrone3.MaxVerticalSpeedChanged(*s.limits("max_vertical_speed"))],
     ),
-    Row(
+    SettingRow(
         "max_rotation_speed",
         {ardrone3.MaxRotationSpeed: lambda m: m.current},
         lambda s: [ardrone3.MaxRotationSpeedChanged(*s.limits("max_rotation_speed"))],
     ),
-    Row(
+    SettingRow(
         "max_tilt_rate",
         {ardrone3.MaxPitchRollRotationSpeed: lambda m: m.current},
         lambda s: [ardrone3.MaxPitchRollRotationSpeedChanged(*s.limits("max_tilt_rate"))],
     ),
-    Row(
+    SettingRow(
         "home_type",
         {
             rth.SetPreferredHomeType: lambda m: m.type,
@@ -179,12 +179,12 @@ ROWS: tuple[Row, ...] = (
         },
         _home_type,
     ),
-    Row(
+    SettingRow(
         "rth_delay",
         {rth.SetDelay: lambda m: m.delay, ardrone3.ReturnHomeDelay: lambda m: m.delay},
         _delay,
     ),
-    Row(
+    SettingRow(
         "rth_min_altitude",
         {rth.SetMinAltitude: lambda m: m.altitude, ardrone3.ReturnHomeMinAltitude: lambda m: m.value},
         lambda s: [
@@ -192,61 +192,61 @@ ROWS: tuple[Row, ...] = (
             ardrone3.ReturnHomeMinAltitudeChanged(*s.limits("rth_min_altitude")),
         ],
     ),
-    Row(
+    SettingRow(
         "rth_auto_trigger",
         {rth.SetAutoTriggerMode: lambda m: m.mode},
         lambda s: [rth.AutoTriggerMode(s["rth_auto_trigger"])],
     ),
-    Row(
+    SettingRow(
         "rth_ending",
         {rth.SetEndingBehavior: lambda m: m.ending_behavior},
         lambda s: [rth.EndingBehavior(s["rth_ending"])],
     ),
-    Row(
+    SettingRow(
         "rth_hovering_altitude",
         {rth.SetEndingHoveringAltitude: lambda m: m.altitude},
         lambda s: [rth.EndingHoveringAltitude(*s.limits("rth_hovering_altitude"))],
     ),
-    Row(
+    SettingRow(
         "precise_home",
         {precise_home.SetMode: lambda m: m.mode},
         lambda s: [precise_home.Mode(s["precise_home"])],
     ),
-    Row(
+    SettingRow(
         "piloting_style",
         {piloting_style.SetStyle: lambda m: m.style},
         lambda s: [piloting_style.Style(s["piloting_style"])],
     ),
-    Row(
+    SettingRow(
         "return_on_disconnect",
         {common.ReturnHomeOnDisconnect: lambda m: m.value},
         lambda s: [common.ReturnHomeOnDisconnectChanged(s["return_on_disconnect"], 0)],
     ),
-    Row(
+    SettingRow(
         "name",
         {common.ProductName: lambda m: m.name[:MAX_NAME]},
         lambda s: [common.ProductNameChanged(s["name"])],
     ),
-    Row(
+    SettingRow(
         "wifi_channel",
         {wifi.SetApChannel: lambda m: (m.type, m.band, m.channel)},
         lambda s: [wifi.ApChannelChanged(*s["wifi_channel"])],
     ),
-    Row(
+    SettingRow(
         "wifi_security",
         {wifi.SetSecurity: lambda m: (m.type, m.key, m.key_type)},
         lambda s: [wifi.SecurityChanged(*s["wifi_security"])],
     ),
-    Row(
+    SettingRow(
         "wifi_country",
         {wifi.SetCountry: lambda m: (m.selection_mode, m.code)},
         lambda s: [wifi.CountryChanged(*s["wifi_country"])],
     ),
-    Row(
+    SettingRow(
         "wifi_environment",
         {wifi.SetEnvironment: lambda m: m.environment},
         lambda s: [wifi.EnvironmentChanged(s["wifi_environment"])],
     ),
 )
 
-_BY_COMMAND: dict[type[Message], Row] = {command: row for row in ROWS for command in row.commands}
+_BY_COMMAND: dict[type[Message], SettingRow] = {command: row for row in ROWS for command in row.commands}

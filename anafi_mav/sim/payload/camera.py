@@ -39,7 +39,7 @@ from anafi_mav.arsdk.messages.camera import (
 )
 from anafi_mav.sim.payload.optics import Optics, seconds, sensitivity, white_balance, zoomed
 from anafi_mav.sim.world.lenses import BITRATES, LOWEST_BITRATE, WIDTHS, Lens, Photos, Recording
-from anafi_mav.sim.world.model import Range
+from anafi_mav.sim.world.model import SettingRange
 from anafi_mav.units import RAD_PER_DEG, clip
 
 STYLE_RANGE = (-3, 3)
@@ -66,7 +66,7 @@ def bits(values: Iterable[int]) -> int:
 class Camera:
     """Settings of one camera."""
 
-    def __init__(self, lens: Lens, zoom_speed: Range) -> None:
+    def __init__(self, lens: Lens, zoom_speed: SettingRange) -> None:
         self.lens = lens
         self.id = lens.id
         self.active = lens.id == 0

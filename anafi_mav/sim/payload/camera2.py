@@ -29,7 +29,7 @@ from anafi_mav.sim.payload.optics import (
     zoomed,
 )
 from anafi_mav.sim.world.lenses import AI
-from anafi_mav.sim.world.model import Model
+from anafi_mav.sim.world.model import AircraftModel
 from anafi_mav.units import RAD_PER_DEG, clip
 
 CAMERA = 0
@@ -81,7 +81,7 @@ _MANUAL_ISO = ("MANUAL_ISO_SENSITIVITY", "MANUAL")
 class Camera2:
     """The Ai's front camera."""
 
-    def __init__(self, model: Model, studio: Studio) -> None:
+    def __init__(self, model: AircraftModel, studio: Studio) -> None:
         self._camera = Camera(AI, model.settings["zoom_speed"])
         self._capture = Capture(self._camera, studio)
         self._config: dict[str, Any] = dict(DEFAULTS)

@@ -16,7 +16,7 @@ from anafi_mav.arsdk.messages.thermal import ThermalMode
 from anafi_mav.sim.payload.camera import Camera, bits
 from anafi_mav.sim.payload.capture import Capture, Studio
 from anafi_mav.sim.payload.optics import Optics
-from anafi_mav.sim.world.model import Model
+from anafi_mav.sim.world.model import AircraftModel
 
 ACTIVE = {ThermalMode.DISABLED: 0, ThermalMode.STANDARD: 1, ThermalMode.BLENDED: 2}
 """Id of the camera that a thermal mode makes the active one."""
@@ -25,7 +25,7 @@ ACTIVE = {ThermalMode.DISABLED: 0, ThermalMode.STANDARD: 1, ThermalMode.BLENDED:
 class Cameras:
     """Cameras by id; exactly one is active."""
 
-    def __init__(self, model: Model, studio: Studio) -> None:
+    def __init__(self, model: AircraftModel, studio: Studio) -> None:
         speed = model.settings["zoom_speed"]
         self._captures = {lens.id: Capture(Camera(lens, speed), studio) for lens in model.lenses}
         self._antiflicker = CameraAntiflickerMode.AUTO

@@ -29,8 +29,8 @@ from anafi_mav.arsdk.messages.camera import (
 from anafi_mav.sim.payload import jpeg_scene
 from anafi_mav.sim.payload.camera import Camera
 from anafi_mav.sim.payload.jpeg_scene import Scene
-from anafi_mav.sim.payload.media import MAX_RESOURCES, Kind, Media, MediaStore, Resource
-from anafi_mav.sim.payload.storage import Place
+from anafi_mav.sim.payload.media import MAX_RESOURCES, Media, MediaKind, MediaStore, Resource
+from anafi_mav.sim.payload.storage import MediaVolume
 from anafi_mav.sim.world.calendar import Calendar
 
 SHOT_TIME = 0.1
@@ -83,9 +83,9 @@ _PLAYED_AT = 30
 """Frames per second of a slow motion when it is played."""
 
 _KINDS = {
-    PhotoFileFormat.JPEG: (Kind.JPG,),
-    PhotoFileFormat.DNG: (Kind.DNG,),
-    PhotoFileFormat.DNG_JPEG: (Kind.JPG, Kind.DNG),
+    PhotoFileFormat.JPEG: (MediaKind.JPG,),
+    PhotoFileFormat.DNG: (MediaKind.DNG,),
+    PhotoFileFormat.DNG_JPEG: (MediaKind.JPG, MediaKind.DNG),
 }
 _PHOTO_MODES = {
     CameraPhotoMode.SINGLE: "SINGLE",
@@ -102,7 +102,7 @@ class Studio:
     """Parts of a drone that all its cameras share."""
 
     media: MediaStore
-    place: Place
+    place: MediaVolume
     calendar: Calendar
     scene: Callable[[], Scene]
 
@@ -128,7 +128,7 @@ class _Shoot:
     media: Media
     shots: list[float]
     """When the next ones are due; a lapse knows only one ahead."""
-    kinds: tuple[Kind, ...]
+    kinds: tuple[MediaKind, ...]
     interval: float = 0.0
     taken: list[_Shot] = field(default_factory=list)
     """Shots that are not on the card yet."""
@@ -391,7 +391,7 @@ class Capture:
             seconds, result = _fitting(take, room), RecordingResult.STOPPED_NO_STORAGE_SPACE
         name = ""
         if seconds >= 0.0:
-            file = studio.media.develop(take.media, Kind.MP4, 1, take.scene, take.media.date, seconds)
+            file = studio.media.develop(take.media, MediaKind.MP4, 1, take.scene, take.media.date, seconds)
             studio.media.add(take.media, [file])
             name = take.media.id
         yield self._recording(result, name)

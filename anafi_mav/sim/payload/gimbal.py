@@ -17,7 +17,7 @@ from typing import Any
 from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import gimbal
 from anafi_mav.arsdk.messages.gimbal import Axis, ControlMode, FrameOfReference, GimbalCalibrationState
-from anafi_mav.sim.world.model import GimbalModel, Model, Range
+from anafi_mav.sim.world.model import AircraftModel, GimbalModel, SettingRange
 from anafi_mav.sim.world.motion import Pose
 from anafi_mav.units import DEG_PER_RAD, clip, wrap_pi
 
@@ -83,7 +83,7 @@ def _body(pose: Pose) -> dict[Axis, float]:
 class Gimbal:
     """One gimbal."""
 
-    def __init__(self, id: int, model: GimbalModel, speed: Range) -> None:
+    def __init__(self, id: int, model: GimbalModel, speed: SettingRange) -> None:
         self.id = id
         self._model = gimbal.Model.FSTCAM if id else gimbal.Model.MAIN
         self._limits = speed
@@ -231,7 +231,7 @@ class Gimbal:
 class Gimbals:
     """All gimbals of a model, by id."""
 
-    def __init__(self, model: Model) -> None:
+    def __init__(self, model: AircraftModel) -> None:
         speed = model.settings["gimbal_speed"]
         self._gimbals = [Gimbal(id, one, speed) for id, one in enumerate(model.gimbals)]
         self._time = 0.0

@@ -27,7 +27,7 @@ MAX_RESOURCES = 9999
 Notify = Callable[[str, dict[str, Any]], None]
 
 
-class Kind(enum.Enum):
+class MediaKind(enum.Enum):
     """A file by the end of its name."""
 
     JPG = "JPG"
@@ -40,7 +40,7 @@ class Resource:
     """One file."""
 
     media_id: str
-    kind: Kind
+    kind: MediaKind
     number: int
     """1 is a media's first shot."""
     scene: Scene
@@ -56,7 +56,7 @@ class Resource:
     """Bytes."""
 
     def __post_init__(self) -> None:
-        video = self.kind is Kind.MP4
+        video = self.kind is MediaKind.MP4
         size = jpeg_scene.mp4_size(self.scene, self.seconds) if video else len(self.content())
         object.__setattr__(self, "size", size)
 
@@ -66,10 +66,10 @@ class Resource:
 
     def content(self) -> bytes:
         """The file."""
-        if self.kind is Kind.MP4:
+        if self.kind is MediaKind.MP4:
             return jpeg_scene.mp4(self.scene, self.seconds)
         packet = xmp.packet(self.scene, self.camera, self.captured)
-        if self.kind is Kind.DNG:
+        if self.kind is MediaKind.DNG:
             return jpeg_scene.dng(self.scene, self.number, self.camera, _exif_date(self.date), packet)
         note = jpeg_scene.exif(self.scene, self.camera, _exif_date(self.date))
         return jpeg_scene.jpeg(self.scene, self.number, exif=note, xmp=xmp.HEADER + packet)
@@ -87,9 +87,9 @@ class Resource:
 
     def describe(self) -> dict[str, Any]:
         """As in the answers of the web server."""
-        video = self.kind is Kind.MP4
+        video = self.kind is MediaKind.MP4
         width, height = jpeg_scene.WIDTH, jpeg_scene.HEIGHT
-        if self.kind is Kind.DNG:
+        if self.kind is MediaKind.DNG:
             width, height = jpeg_scene.RAW_WIDTH, jpeg_scene.RAW_HEIGHT
         told: dict[str, Any] = {
             "media_id": self.media_id,
@@ -200,7 +200,9 @@ class MediaStore:
 
     def by_thumbnail(self, name: str) -> Resource | None:
         stem = name.removesuffix(".JPG")
-        return next((self._resources[id] for kind in Kind if (id := f"{stem}.{kind.value}") in self._resources), None)
+        return next(
+            (self._resources[id] for kind in MediaKind if (id := f"{stem}.{kind.value}") in self._resources), None
+        )
 
     # -- writing
 
@@ -215,7 +217,7 @@ class MediaStore:
     def develop(
         self,
         media: Media,
-        kind: Kind,
+        kind: MediaKind,
         number: int,
         scene: Scene,
         date: str,

@@ -16,14 +16,14 @@ from anafi_mav.sim.payload.media import MediaStore
 from anafi_mav.sim.payload.storage import Storage
 from anafi_mav.sim.payload.thermal import Thermal
 from anafi_mav.sim.world.calendar import Calendar
-from anafi_mav.sim.world.model import Model
+from anafi_mav.sim.world.model import AircraftModel
 
 
 class Payload:
     """One drone's. `scene` says what its camera sees."""
 
     def __init__(
-        self, model: Model, name: str, run_id: str, emit: Callable[[Message], None], scene: Callable[[], Scene]
+        self, model: AircraftModel, name: str, run_id: str, emit: Callable[[Message], None], scene: Callable[[], Scene]
     ) -> None:
         self.calendar = Calendar()
         self.media = MediaStore(run_id, model.title, len(model.cards) - 1, emit)

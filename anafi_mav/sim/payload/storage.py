@@ -15,7 +15,7 @@ from anafi_mav.arsdk.messages import user_storage_v2 as v2
 from anafi_mav.arsdk.messages.generic import ListFlags
 from anafi_mav.arsdk.messages.user_storage import FormattingResult, FormattingStep, FormattingType, FsState, PhyState
 from anafi_mav.sim.payload.media import MediaStore
-from anafi_mav.sim.world.model import Card, Model
+from anafi_mav.sim.world.model import AircraftModel, Card
 
 DEFAULT_PERIOD = 1
 """s between two reports of free space if the client requests 0 (Parrot's user_storage.xml)."""
@@ -38,7 +38,7 @@ _TYPES = 1 << FormattingType.FULL | 1 << FormattingType.QUICK
 _ONLY = 1 << ListFlags.FIRST | 1 << ListFlags.LAST
 
 
-class Place:
+class MediaVolume:
     """One place for media. `words` makes its messages of those of `user_storage`."""
 
     def __init__(self, id: int, card: Card, media: MediaStore | None, words: Callable[[Message], Message]) -> None:
@@ -144,16 +144,16 @@ class Place:
 class Storage:
     """All places of a model."""
 
-    def __init__(self, model: Model, media: MediaStore) -> None:
+    def __init__(self, model: AircraftModel, media: MediaStore) -> None:
         self._numbered = model.modern
         last = len(model.cards) - 1
         self._places = [
-            Place(id, card, media if id == last else None, _words(id) if self._numbered else _as_it_is)
+            MediaVolume(id, card, media if id == last else None, _words(id) if self._numbered else _as_it_is)
             for id, card in enumerate(model.cards)
         ]
 
     @property
-    def place(self) -> Place:
+    def place(self) -> MediaVolume:
         """Return the storage that the cameras write to."""
         return self._places[-1]
 

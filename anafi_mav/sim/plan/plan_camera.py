@@ -7,7 +7,7 @@ from collections.abc import Callable
 from anafi_mav.arsdk.messages import camera
 from anafi_mav.arsdk.messages.common import MavlinkType
 from anafi_mav.sim.payload.camera_operator import Operator
-from anafi_mav.sim.plan.plan_file import Command, Item
+from anafi_mav.sim.plan.plan_file import PlanCommand, PlanLine
 
 
 class PlanCamera:
@@ -31,18 +31,18 @@ class PlanCamera:
             self._photos = 0
             self._operator.operate(camera.StopPhoto(0))
 
-    def count(self, item: Item) -> float:
+    def count(self, item: PlanLine) -> float:
         """How many photos START_PHOTO is for; 0: until it is stopped."""
         return item.p3 if self._type is MavlinkType.FLIGHT_PLAN_V2 else item.p2
 
-    def carry_out(self, item: Item) -> None:
+    def carry_out(self, item: PlanLine) -> None:
         """Begin one of `COMMANDS`."""
         COMMANDS[item.command](self, item)
 
-    def _still_mode(self, item: Item) -> None:
+    def _still_mode(self, item: PlanLine) -> None:
         self._still = (item.p1, item.p2)
 
-    def _start_photo(self, item: Item) -> None:
+    def _start_photo(self, item: PlanLine) -> None:
         interval = item.p2 if self._type is MavlinkType.FLIGHT_PLAN_V2 else item.p1
         mode, step = camera.CameraPhotoMode.SINGLE, 0.0
         if self.count(item) != 1:
@@ -52,10 +52,10 @@ class PlanCamera:
         self._photograph(mode, step)
         self._photos = int(self.count(item)) if self.count(item) > 1 else 0
 
-    def _trigger(self, item: Item) -> None:
+    def _trigger(self, item: PlanLine) -> None:
         if not item.p1 > 0.0:
             self._stop_photo(item)
-        elif item.command is Command.TRIGGER_DISTANCE:
+        elif item.command is PlanCommand.TRIGGER_DISTANCE:
             self._photograph(camera.CameraPhotoMode.GPS_LAPSE, item.p1)
         else:
             self._photograph(camera.CameraPhotoMode.TIME_LAPSE, item.p1 / 1000.0)
@@ -76,24 +76,24 @@ class PlanCamera:
         )
         self._operator.operate(camera.TakePhoto(0))
 
-    def _stop_photo(self, item: Item) -> None:
+    def _stop_photo(self, item: PlanLine) -> None:
         self._photos = 0
         self._operator.operate(camera.StopPhoto(0))
 
-    def _start_video(self, item: Item) -> None:
+    def _start_video(self, item: PlanLine) -> None:
         self._operator.operate(camera.SetCameraMode(0, camera.CameraCameraMode.RECORDING))
         self._operator.operate(camera.StartRecording(0))
 
-    def _stop_video(self, item: Item) -> None:
+    def _stop_video(self, item: PlanLine) -> None:
         self._operator.operate(camera.StopRecording(0))
 
 
-COMMANDS: dict[Command, Callable[[PlanCamera, Item], None]] = {
-    Command.TRIGGER_DISTANCE: PlanCamera._trigger,
-    Command.TRIGGER_INTERVAL: PlanCamera._trigger,
-    Command.START_PHOTO: PlanCamera._start_photo,
-    Command.STOP_PHOTO: PlanCamera._stop_photo,
-    Command.START_VIDEO: PlanCamera._start_video,
-    Command.STOP_VIDEO: PlanCamera._stop_video,
-    Command.SET_STILL_MODE: PlanCamera._still_mode,
+COMMANDS: dict[PlanCommand, Callable[[PlanCamera, PlanLine], None]] = {
+    PlanCommand.TRIGGER_DISTANCE: PlanCamera._trigger,
+    PlanCommand.TRIGGER_INTERVAL: PlanCamera._trigger,
+    PlanCommand.START_PHOTO: PlanCamera._start_photo,
+    PlanCommand.STOP_PHOTO: PlanCamera._stop_photo,
+    PlanCommand.START_VIDEO: PlanCamera._start_video,
+    PlanCommand.STOP_VIDEO: PlanCamera._stop_video,
+    PlanCommand.SET_STILL_MODE: PlanCamera._still_mode,
 }

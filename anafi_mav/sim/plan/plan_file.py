@@ -21,7 +21,7 @@ COLUMNS = 12
 _HEADER = re.compile(r"QGC WPL \d+")
 
 
-class Command(enum.IntEnum):
+class PlanCommand(enum.IntEnum):
     """MAV_CMD numbers that the drone flies."""
 
     WAYPOINT = 16
@@ -46,7 +46,7 @@ class Command(enum.IntEnum):
     SET_STILL_MODE = 50001
 
 
-class Frame(enum.IntEnum):
+class PlanFrame(enum.IntEnum):
     GLOBAL = 0
     """Height above mean sea level."""
     MISSION = 2
@@ -56,10 +56,10 @@ class Frame(enum.IntEnum):
 
 
 ONLY_V2 = frozenset(
-    {Command.SET_ROI_LOCATION, Command.SET_ROI_NONE, Command.TRIGGER_DISTANCE, Command.TRIGGER_INTERVAL}
+    {PlanCommand.SET_ROI_LOCATION, PlanCommand.SET_ROI_NONE, PlanCommand.TRIGGER_DISTANCE, PlanCommand.TRIGGER_INTERVAL}
 )
 
-_PLACED = frozenset({Command.WAYPOINT, Command.SET_ROI_LOCATION})
+_PLACED = frozenset({PlanCommand.WAYPOINT, PlanCommand.SET_ROI_LOCATION})
 """Items that are nothing without a position."""
 
 
@@ -67,9 +67,9 @@ class PlanFileError(Exception):
     """Invalid flight-plan file; the text names the line and the reason."""
 
 
-class Item(NamedTuple):
-    command: Command
-    frame: Frame
+class PlanLine(NamedTuple):
+    command: PlanCommand
+    frame: PlanFrame
     p1: float
     p2: float
     p3: float
@@ -86,10 +86,10 @@ class Item(NamedTuple):
 
     def up(self, ground: float) -> float:
         """Height above take-off, m; `ground` is that of the take-off above mean sea level."""
-        return self.altitude - ground if self.frame is Frame.GLOBAL else self.altitude
+        return self.altitude - ground if self.frame is PlanFrame.GLOBAL else self.altitude
 
 
-def read(data: bytes, version: int) -> tuple[Item, ...]:
+def read(data: bytes, version: int) -> tuple[PlanLine, ...]:
     """The items of a file of version 1 or 2. Raises `PlanFileError`."""
     try:
         lines = data.decode("utf-8").splitlines()
@@ -103,15 +103,15 @@ def read(data: bytes, version: int) -> tuple[Item, ...]:
     return tuple(_item(number, line.split(), version) for number, line in rows)
 
 
-def _item(number: int, words: list[str], version: int) -> Item:
+def _item(number: int, words: list[str], version: int) -> PlanLine:
     if len(words) != COLUMNS:
         raise PlanFileError(f"line {number}: {len(words)} columns")
     try:
-        frame, command = Frame(int(words[2])), Command(int(words[3]))
+        frame, command = PlanFrame(int(words[2])), PlanCommand(int(words[3]))
         values = [float(word) for word in words[4:11]]
     except ValueError as error:
         raise PlanFileError(f"line {number}: {error}") from error
-    item = Item(command, frame, *values)
+    item = PlanLine(command, frame, *values)
     if version == 1 and command in ONLY_V2:
         raise PlanFileError(f"line {number}: command {command} in a file of version 1")
     if any(math.isinf(value) for value in values):
@@ -121,5 +121,5 @@ def _item(number: int, words: list[str], version: int) -> Item:
     return item
 
 
-def _on_earth(item: Item) -> bool:
+def _on_earth(item: PlanLine) -> bool:
     return abs(item.latitude) <= 90.0 and abs(item.longitude) <= 180.0 and math.isfinite(item.altitude)

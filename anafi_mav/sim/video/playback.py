@@ -12,7 +12,7 @@ from anafi_mav.arsdk.video.rtcp import ReceiverReport, SenderReport
 from anafi_mav.arsdk.video.rtp_h264 import CLOCK_RATE, PictureSender
 from anafi_mav.arsdk.video.video_metadata import FrameMetadata
 from anafi_mav.sim.video.h264 import pictures
-from anafi_mav.sim.video.video import Stream
+from anafi_mav.sim.video.video import CameraStream
 
 REPORT_PERIOD = 1.0
 """s between two sender reports."""
@@ -50,7 +50,7 @@ class Track:
 
     def __init__(
         self,
-        stream: Stream,
+        stream: CameraStream,
         chance: random.Random,
         profile: int,
         name: str,

@@ -20,15 +20,23 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from anafi_mav.arsdk.video import rtsp
-from anafi_mav.arsdk.video.rtsp import Malformed, MessageReader, Request, Response, RtpInfo, Status, Transport
+from anafi_mav.arsdk.video.rtsp import (
+    MalformedRtsp,
+    MessageReader,
+    Response,
+    RtpInfo,
+    RtspRequest,
+    RtspTransport,
+    Status,
+)
 from anafi_mav.arsdk.video.sdp import format_description
 from anafi_mav.arsdk.video.video_metadata import FrameMetadata
 from anafi_mav.sim.autopilot.firmware import Firmware
-from anafi_mav.sim.payload.media import Kind
+from anafi_mav.sim.payload.media import MediaKind
 from anafi_mav.sim.video import video
 from anafi_mav.sim.video.h264 import FRAME_RATE
 from anafi_mav.sim.video.playback import Send, Track
-from anafi_mav.sim.video.video import Stream, streams_of
+from anafi_mav.sim.video.video import CameraStream, streams_of
 
 SERVER = "Parrot Streaming Server"
 SESSION_TIMEOUT = 60
@@ -49,7 +57,7 @@ class _Resource:
     """Resource at a URL."""
 
     name: str
-    streams: tuple[Stream, ...]
+    streams: tuple[CameraStream, ...]
     seconds: float | None = None
     """Length of a recording; None: live."""
 
@@ -155,16 +163,16 @@ class VideoServer:
         peer: str = writer.get_extra_info("peername")[0]
         while data := await asyncio.wait_for(reader.read(READ_SIZE), SESSION_TIMEOUT):
             for event in messages.feed(data):
-                if isinstance(event, Malformed):
+                if isinstance(event, MalformedRtsp):
                     self._note("malformed", {"reason": event.reason})
                     writer.write(rtsp.encode(Response(event.status, (("Server", SERVER),))))
                     await asyncio.wait_for(writer.drain(), SESSION_TIMEOUT)
                     return
-                if isinstance(event, Request) and self._hears():
+                if isinstance(event, RtspRequest) and self._hears():
                     writer.write(rtsp.encode(await self._answer(event, peer)))
             await asyncio.wait_for(writer.drain(), SESSION_TIMEOUT)
 
-    async def _answer(self, request: Request, peer: str) -> Response:
+    async def _answer(self, request: RtspRequest, peer: str) -> Response:
         headers: list[tuple[str, str]] = []
         if request.cseq is not None:
             headers.append(("CSeq", str(request.cseq)))
@@ -188,10 +196,10 @@ class VideoServer:
 
     # -- methods: each gives further headers, and a body
 
-    async def _options(self, request: Request, peer: str) -> tuple[list[tuple[str, str]], bytes]:
+    async def _options(self, request: RtspRequest, peer: str) -> tuple[list[tuple[str, str]], bytes]:
         return [("Public", _PUBLIC)], b""
 
-    async def _describe(self, request: Request, peer: str) -> tuple[list[tuple[str, str]], bytes]:
+    async def _describe(self, request: RtspRequest, peer: str) -> tuple[list[tuple[str, str]], bytes]:
         resource, control = self._find(request.uri)
         if control:
             raise _Refused(Status.NOT_FOUND)
@@ -201,7 +209,7 @@ class VideoServer:
         )
         return [("Content-Base", base), ("Content-Type", "application/sdp")], format_description(description)
 
-    async def _setup(self, request: Request, peer: str) -> tuple[list[tuple[str, str]], bytes]:
+    async def _setup(self, request: RtspRequest, peer: str) -> tuple[list[tuple[str, str]], bytes]:
         resource, control = self._find(request.uri)
         stream = next((stream for stream in resource.streams if stream.control == control), None)
         if stream is None:
@@ -231,10 +239,10 @@ class VideoServer:
         self._sessions[session.id] = session
         self._heard(session)
         self._note("setup", {"session": session.id, "stream": stream.title, "client": [peer, *ports]})
-        transport = Transport(client_ports=ports, server_ports=track.ports, ssrc=track.ssrc)
+        transport = RtspTransport(client_ports=ports, server_ports=track.ports, ssrc=track.ssrc)
         return [("Transport", rtsp.format_transport(transport)), self._header(session)], b""
 
-    async def _play(self, request: Request, peer: str) -> tuple[list[tuple[str, str]], bytes]:
+    async def _play(self, request: RtspRequest, peer: str) -> tuple[list[tuple[str, str]], bytes]:
         session = self._session(request)
         if not session.tracks:
             raise _Refused(Status.METHOD_NOT_VALID)
@@ -262,14 +270,14 @@ class VideoServer:
         headers = [("RTP-Info", rtsp.format_rtp_info(infos)), ("Range", told), ("Scale", "1.00")]
         return [*headers, self._header(session)], b""
 
-    async def _pause(self, request: Request, peer: str) -> tuple[list[tuple[str, str]], bytes]:
+    async def _pause(self, request: RtspRequest, peer: str) -> tuple[list[tuple[str, str]], bytes]:
         session = self._session(request)
         self._stop(session, "pause")
         live = session.resource.seconds is None
         told = rtsp.format_range(None) if live else rtsp.format_range(session.position)
         return [("Range", told), self._header(session)], b""
 
-    async def _teardown(self, request: Request, peer: str) -> tuple[list[tuple[str, str]], bytes]:
+    async def _teardown(self, request: RtspRequest, peer: str) -> tuple[list[tuple[str, str]], bytes]:
         session = self._session(request)
         _, control = self._find(request.uri)
         header = self._header(session)
@@ -283,7 +291,7 @@ class VideoServer:
             raise _Refused(Status.NOT_FOUND)
         return [header], b""
 
-    async def _get_parameter(self, request: Request, peer: str) -> tuple[list[tuple[str, str]], bytes]:
+    async def _get_parameter(self, request: RtspRequest, peer: str) -> tuple[list[tuple[str, str]], bytes]:
         if request.header("Session") is None:
             return [], b""
         return [self._header(self._session(request))], b""
@@ -299,14 +307,14 @@ class VideoServer:
         id, _, control = path.removeprefix(_REPLAY).partition("/")
         store = self._firmware.payload.media
         recorded = store.resource(id) if path.startswith(_REPLAY) and store.indexed else None
-        if recorded is None or recorded.kind is not Kind.MP4:
+        if recorded is None or recorded.kind is not MediaKind.MP4:
             raise _Refused(Status.NOT_FOUND)
         media = store.media(recorded.media_id)
         streams = streams_of(self._firmware.model)
         thermal = media is not None and media.thermal
         return _Resource(_REPLAY + id, streams[-1:] if thermal else streams[:1], recorded.seconds), control
 
-    def _session(self, request: Request) -> _Session:
+    def _session(self, request: RtspRequest) -> _Session:
         """The session that a request names."""
         id, _ = rtsp.parse_session(request.header("Session") or "")
         session = self._sessions.get(id)
@@ -385,7 +393,7 @@ class VideoServer:
                     self._stop(session, "finished")
 
 
-_HANDLERS: dict[str, Callable[[VideoServer, Request, str], Awaitable[tuple[list[tuple[str, str]], bytes]]]] = {
+_HANDLERS: dict[str, Callable[[VideoServer, RtspRequest, str], Awaitable[tuple[list[tuple[str, str]], bytes]]]] = {
     "OPTIONS": VideoServer._options,
     "DESCRIBE": VideoServer._describe,
     "SETUP": VideoServer._setup,

@@ -22,13 +22,13 @@ from anafi_mav.arsdk.video.video_metadata import (
     Vector3,
     WifiLink,
 )
-from anafi_mav.models import Payload
+from anafi_mav.models import PayloadSensor
 from anafi_mav.sim.autopilot.firmware import Firmware
 from anafi_mav.sim.features.services import QUALITY
 from anafi_mav.sim.features.wireless import RSSI
 from anafi_mav.sim.payload.optics import Optics, zoomed
 from anafi_mav.sim.video.h264 import pictures
-from anafi_mav.sim.world.model import Model
+from anafi_mav.sim.world.model import AircraftModel
 from anafi_mav.units import DEG_PER_RAD, RAD_PER_DEG, quaternion_from_euler
 
 GOODPUT = 20_000
@@ -36,7 +36,7 @@ GOODPUT = 20_000
 
 
 @dataclass(frozen=True)
-class Intrinsics:
+class StreamIntrinsics:
     """A camera's calibration, in pixels of its stream (anafi_ros, folder calibration)."""
 
     centre: tuple[float, float]
@@ -45,7 +45,7 @@ class Intrinsics:
 
 
 @dataclass(frozen=True)
-class Stream:
+class CameraStream:
     """One camera as it is streamed."""
 
     title: str
@@ -63,44 +63,44 @@ class Stream:
     default: bool = False
     hfov: float = 0.0
     """deg, of one that cannot be set."""
-    intrinsics: Intrinsics | None = None
+    intrinsics: StreamIntrinsics | None = None
 
 
-def streams_of(model: Model) -> tuple[Stream, ...]:
+def streams_of(model: AircraftModel) -> tuple[CameraStream, ...]:
     """Return the streams of a model's cameras; the first is the default."""
     lens = model.lens
-    intrinsics = Intrinsics((lens.cx, lens.cy), (lens.k1, lens.k2, lens.k3), (lens.p1, lens.p2))
+    intrinsics = StreamIntrinsics((lens.cx, lens.cy), (lens.k1, lens.k2, lens.k3), (lens.p1, lens.p2))
     title, control = ("Front camera", "front") if model.modern else ("DefaultVideo", "video")
     return (
-        Stream(title, control, lens.width, lens.height, default=True, intrinsics=intrinsics),
-        *(_THERMAL if Payload.THERMAL in model.record.payloads else ()),
-        *(_STEREO if Payload.STEREO in model.record.payloads else ()),
+        CameraStream(title, control, lens.width, lens.height, default=True, intrinsics=intrinsics),
+        *(_THERMAL if PayloadSensor.THERMAL in model.record.payloads else ()),
+        *(_STEREO if PayloadSensor.STEREO in model.record.payloads else ()),
     )
 
 
 _THERMAL = (
-    Stream("ParrotThermalVideo", "thermal", 960, 720, lens=1, spectrum="thermal"),
-    Stream("ParrotThermalBlendedVideo", "thermal-blended", 960, 720, lens=2, spectrum="blended"),
+    CameraStream("ParrotThermalVideo", "thermal", 960, 720, lens=1, spectrum="thermal"),
+    CameraStream("ParrotThermalBlendedVideo", "thermal-blended", 960, 720, lens=2, spectrum="blended"),
 )
 _STEREO = (
     # The width of the stereo pictures' view is assumed.
-    Stream("Disparity map", "disparity", 176, 90, lens=None, gimbal=1, kind="disparity", hfov=110.0),
+    CameraStream("Disparity map", "disparity", 176, 90, lens=None, gimbal=1, kind="disparity", hfov=110.0),
 )
 
 
-def profile(model: Model) -> int:
+def profile(model: AircraftModel) -> int:
     """Which metadata goes with a model's pictures."""
     return PROTO_PROFILE if model.modern else V3_PROFILE
 
 
-def optics(firmware: Firmware, stream: Stream) -> Optics:
+def optics(firmware: Firmware, stream: CameraStream) -> Optics:
     """Return the optical settings of a stream's camera."""
     if stream.lens is None:
         return Optics(zoomed(stream.hfov, 1.0))
     return firmware.payload.cameras.optics(stream.lens)
 
 
-def metadata(firmware: Firmware, stream: Stream) -> FrameMetadata:
+def metadata(firmware: Firmware, stream: CameraStream) -> FrameMetadata:
     """Return the metadata of a picture taken now.
 
     Its timestamp is of the simulated clock, the same as `SimulatedDrone.time`, and so are the times of everything
@@ -151,7 +151,7 @@ def metadata(firmware: Firmware, stream: Stream) -> FrameMetadata:
     )
 
 
-def _milliseconds(exposure: float, model: Model) -> float | None:
+def _milliseconds(exposure: float, model: AircraftModel) -> float | None:
     """Return the exposure time in ms, or None when an older model cannot report it.
 
     Version 3 of the metadata is limited to 256 ms; how an aircraft reports longer times is not known, here the
@@ -180,7 +180,12 @@ def _mode(firmware: Firmware) -> PilotingMode:
 
 
 def describe(
-    firmware: Firmware, address: str, base: str, name: str, streams: tuple[Stream, ...], duration: float | None = None
+    firmware: Firmware,
+    address: str,
+    base: str,
+    name: str,
+    streams: tuple[CameraStream, ...],
+    duration: float | None = None,
 ) -> SessionDescription:
     """The description of what is at the URL `base`; `duration` in s of a recording, None: live."""
     model, identity = firmware.model, firmware.identity
@@ -204,7 +209,7 @@ def describe(
     )
 
 
-def _describe(firmware: Firmware, stream: Stream) -> MediaDescription:
+def _describe(firmware: Firmware, stream: CameraStream) -> MediaDescription:
     shown = pictures(stream.width, stream.height)
     seen = optics(firmware, stream)
     hfov, vfov = seen.hfov * DEG_PER_RAD, seen.vfov(stream.width, stream.height) * DEG_PER_RAD

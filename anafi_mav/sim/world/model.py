@@ -13,13 +13,13 @@ from dataclasses import dataclass, field
 
 from anafi_mav import models
 from anafi_mav.errors import ConfigError
-from anafi_mav.models import Intrinsics, Payload
+from anafi_mav.models import Intrinsics, PayloadSensor
 from anafi_mav.sim.world import lenses
 from anafi_mav.sim.world.lenses import Lens
 
 
 @dataclass(frozen=True)
-class Range:
+class SettingRange:
     """A setting: what it is when the drone leaves the factory, and what it may be."""
 
     default: float
@@ -48,7 +48,7 @@ class Airframe:
 
 
 @dataclass(frozen=True)
-class Battery:
+class BatteryModel:
     cells: int
     capacity_mah: int
     full_mv: int
@@ -95,7 +95,7 @@ class Envelope:
 
 
 @dataclass(frozen=True)
-class Model:
+class AircraftModel:
     """One aircraft of the family."""
 
     name: str
@@ -107,7 +107,7 @@ class Model:
     hardware: str
     airframe: Airframe
     envelope: Envelope
-    battery: Battery
+    battery: BatteryModel
     gimbals: tuple[GimbalModel, ...]
     """The first carries the cameras."""
     cards: tuple[Card, ...]
@@ -115,7 +115,7 @@ class Model:
     zoom_max: float
     lenses: tuple[Lens, ...] = ()
     """Cameras of feature camera (143); none: they are protobuf ones."""
-    settings: dict[str, Range] = field(default_factory=dict)
+    settings: dict[str, SettingRange] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if self.name not in models.simulated():
@@ -151,7 +151,7 @@ class Model:
     @property
     def thermal(self) -> bool:
         """True for a drone with a thermal camera."""
-        return Payload.THERMAL in self.record.payloads
+        return PayloadSensor.THERMAL in self.record.payloads
 
     @property
     def modern(self) -> bool:
@@ -160,17 +160,17 @@ class Model:
 
 
 _SETTINGS = {
-    "max_altitude": Range(150.0, 0.5, 4000.0),
-    "max_tilt": Range(10.0, 1.0, 40.0),
-    "max_distance": Range(100.0, 10.0, 4000.0),
-    "max_vertical_speed": Range(3.0, 0.1, 4.0),
-    "max_rotation_speed": Range(40.0, 3.0, 200.0),
-    "max_tilt_rate": Range(116.0, 40.0, 300.0),
-    "rth_min_altitude": Range(20.0, 20.0, 100.0),
-    "rth_hovering_altitude": Range(10.0, 1.0, 10.0),
-    "rth_delay": Range(60.0, 0.0, 120.0),  # default assumed; GroundSDK shows 0..120 s
-    "gimbal_speed": Range(90.0, 1.0, 180.0),  # default assumed
-    "zoom_speed": Range(0.34, 0.01, 10.0),
+    "max_altitude": SettingRange(150.0, 0.5, 4000.0),
+    "max_tilt": SettingRange(10.0, 1.0, 40.0),
+    "max_distance": SettingRange(100.0, 10.0, 4000.0),
+    "max_vertical_speed": SettingRange(3.0, 0.1, 4.0),
+    "max_rotation_speed": SettingRange(40.0, 3.0, 200.0),
+    "max_tilt_rate": SettingRange(116.0, 40.0, 300.0),
+    "rth_min_altitude": SettingRange(20.0, 20.0, 100.0),
+    "rth_hovering_altitude": SettingRange(10.0, 1.0, 10.0),
+    "rth_delay": SettingRange(60.0, 0.0, 120.0),  # default assumed; GroundSDK shows 0..120 s
+    "gimbal_speed": SettingRange(90.0, 1.0, 180.0),  # default assumed
+    "zoom_speed": SettingRange(0.34, 0.01, 10.0),
 }
 """m, deg, m, m/s, deg/s, deg/s, m, m, s, deg/s, tan(deg)/s. The same for all four."""
 
@@ -179,8 +179,8 @@ _CARD = Card("SD", 64_000_000_000)
 _ROLL = (-38.0, 38.0)
 """deg; assumed (what the electronic stabilisation can take)."""
 
-MODELS: dict[str, Model] = {
-    "4k": Model(
+MODELS: dict[str, AircraftModel] = {
+    "4k": AircraftModel(
         name="4k",
         title="ANAFI",
         serial_prefix="PI040416DA9H",
@@ -188,14 +188,14 @@ MODELS: dict[str, Model] = {
         hardware="HW_03",
         airframe=Airframe(max_speed=15.0, yaw_delay=0.1, climb_delay=0.15, flight_time=25.0 * 60.0),
         envelope=Envelope((242, 315, 65), 320, 125, 13.9, 4500.0, (-10.0, 40.0)),
-        battery=Battery(cells=2, capacity_mah=2700, full_mv=8700, empty_mv=6600),
+        battery=BatteryModel(cells=2, capacity_mah=2700, full_mv=8700, empty_mv=6600),
         gimbals=(GimbalModel(pitch=(-90.0, 90.0), roll=_ROLL),),
         cards=(_CARD,),
         zoom_max=3.0,
         lenses=lenses.ANAFI_4K,
         settings=_SETTINGS,
     ),
-    "thermal": Model(
+    "thermal": AircraftModel(
         name="thermal",
         title="ANAFI-Thermal",
         serial_prefix="PI040443AA9K",  # assumed, as those below
@@ -203,14 +203,14 @@ MODELS: dict[str, Model] = {
         hardware="HW_01",
         airframe=Airframe(max_speed=15.0, yaw_delay=0.1, climb_delay=0.15, flight_time=26.0 * 60.0),
         envelope=Envelope((242, 315, 64), 315, 125, 13.9, 4500.0, (-10.0, 40.0)),
-        battery=Battery(cells=2, capacity_mah=2700, full_mv=8700, empty_mv=6600),
+        battery=BatteryModel(cells=2, capacity_mah=2700, full_mv=8700, empty_mv=6600),
         gimbals=(GimbalModel(pitch=(-90.0, 90.0), roll=_ROLL),),
         cards=(_CARD,),
         zoom_max=3.0,
         lenses=lenses.THERMAL,
         settings=_SETTINGS,
     ),
-    "usa": Model(
+    "usa": AircraftModel(
         name="usa",
         title="ANAFI-USA",
         serial_prefix="PI040456AA0L",
@@ -218,14 +218,14 @@ MODELS: dict[str, Model] = {
         hardware="HW_01",
         airframe=Airframe(max_speed=14.7, yaw_delay=0.1, climb_delay=0.15, flight_time=32.0 * 60.0),
         envelope=Envelope((303, 398, 84), 499, 195, 14.7, 6000.0, (-35.0, 43.0)),
-        battery=Battery(cells=3, capacity_mah=3400, full_mv=13200, empty_mv=9900),
+        battery=BatteryModel(cells=3, capacity_mah=3400, full_mv=13200, empty_mv=9900),
         gimbals=(GimbalModel(pitch=(-90.0, 90.0), roll=_ROLL),),
         cards=(_CARD,),
         zoom_max=32.0,
         lenses=lenses.USA,
         settings=_SETTINGS,
     ),
-    "ai": Model(
+    "ai": AircraftModel(
         name="ai",
         title="ANAFI-Ai",
         serial_prefix="PI040455BA1B",
@@ -233,7 +233,7 @@ MODELS: dict[str, Model] = {
         hardware="HW_11",
         airframe=Airframe(max_speed=16.0, yaw_delay=0.2, climb_delay=0.15, flight_time=32.0 * 60.0),
         envelope=Envelope((378, 498, 118), 898, 366, 12.7, 5000.0, (-10.0, 40.0)),
-        battery=Battery(cells=3, capacity_mah=6800, full_mv=13200, empty_mv=9900),
+        battery=BatteryModel(cells=3, capacity_mah=6800, full_mv=13200, empty_mv=9900),
         # Roll and yaw of the first and the whole second one (it carries the stereo sensor) are assumed.
         gimbals=(
             GimbalModel(pitch=(-116.0, 176.0), roll=(-36.0, 36.0), yaw=(-48.0, 48.0)),
@@ -247,7 +247,7 @@ MODELS: dict[str, Model] = {
 """By name on the command line."""
 
 
-def model_of(name: str) -> Model:
+def model_of(name: str) -> AircraftModel:
     """The figures of a model. Raises `ConfigError` for one that is not simulated."""
     if name in MODELS:
         return MODELS[name]

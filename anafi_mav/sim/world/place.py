@@ -8,7 +8,7 @@ from anafi_mav import geo
 
 
 @dataclass(frozen=True)
-class Origin:
+class WorldOrigin:
     """Origin (0, 0, 0) of the world: deg, deg, height of the ground in m above mean sea level."""
 
     latitude: float

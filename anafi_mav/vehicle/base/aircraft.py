@@ -15,9 +15,9 @@ from collections.abc import Callable, Hashable, Mapping
 from anafi_mav import texts
 from anafi_mav.drone import Drone
 from anafi_mav.drone.events import FlyingState, PilotingStyleStyle
-from anafi_mav.texts import Text
+from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.flying import AIRBORNE, ON_GROUND
-from anafi_mav.vehicle.base.geo_point import Place, point_of
+from anafi_mav.vehicle.base.geo_point import GeoPoint, point_of
 from anafi_mav.vehicle.base.height import HeightReference
 from anafi_mav.vehicle.base.helm import Helm
 from anafi_mav.vehicle.base.modes import FlightMode
@@ -33,7 +33,7 @@ An action that has not ended by then can send nothing.
 """
 
 
-_ACTIVITIES: Mapping[FlyingState | None, Text] = {
+_ACTIVITIES: Mapping[FlyingState | None, OperatorText] = {
     FlyingState.LANDED: texts.ON_GROUND,
     FlyingState.MOTOR_RAMPING: texts.STARTS_MOTORS,
     FlyingState.USERTAKEOFF: texts.STARTS_MOTORS,
@@ -49,7 +49,9 @@ _ACTIVITIES: Mapping[FlyingState | None, Text] = {
 class Aircraft(ABC):
     """One drone that can be flown. All methods run on the event loop's thread."""
 
-    def __init__(self, drone: Drone, *, text: Callable[[Severity, Text], None], changed: Callable[[], None]) -> None:
+    def __init__(
+        self, drone: Drone, *, text: Callable[[Severity, OperatorText], None], changed: Callable[[], None]
+    ) -> None:
         self.drone = drone
         self.height = HeightReference()
         self.roll = RollCheck()
@@ -58,7 +60,7 @@ class Aircraft(ABC):
         """m/s over ground that moves keep to; None: the drone's own (MAV_CMD_DO_CHANGE_SPEED)."""
         self.climb_speed: float | None = None
         """m/s up and down that moves keep to; None: the drone's own."""
-        self.origin: Place | None = None
+        self.origin: GeoPoint | None = None
         """Origin of the local frame: where the drone last took off, or first stood with a fix."""
         self.fence = FenceWatch()
         self.home_choice = asyncio.Lock()
@@ -116,7 +118,7 @@ class Aircraft(ABC):
 
     @property
     @abstractmethod
-    def descent(self) -> Text | None:
+    def descent(self) -> OperatorText | None:
         """The reason to refuse a command that may not end a landing or return; None without either.
 
         The drone lands or returns, or was commanded to.
@@ -133,26 +135,26 @@ class Aircraft(ABC):
         return self._selected
 
     @property
-    def place(self) -> Place | None:
+    def place(self) -> GeoPoint | None:
         """Position of the drone by its newest GPS location; None without a fix."""
         gps = self.drone.gps.state
         if not gps.fixed or gps.location is None:
             return None
-        return Place(gps.location.latitude, gps.location.longitude)
+        return GeoPoint(gps.location.latitude, gps.location.longitude)
 
     @property
-    def home(self) -> Place | None:
+    def home(self) -> GeoPoint | None:
         """Place at which a return ends, as the drone reports it.
 
         Without a report and on the ground it is the drone's position; None without either.
         """
         home = self.drone.home.state.location
         if home is not None:
-            return Place(home.latitude, home.longitude)
+            return GeoPoint(home.latitude, home.longitude)
         return self.place if self.on_ground else None
 
     @property
-    def geofence_centre(self) -> Place | None:
+    def geofence_centre(self) -> GeoPoint | None:
         """Centre of the drone's own geofence: a controller's GPS, else the take-off point.
 
         Source: ardrone3.xml 1-2-4. On the ground without such a controller it is the drone's position: the drone
@@ -162,11 +164,11 @@ class Aircraft(ABC):
         if self.on_ground and self.drone.controller.state.position is None:
             return self.place
         if reported is not None:
-            return Place(*reported)
-        return self.origin if takeoff is None else Place(takeoff.latitude, takeoff.longitude)
+            return GeoPoint(*reported)
+        return self.origin if takeoff is None else GeoPoint(takeoff.latitude, takeoff.longitude)
 
     @property
-    def activity(self) -> Text:
+    def activity(self) -> OperatorText:
         """Activity of the drone, as the reason of a refusal."""
         if self.returning:
             return texts.RETURNS
@@ -180,9 +182,9 @@ class Aircraft(ABC):
         """
         return self.drone.piloting.state.style == PilotingStyleStyle.CAMERA_OPERATED
 
-    def prearm_problems(self) -> list[Text]:
+    def prearm_problems(self) -> list[OperatorText]:
         """Return the reasons why the drone would not take off, in sentences; empty without any."""
-        problems: list[Text] = []
+        problems: list[OperatorText] = []
         if self.flying_state is None:
             problems.append(texts.FLYING_STATE_UNKNOWN)
         if self.flying_state == FlyingState.EMERGENCY:
@@ -193,7 +195,7 @@ class Aircraft(ABC):
         return problems
 
     @property
-    def fence_problem(self) -> Text | None:
+    def fence_problem(self) -> OperatorText | None:
         """The reason why the fence keeps the drone on the ground, in a sentence; None without one."""
         if self.on_ground:
             try:

@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 
 from anafi_mav import geo, texts
-from anafi_mav.texts import Text
+from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.aircraft import Aircraft
-from anafi_mav.vehicle.base.geo_point import Place, point_of
+from anafi_mav.vehicle.base.geo_point import GeoPoint, point_of
 from anafi_mav.vehicle.base.height import ESTIMATE_FLOOR
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.fence.fence_watch import OutsideFence
@@ -93,7 +93,7 @@ def check_estimate(vehicle: Aircraft, ato: float) -> None:
         raise Refused(texts.HEIGHT, texts.NEAR_ESTIMATE.fill(height=ato, lowest=ESTIMATE_FLOOR))
 
 
-def check_on_earth(place: Place, what: Text) -> None:
+def check_on_earth(place: GeoPoint, what: OperatorText) -> None:
     """Raise `Refused` unless the numbers are a place on earth."""
     if not (abs(place.latitude) <= 90.0 and abs(place.longitude) <= 180.0):
         raise Refused(what, texts.NOT_ON_EARTH, lasting=True)
@@ -101,7 +101,7 @@ def check_on_earth(place: Place, what: Text) -> None:
         raise Refused(what, texts.AT_NULL, lasting=True)
 
 
-def check_place(vehicle: Aircraft, place: Place, *, start: Place | None = None) -> None:
+def check_place(vehicle: Aircraft, place: GeoPoint, *, start: GeoPoint | None = None) -> None:
     """Raise `Refused` unless the drone may fly to `place`.
 
     With `start` the straight way from there is checked, too.

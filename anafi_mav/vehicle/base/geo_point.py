@@ -5,7 +5,7 @@ from __future__ import annotations
 import msgspec
 
 
-class Place(msgspec.Struct, frozen=True):
+class GeoPoint(msgspec.Struct, frozen=True):
     """A point on the map, deg."""
 
     latitude: float
@@ -17,6 +17,6 @@ class Place(msgspec.Struct, frozen=True):
         return self.latitude, self.longitude
 
 
-def point_of(place: Place | None) -> tuple[float, float] | None:
+def point_of(place: GeoPoint | None) -> tuple[float, float] | None:
     """Latitude and longitude, where there is a place."""
     return None if place is None else place.point

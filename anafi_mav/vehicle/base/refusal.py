@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from anafi_mav import texts
 from anafi_mav.errors import AnafiMavError, CommandRejected
-from anafi_mav.texts import Template, Text
+from anafi_mav.texts import OperatorText, Template
 
 
 class Refused(AnafiMavError):
@@ -19,8 +19,8 @@ class Refused(AnafiMavError):
 
     def __init__(
         self,
-        what: Text,
-        reason: Text,
+        what: OperatorText,
+        reason: OperatorText,
         *,
         form: Template = texts.REFUSED,
         lasting: bool = False,
@@ -37,41 +37,41 @@ class Refused(AnafiMavError):
 class Unfinished(AnafiMavError):
     """A command was accepted for later, and what it waited for has failed: MAV_RESULT_FAILED."""
 
-    def __init__(self, what: Text, reason: Text) -> None:
+    def __init__(self, what: OperatorText, reason: OperatorText) -> None:
         super().__init__(texts.FAILED.fill(what=what, reason=reason))
 
 
 class Unsupported(Refused):
     """The vehicle has no such command, or not with these parameters: MAV_RESULT_UNSUPPORTED."""
 
-    def __init__(self, what: Text, reason: Text) -> None:
+    def __init__(self, what: OperatorText, reason: OperatorText) -> None:
         super().__init__(what, reason, lasting=True)
 
 
 class Rejected(CommandRejected):
     """A flight task of the gateway cannot continue; the reason is one of the table."""
 
-    def __init__(self, reason: Text) -> None:
+    def __init__(self, reason: OperatorText) -> None:
         super().__init__(reason)
 
 
 class DroneRefused(CommandRejected):
     """The drone does not start the mission that it was commanded to fly."""
 
-    def __init__(self, text: Text) -> None:
+    def __init__(self, text: OperatorText) -> None:
         super().__init__(text)
 
 
-def not_ready(problems: Sequence[Text]) -> Refused:
+def not_ready(problems: Sequence[OperatorText]) -> Refused:
     """Return the refusal of a take-off that has these problems."""
     return Refused(texts.ARMING, texts.joined(problems), form=texts.PREARM)
 
 
-def reason_of(error: AnafiMavError) -> Text:
+def reason_of(error: AnafiMavError) -> OperatorText:
     """Return the reason of an error, without the subject that a refusal has."""
     return error.reason if isinstance(error, Refused) else texts.from_below(error)
 
 
-def text_of(error: AnafiMavError) -> Text:
+def text_of(error: AnafiMavError) -> OperatorText:
     """Return the whole text of an error."""
     return error.text if isinstance(error, Refused) else texts.from_below(error)

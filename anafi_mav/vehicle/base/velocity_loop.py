@@ -6,8 +6,8 @@ ARSDK knows tilt, climb rate and turn rate (PCMD), and nothing in between these 
 horizontal velocity is closed here, on the drone's own speed, which it reports five times a second:
 
 - the push (m/s2) that the drone's tilt gives is known from its attitude; any further acceleration is the air's: drag
-  and wind. `Motion` keeps that estimate all the time, in a hover as well, so that a loop that begins in wind does not
-  have to learn it first, and one that runs into the limit of its tilt does not wind up;
+  and wind. `MotionEstimate` keeps that estimate all the time, in a hover as well, so that a loop that begins in wind
+  does not have to learn it first, and one that runs into the limit of its tilt does not wind up;
 - a velocity needs a push in proportion to the error, against the air's, and on top of it the acceleration that the
   setpoint names. The error is the one that will be left when the tilt has followed: it lags by `TILT_LAG`;
 - a position needs a velocity; the position of the drone is its GPS location carried on by its speed;
@@ -112,7 +112,7 @@ class Axis:
     velocity: float | None = None
     acceleration: float | None = None
     position: float | None = None
-    """m along this axis as `Motion.north` counts; a velocity is a feed-forward then."""
+    """m along this axis as `MotionEstimate.north` counts; a velocity is a feed-forward then."""
 
 
 @dataclass(frozen=True)
@@ -139,7 +139,7 @@ class Demand:
         return self.x.position is not None or self.y.position is not None
 
 
-class Motion:
+class MotionEstimate:
     """Estimated motion of the drone, from its reports, and the effect of the air on it."""
 
     def __init__(self, roll: RollCheck | None = None) -> None:
@@ -284,10 +284,10 @@ class Motion:
         return self._velocity[2]
 
 
-class Controller:
+class VelocityController:
     """Makes sticks of demands. One per session: what it remembers belongs to the demands before."""
 
-    def __init__(self, motion: Motion) -> None:
+    def __init__(self, motion: MotionEstimate) -> None:
         self.motion = motion
         self._climb: float | None = None
         """m/s up that vertical accelerations have added up to."""
@@ -395,7 +395,7 @@ class Controller:
         return rate
 
 
-def tilt_limit(limits: Limits, motion: Motion) -> float:
+def tilt_limit(limits: Limits, motion: MotionEstimate) -> float:
     """Return the tilt (rad) that a loop may ask for."""
     tilt = limits.tilt_deg * units.RAD_PER_DEG
     return tilt if motion.trusts_tilt else min(tilt, CAUTIOUS_TILT)

@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterable
 
 from anafi_mav import mav_enums
-from anafi_mav.plans.zones import Circle, Fence, Polygon, Zone
+from anafi_mav.plans.zones import CircleZone, Fence, PolygonZone, Zone
 from anafi_mav.vehicle.fence.plan_items import PlanItem
 
 POLYGONS = {
@@ -34,14 +34,14 @@ def fence_of(items: Iterable[PlanItem]) -> Fence:
                 corners = [(corner.latitude, corner.longitude) for corner in polygon]
                 inclusion = POLYGONS[item.command]
                 name = f"{inclusion_word(inclusion)} {number - len(polygon) + 1}-{number}"
-                zones.append(Polygon(name, inclusion, group_of(item), corners))
+                zones.append(PolygonZone(name, inclusion, group_of(item), corners))
                 polygon = []
         elif item.command in CIRCLES:
             inclusion = CIRCLES[item.command]
             name = f"{inclusion_word(inclusion)} {number}"
-            zones.append(Circle(name, inclusion, group_of(item), (item.latitude, item.longitude), item.params[0]))
+            zones.append(CircleZone(name, inclusion, group_of(item), (item.latitude, item.longitude), item.params[0]))
         elif item.command == HOME_CIRCLE:
-            zones.append(Circle(f"home circle {number}", True, group_of(item), None, item.params[0]))
+            zones.append(CircleZone(f"home circle {number}", True, group_of(item), None, item.params[0]))
     return Fence(zones)
 
 

@@ -20,8 +20,8 @@ import msgspec
 
 from anafi_mav import geo, mav_enums, texts
 from anafi_mav.errors import AnafiMavError
-from anafi_mav.plans.zones import Circle, Fence, LatLon, Margin
-from anafi_mav.texts import Text
+from anafi_mav.plans.zones import CircleZone, Fence, LatLon, Margin
+from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.fence.fence import fence_of
 from anafi_mav.vehicle.fence.plan_items import PlanItem
 
@@ -148,7 +148,7 @@ class OutsideFence(AnafiMavError):
     The text is a clause: "12 m beyond …".
     """
 
-    def __init__(self, reason: Text, *, lasting: bool = True) -> None:
+    def __init__(self, reason: OperatorText, *, lasting: bool = True) -> None:
         super().__init__(reason)
         self.reason = reason
         self.lasting = lasting
@@ -186,17 +186,17 @@ class Sight(msgspec.Struct, frozen=True):
 
 
 @dataclass(frozen=True)
-class Verdict:
+class FenceFinding:
     """Problem found by a look."""
 
     breach: Breach
-    text: Text
+    text: OperatorText
     """A clause: "3 m beyond inclusion 0-4"."""
     ahead: bool = False
     """It is not beyond yet."""
 
 
-Finding = tuple[Event | None, Verdict | None]
+Finding = tuple[Event | None, FenceFinding | None]
 """Observation of one boundary; the event is None when nothing can be concluded."""
 
 SAFE: Finding = (Event.SAFE, None)
@@ -207,7 +207,7 @@ class _Side:
 
     def __init__(self) -> None:
         self.state = State.INSIDE
-        self.verdict: Verdict | None = None
+        self.verdict: FenceFinding | None = None
         """Reason of the state; None when all is well."""
         self.orders: int | None = None
         """The vehicle's `orders` count when our action was carried out."""
@@ -216,7 +216,7 @@ class _Side:
         self._calm_since: float | None = None
         """Time since when nothing ahead was seen."""
 
-    def see(self, event: Event | None, verdict: Verdict | None, now: float) -> State:
+    def see(self, event: Event | None, verdict: FenceFinding | None, now: float) -> State:
         """Take an observation, or None without one; return the state before."""
         before = self.state
         if event is not Event.SAFE:
@@ -248,7 +248,7 @@ class FenceWatch:
         """m above the take-off point; counts once the vehicle has been above it. 0: no floor."""
         self.items: tuple[PlanItem, ...] = ()
         self.fence = Fence()
-        self.verdict: Verdict | None = None
+        self.verdict: FenceFinding | None = None
         """Reason of the action that `look` returned; without an action, of the present state."""
         self.breach = Breach.NONE
         """The last one."""
@@ -315,7 +315,7 @@ class FenceWatch:
         return Fence(
             zone
             for zone in self.fence.zones
-            if self.types & (HOME_CIRCLE if isinstance(zone, Circle) and zone.centre is None else ZONES)
+            if self.types & (HOME_CIRCLE if isinstance(zone, CircleZone) and zone.centre is None else ZONES)
         )
 
     @property
@@ -373,7 +373,7 @@ class FenceWatch:
         self.verdict = next((side.verdict for side in self._sides.values() if side.verdict is not None), None)
         return None
 
-    def _answer(self, side: _Side, before: State, verdict: Verdict, sight: Sight, now: float) -> Reaction | None:
+    def _answer(self, side: _Side, before: State, verdict: FenceFinding, sight: Sight, now: float) -> Reaction | None:
         """Return the action for an observation of one boundary, or None."""
         if self.action is Reaction.NONE:
             return None
@@ -390,7 +390,7 @@ class FenceWatch:
             return Reaction.WARN if side.state is State.OUTSIDE else None
         return self._act(side, verdict, sight)
 
-    def _act(self, side: _Side, verdict: Verdict, sight: Sight) -> Reaction:
+    def _act(self, side: _Side, verdict: FenceFinding, sight: Sight) -> Reaction:
         side.retry_at = None
         if not sight.flying or verdict.breach is Breach.CEILING or self.action is Reaction.WARN:
             side.orders = sight.orders
@@ -430,11 +430,13 @@ class FenceWatch:
         if breach is Breach.FLOOR:
             below = self.floor - sight.ato
             if self._has_floor and self._above_floor and below > SLACK:
-                return Event.BREACH, Verdict(breach, texts.FENCE_UNDER_FLOOR.fill(distance=below, floor=self.floor))
+                return Event.BREACH, FenceFinding(
+                    breach, texts.FENCE_UNDER_FLOOR.fill(distance=below, floor=self.floor)
+                )
         elif self.types & CEILING and sight.ceiling is not None:
             above = sight.ato - sight.ceiling
             if above > SLACK:
-                return Event.BREACH, Verdict(
+                return Event.BREACH, FenceFinding(
                     breach, texts.FENCE_OVER_CEILING.fill(distance=above, ceiling=sight.ceiling)
                 )
         return SAFE
@@ -448,13 +450,13 @@ class FenceWatch:
         here = geo.destination(*sight.place, north * sight.age, east * sight.age)
         margin = zones.margin(here, sight.home)
         if margin.metres < 0.0:
-            return Event.BREACH, Verdict(Breach.BOUNDARY, _beyond(margin))
+            return Event.BREACH, FenceFinding(Breach.BOUNDARY, _beyond(margin))
         speed = math.hypot(north, east)
         if self.predict and sight.steering and sight.flying and speed > 0.0:
             stopping = REACTION + speed / (2.0 * BRAKING)
             way = zones.leaves(here, geo.destination(*here, north * stopping, east * stopping), sight.home)
             if way is not None:
-                return Event.AHEAD, Verdict(Breach.BOUNDARY, texts.FENCE_TOO_FAST.fill(zone=way.zone), ahead=True)
+                return Event.AHEAD, FenceFinding(Breach.BOUNDARY, texts.FENCE_TOO_FAST.fill(zone=way.zone), ahead=True)
         return SAFE if margin.metres >= BACK_INSIDE else (None, None)
 
 
@@ -462,5 +464,5 @@ def _sides() -> dict[Breach, _Side]:
     return {breach: _Side() for breach in (Breach.BOUNDARY, Breach.FLOOR, Breach.CEILING)}
 
 
-def _beyond(margin: Margin) -> Text:
+def _beyond(margin: Margin) -> OperatorText:
     return texts.BEYOND_ZONE.fill(distance=-margin.metres, zone=margin.zone)

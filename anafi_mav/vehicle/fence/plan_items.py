@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import msgspec
 
 from anafi_mav import mav_enums, texts
-from anafi_mav.texts import Text
+from anafi_mav.texts import OperatorText
 
 MAX_ITEMS = 5000
 """Items of a list: more than any client sends, small enough to be checked and stored at once."""
@@ -31,12 +31,12 @@ _CONTENT = struct.Struct("<HBB4fiif")
 
 
 @dataclass(frozen=True)
-class Fault:
+class PlanFault:
     """Why an item or a plan is not taken."""
 
     result: int
     """MAV_MISSION_RESULT."""
-    reason: Text
+    reason: OperatorText
     """A clause for people, which names the item where it is one item's fault."""
 
 
@@ -92,16 +92,16 @@ def opaque_id(items: Iterable[PlanItem]) -> int:
     return 0 if empty else checksum or 1
 
 
-def place_fault(item: PlanItem) -> Fault | None:
+def place_fault(item: PlanItem) -> PlanFault | None:
     """Return the fault of an item's place, for an item that needs one."""
     if item.frame not in (*AMSL_FRAMES, *RELATIVE_FRAMES):
-        return Fault(mav_enums.MAV_MISSION_UNSUPPORTED_FRAME, texts.FRAME_UNSUPPORTED.fill(frame=item.frame))
+        return PlanFault(mav_enums.MAV_MISSION_UNSUPPORTED_FRAME, texts.FRAME_UNSUPPORTED.fill(frame=item.frame))
     if not abs(item.latitude) <= 90.0:
-        return Fault(mav_enums.MAV_MISSION_INVALID_PARAM5_X, texts.BAD_LATITUDE)
+        return PlanFault(mav_enums.MAV_MISSION_INVALID_PARAM5_X, texts.BAD_LATITUDE)
     if not abs(item.longitude) <= 180.0:
-        return Fault(mav_enums.MAV_MISSION_INVALID_PARAM6_Y, texts.BAD_LONGITUDE)
+        return PlanFault(mav_enums.MAV_MISSION_INVALID_PARAM6_Y, texts.BAD_LONGITUDE)
     if item.x == 0 and item.y == 0:
-        return Fault(mav_enums.MAV_MISSION_INVALID_PARAM5_X, texts.AT_NULL)
+        return PlanFault(mav_enums.MAV_MISSION_INVALID_PARAM5_X, texts.AT_NULL)
     return None
 
 

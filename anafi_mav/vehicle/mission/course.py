@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from anafi_mav.plans.translation.translate import Cursor, Leg, Step
+from anafi_mav.plans.translation.translate import Cursor, FlightPlanFile, GatewayStep
 
 
 class Course:
@@ -13,7 +13,9 @@ class Course:
     The rest that was too long to be laid out at once follows them.
     """
 
-    def __init__(self, parts: Iterable[Leg | Step] = (), rest: Cursor | None = None, later: int | None = None) -> None:
+    def __init__(
+        self, parts: Iterable[FlightPlanFile | GatewayStep] = (), rest: Cursor | None = None, later: int | None = None
+    ) -> None:
         self.parts = [*parts]
         self.rest = rest
         self.later = later
@@ -27,7 +29,7 @@ class Course:
     @property
     def stepped(self) -> bool:
         """The gateway flies some of it, or begins the next file."""
-        return len(self.parts) > 1 or self.rest is not None or any(isinstance(part, Step) for part in self.parts)
+        return len(self.parts) > 1 or self.rest is not None or any(isinstance(part, GatewayStep) for part in self.parts)
 
     @property
     def following(self) -> int | None:
@@ -45,7 +47,7 @@ class Course:
         self.later = self.following
         self.parts, self.rest = self.parts[:1], None
 
-    def _first_of(self, parts: list[Leg | Step]) -> int | None:
+    def _first_of(self, parts: list[FlightPlanFile | GatewayStep]) -> int | None:
         if not parts:
             return None if self.rest is None else self.rest.item
-        return parts[0].item if isinstance(parts[0], Step) else parts[0].origins[0]
+        return parts[0].item if isinstance(parts[0], GatewayStep) else parts[0].origins[0]

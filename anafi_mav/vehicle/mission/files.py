@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from anafi_mav.drone.automatic.flight_plan import FlightPlan
 from anafi_mav.errors import CommandRejected
 from anafi_mav.plans.plan import Item
-from anafi_mav.plans.translation.translate import Leg
+from anafi_mav.plans.translation.translate import FlightPlanFile
 from anafi_mav.vehicle.mission.path import lines_of
 
 MAX_FILES = 16
@@ -22,10 +22,10 @@ class FilesOnDrone:
         self._plan = plan
         self._names: dict[bytes, str] = {}
         """By a digest of what is in them, oldest first."""
-        self._newest: tuple[Leg, str, Sequence[Item]] | None = None
+        self._newest: tuple[FlightPlanFile, str, Sequence[Item]] | None = None
         """With the mission that it was made of."""
 
-    async def beginning_with(self, leg: Leg, mission: Sequence[Item]) -> tuple[Leg, str, int]:
+    async def beginning_with(self, leg: FlightPlanFile, mission: Sequence[Item]) -> tuple[FlightPlanFile, str, int]:
         """Return the file on the drone that continues with this leg of a mission.
 
         Returns the file, its name, and the line before the leg. It is uploaded if needed. An Ai can begin in the
@@ -56,7 +56,7 @@ class FilesOnDrone:
         return True
 
 
-def _ends_with(whole: Leg, line: int, leg: Leg) -> bool:
+def _ends_with(whole: FlightPlanFile, line: int, leg: FlightPlanFile) -> bool:
     """From this line on it is the leg: the same text, which stands for the same items."""
     same = whole.origins[line:] == leg.origins and whole.done[line:] == leg.done
     return same and lines_of(whole)[line:] == lines_of(leg)

@@ -1,8 +1,8 @@
 """Flies a mission: the shell around the cores `progress` and `plans.translation.translate`.
 
-What the drone can fly by itself it flies from a file (`Leg`); what it cannot, the gateway flies between two files
-(`Step`). The drone says which line it has executed, and nothing else counts. Whatever takes the drone over stops the
-mission, and nothing but a client's word lets it go on.
+What the drone can fly by itself it flies from a file (`FlightPlanFile`); what it cannot, the gateway flies between
+two files (`Step`). The drone says which line it has executed, and nothing else counts. Whatever takes the drone over
+stops the mission, and nothing but a client's word lets it go on.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from anafi_mav.drone import events
 from anafi_mav.drone.events import FlyingState, Message, PlayingState
 from anafi_mav.errors import AnafiMavError, CommandRejected, LinkLost
 from anafi_mav.plans.plan import Item
-from anafi_mav.plans.translation.translate import Leg
-from anafi_mav.texts import Text
+from anafi_mav.plans.translation.translate import FlightPlanFile
+from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import DroneRefused, Refused, not_ready, reason_of, text_of
@@ -27,8 +27,8 @@ from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.mission.course import Course
 from anafi_mav.vehicle.mission.files import FilesOnDrone
 from anafi_mav.vehicle.mission.path import WayPoint, check_path, lay_out, way_points
-from anafi_mav.vehicle.mission.progress import ENDINGS, Progress, State
-from anafi_mav.vehicle.mission.record import Keeper, Record
+from anafi_mav.vehicle.mission.progress import ENDINGS, MissionProgress, State
+from anafi_mav.vehicle.mission.record import Keeper, MissionRecord
 from anafi_mav.vehicle.mission.steps import fly_step
 from anafi_mav.vehicle.mission.texts import beginning, refusal
 from anafi_mav.vehicle.mission.waits import ARM_WAIT, PROOF, ArmWait, EndWatch, StoreWait
@@ -40,14 +40,14 @@ class MissionFlight:
     """Flies the mission of one vehicle; its flight task in mode Mission."""
 
     def __init__(self, vehicle: Aircraft) -> None:
-        self.progress = Progress()
+        self.progress = MissionProgress()
         self.identity = 0
         """The opaque id of the mission."""
         self.news: Callable[[], None] = lambda: None
         """Says that MISSION_CURRENT has changed."""
         self.reached: Callable[[int], None] = lambda item: None
         """Says that an item is done."""
-        self.say: Callable[[Severity, Callable[[int], Text]], None] = lambda severity, text: None
+        self.say: Callable[[Severity, Callable[[int], OperatorText]], None] = lambda severity, text: None
         """A text to everybody; it is made from what they call item 0."""
         self.first_number: Callable[[Hashable], int] = lambda client: 0
         """Returns the number that a client gives item 0."""
@@ -59,9 +59,9 @@ class MissionFlight:
         self._course = Course()
         self._uid = ""
         """Of the file that the drone flies, or flew last."""
-        self._left: tuple[Leg, int, dict[int, int]] | None = None
+        self._left: tuple[FlightPlanFile, int, dict[int, int]] | None = None
         """The drone has it paused, and the mission is to begin elsewhere next: file, last line, jumps."""
-        self._starting: tuple[Leg, int] | None = None
+        self._starting: tuple[FlightPlanFile, int] | None = None
         """File that the drone is commanded to begin, and the line before; None also once withdrawn."""
         self._taken_meanwhile = False
         """While it was asked, the same mission was uploaded again."""
@@ -254,7 +254,7 @@ class MissionFlight:
             course, line = Course(*await lay_out(vehicle, items, item, number, jumps)), -1
         await check_path(vehicle, course.parts, line, number)
         head = course.parts[0]
-        if not resumes and isinstance(head, Leg):
+        if not resumes and isinstance(head, FlightPlanFile):
             if plan.state.playing == PlayingState.PAUSED:
                 await plan.stop()  # some firmware may take no file while another one is paused (GroundSDK stops first)
             head, uid, line = await self._files.beginning_with(head, items)
@@ -278,7 +278,7 @@ class MissionFlight:
         if not resumes:
             progress.jumps = {**jumps}
         try:
-            if isinstance(head, Leg):
+            if isinstance(head, FlightPlanFile):
                 await self._play(head, uid, line)
                 self._require_same(items)
             else:
@@ -300,7 +300,7 @@ class MissionFlight:
             why = texts.MISSION_REPLACED_MEANWHILE if self.there else texts.MISSION_CLEARED_MEANWHILE
             raise Refused(texts.MISSION, why)
 
-    async def _play(self, leg: Leg, uid: str, line: int) -> None:
+    async def _play(self, leg: FlightPlanFile, uid: str, line: int) -> None:
         """Begin a file, or go on with it; returns when the drone flies it."""
         plan = self._vehicle.drone.flight_plan
         goes_on = plan.state.returns_on_disconnect is False if plan.starts_anywhere else None
@@ -352,7 +352,7 @@ class MissionFlight:
                     self._course = Course(*await lay_out(self._vehicle, progress.items, rest, 0))
                     await check_path(self._vehicle, self._course.parts, -1, 0)
                 head = self._course.parts[0]
-                if isinstance(head, Leg):
+                if isinstance(head, FlightPlanFile):
                     leg, uid, line = await self._files.beginning_with(head, progress.items)
                     self._course.parts[0] = leg
                     await self._play(leg, uid, line)
@@ -413,20 +413,20 @@ class MissionFlight:
         stopped = self._vehicle.drone.flight_plan.state.playing == PlayingState.STOPPED
         self._may_end_late = stopped and self._course.following is None
 
-    def _break_off(self, why: Text) -> None:
+    def _break_off(self, why: OperatorText) -> None:
         """Stop the mission for a reason that no client has commanded."""
         if self.progress.state is State.ACTIVE:
             self._stop(why)
             self._vehicle.select(FlightMode.HOLD)
 
-    def _stop(self, why: Text | None) -> None:
+    def _stop(self, why: OperatorText | None) -> None:
         progress = self.progress
         progress.stop()
         self._may_end_late = False
         current, severity = progress.current, Severity.INFO if why is None else Severity.WARNING
         if not self._beginning:
 
-            def paused(first: int) -> Text:
+            def paused(first: int) -> OperatorText:
                 if why is None:
                     return texts.MISSION_PAUSED.fill(item=current + first)
                 return texts.MISSION_PAUSED_REASON.fill(item=current + first, reason=why)
@@ -503,7 +503,7 @@ class MissionFlight:
             else:
                 self._stopped_by_drone()
 
-    def _last_way_point(self, leg: Leg) -> WayPoint | None:
+    def _last_way_point(self, leg: FlightPlanFile) -> WayPoint | None:
         """Return the way point that a file ends at.
 
         Returns None while other way points are left, or when the file ends with a landing or a return.
@@ -601,7 +601,7 @@ class MissionFlight:
         if self.progress.state is State.ACTIVE:
             self.progress.stop()
 
-    def link_up(self, record: Record | None) -> None:
+    def link_up(self, record: MissionRecord | None) -> None:
         """The drone is back, or it is another gateway's: is it our mission that it flies?"""
         progress, plan = self.progress, self._vehicle.drone.flight_plan.state
         if progress.leg is None and record is not None and record.mission == self.identity:

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 from anafi_mav import mav_enums, texts
 from anafi_mav.errors import PlanError
 from anafi_mav.plans.plan import Item
-from anafi_mav.plans.translation.translate import Cursor, Leg, Start, Step, translate
+from anafi_mav.plans.translation.translate import Cursor, FlightPlanFile, GatewayStep, Start, translate
 from anafi_mav.units import DEG_PER_RAD
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.bounds import check_estimate, check_place
-from anafi_mav.vehicle.base.geo_point import Place
+from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.fence.fence_watch import OutsideFence
 
@@ -38,7 +38,7 @@ class WayPoint:
 
     item: int
     """Of the mission."""
-    place: Place
+    place: GeoPoint
     ato: float
     """m above the take-off point."""
     radius: float
@@ -64,7 +64,7 @@ def _start(vehicle: Aircraft) -> Start:
 
 async def lay_out(
     vehicle: Aircraft, items: Sequence[Item], first: int | Cursor, number: int, jumps: Mapping[int, int] | None = None
-) -> tuple[list[Leg | Step], Cursor | None]:
+) -> tuple[list[FlightPlanFile | GatewayStep], Cursor | None]:
     """Return the parts flown from an item on, starting at the drone's position, and the rest.
 
     Raises `Refused`.
@@ -84,12 +84,14 @@ async def lay_out(
     return [*flight.parts], flight.rest
 
 
-def _check_estimates(vehicle: Aircraft, items: Sequence[Item], parts: Sequence[Leg | Step], number: int) -> None:
+def _check_estimates(
+    vehicle: Aircraft, items: Sequence[Item], parts: Sequence[FlightPlanFile | GatewayStep], number: int
+) -> None:
     """Raise `Refused` if an item's AMSL height may be below ground because AMSL is an estimate."""
     if not vehicle.height.estimated:
         return
     for part in parts:
-        for point in way_points(part) if isinstance(part, Leg) else ():
+        for point in way_points(part) if isinstance(part, FlightPlanFile) else ():
             if items[point.item].frame in _AMSL_FRAMES:
                 try:
                     check_estimate(vehicle, point.ato)
@@ -97,12 +99,12 @@ def _check_estimates(vehicle: Aircraft, items: Sequence[Item], parts: Sequence[L
                     raise Refused(texts.ITEM.fill(number=point.item + number), error.reason) from error
 
 
-def lines_of(leg: Leg) -> list[str]:
+def lines_of(leg: FlightPlanFile) -> list[str]:
     """The lines of a file without its first and without their numbers."""
     return [line.split("\t", 1)[-1] for line in leg.content.decode().splitlines()[1:]]
 
 
-def way_points(leg: Leg, after: int = -1) -> Iterator[WayPoint]:
+def way_points(leg: FlightPlanFile, after: int = -1) -> Iterator[WayPoint]:
     """Yield the way points of the lines after one of them.
 
     All heights are above take-off: the translation writes no others.
@@ -111,19 +113,19 @@ def way_points(leg: Leg, after: int = -1) -> Iterator[WayPoint]:
     for line, item in zip(lines[after + 1 :], leg.origins[after + 1 :], strict=False):
         columns = line.split("\t")
         if int(columns[_COMMAND]) == mav_enums.MAV_CMD_NAV_WAYPOINT:
-            place = Place(float(columns[_LATITUDE]), float(columns[_LONGITUDE]))
+            place = GeoPoint(float(columns[_LATITUDE]), float(columns[_LONGITUDE]))
             radius = float(columns[_RADIUS])
             yield WayPoint(item, place, float(columns[_HEIGHT]), radius if radius > 0.0 else ACCEPTANCE)
 
 
-async def check_path(vehicle: Aircraft, parts: Sequence[Leg | Step], after: int, number: int) -> None:
+async def check_path(vehicle: Aircraft, parts: Sequence[FlightPlanFile | GatewayStep], after: int, number: int) -> None:
     """Raise `Refused` if a way point, or the straight way to it, is where the drone may not be.
 
     `after` is the line of the first file after which it is flown, `number` the client's number of the first item.
     """
     where, seen = vehicle.place, 0
     for part in parts:
-        if isinstance(part, Leg):
+        if isinstance(part, FlightPlanFile):
             for point in way_points(part, after):
                 _check(vehicle, where, point, number)
                 where, seen = point.place, seen + 1
@@ -132,7 +134,7 @@ async def check_path(vehicle: Aircraft, parts: Sequence[Leg | Step], after: int,
         after = -1
 
 
-def _check(vehicle: Aircraft, start: Place | None, point: WayPoint, number: int) -> None:
+def _check(vehicle: Aircraft, start: GeoPoint | None, point: WayPoint, number: int) -> None:
     ceiling = vehicle.drone.piloting.state.max_altitude
     try:
         check_place(vehicle, point.place, start=start)

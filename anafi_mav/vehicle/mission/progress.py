@@ -1,8 +1,8 @@
 """Progress of a mission: current item, finished items and state. No I/O.
 
-The drone reports the lines of its file that it has executed; a `Leg` maps them to items of the mission. An item is
-done when the drone has reported it, or when the gateway has flown it itself, and never because time or other items
-passed.
+The drone reports the lines of its file that it has executed; a `FlightPlanFile` maps them to items of the mission. An
+item is done when the drone has reported it, or when the gateway has flown it itself, and never because time or other
+items passed.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 from anafi_mav import mav_enums
 from anafi_mav.plans.plan import DO_JUMP, Item
-from anafi_mav.plans.translation.translate import Leg
+from anafi_mav.plans.translation.translate import FlightPlanFile
 
 ENDINGS = (mav_enums.MAV_CMD_NAV_LAND, mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH)
 """Items that end in a landing or a return, which is the plan's own and no take-over of the drone's."""
@@ -74,7 +74,7 @@ MAVLINK_STATES = {
 }
 
 
-class Progress:
+class MissionProgress:
     """One mission, and how far it is."""
 
     def __init__(self) -> None:
@@ -82,7 +82,7 @@ class Progress:
         self.items: tuple[Item, ...] = ()
         self.current = 0
         """The item that is flown, or will be when it goes on."""
-        self.leg: Leg | None = None
+        self.leg: FlightPlanFile | None = None
         """The file that the drone flies, or flew last; None: none since the mission or its current item was chosen."""
         self.line = -1
         """Of it, the one that was executed last."""
@@ -151,7 +151,7 @@ class Progress:
         if anew:
             self.jumps = {}
 
-    def begin(self, leg: Leg | None, line: int = -1) -> None:
+    def begin(self, leg: FlightPlanFile | None, line: int = -1) -> None:
         """Record that the mission is flown, by a file or (None) by the gateway for now.
 
         `line` is the line of the file that was executed last.

@@ -11,12 +11,12 @@ import msgspec
 from typing_extensions import Self
 
 from anafi_mav.plans.plan import DO_JUMP, Item
-from anafi_mav.plans.translation.translate import Leg
+from anafi_mav.plans.translation.translate import FlightPlanFile
 from anafi_mav.vehicle.mission.path import way_points
-from anafi_mav.vehicle.mission.progress import Progress
+from anafi_mav.vehicle.mission.progress import MissionProgress
 
 
-class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class MissionRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A file on the drone, and what it is of which mission."""
 
     mission: int
@@ -34,7 +34,9 @@ class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Items that jump, and how often each was done by then."""
 
     @classmethod
-    def of(cls, mission: int, uid: str, leg: Leg, line: int, following: int | None, jumps: Mapping[int, int]) -> Self:
+    def of(
+        cls, mission: int, uid: str, leg: FlightPlanFile, line: int, following: int | None, jumps: Mapping[int, int]
+    ) -> Self:
         return cls(mission, uid, leg.content.decode(), leg.origins, leg.done, line, following, tuple(jumps.items()))
 
     def flown_up_to(self, item: int, jumps: Mapping[int, int]) -> Self:
@@ -66,8 +68,8 @@ class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return msgspec.to_builtins(self)
 
     @property
-    def leg(self) -> Leg:
-        return Leg(self.content.encode(), self.origins, self.done)
+    def leg(self) -> FlightPlanFile:
+        return FlightPlanFile(self.content.encode(), self.origins, self.done)
 
 
 class Keeper:
@@ -77,11 +79,11 @@ class Keeper:
     """
 
     def __init__(self) -> None:
-        self.write: Callable[[Record | None], None] = lambda record: None
+        self.write: Callable[[MissionRecord | None], None] = lambda record: None
         """Takes what is to be remembered from now on."""
-        self._kept: Record | None = None
+        self._kept: MissionRecord | None = None
 
-    def found(self, record: Record) -> None:
+    def found(self, record: MissionRecord) -> None:
         """This was remembered by another run."""
         self._kept = record
 
@@ -90,13 +92,13 @@ class Keeper:
         self._kept = None
         self.write(None)
 
-    def keep(self, mission: int, uid: str, progress: Progress, following: int | None) -> None:
+    def keep(self, mission: int, uid: str, progress: MissionProgress, following: int | None) -> None:
         """Remember how far a mission is.
 
         `following` is the item behind the file that the drone flies.
         """
         if progress.leg is not None:
-            self._kept = Record.of(mission, uid, progress.leg, progress.line, following, progress.jumps)
+            self._kept = MissionRecord.of(mission, uid, progress.leg, progress.line, following, progress.jumps)
         elif self._kept is not None:
             self._kept = self._kept.flown_up_to(progress.current, progress.jumps)
         else:
@@ -104,7 +106,7 @@ class Keeper:
         self.write(self._kept)
 
 
-def _leads_somewhere(leg: Leg) -> bool:
+def _leads_somewhere(leg: FlightPlanFile) -> bool:
     """All way points are places."""
     try:
         points = [*way_points(leg)]

@@ -7,7 +7,7 @@ from anafi_mav.drone.automatic.flight_plan import FlightPlanState
 from anafi_mav.drone.events import FlightPlanComponent as Part
 from anafi_mav.drone.events import FlightPlanIndicator as Input
 from anafi_mav.errors import CommandRejected
-from anafi_mav.texts import Text
+from anafi_mav.texts import OperatorText
 
 _REASONS = {
     Part.GPS: texts.NO_FIX,
@@ -26,14 +26,14 @@ _INPUTS = {Input.DRONE_GPS: _REASONS[Part.GPS], Input.DRONE_MAGNETO: _REASONS[Pa
 """Faults that an Ai reports twice: as a missing input, and as one of the components."""
 
 
-def refusal(state: FlightPlanState, error: CommandRejected) -> Text:
+def refusal(state: FlightPlanState, error: CommandRejected) -> OperatorText:
     """Return the refusal of a start that the drone does not accept."""
     reasons: list[str] = [_REASONS.get(part, part.name.lower()) for part, ok in state.components.items() if not ok]
     reasons += [_INPUTS.get(one) or one.name.lower().replace("_", " ") for one in sorted(state.missing or ())]
     return texts.MISSION_REFUSED_BY_DRONE.fill(reasons=", ".join(dict.fromkeys(reasons)) or error.reason)
 
 
-def beginning(item: int, resumes: bool, *, stepped: bool, returns: bool | None) -> Text:
+def beginning(item: int, resumes: bool, *, stepped: bool, returns: bool | None) -> OperatorText:
     """Return the text of a beginning or resumed mission, with the behaviour without the gateway.
 
     `stepped`: the drone has a part of the mission only. `returns`: the value of its ReturnHomeOnDisconnect.

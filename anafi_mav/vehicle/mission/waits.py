@@ -24,7 +24,7 @@ from anafi_mav.drone.events import (
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.mission.path import WayPoint
-from anafi_mav.vehicle.mission.progress import Progress
+from anafi_mav.vehicle.mission.progress import MissionProgress
 
 ARM_WAIT = 10.0
 """s that a mission waits for arming.
@@ -124,7 +124,7 @@ class EndWatch:
     that was received before the drone stopped proves nothing: over a bad link it may be seconds old.
     """
 
-    def __init__(self, vehicle: Aircraft, progress: Progress, ended: Callable[[bool], None]) -> None:
+    def __init__(self, vehicle: Aircraft, progress: MissionProgress, ended: Callable[[bool], None]) -> None:
         """`ended` is called with whether it has."""
         self._vehicle = vehicle
         self._progress = progress

@@ -19,7 +19,7 @@ from anafi_mav.clock import Alarm, Clock
 from anafi_mav.drone import Limits, PilotingCommand, events
 from anafi_mav.drone.events import FlyingState
 from anafi_mav.errors import AnafiMavError, LinkLost
-from anafi_mav.texts import Text
+from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.bounds import TooLow
 from anafi_mav.vehicle.base.clients import system_of
@@ -32,8 +32,8 @@ from anafi_mav.vehicle.base.velocity_loop import (
     CAUTIOUS_TILT,
     STILL,
     WIND,
-    Controller,
-    Motion,
+    MotionEstimate,
+    VelocityController,
     tilt_for,
     tilt_limit,
     turn_towards,
@@ -42,7 +42,7 @@ from anafi_mav.vehicle.offboard.goals import Goal, demand, resolve
 from anafi_mav.vehicle.offboard.moves import OffboardMoves
 from anafi_mav.vehicle.offboard.setpoints import NOTHING, AttitudeSetpoint, MotionSetpoint, Setpoint
 from anafi_mav.vehicle.offboard.stream import GUIDED_TIMEOUT, OffboardStream, State, ends, lasts
-from anafi_mav.vehicle.offboard.takeoff import Launcher, Phase, SetpointTakeoff, Step, climbs
+from anafi_mav.vehicle.offboard.takeoff import Launcher, SetpointTakeoff, TakeoffPhase, TakeoffStep, climbs
 
 WARN_AGAIN = 1.0
 """m/s by which a velocity has to be higher than the last one whose tilt was worth a word."""
@@ -70,9 +70,9 @@ class OffboardFlight:
     def __init__(self, vehicle: Aircraft, clock: Clock, takeoff: Launcher) -> None:
         self.guided_timeout = GUIDED_TIMEOUT
         """s that a velocity lasts in ArduPilot's Guided (a parameter)."""
-        self.motion = Motion(vehicle.roll)
+        self.motion = MotionEstimate(vehicle.roll)
         """Motion of the drone; other flight tasks that fly by sticks use it too."""
-        self.warn_throttled: Callable[[Text], None] = lambda text: vehicle.text(Severity.WARNING, text)
+        self.warn_throttled: Callable[[OperatorText], None] = lambda text: vehicle.text(Severity.WARNING, text)
         """Says what is wrong with something that arrives many times a second."""
         self.run_action: Callable[[Hashable, Coroutine[Any, Any, None]], asyncio.Task[None]] = _at_once
         """Runs what takes the drone over, in its turn among the commands."""
@@ -91,7 +91,7 @@ class OffboardFlight:
         """True while a single setpoint is being engaged."""
         self._afterwards = FlightMode.HOLD
         """The mode that silence ends in."""
-        self._controller = Controller(self.motion)
+        self._controller = VelocityController(self.motion)
         self._warned_of = STILL
         """m/s of velocity up to which it has been said whether MaxTilt is enough."""
         self._goal: Goal | None = None
@@ -120,7 +120,7 @@ class OffboardFlight:
 
     # What programs ask for.
 
-    def receive(self, sender: Hashable, setpoint: Setpoint, *, guided: bool = False) -> Text | None:
+    def receive(self, sender: Hashable, setpoint: Setpoint, *, guided: bool = False) -> OperatorText | None:
         """Take a program's newest setpoint; fly it at once when this program is the pilot.
 
         `guided`: the program is of the family whose setpoints fly the drone in mode Guided, without engagement.
@@ -157,7 +157,7 @@ class OffboardFlight:
         """The drone is on the ground, and can take off from there."""
         return self._vehicle.flying_state == FlyingState.LANDED
 
-    def _on_ground(self, sender: Hashable, setpoint: Setpoint, now: float, *, guided: bool) -> Text | None:
+    def _on_ground(self, sender: Hashable, setpoint: Setpoint, now: float, *, guided: bool) -> OperatorText | None:
         """Handle a setpoint on the ground: only a climb of the client that armed and engaged counts.
 
         Returns why a setpoint that climbs takes nothing off, or None. ArduCopter flies attitudes alone from the
@@ -170,7 +170,7 @@ class OffboardFlight:
         if not climbs(setpoint, vehicle.height.ato):
             self._end_count(sender)
             return None
-        if lift.phase in (Phase.LIFTING, Phase.JOINED):
+        if lift.phase in (TakeoffPhase.LIFTING, TakeoffPhase.JOINED):
             return None
         if guided:
             engaged = vehicle.selected is FlightMode.GUIDED and vehicle.mode_client == sender
@@ -184,15 +184,15 @@ class OffboardFlight:
         if (reason := self._grounded) is not None:
             return reason
         step = lift.climb(sender, now, SILENCE)
-        if step is Step.WARN:
+        if step is TakeoffStep.WARN:
             vehicle.text(Severity.WARNING, texts.SETPOINT_TAKEOFF_SOON.fill(system=system_of(sender)))
-        elif step is Step.TAKE_OFF:
-            lift.begin(sender, Phase.LIFTING)
+        elif step is TakeoffStep.TAKE_OFF:
+            lift.begin(sender, TakeoffPhase.LIFTING)
             self.run_action(sender, self._take_off(sender))
         return None
 
     @property
-    def _grounded(self) -> Text | None:
+    def _grounded(self) -> OperatorText | None:
         """Why setpoints do not take the drone off; None when they do."""
         if problems := self._vehicle.prearm_problems():
             return texts.joined(problems)
@@ -204,7 +204,7 @@ class OffboardFlight:
 
     def _end_count(self, sender: Hashable) -> None:
         """One setpoint that does not climb ends the second of the client that sent it."""
-        if self._lift.phase is Phase.COUNTING and self._lift.client == sender:
+        if self._lift.phase is TakeoffPhase.COUNTING and self._lift.client == sender:
             self._lift.stop()
             self._vehicle.text(Severity.NOTICE, texts.SETPOINT_TAKEOFF_NO_CLIMB)
 
@@ -217,14 +217,14 @@ class OffboardFlight:
             fresh = self._stream.candidate(sender, self._clock.monotonic()) == sender
             if not (self._stands and fresh and self._takeoff.is_armed_by(sender)):
                 raise Refused(texts.SETPOINT_TAKEOFF, texts.SETPOINTS_STOPPED)
-            self._join(sender, Phase.LIFTING, afterwards)
+            self._join(sender, TakeoffPhase.LIFTING, afterwards)
             await self._takeoff.launch()
         except AnafiMavError as error:
-            if lift.phase is Phase.LIFTING:
+            if lift.phase is TakeoffPhase.LIFTING:
                 self.end()
             vehicle.text(Severity.ERROR, texts.SETPOINT_TAKEOFF_FAILED.fill(error=reason_of(error)))
 
-    def _join(self, pilot: Hashable, phase: Phase, afterwards: FlightMode) -> None:
+    def _join(self, pilot: Hashable, phase: TakeoffPhase, afterwards: FlightMode) -> None:
         """The session begins, and flies once the drone hovers at the end of the take-off."""
         self._afterwards = afterwards
         self._stream.engage(pilot)
@@ -235,13 +235,13 @@ class OffboardFlight:
     def after_takeoff(self) -> None:
         """The drone hovers, or a take-off has ended: fly what is fresh at this moment."""
         vehicle = self._vehicle
-        if self._lift.phase not in (Phase.LIFTING, Phase.JOINED) or self._takeoff.under_way:
+        if self._lift.phase not in (TakeoffPhase.LIFTING, TakeoffPhase.JOINED) or self._takeoff.under_way:
             return
         if vehicle.in_air:
             self._lift.stop()
             if self.engaged and not vehicle.returning:
                 self._begin(FlightMode.OFFBOARD)
-        elif self._lift.phase is Phase.JOINED:
+        elif self._lift.phase is TakeoffPhase.JOINED:
             self._lift.stop()
 
     def left_ground(self) -> None:
@@ -249,11 +249,11 @@ class OffboardFlight:
 
         A session that stands by on the ground flies only a take-off that is its own.
         """
-        if self.engaged and self._lift.phase not in (Phase.LIFTING, Phase.JOINED):
+        if self.engaged and self._lift.phase not in (TakeoffPhase.LIFTING, TakeoffPhase.JOINED):
             self.end()
             self._vehicle.text(Severity.WARNING, texts.OFFBOARD_ENDED.fill(reason=texts.NOT_ITS_TAKEOFF))
 
-    def _objection(self, sender: Hashable, setpoint: MotionSetpoint) -> Text | None:
+    def _objection(self, sender: Hashable, setpoint: MotionSetpoint) -> OperatorText | None:
         """Why a position cannot be flown to; None when it can, or is being flown to."""
         if self._vehicle.roll.inverted and setpoint.needs_loop:
             return texts.ROLL_INVERTED
@@ -287,7 +287,7 @@ class OffboardFlight:
             return  # it flies already, and goes on without a jolt
         if self._takeoff.under_way:
             self._takeoff.displace()
-            self._join(candidate, Phase.JOINED, FlightMode.HOLD)
+            self._join(candidate, TakeoffPhase.JOINED, FlightMode.HOLD)
             return
         await self._vehicle.take_over()
         if not self._stands:
@@ -299,9 +299,9 @@ class OffboardFlight:
         self._stream.engage(pilot)
         self._begin(FlightMode.OFFBOARD)
 
-    def _require_freedom(self, what: Text) -> None:
+    def _require_freedom(self, what: OperatorText) -> None:
         vehicle = self._vehicle
-        lifting = self._takeoff.under_way or self._lift.phase is Phase.LIFTING
+        lifting = self._takeoff.under_way or self._lift.phase is TakeoffPhase.LIFTING
         if not (vehicle.in_air or self._stands or lifting):
             raise Refused(what, texts.TAKE_OFF_FIRST)
         if vehicle.drone.piloting.about_to_fly and not lifting:
@@ -317,7 +317,7 @@ class OffboardFlight:
 
     # ArduPilot's way.
 
-    def _begin_guided(self, sender: Hashable, setpoint: Setpoint, now: float, *, follows: bool) -> Text | None:
+    def _begin_guided(self, sender: Hashable, setpoint: Setpoint, now: float, *, follows: bool) -> OperatorText | None:
         mode = self._vehicle.mode
         if self._takeoff.under_way and self._vehicle.selected is FlightMode.GUIDED:
             return None  # at its end the next setpoint is flown
@@ -365,7 +365,7 @@ class OffboardFlight:
 
         Returns tasks that are about to end.
         """
-        if self._lift.stop() is Phase.COUNTING:
+        if self._lift.stop() is TakeoffPhase.COUNTING:
             self._vehicle.mode_client = None  # who counted has to choose the mode once more, and does not count on
             self._vehicle.text(Severity.NOTICE, texts.SETPOINT_TAKEOFF_CANCELLED)
         if not self.engaged:
@@ -386,8 +386,8 @@ class OffboardFlight:
         self._moves.forget()
         self._goal = self.flown = None
         self._stream = OffboardStream()
-        self.motion = Motion(self._vehicle.roll)
-        self._controller = Controller(self.motion)
+        self.motion = MotionEstimate(self._vehicle.roll)
+        self._controller = VelocityController(self.motion)
 
     # What the drone reports.
 
@@ -432,7 +432,7 @@ class OffboardFlight:
     def _begin(self, mode: FlightMode) -> None:
         """The session has a pilot from now on."""
         self._watch()  # the pilot's, which may be older than the newest of all
-        self._controller = Controller(self.motion)
+        self._controller = VelocityController(self.motion)
         self._goal, self._course = None, _Course(False, None, None)
         self._warned_of = STILL
         if self._vehicle.in_air:
@@ -444,7 +444,7 @@ class OffboardFlight:
         """Do what the pilot's newest setpoint asks for at this moment."""
         vehicle, setpoint = self._vehicle, self._stream.setpoint
         limits = vehicle.drone.piloting.limits
-        if setpoint is None or limits is None or not vehicle.in_air or self._lift.phase is Phase.JOINED:
+        if setpoint is None or limits is None or not vehicle.in_air or self._lift.phase is TakeoffPhase.JOINED:
             return
         reason = None
         if vehicle.drone.controller.pilot_acquired_control:
@@ -538,14 +538,14 @@ class OffboardFlight:
     def _expired(self) -> None:
         lifted, phase = self._lift.client, self._lift.phase
         expired = self._stream.expire(self._clock.monotonic())
-        counted = phase is Phase.COUNTING and self._stream.newest(lifted) is None
-        if (expired and phase is Phase.LIFTING and self._vehicle.flying_state in _BEFORE_TAKEOFF) or counted:
+        counted = phase is TakeoffPhase.COUNTING and self._stream.newest(lifted) is None
+        if (expired and phase is TakeoffPhase.LIFTING and self._vehicle.flying_state in _BEFORE_TAKEOFF) or counted:
             self._lift.stop()
             self._vehicle.select(self._afterwards if expired else self._vehicle.selected)
             self._vehicle.text(Severity.WARNING, texts.GROUND_SETPOINTS_STOPPED)
             self.run_action(lifted, self._takeoff.abort())
         elif expired:
-            self._stopped(joined=phase is Phase.JOINED)
+            self._stopped(joined=phase is TakeoffPhase.JOINED)
         self._watch()
 
     def _stopped(self, *, joined: bool) -> None:

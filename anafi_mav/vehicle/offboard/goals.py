@@ -12,27 +12,27 @@ from dataclasses import dataclass
 from anafi_mav import geo, texts
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.bounds import amsl_to_ato, check_estimate, check_height, check_place
-from anafi_mav.vehicle.base.geo_point import Place
+from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.refusal import Refused
-from anafi_mav.vehicle.base.velocity_loop import Axis, Demand, Motion
-from anafi_mav.vehicle.offboard.setpoints import MotionSetpoint, Origin, Vector
+from anafi_mav.vehicle.base.velocity_loop import Axis, Demand, MotionEstimate
+from anafi_mav.vehicle.offboard.setpoints import MotionSetpoint, PositionReference, Vector
 
 
 @dataclass(frozen=True)
 class Goal:
     """A setpoint's position, resolved."""
 
-    origin: Origin
+    origin: PositionReference
     body: bool
     position: Vector
     """As the setpoint said it."""
-    place: Place | None = None
+    place: GeoPoint | None = None
     """Place on the map.
 
     None without both horizontal parts, or while the drone's position is unknown.
     """
     x: float | None = None
-    """m along the first axis, as `Motion.north` counts; None: not said, or no GPS location has come."""
+    """m along the first axis, as `MotionEstimate.north` counts; None: not said, or no GPS location has come."""
     y: float | None = None
     turn: float = 0.0
     """rad from north to the first axis, clockwise."""
@@ -46,29 +46,29 @@ class Goal:
         return (self.origin, self.body, self.position) == (setpoint.origin, setpoint.body, setpoint.position)
 
 
-def resolve(setpoint: MotionSetpoint, vehicle: Aircraft, motion: Motion) -> Goal:
+def resolve(setpoint: MotionSetpoint, vehicle: Aircraft, motion: MotionEstimate) -> Goal:
     """The goal of a setpoint that has a position.
 
     Raises `Refused` for one that the drone may not or cannot fly to.
     """
-    if setpoint.origin is Origin.VEHICLE:
+    if setpoint.origin is PositionReference.VEHICLE:
         return _from_vehicle(setpoint, vehicle, motion)
     x, y, z = setpoint.position
-    height = None if z is None else -z if setpoint.origin is Origin.LOCAL else z
+    height = None if z is None else -z if setpoint.origin is PositionReference.LOCAL else z
     if height is not None:
-        if setpoint.origin is Origin.SEA:
+        if setpoint.origin is PositionReference.SEA:
             height = amsl_to_ato(vehicle, height)
             check_estimate(vehicle, height)
         check_height(vehicle, height)
-    place: Place | None = None
+    place: GeoPoint | None = None
     north = east = None
     if x is not None or y is not None:
-        if setpoint.origin is Origin.LOCAL:
+        if setpoint.origin is PositionReference.LOCAL:
             if vehicle.origin is None:
                 raise Refused(texts.SETPOINT, texts.TAKEOFF_POINT_UNKNOWN)
             place = _local_place(vehicle.origin, x, y, vehicle.place)
         else:
-            place = Place(x or 0.0, y or 0.0)
+            place = GeoPoint(x or 0.0, y or 0.0)
         check_place(vehicle, place, start=vehicle.place)
         if motion.reference is not None:
             north, east = geo.offset(*motion.reference, place.latitude, place.longitude)
@@ -83,15 +83,15 @@ def resolve(setpoint: MotionSetpoint, vehicle: Aircraft, motion: Motion) -> Goal
     )
 
 
-def _local_place(origin: Place, x: float | None, y: float | None, here: Place | None) -> Place:
+def _local_place(origin: GeoPoint, x: float | None, y: float | None, here: GeoPoint | None) -> GeoPoint:
     """A place of the local frame. Of a half that is not said the drone keeps its own."""
     if (x is None or y is None) and here is not None:
         north, east = geo.offset(origin.latitude, origin.longitude, here.latitude, here.longitude)
         x, y = north if x is None else x, east if y is None else y
-    return Place(*geo.destination(origin.latitude, origin.longitude, x or 0.0, y or 0.0))
+    return GeoPoint(*geo.destination(origin.latitude, origin.longitude, x or 0.0, y or 0.0))
 
 
-def _from_vehicle(setpoint: MotionSetpoint, vehicle: Aircraft, motion: Motion) -> Goal:
+def _from_vehicle(setpoint: MotionSetpoint, vehicle: Aircraft, motion: MotionEstimate) -> Goal:
     x, y, z = setpoint.position
     ahead, aside, down = x or 0.0, y or 0.0, z or 0.0
     if motion.yaw is None:
@@ -111,9 +111,9 @@ def _from_vehicle(setpoint: MotionSetpoint, vehicle: Aircraft, motion: Motion) -
     else:
         north, east = ahead, aside
         front, right = north * cos + east * sin, east * cos - north * sin
-    place: Place | None = None
+    place: GeoPoint | None = None
     if here is not None:
-        place = Place(*geo.destination(here.latitude, here.longitude, north, east))
+        place = GeoPoint(*geo.destination(here.latitude, here.longitude, north, east))
         if north != 0.0 or east != 0.0:
             check_place(vehicle, place, start=here)
     turn = motion.yaw if setpoint.body else 0.0

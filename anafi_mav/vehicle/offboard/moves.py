@@ -15,7 +15,7 @@ from typing import TypeAlias
 from anafi_mav import texts, units
 from anafi_mav.drone import MoveEnd
 from anafi_mav.errors import AnafiMavError, LinkLost
-from anafi_mav.texts import Text
+from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.refusal import Rejected, reason_of
 from anafi_mav.vehicle.offboard.goals import Goal
@@ -39,7 +39,7 @@ _Wanted: TypeAlias = "tuple[Goal, float | None]"
 class OffboardMoves:
     """The moves of one session of setpoints."""
 
-    def __init__(self, vehicle: Aircraft, warn_throttled: Callable[[Text], None]) -> None:
+    def __init__(self, vehicle: Aircraft, warn_throttled: Callable[[OperatorText], None]) -> None:
         self._vehicle = vehicle
         self._warn_throttled = warn_throttled
         self._wanted: _Wanted | None = None
@@ -153,7 +153,7 @@ class OffboardMoves:
         """Of a move that was replaced or stopped there is nothing to say."""
         return self._begun == wanted and self._wanted is None
 
-    def _failed(self, wanted: _Wanted, why: Text, *, again: bool) -> None:
+    def _failed(self, wanted: _Wanted, why: OperatorText, *, again: bool) -> None:
         """The drone did not make a move."""
         if not self._is_news_of(wanted):
             return

@@ -26,7 +26,7 @@ class AttitudeSetpoint:
     """-1 full descent .. 1 full climb."""
 
 
-class Origin(enum.Enum):
+class PositionReference(enum.Enum):
     """Origin of positions."""
 
     LOCAL = "the origin of the local frame"
@@ -45,7 +45,7 @@ NOTHING: Vector = (None, None, None)
 class MotionSetpoint:
     """Setpoint of one SET_POSITION_TARGET_*."""
 
-    origin: Origin
+    origin: PositionReference
     body: bool = False
     """Axes are front, right, down of the heading; otherwise north, east, down."""
     position: Vector = NOTHING
@@ -81,7 +81,7 @@ class MotionSetpoint:
     @property
     def on_earth(self) -> bool:
         """Positions are latitudes and longitudes."""
-        return self.origin in (Origin.SEA, Origin.TAKEOFF)
+        return self.origin in (PositionReference.SEA, PositionReference.TAKEOFF)
 
 
 Setpoint: TypeAlias = "AttitudeSetpoint | MotionSetpoint"

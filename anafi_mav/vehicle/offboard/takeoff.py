@@ -14,7 +14,7 @@ import enum
 from collections.abc import Callable, Hashable
 from typing import Protocol
 
-from anafi_mav.vehicle.offboard.setpoints import AttitudeSetpoint, Origin, Setpoint
+from anafi_mav.vehicle.offboard.setpoints import AttitudeSetpoint, PositionReference, Setpoint
 
 CLIMB_FOR = 1.0
 """s for which a client asks to climb before the drone takes off."""
@@ -34,7 +34,7 @@ def climbs(setpoint: Setpoint, ato: Callable[[float], float | None]) -> bool:
         return setpoint.climb > 0.0
     ups = [None if down is None else -down for down in (setpoint.velocity[2], setpoint.acceleration[2])]
     if (z := setpoint.position[2]) is not None:
-        height = {Origin.TAKEOFF: z, Origin.SEA: ato(z)}.get(setpoint.origin, -z)
+        height = {PositionReference.TAKEOFF: z, PositionReference.SEA: ato(z)}.get(setpoint.origin, -z)
         ups.append(height)
     known = [up for up in ups if up is not None]
     return any(up > LEAST_CLIMB for up in known) and not any(up < -LEAST_CLIMB for up in known)
@@ -60,7 +60,7 @@ class Launcher(Protocol):
         """Disarm a drone that stands, land one that is about to leave the ground."""
 
 
-class Phase(enum.Enum):
+class TakeoffPhase(enum.Enum):
     """State of a take-off by setpoints."""
 
     IDLE = "none"
@@ -69,7 +69,7 @@ class Phase(enum.Enum):
     JOINED = "another take-off is under way, the setpoints are flown at its end"
 
 
-class Step(enum.Enum):
+class TakeoffStep(enum.Enum):
     """Consequence of a setpoint that climbs."""
 
     WARN = "the second has begun"
@@ -81,29 +81,29 @@ class SetpointTakeoff:
     """The take-off that setpoints of one client ask for."""
 
     def __init__(self) -> None:
-        self.phase = Phase.IDLE
+        self.phase = TakeoffPhase.IDLE
         self.client: Hashable = None
         self._since = 0.0
         self._last = 0.0
 
-    def climb(self, client: Hashable, now: float, gap: float) -> Step:
+    def climb(self, client: Hashable, now: float, gap: float) -> TakeoffStep:
         """A setpoint that climbs has arrived.
 
         `gap`: s between two of them that begin the second again.
         """
-        if self.phase is not Phase.COUNTING or now - self._last >= gap:
-            self.phase, self.client, self._since, self._last = Phase.COUNTING, client, now, now
-            return Step.WARN
+        if self.phase is not TakeoffPhase.COUNTING or now - self._last >= gap:
+            self.phase, self.client, self._since, self._last = TakeoffPhase.COUNTING, client, now, now
+            return TakeoffStep.WARN
         if client != self.client:
-            return Step.WAIT
+            return TakeoffStep.WAIT
         self._last = now
-        return Step.TAKE_OFF if now - self._since >= CLIMB_FOR else Step.WAIT
+        return TakeoffStep.TAKE_OFF if now - self._since >= CLIMB_FOR else TakeoffStep.WAIT
 
-    def begin(self, client: Hashable, phase: Phase) -> None:
+    def begin(self, client: Hashable, phase: TakeoffPhase) -> None:
         """The drone is about to leave the ground, by this client's setpoints or another take-off."""
         self.phase, self.client = phase, client
 
-    def stop(self) -> Phase:
+    def stop(self) -> TakeoffPhase:
         """It is over, or ended. Returns the phase that has ended."""
-        before, self.phase, self.client = self.phase, Phase.IDLE, None
+        before, self.phase, self.client = self.phase, TakeoffPhase.IDLE, None
         return before

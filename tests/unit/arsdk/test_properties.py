@@ -21,7 +21,7 @@ from anafi_mav.arsdk.codec import wire
 from anafi_mav.arsdk.codec.wire import Bits, Blob, Message, MessageId, OpenEnum, Scalar, Text, UnknownMessage
 from anafi_mav.arsdk.link import handshake
 from anafi_mav.arsdk.link.frame import decode_frames, encode_frame
-from anafi_mav.arsdk.link.transport import ACK_TIMEOUT, Delivered, Received, Role, Transport, Undelivered
+from anafi_mav.arsdk.link.transport import ACK_TIMEOUT, Delivered, ReceivedMessage, Role, Transport, Undelivered
 from anafi_mav.arsdk.messages import ardrone3
 
 VERSIONS = [1, 2, 3]
@@ -111,7 +111,7 @@ class Weather:
 
     def _collect(self, end: int, events: list[Any]) -> None:
         for event in events:
-            if isinstance(event, Received):
+            if isinstance(event, ReceivedMessage):
                 self.heard[end].append(event.message)
             elif isinstance(event, Delivered):
                 self.delivered[end].append(event.token)

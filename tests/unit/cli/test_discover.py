@@ -19,7 +19,7 @@ from support.world import loopback
 from anafi_mav.arsdk.link import interface
 from anafi_mav.arsdk.link.controller import look
 from anafi_mav.arsdk.link.handshake import DeviceInfo
-from anafi_mav.cli.discover import Find, Place, configuration, places
+from anafi_mav.cli.discover import Find, SearchAddress, configuration, places
 from anafi_mav.config import from_text
 from anafi_mav.errors import LinkLost
 from anafi_mav.sim import DroneSpec, Simulator
@@ -94,22 +94,22 @@ NET42, NET53 = ipaddress.IPv4Network("192.168.42.0/24"), ipaddress.IPv4Network("
 def test_where_it_looks() -> None:
     here = [("eth0", ipaddress.IPv4Network("10.0.0.0/24")), ("wlan1", NET42), ("wlan2", NET42), ("usb0", NET53)]
     assert places([], here) == [
-        Place("192.168.42.1", "wlan1"),
-        Place("192.168.42.1", "wlan2"),
-        Place("192.168.53.1", "usb0"),
+        SearchAddress("192.168.42.1", "wlan1"),
+        SearchAddress("192.168.42.1", "wlan2"),
+        SearchAddress("192.168.53.1", "usb0"),
     ]
     # What was asked for is tried as the routes say, and on the interfaces that are in its network.
-    assert places([Place("10.0.0.7"), Place("10.9.9.9", "eth0")], here)[:2] == [
-        Place("10.0.0.7"),
-        Place("10.9.9.9", "eth0"),
+    assert places([SearchAddress("10.0.0.7"), SearchAddress("10.9.9.9", "eth0")], here)[:2] == [
+        SearchAddress("10.0.0.7"),
+        SearchAddress("10.9.9.9", "eth0"),
     ]
-    assert Place("10.0.0.7", "eth0") in places([Place("10.0.0.7")], here)
-    assert Place("192.168.42.1") in places([], [])
+    assert SearchAddress("10.0.0.7", "eth0") in places([SearchAddress("10.0.0.7")], here)
+    assert SearchAddress("192.168.42.1") in places([], [])
 
 
 def test_the_interface_is_told_where_an_address_is_not_enough() -> None:
     def find(address: str, on: str, serial: str, name: str = "ANAFI") -> Find:
-        return Find(Place(address, on), DeviceInfo(0x0914, serial, 44444, name))
+        return Find(SearchAddress(address, on), DeviceInfo(0x0914, serial, 44444, name))
 
     lines = configuration(
         [find("192.168.42.1", "wlan1", "A"), find("192.168.42.1", "wlan2", "B"), find("192.168.43.1", "usb0", "C")]
@@ -122,7 +122,7 @@ def test_the_interface_is_told_where_an_address_is_not_enough() -> None:
 @pytest.mark.parametrize("name", ["", "no", "007", "2026-01-01", '"}\n- evil: {', "ÄÖÜ", "-", "a" * 300, "x: y # z"])
 def test_whatever_a_device_calls_itself_is_no_trouble(name: str) -> None:
     device = DeviceInfo(0x1234, name, 44444, name)
-    lines = configuration([Find(Place("192.168.42.1"), device)])
+    lines = configuration([Find(SearchAddress("192.168.42.1"), device)])
     (drone,) = from_text("\n".join(lines), "lines").drones
     assert drone.address == "192.168.42.1"
 

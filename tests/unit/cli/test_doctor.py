@@ -17,7 +17,7 @@ from support.world import loopback
 from anafi_mav.arsdk.link import interface
 from anafi_mav.arsdk.link.handshake import ConnectReply, DeviceInfo, format_discovery, format_reply
 from anafi_mav.cli import doctor
-from anafi_mav.cli.doctor import Finding, Place, before_handshake, with_handshake
+from anafi_mav.cli.doctor import DroneAddress, Finding, before_handshake, with_handshake
 from anafi_mav.drone import Drone
 from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
 from anafi_mav.state_lock import HeldDrone, StateLock, state_folder
@@ -32,8 +32,8 @@ async def simulated(model: str = "4k", skycontroller: int | None = None) -> Asyn
         yield simulator.drones[0]
 
 
-def place(address: str) -> Place:
-    return Place(address, None, HTTP, RTSP)
+def place(address: str) -> DroneAddress:
+    return DroneAddress(address, None, HTTP, RTSP)
 
 
 def faults(findings: list[Finding]) -> dict[str, str]:
@@ -161,19 +161,19 @@ def test_doctor_adapter_is_judged_by_the_networks(
     other = "eth0\t000014AC\t00000000\t0001\t0\t0\t0\t0000FFFF\t0\t0\t0\n"
     (tmp_path / "route").write_text(ROUTES.format(other + "".join(map(IN_42.format, adapters))))
     monkeypatch.setattr(interface, "ROUTES", tmp_path / "route")
-    finding = doctor.adapter(Place("192.168.42.1"))
+    finding = doctor.adapter(DroneAddress("192.168.42.1"))
     assert finding.wrong is wanted
     assert words in str(finding)
 
 
 async def test_doctor_with_an_unknown_adapter_stops_there() -> None:
-    findings, _ = await before_handshake(Place("127.0.0.1", "nosuchif0"))
+    findings, _ = await before_handshake(DroneAddress("127.0.0.1", "nosuchif0"))
     assert "there is no network adapter nosuchif0; expected one of" in faults(findings)["adapter"]
     assert not [finding for finding in findings if finding.check.startswith("port")]
 
 
 async def test_doctor_without_a_route_says_so() -> None:
-    findings, _ = await before_handshake(Place("255.255.255.255"))  # no socket is let send there unasked
+    findings, _ = await before_handshake(DroneAddress("255.255.255.255"))  # no socket is let send there unasked
     assert faults(findings)["route"].startswith("route: WRONG: none to 255.255.255.255: ")
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from anafi_mav.arsdk.codec import wire
 from anafi_mav.arsdk.codec.envelope import ProtobufMessage
-from anafi_mav.arsdk.codec.protobuf import Kind, Map, Record, record_fields
+from anafi_mav.arsdk.codec.protobuf import FieldType, Map, Submessage, record_fields
 from anafi_mav.arsdk.codec.wire import Message, OpenEnum
 from anafi_mav.arsdk.messages import camera as old
 from anafi_mav.arsdk.messages import gimbal
@@ -62,7 +62,7 @@ def plain(message: type[Message], rng: random.Random) -> Message | None:
     return event if type(event) is message else None
 
 
-def record(kind: type[Record], rng: random.Random, depth: int = 0) -> Any:
+def record(kind: type[Submessage], rng: random.Random, depth: int = 0) -> Any:
     """A record of random fields: anything that its bytes could make of it."""
     values: dict[str, Any] = {}
     for field in record_fields(kind):
@@ -71,7 +71,7 @@ def record(kind: type[Record], rng: random.Random, depth: int = 0) -> Any:
 
         def one(field: Any = field) -> Any:
             number = rng.choice(INTS)
-            if field.wire.kind is Kind.RECORD:
+            if field.wire.kind is FieldType.RECORD:
                 return record(field.python, rng, depth + 1)
             if isinstance(field.python, type) and issubclass(field.python, OpenEnum):
                 return field.python(number)

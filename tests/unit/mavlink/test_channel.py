@@ -9,7 +9,7 @@ import pytest
 from anafi_mav.errors import LocalProtocolError
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import FRAME_BYTES, Channel, total
-from anafi_mav.mavlink.frames import Parser, Received, frame, pack
+from anafi_mav.mavlink.frames import Parser, ReceivedFrame, frame, pack
 
 ATTITUDE = dialect.MAVLink_attitude_message(1, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5)
 ACK = dialect.MAVLink_command_ack_message(400, 0)
@@ -22,14 +22,14 @@ class Wire:
         self.written: list[bytes] = []
         self.channel = Channel("a wire", self.written.append, **options)
 
-    def read(self) -> list[Received]:
+    def read(self) -> list[ReceivedFrame]:
         """The frames written since the last call."""
         data = b"".join(self.written)
         self.written.clear()
         return Parser().receive(data)
 
 
-def sequence(frames: list[Received], source: tuple[int, int]) -> list[int]:
+def sequence(frames: list[ReceivedFrame], source: tuple[int, int]) -> list[int]:
     return [received.raw[4] for received in frames if (received.sysid, received.compid) == source]
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from anafi_mav.errors import LocalProtocolError
 from anafi_mav.mavlink import dialect
-from anafi_mav.mavlink.frames import MAX_FRAME, Packed, Parser, Received, frame, pack
+from anafi_mav.mavlink.frames import MAX_FRAME, Packed, Parser, ReceivedFrame, frame, pack
 
 # HEARTBEAT, quadrotor, PX4, custom mode 0x00030000 (Position), active, from 1/1 with sequence number 7, written out
 # by hand from MAVLink serialization.md §packet_format and common.xml; the checksum by its §checksum with CRC extra 50.
@@ -265,7 +265,7 @@ def test_an_unknown_message_passes_only_from_a_source_that_proved_itself() -> No
     assert parser.receive_datagram(unknown(1, 2)) == []
     assert parser.receive_datagram(unknown(1, 1) + b"x") == []
     [received] = parser.receive_datagram(unknown(1, 1))
-    assert received == Received(None, 0x0FFFFF, 1, 1, unknown(1, 1))
+    assert received == ReceivedFrame(None, 0x0FFFFF, 1, 1, unknown(1, 1))
     assert received.version_2() == unknown(1, 1)
     assert parser.counters["unknown_frames"] == 1
     # In a stream the next start mark must follow, in the same read or a later one.

@@ -20,7 +20,7 @@ from anafi_mav.errors import ConfigError
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.base import MAX_PEERS
 from anafi_mav.mavlink.channel import QUEUE_BYTES, Channel
-from anafi_mav.mavlink.frames import Parser, Received, frame, pack
+from anafi_mav.mavlink.frames import Parser, ReceivedFrame, frame, pack
 from anafi_mav.mavlink.node import Inbound, Node
 from anafi_mav.mavlink.router import EVERY_COMPONENT
 
@@ -168,7 +168,7 @@ COUNT, FRAME, ANSWER = 120_000, 40, 15
 COMMAND_ACK without its trailing zeros."""
 
 
-def newest(frames: list[Received]) -> int:
+def newest(frames: list[ReceivedFrame]) -> int:
     """The time that the last frame tells."""
     time: int = frames[-1].message.time_boot_ms
     return time

@@ -17,8 +17,8 @@ from anafi_mav.mavlink.plan_client import (
     Build,
     Download,
     Outcome,
-    Result,
     Transfer,
+    TransferResult,
     Upload,
 )
 from anafi_mav.services.plan.item_messages import item_float, item_int, item_of
@@ -68,11 +68,11 @@ def test_a_plan_goes_up_and_comes_down() -> None:
     plans = desk()
     upload = Upload(builds(items(5)), 1, 1, FENCE)
     run(upload, plans)
-    assert (upload.result, upload.done, upload.total) == (Result(Outcome.DONE), 5, 5)
+    assert (upload.result, upload.done, upload.total) == (TransferResult(Outcome.DONE), 5, 5)
     assert plans.transfers[FENCE].items == items(5)
     download = Download(1, 1, FENCE)
     wire = run(download, plans)
-    assert download.result == Result(Outcome.DONE)
+    assert download.result == TransferResult(Outcome.DONE)
     assert tuple(item_of(message) for message in download.items) == items(5)
     assert [type(message).__name__ for message in wire.sent].count("MAVLink_mission_item_int_message") == 5
 
@@ -82,17 +82,17 @@ def test_an_empty_plan() -> None:
     run(Upload(builds(items(3)), 1, 1, FENCE), plans)
     clear = Upload([], 1, 1, FENCE)
     run(clear, plans)
-    assert clear.result == Result(Outcome.DONE)
+    assert clear.result == TransferResult(Outcome.DONE)
     download = Download(1, 1, FENCE)
     run(download, plans)
-    assert (download.result, download.items) == (Result(Outcome.DONE), [])
+    assert (download.result, download.items) == (TransferResult(Outcome.DONE), [])
 
 
 def test_a_refusal_has_its_reason() -> None:
     plans = desk()
     upload = Upload(builds((*items(3), an_item(3, 666), an_item(4))), 1, 1, FENCE)
     run(upload, plans)
-    assert upload.result == Result(Outcome.REFUSED, dialect.MAV_MISSION_UNSUPPORTED)
+    assert upload.result == TransferResult(Outcome.REFUSED, dialect.MAV_MISSION_UNSUPPORTED)
     assert upload.result.reason == "UNSUPPORTED"
     assert plans.transfers[FENCE].items == ()
 
@@ -109,7 +109,7 @@ def test_a_quarter_lost_each_way(seed: int) -> None:
     assert plans.transfers[FENCE].items == items(500)
     download = Download(1, 1, FENCE)
     run(download, plans, loss=0.25, duplicate=0.05, delay=(0.005, 0.06), seed=seed)
-    assert download.result == Result(Outcome.DONE)
+    assert download.result == TransferResult(Outcome.DONE)
     assert tuple(item_of(message) for message in download.items) == items(500)
 
 
@@ -131,11 +131,11 @@ def test_a_vehicle_that_says_nothing() -> None:
     (first,) = upload.start(10.0)
     assert (first.get_type(), first.count, first.mission_type) == ("MISSION_COUNT", 2, FENCE)
     assert through_silence(upload, 10.0) == [(10.0 + TIMEOUT * n, "MISSION_COUNT") for n in range(1, TRIES)]
-    assert upload.result == Result(Outcome.SILENT)
+    assert upload.result == TransferResult(Outcome.SILENT)
     download = Download(1, 1, FENCE)
     download.start(10.0)
     assert len(through_silence(download, 10.0)) == TRIES - 1
-    assert download.result == Result(Outcome.SILENT)
+    assert download.result == TransferResult(Outcome.SILENT)
 
 
 def test_a_vehicle_that_falls_silent_within_a_download() -> None:
@@ -145,7 +145,7 @@ def test_a_vehicle_that_falls_silent_within_a_download() -> None:
     assert (request.get_type(), request.seq) == ("MISSION_REQUEST_INT", 0)
     asked = through_silence(download, 1.0)
     assert asked == [(1.0 + ITEM_TIMEOUT * n, "MISSION_REQUEST_INT") for n in range(1, ITEM_TRIES)]
-    assert download.result == Result(Outcome.SILENT)
+    assert download.result == TransferResult(Outcome.SILENT)
 
 
 def test_a_vehicle_that_takes_everything_and_does_not_say_so() -> None:
@@ -155,7 +155,7 @@ def test_a_vehicle_that_takes_everything_and_does_not_say_so() -> None:
     assert item.get_type() == "MISSION_ITEM_INT"
     said = through_silence(upload, 0.1)
     assert said == [(round(0.1 + TIMEOUT * n, 3), "MISSION_ITEM_INT") for n in range(1, TRIES)]
-    assert upload.result == Result(Outcome.UNCONFIRMED)
+    assert upload.result == TransferResult(Outcome.UNCONFIRMED)
 
 
 def test_what_is_not_of_this_transfer_is_ignored() -> None:
@@ -178,7 +178,7 @@ def test_a_list_without_bounds() -> None:
     download.start(0.0)
     (ack,) = download.receive(dialect.MAVLink_mission_count_message(255, 190, MAX_ITEMS + 1, FENCE), 1, 1, 0.1)
     assert (ack.get_type(), ack.type) == ("MISSION_ACK", dialect.MAV_MISSION_NO_SPACE)
-    assert download.result == Result(Outcome.TOO_MANY)
+    assert download.result == TransferResult(Outcome.TOO_MANY)
 
 
 def test_items_in_the_older_form_and_out_of_turn() -> None:
@@ -198,7 +198,7 @@ def test_a_download_that_is_refused() -> None:
     download = Download(1, 1, FENCE)
     download.start(0.0)
     assert download.receive(dialect.MAVLink_mission_ack_message(255, 190, 3, FENCE), 1, 1, 0.1) == []
-    assert download.result == Result(Outcome.REFUSED, dialect.MAV_MISSION_UNSUPPORTED)
+    assert download.result == TransferResult(Outcome.REFUSED, dialect.MAV_MISSION_UNSUPPORTED)
 
 
 def test_giving_up_is_said() -> None:

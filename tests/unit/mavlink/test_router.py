@@ -7,22 +7,22 @@ from typing import Any
 import pytest
 
 from anafi_mav.mavlink import dialect
-from anafi_mav.mavlink.frames import MAX_SOURCES, Parser, Received, frame, pack
+from anafi_mav.mavlink.frames import MAX_SOURCES, Parser, ReceivedFrame, frame, pack
 from anafi_mav.mavlink.router import EVERY_COMPONENT, RING_FRAMES, RING_WINDOW, Router, targets
 
 GCS, OTHER_GCS, OURS, FOREIGN = (255, 190), (254, 190), 1, 42
 
 
-def received(message: Any, source: tuple[int, int] = GCS, seq: int = 0) -> Received:
+def received(message: Any, source: tuple[int, int] = GCS, seq: int = 0) -> ReceivedFrame:
     [one] = Parser().receive(frame(pack(message), seq, *source))
     return one
 
 
-def heartbeat(seq: int = 0, source: tuple[int, int] = GCS) -> Received:
+def heartbeat(seq: int = 0, source: tuple[int, int] = GCS) -> ReceivedFrame:
     return received(dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3), source, seq)
 
 
-def command(system: int, component: int, seq: int = 0, source: tuple[int, int] = GCS) -> Received:
+def command(system: int, component: int, seq: int = 0, source: tuple[int, int] = GCS) -> ReceivedFrame:
     return received(dialect.MAVLink_command_long_message(system, component, 512, 0, 1, 0, 0, 0, 0, 0, 0), source, seq)
 
 
@@ -190,7 +190,7 @@ def test_system_0_is_nobodys_name(router: Router[str, str]) -> None:
 
 
 def test_an_unknown_message_is_passed_on_to_all_and_not_ours(router: Router[str, str]) -> None:
-    unknown = Received(None, 0xABCDE, *GCS, b"\xfd\x00\x00\x00\x00\xff\xbe\xde\xbc\x0a\x00\x00")
+    unknown = ReceivedFrame(None, 0xABCDE, *GCS, b"\xfd\x00\x00\x00\x00\xff\xbe\xde\xbc\x0a\x00\x00")
     route = router.route("a", unknown, 0.0)
     assert (route.hosts, route.forward) == ((), ("b", "c"))
     assert router.heard_on(GCS[0]) == []

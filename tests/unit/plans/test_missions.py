@@ -186,7 +186,7 @@ def test_a_samples_twin_is_current(path: Path, version: parrot.Version, tmp_path
     for before, after in zip(one, two, strict=True):
         assert before.params == pytest.approx(after.params, abs=1e-7)
     read = plan_file.read(kept.read_bytes(), version)
-    ways = [item for item in read if item.command == plan_file.Command.WAYPOINT]
+    ways = [item for item in read if item.command == plan_file.PlanCommand.WAYPOINT]
     places = [(item.latitude, item.longitude) for item in ways]
     wanted = [place_of(item) for item in files.load(path).items if item.command == WAYPOINT]
     assert [place for place in wanted if place is not None and place not in places] == []

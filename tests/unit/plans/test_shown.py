@@ -16,7 +16,7 @@ from anafi_mav.errors import PlanError
 from anafi_mav.plans import path, plot, table
 from anafi_mav.plans.formats import files
 from anafi_mav.plans.plan import RELATIVE, Item, Plan, Point
-from anafi_mav.plans.shots import Kind, shots
+from anafi_mav.plans.shots import ShotKind, shots
 
 LINE = [[2.3677, 48.8789], [2.3687, 48.8789, 120.0], [2.3687, 48.8799]]
 KML = """<?xml version="1.0" encoding="UTF-8"?>
@@ -83,7 +83,7 @@ MISSIONS = Path(__file__).parents[3] / "missions"
 
 def test_shots_of_a_survey_are_on_its_lanes() -> None:
     found = shots(files.load(MISSIONS / "survey.plan"))
-    assert {kind for kind, _, _ in found.ways} == {Kind.PHOTOS}
+    assert {kind for kind, _, _ in found.ways} == {ShotKind.PHOTOS}
     assert len(found.ways) == 7  # four lanes and what joins them, not the way there
     assert found.looks == ()
 
@@ -91,7 +91,7 @@ def test_shots_of_a_survey_are_on_its_lanes() -> None:
 def test_shots_of_an_orbit_are_a_video_and_its_target() -> None:
     """From the way point before the region of interest; the video ends where it began."""
     found = shots(files.load(MISSIONS / "orbit.plan"))
-    assert [kind for kind, _, _ in found.ways] == [Kind.VIDEO] * 8
+    assert [kind for kind, _, _ in found.ways] == [ShotKind.VIDEO] * 8
     assert found.ways[0][1] == found.ways[-1][2] == (48.8790349, 2.3677)
     assert found.looks == (((48.8790349, 2.3677), (48.8792597, 2.3677)),)
     assert found.photos == ()

@@ -13,7 +13,7 @@ import pytest
 
 from anafi_mav.sim.http import MAX_BODY, MAX_UNREAD, WebServer
 from anafi_mav.sim.payload.jpeg_scene import Scene
-from anafi_mav.sim.payload.media import Kind, Media, MediaStore
+from anafi_mav.sim.payload.media import Media, MediaKind, MediaStore
 from anafi_mav.sim.plan.plan_store import FlightPlanStore
 
 DATE = "20261121T101112+0100"
@@ -30,15 +30,15 @@ class Site:
         self.server = WebServer(self.media, self.plans, {"model": "4k"}, lambda: DATE)
         self.client: aiohttp.ClientSession
 
-    def photo(self, *kinds: Kind) -> Media:
+    def photo(self, *kinds: MediaKind) -> Media:
         media = self.media.begin(video=False, mode="SINGLE", date=DATE)
-        files = [self.media.develop(media, kind, 1, Scene(), DATE) for kind in kinds or (Kind.JPG,)]
+        files = [self.media.develop(media, kind, 1, Scene(), DATE) for kind in kinds or (MediaKind.JPG,)]
         self.media.add(media, files)
         return media
 
     def film(self) -> Media:
         media = self.media.begin(video=True, mode="STANDARD", date=DATE)
-        self.media.add(media, [self.media.develop(media, Kind.MP4, 1, Scene(), DATE, 2.5)])
+        self.media.add(media, [self.media.develop(media, MediaKind.MP4, 1, Scene(), DATE, 2.5)])
         return media
 
     async def ask(self, method: str, path: str, **options: Any) -> tuple[int, Any]:
@@ -83,7 +83,7 @@ async def test_who_asks_while_the_air_is_gone_waits(site: Site) -> None:
 
 async def test_media_are_listed(site: Site) -> None:
     assert await site.ask("GET", f"{API}/media/medias") == (200, [])
-    photo, film = site.photo(Kind.JPG, Kind.DNG), site.film()
+    photo, film = site.photo(MediaKind.JPG, MediaKind.DNG), site.film()
     status, listed = await site.ask("GET", f"{API}/media/medias")
     assert (status, listed) == (200, [photo.describe(), film.describe()])
     assert listed[1]["duration"] == 2500
@@ -104,7 +104,7 @@ async def test_media_are_listed(site: Site) -> None:
 
 
 async def test_files_are_what_the_list_says(site: Site) -> None:
-    for media in (site.photo(Kind.JPG, Kind.DNG), site.film()):
+    for media in (site.photo(MediaKind.JPG, MediaKind.DNG), site.film()):
         for resource in media.describe()["resources"]:
             async with site.client.get(resource["url"]) as answer:
                 data = await answer.read()
@@ -117,7 +117,7 @@ async def test_files_are_what_the_list_says(site: Site) -> None:
 
 
 async def test_what_is_deleted_is_gone(site: Site) -> None:
-    first, second, third = site.photo(Kind.JPG, Kind.DNG), site.photo(), site.film()
+    first, second, third = site.photo(MediaKind.JPG, MediaKind.DNG), site.photo(), site.film()
     raw = first.resources[1].id
     assert (await site.ask("DELETE", f"{API}/media/resources/{raw}"))[0] == 200
     assert (await site.ask("GET", f"/data/media/{raw}"))[0] == 404
@@ -174,7 +174,7 @@ async def test_changes_are_told_to_every_listener(site: Site) -> None:
     ):
         await one.send_str("what a client says means nothing")
         burst = site.media.begin(video=False, mode="BURST", date=DATE)
-        files = [site.media.develop(burst, Kind.JPG, number, Scene(), DATE) for number in (1, 2)]
+        files = [site.media.develop(burst, MediaKind.JPG, number, Scene(), DATE) for number in (1, 2)]
         site.media.add(burst, files)
         await site.ask("DELETE", f"{API}/media/medias")
         for listener in (one, two):

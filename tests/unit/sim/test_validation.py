@@ -17,8 +17,8 @@ import pytest
 from anafi_mav.arsdk.video.video_metadata import FrameMetadata, Ned, Quaternion
 from anafi_mav.cli import main, sim_validate
 from anafi_mav.sim.validation import (
-    Result,
-    Track,
+    Comparison,
+    MeasuredTrack,
     at,
     climb_results,
     derivative,
@@ -34,7 +34,7 @@ ROOT = Path(__file__).parents[3]
 RAMP = [(n / 10, n * 2.0) for n in range(-5, 91)]  # 20 a second
 
 
-def by_name(results: object) -> dict[str, Result]:
+def by_name(results: object) -> dict[str, Comparison]:
     return {result.what: result for result in results}  # type: ignore[attr-defined]
 
 
@@ -58,7 +58,7 @@ def test_the_rate_over_a_window() -> None:
 
 
 def test_a_turn_is_counted_through() -> None:
-    track = Track()
+    track = MeasuredTrack()
     track.attitude = [(n * 0.5, 0.0, 0.0, (n * math.pi / 2 + math.pi) % (2 * math.pi) - math.pi) for n in range(9)]
     assert [angle for _, angle in track.turned()] == pytest.approx([90.0 * n for n in range(9)])
     results = by_name(yaw_results(track, 0.1))
@@ -73,7 +73,7 @@ def test_what_a_picture_says() -> None:
     half = math.radians(45.0)
     heading = np.array([math.cos(half), 0.0, 0.0, math.sin(half)])
     roll, pitch = math.radians(10.0), math.radians(88.0)
-    track = Track()
+    track = MeasuredTrack()
     track.add(
         0.5,
         FrameMetadata(
@@ -106,9 +106,9 @@ def turned(first: Sequence[float], then: Sequence[float]) -> tuple[float, ...]:
     return (float(a[0] * b[0] - a[1:] @ b[1:]), *map(float, vector))
 
 
-def flight(speed: float, angle: float) -> Track:
+def flight(speed: float, angle: float) -> MeasuredTrack:
     """A tilt to both sides, with this top speed."""
-    track = Track()
+    track = MeasuredTrack()
     for n in range(91):
         t = n / 10
         sign = 1 if 0.5 < t < 2.2 else -1 if 2.7 < t < 4.2 else 0
@@ -152,7 +152,11 @@ def test_a_gimbal() -> None:
 
 
 def test_nothing_heard_does_not_agree() -> None:
-    results = [*tilt_results("roll", [], Track(), 10.0), *climb_results(Track()), *yaw_results(Track(), 0.2)]
+    results = [
+        *tilt_results("roll", [], MeasuredTrack(), 10.0),
+        *climb_results(MeasuredTrack()),
+        *yaw_results(MeasuredTrack(), 0.2),
+    ]
     assert not any(result.agrees for result in results)
 
 

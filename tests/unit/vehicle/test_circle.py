@@ -7,20 +7,20 @@ import math
 import pytest
 
 from anafi_mav import geo
-from anafi_mav.vehicle.base.geo_point import Place
-from anafi_mav.vehicle.base.velocity_loop import Motion
+from anafi_mav.vehicle.base.geo_point import GeoPoint
+from anafi_mav.vehicle.base.velocity_loop import MotionEstimate
 from anafi_mav.vehicle.circle import Circle, Facing, Lap, entry, fastest, heading_at, outline
 
-CENTRE = Place(48.8789, 2.3677)
+CENTRE = GeoPoint(48.8789, 2.3677)
 
 
 def circle(direction: int = 1, facing: Facing = Facing.CENTRE, angle: float | None = None) -> Circle:
     return Circle(CENTRE, 20.0, direction, 4.0, 15.0, facing, heading=0.5, angle=angle)
 
 
-def at(north: float, east: float) -> Motion:
+def at(north: float, east: float) -> MotionEstimate:
     """A drone that is so far from the centre."""
-    motion = Motion()
+    motion = MotionEstimate()
     motion.on_place(*CENTRE.point)
     motion.north, motion.east = north, east
     return motion
@@ -78,11 +78,11 @@ def test_a_lap_is_counted_the_way_it_is_flown(direction: int) -> None:
 
 
 def test_nobody_knows_where_it_is() -> None:
-    assert Lap(circle()).demand(Motion()) is None
+    assert Lap(circle()).demand(MotionEstimate()) is None
 
 
 def test_the_nearest_point_of_the_circle() -> None:
-    start = entry(circle(), Place(*geo.destination(*CENTRE.point, 0.0, -50.0)))
+    start = entry(circle(), GeoPoint(*geo.destination(*CENTRE.point, 0.0, -50.0)))
     assert geo.offset(*CENTRE.point, *start.point) == pytest.approx((0.0, -20.0), abs=0.01)
     start = entry(circle(), CENTRE)
     assert geo.offset(*CENTRE.point, *start.point) == pytest.approx((20.0, 0.0), abs=0.01)

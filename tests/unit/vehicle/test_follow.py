@@ -9,7 +9,7 @@ import pytest
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.setpoint.target_messages import sighting
-from anafi_mav.vehicle.follow import FORESIGHT, TRANSITIONS, Event, Follower, FollowSettings, Sighting, State
+from anafi_mav.vehicle.follow import FORESIGHT, TRANSITIONS, Event, FollowSettings, Sighting, State, TargetFollower
 
 NAN = math.nan
 
@@ -21,9 +21,9 @@ def test_every_state_of_following_knows_its_events() -> None:
             assert impossible is (event not in TRANSITIONS[state])
 
 
-def following(angle: float = 180.0, *, speed: float = 2.0, seconds: int = 30, **settings: Any) -> Follower:
+def following(angle: float = 180.0, *, speed: float = 2.0, seconds: int = 30, **settings: Any) -> TargetFollower:
     """A target that has walked north for a while, and is at (2 * seconds, 0) at time `seconds`."""
-    follower = Follower(FollowSettings(angle=angle, responsiveness=0.0, **settings))
+    follower = TargetFollower(FollowSettings(angle=angle, responsiveness=0.0, **settings))
     for second in range(seconds + 1):
         follower.see(speed * second, 0.0, 100.0, (speed, 0.0), float(second))
         follower.aim(speed * second - 8.0, 0.0, 8.0, float(second))
@@ -57,7 +57,7 @@ def test_the_target_goes_on_for_a_moment_and_then_stands() -> None:
 
 
 def test_a_target_that_has_not_moved_is_followed_from_where_the_drone_is() -> None:
-    follower = Follower(FollowSettings(distance=10.0))
+    follower = TargetFollower(FollowSettings(distance=10.0))
     assert follower.aim(0.0, 30.0, 8.0, 0.0) is None
     follower.see(0.0, 0.0, None, None, 1.0)
     wanted = follower.aim(0.0, 30.0, 8.0, 1.0)
@@ -66,7 +66,7 @@ def test_a_target_that_has_not_moved_is_followed_from_where_the_drone_is() -> No
 
 
 def test_a_target_that_tells_no_velocity_is_seen_to_move() -> None:
-    follower = Follower(FollowSettings(responsiveness=0.0))
+    follower = TargetFollower(FollowSettings(responsiveness=0.0))
     for second in range(5):
         follower.see(0.0, 3.0 * second, None, None, float(second))
     assert follower.speed == pytest.approx(3.0)
@@ -77,7 +77,7 @@ def test_a_target_that_tells_no_velocity_is_seen_to_move() -> None:
 
 def test_a_position_that_is_said_twice_stops_nobody() -> None:
     """MAVSDK repeats the last one each second, right before its user tells the next."""
-    follower = Follower(FollowSettings(responsiveness=0.0))
+    follower = TargetFollower(FollowSettings(responsiveness=0.0))
     for second in range(8):
         follower.see(1.5 * second, 0.0, None, None, float(second))
         follower.see(1.5 * second, 0.0, None, None, second + 0.995)
@@ -90,7 +90,7 @@ def test_a_position_that_is_said_twice_stops_nobody() -> None:
 
 
 def test_two_positions_at_once_make_no_rocket() -> None:
-    follower = Follower(FollowSettings(responsiveness=0.0))
+    follower = TargetFollower(FollowSettings(responsiveness=0.0))
     follower.see(0.0, 0.0, None, None, 0.0)
     follower.see(1.5, 0.0, None, None, 0.005)
     assert follower.speed == 0.0
@@ -121,7 +121,7 @@ def test_the_drone_does_not_rush_round_a_target_that_turns() -> None:
 
 
 def test_a_calm_follower_smoothes() -> None:
-    calm, quick = Follower(FollowSettings(responsiveness=0.8)), Follower(FollowSettings(responsiveness=0.1))
+    calm, quick = TargetFollower(FollowSettings(responsiveness=0.8)), TargetFollower(FollowSettings(responsiveness=0.1))
     for follower in (calm, quick):
         follower.see(0.0, 0.0, None, (0.0, 0.0), 0.0)
         follower.see(10.0, 0.0, None, (0.0, 0.0), 1.0)

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.setpoint.stick_messages import Channels, manual_sticks
+from anafi_mav.services.setpoint.stick_messages import RcChannels, manual_sticks
 from anafi_mav.vehicle.manual_flight import TRANSITIONS, Event, State, Sticks
 
 
@@ -56,11 +56,11 @@ def override(*channels: int) -> Any:
     return dialect.MAVLink_rc_channels_override_message(1, 1, *channels, *[0xFFFF] * (8 - len(channels)))
 
 
-def after(*messages: Any) -> Channels:
-    channels = Channels()
+def after(*messages: Any) -> RcChannels:
+    channels = RcChannels()
     for message in messages:
         result = channels.after(message)
-        assert isinstance(result, Channels)
+        assert isinstance(result, RcChannels)
         channels = result
     return channels
 
@@ -95,4 +95,4 @@ def test_only_the_channels_that_are_set_change() -> None:
 
 @pytest.mark.parametrize("value", [1, 799, 2201, 65534])
 def test_channels_of_another_scale_are_not_flown(value: int) -> None:
-    assert isinstance(Channels().after(override(value)), str)
+    assert isinstance(RcChannels().after(override(value)), str)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from anafi_mav.arsdk.codec.envelope import ProtobufMessage, Service
-from anafi_mav.arsdk.codec.protobuf import BOOL, ENUM, RECORD, Empty, Field, Record
+from anafi_mav.arsdk.codec.envelope import ProtobufEnvelope, ProtobufMessage
+from anafi_mav.arsdk.codec.protobuf import BOOL, ENUM, RECORD, Empty, Field, Submessage
 from anafi_mav.arsdk.codec.wire import OpenEnum
 
-COMMAND = Service("arsdk.antiflicker.Command", "antiflicker.Command")
-EVENT = Service("arsdk.antiflicker.Event", "antiflicker.Event")
+COMMAND = ProtobufEnvelope("arsdk.antiflicker.Command", "antiflicker.Command")
+EVENT = ProtobufEnvelope("arsdk.antiflicker.Event", "antiflicker.Event")
 
 
 class Frequency(OpenEnum):
@@ -24,7 +24,7 @@ class Mode(OpenEnum):
     _60_HZ = 3
 
 
-class Capabilities(Record, frozen=True, kw_only=True):
+class Capabilities(Submessage, frozen=True, kw_only=True):
     supported_modes: Annotated[tuple[Mode, ...], Field(1, ENUM)] = ()
 
 

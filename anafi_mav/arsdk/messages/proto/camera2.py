@@ -10,7 +10,7 @@ from typing import Annotated, ClassVar
 
 import msgspec
 
-from anafi_mav.arsdk.codec.envelope import ProtobufMessage, Service
+from anafi_mav.arsdk.codec.envelope import ProtobufEnvelope, ProtobufMessage
 from anafi_mav.arsdk.codec.protobuf import (
     BOOL,
     DOUBLE,
@@ -22,7 +22,7 @@ from anafi_mav.arsdk.codec.protobuf import (
     UINT64,
     Field,
     Map,
-    Record,
+    Submessage,
     Wrapped,
 )
 from anafi_mav.arsdk.messages.proto import thermal_rendering
@@ -74,11 +74,11 @@ from anafi_mav.arsdk.messages.proto.camera2_values import (
     ZoomVelocityControlQualityMode,
 )
 
-COMMAND = Service("arsdk.camera.Command", "camera2.Command")
-EVENT = Service("arsdk.camera.Event", "camera2.Event")
+COMMAND = ProtobufEnvelope("arsdk.camera.Command", "camera2.Command")
+EVENT = ProtobufEnvelope("arsdk.camera.Event", "camera2.Event")
 
 
-class Config(Record, frozen=True, kw_only=True):
+class Config(Submessage, frozen=True, kw_only=True):
     SELECTED: ClassVar[int] = 1
 
     camera_mode: Annotated[CameraMode | None, Field(2, ENUM)] = None
@@ -121,12 +121,12 @@ class Config(Record, frozen=True, kw_only=True):
     low_light_mode: Annotated[LowLightMode | None, Field(45, ENUM)] = None
 
 
-class ExposureRoiCenter(Record, frozen=True, kw_only=True):
+class ExposureRoiCenter(Submessage, frozen=True, kw_only=True):
     x: Annotated[float, Field(1, DOUBLE)] = 0.0
     y: Annotated[float, Field(2, DOUBLE)] = 0.0
 
 
-class MediaMetadata(Record, frozen=True, kw_only=True):
+class MediaMetadata(Submessage, frozen=True, kw_only=True):
     SELECTED: ClassVar[int] = 1
 
     copyright: Annotated[str | None, Field(2, STRING)] = None
@@ -134,30 +134,30 @@ class MediaMetadata(Record, frozen=True, kw_only=True):
     custom_title: Annotated[str | None, Field(4, STRING)] = None
 
 
-class Vec2(Record, frozen=True, kw_only=True):
+class Vec2(Submessage, frozen=True, kw_only=True):
     x: Annotated[float, Field(1, FLOAT)] = 0.0
     y: Annotated[float, Field(2, FLOAT)] = 0.0
 
 
-class AlignmentOffsets(Record, frozen=True, kw_only=True):
+class AlignmentOffsets(Submessage, frozen=True, kw_only=True):
     pitch: Annotated[float | None, Wrapped(1, DOUBLE)] = None
     roll: Annotated[float | None, Wrapped(2, DOUBLE)] = None
     yaw: Annotated[float | None, Wrapped(3, DOUBLE)] = None
 
 
-class ExposureRoi(Record, frozen=True, kw_only=True):
+class ExposureRoi(Submessage, frozen=True, kw_only=True):
     center: Annotated[ExposureRoiCenter | None, Field(1, RECORD)] = None
     width: Annotated[float, Field(2, DOUBLE)] = 0.0
     height: Annotated[float, Field(3, DOUBLE)] = 0.0
 
 
-class Capabilities(Record, frozen=True, kw_only=True):
+class Capabilities(Submessage, frozen=True, kw_only=True):
     rules: Annotated[tuple[CapabilitiesRule, ...], Field(1, RECORD)] = ()
     thermal_alignment_offset_ranges: Annotated[CapabilitiesAlignmentOffsetRanges | None, Field(2, RECORD)] = None
     thermal_mixing_modes: Annotated[tuple[thermal_rendering.MixingMode, ...], Field(3, ENUM)] = ()
 
 
-class CapabilitiesRule(Record, frozen=True, kw_only=True):
+class CapabilitiesRule(Submessage, frozen=True, kw_only=True):
     SELECTED: ClassVar[int] = 2
 
     index: Annotated[int | None, Field(1, UINT64)] = None
@@ -203,18 +203,18 @@ class CapabilitiesRule(Record, frozen=True, kw_only=True):
     low_light_modes: Annotated[tuple[LowLightMode, ...] | None, Field(46, ENUM)] = None
 
 
-class DoubleRange(Record, frozen=True, kw_only=True):
+class DoubleRange(Submessage, frozen=True, kw_only=True):
     min: Annotated[float, Field(1, DOUBLE)] = 0.0
     max: Annotated[float, Field(2, DOUBLE)] = 0.0
 
 
-class CapabilitiesAlignmentOffsetRanges(Record, frozen=True, kw_only=True):
+class CapabilitiesAlignmentOffsetRanges(Submessage, frozen=True, kw_only=True):
     pitch: Annotated[DoubleRange | None, Field(1, RECORD)] = None
     roll: Annotated[DoubleRange | None, Field(2, RECORD)] = None
     yaw: Annotated[DoubleRange | None, Field(3, RECORD)] = None
 
 
-class StatePhoto(Record, frozen=True, kw_only=True):
+class StatePhoto(Submessage, frozen=True, kw_only=True):
     """`duration` is milliseconds."""
 
     state: Annotated[PhotoState, Field(1, ENUM)] = PhotoState.UNAVAILABLE
@@ -223,7 +223,7 @@ class StatePhoto(Record, frozen=True, kw_only=True):
     duration: Annotated[int | None, Wrapped(5, UINT64)] = None
 
 
-class StateRecording(Record, frozen=True, kw_only=True):
+class StateRecording(Submessage, frozen=True, kw_only=True):
     """`duration` is milliseconds."""
 
     state: Annotated[RecordingState, Field(1, ENUM)] = RecordingState.UNAVAILABLE
@@ -232,29 +232,29 @@ class StateRecording(Record, frozen=True, kw_only=True):
     duration: Annotated[int | None, Wrapped(5, UINT64)] = None
 
 
-class StateWhiteBalanceLock(Record, frozen=True, kw_only=True):
+class StateWhiteBalanceLock(Submessage, frozen=True, kw_only=True):
     supported_modes: Annotated[tuple[WhiteBalanceLockMode, ...], Field(1, ENUM)] = ()
     mode: Annotated[WhiteBalanceLockMode, Field(2, ENUM)] = WhiteBalanceLockMode.UNLOCKED
 
 
-class StateExposureLock(Record, frozen=True, kw_only=True):
+class StateExposureLock(Submessage, frozen=True, kw_only=True):
     supported_modes: Annotated[tuple[ExposureLockMode, ...], Field(1, ENUM)] = ()
     mode: Annotated[ExposureLockMode, Field(2, ENUM)] = ExposureLockMode.UNLOCKED
 
 
-class StateZoom(Record, frozen=True, kw_only=True):
+class StateZoom(Submessage, frozen=True, kw_only=True):
     zoom_level_max: Annotated[float, Field(1, DOUBLE)] = 0.0
     zoom_high_quality_level_max: Annotated[float, Field(2, DOUBLE)] = 0.0
     presets: Annotated[tuple[StateZoomPreset, ...], Field(3, RECORD)] = ()
     cam_ranges: Annotated[tuple[StateZoomCameraRange, ...], Field(4, RECORD)] = ()
 
 
-class StateZoomPreset(Record, frozen=True, kw_only=True):
+class StateZoomPreset(Submessage, frozen=True, kw_only=True):
     preset: Annotated[ZoomPresetEnum, Field(1, ENUM)] = ZoomPresetEnum.WIDE
     value: Annotated[float, Field(2, FLOAT)] = 0.0
 
 
-class StateZoomCameraRange(Record, frozen=True, kw_only=True):
+class StateZoomCameraRange(Submessage, frozen=True, kw_only=True):
     phys_cam: Annotated[CameraSubtype, Field(1, ENUM)] = CameraSubtype.WIDE
     level_min: Annotated[float, Field(2, FLOAT)] = 0.0
     level_max: Annotated[float, Field(3, FLOAT)] = 0.0
@@ -263,11 +263,11 @@ class StateZoomCameraRange(Record, frozen=True, kw_only=True):
     hfov_max: Annotated[float | None, Wrapped(6, FLOAT)] = None
 
 
-class StateEffectiveFramerate(Record, frozen=True, kw_only=True):
+class StateEffectiveFramerate(Submessage, frozen=True, kw_only=True):
     effective_framerate: Annotated[Framerate, Field(1, ENUM)] = Framerate._24
 
 
-class StateUserLfic(Record, frozen=True, kw_only=True):
+class StateUserLfic(Submessage, frozen=True, kw_only=True):
     coords: Annotated[Vec2 | None, Field(1, RECORD)] = None
 
 

@@ -6,12 +6,24 @@ from typing import Annotated
 
 import msgspec
 
-from anafi_mav.arsdk.codec.envelope import ProtobufMessage, Service
-from anafi_mav.arsdk.codec.protobuf import BOOL, BYTES, ENUM, INT32, RECORD, STRING, UINT32, Field, Map, Record, Wrapped
+from anafi_mav.arsdk.codec.envelope import ProtobufEnvelope, ProtobufMessage
+from anafi_mav.arsdk.codec.protobuf import (
+    BOOL,
+    BYTES,
+    ENUM,
+    INT32,
+    RECORD,
+    STRING,
+    UINT32,
+    Field,
+    Map,
+    Submessage,
+    Wrapped,
+)
 from anafi_mav.arsdk.codec.wire import OpenEnum
 
-COMMAND = Service("arsdk.connectivity.Command", "connectivity.Command")
-EVENT = Service("arsdk.connectivity.Event", "connectivity.Event")
+COMMAND = ProtobufEnvelope("arsdk.connectivity.Command", "connectivity.Command")
+EVENT = ProtobufEnvelope("arsdk.connectivity.Event", "connectivity.Event")
 
 
 class Band(OpenEnum):
@@ -76,7 +88,7 @@ class SystemState(OpenEnum):
     RUNNING = 2
 
 
-class AccessPointConfig(Record, frozen=True, kw_only=True):
+class AccessPointConfig(Submessage, frozen=True, kw_only=True):
     security: Annotated[NetworkSecurityMode | None, Field(1, RECORD)] = None
     ssid: Annotated[str | None, Wrapped(2, STRING)] = None
     hidden: Annotated[bool | None, Wrapped(3, BOOL)] = None
@@ -90,44 +102,44 @@ class AccessPointConfig(Record, frozen=True, kw_only=True):
     extra_infos: Annotated[ExtraInfos | None, Field(11, RECORD)] = None
 
 
-class NetworkSecurityMode(Record, frozen=True, kw_only=True):
+class NetworkSecurityMode(Submessage, frozen=True, kw_only=True):
     encryption: Annotated[tuple[EncryptionType, ...], Field(1, ENUM)] = ()
     passphrase: Annotated[str, Field(2, STRING)] = ""
 
 
-class EnvironmentValue(Record, frozen=True, kw_only=True):
+class EnvironmentValue(Submessage, frozen=True, kw_only=True):
     value: Annotated[Environment, Field(1, ENUM)] = Environment.INDOOR
 
 
-class Channel(Record, frozen=True, kw_only=True):
+class Channel(Submessage, frozen=True, kw_only=True):
     radio_channel: Annotated[RadioChannel | None, Field(1, RECORD, "type")] = None
 
 
-class RadioChannel(Record, frozen=True, kw_only=True):
+class RadioChannel(Submessage, frozen=True, kw_only=True):
     band: Annotated[Band, Field(1, ENUM)] = Band._2_4_GHZ
     id: Annotated[int, Field(2, UINT32)] = 0
 
 
-class AutomaticChannelSelection(Record, frozen=True, kw_only=True):
+class AutomaticChannelSelection(Submessage, frozen=True, kw_only=True):
     allowed_bands: Annotated[tuple[Band, ...], Field(1, ENUM)] = ()
 
 
-class FrequencyHoppingList(Record, frozen=True, kw_only=True):
+class FrequencyHoppingList(Submessage, frozen=True, kw_only=True):
     tx_channels: Annotated[tuple[Channel, ...], Field(1, RECORD)] = ()
     rx_channels: Annotated[tuple[Channel, ...], Field(2, RECORD)] = ()
 
 
-class BackupFreqs(Record, frozen=True, kw_only=True):
+class BackupFreqs(Submessage, frozen=True, kw_only=True):
     rx_freqs: Annotated[tuple[int, ...], Field(1, UINT32)] = ()
     tx_freqs: Annotated[tuple[int, ...], Field(2, UINT32)] = ()
 
 
-class ExtraInfos(Record, frozen=True, kw_only=True):
+class ExtraInfos(Submessage, frozen=True, kw_only=True):
     real_country: Annotated[str, Field(1, STRING)] = ""
     active_cellular: Annotated[bool, Field(2, BOOL)] = False
 
 
-class StationConfig(Record, frozen=True, kw_only=True):
+class StationConfig(Submessage, frozen=True, kw_only=True):
     security: Annotated[NetworkSecurityMode | None, Field(1, RECORD)] = None
     ssid: Annotated[str | None, Wrapped(2, STRING)] = None
     hidden: Annotated[bool | None, Wrapped(3, BOOL)] = None
@@ -141,40 +153,40 @@ class StationConfig(Record, frozen=True, kw_only=True):
     extra_infos: Annotated[ExtraInfos | None, Field(11, RECORD)] = None
 
 
-class Capabilities(Record, frozen=True, kw_only=True):
+class Capabilities(Submessage, frozen=True, kw_only=True):
     model: Annotated[str, Field(1, STRING)] = ""
     supported_modes: Annotated[tuple[Mode, ...], Field(2, ENUM)] = ()
     supported_encryption_types: Annotated[tuple[EncryptionType, ...], Field(3, ENUM)] = ()
     supported_countries: Annotated[tuple[str, ...], Field(4, STRING)] = ()
 
 
-class IdleState(Record, frozen=True, kw_only=True):
+class IdleState(Submessage, frozen=True, kw_only=True):
     pass
 
 
-class AccessPointState(Record, frozen=True, kw_only=True):
+class AccessPointState(Submessage, frozen=True, kw_only=True):
     system_state: Annotated[SystemState, Field(1, ENUM)] = SystemState.STOPPING
 
 
-class StationState(Record, frozen=True, kw_only=True):
+class StationState(Submessage, frozen=True, kw_only=True):
     system_state: Annotated[SystemState, Field(1, ENUM)] = SystemState.STOPPING
     connection_state: Annotated[StationConnectionState, Field(2, ENUM)] = StationConnectionState.CONNECTING
 
 
-class AuthorizedChannels(Record, frozen=True, kw_only=True):
+class AuthorizedChannels(Submessage, frozen=True, kw_only=True):
     channel: Annotated[tuple[ChannelDescriptor, ...], Field(1, RECORD)] = ()
 
 
-class ChannelDescriptor(Record, frozen=True, kw_only=True):
+class ChannelDescriptor(Submessage, frozen=True, kw_only=True):
     channel: Annotated[Channel | None, Field(1, RECORD)] = None
     frequency: Annotated[int, Field(3, UINT32)] = 0
 
 
-class AuthorizedPackedChannels(Record, frozen=True, kw_only=True):
+class AuthorizedPackedChannels(Submessage, frozen=True, kw_only=True):
     channels: Annotated[tuple[PackedChannelDescriptor, ...], Field(1, RECORD)] = ()
 
 
-class PackedChannelDescriptor(Record, frozen=True, kw_only=True):
+class PackedChannelDescriptor(Submessage, frozen=True, kw_only=True):
     band: Annotated[Band, Field(1, ENUM)] = Band._2_4_GHZ
     number_of_channels: Annotated[int, Field(2, UINT32)] = 0
     first_id: Annotated[int, Field(3, UINT32)] = 0
@@ -183,14 +195,14 @@ class PackedChannelDescriptor(Record, frozen=True, kw_only=True):
     frequency_step: Annotated[int, Field(6, UINT32)] = 0
 
 
-class Network(Record, frozen=True, kw_only=True):
+class Network(Submessage, frozen=True, kw_only=True):
     channel: Annotated[Channel | None, Field(1, RECORD)] = None
     encryption: Annotated[tuple[EncryptionType, ...], Field(2, ENUM)] = ()
     ssid: Annotated[str, Field(3, STRING)] = ""
     bie: Annotated[tuple[Bie, ...], Field(4, RECORD)] = ()
 
 
-class Bie(Record, frozen=True, kw_only=True):
+class Bie(Submessage, frozen=True, kw_only=True):
     oui: Annotated[bytes, Field(1, BYTES)] = b""
     data: Annotated[bytes, Field(2, BYTES)] = b""
 

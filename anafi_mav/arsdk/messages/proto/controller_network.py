@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from anafi_mav.arsdk.codec.envelope import ProtobufMessage, Service
+from anafi_mav.arsdk.codec.envelope import ProtobufEnvelope, ProtobufMessage
 from anafi_mav.arsdk.codec.protobuf import RECORD, Field
 from anafi_mav.arsdk.messages.proto import network
 
-COMMAND = Service("arsdk.controllernetwork.Command", "controllerNetwork.Command")
-EVENT = Service("arsdk.controllernetwork.Event", "controllerNetwork.Event")
+COMMAND = ProtobufEnvelope("arsdk.controllernetwork.Command", "controllerNetwork.Command")
+EVENT = ProtobufEnvelope("arsdk.controllernetwork.Event", "controllerNetwork.Event")
 
 
 @COMMAND.message("GetState", 16)

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from anafi_mav.arsdk.codec.envelope import ProtobufMessage, Service
-from anafi_mav.arsdk.codec.protobuf import BOOL, RECORD, STRING, Field, Record
+from anafi_mav.arsdk.codec.envelope import ProtobufEnvelope, ProtobufMessage
+from anafi_mav.arsdk.codec.protobuf import BOOL, RECORD, STRING, Field, Submessage
 
-COMMAND = Service("arsdk.developer.Command", "developer.Command")
-EVENT = Service("arsdk.developer.Event", "developer.Event")
+COMMAND = ProtobufEnvelope("arsdk.developer.Command", "developer.Command")
+EVENT = ProtobufEnvelope("arsdk.developer.Event", "developer.Event")
 
 
-class Shell(Record, frozen=True, kw_only=True):
+class Shell(Submessage, frozen=True, kw_only=True):
     enabled: Annotated[bool, Field(1, BOOL)] = False
     public_key: Annotated[str, Field(2, STRING)] = ""
 
 
-class EventAirSdkLog(Record, frozen=True, kw_only=True):
+class EventAirSdkLog(Submessage, frozen=True, kw_only=True):
     enabled: Annotated[bool, Field(1, BOOL)] = False
 
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from anafi_mav.arsdk.codec.envelope import ProtobufMessage, Service
-from anafi_mav.arsdk.codec.protobuf import BOOL, ENUM, RECORD, SINT32, STRING, UINT32, Field, Record, Wrapped
+from anafi_mav.arsdk.codec.envelope import ProtobufEnvelope, ProtobufMessage
+from anafi_mav.arsdk.codec.protobuf import BOOL, ENUM, RECORD, SINT32, STRING, UINT32, Field, Submessage, Wrapped
 from anafi_mav.arsdk.codec.wire import OpenEnum
 from anafi_mav.arsdk.messages.proto import backuplink, microhard
 
-COMMAND = Service("arsdk.devicemanager.Command", "devicemanager.Command")
-EVENT = Service("arsdk.devicemanager.Event", "devicemanager.Event")
+COMMAND = ProtobufEnvelope("arsdk.devicemanager.Command", "devicemanager.Command")
+EVENT = ProtobufEnvelope("arsdk.devicemanager.Event", "devicemanager.Event")
 
 
 class ConnectionFailureReason(OpenEnum):
@@ -44,56 +44,56 @@ class WifiSecurity(OpenEnum):
     WPA2 = 1
 
 
-class ConnectDeviceWifi(Record, frozen=True, kw_only=True):
+class ConnectDeviceWifi(Submessage, frozen=True, kw_only=True):
     security_key: Annotated[str, Field(1, STRING)] = ""
 
 
-class ConnectDeviceCellular(Record, frozen=True, kw_only=True):
+class ConnectDeviceCellular(Submessage, frozen=True, kw_only=True):
     pass
 
 
-class ConnectDeviceMicrohard(Record, frozen=True, kw_only=True):
+class ConnectDeviceMicrohard(Submessage, frozen=True, kw_only=True):
     power: Annotated[int | None, Wrapped(1, UINT32)] = None
 
 
-class ConnectDeviceMars(Record, frozen=True, kw_only=True):
+class ConnectDeviceMars(Submessage, frozen=True, kw_only=True):
     pass
 
 
-class ChangeConnectionParametersWifi(Record, frozen=True, kw_only=True):
+class ChangeConnectionParametersWifi(Submessage, frozen=True, kw_only=True):
     pass
 
 
-class ChangeConnectionParametersCellular(Record, frozen=True, kw_only=True):
+class ChangeConnectionParametersCellular(Submessage, frozen=True, kw_only=True):
     pass
 
 
-class ChangeConnectionParametersMicrohard(Record, frozen=True, kw_only=True):
+class ChangeConnectionParametersMicrohard(Submessage, frozen=True, kw_only=True):
     power: Annotated[int | None, Wrapped(1, UINT32)] = None
     channel: Annotated[int | None, Wrapped(2, UINT32)] = None
     bandwidth: Annotated[microhard.BandwidthValue | None, Field(3, RECORD)] = None
 
 
-class ChangeConnectionParametersMars(Record, frozen=True, kw_only=True):
+class ChangeConnectionParametersMars(Submessage, frozen=True, kw_only=True):
     pass
 
 
-class Capabilities(Record, frozen=True, kw_only=True):
+class Capabilities(Submessage, frozen=True, kw_only=True):
     discovery_transports: Annotated[tuple[Transport, ...], Field(1, ENUM)] = ()
     microhard: Annotated[CapabilitiesMicrohard | None, Field(2, RECORD)] = None
     available_transports: Annotated[tuple[Transport, ...], Field(3, ENUM)] = ()
 
 
-class CapabilitiesMicrohard(Record, frozen=True, kw_only=True):
+class CapabilitiesMicrohard(Submessage, frozen=True, kw_only=True):
     power_min: Annotated[int, Field(2, UINT32)] = 0
     power_max: Annotated[int, Field(3, UINT32)] = 0
 
 
-class StateKnownDevices(Record, frozen=True, kw_only=True):
+class StateKnownDevices(Submessage, frozen=True, kw_only=True):
     devices: Annotated[tuple[KnownDevice, ...], Field(2, RECORD)] = ()
 
 
-class KnownDevice(Record, frozen=True, kw_only=True):
+class KnownDevice(Submessage, frozen=True, kw_only=True):
     info: Annotated[DeviceInfo | None, Field(1, RECORD)] = None
     wifi: Annotated[WifiInfo | None, Field(2, RECORD)] = None
     cellular: Annotated[CellularInfo | None, Field(3, RECORD)] = None
@@ -102,63 +102,63 @@ class KnownDevice(Record, frozen=True, kw_only=True):
     backup_link: Annotated[BackupLinkInfo | None, Field(6, RECORD)] = None
 
 
-class DeviceInfo(Record, frozen=True, kw_only=True):
+class DeviceInfo(Submessage, frozen=True, kw_only=True):
     uid: Annotated[str, Field(1, STRING)] = ""
     model: Annotated[int, Field(2, UINT32)] = 0
     network_id: Annotated[str, Field(3, STRING)] = ""
 
 
-class WifiInfo(Record, frozen=True, kw_only=True):
+class WifiInfo(Submessage, frozen=True, kw_only=True):
     security: Annotated[WifiSecurity, Field(1, ENUM)] = WifiSecurity.NONE
     saved_key: Annotated[bool, Field(2, BOOL)] = False
 
 
-class CellularInfo(Record, frozen=True, kw_only=True):
+class CellularInfo(Submessage, frozen=True, kw_only=True):
     pass
 
 
-class MicrohardInfo(Record, frozen=True, kw_only=True):
+class MicrohardInfo(Submessage, frozen=True, kw_only=True):
     power: Annotated[int, Field(1, UINT32)] = 0
     channel: Annotated[int, Field(2, UINT32)] = 0
     bandwidth: Annotated[microhard.Bandwidth, Field(3, ENUM)] = microhard.Bandwidth._1MHZ
     encryption_algorithm: Annotated[microhard.Encryption, Field(4, ENUM)] = microhard.Encryption.NONE
 
 
-class MarsInfo(Record, frozen=True, kw_only=True):
+class MarsInfo(Submessage, frozen=True, kw_only=True):
     pass
 
 
-class BackupLinkInfo(Record, frozen=True, kw_only=True):
+class BackupLinkInfo(Submessage, frozen=True, kw_only=True):
     pass
 
 
-class ConnectionStateIdle(Record, frozen=True, kw_only=True):
+class ConnectionStateIdle(Submessage, frozen=True, kw_only=True):
     pass
 
 
-class ConnectionStateSearching(Record, frozen=True, kw_only=True):
+class ConnectionStateSearching(Submessage, frozen=True, kw_only=True):
     scanning_idle_devices: Annotated[bool, Field(1, BOOL)] = False
 
 
-class ConnectionStateConnecting(Record, frozen=True, kw_only=True):
+class ConnectionStateConnecting(Submessage, frozen=True, kw_only=True):
     device: Annotated[DeviceInfo | None, Field(1, RECORD)] = None
     transport: Annotated[Transport, Field(2, ENUM)] = Transport.WIFI
     sdk_ready: Annotated[bool, Field(3, BOOL)] = False
     backup_link: Annotated[backuplink.LinkState, Field(4, ENUM)] = backuplink.LinkState.OFF
 
 
-class ConnectionStateConnected(Record, frozen=True, kw_only=True):
+class ConnectionStateConnected(Submessage, frozen=True, kw_only=True):
     device: Annotated[DeviceInfo | None, Field(1, RECORD)] = None
     transport: Annotated[Transport, Field(2, ENUM)] = Transport.WIFI
     backup_link: Annotated[backuplink.LinkState, Field(3, ENUM)] = backuplink.LinkState.OFF
 
 
-class ConnectionStateDisconnecting(Record, frozen=True, kw_only=True):
+class ConnectionStateDisconnecting(Submessage, frozen=True, kw_only=True):
     device: Annotated[DeviceInfo | None, Field(1, RECORD)] = None
     transport: Annotated[Transport, Field(2, ENUM)] = Transport.WIFI
 
 
-class DiscoveredDevice(Record, frozen=True, kw_only=True):
+class DiscoveredDevice(Submessage, frozen=True, kw_only=True):
     info: Annotated[DeviceInfo | None, Field(1, RECORD)] = None
     known: Annotated[bool, Field(2, BOOL)] = False
     wifi_visibility: Annotated[DiscoveredDeviceWifiVisibility | None, Field(3, RECORD)] = None
@@ -166,16 +166,16 @@ class DiscoveredDevice(Record, frozen=True, kw_only=True):
     backup_link_visibility: Annotated[DiscoveredDeviceBackupLinkVisibility | None, Field(5, RECORD)] = None
 
 
-class DiscoveredDeviceWifiVisibility(Record, frozen=True, kw_only=True):
+class DiscoveredDeviceWifiVisibility(Submessage, frozen=True, kw_only=True):
     transport_info: Annotated[WifiInfo | None, Field(1, RECORD)] = None
     rssi: Annotated[int, Field(2, SINT32)] = 0
 
 
-class DiscoveredDeviceCellularVisibility(Record, frozen=True, kw_only=True):
+class DiscoveredDeviceCellularVisibility(Submessage, frozen=True, kw_only=True):
     transport_info: Annotated[CellularInfo | None, Field(1, RECORD)] = None
 
 
-class DiscoveredDeviceBackupLinkVisibility(Record, frozen=True, kw_only=True):
+class DiscoveredDeviceBackupLinkVisibility(Submessage, frozen=True, kw_only=True):
     drone_started: Annotated[bool, Field(1, BOOL)] = False
 
 

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from anafi_mav.arsdk.codec.envelope import ProtobufMessage, Service
+from anafi_mav.arsdk.codec.envelope import ProtobufEnvelope, ProtobufMessage
 from anafi_mav.arsdk.codec.protobuf import ENUM, STRING, UINT32, Field
 from anafi_mav.arsdk.codec.wire import OpenEnum
 
-COMMAND = Service("arsdk.logsync.Command", "logsync.Command")
-EVENT = Service("arsdk.logsync.Event", "logsync.Event")
+COMMAND = ProtobufEnvelope("arsdk.logsync.Command", "logsync.Command")
+EVENT = ProtobufEnvelope("arsdk.logsync.Event", "logsync.Event")
 
 
 class Role(OpenEnum):

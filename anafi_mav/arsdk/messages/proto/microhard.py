@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from anafi_mav.arsdk.codec.protobuf import ENUM, Field, Record
+from anafi_mav.arsdk.codec.protobuf import ENUM, Field, Submessage
 from anafi_mav.arsdk.codec.wire import OpenEnum
 
 
@@ -21,5 +21,5 @@ class Encryption(OpenEnum):
     AES256 = 2
 
 
-class BandwidthValue(Record, frozen=True, kw_only=True):
+class BandwidthValue(Submessage, frozen=True, kw_only=True):
     value: Annotated[Bandwidth, Field(1, ENUM)] = Bandwidth._1MHZ

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from anafi_mav.arsdk.codec.envelope import ProtobufMessage, Service
-from anafi_mav.arsdk.codec.protobuf import BOOL, ENUM, INT32, RECORD, STRING, Empty, Field, Record, Wrapped
+from anafi_mav.arsdk.codec.envelope import ProtobufEnvelope, ProtobufMessage
+from anafi_mav.arsdk.codec.protobuf import BOOL, ENUM, INT32, RECORD, STRING, Empty, Field, Submessage, Wrapped
 from anafi_mav.arsdk.codec.wire import OpenEnum
 
-COMMAND = Service("arsdk.network.Command", "network.Command")
-EVENT = Service("arsdk.network.Event", "network.Event")
+COMMAND = ProtobufEnvelope("arsdk.network.Command", "network.Command")
+EVENT = ProtobufEnvelope("arsdk.network.Event", "network.Event")
 
 
 class CellularStatus(OpenEnum):
@@ -96,22 +96,22 @@ class RoutingPolicy(OpenEnum):
     HYBRID = 3
 
 
-class IpConfig(Record, frozen=True, kw_only=True):
+class IpConfig(Submessage, frozen=True, kw_only=True):
     automatic: Annotated[Empty | None, Field(1, RECORD, "mode")] = None
     static: Annotated[StaticIpConfig | None, Field(2, RECORD, "mode")] = None
 
 
-class StaticIpConfig(Record, frozen=True, kw_only=True):
+class StaticIpConfig(Submessage, frozen=True, kw_only=True):
     address: Annotated[str, Field(1, STRING)] = ""
     mask: Annotated[str, Field(2, STRING)] = ""
     gateway: Annotated[str | None, Wrapped(3, STRING)] = None
 
 
-class LinksStatus(Record, frozen=True, kw_only=True):
+class LinksStatus(Submessage, frozen=True, kw_only=True):
     links: Annotated[tuple[LinksStatusLinkInfo, ...], Field(1, RECORD)] = ()
 
 
-class LinksStatusLinkInfo(Record, frozen=True, kw_only=True):
+class LinksStatusLinkInfo(Submessage, frozen=True, kw_only=True):
     type: Annotated[LinkType, Field(1, ENUM)] = LinkType.UNKNOWN
     status: Annotated[LinkStatus, Field(2, ENUM)] = LinkStatus.DOWN
     quality: Annotated[int, Field(3, INT32)] = 0
@@ -119,7 +119,7 @@ class LinksStatusLinkInfo(Record, frozen=True, kw_only=True):
     cellular_status: Annotated[CellularStatus, Field(5, ENUM)] = CellularStatus.UNKNOWN
 
 
-class Capabilities(Record, frozen=True, kw_only=True):
+class Capabilities(Submessage, frozen=True, kw_only=True):
     """kbit/s."""
 
     cellular_min_bitrate: Annotated[int, Field(1, INT32)] = 0
@@ -127,16 +127,16 @@ class Capabilities(Record, frozen=True, kw_only=True):
     supported_direct_connection_modes: Annotated[tuple[DirectConnectionMode, ...], Field(3, ENUM)] = ()
 
 
-class RoutingInfo(Record, frozen=True, kw_only=True):
+class RoutingInfo(Submessage, frozen=True, kw_only=True):
     policy: Annotated[RoutingPolicy, Field(1, ENUM)] = RoutingPolicy.ALL
     current_link: Annotated[RoutingLink, Field(2, ENUM)] = RoutingLink.ANY
 
 
-class GlobalLinkQuality(Record, frozen=True, kw_only=True):
+class GlobalLinkQuality(Submessage, frozen=True, kw_only=True):
     quality: Annotated[int, Field(1, INT32)] = 0
 
 
-class CellularMaxBitrate(Record, frozen=True, kw_only=True):
+class CellularMaxBitrate(Submessage, frozen=True, kw_only=True):
     """kbit/s, 0 for the default."""
 
     max_bitrate: Annotated[int, Field(1, INT32)] = 0

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from anafi_mav.arsdk.codec.envelope import ProtobufMessage, Service
-from anafi_mav.arsdk.codec.protobuf import BOOL, ENUM, FLOAT, RECORD, Field, Record, Wrapped
+from anafi_mav.arsdk.codec.envelope import ProtobufEnvelope, ProtobufMessage
+from anafi_mav.arsdk.codec.protobuf import BOOL, ENUM, FLOAT, RECORD, Field, Submessage, Wrapped
 from anafi_mav.arsdk.codec.wire import OpenEnum
 
-COMMAND = Service("arsdk.piloting.Command", "piloting.Command")
-EVENT = Service("arsdk.piloting.Event", "piloting.Event")
+COMMAND = ProtobufEnvelope("arsdk.piloting.Command", "piloting.Command")
+EVENT = ProtobufEnvelope("arsdk.piloting.Event", "piloting.Event")
 
 
 class AssistanceMode(OpenEnum):
@@ -55,31 +55,31 @@ class VehicleType(OpenEnum):
     PLANE = 3
 
 
-class SpeedModeValue(Record, frozen=True, kw_only=True):
+class SpeedModeValue(Submessage, frozen=True, kw_only=True):
     value: Annotated[SpeedMode, Field(1, ENUM)] = SpeedMode.NORMAL_SPEED_MODE
 
 
-class AttiMode(Record, frozen=True, kw_only=True):
+class AttiMode(Submessage, frozen=True, kw_only=True):
     enabled: Annotated[bool, Field(1, BOOL)] = False
 
 
-class AssistanceModeValue(Record, frozen=True, kw_only=True):
+class AssistanceModeValue(Submessage, frozen=True, kw_only=True):
     value: Annotated[AssistanceMode, Field(1, ENUM)] = AssistanceMode.ASSISTED_ATTITUDE
 
 
-class TakeoffStateValue(Record, frozen=True, kw_only=True):
+class TakeoffStateValue(Submessage, frozen=True, kw_only=True):
     value: Annotated[TakeoffState, Field(1, ENUM)] = TakeoffState.IDLE
 
 
-class VehicleTypeValue(Record, frozen=True, kw_only=True):
+class VehicleTypeValue(Submessage, frozen=True, kw_only=True):
     value: Annotated[VehicleType, Field(1, ENUM)] = VehicleType.MULTICOPTER
 
 
-class VehicleModeValue(Record, frozen=True, kw_only=True):
+class VehicleModeValue(Submessage, frozen=True, kw_only=True):
     value: Annotated[VehicleMode, Field(1, ENUM)] = VehicleMode.COPTER
 
 
-class FloatRange(Record, frozen=True, kw_only=True):
+class FloatRange(Submessage, frozen=True, kw_only=True):
     min: Annotated[float, Field(1, FLOAT)] = 0.0
     max: Annotated[float, Field(2, FLOAT)] = 0.0
 

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from anafi_mav.arsdk.codec.envelope import ProtobufMessage, Service
-from anafi_mav.arsdk.codec.protobuf import BOOL, DOUBLE, ENUM, RECORD, Empty, Field, Record
+from anafi_mav.arsdk.codec.envelope import ProtobufEnvelope, ProtobufMessage
+from anafi_mav.arsdk.codec.protobuf import BOOL, DOUBLE, ENUM, RECORD, Empty, Field, Submessage
 from anafi_mav.arsdk.codec.wire import OpenEnum
 from anafi_mav.arsdk.messages.proto import backuplink
 
-COMMAND = Service("arsdk.pointnfly.Command", "pointnfly.Command")
-EVENT = Service("arsdk.pointnfly.Event", "pointnfly.Event")
+COMMAND = ProtobufEnvelope("arsdk.pointnfly.Command", "pointnfly.Command")
+EVENT = ProtobufEnvelope("arsdk.pointnfly.Event", "pointnfly.Event")
 
 
 class ExecutionStatus(OpenEnum):
@@ -38,14 +38,14 @@ class UnavailabilityReason(OpenEnum):
     DRONE_NOT_FLYING = 6
 
 
-class Point(Record, frozen=True, kw_only=True):
+class Point(Submessage, frozen=True, kw_only=True):
     gimbal_control_mode: Annotated[GimbalControlMode, Field(1, ENUM)] = GimbalControlMode.LOCKED
     latitude: Annotated[float, Field(2, DOUBLE)] = 0.0
     longitude: Annotated[float, Field(3, DOUBLE)] = 0.0
     altitude: Annotated[float, Field(4, DOUBLE)] = 0.0
 
 
-class Fly(Record, frozen=True, kw_only=True):
+class Fly(Submessage, frozen=True, kw_only=True):
     gimbal_control_mode: Annotated[GimbalControlMode, Field(1, ENUM)] = GimbalControlMode.LOCKED
     latitude: Annotated[float, Field(2, DOUBLE)] = 0.0
     longitude: Annotated[float, Field(3, DOUBLE)] = 0.0
@@ -60,20 +60,20 @@ class Fly(Record, frozen=True, kw_only=True):
     enabled_links: Annotated[backuplink.EnabledLinks, Field(12, ENUM)] = backuplink.EnabledLinks.ALL
 
 
-class StateUnavailable(Record, frozen=True, kw_only=True):
+class StateUnavailable(Submessage, frozen=True, kw_only=True):
     reasons: Annotated[tuple[UnavailabilityReason, ...], Field(1, ENUM)] = ()
 
 
-class StateIdle(Record, frozen=True, kw_only=True):
+class StateIdle(Submessage, frozen=True, kw_only=True):
     pass
 
 
-class StateActive(Record, frozen=True, kw_only=True):
+class StateActive(Submessage, frozen=True, kw_only=True):
     point: Annotated[Point | None, Field(1, RECORD, "current_directive")] = None
     fly: Annotated[Fly | None, Field(2, RECORD, "current_directive")] = None
 
 
-class Capabilities(Record, frozen=True, kw_only=True):
+class Capabilities(Submessage, frozen=True, kw_only=True):
     allowed_links: Annotated[tuple[backuplink.EnabledLinks, ...], Field(1, ENUM)] = ()
 
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from anafi_mav.arsdk.codec.envelope import ProtobufMessage, Service
-from anafi_mav.arsdk.codec.protobuf import BOOL, ENUM, RECORD, STRING, Field, Record
+from anafi_mav.arsdk.codec.envelope import ProtobufEnvelope, ProtobufMessage
+from anafi_mav.arsdk.codec.protobuf import BOOL, ENUM, RECORD, STRING, Field, Submessage
 from anafi_mav.arsdk.codec.wire import OpenEnum
 
-COMMAND = Service("arsdk.privacy.Command", "privacy.Command")
-EVENT = Service("arsdk.privacy.Event", "privacy.Event")
+COMMAND = ProtobufEnvelope("arsdk.privacy.Command", "privacy.Command")
+EVENT = ProtobufEnvelope("arsdk.privacy.Event", "privacy.Event")
 
 
 class Authorization(OpenEnum):
@@ -29,17 +29,17 @@ class LogStorage(OpenEnum):
     NONE = 2
 
 
-class Capabilities(Record, frozen=True, kw_only=True):
+class Capabilities(Submessage, frozen=True, kw_only=True):
     supported_log_storage: Annotated[tuple[LogStorage, ...], Field(1, ENUM)] = ()
     supported_log_config_persistence: Annotated[tuple[LogConfigPersistence, ...], Field(2, ENUM)] = ()
     supported_authorizations: Annotated[tuple[Authorization, ...], Field(3, ENUM)] = ()
 
 
-class LogEncryption(Record, frozen=True, kw_only=True):
+class LogEncryption(Submessage, frozen=True, kw_only=True):
     enabled: Annotated[bool, Field(1, BOOL)] = False
 
 
-class PairingAuthorization(Record, frozen=True, kw_only=True):
+class PairingAuthorization(Submessage, frozen=True, kw_only=True):
     value: Annotated[Authorization, Field(1, ENUM)] = Authorization.NEVER
 
 

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from anafi_mav.arsdk.codec.envelope import ProtobufMessage, Service
-from anafi_mav.arsdk.codec.protobuf import BOOL, ENUM, RECORD, STRING, UINT32, UINT64, Field, Record, Wrapped
+from anafi_mav.arsdk.codec.envelope import ProtobufEnvelope, ProtobufMessage
+from anafi_mav.arsdk.codec.protobuf import BOOL, ENUM, RECORD, STRING, UINT32, UINT64, Field, Submessage, Wrapped
 from anafi_mav.arsdk.codec.wire import OpenEnum
 
-COMMAND = Service("arsdk.storage.Command", "storage.Command")
-EVENT = Service("arsdk.storage.Event", "storage.Event")
+COMMAND = ProtobufEnvelope("arsdk.storage.Command", "storage.Command")
+EVENT = ProtobufEnvelope("arsdk.storage.Event", "storage.Event")
 
 
 class Attribute(OpenEnum):
@@ -88,22 +88,22 @@ class UnlockStatus(OpenEnum):
     RESULT_SUCCESS = 1
 
 
-class Storage(Record, frozen=True, kw_only=True):
+class Storage(Submessage, frozen=True, kw_only=True):
     id: Annotated[int, Field(1, UINT32)] = 0
     type: Annotated[StorageType, Field(2, ENUM)] = StorageType.INTERNAL
 
 
-class Capabilities(Record, frozen=True, kw_only=True):
+class Capabilities(Submessage, frozen=True, kw_only=True):
     supported_features: Annotated[tuple[Feature, ...], Field(1, ENUM)] = ()
     supported_erasing_types: Annotated[tuple[ErasingType, ...], Field(2, ENUM)] = ()
 
 
-class StorageInfo(Record, frozen=True, kw_only=True):
+class StorageInfo(Submessage, frozen=True, kw_only=True):
     name: Annotated[str, Field(1, STRING)] = ""
     capacity: Annotated[int, Field(2, UINT64)] = 0
 
 
-class StorageState(Record, frozen=True, kw_only=True):
+class StorageState(Submessage, frozen=True, kw_only=True):
     physical_state: Annotated[PhysicalState, Field(1, ENUM)] = PhysicalState.UNDETECTED
     file_system_state: Annotated[FileSystemState, Field(2, ENUM)] = FileSystemState.UNKNOWN
     file_system_type: Annotated[str, Field(3, STRING)] = ""
@@ -113,7 +113,7 @@ class StorageState(Record, frozen=True, kw_only=True):
     encryption_state: Annotated[EncryptionState | None, Field(7, RECORD)] = None
 
 
-class EncryptionState(Record, frozen=True, kw_only=True):
+class EncryptionState(Submessage, frozen=True, kw_only=True):
     encryption_type: Annotated[EncryptionType, Field(1, ENUM)] = EncryptionType.NONE
     is_locked: Annotated[bool, Field(2, BOOL)] = False
     has_passphrase: Annotated[bool, Field(3, BOOL)] = False
@@ -122,7 +122,7 @@ class EncryptionState(Record, frozen=True, kw_only=True):
     can_remove_passphrase: Annotated[bool, Field(6, BOOL)] = False
 
 
-class StorageUUID(Record, frozen=True, kw_only=True):
+class StorageUUID(Submessage, frozen=True, kw_only=True):
     uuid: Annotated[str, Field(1, STRING)] = ""
 
 

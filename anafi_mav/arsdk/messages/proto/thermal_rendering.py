@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from anafi_mav.arsdk.codec.protobuf import BOOL, ENUM, FLOAT, RECORD, Field, Record, Wrapped
+from anafi_mav.arsdk.codec.protobuf import BOOL, ENUM, FLOAT, RECORD, Field, Submessage, Wrapped
 from anafi_mav.arsdk.codec.wire import OpenEnum
 
 
@@ -13,18 +13,18 @@ class MixingMode(OpenEnum):
     BLENDED = 1
 
 
-class Palette(Record, frozen=True, kw_only=True):
+class Palette(Submessage, frozen=True, kw_only=True):
     palette_elements: Annotated[tuple[PaletteElement, ...], Field(1, RECORD)] = ()
 
 
-class PaletteElement(Record, frozen=True, kw_only=True):
+class PaletteElement(Submessage, frozen=True, kw_only=True):
     red: Annotated[float, Field(1, FLOAT)] = 0.0
     green: Annotated[float, Field(2, FLOAT)] = 0.0
     blue: Annotated[float, Field(3, FLOAT)] = 0.0
     position: Annotated[float, Field(4, FLOAT)] = 0.0
 
 
-class Rendering(Record, frozen=True, kw_only=True):
+class Rendering(Submessage, frozen=True, kw_only=True):
     mixing_mode: Annotated[MixingModeValue | None, Field(1, RECORD)] = None
     edge_coef: Annotated[float | None, Wrapped(2, FLOAT)] = None
     min_visibility_threshold: Annotated[float | None, Wrapped(3, FLOAT)] = None
@@ -32,5 +32,5 @@ class Rendering(Record, frozen=True, kw_only=True):
     range_locked: Annotated[bool | None, Wrapped(5, BOOL)] = None
 
 
-class MixingModeValue(Record, frozen=True, kw_only=True):
+class MixingModeValue(Submessage, frozen=True, kw_only=True):
     value: Annotated[MixingMode, Field(1, ENUM)] = MixingMode.FULL_THERMAL

@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from anafi_mav.arsdk.codec import protobuf, wire
-from anafi_mav.arsdk.codec.envelope import ProtobufMessage, Service
-from anafi_mav.arsdk.codec.protobuf import ENUM, RECORD, UINT32, Field, Kind, Map, Record, Wrapped
+from anafi_mav.arsdk.codec.envelope import ProtobufEnvelope, ProtobufMessage
+from anafi_mav.arsdk.codec.protobuf import ENUM, RECORD, UINT32, Field, FieldType, Map, Submessage, Wrapped
 from anafi_mav.arsdk.messages.proto import camera2, connectivity, device_manager, logsync, network, piloting, pointnfly
 from anafi_mav.errors import LocalProtocolError
 
@@ -23,43 +23,43 @@ class Colour(wire.OpenEnum):
     BLUE = 2
 
 
-class Leaf(Record, frozen=True, kw_only=True):
-    number: Annotated[int, Field(1, Kind.INT32)] = 0
+class Leaf(Submessage, frozen=True, kw_only=True):
+    number: Annotated[int, Field(1, FieldType.INT32)] = 0
 
 
-class All(Record, frozen=True, kw_only=True):
-    int32: Annotated[int, Field(1, Kind.INT32)] = 0
-    int64: Annotated[int, Field(2, Kind.INT64)] = 0
-    uint32: Annotated[int, Field(3, Kind.UINT32)] = 0
-    uint64: Annotated[int, Field(4, Kind.UINT64)] = 0
-    sint32: Annotated[int, Field(5, Kind.SINT32)] = 0
-    sint64: Annotated[int, Field(6, Kind.SINT64)] = 0
-    flag: Annotated[bool, Field(7, Kind.BOOL)] = False
-    colour: Annotated[Colour, Field(8, Kind.ENUM)] = Colour.RED
-    fixed32: Annotated[int, Field(9, Kind.FIXED32)] = 0
-    sfixed32: Annotated[int, Field(10, Kind.SFIXED32)] = 0
-    float32: Annotated[float, Field(11, Kind.FLOAT)] = 0.0
-    fixed64: Annotated[int, Field(12, Kind.FIXED64)] = 0
-    sfixed64: Annotated[int, Field(13, Kind.SFIXED64)] = 0
-    float64: Annotated[float, Field(14, Kind.DOUBLE)] = 0.0
-    text: Annotated[str, Field(15, Kind.STRING)] = ""
-    blob: Annotated[bytes, Field(16, Kind.BYTES)] = b""
-    leaf: Annotated[Leaf | None, Field(17, Kind.RECORD)] = None
-    numbers: Annotated[tuple[int, ...], Field(18, Kind.SINT32)] = ()
-    floats: Annotated[tuple[float, ...], Field(19, Kind.FLOAT)] = ()
-    texts: Annotated[tuple[str, ...], Field(20, Kind.STRING)] = ()
-    leaves: Annotated[tuple[Leaf, ...], Field(21, Kind.RECORD)] = ()
-    named: Annotated[dict[str, int], Map(22, Kind.STRING, Kind.FIXED32)] = msgspec.field(default_factory=dict)
-    perhaps: Annotated[float | None, Wrapped(23, Kind.DOUBLE)] = None
-    this: Annotated[int | None, Field(24, Kind.UINT32, "choice")] = None
-    that: Annotated[Leaf | None, Field(25, Kind.RECORD, "choice")] = None
+class All(Submessage, frozen=True, kw_only=True):
+    int32: Annotated[int, Field(1, FieldType.INT32)] = 0
+    int64: Annotated[int, Field(2, FieldType.INT64)] = 0
+    uint32: Annotated[int, Field(3, FieldType.UINT32)] = 0
+    uint64: Annotated[int, Field(4, FieldType.UINT64)] = 0
+    sint32: Annotated[int, Field(5, FieldType.SINT32)] = 0
+    sint64: Annotated[int, Field(6, FieldType.SINT64)] = 0
+    flag: Annotated[bool, Field(7, FieldType.BOOL)] = False
+    colour: Annotated[Colour, Field(8, FieldType.ENUM)] = Colour.RED
+    fixed32: Annotated[int, Field(9, FieldType.FIXED32)] = 0
+    sfixed32: Annotated[int, Field(10, FieldType.SFIXED32)] = 0
+    float32: Annotated[float, Field(11, FieldType.FLOAT)] = 0.0
+    fixed64: Annotated[int, Field(12, FieldType.FIXED64)] = 0
+    sfixed64: Annotated[int, Field(13, FieldType.SFIXED64)] = 0
+    float64: Annotated[float, Field(14, FieldType.DOUBLE)] = 0.0
+    text: Annotated[str, Field(15, FieldType.STRING)] = ""
+    blob: Annotated[bytes, Field(16, FieldType.BYTES)] = b""
+    leaf: Annotated[Leaf | None, Field(17, FieldType.RECORD)] = None
+    numbers: Annotated[tuple[int, ...], Field(18, FieldType.SINT32)] = ()
+    floats: Annotated[tuple[float, ...], Field(19, FieldType.FLOAT)] = ()
+    texts: Annotated[tuple[str, ...], Field(20, FieldType.STRING)] = ()
+    leaves: Annotated[tuple[Leaf, ...], Field(21, FieldType.RECORD)] = ()
+    named: Annotated[dict[str, int], Map(22, FieldType.STRING, FieldType.FIXED32)] = msgspec.field(default_factory=dict)
+    perhaps: Annotated[float | None, Wrapped(23, FieldType.DOUBLE)] = None
+    this: Annotated[int | None, Field(24, FieldType.UINT32, "choice")] = None
+    that: Annotated[Leaf | None, Field(25, FieldType.RECORD, "choice")] = None
 
 
-class Chain(Record, frozen=True, kw_only=True):
+class Chain(Submessage, frozen=True, kw_only=True):
     next: Annotated[Chain | None, Field(1, RECORD)] = None
 
 
-class Picked(Record, frozen=True, kw_only=True):
+class Picked(Submessage, frozen=True, kw_only=True):
     SELECTED: ClassVar[int] = 2
     number: Annotated[int | None, Field(1, UINT32)] = None
     colour: Annotated[Colour | None, Field(3, ENUM)] = None
@@ -67,7 +67,7 @@ class Picked(Record, frozen=True, kw_only=True):
     leaf: Annotated[Leaf | None, Field(5, RECORD)] = None
 
 
-VECTORS: list[tuple[str, Record]] = [
+VECTORS: list[tuple[str, Submessage]] = [
     ("", All()),
     # the guide's first example: field 1, varint 150
     ("08 9601", All(int32=150)),
@@ -114,7 +114,7 @@ VECTORS: list[tuple[str, Record]] = [
 
 
 @pytest.mark.parametrize(("text", "record"), VECTORS)
-def test_known_bytes(text: str, record: Record) -> None:
+def test_known_bytes(text: str, record: Submessage) -> None:
     data = bytes.fromhex(text)
     assert protobuf.serialize(record) == data
     back = protobuf.parse(type(record), data)
@@ -152,7 +152,7 @@ def test_known_bytes(text: str, record: Record) -> None:
         ),
     ],
 )
-def test_what_peers_may_also_send(text: str, record: Record) -> None:
+def test_what_peers_may_also_send(text: str, record: Submessage) -> None:
     assert protobuf.parse(type(record), bytes.fromhex(text)) == record
 
 
@@ -227,16 +227,16 @@ def test_nesting_is_bounded() -> None:
         All(this=1, that=Leaf()),
     ],
 )
-def test_our_own_wrong_values_raise(record: Record) -> None:
+def test_our_own_wrong_values_raise(record: Submessage) -> None:
     with pytest.raises(LocalProtocolError, match="cannot encode"):
         protobuf.serialize(record)
 
 
 def test_wrong_declarations_raise() -> None:
-    class Bare(Record, frozen=True):
+    class Bare(Submessage, frozen=True):
         number: int = 0
 
-    class Twice(Record, frozen=True):
+    class Twice(Submessage, frozen=True):
         one: Annotated[int, Field(1, UINT32)] = 0
         two: Annotated[int, Field(1, UINT32)] = 0
 
@@ -264,7 +264,7 @@ def test_wrong_declarations_raise() -> None:
     ],
 )
 def test_service_ids(name: str, number: int) -> None:
-    assert Service(name, "").id == number
+    assert ProtobufEnvelope(name, "").id == number
 
 
 ENVELOPES = [

@@ -18,7 +18,7 @@ from anafi_mav.arsdk.link.transport import (
     Event,
     Garbage,
     LinkDown,
-    Received,
+    ReceivedMessage,
     Role,
     Silent,
     Speaks,
@@ -61,7 +61,7 @@ def ack(version: int, id: int, seq: int) -> bytes:
 
 
 def messages(events: list[Event]) -> list[object]:
-    return [event.message for event in events if isinstance(event, Received)]
+    return [event.message for event in events if isinstance(event, ReceivedMessage)]
 
 
 # -- queues
@@ -87,7 +87,7 @@ def test_a_message_travels_in_the_queue_of_its_buffer(
     (frame,) = frames(transport, transport.outgoing(0.0))
     assert frame == Frame(type, id, 0, with_length(version, wire.encode(message)))
     peer = Transport(Role.DEVICE if role is Role.CONTROLLER else Role.CONTROLLER, version, 0.0)
-    assert peer.receive(encode_frame(version, *frame), 0.0) == [Received(message)]
+    assert peer.receive(encode_frame(version, *frame), 0.0) == [ReceivedMessage(message)]
 
 
 def test_low_priority_events_have_a_queue_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -612,7 +612,7 @@ def test_no_bytes_of_a_peer_raise(role: Role, version: int, seed: int) -> None:
         if number % 10 == 0:
             victim.send(tilt(number), now)
         for event in victim.receive(datagram, now):
-            assert isinstance(event, Received | Delivered | Garbage), f"seed {seed}"
+            assert isinstance(event, ReceivedMessage | Delivered | Garbage), f"seed {seed}"
         victim.outgoing(now)
         victim.expire(now)
     assert sum(count for name, count in victim.counters.items() if name.startswith("garbage.")) > 100
@@ -639,7 +639,7 @@ def test_a_fading_link_drops_what_waits_and_goes_on_when_the_peer_speaks() -> No
         assert transport.expire(now) == []
         assert {frame.id for frame in frames(transport, transport.outgoing(now))} <= {0}
     spoken = transport.receive(data_frame(3, 126, 0, HOVERING), 12.0)
-    assert spoken == [Speaks(), Received(HOVERING)]
+    assert spoken == [Speaks(), ReceivedMessage(HOVERING)]
     (answer,) = frames(transport, transport.outgoing(12.0))
     assert answer.type == FrameType.ACK
     transport.send(tilt(4.0), 12.0)

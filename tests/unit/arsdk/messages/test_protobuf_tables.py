@@ -16,8 +16,8 @@ import pytest
 
 import anafi_mav.arsdk.messages
 from anafi_mav.arsdk.codec import protobuf, wire
-from anafi_mav.arsdk.codec.envelope import ProtobufMessage, Service
-from anafi_mav.arsdk.codec.protobuf import Empty, FieldPlan, Kind, Map, Record, Wrapped
+from anafi_mav.arsdk.codec.envelope import ProtobufEnvelope, ProtobufMessage
+from anafi_mav.arsdk.codec.protobuf import Empty, FieldPlan, FieldType, Map, Submessage, Wrapped
 
 FILES = [
     "antiflicker",
@@ -82,7 +82,7 @@ def described(message: type[ProtobufMessage], services: dict[str, Any]) -> Any:
 # ---------------------------------------------------------------------------------------------------------- the tables
 
 
-def compare(ours: type[Record], theirs: Any, seen: set[tuple[str, str]]) -> None:
+def compare(ours: type[Submessage], theirs: Any, seen: set[tuple[str, str]]) -> None:
     """A record class and a descriptor, and everything below them."""
     pair = (ours.__qualname__, theirs.full_name)
     if pair in seen:
@@ -114,20 +114,26 @@ def compare_field(field: FieldPlan, theirs: Any, selected: bool, seen: set[tuple
     else:
         assert field.repeated is (theirs.label == theirs.LABEL_REPEATED), where
         assert spec.oneof == (theirs.containing_oneof.name if theirs.containing_oneof else ""), where
-        shows = spec.kind is Kind.RECORD and not field.repeated
+        shows = spec.kind is FieldType.RECORD and not field.repeated
         assert field.optional is (selected or bool(spec.oneof) or shows), where
     assert spec.kind.value == type_name(theirs), where
-    if spec.kind is Kind.ENUM:
+    if spec.kind is FieldType.ENUM:
         compare_enum(field.python, theirs.enum_type)
-    elif spec.kind is Kind.RECORD:
-        assert issubclass(field.python, Record)
+    elif spec.kind is FieldType.RECORD:
+        assert issubclass(field.python, Submessage)
         if theirs.message_type.full_name == "google.protobuf.Empty":
             assert field.python is Empty, where
         else:
             assert not theirs.message_type.file.name.startswith("google/"), where
             compare(field.python, theirs.message_type, seen)
     else:
-        python = {Kind.STRING: str, Kind.BYTES: bytes, Kind.BOOL: bool, Kind.FLOAT: float, Kind.DOUBLE: float}
+        python = {
+            FieldType.STRING: str,
+            FieldType.BYTES: bytes,
+            FieldType.BOOL: bool,
+            FieldType.FLOAT: float,
+            FieldType.DOUBLE: float,
+        }
         assert field.python is python.get(spec.kind, int), where
 
 
@@ -180,7 +186,7 @@ def test_olympe_knows_our_services_numbers_and_names_by_the_same() -> None:
 # ------------------------------------------------------------------------------------------------- the bytes, both ways
 
 
-def sample(record: type[Record], rng: random.Random) -> Any:
+def sample(record: type[Submessage], rng: random.Random) -> Any:
     """A record with something in each field, or nothing in some."""
     values = {}
     for field in protobuf.record_fields(record):
@@ -205,24 +211,24 @@ def sample_field(field: FieldPlan, rng: random.Random) -> Any:
 
 def sample_one(field: FieldPlan, rng: random.Random) -> Any:
     kind = field.wire.kind
-    if kind is Kind.RECORD:
+    if kind is FieldType.RECORD:
         return sample(field.python, rng)
-    if kind is Kind.ENUM:
+    if kind is FieldType.ENUM:
         return field.python(rng.choice([*map(int, field.python), 77]))
-    if kind is Kind.BOOL:
+    if kind is FieldType.BOOL:
         return rng.random() < 0.5
-    if kind in (Kind.FLOAT, Kind.DOUBLE):
+    if kind in (FieldType.FLOAT, FieldType.DOUBLE):
         return rng.choice([0.0, -0.5, 1.25, 1e6])
-    if kind is Kind.STRING:
+    if kind is FieldType.STRING:
         return rng.choice(["", "é", "text " * rng.randrange(50)])
-    if kind is Kind.BYTES:
+    if kind is FieldType.BYTES:
         return rng.choice([b"", b"\0\xff", rng.randbytes(200)])
     bits = 64 if kind.value.endswith("64") else 32
     numbers = [0, 1, 127, 128, (1 << bits) - 1] if kind.value.startswith("u") else [0, 1, -1, -(1 << bits - 1)]
     return rng.choice(numbers)
 
 
-def fill(theirs: Any, record: Record) -> None:
+def fill(theirs: Any, record: Submessage) -> None:
     """Put a record into Google's message, as Olympe does it: what is given is listed in `selected_fields`."""
     theirs.SetInParent()
     for field in protobuf.record_fields(type(record)):
@@ -236,14 +242,14 @@ def fill(theirs: Any, record: Record) -> None:
             inner.SetInParent()
             inner.value = value
         elif isinstance(field.wire, Map):
-            assert field.wire.kind is not Kind.RECORD
+            assert field.wire.kind is not FieldType.RECORD
             getattr(theirs, field.name).update(value)
-        elif field.repeated and field.wire.kind is Kind.RECORD:
+        elif field.repeated and field.wire.kind is FieldType.RECORD:
             for one in value:
                 fill(getattr(theirs, field.name).add(), one)
         elif field.repeated:
             getattr(theirs, field.name).extend(value)
-        elif field.wire.kind is Kind.RECORD:
+        elif field.wire.kind is FieldType.RECORD:
             fill(getattr(theirs, field.name), value)
         else:
             setattr(theirs, field.name, value)
@@ -264,6 +270,6 @@ def test_google_writes_and_reads_the_same_bytes(message: type[ProtobufMessage], 
 
 def test_services_are_named_as_their_files(services: dict[str, Any]) -> None:
     for proto in services:
-        assert Service(proto, "").direction is (
+        assert ProtobufEnvelope(proto, "").direction is (
             wire.Direction.COMMAND if proto.endswith(".Command") else wire.Direction.EVENT
         )

@@ -16,7 +16,7 @@ from anafi_mav.arsdk.link.handshake import DeviceInfo
 from anafi_mav.arsdk.link.session import OnMessage
 from anafi_mav.arsdk.messages import ardrone3, common
 from anafi_mav.arsdk.mux import mux, mux_link
-from anafi_mav.arsdk.mux.mux import Control, Decoder, Frame, decode_control, decode_pomp, encode_frame, encode_pomp
+from anafi_mav.arsdk.mux.mux import Control, Decoder, MuxFrame, decode_control, decode_pomp, encode_frame, encode_pomp
 from anafi_mav.errors import LinkLost, LocalProtocolError
 
 INFO = DeviceInfo(0x091D, "PI040443AA9K754503", 0, "SC4")
@@ -26,7 +26,7 @@ def test_frames_by_hand() -> None:
     # libmux: magic, channel, size with the header of 12 bytes.
     data = bytes.fromhex("4d555821 01000000 0f000000 616263")
     assert encode_frame(1, b"abc") == data
-    assert Decoder().feed(data) == [Frame(1, b"abc")]
+    assert Decoder().feed(data) == [MuxFrame(1, b"abc")]
 
 
 def test_the_handshake_by_hand() -> None:
@@ -56,11 +56,11 @@ def test_our_own_wrong_arguments_raise(argument: tuple[str, mux.Argument]) -> No
         encode_pomp(1, [argument])
 
 
-FRAMES = st.lists(st.builds(Frame, st.integers(0, 0xFFFFFFFF), st.binary(max_size=80)), max_size=8)
+FRAMES = st.lists(st.builds(MuxFrame, st.integers(0, 0xFFFFFFFF), st.binary(max_size=80)), max_size=8)
 
 
 @given(frames=FRAMES, cuts=st.lists(st.integers(0, 2000), max_size=12), noise=st.binary(max_size=10))
-def test_a_stream_is_read_however_it_was_cut(frames: list[Frame], cuts: list[int], noise: bytes) -> None:
+def test_a_stream_is_read_however_it_was_cut(frames: list[MuxFrame], cuts: list[int], noise: bytes) -> None:
     noise = noise.replace(b"M", b"m")
     data = noise + b"".join(encode_frame(*frame) for frame in frames)
     decoder, found, position = Decoder(), [], 0

@@ -8,13 +8,13 @@ import pytest
 
 from anafi_mav.arsdk.video import rtsp, sdp
 from anafi_mav.arsdk.video.rtsp import (
-    Malformed,
+    MalformedRtsp,
     MessageReader,
-    Request,
     Response,
     RtpInfo,
+    RtspRequest,
+    RtspTransport,
     Status,
-    Transport,
     encode,
     format_range,
     format_rtp_info,
@@ -30,7 +30,7 @@ from anafi_mav.arsdk.video.rtsp import (
 from anafi_mav.arsdk.video.sdp import MediaDescription, SessionDescription, format_description, parse_description
 from anafi_mav.errors import LocalProtocolError
 
-DESCRIBE = Request("DESCRIBE", "rtsp://192.168.42.1/live", (("CSeq", "2"), ("Accept", "application/sdp")))
+DESCRIBE = RtspRequest("DESCRIBE", "rtsp://192.168.42.1/live", (("CSeq", "2"), ("Accept", "application/sdp")))
 DESCRIBE_BYTES = b"DESCRIBE rtsp://192.168.42.1/live RTSP/1.0\r\nCSeq: 2\r\nAccept: application/sdp\r\n\r\n"
 ANSWER = Response(200, (("CSeq", "2"), ("Content-Type", "application/sdp")), b"v=0\r\n", "OK")
 ANSWER_BYTES = b"RTSP/1.0 200 OK\r\nCSeq: 2\r\nContent-Type: application/sdp\r\nContent-Length: 5\r\n\r\nv=0\r\n"
@@ -87,7 +87,7 @@ def test_a_stream_may_be_cut_anywhere() -> None:
 def test_what_is_no_rtsp_is_answered_and_then_not_read(data: bytes, status: Status) -> None:
     reader = MessageReader()
     (event,) = reader.feed(data)
-    assert isinstance(event, Malformed)
+    assert isinstance(event, MalformedRtsp)
     assert event.status == status
     assert reader.feed(DESCRIBE_BYTES) == []
 
@@ -104,15 +104,15 @@ def test_noise_never_raises() -> None:
 
 def test_a_line_end_in_our_own_lines_raises() -> None:
     with pytest.raises(LocalProtocolError):
-        encode(Request("PLAY", "rtsp://a/b\r\nX: y"))
+        encode(RtspRequest("PLAY", "rtsp://a/b\r\nX: y"))
     with pytest.raises(LocalProtocolError):
         format_description(SessionDescription(name="a\nb"))
 
 
 def test_transport_by_hand() -> None:
     text = "RTP/AVP;unicast;client_port=55004-55005"
-    assert parse_transport(text) == [Transport(client_ports=(55004, 55005))]
-    answer = Transport(client_ports=(55004, 55005), server_ports=(5004, 5005), ssrc=0x0A)
+    assert parse_transport(text) == [RtspTransport(client_ports=(55004, 55005))]
+    answer = RtspTransport(client_ports=(55004, 55005), server_ports=(5004, 5005), ssrc=0x0A)
     line = "RTP/AVP/UDP;unicast;client_port=55004-55005;server_port=5004-5005;ssrc=0000000A"
     assert format_transport(answer) == line
     assert parse_transport(line) == [answer]
@@ -125,7 +125,7 @@ def test_transport_by_hand() -> None:
 
 @pytest.mark.parametrize("ports", ["0-1", "65536-65537", "abc", "-5", ""])
 def test_ports_that_are_none(ports: str) -> None:
-    assert parse_transport(f"RTP/AVP;unicast;client_port={ports}") == [Transport()]
+    assert parse_transport(f"RTP/AVP;unicast;client_port={ports}") == [RtspTransport()]
 
 
 def test_session_range_and_rtp_info_by_hand() -> None:

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from anafi_mav.arsdk.messages.ardrone3 import PCMD
-from anafi_mav.drone.piloting.sticks import CENTRED, Limits, Percent, PilotingCommand, Sticks, percent
+from anafi_mav.drone.piloting.sticks import CENTRED, Limits, Percent, PilotingCommand, StickSchedule, percent
 from anafi_mav.errors import LocalProtocolError
 
 LIMITS = Limits(tilt_deg=40.0, yaw_rate_dps=200.0, climb_mps=4.0)
@@ -47,7 +47,7 @@ def test_a_setpoint_that_is_no_number_is_our_own_mistake(field: str) -> None:
         percent(PilotingCommand(**{field: math.nan}), LIMITS)
 
 
-def run(sticks: Sticks, start: float, end: float) -> list[tuple[float, PCMD]]:
+def run(sticks: StickSchedule, start: float, end: float) -> list[tuple[float, PCMD]]:
     """Serve the sticks as their shell does, always in time."""
     sent = []
     now = start
@@ -62,12 +62,12 @@ def run(sticks: Sticks, start: float, end: float) -> list[tuple[float, PCMD]]:
 
 
 def test_nothing_is_sent_before_the_first_command() -> None:
-    assert Sticks().deadline is None
-    assert Sticks().due(10.0) is None
+    assert StickSchedule().deadline is None
+    assert StickSchedule().due(10.0) is None
 
 
 def test_a_setpoint_leaves_at_once_and_is_repeated_at_20_hz() -> None:
-    sticks = Sticks()
+    sticks = StickSchedule()
     sticks.command(Percent(10, -20, 30, -40), 100.0)
     assert sticks.deadline == 100.0
     sent = run(sticks, 100.0, 100.49)
@@ -76,7 +76,7 @@ def test_a_setpoint_leaves_at_once_and_is_repeated_at_20_hz() -> None:
 
 
 def test_a_newer_setpoint_does_not_wait_for_the_rhythm() -> None:
-    sticks = Sticks()
+    sticks = StickSchedule()
     sticks.command(Percent(10, 0, 0, 0), 1.0)
     assert sticks.due(1.0) is not None
     sticks.command(Percent(20, 0, 0, 0), 1.01)
@@ -87,7 +87,7 @@ def test_a_newer_setpoint_does_not_wait_for_the_rhythm() -> None:
 
 
 def test_setpoints_that_come_too_often_wait_and_the_newest_wins() -> None:
-    sticks = Sticks()
+    sticks = StickSchedule()
     for now, roll in ((1.0, 10), (1.005, 11)):  # two may follow each other at once
         sticks.command(Percent(roll, 0, 0, 0), now)
         assert sticks.due(now) is not None
@@ -102,7 +102,7 @@ def test_setpoints_that_come_too_often_wait_and_the_newest_wins() -> None:
 
 def test_the_same_said_again_leaves_with_the_repetition() -> None:
     """A joystick that is held still is streamed fifty times a second; the drone hears it twenty times."""
-    sticks = Sticks()
+    sticks = StickSchedule()
     sent = []
     for number in range(50):
         now = 3.0 + 0.02 * number
@@ -117,7 +117,7 @@ def test_the_same_said_again_leaves_with_the_repetition() -> None:
 
 
 def test_a_setpoint_that_is_not_renewed_becomes_centred_sticks() -> None:
-    sticks = Sticks()
+    sticks = StickSchedule()
     sticks.command(Percent(10, 0, 0, 0), 0.0)
     sent = run(sticks, 0.0, 60.0)
     assert {p.roll for t, p in sent if t < 0.5} == {10}
@@ -126,7 +126,7 @@ def test_a_setpoint_that_is_not_renewed_becomes_centred_sticks() -> None:
 
 
 def test_centred_sticks_are_sent_for_two_seconds() -> None:
-    sticks = Sticks()
+    sticks = StickSchedule()
     sticks.command(Percent(50, 0, 0, 0), 5.0)
     sticks.due(5.0)
     sticks.centre(5.02)
@@ -151,7 +151,7 @@ FLAGS = [
 
 @pytest.mark.parametrize(("position", "flag"), FLAGS)
 def test_pcmd_flag_is_one_only_while_roll_or_pitch_is_deflected(position: Percent, flag: int) -> None:
-    sticks = Sticks()
+    sticks = StickSchedule()
     sticks.command(position, 1.0)
     pcmd = sticks.due(1.0)
     assert pcmd is not None
@@ -159,7 +159,7 @@ def test_pcmd_flag_is_one_only_while_roll_or_pitch_is_deflected(position: Percen
 
 
 def test_a_command_ends_the_centring_and_stop_ends_all() -> None:
-    sticks = Sticks()
+    sticks = StickSchedule()
     sticks.centre(0.0)
     sticks.command(Percent(1, 2, 3, 4), 0.5)
     assert len(run(sticks, 0.5, 0.99)) == 10
@@ -169,7 +169,7 @@ def test_a_command_ends_the_centring_and_stop_ends_all() -> None:
 
 
 def test_a_late_call_keeps_the_grid_but_missed_ones_are_not_made_up_for() -> None:
-    sticks = Sticks()
+    sticks = StickSchedule()
     sticks.command(CENTRED, 0.0)
     sticks.due(0.0)
     assert sticks.due(0.058) is not None  # 8 ms late
@@ -180,7 +180,7 @@ def test_a_late_call_keeps_the_grid_but_missed_ones_are_not_made_up_for() -> Non
 
 
 def test_the_stamp_counts_and_tells_the_milliseconds() -> None:
-    sticks = Sticks()
+    sticks = StickSchedule()
     sticks.command(CENTRED, 1.0)
     stamps = [p.timestampAndSeqNum for _, p in run(sticks, 1.0, 1.11)]
     # sequence 1, 2, 3 in the top byte; 1000, 1050, 1100 ms below
@@ -193,5 +193,5 @@ def test_the_stamp_counts_and_tells_the_milliseconds() -> None:
 
 
 def test_single_pcmd_of_centred_sticks_has_flag_zero() -> None:
-    pcmd = Sticks().single(CENTRED, 0.0)
+    pcmd = StickSchedule().single(CENTRED, 0.0)
     assert (pcmd.flag, pcmd.roll, pcmd.pitch, pcmd.yaw, pcmd.gaz) == (0, 0, 0, 0, 0)

@@ -32,7 +32,18 @@ from anafi_mav import geo, mav_enums
 from anafi_mav.errors import PlanError
 from anafi_mav.plans.formats import files, parrot, qgc_plan, waypoints
 from anafi_mav.plans.formats.files import Format
-from anafi_mav.plans.plan import DO_JUMP, MAX_ITEMS, MISSION, RELATIVE, Circle, Item, Loss, Plan, Point, Polygon
+from anafi_mav.plans.plan import (
+    DO_JUMP,
+    MAX_ITEMS,
+    MISSION,
+    RELATIVE,
+    FenceCircle,
+    FencePolygon,
+    Item,
+    Loss,
+    Plan,
+    Point,
+)
 from anafi_mav.sim.plan import plan_file
 
 # QGroundControl.
@@ -54,8 +65,8 @@ def test_a_plan_of_qgroundcontrol() -> None:
     assert plan.items[7].params[0] == 3.0  # an item of the survey
     assert plan.home == Point(LAT, LON, 35.25)
     assert plan.zones == (
-        Polygon(False, ((LAT, LON), (LAT + 0.001, LON), (LAT, LON + 0.001))),
-        Circle(True, (LAT, LON), 80.5),
+        FencePolygon(False, ((LAT, LON), (LAT + 0.001, LON), (LAT, LON + 0.001))),
+        FenceCircle(True, (LAT, LON), 80.5),
     )
     assert plan.breach_return == Point(LAT, LON, 30.0)
     assert plan.rally == (Point(LAT, LON, 50.0),)
@@ -228,7 +239,7 @@ def test_waypoints_as_pymavlink_writes_and_reads_them(tmp_path: Path) -> None:
 def test_fences_and_rally_points_as_mavproxy_keeps_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MAVLINK20", "1")
     monkeypatch.setattr(mavutil, "mavlink", common)
-    fence = Plan(zones=(*FLIGHT.zones, Circle(True, None, 90.0, 2)), breach_return=FLIGHT.breach_return)
+    fence = Plan(zones=(*FLIGHT.zones, FenceCircle(True, None, 90.0, 2)), breach_return=FLIGHT.breach_return)
     data, losses = waypoints.write(fence)
     (tmp_path / "fence.txt").write_bytes(data)
     theirs = mavwp.MissionItemProtocol_Fence()
@@ -377,7 +388,7 @@ def test_any_plan_through_qgroundcontrols_format(plan: Plan) -> None:
         assert "no speeds" in said
     else:
         assert (again.hover_speed, again.cruise_speed) == (plan.hover_speed, plan.cruise_speed)
-    around_home = [zone for zone in plan.zones if isinstance(zone, Circle) and zone.centre is None]
+    around_home = [zone for zone in plan.zones if isinstance(zone, FenceCircle) and zone.centre is None]
     grouped = [zone for zone in plan.zones if zone.inclusion and zone.group]
     assert said.count("around home") == len(around_home)
     assert said.count("of group") == len(grouped)

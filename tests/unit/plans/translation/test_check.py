@@ -10,8 +10,8 @@ from support.plan_samples import LAT, LON, action, waypoint
 from anafi_mav import mav_enums
 from anafi_mav.models import planned
 from anafi_mav.plans.formats import files
-from anafi_mav.plans.plan import GLOBAL, RELATIVE, Circle, Item, Plan, Point, Polygon
-from anafi_mav.plans.translation.check import Findings, Limits, Severity, check
+from anafi_mav.plans.plan import GLOBAL, RELATIVE, FenceCircle, FencePolygon, Item, Plan, Point
+from anafi_mav.plans.translation.check import Findings, FindingSeverity, FlightLimits, check
 from anafi_mav.sim.world.model import MODELS as SIMULATED
 
 MISSIONS = Path(__file__).parents[4] / "missions"
@@ -22,11 +22,11 @@ UP = Item(mav_enums.MAV_CMD_NAV_TAKEOFF, RELATIVE, (0.0, 0.0, 0.0, None, None, N
 BACK = action(mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH)
 
 
-def found(*items: Item, model: str = "4k", limits: Limits | None = None, **more: object) -> Findings:
+def found(*items: Item, model: str = "4k", limits: FlightLimits | None = None, **more: object) -> Findings:
     return check(Plan(tuple(items), **{"home": HOME, **more}), MODELS[model], limits)  # type: ignore[arg-type]
 
 
-def told(findings: Findings, severity: Severity = Severity.ERROR) -> list[str]:
+def told(findings: Findings, severity: FindingSeverity = FindingSeverity.ERROR) -> list[str]:
     return [str(problem) for problem in findings.problems if problem.severity is severity]
 
 
@@ -65,14 +65,14 @@ def test_what_cannot_be_flown() -> None:
 def test_heights() -> None:
     items = (UP, waypoint(1, 0, 120.0), waypoint(2, 0, -3.0), BACK)
     assert told(found(*items)) == ["item 2: -3 m is below the take-off"]
-    assert told(found(*items, limits=Limits(max_altitude=100.0))) == [
+    assert told(found(*items, limits=FlightLimits(max_altitude=100.0))) == [
         "item 1: 120 m above take-off is higher than the limit of 100 m",
         "item 2: -3 m is below the take-off",
     ]
     assert told(found(UP, waypoint(1, 0, 120.0), BACK, home=Point(LAT, LON, 4400.0))) == [
         "item 1: 4520 m above the sea is higher than an ANAFI 4K flies"
     ]
-    assert told(found(UP, waypoint(1, 0, 135.0, frame=GLOBAL), BACK, limits=Limits(max_altitude=99.0))) == [
+    assert told(found(UP, waypoint(1, 0, 135.0, frame=GLOBAL), BACK, limits=FlightLimits(max_altitude=99.0))) == [
         "item 1: 100 m above take-off is higher than the limit of 99 m"
     ]
 
@@ -80,7 +80,7 @@ def test_heights() -> None:
 def test_without_a_home_heights_above_the_sea_are_not_known() -> None:
     findings = found(UP, waypoint(1, 0, 60.0, frame=GLOBAL), BACK, home=None)
     assert told(findings) == []
-    assert told(findings, Severity.WARNING) == [
+    assert told(findings, FindingSeverity.WARNING) == [
         "item 1: its height is above mean sea level, and that of the take-off point is not known: "
         "its path cannot be checked"
     ]
@@ -88,17 +88,17 @@ def test_without_a_home_heights_above_the_sea_are_not_known() -> None:
 
 def test_the_fence() -> None:
     """The circle is 50 m wide; the way to item 2 leads through the forbidden square and ends outside of it."""
-    circle = found(UP, waypoint(9, 0), BACK, zones=(Circle(True, (LAT, LON), 50.0),))
+    circle = found(UP, waypoint(9, 0), BACK, zones=(FenceCircle(True, (LAT, LON), 50.0),))
     assert told(circle) == ["item 1: the way there leaves the fence (inclusion circle 0)"]
     square = tuple((LAT + north * 1e-4, LON + east * 1e-4) for north, east in ((4, -1), (4, 1), (6, 1), (6, -1)))
-    through = found(UP, waypoint(3, 0), waypoint(7, 0), waypoint(7, 5), BACK, zones=(Polygon(False, square),))
+    through = found(UP, waypoint(3, 0), waypoint(7, 0), waypoint(7, 5), BACK, zones=(FencePolygon(False, square),))
     assert told(through) == ["item 2: the way there leaves the fence (exclusion polygon 0)"]
-    outside = found(UP, waypoint(1, 0), BACK, zones=(Circle(True, (LAT + 0.01, LON), 50.0),))
+    outside = found(UP, waypoint(1, 0), BACK, zones=(FenceCircle(True, (LAT + 0.01, LON), 50.0),))
     assert "it begins outside the fence" in told(outside)
 
 
 def test_distances() -> None:
-    assert told(found(UP, waypoint(20, 0), BACK, limits=Limits(max_distance=200.0))) == [
+    assert told(found(UP, waypoint(20, 0), BACK, limits=FlightLimits(max_distance=200.0))) == [
         "item 1: it is 222 m from home, the limit is 200 m"
     ]
     assert told(found(UP, waypoint(540, 0), BACK))[0] == (
@@ -108,7 +108,7 @@ def test_distances() -> None:
     assert told(begins_there) == []
     far_take_off = Item(mav_enums.MAV_CMD_NAV_TAKEOFF, RELATIVE, (0.0, 0.0, 0.0, None, None, None, 0.0))
     assert "item 1: it is 1112 m from home: the drone may refuse to begin so far away" in told(
-        found(far_take_off, waypoint(100, 0), BACK), Severity.WARNING
+        found(far_take_off, waypoint(100, 0), BACK), FindingSeverity.WARNING
     )
 
 
@@ -123,11 +123,11 @@ def test_the_battery() -> None:
         "it takes 26 min of the 25 that an ANAFI 4K flies"
     ]
     findings = found(UP, action(mav_enums.MAV_CMD_NAV_DELAY, 1500.0), BACK, model="usa")
-    assert (told(findings), told(findings, Severity.WARNING)) == (
+    assert (told(findings), told(findings, FindingSeverity.WARNING)) == (
         [],
         [],
     )
-    assert told(found(UP, action(mav_enums.MAV_CMD_NAV_DELAY, 1700.0), BACK, model="usa"), Severity.WARNING) == [
+    assert told(found(UP, action(mav_enums.MAV_CMD_NAV_DELAY, 1700.0), BACK, model="usa"), FindingSeverity.WARNING) == [
         "it takes 29 min of the 32 that an ANAFI USA flies"
     ]
 
@@ -135,9 +135,9 @@ def test_the_battery() -> None:
 def test_a_plan_without_an_end() -> None:
     findings = found(UP, waypoint(1, 0), waypoint(2, 0), action(mav_enums.MAV_CMD_DO_JUMP, 1.0, -1.0))
     assert not findings.errors
-    assert "it is flown until the battery is low" in told(findings, Severity.WARNING)
+    assert "it is flown until the battery is low" in told(findings, FindingSeverity.WARNING)
     assert findings.seconds is None
-    assert told(found(UP, waypoint(1, 0)), Severity.WARNING) == [
+    assert told(found(UP, waypoint(1, 0)), FindingSeverity.WARNING) == [
         "it ends in the air: the drone hovers there until the battery is low"
     ]
 
@@ -145,18 +145,20 @@ def test_a_plan_without_an_end() -> None:
 def test_how_an_ai_begins() -> None:
     """At its return height above the first way point, if that is lower (Parrot's flight plan page)."""
     low = Item(mav_enums.MAV_CMD_NAV_TAKEOFF, RELATIVE, (0.0, 0.0, 0.0, None, None, None, 10.0))
-    findings = found(low, waypoint(1, 0, 10.0), BACK, model="ai", limits=Limits(return_height=30.0))
-    assert told(findings, Severity.WARNING) == [
+    findings = found(low, waypoint(1, 0, 10.0), BACK, model="ai", limits=FlightLimits(return_height=30.0))
+    assert told(findings, FindingSeverity.WARNING) == [
         "item 0: an Ai begins at 30 m above take-off: it rises there first, goes over to above it and sinks"
     ]
-    assert told(found(low, waypoint(1, 0, 10.0), BACK), Severity.WARNING) == []
-    high = found(low, waypoint(1, 0, 10.0), BACK, model="ai", limits=Limits(max_altitude=25.0, return_height=30.0))
+    assert told(found(low, waypoint(1, 0, 10.0), BACK), FindingSeverity.WARNING) == []
+    high = found(
+        low, waypoint(1, 0, 10.0), BACK, model="ai", limits=FlightLimits(max_altitude=25.0, return_height=30.0)
+    )
     assert told(high) == ["item 0: 30 m above take-off is higher than the limit of 25 m"]
 
 
 def test_what_the_gateway_flies_is_told() -> None:
     findings = found(UP, action(mav_enums.MAV_CMD_SET_CAMERA_ZOOM, 2.0, 50.0), waypoint(1, 0), BACK)
-    assert told(findings, Severity.WARNING) == [
+    assert told(findings, FindingSeverity.WARNING) == [
         "item 1: flown by the gateway: SET_CAMERA_ZOOM: the gateway zooms: a flight plan cannot"
     ]
 

@@ -15,7 +15,14 @@ from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.messages.common import MavlinkType, PlayingState
 from anafi_mav.plans.formats import files
 from anafi_mav.plans.plan import GLOBAL, RELATIVE, WAYPOINT, Item
-from anafi_mav.plans.translation.translate import Flight, Leg, Start, Step, examine, translate
+from anafi_mav.plans.translation.translate import (
+    FlightPlanFile,
+    GatewayStep,
+    Start,
+    TranslatedMission,
+    examine,
+    translate,
+)
 from anafi_mav.units import DEG_PER_RAD
 
 MISSIONS = Path(__file__).parents[4] / "missions"
@@ -37,9 +44,9 @@ class Flown:
         self.seen: dict[int, tuple[float, float, float, float]] = {}
         """Item -> where the drone was when it was done: m north, east, up; deg of its heading."""
         assert examine(self.items, self.version).faults == ()
-        self.flight: Flight = translate(self.items, self.version, self._start())
+        self.flight: TranslatedMission = translate(self.items, self.version, self._start())
         for part in self.flight.parts:
-            if isinstance(part, Step):
+            if isinstance(part, GatewayStep):
                 self.done += part.done
             else:
                 self._fly(part)
@@ -47,7 +54,7 @@ class Flown:
     def _start(self) -> Start:
         return Start(HOME[0], HOME[1], 0.0, flying=False, takeoff_amsl=HOME[2], heading=0.0)
 
-    def _fly(self, leg: Leg) -> None:
+    def _fly(self, leg: FlightPlanFile) -> None:
         bench = self.bench
         bench.events.clear()
         kind = MavlinkType.FLIGHT_PLAN if self.version == 1 else MavlinkType.FLIGHT_PLAN_V2
@@ -83,7 +90,7 @@ class Flown:
 def check(flown: Flown) -> None:
     assert flown.done == list(range(len(flown.items)))
     steps = [number for number, item in enumerate(flown.items) if item.command in (ZOOM, TURN)]
-    assert [part.item for part in flown.flight.parts if isinstance(part, Step)] == steps
+    assert [part.item for part in flown.flight.parts if isinstance(part, GatewayStep)] == steps
     for number, item in enumerate(flown.items):
         if item.command == WAYPOINT:
             assert flown.missed_by(number, item) < WITHIN, number

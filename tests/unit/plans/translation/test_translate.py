@@ -16,16 +16,16 @@ from anafi_mav import mav_enums
 from anafi_mav.errors import PlanError
 from anafi_mav.plans.formats.parrot import Version
 from anafi_mav.plans.plan import DO_JUMP, GLOBAL, RELATIVE, TERRAIN, Item, Loss
-from anafi_mav.plans.rules.rule import Verdict
+from anafi_mav.plans.rules.rule import Fidelity
 from anafi_mav.plans.rules.rules import TABLE
 from anafi_mav.plans.translation.translate import (
     MAX_LINES,
-    Fault,
     FaultKind,
-    Flight,
-    Leg,
+    FlightPlanFile,
+    GatewayStep,
     Start,
-    Step,
+    TranslatedMission,
+    TranslationFault,
     examine,
     translate,
 )
@@ -42,10 +42,10 @@ def take_off(height: float | None, *place: float, heading: float | None = None) 
     return Item(mav_enums.MAV_CMD_NAV_TAKEOFF, RELATIVE, (0.0, 0.0, 0.0, heading, latitude, longitude, height))
 
 
-def lines(flight: Flight, part: int = 0) -> list[str]:
+def lines(flight: TranslatedMission, part: int = 0) -> list[str]:
     """The lines of a file, without what is the same in all: number, current and autocontinue."""
     leg = flight.parts[part]
-    assert isinstance(leg, Leg)
+    assert isinstance(leg, FlightPlanFile)
     header, *rows = leg.content.decode().splitlines()
     assert header == "QGC WPL 120"
     found = []
@@ -83,7 +83,7 @@ def test_a_flight_of_version_1() -> None:
         "3 20 0.0 0.0 0.0 0.0 0.0 0.0 0.0",
     ]
     (leg,) = flight.parts
-    assert isinstance(leg, Leg)
+    assert isinstance(leg, FlightPlanFile)
     assert leg.origins == (0, 0, 1, 2, 2, 3, 4, 5)
     assert leg.done == ((), (0,), (1,), (), (2,), (3,), (4,), (5,))
     assert (flight.notes, flight.rest) == ((), None)
@@ -197,7 +197,7 @@ def test_jumps_are_written_out() -> None:
     items = [waypoint(1, 0), waypoint(2, 0), action(DO_JUMP, 0.0, 2.0), action(mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH)]
     flight = translate(items, 1, AIR)
     (leg,) = flight.parts
-    assert isinstance(leg, Leg)
+    assert isinstance(leg, FlightPlanFile)
     assert leg.origins == (0, 1, 0, 1, 0, 1, 3)
     assert leg.done == ((0,), (1, 2), (0,), (1, 2), (0,), (1, 2), (3,))
     assert examine(items, 1).stepped == ()
@@ -244,7 +244,7 @@ def test_a_long_mission_is_flown_file_after_file_and_told_of_to_its_end() -> Non
     flight = translate(items, 2, AIR, flight.rest)
     assert flight.rest is None
     for part in flight.parts:
-        done += chain(*part.done) if isinstance(part, Leg) else part.done
+        done += chain(*part.done) if isinstance(part, FlightPlanFile) else part.done
     assert done == list(range(MAX_LINES + 4))
 
 
@@ -252,7 +252,7 @@ def test_a_loop_in_a_loop_counts_for_the_whole_mission() -> None:
     """As in PX4 and ArduPilot: the inner jump is used up in the first round of the outer one."""
     items = [waypoint(1, 0), action(DO_JUMP, 0.0, 2.0), waypoint(2, 0), action(DO_JUMP, 0.0, 1.0)]
     (leg,) = translate(items, 1, AIR).parts
-    assert isinstance(leg, Leg)
+    assert isinstance(leg, FlightPlanFile)
     assert leg.origins == (0, 0, 0, 2, 0, 2)
 
 
@@ -268,10 +268,10 @@ def test_a_turn_in_place_is_flown_by_the_gateway() -> None:
     assert [loss.item for loss in report.stepped] == [2]
     flight = translate(items, 1, AIR)
     first, step, last = flight.parts
-    assert isinstance(first, Leg)
-    assert isinstance(last, Leg)
+    assert isinstance(first, FlightPlanFile)
+    assert isinstance(last, FlightPlanFile)
     assert first.done == ((0,), (1,))
-    assert step == Step(2, (2, 3))
+    assert step == GatewayStep(2, (2, 3))
     assert lines(flight, 2)[0] == "3 178 0.0 3.0 0.0 0.0 0.0 0.0 0.0"  # a new file: what holds is set again
     assert last.origins == (4, 4)
     assert last.done == ((), (4,))
@@ -299,36 +299,38 @@ def test_begin_in_the_middle() -> None:
 WRONG = {
     "unknown": (
         [waypoint(0, 1), action(mav_enums.MAV_CMD_DO_VTOL_TRANSITION)],
-        Fault(1, "DO_VTOL_TRANSITION: no flight plan has it", FaultKind.COMMAND),
+        TranslationFault(1, "DO_VTOL_TRANSITION: no flight plan has it", FaultKind.COMMAND),
     ),
     "circle": (
         [Item(mav_enums.MAV_CMD_NAV_LOITER_TURNS, RELATIVE, (1.0, 0.0, 5.0, 0.0, LAT, LON, 9.0))],
-        Fault(0, "NAV_LOITER_TURNS: the drone flies straight lines: draw the circle as way points", FaultKind.COMMAND),
+        TranslationFault(
+            0, "NAV_LOITER_TURNS: the drone flies straight lines: draw the circle as way points", FaultKind.COMMAND
+        ),
     ),
     "latitude": (
         [Item(mav_enums.MAV_CMD_NAV_WAYPOINT, RELATIVE, (0.0, 0.0, 0.0, 0.0, 91.0, LON, 9.0))],
-        Fault(0, "NAV_WAYPOINT: 91 is no latitude", FaultKind.PARAM, 5),
+        TranslationFault(0, "NAV_WAYPOINT: 91 is no latitude", FaultKind.PARAM, 5),
     ),
     "longitude": (
         [Item(mav_enums.MAV_CMD_NAV_WAYPOINT, RELATIVE, (0.0, 0.0, 0.0, 0.0, LAT, None, 9.0))],
-        Fault(0, "NAV_WAYPOINT: it has no longitude", FaultKind.PARAM, 6),
+        TranslationFault(0, "NAV_WAYPOINT: it has no longitude", FaultKind.PARAM, 6),
     ),
-    "infinite": ([waypoint(0, 1, float("inf"))], Fault(0, "inf is no number", FaultKind.PARAM, 7)),
+    "infinite": ([waypoint(0, 1, float("inf"))], TranslationFault(0, "inf is no number", FaultKind.PARAM, 7)),
     "frame": (
         [waypoint(0, 1, frame=1)],
-        Fault(0, "NAV_WAYPOINT: frame 1 is none of a place on earth", FaultKind.FRAME),
+        TranslationFault(0, "NAV_WAYPOINT: frame 1 is none of a place on earth", FaultKind.FRAME),
     ),
     "waits": (
         [replace(waypoint(0, 1), autocontinue=False)],
-        Fault(0, "it waits to be continued, which the drone does not", FaultKind.COMMAND),
+        TranslationFault(0, "it waits to be continued, which the drone does not", FaultKind.COMMAND),
     ),
     "speed": (
         [waypoint(0, 1), action(mav_enums.MAV_CMD_DO_CHANGE_SPEED, 1.0, 0.0)],
-        Fault(1, "DO_CHANGE_SPEED: it says a speed of 0 m/s", FaultKind.PARAM, 2),
+        TranslationFault(1, "DO_CHANGE_SPEED: it says a speed of 0 m/s", FaultKind.PARAM, 2),
     ),
     "climbing": (
         [waypoint(0, 1), action(mav_enums.MAV_CMD_DO_CHANGE_SPEED, 2.0, 1.0)],
-        Fault(
+        TranslationFault(
             1,
             "DO_CHANGE_SPEED: a flight plan has a speed over ground only, not one for climbing and sinking",
             FaultKind.PARAM,
@@ -337,32 +339,35 @@ WRONG = {
     ),
     "clock": (
         [waypoint(0, 1), action(mav_enums.MAV_CMD_NAV_DELAY, -1.0, 12.0, 0.0, 0.0)],
-        Fault(1, "NAV_DELAY: it waits for a time of day, which the drone cannot", FaultKind.PARAM, 1),
+        TranslationFault(1, "NAV_DELAY: it waits for a time of day, which the drone cannot", FaultKind.PARAM, 1),
     ),
     "jump": (
         [waypoint(0, 1), action(DO_JUMP, 7.0, 1.0)],
-        Fault(1, "it jumps to an item that is not there", FaultKind.PARAM, 1),
+        TranslationFault(1, "it jumps to an item that is not there", FaultKind.PARAM, 1),
     ),
-    "jumps": ([waypoint(0, 1), action(DO_JUMP, 0.0, -2.0)], Fault(1, "it jumps -2 times", FaultKind.PARAM, 2)),
+    "jumps": (
+        [waypoint(0, 1), action(DO_JUMP, 0.0, -2.0)],
+        TranslationFault(1, "it jumps -2 times", FaultKind.PARAM, 2),
+    ),
     "too many jumps": (
         [waypoint(0, 1), *[action(DO_JUMP, 0.0, 40000.0)] * 2],
-        Fault(2, "the mission jumps more than 65535 times", FaultKind.PARAM, 2),
+        TranslationFault(2, "the mission jumps more than 65535 times", FaultKind.PARAM, 2),
     ),
     "for ever": (
         [waypoint(0, 1), action(mav_enums.MAV_CMD_NAV_DELAY, 0.0), action(DO_JUMP, 1.0, -1.0)],
-        Fault(2, "it goes round for ever and flies nowhere", FaultKind.PLAN),
+        TranslationFault(2, "it goes round for ever and flies nowhere", FaultKind.PLAN),
     ),
     "for ever at one place": (
         [waypoint(0, 1), action(mav_enums.MAV_CMD_DO_CHANGE_SPEED, 1.0, 4.0), action(DO_JUMP, 1.0, -1.0)],
-        Fault(2, "it goes round for ever and flies nowhere", FaultKind.PLAN),
+        TranslationFault(2, "it goes round for ever and flies nowhere", FaultKind.PLAN),
     ),
     "for ever at one way point": (
         [take_off(8.0), waypoint(0, 1), action(DO_JUMP, 1.0, -1.0)],
-        Fault(2, "it goes round for ever and flies nowhere", FaultKind.PLAN),
+        TranslationFault(2, "it goes round for ever and flies nowhere", FaultKind.PLAN),
     ),
     "for ever with way points that are as wide as the way between them": (
         [waypoint(0, 1, 20.0, 0.0, 40.0), waypoint(0, 4, 20.0, 0.0, 40.0), action(DO_JUMP, 0.0, -1.0)],
-        Fault(2, "it goes round for ever and flies nowhere", FaultKind.PLAN),
+        TranslationFault(2, "it goes round for ever and flies nowhere", FaultKind.PLAN),
     ),
     "for ever after more than is written at once": (
         [
@@ -371,7 +376,7 @@ WRONG = {
             action(mav_enums.MAV_CMD_DO_CHANGE_SPEED, 1.0, 4.0),
             action(DO_JUMP, 2.0 * MAX_LINES + 1.0, -1.0),
         ],
-        Fault(2 * MAX_LINES + 2, "it goes round for ever and flies nowhere", FaultKind.PLAN),
+        TranslationFault(2 * MAX_LINES + 2, "it goes round for ever and flies nowhere", FaultKind.PLAN),
     ),
     "for ever when the count is used up": (
         [
@@ -380,11 +385,11 @@ WRONG = {
             action(DO_JUMP, 0.0, 3.0),
             action(DO_JUMP, 1.0, -1.0),
         ],
-        Fault(3, "it goes round for ever and flies nowhere", FaultKind.PLAN),
+        TranslationFault(3, "it goes round for ever and flies nowhere", FaultKind.PLAN),
     ),
     "very often": (
         [take_off(8.0), waypoint(0, 1), action(mav_enums.MAV_CMD_DO_LAND_START), action(DO_JUMP, 2.0, 65535.0)],
-        Fault(3, "it goes round and round and flies nowhere", FaultKind.PLAN),
+        TranslationFault(3, "it goes round and round and flies nowhere", FaultKind.PLAN),
     ),
     "very often with a region": (
         [
@@ -393,15 +398,15 @@ WRONG = {
             action(mav_enums.MAV_CMD_DO_SET_ROI_NONE),
             action(DO_JUMP, 1.0, 2000.0),
         ],
-        Fault(3, "it goes round and round and flies nowhere", FaultKind.PLAN),
+        TranslationFault(3, "it goes round and round and flies nowhere", FaultKind.PLAN),
     ),
     "after the landing": (
         [waypoint(0, 1), action(mav_enums.MAV_CMD_NAV_LAND), action(mav_enums.MAV_CMD_DO_LAND_START)],
-        Fault(2, "a landing stands before it, which ends the plan", FaultKind.PLAN),
+        TranslationFault(2, "a landing stands before it, which ends the plan", FaultKind.PLAN),
     ),
     "nothing flies": (
         [action(mav_enums.MAV_CMD_DO_CHANGE_SPEED, 1.0, 4.0)],
-        Fault(0, "nothing of the mission flies", FaultKind.PLAN),
+        TranslationFault(0, "nothing of the mission flies", FaultKind.PLAN),
     ),
 }
 
@@ -444,7 +449,7 @@ def test_loops_without_end_in_which_something_or_nothing_is_flown(what: str, ver
     """A photo is nothing: that the drone waits until it is taken, nobody says."""
     items = [take_off(8.0), *{**IDLE, **BUSY}[what]]
     report = examine([*items, action(DO_JUMP, 1.0, -1.0)], version)
-    idle = Fault(len(items), "it goes round for ever and flies nowhere", FaultKind.PLAN)
+    idle = TranslationFault(len(items), "it goes round for ever and flies nowhere", FaultKind.PLAN)
     assert report.faults == ((idle,) if what in IDLE else ())
 
 
@@ -467,18 +472,18 @@ def test_a_loop_of_many_items_that_need_no_line() -> None:
     ]
     flight = translate(items, 1, AIR)
     (leg,) = flight.parts
-    assert isinstance(leg, Leg)
+    assert isinstance(leg, FlightPlanFile)
     assert len(leg.origins) == 10
     assert flight.rest is not None
     again = translate(items, 1, AIR, flight.rest)
-    assert isinstance(again.parts[0], Leg)
+    assert isinstance(again.parts[0], FlightPlanFile)
     assert again.parts[0].origins == leg.origins
     assert again.rest is not None
 
 
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize(("items", "fault"), WRONG.values(), ids=WRONG)
-def test_what_is_refused(items: list[Item], fault: Fault, version: Version) -> None:
+def test_what_is_refused(items: list[Item], fault: TranslationFault, version: Version) -> None:
     assert examine(items, version).faults == (fault,)
     with pytest.raises(PlanError):
         translate(items, version, AIR)
@@ -500,7 +505,7 @@ def test_the_simulated_drone_reads_what_is_written(version: Version) -> None:
     ]
     flight = translate(items, version, GROUND)
     (leg,) = flight.parts
-    assert isinstance(leg, Leg)
+    assert isinstance(leg, FlightPlanFile)
     read = plan_file.read(leg.content, version)
     assert [int(item.command) for item in read] == [22, 16, 16, {1: 112, 2: 93}[version], 16, 20]
     assert read[4].longitude == LON + 1e-7  # a centimetre is not lost
@@ -546,13 +551,13 @@ PARROT = (16, 20, 21, 22, 93, 112, 178, 195, 197, 201, 205, 206, 214, 2000, 2001
 
 def test_the_table_knows_what_is_put_into_plans() -> None:
     assert set(QGROUNDCONTROL) | set(PARROT) | {531, 1001} <= set(TABLE)
-    assert all(TABLE[command].verdict is not Verdict.REFUSED for command in PARROT)
+    assert all(TABLE[command].verdict is not Fidelity.REFUSED for command in PARROT)
     for row in TABLE.values():
         assert row.how.endswith(".")
-        assert row.write is not None or row.verdict is Verdict.REFUSED or row.command == DO_JUMP
+        assert row.write is not None or row.verdict is Fidelity.REFUSED or row.command == DO_JUMP
 
 
-@pytest.mark.parametrize("command", [row.command for row in TABLE.values() if row.verdict is Verdict.REFUSED])
+@pytest.mark.parametrize("command", [row.command for row in TABLE.values() if row.verdict is Fidelity.REFUSED])
 def test_what_the_table_refuses_is_refused(command: int) -> None:
     (fault,) = examine([waypoint(0, 1), action(command)], 2).faults
     assert (fault.item, fault.kind) == (1, FaultKind.COMMAND)
@@ -625,7 +630,9 @@ def test_any_mission_is_refused_or_flown_whole(seed: int, version: Version, flyi
     except PlanError as error:  # a return or a landing before all that flies
         assert (start.flying, error.problem) == (False, "on the ground it has nowhere to fly to")  # noqa: PT017
         return
-    done = [item for part in flight.parts for item in chain(*part.done if isinstance(part, Leg) else [part.done])]
+    done = [
+        item for part in flight.parts for item in chain(*part.done if isinstance(part, FlightPlanFile) else [part.done])
+    ]
     assert bool(flight.parts) is not bool(flight.done)
     done += flight.done
     never = {loss.item for loss in report.approximations if loss.what == "it is never reached"}
@@ -635,16 +642,21 @@ def test_any_mission_is_refused_or_flown_whole(seed: int, version: Version, flyi
     if not any(item.command == DO_JUMP for item in items):
         assert done == sorted(done)
         assert len(set(done)) == len(done)
-        assert {part.item for part in flight.parts if isinstance(part, Step)} == {loss.item for loss in report.stepped}
+        assert {part.item for part in flight.parts if isinstance(part, GatewayStep)} == {
+            loss.item for loss in report.stepped
+        }
     for part in flight.parts:
-        if isinstance(part, Leg):
+        if isinstance(part, FlightPlanFile):
             read = plan_file.read(part.content, version)
             assert len(read) == len(part.origins) == len(part.done)
     commands = [
-        item.command for part in flight.parts if isinstance(part, Leg) for item in plan_file.read(part.content, version)
+        item.command
+        for part in flight.parts
+        if isinstance(part, FlightPlanFile)
+        for item in plan_file.read(part.content, version)
     ]
-    assert commands.count(plan_file.Command.TAKEOFF) == (not start.flying)
-    assert start.flying or commands[0] is plan_file.Command.TAKEOFF
+    assert commands.count(plan_file.PlanCommand.TAKEOFF) == (not start.flying)
+    assert start.flying or commands[0] is plan_file.PlanCommand.TAKEOFF
 
 
 def test_the_missions_of_the_property_test_are_flown_often_enough() -> None:

@@ -10,9 +10,17 @@ from anafi_mav.errors import PlanError
 from anafi_mav.plans.formats import files, parrot
 from anafi_mav.plans.formats.parrot import Version
 from anafi_mav.plans.plan import GLOBAL, RELATIVE, Item, Loss
-from anafi_mav.plans.translation.translate import Fault, FaultKind, Leg, Start, Step, examine, translate
+from anafi_mav.plans.translation.translate import (
+    FaultKind,
+    FlightPlanFile,
+    GatewayStep,
+    Start,
+    TranslationFault,
+    examine,
+    translate,
+)
 from anafi_mav.sim.plan import plan_file
-from anafi_mav.sim.plan.plan_file import Command
+from anafi_mav.sim.plan.plan_file import PlanCommand
 
 AIR = Start(LAT, LON, 10.0, flying=True, takeoff_amsl=35.0, heading=30.0)
 
@@ -21,11 +29,11 @@ VERSIONS: tuple[Version, ...] = (1, 2)
 GO = waypoint(1, 0)
 
 
-def read(items: list[Item], version: Version, start: Start = AIR) -> list[plan_file.Item]:
+def read(items: list[Item], version: Version, start: Start = AIR) -> list[plan_file.PlanLine]:
     """The mission as the simulated drone reads its translation."""
     assert examine(items, version).faults == ()
     (leg,) = translate(items, version, start).parts
-    assert isinstance(leg, Leg)
+    assert isinstance(leg, FlightPlanFile)
     return list(plan_file.read(leg.content, version))
 
 
@@ -72,10 +80,10 @@ def test_parrots_own_example() -> None:
     assert one[3:5] == [(50001, 0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 0.0), (2000, 0.0, 1.0, 12.0, 0.0, 0.0, 0.0, 0.0)]
     # What is translated is a plan that is translated to itself, but for the take-off that is in it already.
     (leg,) = translate(items, 2, start).parts
-    assert isinstance(leg, Leg)
+    assert isinstance(leg, FlightPlanFile)
     again = parrot.read(leg.content.decode(), "x", 2).items
     (second,) = translate(again, 2, start).parts
-    assert isinstance(second, Leg)
+    assert isinstance(second, FlightPlanFile)
     assert second.content == leg.content
 
 
@@ -131,10 +139,10 @@ def test_a_survey_as_qgroundcontrol_writes_it(version: Version) -> None:
     assert [int(item.command) for item in found] == [205, 16, 50001, 2000, 16, 2001, 50001, 2000]
     assert found[0].p1 == -90.0
     assert (found[2].p1, found[2].p2) == (1.0, 25.0)
-    counts = [item.p2 if version == 1 else item.p3 for item in found if item.command is Command.START_PHOTO]
+    counts = [item.p2 if version == 1 else item.p3 for item in found if item.command is PlanCommand.START_PHOTO]
     assert counts == [0.0, 1.0]
     (leg,) = translate(items, version, AIR).parts
-    assert isinstance(leg, Leg)
+    assert isinstance(leg, FlightPlanFile)
     assert leg.origins == (1, 2, 3, 3, 4, 5, 5, 5)
     assert leg.done == ((0, 1), (2,), (), (3,), (4,), (), (), (5,))
 
@@ -253,8 +261,8 @@ def test_aiming_the_gimbal_ends_looking_at_something(version: Version) -> None:
         [roi(), GO, action(mav_enums.MAV_CMD_DO_MOUNT_CONTROL, -30.0, 0.0, 0.0, None, None, None, 2.0), waypoint(2, 0)],
         version,
     )
-    ends = Command.SET_VIEW_MODE if version == 1 else Command.SET_ROI_NONE
-    assert [item.command for item in found][-3:] == [ends, Command.MOUNT_CONTROL, Command.WAYPOINT]
+    ends = PlanCommand.SET_VIEW_MODE if version == 1 else PlanCommand.SET_ROI_NONE
+    assert [item.command for item in found][-3:] == [ends, PlanCommand.MOUNT_CONTROL, PlanCommand.WAYPOINT]
 
 
 def test_what_the_gimbal_is_not_told_stays() -> None:
@@ -272,10 +280,13 @@ def test_zooming_is_flown_by_the_gateway() -> None:
         waypoint(2, 0),
     ]
     first, step, last = translate(items, 1, AIR).parts
-    assert isinstance(first, Leg)
-    assert isinstance(last, Leg)
-    assert step == Step(2, (2,))
-    assert [item.command for item in plan_file.read(last.content, 1)] == [Command.MOUNT_CONTROL, Command.WAYPOINT]
+    assert isinstance(first, FlightPlanFile)
+    assert isinstance(last, FlightPlanFile)
+    assert step == GatewayStep(2, (2,))
+    assert [item.command for item in plan_file.read(last.content, 1)] == [
+        PlanCommand.MOUNT_CONTROL,
+        PlanCommand.WAYPOINT,
+    ]
     assert [loss.item for loss in examine(items, 1).stepped] == [2]
 
 
@@ -288,9 +299,9 @@ def test_an_ai_takes_a_photo_where_it_is_to_be_taken() -> None:
         waypoint(5, 0),
     ]
     first, step, last = translate(items, 2, AIR).parts
-    assert step == Step(1, (1,))
-    assert isinstance(first, Leg)
-    assert isinstance(last, Leg)
+    assert step == GatewayStep(1, (1,))
+    assert isinstance(first, FlightPlanFile)
+    assert isinstance(last, FlightPlanFile)
     assert [row.command for row in plan_file.read(first.content, 2)] == [16]
     rows = plan_file.read(last.content, 2)
     assert [row.command for row in rows] == [16, 50001, 2000, 16]
@@ -299,10 +310,10 @@ def test_an_ai_takes_a_photo_where_it_is_to_be_taken() -> None:
     assert last.done == ((), (), (2,), (3,))
     # Nothing has to be kept here when only settings stand before the way point, nor on the others.
     (leg,) = translate([action(mav_enums.MAV_CMD_DO_CHANGE_SPEED, 1.0, 4.0), GO], 2, AIR).parts
-    assert isinstance(leg, Leg)
+    assert isinstance(leg, FlightPlanFile)
     assert [row.command for row in plan_file.read(leg.content, 2)] == [178, 16]
     last = translate(items, 1, AIR).parts[2]
-    assert isinstance(last, Leg)
+    assert isinstance(last, FlightPlanFile)
     assert [row.command for row in plan_file.read(last.content, 1)] == [50001, 2000, 16]
 
 
@@ -317,7 +328,7 @@ def test_beginning_in_the_middle_begins_what_runs_there() -> None:
         action(mav_enums.MAV_CMD_DO_SET_CAM_TRIGG_DIST, 0.0),
     ]
     (leg,) = translate(items, 1, AIR, 4).parts
-    assert isinstance(leg, Leg)
+    assert isinstance(leg, FlightPlanFile)
     assert [int(item.command) for item in plan_file.read(leg.content, 1)] == [
         205,
         201,
@@ -336,7 +347,7 @@ def test_beginning_in_the_middle_begins_what_runs_there() -> None:
         action(mav_enums.MAV_CMD_VIDEO_STOP_CAPTURE),
     ]
     (leg,) = translate(video, 1, AIR, 2).parts
-    assert isinstance(leg, Leg)
+    assert isinstance(leg, FlightPlanFile)
     assert [int(item.command) for item in plan_file.read(leg.content, 1)] == [2500, 16, 2501]
 
 
@@ -479,7 +490,7 @@ WRONG = {
 @pytest.mark.parametrize(("items", "reason", "kind", "param"), WRONG.values(), ids=WRONG)
 def test_what_is_refused(items: list[Item], reason: str, kind: FaultKind, param: int | None, version: Version) -> None:
     (fault,) = examine([GO, *items], version).faults
-    assert isinstance(fault, Fault)
+    assert isinstance(fault, TranslationFault)
     assert (fault.item, fault.kind, fault.param) == (len(items), kind, param)
     assert reason in fault.reason
     with pytest.raises(PlanError):

@@ -15,7 +15,7 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Node
 from anafi_mav.services import commands, system
 from anafi_mav.services.command_targets import height
-from anafi_mav.services.commands import Action, Altitude, Command, Definition, Effect, Progress, effect_of_mode
+from anafi_mav.services.commands import Action, Altitude, Command, Definition, Effect, ProgressPolicy, effect_of_mode
 from anafi_mav.services.flavours import ARDUPILOT, PX4, STANDARD, Flavour
 from anafi_mav.services.service import Service
 from anafi_mav.services.system import System
@@ -25,33 +25,33 @@ NAN = math.nan
 
 BY_PARAMETER = "by its parameters"
 
-ROWS: dict[str, tuple[bool, Altitude, object, Progress]] = {
-    "COMPONENT_ARM_DISARM": (False, Altitude.UNUSED, BY_PARAMETER, Progress.PROMPT),
-    "CONDITION_YAW": (False, Altitude.UNUSED, Effect.CHANGE, Progress.PROMPT),
-    "DO_ACCEPT_MAG_CAL": (False, Altitude.UNUSED, Effect.CHANGE, Progress.PROMPT),
-    "DO_CANCEL_MAG_CAL": (False, Altitude.UNUSED, Effect.CHANGE, Progress.PROMPT),
-    "DO_CHANGE_ALTITUDE": (False, Altitude.UNUSED, Effect.CHANGE, Progress.PROMPT),
-    "DO_CHANGE_SPEED": (False, Altitude.UNUSED, Effect.CHANGE, Progress.PROMPT),
-    "DO_FENCE_ENABLE": (False, Altitude.UNUSED, Effect.CHANGE, Progress.PROMPT),
-    "DO_FLIGHTTERMINATION": (False, Altitude.UNUSED, Effect.STOP, Progress.PROMPT),
-    "DO_ORBIT": (True, Altitude.AMSL, Effect.CHANGE, Progress.PROMPT),
-    "DO_PAUSE_CONTINUE": (False, Altitude.UNUSED, BY_PARAMETER, Progress.PROMPT),
-    "DO_REPOSITION": (True, Altitude.BY_FRAME, BY_PARAMETER, Progress.EARLY),
-    "DO_SET_HOME": (True, Altitude.AMSL, Effect.CHANGE, Progress.PROMPT),
-    "DO_SET_MISSION_CURRENT": (False, Altitude.UNUSED, Effect.CHANGE, Progress.PROMPT),
-    "DO_SET_MODE": (False, Altitude.UNUSED, effect_of_mode, Progress.LATE),
-    "DO_SET_ROI": (True, Altitude.BY_FRAME, Effect.CHANGE, Progress.PROMPT),
-    "DO_SET_ROI_LOCATION": (True, Altitude.AMSL, Effect.CHANGE, Progress.PROMPT),
-    "DO_SET_ROI_NONE": (False, Altitude.UNUSED, Effect.STOP, Progress.PROMPT),
-    "DO_SET_STANDARD_MODE": (False, Altitude.UNUSED, effect_of_mode, Progress.PROMPT),
-    "DO_START_MAG_CAL": (False, Altitude.UNUSED, Effect.CHANGE, Progress.PROMPT),
-    "GIMBAL_REQUEST_AXIS_CALIBRATION": (False, Altitude.UNUSED, Effect.CHANGE, Progress.PROMPT),
-    "MISSION_START": (False, Altitude.UNUSED, effect_of_mode, Progress.PROMPT),
-    "NAV_LAND": (True, Altitude.UNUSED, Effect.LAND, Progress.PROMPT),
-    "NAV_RETURN_TO_LAUNCH": (False, Altitude.UNUSED, Effect.RETURN, Progress.PROMPT),
-    "NAV_TAKEOFF": (True, Altitude.BY_FRAME, Effect.IRREVOCABLE, Progress.PROMPT),
-    "PREFLIGHT_CALIBRATION": (False, Altitude.UNUSED, Effect.CHANGE, Progress.FINAL_ONLY),
-    "PREFLIGHT_REBOOT_SHUTDOWN": (False, Altitude.UNUSED, Effect.IRREVOCABLE, Progress.FINAL_ONLY),
+ROWS: dict[str, tuple[bool, Altitude, object, ProgressPolicy]] = {
+    "COMPONENT_ARM_DISARM": (False, Altitude.UNUSED, BY_PARAMETER, ProgressPolicy.PROMPT),
+    "CONDITION_YAW": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.PROMPT),
+    "DO_ACCEPT_MAG_CAL": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.PROMPT),
+    "DO_CANCEL_MAG_CAL": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.PROMPT),
+    "DO_CHANGE_ALTITUDE": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.PROMPT),
+    "DO_CHANGE_SPEED": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.PROMPT),
+    "DO_FENCE_ENABLE": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.PROMPT),
+    "DO_FLIGHTTERMINATION": (False, Altitude.UNUSED, Effect.STOP, ProgressPolicy.PROMPT),
+    "DO_ORBIT": (True, Altitude.AMSL, Effect.CHANGE, ProgressPolicy.PROMPT),
+    "DO_PAUSE_CONTINUE": (False, Altitude.UNUSED, BY_PARAMETER, ProgressPolicy.PROMPT),
+    "DO_REPOSITION": (True, Altitude.BY_FRAME, BY_PARAMETER, ProgressPolicy.EARLY),
+    "DO_SET_HOME": (True, Altitude.AMSL, Effect.CHANGE, ProgressPolicy.PROMPT),
+    "DO_SET_MISSION_CURRENT": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.PROMPT),
+    "DO_SET_MODE": (False, Altitude.UNUSED, effect_of_mode, ProgressPolicy.LATE),
+    "DO_SET_ROI": (True, Altitude.BY_FRAME, Effect.CHANGE, ProgressPolicy.PROMPT),
+    "DO_SET_ROI_LOCATION": (True, Altitude.AMSL, Effect.CHANGE, ProgressPolicy.PROMPT),
+    "DO_SET_ROI_NONE": (False, Altitude.UNUSED, Effect.STOP, ProgressPolicy.PROMPT),
+    "DO_SET_STANDARD_MODE": (False, Altitude.UNUSED, effect_of_mode, ProgressPolicy.PROMPT),
+    "DO_START_MAG_CAL": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.PROMPT),
+    "GIMBAL_REQUEST_AXIS_CALIBRATION": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.PROMPT),
+    "MISSION_START": (False, Altitude.UNUSED, effect_of_mode, ProgressPolicy.PROMPT),
+    "NAV_LAND": (True, Altitude.UNUSED, Effect.LAND, ProgressPolicy.PROMPT),
+    "NAV_RETURN_TO_LAUNCH": (False, Altitude.UNUSED, Effect.RETURN, ProgressPolicy.PROMPT),
+    "NAV_TAKEOFF": (True, Altitude.BY_FRAME, Effect.IRREVOCABLE, ProgressPolicy.PROMPT),
+    "PREFLIGHT_CALIBRATION": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.FINAL_ONLY),
+    "PREFLIGHT_REBOOT_SHUTDOWN": (False, Altitude.UNUSED, Effect.IRREVOCABLE, ProgressPolicy.FINAL_ONLY),
 }
 """What a system carries out: location, height, effect, progress. The other MAV_CMD are queries or UNSUPPORTED."""
 
@@ -136,10 +136,11 @@ def test_effect_says_what_is_repeated_and_what_is_cancelled(effect: Effect, stop
 
 
 @pytest.mark.parametrize(
-    ("flavour", "progress"), [(PX4, Progress.FINAL_ONLY), (STANDARD, Progress.FINAL_ONLY), (ARDUPILOT, None)]
+    ("flavour", "progress"),
+    [(PX4, ProgressPolicy.FINAL_ONLY), (STANDARD, ProgressPolicy.FINAL_ONLY), (ARDUPILOT, None)],
 )
 def test_progress_of_a_restart_is_not_sent_to_ardupilot_clients(
-    rows: Mapping[str, Action], flavour: Flavour, progress: Progress | None
+    rows: Mapping[str, Action], flavour: Flavour, progress: ProgressPolicy | None
 ) -> None:
     row = rows["PREFLIGHT_REBOOT_SHUTDOWN"]
     assert Command(0, row, (1.0, NAN, NAN, NAN), NAN, NAN, NAN, None, flavour=flavour).progress is progress

@@ -9,7 +9,7 @@ import pytest
 from anafi_mav.drone.events import TakeoffChecklistType
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.event import event_table as table
-from anafi_mav.services.event.event_table import EVENTS, Health, events_file, mode_groups
+from anafi_mav.services.event.event_table import EVENTS, HealthComponent, events_file, mode_groups
 from anafi_mav.services.event.events import KEPT, MAX_REQUEST, EventLog, part_of
 from anafi_mav.services.flavours import ARDUPILOT, FLAVOURS, PX4, Flavour
 
@@ -63,7 +63,7 @@ def test_arguments() -> None:
     """One after the other, little endian, no padding (libevents README.md §Serialization)."""
     packed = table.ARMING_SUMMARY.pack(0, 0x08, 0x02, 0x3FF, 0x41)
     assert packed == bytes.fromhex("00 08000000 02000000 ff030000 41000000").ljust(40, b"\0")
-    assert table.BATTERY.pack(0x3FF, Health.BATTERY.index, 2)[:6] == bytes.fromhex("ff030000 02 02")
+    assert table.BATTERY.pack(0x3FF, HealthComponent.BATTERY.index, 2)[:6] == bytes.fromhex("ff030000 02 02")
     assert table.ARMING_SUMMARY.id == 0x01000001
     assert table.ARMING_SUMMARY.log_levels == 0x88
     assert table.NO_FIX.log_levels == 0x44
@@ -107,7 +107,7 @@ def test_every_mode_number_is_in_one_group() -> None:
 
 def test_every_check_has_a_part() -> None:
     for check in TakeoffChecklistType:
-        assert part_of(check) in Health
-    assert part_of(TakeoffChecklistType.BATTERY_IS_TOO_COLD) is Health.BATTERY
-    assert part_of(TakeoffChecklistType.MAGNETO_CALIBRATION) is Health.MAGNETOMETER
-    assert part_of(TakeoffChecklistType(99)) is Health.SYSTEM
+        assert part_of(check) in HealthComponent
+    assert part_of(TakeoffChecklistType.BATTERY_IS_TOO_COLD) is HealthComponent.BATTERY
+    assert part_of(TakeoffChecklistType.MAGNETO_CALIBRATION) is HealthComponent.MAGNETOMETER
+    assert part_of(TakeoffChecklistType(99)) is HealthComponent.SYSTEM

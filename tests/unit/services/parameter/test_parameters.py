@@ -18,7 +18,7 @@ from anafi_mav.services.flavours import ARDUPILOT, FLAVOURS, PX4
 from anafi_mav.services.parameter.parameter_codec import (
     HASH_NAME,
     NO_INDEX,
-    Kind,
+    ParamType,
     carried,
     carrier,
     hash_check,
@@ -33,22 +33,22 @@ from anafi_mav.services.parameter.parameter_table_setup import SETUP_PX4
 @pytest.mark.parametrize(
     ("value", "kind", "bytewise", "bits"),
     [
-        (1, Kind.INT32, True, 0x00000001),
-        (-1, Kind.INT32, True, 0xFFFFFFFF),
-        (2**31 - 1, Kind.INT32, True, 0x7FFFFFFF),
-        (-(2**31), Kind.INT32, True, 0x80000000),
-        (0x7F800001, Kind.INT32, True, 0x7F800001),  # the bits of a signalling NaN
-        (-2, Kind.INT16, True, 0x0000FFFE),
-        (-2, Kind.INT8, True, 0x000000FE),
-        (20.5, Kind.REAL32, True, 0x41A40000),
-        (1, Kind.INT32, False, 0x3F800000),
-        (-4001, Kind.INT32, False, 0xC57A1000),
-        (7, Kind.INT8, False, 0x40E00000),
-        (20.5, Kind.REAL32, False, 0x41A40000),
-        (math.nan, Kind.REAL32, True, 0x7FC00000),
+        (1, ParamType.INT32, True, 0x00000001),
+        (-1, ParamType.INT32, True, 0xFFFFFFFF),
+        (2**31 - 1, ParamType.INT32, True, 0x7FFFFFFF),
+        (-(2**31), ParamType.INT32, True, 0x80000000),
+        (0x7F800001, ParamType.INT32, True, 0x7F800001),  # the bits of a signalling NaN
+        (-2, ParamType.INT16, True, 0x0000FFFE),
+        (-2, ParamType.INT8, True, 0x000000FE),
+        (20.5, ParamType.REAL32, True, 0x41A40000),
+        (1, ParamType.INT32, False, 0x3F800000),
+        (-4001, ParamType.INT32, False, 0xC57A1000),
+        (7, ParamType.INT8, False, 0x40E00000),
+        (20.5, ParamType.REAL32, False, 0x41A40000),
+        (math.nan, ParamType.REAL32, True, 0x7FC00000),
     ],
 )
-def test_the_float_field(value: float, kind: Kind, bytewise: bool, bits: int) -> None:
+def test_the_float_field(value: float, kind: ParamType, bytewise: bool, bits: int) -> None:
     """Four bytes of param_value on the wire, little endian, as MAVLink parameter.md has them."""
     assert carrier(value, kind, bytewise=bytewise) == bits
     message = param_value("SIXTEEN_LETTERS_", value, kind, count=3, index=2, bytewise=bytewise)
@@ -60,20 +60,25 @@ def test_the_float_field(value: float, kind: Kind, bytewise: bool, bits: int) ->
 @pytest.mark.parametrize("value", [0, 1, -1, 4001, 2**31 - 1, -(2**31)])
 def test_bytewise_integers_come_back(value: int) -> None:
     (field,) = struct.unpack("<f", struct.pack("<i", value))
-    assert carried(field, Kind.INT32, bytewise=True) == value
+    assert carried(field, ParamType.INT32, bytewise=True) == value
 
 
 @pytest.mark.parametrize(
     ("field", "kind", "value"),
-    [(4.0, Kind.INT32, 4.0), (4.4, Kind.INT8, 4.0), (-3.0, Kind.INT16, -3.0), (2.5, Kind.REAL32, 2.5)],
+    [
+        (4.0, ParamType.INT32, 4.0),
+        (4.4, ParamType.INT8, 4.0),
+        (-3.0, ParamType.INT16, -3.0),
+        (2.5, ParamType.REAL32, 2.5),
+    ],
 )
-def test_cast_values_come_back(field: float, kind: Kind, value: float) -> None:
+def test_cast_values_come_back(field: float, kind: ParamType, value: float) -> None:
     assert carried(field, kind, bytewise=False) == value
 
 
 @pytest.mark.parametrize("field", [math.nan, math.inf, -math.inf])
 def test_no_whole_number_in_the_field(field: float) -> None:
-    assert math.isnan(carried(field, Kind.INT32, bytewise=False))
+    assert math.isnan(carried(field, ParamType.INT32, bytewise=False))
 
 
 def test_crc32() -> None:
@@ -92,14 +97,18 @@ def test_crc32() -> None:
 
 def test_hash() -> None:
     """Over names and raw values in the order of the names, whatever the order of the list."""
-    values = [("SYS_AUTOSTART", 4001.0, Kind.INT32), ("MIS_TAKEOFF_ALT", 2.5, Kind.REAL32)]
+    values = [("SYS_AUTOSTART", 4001.0, ParamType.INT32), ("MIS_TAKEOFF_ALT", 2.5, ParamType.REAL32)]
     data = b"MIS_TAKEOFF_ALT" + b"\x00\x00\x20\x40" + b"SYS_AUTOSTART" + b"\xa1\x0f\x00\x00"
     assert hash_check(values) == crc32(data)
-    message = param_value(HASH_NAME, crc32(data), Kind.UINT32, count=2, index=NO_INDEX, bytewise=True)
+    message = param_value(HASH_NAME, crc32(data), ParamType.UINT32, count=2, index=NO_INDEX, bytewise=True)
     assert pack(message).payload == struct.pack("<IHH", crc32(data), 2, 0xFFFF) + b"_HASH_CHECK\0\0\0\0\0\x05"
 
 
-VALUES = [("RTL_ALT", 2000.0, Kind.INT32), ("RTL_ALT_FINAL", 0.0, Kind.INT16), ("SIMPLE", -1.0, Kind.INT8)]
+VALUES = [
+    ("RTL_ALT", 2000.0, ParamType.INT32),
+    ("RTL_ALT_FINAL", 0.0, ParamType.INT16),
+    ("SIMPLE", -1.0, ParamType.INT8),
+]
 
 
 def test_packed_file() -> None:
@@ -145,9 +154,9 @@ def test_the_tables_are_sound(flavour: object) -> None:
         assert one.name.replace("_", "").isalnum()
         assert one.name == one.name.upper()
         assert not one.native or one.native in native
-        assert one.kind is not Kind.UINT32
+        assert one.kind is not ParamType.UINT32
         if flavour is PX4:
-            assert one.kind in (Kind.INT32, Kind.REAL32)  # all that PX4 has
+            assert one.kind in (ParamType.INT32, ParamType.REAL32)  # all that PX4 has
         if one.write is not None:  # a choice, a range, or both can be shown to a user
             assert one.values or one.limits is not None
 

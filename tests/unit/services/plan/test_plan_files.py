@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as stock
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.plan.plan_files import MAGIC, PATHS, pack_plan, size_of, unpack_plan
-from anafi_mav.vehicle.fence.plan_items import Fault, PlanItem
+from anafi_mav.vehicle.fence.plan_items import PlanFault, PlanItem
 
 MISSION, FENCE = dialect.MAV_MISSION_TYPE_MISSION, dialect.MAV_MISSION_TYPE_FENCE
 ITEMS = [
@@ -55,5 +55,5 @@ def test_file_that_is_read_back_holds_the_same_list(kind: int) -> None:
 )
 def test_file_that_is_not_whole_is_refused(content: bytes, reason: str) -> None:
     found = unpack_plan(content, MISSION)
-    assert isinstance(found, Fault)
+    assert isinstance(found, PlanFault)
     assert reason in found.reason

@@ -28,7 +28,7 @@ from anafi_mav.services.plan.plan_transfer import (
     Reply,
     State,
 )
-from anafi_mav.vehicle.fence.plan_items import MAX_ITEMS, Fault, PlanItem, opaque_id
+from anafi_mav.vehicle.fence.plan_items import MAX_ITEMS, PlanFault, PlanItem, opaque_id
 
 ACCEPTED, ERROR, UNSUPPORTED = dialect.MAV_MISSION_ACCEPTED, dialect.MAV_MISSION_ERROR, dialect.MAV_MISSION_UNSUPPORTED
 DENIED, NO_SPACE = dialect.MAV_MISSION_DENIED, dialect.MAV_MISSION_NO_SPACE
@@ -256,7 +256,7 @@ def test_capacity() -> None:
 
 def test_a_kind_that_takes_nothing() -> None:
     class Closed(Kind):
-        refusal = Fault(UNSUPPORTED, "not yet")
+        refusal = PlanFault(UNSUPPORTED, "not yet")
 
     plans = PlanDesk([Closed(MISSION, "mission")])
     effects = plans.receive(count(3, MISSION), ME, 0.0)
@@ -274,7 +274,7 @@ def test_a_plan_that_turns_out_bad_when_it_is_stored() -> None:
     uploaded(plans, 2)
     plans.receive(count(1), ME, 1.0)
     commit = commit_of(plans.receive(item(0), ME, 1.0))
-    (final,) = replies(plans.stored(commit, 1.0, Fault(dialect.MAV_MISSION_INVALID, "")))
+    (final,) = replies(plans.stored(commit, 1.0, PlanFault(dialect.MAV_MISSION_INVALID, "")))
     assert (final.type, final.opaque_id) == (dialect.MAV_MISSION_INVALID, 0)
     assert plans.transfers[FENCE].items == items(2)
 
@@ -633,7 +633,7 @@ def test_a_refusal_that_was_lost_is_the_answer_again(at_fault: str) -> None:
     effects = plans.receive(item(last, an_item(last, command)), ME, 1.3)
     result = UNSUPPORTED if at_fault == "item" else dialect.MAV_MISSION_INVALID
     if command == 5001:
-        effects = plans.stored(commit_of(effects), 1.3, Fault(result, "said by who found it"))
+        effects = plans.stored(commit_of(effects), 1.3, PlanFault(result, "said by who found it"))
     else:
         assert len(texts(effects)) == 1
     assert [m.type for m in replies(effects)] == [result]
@@ -836,7 +836,7 @@ def test_numbers_without_a_place_are_not_scaled() -> None:
 @pytest.mark.parametrize("value", [math.inf, -math.inf, 1e30, 215.0])
 def test_a_float_that_is_no_integer(value: float) -> None:
     bad = item_of(dialect.MAVLink_mission_item_message(1, 1, 0, 3, 16, 0, 1, 0, 0, 0, 0, 1.0, value, 0, 0))
-    assert isinstance(bad, Fault)
+    assert isinstance(bad, PlanFault)
     assert bad.result == dialect.MAV_MISSION_INVALID_PARAM6_Y
 
 

@@ -13,7 +13,7 @@ from anafi_mav.arsdk.messages import animation, ardrone3, camera, follow_me, rth
 from anafi_mav.arsdk.messages.animation import AnimationState, Indicator, PlayMode, Type
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState, PoiMode
 from anafi_mav.sim.autopilot.animation_paths import STARTS
-from anafi_mav.sim.world.place import Origin
+from anafi_mav.sim.world.place import WorldOrigin
 
 RAD = math.pi / 180.0
 ALL = 0xFF
@@ -30,7 +30,7 @@ def bench() -> Bench:
 
 
 def place(north: float, east: float) -> tuple[float, float]:
-    return Origin(*HOME).place(north, east)
+    return WorldOrigin(*HOME).place(north, east)
 
 
 def look_at(bench: Bench, north: float, east: float, up: float = 0.0) -> None:

@@ -14,7 +14,7 @@ from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.messages.common import FlightPlanComponent as Part
 from anafi_mav.arsdk.messages.common import MavlinkType, PlayError, PlayingState
 from anafi_mav.arsdk.messages.rth import RthState, StateReason
-from anafi_mav.sim.plan.plan_file import MAX_ITEMS, Command, Frame, PlanFileError, read
+from anafi_mav.sim.plan.plan_file import MAX_ITEMS, PlanCommand, PlanFileError, PlanFrame, read
 from anafi_mav.sim.states import all_states
 
 S = FlyingState
@@ -42,14 +42,14 @@ def test_the_sample_of_parrots_pages() -> None:
     assert [item.command for item in items] == [22, 16, 2000, 93, 2001, 16, 21]
     assert items[1][2:] == (0.0, 0.0, 0.0, 0.0, 48.879, 2.366549, 20.0)
     assert math.isnan(items[0].p4)
-    assert (items[2].frame, items[3].p1) == (Frame.MISSION, 10.0)
+    assert (items[2].frame, items[3].p1) == (PlanFrame.MISSION, 10.0)
     assert len(read(PARROTS_EXAMPLE, 1)) == 7
     assert read(text(line(16, at=(0.0, 0.0, 5.0))).replace(b"120", b"110"), 1)[0].altitude == 5.0
 
 
 @pytest.mark.parametrize("version", [1, 2])
-@pytest.mark.parametrize("command", list(Command))
-def test_every_command_in_its_version(command: Command, version: int) -> None:
+@pytest.mark.parametrize("command", list(PlanCommand))
+def test_every_command_in_its_version(command: PlanCommand, version: int) -> None:
     data = text(line(command, 1.0, at=(1.0, 1.0, 5.0)))
     if version == 1 and command in (195, 197, 206, 214):
         with pytest.raises(PlanFileError):
@@ -66,8 +66,8 @@ def test_every_command_in_its_version(command: Command, version: int) -> None:
         (b"QGC WPL x\n", "line 1: no QGC WPL header"),
         (b"QGC WPL 120\n", "0 items"),
         (text("1\t2\t3"), "line 2: 3 columns"),
-        (text(line(16, at=(0.0, 0.0, 1.0)), line(19)), "line 3: 19 is not a valid Command"),
-        (text(line(16, frame=7)), "line 2: 7 is not a valid Frame"),
+        (text(line(16, at=(0.0, 0.0, 1.0)), line(19)), "line 3: 19 is not a valid PlanCommand"),
+        (text(line(16, frame=7)), "line 2: 7 is not a valid PlanFrame"),
         (text(line(93).replace("93\t0.0", "93\tlong")), "line 2: could not convert string to float: 'long'"),
         (text(line(93, math.inf)), "line 2: an infinite number"),
         (text(line(16).replace("0.00000000", "91.0")), "line 2: no position"),

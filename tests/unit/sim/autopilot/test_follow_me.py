@@ -11,7 +11,7 @@ from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import ardrone3, common, controller_info, follow_me, rth
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState, PoiMode, PoiStatus
 from anafi_mav.arsdk.messages.follow_me import Behavior, Input, Mode
-from anafi_mav.sim.world.place import Origin
+from anafi_mav.sim.world.place import WorldOrigin
 
 RAD = math.pi / 180.0
 
@@ -24,7 +24,7 @@ class Walk:
         self.north, self.east, self.vn, self.ve = north, east, vn, ve
 
     def tell(self, accuracy: float = 3.0) -> None:
-        latitude, longitude = Origin(*HOME).place(self.north, self.east)
+        latitude, longitude = WorldOrigin(*HOME).place(self.north, self.east)
         gps = controller_info.Gps(latitude, longitude, HOME[2], accuracy, accuracy, self.vn, self.ve, 0.0, 0.0)
         self.bench.send(gps)
 
@@ -172,7 +172,7 @@ def test_a_target_that_is_only_seen_stands_on_the_ground(bench: Bench) -> None:
     assert bench.of(follow_me.TargetImageDetectionState)[-1].state is follow_me.ImageDetectionStatus.LOST
     (trajectory,) = bench.firmware.follow.telemetry()
     assert isinstance(trajectory, follow_me.TargetTrajectory)
-    assert (trajectory.latitude, trajectory.longitude) == pytest.approx(Origin(*HOME).place(10.0, 0.0), abs=1e-6)
+    assert (trajectory.latitude, trajectory.longitude) == pytest.approx(WorldOrigin(*HOME).place(10.0, 0.0), abs=1e-6)
 
 
 def test_a_start_without_a_target_waits_for_one(bench: Bench) -> None:
@@ -214,7 +214,7 @@ def test_nobody_is_followed_from_the_ground_or_on_a_leash() -> None:
         ardrone3.MoveBy(1.0, 0.0, 0.0, 0.0),
         ardrone3.Landing(),
         rth.ReturnToHome(),
-        ardrone3.StartPilotedPOIV2(*Origin(*HOME).place(50.0, 0.0), 0.0, PoiMode.LOCKED_GIMBAL),
+        ardrone3.StartPilotedPOIV2(*WorldOrigin(*HOME).place(50.0, 0.0), 0.0, PoiMode.LOCKED_GIMBAL),
     ],
     ids=lambda command: command.NAME,
 )
@@ -244,7 +244,7 @@ def test_a_lost_link_ends_it(bench: Bench) -> None:
 def test_it_takes_over_from_a_move_and_a_point(bench: Bench) -> None:
     walk = Walk(bench, 10.0, 0.0)
     walk.walk(0.4)
-    bench.send(ardrone3.StartPilotedPOIV2(*Origin(*HOME).place(50.0, 0.0), 0.0, PoiMode.LOCKED_GIMBAL))
+    bench.send(ardrone3.StartPilotedPOIV2(*WorldOrigin(*HOME).place(50.0, 0.0), 0.0, PoiMode.LOCKED_GIMBAL))
     bench.send(follow_me.Start(Mode.LOOK_AT))
     assert bench.of(ardrone3.PilotedPOIV2)[-1].status is PoiStatus.AVAILABLE
     bench.send(ardrone3.MoveBy(50.0, 0.0, 0.0, 0.0))

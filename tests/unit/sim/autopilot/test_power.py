@@ -26,7 +26,7 @@ from anafi_mav.arsdk.messages.rth import (
     StateReason,
 )
 from anafi_mav.sim.autopilot.endurance import Endurance
-from anafi_mav.sim.features.settings import Settings
+from anafi_mav.sim.features.settings import DroneSettings
 from anafi_mav.sim.states import all_settings, all_states
 from anafi_mav.sim.world.model import MODELS
 from anafi_mav.sim.world.motion import Pose
@@ -41,7 +41,7 @@ def at(north: float, up: float = 20.0) -> Pose:
 
 
 def endurance() -> Endurance:
-    return Endurance(MODEL, Settings(MODEL, "x"))
+    return Endurance(MODEL, DroneSettings(MODEL, "x"))
 
 
 def returns(bench: Bench) -> list[tuple[RthState, StateReason]]:

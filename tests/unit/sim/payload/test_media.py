@@ -16,7 +16,7 @@ from anafi_mav.arsdk.messages import mediastore
 from anafi_mav.arsdk.messages.mediastore import MediastoreState
 from anafi_mav.sim.payload import jpeg_scene
 from anafi_mav.sim.payload.jpeg_scene import Scene
-from anafi_mav.sim.payload.media import Kind, Media, MediaStore
+from anafi_mav.sim.payload.media import Media, MediaKind, MediaStore
 from anafi_mav.sim.plan.plan_store import MAX_PLANS, FlightPlanStore
 from anafi_mav.sim.world.calendar import Calendar
 
@@ -47,7 +47,7 @@ def test_a_photo_is_a_jpeg_of_what_was_seen() -> None:
 def test_a_photo_knows_where_and_when() -> None:
     store = MediaStore("run", "ANAFI", 0, lambda message: None)
     media = store.begin(video=False, mode="SINGLE", date=DATE)
-    resource = store.develop(media, Kind.JPG, 1, PARIS, DATE)
+    resource = store.develop(media, MediaKind.JPG, 1, PARIS, DATE)
     exif = Image.open(io.BytesIO(resource.content())).getexif()
     assert (exif[0x010F], exif[0x0110], exif[0x0132]) == ("Parrot", "ANAFI", "2026:11:21 10:11:12")
     place = exif.get_ifd(0x8825)
@@ -55,9 +55,9 @@ def test_a_photo_knows_where_and_when() -> None:
     assert (place[1], place[2]) == ("N", pytest.approx((48.0, 52.0, 44.04)))
     assert (place[3], place[4]) == ("E", pytest.approx((2.0, 22.0, 3.72)))
     assert (place[5], place[6]) == (b"\0", 85.5)
-    nowhere = store.develop(media, Kind.JPG, 1, Scene(), DATE)
+    nowhere = store.develop(media, MediaKind.JPG, 1, Scene(), DATE)
     assert 0x8825 not in Image.open(io.BytesIO(nowhere.content())).getexif()
-    south = store.develop(media, Kind.JPG, 1, Scene(-33.5, -151.25, -2.0), DATE)
+    south = store.develop(media, MediaKind.JPG, 1, Scene(-33.5, -151.25, -2.0), DATE)
     place = Image.open(io.BytesIO(south.content())).getexif().get_ifd(0x8825)
     assert (place[1], place[2], place[3], place[4]) == ("S", (33.0, 30.0, 0.0), "W", (151.0, 15.0, 0.0))
     assert (place[5], place[6]) == (b"\1", 2.0)
@@ -123,7 +123,7 @@ class Told:
 
     def photo(self, shots: int = 1) -> Media:
         media = self.store.begin(video=False, mode="BURST" if shots > 1 else "SINGLE", date=DATE)
-        files = [self.store.develop(media, Kind.JPG, number + 1, PARIS, DATE) for number in range(shots)]
+        files = [self.store.develop(media, MediaKind.JPG, number + 1, PARIS, DATE) for number in range(shots)]
         self.store.add(media, files)
         return media
 
@@ -166,7 +166,7 @@ def test_what_is_told_of_each_change() -> None:
     first, burst = told.photo(), told.photo(3)
     assert told.names() == ["media_created", "media_created", *["resource_created"] * 2]
     assert told.events[-1] == mediastore.Counters(0, 2, 0, 4)
-    told.store.add(first, [told.store.develop(first, Kind.JPG, 2, PARIS, DATE)])
+    told.store.add(first, [told.store.develop(first, MediaKind.JPG, 2, PARIS, DATE)])
     assert told.names() == ["media_updated", "resource_created"]
     assert told.store.remove_resource("100000010001.JPG")
     assert told.names() == ["resource_removed"]

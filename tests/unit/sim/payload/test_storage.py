@@ -17,7 +17,7 @@ from anafi_mav.arsdk.messages.user_storage import (
     FsState,
     PhyState,
 )
-from anafi_mav.sim.payload.storage import Place
+from anafi_mav.sim.payload.storage import MediaVolume
 
 
 @pytest.fixture
@@ -27,7 +27,7 @@ def bench() -> Bench:
     return bench
 
 
-def place(bench: Bench) -> Place:
+def place(bench: Bench) -> MediaVolume:
     return bench.firmware.payload.storage.place
 
 

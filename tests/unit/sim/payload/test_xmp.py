@@ -11,7 +11,7 @@ from PIL import Image
 
 from anafi_mav.sim.payload import jpeg_scene
 from anafi_mav.sim.payload.jpeg_scene import Scene
-from anafi_mav.sim.payload.media import Kind, MediaStore
+from anafi_mav.sim.payload.media import MediaKind, MediaStore
 
 DATE = "20261121T101112+0100"
 PARIS = Scene(48.8789, 2.3677, 85.5, pitch=-30.0, roll=1.25, heading=200.0)
@@ -19,7 +19,7 @@ PARIS = Scene(48.8789, 2.3677, 85.5, pitch=-30.0, roll=1.25, heading=200.0)
 PARROT, EXIF = "{http://www.parrot.com/drone-parrot/1.0/}", "{http://ns.adobe.com/exif/1.0/}"
 
 
-def photo(scene: Scene, kind: Kind = Kind.JPG, captured: float = 12.5) -> bytes:
+def photo(scene: Scene, kind: MediaKind = MediaKind.JPG, captured: float = 12.5) -> bytes:
     store = MediaStore("run", "ANAFI", 0, lambda message: None)
     media = store.begin(video=False, mode="SINGLE", date=DATE)
     return store.develop(media, kind, 1, scene, DATE, captured=captured).content()
@@ -32,8 +32,8 @@ def tags(data: bytes) -> dict[str, str]:
     return {child.tag: child.text or "" for child in description}
 
 
-@pytest.mark.parametrize("kind", [Kind.JPG, Kind.DNG])
-def test_photo_has_the_attitude_time_and_place_of_its_camera(kind: Kind) -> None:
+@pytest.mark.parametrize("kind", [MediaKind.JPG, MediaKind.DNG])
+def test_photo_has_the_attitude_time_and_place_of_its_camera(kind: MediaKind) -> None:
     found = tags(photo(PARIS, kind))
     assert float(found[PARROT + "CameraRollDegree"]) == 1.25
     assert float(found[PARROT + "CameraPitchDegree"]) == -30.0

@@ -18,7 +18,7 @@ from anafi_mav.arsdk.video import rtcp, rtsp
 from anafi_mav.arsdk.video.video_metadata import FlyingState
 from anafi_mav.sim import DroneSpec, Simulator
 from anafi_mav.sim.payload.jpeg_scene import Scene
-from anafi_mav.sim.payload.media import Kind
+from anafi_mav.sim.payload.media import MediaKind
 from anafi_mav.sim.video.h264 import KEY_INTERVAL
 from anafi_mav.sim.video.rtsp import MAX_CONNECTIONS, MAX_SESSIONS, VideoServer
 from anafi_mav.sim.world.faults import Impairment
@@ -72,7 +72,7 @@ class Studio:
         """A recording on the card; the id of its file."""
         store = self.bench.firmware.payload.media
         media = store.begin(video=True, mode="STANDARD", date="20261121T101112+0100")
-        store.add(media, [store.develop(media, Kind.MP4, 1, Scene(), media.date, seconds)])
+        store.add(media, [store.develop(media, MediaKind.MP4, 1, Scene(), media.date, seconds)])
         return media.resources[0].id
 
 
@@ -305,7 +305,7 @@ async def test_what_is_no_recording_is_not_found() -> None:
     async with watching() as (held, client):
         store = held.bench.firmware.payload.media
         photo = store.begin(video=False, mode="SINGLE", date="20261121T101112+0100")
-        store.add(photo, [store.develop(photo, Kind.JPG, 1, Scene(), photo.date)])
+        store.add(photo, [store.develop(photo, MediaKind.JPG, 1, Scene(), photo.date)])
         film = held.film(1.0)
         for path in ("replay/1.MP4", f"replay/{photo.resources[0].id}", "replay/", "replay", "", "other", "live/x"):
             assert (await client.ask("DESCRIBE", path)).status == 404, path

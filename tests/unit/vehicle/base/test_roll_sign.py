@@ -13,7 +13,15 @@ from anafi_mav.drone.piloting.sticks import percent
 from anafi_mav.services.monitor.roll_sign_service import read, written
 from anafi_mav.sim.world.motion import STEP
 from anafi_mav.vehicle.base.roll_sign import OVERTURN, SAMPLES, RollCheck, Sign
-from anafi_mav.vehicle.base.velocity_loop import CAUTIOUS_GAIN, CAUTIOUS_TILT, Axis, Controller, Demand, G, Motion
+from anafi_mav.vehicle.base.velocity_loop import (
+    CAUTIOUS_GAIN,
+    CAUTIOUS_TILT,
+    Axis,
+    Demand,
+    G,
+    MotionEstimate,
+    VelocityController,
+)
 
 STEPS = round(1.0 / STEP)
 """Steps of the simulated motion in a second."""
@@ -137,10 +145,10 @@ def test_roll_record_counts_for_its_firmware_only(sign: Sign) -> None:
 
 
 def test_loop_with_unverified_roll_leans_by_ten_degrees_at_most() -> None:
-    motion = Motion(RollCheck())
+    motion = MotionEstimate(RollCheck())
     motion.on_attitude(0.0, 0.0, 0.0, 0.0)
     motion.on_velocity(0.0, 0.0, 0.0, 0.0)
-    command = Controller(motion).sticks(Demand(Axis(12.0), Axis(9.0)), Limits(35.0, 90.0, 3.0), 0.0)
+    command = VelocityController(motion).sticks(Demand(Axis(12.0), Axis(9.0)), Limits(35.0, 90.0, 3.0), 0.0)
     assert command is not None
     front, right = math.tan(math.radians(-command.pitch_deg)), math.tan(math.radians(command.roll_deg))
     assert math.atan(math.hypot(front, right)) == pytest.approx(CAUTIOUS_TILT)
@@ -149,12 +157,12 @@ def test_loop_with_unverified_roll_leans_by_ten_degrees_at_most() -> None:
 
 @pytest.mark.parametrize("reported", [-5.0, 0.0, 5.0])
 def test_loop_with_unverified_roll_does_not_use_the_reported_tilt(reported: float) -> None:
-    motion = Motion(RollCheck())
+    motion = MotionEstimate(RollCheck())
     for step in range(20):
         motion.on_attitude(math.radians(reported), math.radians(reported), 0.0, 0.2 * step)
         motion.on_velocity(0.0, 0.0, 0.0, 0.2 * step)
     assert motion.velocity(4.2) == (0.0, 0.0)
-    command = Controller(motion).sticks(Demand(Axis(0.5), Axis(0.0)), Limits(35.0, 90.0, 3.0), 3.8)
+    command = VelocityController(motion).sticks(Demand(Axis(0.5), Axis(0.0)), Limits(35.0, 90.0, 3.0), 3.8)
     assert command is not None
     # The gain, and the drag of 0.5 m/s in calm air.
     assert -math.tan(math.radians(command.pitch_deg)) * G == pytest.approx(CAUTIOUS_GAIN * 0.5, abs=0.02)
@@ -172,8 +180,8 @@ def test_step_in_virtual_time_with_unverified_roll_settles(model: str, inverted:
     bench.take_off()
     bench.climb(10.0)
     roll_check, unknown = RollCheck(), RollCheck()
-    motion = Motion(unknown)
-    controller = Controller(motion)
+    motion = MotionEstimate(unknown)
+    controller = VelocityController(motion)
     reports: list[tuple[float, tuple[float, ...]]] = []
     speeds, command, wanted = [], None, 3.0
     for step in range(24 * STEPS):

@@ -22,10 +22,10 @@ from anafi_mav.vehicle.base.velocity_loop import (
     VELOCITY_GAIN,
     YAW_GAIN,
     Axis,
-    Controller,
     Demand,
     G,
-    Motion,
+    MotionEstimate,
+    VelocityController,
     tilt_for,
     turn_towards,
 )
@@ -33,9 +33,9 @@ from anafi_mav.vehicle.base.velocity_loop import (
 LIMITS = Limits(tilt_deg=35.0, yaw_rate_dps=90.0, climb_mps=3.0)
 
 
-def still(yaw: float = 0.0, *, height: float = 10.0, now: float = 0.0) -> Motion:
+def still(yaw: float = 0.0, *, height: float = 10.0, now: float = 0.0) -> MotionEstimate:
     """A drone that hovers in calm air with its nose to `yaw` (deg)."""
-    motion = Motion()
+    motion = MotionEstimate()
     motion.on_attitude(0.0, 0.0, math.radians(yaw), now)
     motion.on_velocity(0.0, 0.0, 0.0, now)
     motion.on_height(height, now)
@@ -43,8 +43,10 @@ def still(yaw: float = 0.0, *, height: float = 10.0, now: float = 0.0) -> Motion
     return motion
 
 
-def sticks(demand: Demand, motion: Motion | None = None, now: float = 0.0, limits: Limits = LIMITS) -> PilotingCommand:
-    command = Controller(motion or still()).sticks(demand, limits, now)
+def sticks(
+    demand: Demand, motion: MotionEstimate | None = None, now: float = 0.0, limits: Limits = LIMITS
+) -> PilotingCommand:
+    command = VelocityController(motion or still()).sticks(demand, limits, now)
     assert command is not None
     return command
 
@@ -106,7 +108,7 @@ def test_a_height_is_climbed_to() -> None:
 
 def test_vertical_accelerations_add_up() -> None:
     motion = still()
-    controller = Controller(motion)
+    controller = VelocityController(motion)
     climbs = []
     for step in range(11):
         now = 0.2 * step
@@ -182,7 +184,7 @@ def test_the_tilt_is_limited_as_a_whole_and_keeps_its_direction() -> None:
 
 def test_a_limit_that_lasts_is_told() -> None:
     motion, controller = still(), None
-    controller = Controller(motion)
+    controller = VelocityController(motion)
     short = []
     for step in range(12):
         now = 0.2 * step
@@ -198,7 +200,7 @@ def test_a_limit_that_lasts_is_told() -> None:
 
 def test_what_is_not_known_any_more_is_not_flown_by() -> None:
     motion = still()
-    controller = Controller(motion)
+    controller = VelocityController(motion)
     assert controller.sticks(Demand(Axis(1.0)), LIMITS, STALE) is None
     assert controller.sticks(Demand(height=5.0), LIMITS, STALE) is None
     assert controller.sticks(Demand(down_velocity=1.0), LIMITS, STALE) is not None
@@ -219,7 +221,7 @@ def test_the_tilt_that_a_speed_needs() -> None:
 
 def test_a_hover_in_wind_tells_what_the_air_does() -> None:
     """Nose north, it leans 5 degrees forward and does not move: the air pushes it south with g tan 5."""
-    motion = Motion()
+    motion = MotionEstimate()
     for step in range(20):
         motion.on_attitude(0.0, math.radians(-5.0), 0.0, 0.2 * step)
         motion.on_velocity(0.0, 0.0, 0.0, 0.2 * step)
@@ -227,7 +229,7 @@ def test_a_hover_in_wind_tells_what_the_air_does() -> None:
 
 
 def test_one_look_believes_a_share() -> None:
-    motion = Motion()
+    motion = MotionEstimate()
     for now, north in ((0.0, 0.0), (0.2, 0.1)):
         motion.on_attitude(0.0, 0.0, 0.0, now)
         motion.on_velocity(north, 0.0, 0.0, now)
@@ -236,7 +238,7 @@ def test_one_look_believes_a_share() -> None:
 
 def test_the_air_is_looked_at_no_more_often_at_high_rates() -> None:
     """A speed with a ripple, 200 times a second: its difference would be 20 m/s2."""
-    motion = Motion()
+    motion = MotionEstimate()
     for step in range(400):
         motion.on_attitude(0.0, 0.0, 0.0, 0.005 * step)
         motion.on_velocity(0.05 * (step % 2), 0.0, 0.0, 0.005 * step)
@@ -256,7 +258,7 @@ def test_the_place_is_carried_on_by_speed_and_set_right_by_gps() -> None:
 
 
 def test_the_heading_goes_on_as_it_turns() -> None:
-    motion = Motion()
+    motion = MotionEstimate()
     motion.on_attitude(0.0, 0.0, math.radians(170.0), 0.0)
     motion.on_attitude(0.0, 0.0, math.radians(-170.0), 0.2)
     assert motion.turning == pytest.approx(math.radians(100.0))
@@ -275,8 +277,8 @@ def test_a_step_in_virtual_time(model: str, late: float) -> None:
         bench.send(setting)
     bench.take_off()
     bench.climb(10.0)
-    motion = Motion()
-    controller = Controller(motion)
+    motion = MotionEstimate()
+    controller = VelocityController(motion)
     reports: list[tuple[float, tuple[float, ...]]] = []
     speeds = []
     command = None

@@ -16,7 +16,7 @@ from msgspec.structs import replace
 
 from anafi_mav import geo
 from anafi_mav.mavlink import dialect
-from anafi_mav.plans.zones import Circle, Fence, Polygon
+from anafi_mav.plans.zones import CircleZone, Fence, PolygonZone
 from anafi_mav.services.plan.fence_kind import FenceKind, summary
 from anafi_mav.vehicle.fence.fence import fence_of
 from anafi_mav.vehicle.fence.fence_watch import (
@@ -49,9 +49,11 @@ NORTH, EAST = 111.2074, 73.3490
 INCLUSION, EXCLUSION = True, False
 
 
-def square(lat: float = LAT, lon: float = LON, half: float = 0.001, kind: bool = INCLUSION, group: int = 0) -> Polygon:
+def square(
+    lat: float = LAT, lon: float = LON, half: float = 0.001, kind: bool = INCLUSION, group: int = 0
+) -> PolygonZone:
     corners = [(lat + half, lon + half), (lat - half, lon + half), (lat - half, lon - half), (lat + half, lon - half)]
-    return Polygon("square", kind, group, corners)
+    return PolygonZone("square", kind, group, corners)
 
 
 @pytest.mark.parametrize(
@@ -68,7 +70,7 @@ def test_depth_in_a_square(lat: float, lon: float, north: float, east: float) ->
         return (longitude + 180.0) % 360.0 - 180.0
 
     corners = [(lat + n * 0.001, wrapped(lon + e * 0.001)) for n, e in ((1, 1), (-1, 1), (-1, -1), (1, -1))]
-    zone = Polygon("square", INCLUSION, 0, corners)
+    zone = PolygonZone("square", INCLUSION, 0, corners)
     assert zone.depth((lat, lon), None) == pytest.approx(min(north, east), abs=0.01)
     # 0.0002 degrees inside the eastern side, and as far outside of it.
     assert zone.depth((lat, wrapped(lon + 0.0008)), None) == pytest.approx(0.2 * east, abs=0.01)
@@ -83,21 +85,21 @@ def test_depth_in_a_square(lat: float, lon: float, north: float, east: float) ->
 def test_depth_in_a_hollow() -> None:
     """A U that is open to the north: its middle is outside, between two arms."""
     u = [(1, -3), (1, -1), (-1, -1), (-1, 1), (1, 1), (1, 3), (-3, 3), (-3, -3)]
-    zone = Polygon("U", INCLUSION, 0, [(LAT + n * 0.001, LON + e * 0.001) for n, e in u])
+    zone = PolygonZone("U", INCLUSION, 0, [(LAT + n * 0.001, LON + e * 0.001) for n, e in u])
     assert zone.depth((LAT, LON), None) == pytest.approx(-EAST, abs=0.01)  # to the arms; the bottom is farther
     assert zone.depth((LAT, LON + 0.002), None) == pytest.approx(EAST, abs=0.01)  # in the middle of an arm
     assert zone.depth((LAT - 0.0015, LON), None) == pytest.approx(0.5 * NORTH, abs=0.01)
 
 
 def test_depth_in_a_circle() -> None:
-    zone = Circle("circle", INCLUSION, 0, (LAT, LON), 100.0)
+    zone = CircleZone("circle", INCLUSION, 0, (LAT, LON), 100.0)
     assert zone.depth((LAT, LON), None) == 100.0
     assert zone.depth((LAT + 0.0005, LON), None) == pytest.approx(100.0 - 0.5 * NORTH, abs=0.01)
     assert zone.depth((LAT, LON + 0.002), None) == pytest.approx(100.0 - 2.0 * EAST, abs=0.01)
 
 
 def test_a_circle_around_home_is_where_home_is() -> None:
-    zone = Circle("circle", INCLUSION, 0, None, 100.0)
+    zone = CircleZone("circle", INCLUSION, 0, None, 100.0)
     assert zone.depth((LAT, LON), (LAT, LON)) == 100.0
     assert zone.depth((LAT, LON), (LAT + 0.001, LON)) == pytest.approx(100.0 - NORTH, abs=0.01)
     assert zone.depth((LAT, LON), None) == math.inf
@@ -114,7 +116,7 @@ def test_no_fence() -> None:
 
 def test_inside_all_zones_of_one_group() -> None:
     """param2 0 or unset in all of them: what they have in common counts."""
-    fence = Fence([square(), Circle("circle", INCLUSION, 0, (LAT + 0.001, LON), 150.0)])
+    fence = Fence([square(), CircleZone("circle", INCLUSION, 0, (LAT + 0.001, LON), 150.0)])
     assert fence.margin((LAT, LON)).metres == pytest.approx(150.0 - NORTH, abs=0.01)
     assert fence.margin((LAT - 0.0005, LON)).zone == "circle"
     assert fence.margin((LAT - 0.0005, LON)).metres == pytest.approx(150.0 - 1.5 * NORTH, abs=0.01)
@@ -130,7 +132,7 @@ def test_inside_at_least_one_group() -> None:
 
 
 def test_outside_every_exclusion_zone() -> None:
-    hole = Circle("hole", EXCLUSION, 0, (LAT + 0.0005, LON), 20.0)
+    hole = CircleZone("hole", EXCLUSION, 0, (LAT + 0.0005, LON), 20.0)
     fence = Fence([square(), hole])
     assert fence.margin((LAT, LON)).metres == pytest.approx(0.5 * NORTH - 20.0, abs=0.01)
     assert fence.margin((LAT, LON)).zone == "hole"
@@ -139,7 +141,7 @@ def test_outside_every_exclusion_zone() -> None:
 
 
 def test_ways() -> None:
-    hole = Circle("hole", EXCLUSION, 0, (LAT, LON), 20.0)
+    hole = CircleZone("hole", EXCLUSION, 0, (LAT, LON), 20.0)
     fence = Fence([square(half=0.005), hole])
     west, east, north = (LAT, LON - 0.002), (LAT, LON + 0.002), (LAT + 0.001, LON)
     through = fence.leaves(west, east)
@@ -156,7 +158,7 @@ def test_ways() -> None:
         assert (fence.leaves((LAT + shift, LON - 0.002), (LAT + shift, LON + 0.002)) is None) is free
     # Both ends are in the U, and the way between its arms is not.
     u = [(1, -3), (1, -1), (-1, -1), (-1, 1), (1, 1), (1, 3), (-3, 3), (-3, -3)]
-    hollow = Fence([Polygon("U", INCLUSION, 0, [(LAT + n * 0.001, LON + e * 0.001) for n, e in u])])
+    hollow = Fence([PolygonZone("U", INCLUSION, 0, [(LAT + n * 0.001, LON + e * 0.001) for n, e in u])])
     assert hollow.leaves((LAT, LON - 0.002), (LAT, LON + 0.002)) is not None
     assert hollow.leaves((LAT - 0.002, LON - 0.002), (LAT - 0.002, LON + 0.002)) is None
 
@@ -166,8 +168,8 @@ def test_ways_between_groups() -> None:
     for gap, free in ((-5.0, True), (5.0, False)):
         shift = 100.0 + gap
         zones = [
-            Circle("one", INCLUSION, 1, (LAT, LON), 50.0),
-            Circle("two", INCLUSION, 2, geo.destination(LAT, LON, shift, 0.0), 50.0),
+            CircleZone("one", INCLUSION, 1, (LAT, LON), 50.0),
+            CircleZone("two", INCLUSION, 2, geo.destination(LAT, LON, shift, 0.0), 50.0),
         ]
         fence = Fence(zones)
         assert (fence.leaves((LAT, LON), geo.destination(LAT, LON, shift, 0.0)) is None) is free
@@ -176,7 +178,7 @@ def test_ways_between_groups() -> None:
 def test_a_way_is_looked_at_as_a_whole() -> None:
     """A wall of a hand's breadth, ten kilometres away."""
     wall = [(9000.0, -50.0), (9000.1, -50.0), (9000.1, 50.0), (9000.0, 50.0)]
-    zone = Polygon("wall", EXCLUSION, 0, [geo.destination(LAT, LON, *corner) for corner in wall])
+    zone = PolygonZone("wall", EXCLUSION, 0, [geo.destination(LAT, LON, *corner) for corner in wall])
     fence = Fence([zone])
     assert fence.leaves((LAT, LON), geo.destination(LAT, LON, 10_000.0, 0.0)) is not None
     assert fence.leaves((LAT, LON), geo.destination(LAT, LON, 10_000.0, 2000.0)) is None
@@ -189,7 +191,7 @@ def test_a_large_fence_is_looked_at_in_no_time() -> None:
     """5000 corners, which is the most: a way along all of them takes milliseconds."""
     turns = [2.0 * math.pi * n / 5000 for n in range(5000)]
     corners = [(LAT + 0.01 * math.cos(t), LON + 0.015 * math.sin(t)) for t in turns]
-    fence = Fence([Polygon("round", INCLUSION, 0, corners)])
+    fence = Fence([PolygonZone("round", INCLUSION, 0, corners)])
     assert fence.margin((LAT, LON)).metres == pytest.approx(1100.0, abs=15.0)
     began = time.process_time()
     for _ in range(100):
@@ -227,11 +229,12 @@ def test_a_fence_of_items() -> None:
     assert all(FenceKind().check_item(one) is None for one in items)
     zones = fence_of(items).zones
     assert [(type(zone), zone.inclusion) for zone in zones] == [
-        (Polygon, True), (Polygon, True), (Circle, True), (Polygon, False), (Circle, False), (Circle, True),
+        (PolygonZone, True), (PolygonZone, True), (CircleZone, True),
+        (PolygonZone, False), (CircleZone, False), (CircleZone, True),
     ]  # fmt: skip
     assert [zone.group for zone in zones if zone.inclusion] == [1, 0, 2, 3]
     assert zones[0].name == "inclusion 0-4"
-    assert isinstance(zones[5], Circle)
+    assert isinstance(zones[5], CircleZone)
     assert zones[5].centre is None
     assert summary(items) == (
         "Fence: 2 inclusion polygons, 2 inclusion circles, 1 exclusion polygon, 1 exclusion circle; return point unused"

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from anafi_mav.plans.rules.parts import Leg, Settings, Step
+from anafi_mav.plans.rules.parts import FlightPlanFile, GatewayStep, ItemSettings
 from anafi_mav.plans.translation.translate import Cursor
 from anafi_mav.vehicle.mission.course import Course
 
-FILE = Leg(b"QGC WPL 120\n", (0, 1), ((0,), (1,)))
-ZOOM = Step(2, (2,))
-BEHIND = Leg(b"QGC WPL 120\n", (4, 5), ((3, 4), (5,)))
-REST = Cursor(6, ((7, 40),), Settings())
+FILE = FlightPlanFile(b"QGC WPL 120\n", (0, 1), ((0,), (1,)))
+ZOOM = GatewayStep(2, (2,))
+BEHIND = FlightPlanFile(b"QGC WPL 120\n", (4, 5), ((3, 4), (5,)))
+REST = Cursor(6, ((7, 40),), ItemSettings())
 
 
 def test_part_after_part() -> None:

@@ -9,9 +9,9 @@ from support.simulated import connected
 
 from anafi_mav import mav_enums
 from anafi_mav.plans.plan import Item
-from anafi_mav.plans.translation.translate import Leg, Start, translate
+from anafi_mav.plans.translation.translate import FlightPlanFile, Start, translate
 from anafi_mav.vehicle.mission.files import FilesOnDrone
-from anafi_mav.vehicle.mission.progress import Progress
+from anafi_mav.vehicle.mission.progress import MissionProgress
 
 
 def way(latitude: float, command: int = 16) -> Item:
@@ -25,9 +25,9 @@ GROUND = Start(48.0, 2.0, 0.0, flying=False, takeoff_amsl=0.0)
 AIR = Start(48.0002, 2.0, 20.0, flying=True, takeoff_amsl=0.0)
 
 
-def leg(mission: tuple[Item, ...], start: Start, first: int = 0) -> Leg:
+def leg(mission: tuple[Item, ...], start: Start, first: int = 0) -> FlightPlanFile:
     head = translate(mission, 2, start, first).parts[0]
-    assert isinstance(head, Leg)
+    assert isinstance(head, FlightPlanFile)
     return head
 
 
@@ -37,9 +37,9 @@ async def files() -> AsyncIterator[FilesOnDrone]:
         yield FilesOnDrone(pair.drone.flight_plan)
 
 
-def told(mission: tuple[Item, ...], flown: Leg, after: int) -> list[tuple[int, ...]]:
+def told(mission: tuple[Item, ...], flown: FlightPlanFile, after: int) -> list[tuple[int, ...]]:
     """What is done with the lines that the drone flies."""
-    progress = Progress()
+    progress = MissionProgress()
     progress.take(mission)
     progress.begin(flown, after)
     done = [progress.executed(line) for line in range(after + 1, len(flown.origins))]

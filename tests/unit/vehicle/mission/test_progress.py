@@ -6,9 +6,9 @@ import pytest
 
 from anafi_mav import mav_enums
 from anafi_mav.plans.plan import Item
-from anafi_mav.plans.translation.translate import Leg
-from anafi_mav.vehicle.mission.progress import TRANSITIONS, Event, Progress, State
-from anafi_mav.vehicle.mission.record import Record
+from anafi_mav.plans.translation.translate import FlightPlanFile
+from anafi_mav.vehicle.mission.progress import TRANSITIONS, Event, MissionProgress, State
+from anafi_mav.vehicle.mission.record import MissionRecord
 
 IMPOSSIBLE = {
     (State.NONE, Event.CHOOSE),
@@ -37,11 +37,11 @@ def item(command: int) -> Item:
 
 ITEMS = [item(command) for command in (22, 178, 16, 1001, 16, 20)]
 # Take-off and the way up are two lines of item 0; item 3 has no line and is done with the line before it.
-LEG = Leg(b"QGC WPL 120\n" + b"x\n" * 6, (0, 0, 1, 2, 4, 5), ((), (0,), (1,), (2, 3), (4,), (5,)))
+LEG = FlightPlanFile(b"QGC WPL 120\n" + b"x\n" * 6, (0, 0, 1, 2, 4, 5), ((), (0,), (1,), (2, 3), (4,), (5,)))
 
 
-def flying() -> Progress:
-    progress = Progress()
+def flying() -> MissionProgress:
+    progress = MissionProgress()
     progress.take(ITEMS)
     assert (progress.state, progress.current, progress.first) == (State.READY, 0, 0)
     progress.begin(LEG)
@@ -62,9 +62,9 @@ JUMP = Item(mav_enums.MAV_CMD_DO_JUMP, 2, (1.0, 3.0, None, None, None, None, Non
 
 def test_turns_of_loops_are_counted() -> None:
     """With each line that has the jump, also when the drone's word for it was lost; a chosen item begins them anew."""
-    progress = Progress()
+    progress = MissionProgress()
     progress.take([*ITEMS[:3], JUMP])
-    progress.begin(Leg(b"", (1, 2, 1, 2, 1, 2), ((1,), (2, 3), (1,), (2, 3), (1,), (2, 3))))
+    progress.begin(FlightPlanFile(b"", (1, 2, 1, 2, 1, 2), ((1,), (2, 3), (1,), (2, 3), (1,), (2, 3))))
     progress.executed(0)
     assert progress.jumps == {}
     progress.executed(1)
@@ -157,20 +157,20 @@ PLACE = "\t0\t3\t16\t0\t0\t0\t0\t48.0\t2.0\t10.0\t1"
 KEPT = [*ITEMS[:3], JUMP, *ITEMS[4:]]
 
 
-def kept(following: int | None = None) -> Record:
+def kept(following: int | None = None) -> MissionRecord:
     content = "QGC WPL 120\n" + "".join(f"{line}{PLACE}\n" for line in range(6))
-    return Record.of(77, "abc", Leg(content.encode(), LEG.origins, LEG.done), 2, following, {3: 2})
+    return MissionRecord.of(77, "abc", FlightPlanFile(content.encode(), LEG.origins, LEG.done), 2, following, {3: 2})
 
 
 def test_what_is_kept_is_read_again() -> None:
     record = kept(5)
-    again = Record.read(record.written, KEPT)
+    again = MissionRecord.read(record.written, KEPT)
     assert again == record
     assert (again.leg.origins, again.leg.done) == (LEG.origins, LEG.done)
     assert dict(again.jumps) == {3: 2}
-    assert Record.read(kept().written, KEPT) == kept()
+    assert MissionRecord.read(kept().written, KEPT) == kept()
     earlier = {key: value for key, value in record.written.items() if key != "jumps"}
-    without = Record.read(earlier, KEPT)
+    without = MissionRecord.read(earlier, KEPT)
     assert without is not None
     assert without.jumps == ()
 
@@ -178,7 +178,7 @@ def test_what_is_kept_is_read_again() -> None:
 def test_what_is_kept_when_the_file_is_flown() -> None:
     behind = kept().flown_up_to(4, {3: 1})
     assert (behind.line, behind.next, behind.jumps) == (5, 4, ((3, 1),))
-    assert Record.read(behind.written, KEPT) == behind
+    assert MissionRecord.read(behind.written, KEPT) == behind
 
 
 @pytest.mark.parametrize(
@@ -207,11 +207,11 @@ def test_what_is_kept_when_the_file_is_flown() -> None:
 )
 def test_what_is_kept_and_can_be_nothing_of_the_mission_is_not_read(key: str, wrong: object) -> None:
     """People can write files: each number is looked at before anything is looked up with it."""
-    assert Record.read({**kept().written, key: wrong}, KEPT) is None
+    assert MissionRecord.read({**kept().written, key: wrong}, KEPT) is None
 
 
 def test_what_is_kept_of_no_line_or_of_nothing_is_not_read() -> None:
     empty = {"content": "QGC WPL 120\n", "origins": [], "done": [], "line": -1}
-    assert Record.read({**kept().written, **empty}, KEPT) is None
-    assert Record.read(kept().written, KEPT[:5]) is None, "a shorter mission"
-    assert Record.read(None, KEPT) is None
+    assert MissionRecord.read({**kept().written, **empty}, KEPT) is None
+    assert MissionRecord.read(kept().written, KEPT[:5]) is None, "a shorter mission"
+    assert MissionRecord.read(None, KEPT) is None

@@ -11,7 +11,7 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.services.setpoint.setpoint_messages import attitude_setpoint, global_setpoint, local_setpoint
 from anafi_mav.vehicle.base.silence import SILENCE
 from anafi_mav.vehicle.base.velocity_loop import turn_towards
-from anafi_mav.vehicle.offboard.setpoints import AttitudeSetpoint, MotionSetpoint, Origin, Setpoint
+from anafi_mav.vehicle.offboard.setpoints import AttitudeSetpoint, MotionSetpoint, PositionReference, Setpoint
 from anafi_mav.vehicle.offboard.stream import (
     MAX_PILOTS,
     STRAGGLING,
@@ -107,13 +107,13 @@ def test_an_offboard_session_ends_with_its_setpoints() -> None:
 @pytest.mark.parametrize(
     ("setpoint", "guided", "seconds"),
     [
-        (MotionSetpoint(Origin.LOCAL, velocity=(1.0, 0.0, 0.0)), 1.5, 1.45),
-        (MotionSetpoint(Origin.LOCAL, yaw_rate=0.3), 3.0, 2.95),
-        (MotionSetpoint(Origin.LOCAL, velocity=(1.0, 0.0, 0.0), yaw=1.0), 0.5, 0.45),
-        (MotionSetpoint(Origin.LOCAL, velocity=(1.0, 0.0, 0.0)), None, 0.45),
-        (MotionSetpoint(Origin.LOCAL, velocity=(1.0, 0.0, 0.0), acceleration=(1.0, 0.0, 0.0)), 1.5, 0.45),
-        (MotionSetpoint(Origin.LOCAL, velocity=(1.0, 0.0, 0.0), position=(9.0, 0.0, 0.0)), 1.5, 0.45),
-        (MotionSetpoint(Origin.LOCAL, acceleration=(1.0, 0.0, 0.0)), 1.5, 0.45),
+        (MotionSetpoint(PositionReference.LOCAL, velocity=(1.0, 0.0, 0.0)), 1.5, 1.45),
+        (MotionSetpoint(PositionReference.LOCAL, yaw_rate=0.3), 3.0, 2.95),
+        (MotionSetpoint(PositionReference.LOCAL, velocity=(1.0, 0.0, 0.0), yaw=1.0), 0.5, 0.45),
+        (MotionSetpoint(PositionReference.LOCAL, velocity=(1.0, 0.0, 0.0)), None, 0.45),
+        (MotionSetpoint(PositionReference.LOCAL, velocity=(1.0, 0.0, 0.0), acceleration=(1.0, 0.0, 0.0)), 1.5, 0.45),
+        (MotionSetpoint(PositionReference.LOCAL, velocity=(1.0, 0.0, 0.0), position=(9.0, 0.0, 0.0)), 1.5, 0.45),
+        (MotionSetpoint(PositionReference.LOCAL, acceleration=(1.0, 0.0, 0.0)), 1.5, 0.45),
         (LEVEL, 1.5, 0.45),
     ],
 )
@@ -125,7 +125,7 @@ def test_silence_that_ends_a_setpoint_is_longer_for_velocities_of_guided_alone(
 
 def test_sticks_of_a_velocity_stay_young_until_shortly_before_its_end() -> None:
     """The layer below centres sticks of half a second: it must not before a velocity of 1.5 s is over."""
-    stream, velocity = OffboardStream(), MotionSetpoint(Origin.LOCAL, velocity=(1.0, 0.0, 0.0))
+    stream, velocity = OffboardStream(), MotionSetpoint(PositionReference.LOCAL, velocity=(1.0, 0.0, 0.0))
     stream.receive("a", velocity, 10.0, 1.45)
     stream.engage("a")
     assert [round(stream.stick_age(10.0 + age), 2) for age in (0.0, 0.5, 1.0, 1.2, 1.45)] == [0.0, 0.0, 0.0, 0.2, 0.45]
@@ -167,7 +167,7 @@ def test_a_crowd_of_senders_is_bounded() -> None:
     assert stream.receive("one more", LEVEL, SILENCE)  # the others have fallen silent
 
 
-PLACE = MotionSetpoint(Origin.LOCAL, position=(1.0, 2.0, -3.0))
+PLACE = MotionSetpoint(PositionReference.LOCAL, position=(1.0, 2.0, -3.0))
 
 
 def test_a_single_setpoint_ends_by_no_silence() -> None:
@@ -271,21 +271,21 @@ def test_every_type_mask_says_what_it_asks_for() -> None:
 @pytest.mark.parametrize(
     ("frame", "origin", "body"),
     [
-        (1, Origin.LOCAL, False),
-        (7, Origin.VEHICLE, False),
-        (8, Origin.VEHICLE, True),
-        (9, Origin.VEHICLE, True),
-        (12, Origin.VEHICLE, True),
+        (1, PositionReference.LOCAL, False),
+        (7, PositionReference.VEHICLE, False),
+        (8, PositionReference.VEHICLE, True),
+        (9, PositionReference.VEHICLE, True),
+        (12, PositionReference.VEHICLE, True),
     ],
 )
-def test_local_frames(frame: int, origin: Origin, body: bool) -> None:
+def test_local_frames(frame: int, origin: PositionReference, body: bool) -> None:
     setpoint = local_setpoint(local(0, frame))
     assert isinstance(setpoint, MotionSetpoint)
     assert (setpoint.origin, setpoint.body) == (origin, body)
 
 
-@pytest.mark.parametrize(("frame", "origin"), [(5, Origin.SEA), (6, Origin.TAKEOFF)])
-def test_global_frames(frame: int, origin: Origin) -> None:
+@pytest.mark.parametrize(("frame", "origin"), [(5, PositionReference.SEA), (6, PositionReference.TAKEOFF)])
+def test_global_frames(frame: int, origin: PositionReference) -> None:
     setpoint = global_setpoint(on_earth(0, frame))
     assert isinstance(setpoint, MotionSetpoint)
     assert (setpoint.origin, setpoint.body) == (origin, False)
