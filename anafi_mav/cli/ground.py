@@ -53,7 +53,7 @@ class Ground:
         self.heartbeat: Any = None
         """Its last."""
         self._beats: dict[int, Inbound] = {}
-        self._news = asyncio.Event()
+        self._updated = asyncio.Event()
         self._clock = SystemClock()
         self._node = Node(clock=self._clock, flavours=tuple(FLAVOURS))
         self._beating: asyncio.Task[None] | None = None
@@ -108,13 +108,13 @@ class Ground:
         self._tell()
 
     def _tell(self) -> None:
-        self._news.set()
-        self._news = asyncio.Event()
+        self._updated.set()
+        self._updated = asyncio.Event()
 
-    async def news(self, timeout: float) -> None:
+    async def wait_for_update(self, timeout: float) -> None:
         """Return when something has come, or after so many seconds."""
         with contextlib.suppress(asyncio.TimeoutError):
-            await asyncio.wait_for(self._news.wait(), max(timeout, 0.0))
+            await asyncio.wait_for(self._updated.wait(), max(timeout, 0.0))
 
     # Who is there.
 
@@ -131,7 +131,7 @@ class Ground:
                 first = now
             if sysid is None and first is not None and now >= first + OTHERS:
                 break
-            await self.news(min(limit, limit if first is None else first + OTHERS) - now)
+            await self.wait_for_update(min(limit, limit if first is None else first + OTHERS) - now)
             now = self._clock.monotonic()
         there = ", ".join(map(str, sorted(self._beats)))
         if not self._beats:
@@ -157,7 +157,7 @@ class Ground:
             for message in transfer.start(self._clock.monotonic()):
                 self.send(message)
             while (deadline := transfer.deadline()) is not None:
-                await self.news(deadline - self._clock.monotonic())
+                await self.wait_for_update(deadline - self._clock.monotonic())
                 for message in transfer.expire(self._clock.monotonic()):
                     self.send(message)
                 progress(transfer.done, transfer.total)
@@ -189,7 +189,7 @@ class Ground:
                         result = str(ack.result) if entry is None else entry.name.removeprefix("MAV_RESULT_")
                         raise CommandRejected(f"{name} refused: {result}")
                     limit = now + PROGRESS_LIMIT
-                await self.news(limit - now)
+                await self.wait_for_update(limit - now)
         raise LinkLost(f"the vehicle did not answer {name}")
 
 

@@ -21,7 +21,7 @@ from anafi_mav.plans.formats.files import Format
 from anafi_mav.plans.plan import FenceCircle, Plan
 from anafi_mav.plans.translation.check import Findings, FindingSeverity
 from anafi_mav.plans.translation.check import check as lint
-from anafi_mav.plans.translation.parrot_export import twin
+from anafi_mav.plans.translation.parrot_export import export_parrot
 
 
 def show(arguments: argparse.Namespace) -> int:
@@ -158,7 +158,7 @@ def store(plan: Plan, arguments: argparse.Namespace, source: Path) -> None:
     out, form = arguments.out, target_format(arguments.out, arguments.model)
     model = version(arguments.model)
     if form in (Format.PARROT_1, Format.PARROT_2) and model is not None and source.suffix.lower() != PARROT:
-        data, losses = twin(plan, model, source.name)
+        data, losses = export_parrot(plan, model, source.name)
     else:
         data, losses = files.encode(plan, form)
     may_replace(out, force=arguments.force)

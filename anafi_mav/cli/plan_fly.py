@@ -80,7 +80,7 @@ class MissionFollower:
     async def follow(self) -> None:
         """Until it is complete. Raises `Ended` and `LinkLost`."""
         while not self._over and self._problem is None:
-            await self._ground.news(1.0)
+            await self._ground.wait_for_update(1.0)
             if asyncio.get_running_loop().time() - self._heard > SILENCE:
                 raise LinkLost(f"nothing heard of the vehicle for {SILENCE:g} s, at {self.where()}")
         if self._problem is not None:

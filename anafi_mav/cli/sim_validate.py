@@ -121,7 +121,7 @@ async def validate(models: list[str], speed: float, plots: Path | None) -> int:
     """
     try:
         flights = await _fly_all(models, speed)
-    except StoodStill as error:
+    except HostStalled as error:
         complain(f"the flights are invalid: {error}; try again when it is less busy, or one --model at a time")
         return 1
     agreed = True
@@ -141,7 +141,7 @@ async def validate(models: list[str], speed: float, plots: Path | None) -> int:
     return 0 if agreed else 1
 
 
-class StoodStill(Exception):
+class HostStalled(Exception):
     """The machine was too slow for a test, as often as it was flown."""
 
 
@@ -168,7 +168,7 @@ class ValidationFlight:
     async def fly(self) -> None:
         """All tests, one after the other.
 
-        Raises `LinkLost`, `CommandTimeout`, `CommandRejected`, `StoodStill`.
+        Raises `LinkLost`, `CommandTimeout`, `CommandRejected`, `HostStalled`.
         """
         await self._drone.connect()
         try:
@@ -257,7 +257,7 @@ class ValidationFlight:
             why = _standstill([frame.arrived for frame in self._frames if frame.taken - zero < 2 * HOLD]) or self._gap()
             if why is None:
                 return track
-        raise StoodStill(why)
+        raise HostStalled(why)
 
     async def _pitch_and_roll(self) -> None:
         track = await self._test(PilotingCommand(pitch_deg=-TILT))
@@ -297,7 +297,7 @@ class ValidationFlight:
             why = self._gap()
             if why is None:
                 return track
-        raise StoodStill(why)
+        raise HostStalled(why)
 
     def _gap(self) -> str | None:
         """Why the pictures of this test are too few to measure by; None when they are not."""

@@ -1,6 +1,6 @@
 """The command protocol: decoding, execution, retransmission and answer of a command.
 
-No I/O. `CommandDesk` decides; `CommandService` runs the handler and sends the acknowledgements.
+No I/O. `CommandHistory` decides; `CommandService` runs the handler and sends the acknowledgements.
 Rules: conformance R5-R10, MAVLink command.md.
 """
 
@@ -259,7 +259,7 @@ class Execution:
     """Another client's action has replaced it since."""
 
 
-class CommandDesk:
+class CommandHistory:
     """Distinguishes a new action from the retransmission of one.
 
     For each client only the newest action counts: arm, disarm, arm within two seconds are three actions, although the

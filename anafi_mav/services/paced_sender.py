@@ -24,7 +24,7 @@ BUSY = 0.02
 """s until a peer that accepts nothing at present is checked again."""
 
 
-class Trickle:
+class PacedSender:
     """The long answers under way on every channel, one message of each in turn."""
 
     def __init__(self, host: Host) -> None:

@@ -21,7 +21,7 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound, Node
 from anafi_mav.mavlink.router import EVERY_COMPONENT
-from anafi_mav.services.command.calibration_service import MaintenanceService
+from anafi_mav.services.command.calibration_service import CalibrationService
 from anafi_mav.services.command.command_service import CommandService
 from anafi_mav.services.command.compass_service import CompassService
 from anafi_mav.services.command.guided_service import GuidedService
@@ -74,7 +74,7 @@ SERVICES: tuple[type[Service], ...] = (
     IdentityService,
     ModesService,
     GuidedService,
-    MaintenanceService,
+    CalibrationService,
     CompassService,
     OrbitService,
     TelemetryService,

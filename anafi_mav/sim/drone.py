@@ -31,9 +31,9 @@ from anafi_mav.sim.states import all_settings, all_states
 from anafi_mav.sim.telemetry import RATE, Telemetry
 from anafi_mav.sim.video.rtsp import VideoServer
 from anafi_mav.sim.world import quirks
-from anafi_mav.sim.world.airframe import Body
+from anafi_mav.sim.world.airframe import Airframe
 from anafi_mav.sim.world.faults import Faults
-from anafi_mav.sim.world.link_emulation import Air
+from anafi_mav.sim.world.link_emulation import LinkEmulation
 from anafi_mav.sim.world.model import model_of
 from anafi_mav.sim.world.motion import Pose
 from anafi_mav.sim.world.place import WorldOrigin
@@ -128,7 +128,7 @@ class SimulatedDrone:
     """A drone on the network. `log` says what it went through, `faults` is where to break it."""
 
     def __init__(
-        self, spec: DroneSpec, body: Body, log: Log, clock: Callable[[], float], chance: random.Random, phase: float
+        self, spec: DroneSpec, body: Airframe, log: Log, clock: Callable[[], float], chance: random.Random, phase: float
     ) -> None:
         model = model_of(spec.model)
         serial = spec.serial or _serial(model.serial_prefix, spec.address)
@@ -145,7 +145,7 @@ class SimulatedDrone:
         self.faults.on_mute = self._mute_link
         self.wind = Wind(spec.wind, random.Random(chance.getrandbits(64)))
         """Set its `spec` to let it blow."""
-        self._air = Air(self.faults, random.Random(chance.getrandbits(64)), _later)
+        self._air = LinkEmulation(self.faults, random.Random(chance.getrandbits(64)), _later)
         self.http_problem = ""
         """Reason why the requested web server does not run; empty when it runs or was not requested."""
         self.rtsp_problem = ""
@@ -171,7 +171,7 @@ class SimulatedDrone:
         self._web: WebServer | None = None
         # The video has luck of its own, so that what else happens is the same whether it is watched or not.
         luck = random.Random(identity.boot_id)
-        video_air = Air(self.faults, luck, _later)
+        video_air = LinkEmulation(self.faults, luck, _later)
         self._video = VideoServer(
             self.firmware,
             luck,

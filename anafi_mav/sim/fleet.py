@@ -15,7 +15,7 @@ from anafi_mav.errors import ConfigError
 from anafi_mav.sim.drone import DroneSpec, SimulatedDrone
 from anafi_mav.sim.log import Log, LogFile
 from anafi_mav.sim.scenario import Scenario
-from anafi_mav.sim.world.airframe import Body
+from anafi_mav.sim.world.airframe import Airframe
 from anafi_mav.sim.world.model import model_of
 from anafi_mav.sim.world.motion import STEP, Motion
 
@@ -72,7 +72,7 @@ class Simulator:
         self.drones = [
             SimulatedDrone(
                 spec,
-                Body(self._motion, index),
+                Airframe(self._motion, index),
                 Log(spec.address, capacity, self._file),
                 _clock,
                 random.Random(chance.getrandbits(64)),

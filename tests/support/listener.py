@@ -16,24 +16,24 @@ class Listener(Generic[T]):
 
     def __init__(self) -> None:
         self.heard: list[T] = []
-        self._news = asyncio.Event()
+        self._updated = asyncio.Event()
 
     def hear(self, thing: T) -> None:
         self.heard.append(thing)
-        self._news.set()
+        self._updated.set()
 
     async def until(self, happened: Callable[[], bool], timeout: float = 5.0) -> None:
         """Wait until this is true; it is looked at whenever something is heard."""
 
         async def wait() -> None:
             while not happened():
-                self._news.clear()
-                await self._news.wait()
+                self._updated.clear()
+                await self._updated.wait()
 
         await asyncio.wait_for(wait(), timeout)
 
 
-class Ear(Listener[Message | UnknownMessage]):
+class MessageListener(Listener[Message | UnknownMessage]):
     """What a session tells of its messages: `on_message`."""
 
     def __call__(self, message: Message | UnknownMessage, now: float) -> None:

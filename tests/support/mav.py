@@ -33,7 +33,7 @@ class Client:
         self._parser.robust_parsing = True
         self._newer = newer.MAVLink(None, sysid, compid)
         self._out = dialect.MAVLink(None, sysid, compid)
-        self._news = asyncio.Event()
+        self._updated = asyncio.Event()
         self._writer: asyncio.StreamWriter | None = None
         self._socket: socket.socket | None = None
         self._task: asyncio.Task[None] | None = None
@@ -65,8 +65,8 @@ class Client:
                 self.bad += 1
             else:
                 self.received.append((now, message))
-        self._news.set()
-        self._news = asyncio.Event()
+        self._updated.set()
+        self._updated = asyncio.Event()
 
     async def close(self) -> None:
         if self._task is not None:
@@ -122,7 +122,7 @@ class Client:
                 if message.get_type() in kinds and accept(message):
                     return message
             left = deadline - time.monotonic()
-            news = self._news
+            news = self._updated
             try:
                 await asyncio.wait_for(news.wait(), max(left, 0.0))
             except asyncio.TimeoutError:

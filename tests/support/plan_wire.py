@@ -1,4 +1,4 @@
-"""A plan desk and scripted clients, with a bad link between them, in virtual time."""
+"""A plan protocol and scripted clients, with a bad link between them, in virtual time."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.flavours import PX4, Flavour
 from anafi_mav.services.plan.item_messages import item_float, item_int, item_of
-from anafi_mav.services.plan.plan_protocol import PlanDesk
+from anafi_mav.services.plan.plan_protocol import MissionProtocol
 from anafi_mav.services.plan.plan_transfer import Changed, Commit, Effect, Peer, PlanKind, Reply, Say
 from anafi_mav.vehicle.fence.plan_items import PlanFault, PlanItem
 
@@ -30,8 +30,8 @@ class Kind(PlanKind):
         return PlanFault(dialect.MAV_MISSION_INVALID, "it ends badly") if items and items[-1].command == 667 else None
 
 
-def desk() -> PlanDesk:
-    return PlanDesk([Kind(MISSION, "mission"), Kind(FENCE, "fence"), Kind(RALLY, "rally")])
+def mission_protocol() -> MissionProtocol:
+    return MissionProtocol([Kind(MISSION, "mission"), Kind(FENCE, "fence"), Kind(RALLY, "rally")])
 
 
 def an_item(number: int, command: int = 5001) -> PlanItem:
@@ -150,11 +150,11 @@ class Client:
 
 
 class Wire:
-    """One desk, some clients, and what happens between them."""
+    """One protocol, some clients, and what happens between them."""
 
     def __init__(
         self,
-        plans: PlanDesk,
+        plans: MissionProtocol,
         clients: list[Client],
         *,
         seed: int = 0,
@@ -163,9 +163,9 @@ class Wire:
         delay: tuple[float, float] = (0.005, 0.005),
         storing: float = 0.002,
     ) -> None:
-        self.desk, self.clients, self.now = plans, clients, 0.0
+        self.protocol, self.clients, self.now = plans, clients, 0.0
         self.sent: list[Any] = []
-        """What the desk sent, in order."""
+        """What the protocol sent, in order."""
         self._random = random.Random(seed)
         self._loss, self._duplicate, self._delay, self._storing = loss, duplicate, delay, storing
         self._air: list[tuple[float, int, Any, Any]] = []
@@ -199,20 +199,20 @@ class Wire:
         """Let time pass until every client is done, or `until`."""
         while not all(client.done for client in self.clients):
             times = [client.deadline() for client in self.clients]
-            times += [at for at in (self.desk.deadline(),) if at is not None]
+            times += [at for at in (self.protocol.deadline(),) if at is not None]
             times += [self._air[0][0]] if self._air else []
             if min(times) > until:
                 self.now = until
                 return
             self.now = max(self.now, min(times))
-            self._perform(self.desk.expire(self.now))
+            self._perform(self.protocol.expire(self.now))
             for client in self.clients:
                 self.to_desk(client, client.expire(self.now))
             while self._air and self._air[0][0] <= self.now:
                 _, _, what, way = heapq.heappop(self._air)
                 if way is None:
-                    self._perform(self.desk.stored(what, self.now))
+                    self._perform(self.protocol.stored(what, self.now))
                 elif way[1]:
                     self.to_desk(way[0], way[0].receive(what, self.now))
                 else:
-                    self._perform(self.desk.receive(what, way[0].peer, self.now))
+                    self._perform(self.protocol.receive(what, way[0].peer, self.now))

@@ -38,7 +38,7 @@ class Process:
         """stdout."""
         self.complaints: list[str] = []
         """stderr."""
-        self._news = asyncio.Event()
+        self._updated = asyncio.Event()
         loop = asyncio.get_running_loop()
         self._readers = [
             loop.create_task(self._read(process.stdout, self.lines)),
@@ -68,8 +68,8 @@ class Process:
         self._tell()
 
     def _tell(self) -> None:
-        self._news.set()
-        self._news = asyncio.Event()
+        self._updated.set()
+        self._updated = asyncio.Event()
 
     async def look(self, accept: Callable[[str], bool], *, since: int, timeout: float) -> str | None:
         """The first line of stdout, from a place on, that `accept` likes; None when none comes in time."""
@@ -82,7 +82,7 @@ class Process:
                     if accept(line):
                         return line
                 assert not all(reader.done() for reader in self._readers), f"ended: {self.process.returncode}{self}"
-                await self._news.wait()
+                await self._updated.wait()
 
         try:
             return await asyncio.wait_for(find(), timeout)

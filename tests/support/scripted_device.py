@@ -49,7 +49,7 @@ class ScriptedDevice:
         }
         self._versions = versions
         self.sessions: list[DeviceSession] = []
-        self._news = asyncio.Event()
+        self._updated = asyncio.Event()
         self._server: DeviceServer
 
     async def __aenter__(self) -> ScriptedDevice:
@@ -105,7 +105,7 @@ class ScriptedDevice:
         self.received.append((now, message))
         for answer in self.script.get(type(message), lambda _: ())(message):  # type: ignore[arg-type]
             self.session.send(answer)
-        self._news.set()
+        self._updated.set()
 
     def say(self, *events: Message) -> None:
         """Send these events."""
@@ -133,8 +133,8 @@ class ScriptedDevice:
 
         async def wait() -> MessageT:
             while len(self.got(kind)) < count:
-                self._news.clear()
-                await self._news.wait()
+                self._updated.clear()
+                await self._updated.wait()
             return self.got(kind)[count - 1]
 
         return await asyncio.wait_for(wait(), timeout)

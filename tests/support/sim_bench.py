@@ -10,7 +10,7 @@ from anafi_mav.arsdk.codec.wire import Message, encode
 from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.sim.autopilot.firmware import Firmware, Identity
-from anafi_mav.sim.world.airframe import Body
+from anafi_mav.sim.world.airframe import Airframe
 from anafi_mav.sim.world.faults import Faults
 from anafi_mav.sim.world.model import MODELS
 from anafi_mav.sim.world.motion import STEP, Motion, Pose
@@ -27,7 +27,7 @@ class Bench:
     def __init__(self, model_name: str = "4k") -> None:
         model = MODELS[model_name]
         self.motion = Motion([model.airframe])
-        self.body = Body(self.motion, 0)
+        self.body = Airframe(self.motion, 0)
         self.events: list[Message] = []
         self.notes: list[dict[str, Any]] = []
         self.faults = Faults()

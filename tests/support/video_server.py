@@ -100,7 +100,7 @@ class VideoServer:
     """Sessions that are being shown a video."""
 
     async def __aenter__(self) -> VideoServer:
-        self._news = asyncio.Event()
+        self._updated = asyncio.Event()
         self._tasks: set[asyncio.Task[None]] = set()
         self.writers: list[asyncio.StreamWriter] = []
         self._server = await asyncio.start_server(self._serve, self.address, 0)
@@ -128,8 +128,8 @@ class VideoServer:
 
         async def look() -> None:
             while not true():
-                self._news.clear()
-                await self._news.wait()
+                self._updated.clear()
+                await self._updated.wait()
 
         await asyncio.wait_for(look(), timeout)
 
@@ -168,13 +168,13 @@ class VideoServer:
                     self._tasks.add(show)
                 if method == "TEARDOWN" and show is not None:
                     show.cancel()
-                self._news.set()
+                self._updated.set()
         except (asyncio.IncompleteReadError, ConnectionError):
             pass
         finally:
             if show is not None:
                 show.cancel()
-            self._news.set()
+            self._updated.set()
 
     def _usual(self, asked: Asked) -> bytes:
         extra, body = "", ""
@@ -201,7 +201,7 @@ class VideoServer:
                     for datagram in sender.send(units, timestamp, self.metadata, self.profile):
                         self.rtp.sendto(datagram, client)
                     self.sent += 1
-                    self._news.set()
+                    self._updated.set()
                 timestamp += 3000
                 await asyncio.sleep(1 / 30)
         finally:
@@ -214,7 +214,7 @@ class _Reports(asyncio.DatagramProtocol):
 
     def datagram_received(self, data: bytes, address: object) -> None:
         self._server.reports += decode_reports(data)
-        self._server._news.set()
+        self._server._updated.set()
 
 
 def ok(asked: Asked, extra: str = "", body: str = "") -> bytes:

@@ -17,9 +17,9 @@ from anafi_mav.arsdk.messages.proto import camera2
 from anafi_mav.drone.element import Reducer
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT
 from anafi_mav.drone.payload import camera_classic, camera_modern
-from anafi_mav.drone.payload.camera_classic import Classic
+from anafi_mav.drone.payload.camera_classic import ClassicCamera
 from anafi_mav.drone.payload.camera_enums import Antiflicker, CameraMode, PhotoMode, Streaming, Style, WhiteBalance
-from anafi_mav.drone.payload.camera_modern import Modern
+from anafi_mav.drone.payload.camera_modern import ModernCamera
 from anafi_mav.drone.payload.camera_state import (
     CamerasState,
     CameraState,
@@ -47,9 +47,9 @@ ZOOM_STILL = 1e-3
 SERIES = frozenset({PhotoMode.TIME_LAPSE, PhotoMode.GPS_LAPSE})
 """Photo modes that go on until they are stopped."""
 
-_SPEECH: Mapping[str, type[Classic] | type[Modern]] = {
-    camera_classic.FEATURE: Classic,
-    camera_modern.FEATURE: Modern,
+_SPEECH: Mapping[str, type[ClassicCamera] | type[ModernCamera]] = {
+    camera_classic.FEATURE: ClassicCamera,
+    camera_modern.FEATURE: ModernCamera,
 }
 
 Ask: TypeAlias = tuple[Message, type[Message]]
@@ -95,12 +95,12 @@ class Camera(Commanding[CamerasState]):
             raise CommandRejected("the camera cannot take a photo now")
         series = now.photo is not None and now.photo.mode in SERIES
 
-        def judge(news: CaptureUpdate) -> str | bool | AnafiMavError | None:
-            if news.progress is CaptureProgress.SAVED:
-                return news.media
-            if news.progress is CaptureProgress.FAILED:
-                return CommandRejected(f"photo: {news.reason}")
-            return True if series and news.progress is CaptureProgress.STARTED else None
+        def judge(update: CaptureUpdate) -> str | bool | AnafiMavError | None:
+            if update.progress is CaptureProgress.SAVED:
+                return update.media
+            if update.progress is CaptureProgress.FAILED:
+                return CommandRejected(f"photo: {update.reason}")
+            return True if series and update.progress is CaptureProgress.STARTED else None
 
         result = await self._capture(
             id, speech.take_photo(id), speech.photo_events, speech.photo_news, judge, ANSWER_TIMEOUT, timeout
@@ -117,14 +117,14 @@ class Camera(Commanding[CamerasState]):
             raise CommandRejected("no photo is being taken")
         saved: str | None = None
 
-        def judge(news: CaptureUpdate) -> str | bool | AnafiMavError | None:
+        def judge(update: CaptureUpdate) -> str | bool | AnafiMavError | None:
             nonlocal saved
-            if news.progress is CaptureProgress.SAVED:
-                saved = news.media
-                return saved if speech is Modern else None
-            if news.progress is CaptureProgress.FAILED:
-                return CommandRejected(f"photo: {news.reason}")
-            return True if news.progress is CaptureProgress.ENDED else None
+            if update.progress is CaptureProgress.SAVED:
+                saved = update.media
+                return saved if speech is ModernCamera else None
+            if update.progress is CaptureProgress.FAILED:
+                return CommandRejected(f"photo: {update.reason}")
+            return True if update.progress is CaptureProgress.ENDED else None
 
         await self._capture(
             id, speech.stop_photo(id), speech.photo_events, speech.photo_news, judge, ANSWER_TIMEOUT, timeout
@@ -145,10 +145,10 @@ class Camera(Commanding[CamerasState]):
         if now.recording_available is False:
             raise CommandRejected("the camera cannot record now")
 
-        def judge(news: CaptureUpdate) -> bool | AnafiMavError | None:
-            if news.progress is CaptureProgress.STARTED:
+        def judge(update: CaptureUpdate) -> bool | AnafiMavError | None:
+            if update.progress is CaptureProgress.STARTED:
                 return True
-            return CommandRejected(f"recording: {news.reason}") if news.progress is CaptureProgress.FAILED else None
+            return CommandRejected(f"recording: {update.reason}") if update.progress is CaptureProgress.FAILED else None
 
         command = speech.start_recording(id)
         await self._capture(id, command, speech.recording_events, speech.recording_news, judge, ANSWER_TIMEOUT, None)
@@ -159,10 +159,10 @@ class Camera(Commanding[CamerasState]):
         if now.recording_now is False:
             raise CommandRejected("the camera does not record")
 
-        def judge(news: CaptureUpdate) -> str | AnafiMavError | None:
-            if news.progress is CaptureProgress.ENDED:
-                return news.media
-            return CommandRejected(f"recording: {news.reason}") if news.progress is CaptureProgress.FAILED else None
+        def judge(update: CaptureUpdate) -> str | AnafiMavError | None:
+            if update.progress is CaptureProgress.ENDED:
+                return update.media
+            return CommandRejected(f"recording: {update.reason}") if update.progress is CaptureProgress.FAILED else None
 
         command = speech.stop_recording(id)
         return str(
@@ -329,13 +329,13 @@ class Camera(Commanding[CamerasState]):
 
         def about(id: int) -> Question:
             command = camera2.GetState(camera_id=id, include_default_capabilities=True)
-            return command, camera2.State, lambda message: True if Modern.camera_of(message) == id else None
+            return command, camera2.State, lambda message: True if ModernCamera.camera_of(message) == id else None
 
         return [about(id) for id, camera in self.state.cameras.items() if camera.feature == camera_modern.FEATURE]
 
     # -- inside
 
-    def _known(self, id: int) -> tuple[type[Classic] | type[Modern], CameraState]:
+    def _known(self, id: int) -> tuple[type[ClassicCamera] | type[ModernCamera], CameraState]:
         """How to ask this camera, and its state."""
         now = self[id]
         self._require(now.feature, f"camera {id}")
@@ -349,7 +349,7 @@ class Camera(Commanding[CamerasState]):
         return now.zoom_max
 
     async def _ask(
-        self, id: int, field: str, ask: Callable[[type[Classic] | type[Modern], CameraState], Ask]
+        self, id: int, field: str, ask: Callable[[type[ClassicCamera] | type[ModernCamera], CameraState], Ask]
     ) -> CameraState:
         """Change a setting; returns the state after the drone's answer.
 
@@ -386,12 +386,12 @@ class Camera(Commanding[CamerasState]):
         """
 
         def listen(message: Any) -> Any:
-            news = read(message)
-            if news is None or news.camera != id:
+            update = read(message)
+            if update is None or update.camera != id:
                 return None
             if next is not None:
                 answer.expire_after(next, CommandTimeout(command.NAME, next))
-            return judge(news)
+            return judge(update)
 
         answer = self._commander.expect(events, listen)
         self._commander.dispatch(answer, command, first)

@@ -324,7 +324,7 @@ def _onoff(on: bool) -> State:
     return State.ACTIVE if on else State.INACTIVE
 
 
-class Classic:
+class ClassicCamera:
     """A command, and the kind of event that answers it.
 
     Each takes the camera's id and its state.

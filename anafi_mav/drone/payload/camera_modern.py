@@ -341,7 +341,7 @@ def _pixels(wanted: float) -> wire.PhotoResolution:
     return min(known)[1]
 
 
-class Modern:
+class ModernCamera:
     """A command, and the kind of event that answers it.
 
     Each takes the camera's id and its state.

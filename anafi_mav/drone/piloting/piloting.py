@@ -29,7 +29,7 @@ from anafi_mav.drone.piloting.guided_moves import GuidedMoves
 from anafi_mav.drone.piloting.landing import LandingEnd
 from anafi_mav.drone.piloting.motors import Motors
 from anafi_mav.drone.piloting.moves import Displacement, Move, MoveEnd, Moves
-from anafi_mav.drone.piloting.return_home import Returns
+from anafi_mav.drone.piloting.return_home import ReturnHome
 from anafi_mav.drone.piloting.settings import PilotingSettings
 from anafi_mav.drone.piloting.state import REDUCERS, PilotingState
 from anafi_mav.drone.piloting.stick_stream import StickStream
@@ -60,7 +60,7 @@ class Piloting(PilotingSettings):
         self._sticks = StickStream(commander, self, home, lambda: self.pilot_has_source())
         self._motors = Motors(commander, self, self._sticks, takeoff_blockers)
         self._guided = GuidedMoves(commander, self, home, self._sticks, self._moves)
-        self._returns = Returns(commander, self, home, self._sticks, self._moves)
+        self._returns = ReturnHome(commander, self, home, self._sticks, self._moves)
         self.is_modern: Callable[[], bool] = lambda: False
         """True for an Ai; set by `Drone`."""
         self._landing_end = LandingEnd(commander, self, self._sticks, self._motors, lambda: self.is_modern())

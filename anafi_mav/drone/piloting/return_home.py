@@ -20,7 +20,7 @@ from anafi_mav.drone.status.home import Home
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost
 
 
-class Returns:
+class ReturnHome:
     """Returns home that were asked for.
 
     `Piloting` says what its verbs of the same names promise.

@@ -77,7 +77,7 @@ _SETS = frozenset(
 _TARGETING = float(mav_enums.MAV_MOUNT_MODE_MAVLINK_TARGETING)
 
 
-class Pen:
+class FlightPlanWriter:
     """Writes legs; knows where the drone will be."""
 
     def __init__(

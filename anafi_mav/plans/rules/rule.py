@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from anafi_mav import mav_enums
 from anafi_mav.plans.formats.parrot import SET_STILL_MODE, SET_VIEW_MODE
 from anafi_mav.plans.plan import Item
-from anafi_mav.plans.rules.flight_plan_writer import Pen
+from anafi_mav.plans.rules.flight_plan_writer import FlightPlanWriter
 
 
 class Fidelity(enum.Enum):
@@ -21,7 +21,7 @@ class Fidelity(enum.Enum):
     REFUSED = "not at all: the mission is refused"
 
 
-Write = Callable[[Pen, Item], None]
+Write = Callable[[FlightPlanWriter, Item], None]
 
 _NOTHING = frozenset({None, 0.0})
 
@@ -55,8 +55,10 @@ class Rule:
         return known or (f"command {self.command}" if entry is None else entry.name.removeprefix("MAV_CMD_"))
 
 
-def only(pen: Pen, item: Item, number: int, what: str, allowed: frozenset[float | None] = _NOTHING) -> None:
+def only(
+    writer: FlightPlanWriter, item: Item, number: int, what: str, allowed: frozenset[float | None] = _NOTHING
+) -> None:
     """Refuse the item when a parameter is set to what the drone cannot do."""
     value = item.params[number - 1]
     if value not in allowed:
-        pen.refuse(f"{what} ({value:g})", number)
+        writer.refuse(f"{what} ({value:g})", number)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from anafi_mav import mav_enums
 from anafi_mav.plans.formats.parrot import SET_STILL_MODE, SET_VIEW_MODE
 from anafi_mav.plans.plan import Item, Point
-from anafi_mav.plans.rules.flight_plan_writer import SHORTEST_INTERVAL, SHORTEST_STEP, Pen
+from anafi_mav.plans.rules.flight_plan_writer import SHORTEST_INTERVAL, SHORTEST_STEP, FlightPlanWriter
 from anafi_mav.plans.rules.rule import Fidelity, Rule, only
 
 _CAMERAS = frozenset({None, 0.0, 1.0, 100.0})
@@ -20,250 +20,252 @@ _FORMATS = frozenset({None, 0.0, 12.0, 13.0, 14.0, 15.0})
 _UNSET = frozenset({None, 0.0, -1.0})
 
 
-def _camera(pen: Pen, item: Item, number: int) -> None:
-    only(pen, item, number, "the flight plan's camera is component 100, not this", _CAMERAS)
+def _camera(writer: FlightPlanWriter, item: Item, number: int) -> None:
+    only(writer, item, number, "the flight plan's camera is component 100, not this", _CAMERAS)
 
 
-def _gimbal(pen: Pen, item: Item, number: int) -> None:
-    only(pen, item, number, "the gimbal is component 154, not this", _GIMBALS)
+def _gimbal(writer: FlightPlanWriter, item: Item, number: int) -> None:
+    only(writer, item, number, "the gimbal is component 154, not this", _GIMBALS)
 
 
 # What is looked at.
 
 
-def _look(pen: Pen, item: Item) -> None:
-    if not pen.names_place(item):
-        pen.refuse("it has no place", 5)
+def _look(writer: FlightPlanWriter, item: Item) -> None:
+    if not writer.names_place(item):
+        writer.refuse("it has no place", 5)
     latitude, longitude = item.params[4:6]
-    pen.look_at(Point(latitude or 0.0, longitude or 0.0, pen.height(item) or 0.0))
+    writer.look_at(Point(latitude or 0.0, longitude or 0.0, writer.height(item) or 0.0))
 
 
-def _roi_location(pen: Pen, item: Item) -> None:
-    _gimbal(pen, item, 1)
-    _look(pen, item)
+def _roi_location(writer: FlightPlanWriter, item: Item) -> None:
+    _gimbal(writer, item, 1)
+    _look(writer, item)
 
 
-def _roi_beside(pen: Pen, item: Item) -> None:
-    _gimbal(pen, item, 1)
+def _roi_beside(writer: FlightPlanWriter, item: Item) -> None:
+    _gimbal(writer, item, 1)
     pitch, roll, yaw = item.params[4:]
     if roll not in (None, 0.0):
-        pen.refuse("a flight plan does not roll the camera", 6)
-    pen.look_ahead()
-    pen.look_beside(yaw or 0.0)
-    _tilt(pen, pitch or 0.0, 5)
+        writer.refuse("a flight plan does not roll the camera", 6)
+    writer.look_ahead()
+    writer.look_beside(yaw or 0.0)
+    _tilt(writer, pitch or 0.0, 5)
 
 
-def _roi_none(pen: Pen, item: Item) -> None:
-    _gimbal(pen, item, 1)
-    _look_ahead(pen)
+def _roi_none(writer: FlightPlanWriter, item: Item) -> None:
+    _gimbal(writer, item, 1)
+    _look_ahead(writer)
 
 
-def _look_ahead(pen: Pen) -> None:
-    looked = pen.settings.roi is not None or pen.settings.beside is not None
-    pen.look_ahead()
+def _look_ahead(writer: FlightPlanWriter) -> None:
+    looked = writer.settings.roi is not None or writer.settings.beside is not None
+    writer.look_ahead()
     if looked:
-        pen.aim(0.0)
+        writer.aim(0.0)
 
 
-def _roi(pen: Pen, item: Item) -> None:
+def _roi(writer: FlightPlanWriter, item: Item) -> None:
     mode = item.params[0]
     if mode not in (None, 0.0, float(mav_enums.MAV_ROI_LOCATION)):
-        pen.refuse("only a place can be looked at, no way point and no target", 1)
-    if pen.numbers_regions:
-        if not pen.names_place(item):
-            pen.refuse("it has no place", 5)
-        pen.height(item)
+        writer.refuse("only a place can be looked at, no way point and no target", 1)
+    if writer.numbers_regions:
+        if not writer.names_place(item):
+            writer.refuse("it has no place", 5)
+        writer.height(item)
         return
-    if mode or pen.names_place(item):
-        _look(pen, item)
+    if mode or writer.names_place(item):
+        _look(writer, item)
     else:
-        _look_ahead(pen)
+        _look_ahead(writer)
 
 
-def _view_mode(pen: Pen, item: Item) -> None:
+def _view_mode(writer: FlightPlanWriter, item: Item) -> None:
     mode, number, gimbal = item.params[:3]
     if mode in (0.0, 1.0):
-        pen.view(mode, gimbal)
+        writer.view(mode, gimbal)
         return
     if mode != 2.0:
-        pen.refuse("there is no such view mode", 1)
-    if number is None or not number.is_integer() or not 0 <= number < len(pen.regions):
-        pen.refuse("it looks at a region that is not there", 2)
-    _look(pen, pen.regions[int(number)])
+        writer.refuse("there is no such view mode", 1)
+    if number is None or not number.is_integer() or not 0 <= number < len(writer.regions):
+        writer.refuse("it looks at a region that is not there", 2)
+    _look(writer, writer.regions[int(number)])
 
 
 # The gimbal.
 
 
-def _tilt(pen: Pen, pitch: float | None, number: int, roll: float | None = None, yaw: float | None = None) -> None:
-    lowest, highest = _TILT[pen.version]
+def _tilt(
+    writer: FlightPlanWriter, pitch: float | None, number: int, roll: float | None = None, yaw: float | None = None
+) -> None:
+    lowest, highest = _TILT[writer.version]
     if pitch is not None and not lowest <= pitch <= highest:
-        pen.refuse(f"the camera tilts from {lowest:g} to {highest:g} deg, not to {pitch:g}", number)
-    if pen.settings.roi is not None:
-        pen.look_ahead()
-    pen.aim(pitch, roll, yaw)
+        writer.refuse(f"the camera tilts from {lowest:g} to {highest:g} deg, not to {pitch:g}", number)
+    if writer.settings.roi is not None:
+        writer.look_ahead()
+    writer.aim(pitch, roll, yaw)
 
 
-def _mount(pen: Pen, item: Item) -> None:
+def _mount(writer: FlightPlanWriter, item: Item) -> None:
     pitch, roll, yaw = item.params[:3]
     mode = item.params[6]
     if mode == mav_enums.MAV_MOUNT_MODE_NEUTRAL:
-        _tilt(pen, 0.0, 1, 0.0, 0.0)
+        _tilt(writer, 0.0, 1, 0.0, 0.0)
         return
     if mode not in (None, float(mav_enums.MAV_MOUNT_MODE_RETRACT), float(mav_enums.MAV_MOUNT_MODE_MAVLINK_TARGETING)):
-        pen.refuse("the gimbal is aimed by angles only", 7)
+        writer.refuse("the gimbal is aimed by angles only", 7)
     if mode == mav_enums.MAV_MOUNT_MODE_RETRACT:
-        pen.say("the gimbal cannot be put away: it is aimed")
-    if pen.version == 1:
-        only(pen, item, 2, "the flight plan does not roll the camera")
-        only(pen, item, 3, "the camera does not turn to the side: turn the drone")
-    _tilt(pen, pitch, 1, roll, yaw)
+        writer.say("the gimbal cannot be put away: it is aimed")
+    if writer.version == 1:
+        only(writer, item, 2, "the flight plan does not roll the camera")
+        only(writer, item, 3, "the camera does not turn to the side: turn the drone")
+    _tilt(writer, pitch, 1, roll, yaw)
 
 
-def _mount_mode(pen: Pen, item: Item) -> None:
+def _mount_mode(writer: FlightPlanWriter, item: Item) -> None:
     mode = item.params[0]
     if mode not in (None, 0.0, 1.0, float(mav_enums.MAV_MOUNT_MODE_MAVLINK_TARGETING)):
-        pen.refuse("the gimbal is aimed by angles only", 1)
+        writer.refuse("the gimbal is aimed by angles only", 1)
     if mode == mav_enums.MAV_MOUNT_MODE_NEUTRAL:
-        _tilt(pen, 0.0, 1, 0.0, 0.0)
+        _tilt(writer, 0.0, 1, 0.0, 0.0)
 
 
-def _pitch_yaw(pen: Pen, item: Item) -> None:
+def _pitch_yaw(writer: FlightPlanWriter, item: Item) -> None:
     pitch, yaw, _, _, flags = item.params[:5]
-    _gimbal(pen, item, 7)
-    only(pen, item, 3, "a flight plan aims at an angle, it does not turn with a speed")
-    only(pen, item, 4, "a flight plan aims at an angle, it does not turn with a speed")
+    _gimbal(writer, item, 7)
+    only(writer, item, 3, "a flight plan aims at an angle, it does not turn with a speed")
+    only(writer, item, 4, "a flight plan aims at an angle, it does not turn with a speed")
     bits = int(flags or 0.0)
     if bits & (mav_enums.GIMBAL_MANAGER_FLAGS_RETRACT | mav_enums.GIMBAL_MANAGER_FLAGS_NEUTRAL):
-        _tilt(pen, 0.0, 1, 0.0, 0.0)
+        _tilt(writer, 0.0, 1, 0.0, 0.0)
         if bits & mav_enums.GIMBAL_MANAGER_FLAGS_RETRACT:
-            pen.say("the gimbal cannot be put away: it looks ahead")
+            writer.say("the gimbal cannot be put away: it looks ahead")
         return
     earth = bits & (mav_enums.GIMBAL_MANAGER_FLAGS_YAW_LOCK | mav_enums.GIMBAL_MANAGER_FLAGS_YAW_IN_EARTH_FRAME)
-    if yaw is not None and (earth or (yaw != 0.0 and pen.version == 1)):
-        pen.refuse("the camera looks where the drone's nose does: turn the drone" if pen.version == 1
+    if yaw is not None and (earth or (yaw != 0.0 and writer.version == 1)):
+        writer.refuse("the camera looks where the drone's nose does: turn the drone" if writer.version == 1
                    else "the camera is aimed from the drone's nose, not from north", 2)  # fmt: skip
-    _tilt(pen, pitch, 1, None, yaw)
+    _tilt(writer, pitch, 1, None, yaw)
 
 
-def _gimbal_owner(pen: Pen, item: Item) -> None:
-    _gimbal(pen, item, 7)
+def _gimbal_owner(writer: FlightPlanWriter, item: Item) -> None:
+    _gimbal(writer, item, 7)
 
 
 # The camera.
 
 
-def _camera_mode(pen: Pen, item: Item) -> None:
-    _camera(pen, item, 1)
+def _camera_mode(writer: FlightPlanWriter, item: Item) -> None:
+    _camera(writer, item, 1)
     if item.params[1] not in (0.0, 1.0, 2.0):
-        pen.refuse("there is no such camera mode", 2)
-    pen.want_mode()
+        writer.refuse("there is no such camera mode", 2)
+    writer.want_mode()
 
 
-def _still_mode(pen: Pen, item: Item) -> None:
+def _still_mode(writer: FlightPlanWriter, item: Item) -> None:
     mode, step, form = item.params[:3]
     if mode not in (0.0, 1.0):
-        pen.refuse("photos are taken by time or by distance", 1)
-    only(pen, item, 3, "there is no such format of photos", _FORMATS)
-    pen.set_still(mode, step or 0.0, form or 0.0)
+        writer.refuse("photos are taken by time or by distance", 1)
+    only(writer, item, 3, "there is no such format of photos", _FORMATS)
+    writer.set_still(mode, step or 0.0, form or 0.0)
 
 
-def _interval(pen: Pen, seconds: float, number: int) -> None:
+def _interval(writer: FlightPlanWriter, seconds: float, number: int) -> None:
     if seconds < SHORTEST_INTERVAL:
-        pen.refuse(f"the camera needs {SHORTEST_INTERVAL:g} s between photos, not {seconds:g}", number)
+        writer.refuse(f"the camera needs {SHORTEST_INTERVAL:g} s between photos, not {seconds:g}", number)
 
 
-def _distance(pen: Pen, metres: float, number: int) -> None:
+def _distance(writer: FlightPlanWriter, metres: float, number: int) -> None:
     if metres < SHORTEST_STEP:
-        pen.refuse(f"the camera needs {SHORTEST_STEP:g} m between photos, not {metres:g}", number)
+        writer.refuse(f"the camera needs {SHORTEST_STEP:g} m between photos, not {metres:g}", number)
 
 
-def _photos(pen: Pen, item: Item) -> None:
+def _photos(writer: FlightPlanWriter, item: Item) -> None:
     interval, count = item.params[1:3]
-    _camera(pen, item, 1)
+    _camera(writer, item, 1)
     if count is None or count < 0.0 or not count.is_integer():
-        pen.refuse("it does not say how many photos", 3)
+        writer.refuse("it does not say how many photos", 3)
     if count == 1.0:
-        pen.photo()
+        writer.photo()
     elif interval:
-        _interval(pen, interval, 2)
-        pen.photos_in_time(interval, count)
-    elif pen.settings.still is None:
-        pen.refuse("it does not say how often", 2)
-    elif pen.settings.still[0] == 1.0:
-        _distance(pen, pen.settings.still[1], 2)
-        pen.photos_on_the_way(pen.settings.still[1], count)
+        _interval(writer, interval, 2)
+        writer.photos_in_time(interval, count)
+    elif writer.settings.still is None:
+        writer.refuse("it does not say how often", 2)
+    elif writer.settings.still[0] == 1.0:
+        _distance(writer, writer.settings.still[1], 2)
+        writer.photos_on_the_way(writer.settings.still[1], count)
     else:
-        _interval(pen, pen.settings.still[1], 2)
-        pen.photos_in_time(pen.settings.still[1], count)
+        _interval(writer, writer.settings.still[1], 2)
+        writer.photos_in_time(writer.settings.still[1], count)
 
 
-def _stop_photos(pen: Pen, item: Item) -> None:
-    _camera(pen, item, 1)
-    pen.stop_photos()
+def _stop_photos(writer: FlightPlanWriter, item: Item) -> None:
+    _camera(writer, item, 1)
+    writer.stop_photos()
 
 
-def _trigger_distance(pen: Pen, item: Item) -> None:
+def _trigger_distance(writer: FlightPlanWriter, item: Item) -> None:
     metres, shutter, at_once = item.params[:3]
-    _camera(pen, item, 4)
+    _camera(writer, item, 4)
     if metres is None or metres < 0.0:
-        pen.refuse("it does not say how far apart", 1)
+        writer.refuse("it does not say how far apart", 1)
     if metres == 0.0:
-        pen.stop_photos()
+        writer.stop_photos()
         if at_once:
-            pen.photo()
+            writer.photo()
         return
-    _distance(pen, metres, 1)
+    _distance(writer, metres, 1)
     if shutter not in _UNSET:
-        pen.say(f"the camera chooses its shutter time itself, not {shutter:g} ms")
+        writer.say(f"the camera chooses its shutter time itself, not {shutter:g} ms")
     if not at_once:
-        pen.say("the first photo is taken at once")
-    pen.photos_on_the_way(metres, 0.0)
+        writer.say("the first photo is taken at once")
+    writer.photos_on_the_way(metres, 0.0)
 
 
-def _trigger_interval(pen: Pen, item: Item) -> None:
+def _trigger_interval(writer: FlightPlanWriter, item: Item) -> None:
     period, shutter = item.params[:2]
-    _camera(pen, item, 3)
+    _camera(writer, item, 3)
     if period in _UNSET:
         return
-    _interval(pen, (period or 0.0) / 1000.0, 1)
+    _interval(writer, (period or 0.0) / 1000.0, 1)
     if shutter not in _UNSET:
-        pen.say(f"the camera chooses its shutter time itself, not {shutter:g} ms")
-    pen.photos_in_time((period or 0.0) / 1000.0, 0.0)
+        writer.say(f"the camera chooses its shutter time itself, not {shutter:g} ms")
+    writer.photos_in_time((period or 0.0) / 1000.0, 0.0)
 
 
-def _digicam(pen: Pen, item: Item) -> None:
+def _digicam(writer: FlightPlanWriter, item: Item) -> None:
     for number, what in ((1, "there is no lens to be shown"), (2, "zoom by SET_CAMERA_ZOOM"),
                          (3, "zoom by SET_CAMERA_ZOOM"), (4, "a flight plan cannot focus")):  # fmt: skip
-        only(pen, item, number, what)
-    only(pen, item, 5, "there is no such shooting command", frozenset({None, 0.0, 1.0}))
+        only(writer, item, number, what)
+    only(writer, item, 5, "there is no such shooting command", frozenset({None, 0.0, 1.0}))
     if item.params[4] == 1.0:
-        pen.photo()
+        writer.photo()
 
 
-def _video(pen: Pen, item: Item) -> None:
-    _camera(pen, item, 3)
-    pen.film()
+def _video(writer: FlightPlanWriter, item: Item) -> None:
+    _camera(writer, item, 3)
+    writer.film()
 
 
-def _stop_video(pen: Pen, item: Item) -> None:
-    _camera(pen, item, 3)
-    pen.stop_film()
+def _stop_video(writer: FlightPlanWriter, item: Item) -> None:
+    _camera(writer, item, 3)
+    writer.stop_film()
 
 
-def _panorama(pen: Pen, item: Item) -> None:
+def _panorama(writer: FlightPlanWriter, item: Item) -> None:
     if not item.params[0] and not item.params[1]:
-        pen.refuse("its angles are nothing", 1)
-    pen.panorama(*item.params[:4])
+        writer.refuse("its angles are nothing", 1)
+    writer.panorama(*item.params[:4])
 
 
-def _zoom(pen: Pen, item: Item) -> None:
+def _zoom(writer: FlightPlanWriter, item: Item) -> None:
     kind, value = item.params[:2]
-    _camera(pen, item, 3)
+    _camera(writer, item, 3)
     if kind != float(mav_enums.ZOOM_TYPE_RANGE):
-        pen.refuse("only a zoom range in percent can be flown", 1)
+        writer.refuse("only a zoom range in percent can be flown", 1)
     if value is None or not 0.0 <= value <= 100.0:
-        pen.refuse("a zoom range is from 0 to 100 %", 2)
+        writer.refuse("a zoom range is from 0 to 100 %", 2)
 
 
 _EXACT, _NEARLY, _STEPPED = Fidelity.EXACT, Fidelity.APPROXIMATED, Fidelity.STEPPED

@@ -6,101 +6,101 @@ from dataclasses import replace
 
 from anafi_mav import mav_enums
 from anafi_mav.plans.plan import DO_JUMP, WAYPOINT, Item, Point
-from anafi_mav.plans.rules.flight_plan_writer import Pen
+from anafi_mav.plans.rules.flight_plan_writer import FlightPlanWriter
 from anafi_mav.plans.rules.rule import Fidelity, Rule
 
 # What flies.
 
 
-def _fly(pen: Pen, item: Item, heading: float | None, radius: float | None = None) -> None:
-    pen.fly(pen.destination(item), heading, radius)
+def _fly(writer: FlightPlanWriter, item: Item, heading: float | None, radius: float | None = None) -> None:
+    writer.fly(writer.destination(item), heading, radius)
 
 
-def _waypoint(pen: Pen, item: Item) -> None:
+def _waypoint(writer: FlightPlanWriter, item: Item) -> None:
     hold, radius, beside, heading = item.params[:4]
     if (hold or 0.0) < 0.0:
-        pen.refuse(f"it waits for {hold:g} s", 1)
+        writer.refuse(f"it waits for {hold:g} s", 1)
     if (radius or 0.0) < 0.0:
-        pen.refuse(f"a radius of {radius:g} m", 2)
-    if not pen.names_place(item):
-        pen.say("it names no place: it is where the drone is then")
+        writer.refuse(f"a radius of {radius:g} m", 2)
+    if not writer.names_place(item):
+        writer.say("it names no place: it is where the drone is then")
     if beside:
-        pen.say(f"it is flown over, not passed at {abs(beside):g} m")
-    _fly(pen, item, heading, radius)
-    pen.wait(hold or 0.0)
+        writer.say(f"it is flown over, not passed at {abs(beside):g} m")
+    _fly(writer, item, heading, radius)
+    writer.wait(hold or 0.0)
 
 
-def _loiter(pen: Pen, item: Item) -> None:
-    _fly(pen, item, item.params[3])
+def _loiter(writer: FlightPlanWriter, item: Item) -> None:
+    _fly(writer, item, item.params[3])
 
 
-def _loiter_time(pen: Pen, item: Item) -> None:
+def _loiter_time(writer: FlightPlanWriter, item: Item) -> None:
     seconds = item.params[0] or 0.0
     if seconds < 0.0:
-        pen.refuse(f"it waits for {seconds:g} s", 1)
-    _fly(pen, item, None)
-    pen.wait(seconds)
+        writer.refuse(f"it waits for {seconds:g} s", 1)
+    _fly(writer, item, None)
+    writer.wait(seconds)
 
 
-def _loiter_to_height(pen: Pen, item: Item) -> None:
-    _fly(pen, item, None)
+def _loiter_to_height(writer: FlightPlanWriter, item: Item) -> None:
+    _fly(writer, item, None)
 
 
-def _take_off(pen: Pen, item: Item) -> None:
-    heading, height = item.params[3], pen.height(item) if item.params[6] else None
-    away = pen.names_place(item)
+def _take_off(writer: FlightPlanWriter, item: Item) -> None:
+    heading, height = item.params[3], writer.height(item) if item.params[6] else None
+    away = writer.names_place(item)
     if height is None:
-        pen.say("it says no height: the drone rises as high as it does by itself")
+        writer.say("it says no height: the drone rises as high as it does by itself")
     elif height < 0.0:
-        pen.refuse(f"it rises to {height:g} m above take-off", 7)
+        writer.refuse(f"it rises to {height:g} m above take-off", 7)
     else:
-        up = replace(pen.place, height=max(height, pen.place.height))
-        if height > pen.place.height or heading is not None:
-            pen.fly(up, heading, None)
+        up = replace(writer.place, height=max(height, writer.place.height))
+        if height > writer.place.height or heading is not None:
+            writer.fly(up, heading, None)
     if away:
-        there = pen.destination(item)
-        pen.fly_on(replace(there, height=max(there.height, pen.place.height)), heading)
+        there = writer.destination(item)
+        writer.fly_on(replace(there, height=max(there.height, writer.place.height)), heading)
 
 
-def _land(pen: Pen, item: Item) -> None:
+def _land(writer: FlightPlanWriter, item: Item) -> None:
     precision, heading = item.params[1], item.params[3]
     if precision == mav_enums.PRECISION_LAND_MODE_REQUIRED:
-        pen.refuse("the drone cannot land by a mark on the ground", 2)
+        writer.refuse("the drone cannot land by a mark on the ground", 2)
     if precision:
-        pen.say("it lands without looking for a mark on the ground")
-    if pen.names_place(item):
+        writer.say("it lands without looking for a mark on the ground")
+    if writer.names_place(item):
         latitude, longitude = item.params[4:6]
-        over = Point(latitude or 0.0, longitude or 0.0, pen.place.height)
+        over = Point(latitude or 0.0, longitude or 0.0, writer.place.height)
         if heading is None:
-            pen.fly_on(over, None)
+            writer.fly_on(over, None)
         else:
-            pen.fly(over, heading, None)
+            writer.fly(over, heading, None)
     elif heading:
-        pen.say(f"it lands with the heading that it has, not {heading:g} deg")
-    pen.line(mav_enums.MAV_CMD_NAV_LAND)
+        writer.say(f"it lands with the heading that it has, not {heading:g} deg")
+    writer.line(mav_enums.MAV_CMD_NAV_LAND)
 
 
-def _return(pen: Pen, item: Item) -> None:
-    pen.line(mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH)
+def _return(writer: FlightPlanWriter, item: Item) -> None:
+    writer.line(mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH)
 
 
 # What waits.
 
 
-def _delay(pen: Pen, item: Item) -> None:
+def _delay(writer: FlightPlanWriter, item: Item) -> None:
     seconds = item.params[0]
     if seconds is None or seconds < 0.0:
-        pen.refuse("it waits for a time of day, which the drone cannot" if seconds == -1.0 else "it says no time", 1)
-    pen.wait(seconds)
+        writer.refuse("it waits for a time of day, which the drone cannot" if seconds == -1.0 else "it says no time", 1)
+    writer.wait(seconds)
 
 
-def _condition_delay(pen: Pen, item: Item) -> None:
+def _condition_delay(writer: FlightPlanWriter, item: Item) -> None:
     seconds = item.params[0] or 0.0
     if seconds < 0.0:
-        pen.refuse(f"it waits for {seconds:g} s", 1)
+        writer.refuse(f"it waits for {seconds:g} s", 1)
     if seconds:
-        pen.say("the drone waits where it is, not on the way to the next way point")
-    pen.wait(seconds)
+        writer.say("the drone waits where it is, not on the way to the next way point")
+    writer.wait(seconds)
 
 
 def is_relative(reference: float | None) -> bool:
@@ -111,17 +111,17 @@ def is_relative(reference: float | None) -> bool:
     return bool(reference)
 
 
-def _turn(pen: Pen, item: Item) -> None:
+def _turn(writer: FlightPlanWriter, item: Item) -> None:
     """Only what the drone looks at then: the gateway turns it."""
     angle, _, way, reference = item.params[:4]
     if angle is None:
-        pen.refuse("it says no angle", 1)
+        writer.refuse("it says no angle", 1)
     if reference is not None and not (reference.is_integer() and 0.0 <= reference <= 0xFF):
-        pen.refuse(f"{reference:g} is neither relative nor absolute", 4)
+        writer.refuse(f"{reference:g} is neither relative nor absolute", 4)
     if way not in (None, -1.0, 0.0, 1.0):
-        pen.refuse(f"{way:g} is no direction to turn in", 3)
+        writer.refuse(f"{way:g} is no direction to turn in", 3)
     relative = is_relative(reference)
-    pen.turn(-angle if relative and way == -1.0 else angle, relative=relative)
+    writer.turn(-angle if relative and way == -1.0 else angle, relative=relative)
 
 
 # What sets.
@@ -130,22 +130,22 @@ _AIRSPEED, _GROUNDSPEED = float(mav_enums.SPEED_TYPE_AIRSPEED), float(mav_enums.
 _SAME = -1.0
 
 
-def _speed(pen: Pen, item: Item) -> None:
+def _speed(writer: FlightPlanWriter, item: Item) -> None:
     kind, speed, throttle, relative = item.params[:4]
     if kind not in (None, _AIRSPEED, _GROUNDSPEED):
-        pen.refuse("a flight plan has a speed over ground only, not one for climbing and sinking", 1)
+        writer.refuse("a flight plan has a speed over ground only, not one for climbing and sinking", 1)
     if relative == 1.0:
-        pen.refuse("it says how much faster, not how fast", 4)
+        writer.refuse("it says how much faster, not how fast", 4)
     if throttle not in (None, 0.0, _SAME):
-        pen.say(f"there is no throttle to be set to {throttle:g} %")
+        writer.say(f"there is no throttle to be set to {throttle:g} %")
     if speed == _SAME:
         return
     if speed is None or speed <= 0.0:
-        pen.refuse("it says no speed" if speed is None else f"it says a speed of {speed:g} m/s", 2)
-    pen.set_speed(_GROUNDSPEED if kind is None else kind, speed)
+        writer.refuse("it says no speed" if speed is None else f"it says a speed of {speed:g} m/s", 2)
+    writer.set_speed(_GROUNDSPEED if kind is None else kind, speed)
 
 
-def _nothing(pen: Pen, item: Item) -> None:
+def _nothing(writer: FlightPlanWriter, item: Item) -> None:
     """No line."""
 
 

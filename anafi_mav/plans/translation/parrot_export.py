@@ -23,7 +23,7 @@ def start_of(plan: Plan) -> Start:
     return Start(*first, 0.0, False, None)
 
 
-def twin(plan: Plan, version: Version, source: str) -> tuple[bytes, list[Loss]]:
+def export_parrot(plan: Plan, version: Version, source: str) -> tuple[bytes, list[Loss]]:
     """The file, and what of the plan it does not hold or has otherwise.
 
     Raises `PlanError` for what no drone of this version flies, or none without a gateway; `source` names the plan.

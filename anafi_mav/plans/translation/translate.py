@@ -16,7 +16,7 @@ from anafi_mav import mav_enums
 from anafi_mav.errors import PlanError
 from anafi_mav.plans.formats.parrot import Version
 from anafi_mav.plans.plan import DO_JUMP, Item, Loss
-from anafi_mav.plans.rules.flight_plan_writer import Pen
+from anafi_mav.plans.rules.flight_plan_writer import FlightPlanWriter
 from anafi_mav.plans.rules.parts import (
     FaultKind,
     FlightPlanFile,
@@ -151,41 +151,43 @@ def _judged(items: Sequence[Item], version: Version) -> tuple[list[TranslationFa
 
     Returns at most one fault of each item, and the parts that are left out.
     """
-    pen = Pen(version, Start(0.0, 0.0, 0.0, flying=True, takeoff_amsl=0.0), items)
-    pen.muted = True
+    writer = FlightPlanWriter(version, Start(0.0, 0.0, 0.0, flying=True, takeoff_amsl=0.0), items)
+    writer.muted = True
     faults = []
-    for pen.item, item in enumerate(items):
-        fault = _wrong_item(pen, item, len(items))
+    for writer.item, item in enumerate(items):
+        fault = _wrong_item(writer, item, len(items))
         if fault is not None:
             faults.append(fault)
-    pen.end_modes()
-    return faults, list(pen.notes)
+    writer.end_modes()
+    return faults, list(writer.notes)
 
 
-def _wrong_item(pen: Pen, item: Item, count: int) -> TranslationFault | None:
+def _wrong_item(writer: FlightPlanWriter, item: Item, count: int) -> TranslationFault | None:
     row = TABLE.get(item.command)
     if row is None or row.verdict is Fidelity.REFUSED:
         name = Rule(item.command, Fidelity.REFUSED, "").name
-        return TranslationFault(pen.item, f"{name}: {row.why if row else 'no flight plan has it'}", FaultKind.COMMAND)
+        return TranslationFault(
+            writer.item, f"{name}: {row.why if row else 'no flight plan has it'}", FaultKind.COMMAND
+        )
     for number, value in enumerate(item.params, 1):
         if value is not None and not math.isfinite(value):
-            return TranslationFault(pen.item, f"{value} is no number", FaultKind.PARAM, number)
+            return TranslationFault(writer.item, f"{value} is no number", FaultKind.PARAM, number)
     if not item.autocontinue:
-        return TranslationFault(pen.item, "it waits to be continued, which the drone does not", FaultKind.COMMAND)
+        return TranslationFault(writer.item, "it waits to be continued, which the drone does not", FaultKind.COMMAND)
     if item.command == DO_JUMP:
-        return _wrong_jump(pen.item, item, count)
+        return _wrong_jump(writer.item, item, count)
     try:
-        _write(pen, item)
+        _write(writer, item)
     except TranslationRefused as error:
         return error.fault
     return None
 
 
-def _write(pen: Pen, item: Item) -> None:
+def _write(writer: FlightPlanWriter, item: Item) -> None:
     row = TABLE[item.command]
     assert row.write is not None, "what is not refused is written"
     try:
-        row.write(pen, item)
+        row.write(writer, item)
     except TranslationRefused as error:
         raise TranslationRefused(replace(error.fault, reason=f"{row.name}: {error.fault.reason}")) from None
 
@@ -256,13 +258,13 @@ def _after(items: Sequence[Item], number: int) -> int:
 
 def _flies(items: Sequence[Item], version: Version, loop: Sequence[int]) -> bool:
     """Something of a loop takes its time. The first turn leads to where the second begins."""
-    pen = Pen(version, Start(0.0, 0.0, 0.0, flying=True, takeoff_amsl=0.0), items)
+    writer = FlightPlanWriter(version, Start(0.0, 0.0, 0.0, flying=True, takeoff_amsl=0.0), items)
     for turn in range(2):
-        before = pen.flown
-        for pen.item in loop:
-            if TABLE[items[pen.item].command].moves:
-                _write(pen, items[pen.item])
-            if turn and pen.flown > before:
+        before = writer.flown
+        for writer.item in loop:
+            if TABLE[items[writer.item].command].moves:
+                _write(writer, items[writer.item])
+            if turn and writer.flown > before:
                 return True
     return False
 
@@ -304,48 +306,50 @@ def _cursor(items: Sequence[Item], version: Version, start: Start, first: int, j
     """Return the cursor at an item, with the settings of all items before it in the list."""
     if not 0 <= first < len(items):
         raise PlanError("mission", f"it has {len(items)} items", first)
-    pen = Pen(version, start, items)
-    pen.muted = True
-    for pen.item, item in enumerate(items[:first]):
+    writer = FlightPlanWriter(version, start, items)
+    writer.muted = True
+    for writer.item, item in enumerate(items[:first]):
         if item.command != DO_JUMP:
-            _write(pen, item)
-    return Cursor(first, tuple(sorted(jumps.items())), pen.settings, anew=True)
+            _write(writer, item)
+    return Cursor(first, tuple(sorted(jumps.items())), writer.settings, anew=True)
 
 
 def _fly(items: Sequence[Item], version: Version, start: Start, cursor: Cursor) -> TranslatedMission:
-    pen = Pen(version, start, items, cursor.settings)
-    pen.films_again = cursor.anew
+    writer = FlightPlanWriter(version, start, items, cursor.settings)
+    writer.films_again = cursor.anew
     jumps = dict(cursor.jumps)
     index, visits, busy, lively = cursor.item, 0, 0, 0
     """`busy`: what has been flown and photographed by then, and `lively`: when it became more."""
     if not start.flying and items:
-        _rise(pen, items, index)
-    while index < len(items) and pen.written < MAX_LINES and visits < MAX_VISITS:
-        item, pen.item = items[index], index
+        _rise(writer, items, index)
+    while index < len(items) and writer.written < MAX_LINES and visits < MAX_VISITS:
+        item, writer.item = items[index], index
         row = TABLE[item.command]
         following = index + 1
         visits += 1
-        if pen.flown + pen.photographed > busy:
-            busy, lively = pen.flown + pen.photographed, visits
+        if writer.flown + writer.photographed > busy:
+            busy, lively = writer.flown + writer.photographed, visits
         if item.command == DO_JUMP:
             target, often = int(item.params[0] or 0.0), item.params[1]
             if often == _ENDLESS:
                 following = target
             elif jumps.get(index, 0) < (often or 0.0):
                 if visits - lively > 2 * len(items) + MAX_IDLE:
-                    pen.refuse("it goes round and round and flies nowhere", kind=FaultKind.PLAN)
+                    writer.refuse("it goes round and round and flies nowhere", kind=FaultKind.PLAN)
                 jumps[index], following = jumps.get(index, 0) + 1, target
         else:
             if row.verdict is Fidelity.STEPPED:
-                pen.step()
-            _write(pen, item)
-        pen.finish()
+                writer.step()
+            _write(writer, item)
+        writer.finish()
         index = len(items) if row.ends else following
-    pen.close()
+    writer.close()
     if index >= len(items):
-        pen.end_modes()
-    rest = Cursor(index, tuple(sorted(jumps.items())), pen.settings) if index < len(items) else None
-    return TranslatedMission(tuple(pen.parts), tuple(pen.notes), rest, () if pen.parts else tuple(pen.waiting))
+        writer.end_modes()
+    rest = Cursor(index, tuple(sorted(jumps.items())), writer.settings) if index < len(items) else None
+    return TranslatedMission(
+        tuple(writer.parts), tuple(writer.notes), rest, () if writer.parts else tuple(writer.waiting)
+    )
 
 
 def _way_up(items: Sequence[Item], first: int) -> int | None:
@@ -359,27 +363,27 @@ def _way_up(items: Sequence[Item], first: int) -> int | None:
     return None
 
 
-def _rise(pen: Pen, items: Sequence[Item], first: int) -> None:
+def _rise(writer: FlightPlanWriter, items: Sequence[Item], first: int) -> None:
     """Write the take-off from the ground.
 
     Without an item that takes off, the drone climbs straight up to the height of the first way point.
     """
-    pen.item = first
+    writer.item = first
     number = _way_up(items, first)
     if number is None:
         raise PlanError("mission", "on the ground it has nowhere to fly to", first)
     if items[number].command == mav_enums.MAV_CMD_NAV_TAKEOFF:
         if any(TABLE[item.command].moves for item in items[first:number]):
-            pen.say("the drone takes off first")
-        pen.take_off(None)
+            writer.say("the drone takes off first")
+        writer.take_off(None)
         return
-    pen.item = number
-    there = pen.destination(items[number])
-    climbs = there.height > pen.place.height
-    pen.say(
+    writer.item = number
+    there = writer.destination(items[number])
+    climbs = there.height > writer.place.height
+    writer.say(
         f"no item takes off: the drone rises straight to {there.height:g} m above take-off first"
         if climbs
         else "no item takes off"
     )
-    pen.item = first
-    pen.take_off(replace(pen.place, height=there.height) if climbs else None)
+    writer.item = first
+    writer.take_off(replace(writer.place, height=there.height) if climbs else None)

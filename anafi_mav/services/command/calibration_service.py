@@ -44,7 +44,7 @@ of that turn, and what to do with the drone in hand. QGroundControl shows the pi
 Work = Callable[[], Awaitable[None]]
 
 
-class MaintenanceService(Service):
+class CalibrationService(Service):
     """Refused with turning motors, all of it."""
 
     def actions(self) -> Mapping[int, Action]:
@@ -140,12 +140,12 @@ class MaintenanceService(Service):
         done: frozenset[CalibrationAxis] | None = None
         axis: CalibrationAxis | None = None
         fresh = False
-        news = asyncio.Event()
+        updated = asyncio.Event()
 
         def hear(message: Message, now: float) -> None:
             nonlocal fresh
             fresh = fresh or isinstance(message, MagnetoCalibrationStateChanged)
-            news.set()
+            updated.set()
 
         undo = self.host.drone.subscribe(hear)
         try:
@@ -161,8 +161,8 @@ class MaintenanceService(Service):
                     self._say(what)
                     self._say(texts.CAL_ORIENTATION.fill(side=side))
                 done, axis = now, state.axis
-                news.clear()
-                await news.wait()
+                updated.clear()
+                await updated.wait()
         finally:
             undo()
 

@@ -1,6 +1,6 @@
 """The command protocol's service: runs commands, informs their senders, ends replaced ones.
 
-The table of actions holds the meaning of a command; `CommandDesk` knows whether it is a new one (both without I/O).
+The table of actions holds the meaning of a command; `CommandHistory` knows whether it is a new one (both without I/O).
 Rules: conformance R5-R10, C2, MAVLink command.md.
 """
 
@@ -26,7 +26,7 @@ from anafi_mav.services.commands import (
     QUERY,
     Action,
     Command,
-    CommandDesk,
+    CommandHistory,
     Definition,
     Effect,
     Execution,
@@ -78,7 +78,7 @@ class CommandService(Service):
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
-        self._desk = CommandDesk()
+        self._history = CommandHistory()
         self._queries: Mapping[int, Query] = {}
         self._actions: Mapping[int, Action] = {}
         self._running: dict[asyncio.Task[None], _Running] = {}
@@ -132,7 +132,7 @@ class CommandService(Service):
         for running in tuple(self._running.values()):
             if running.answer is not None:
                 self._finish(*running.answer, dialect.MAV_RESULT_FAILED)
-        self._desk.forget()
+        self._history.forget()
 
     async def end_all(self) -> None:
         """Cancel all running actions, and wait for their end."""
@@ -143,7 +143,7 @@ class CommandService(Service):
 
     def run(self, client: Hashable, work: Coroutine[Any, Any, None], *, is_order: bool = True) -> asyncio.Task[None]:
         """Run an action of a message that has no acknowledgement; its refusal is sent as a text."""
-        self._desk.forget(client)  # the vehicle was moved by other means than this client's newest command
+        self._history.forget(client)  # the vehicle was moved by other means than this client's newest command
         return self._spawn(self._explained(work), _Running(client, None, is_order))
 
     @property
@@ -165,7 +165,7 @@ class CommandService(Service):
             if running is not None and running.is_order:
                 self._running[task].replaced_by_order = True
             task.cancel()
-        self._desk.supersede(None if running is None else running.client)
+        self._history.supersede(None if running is None else running.client)
         return others
 
     def _receive(self, inbound: Inbound, decode: _Decode) -> None:
@@ -190,13 +190,13 @@ class CommandService(Service):
         counted = command.effect is not Effect.HOLD or self.host.vehicle.holds.arrive(command.client, now)
         command = replace(command, at=now, counted=counted)
         ended_at = self.host.vehicle.landing_ended_at
-        repeated = self._desk.retransmission(command.client, command, now, mode, ended_at)
+        repeated = self._history.retransmission(command.client, command, now, mode, ended_at)
         if repeated is not None:
             quiet = command.progress in (ProgressPolicy.LATE, None)  # IN_PROGRESS is sent later, or not at all
             if not (quiet and repeated == dialect.MAV_RESULT_IN_PROGRESS):
                 self._acknowledge(inbound, command.id, repeated)
             return
-        execution = self._desk.begin(command.client, command)
+        execution = self._history.begin(command.client, command)
         self._spawn(self._execute(inbound, execution), _Running(command.client, (inbound, execution)))
 
     async def _execute(self, inbound: Inbound, execution: Execution) -> None:

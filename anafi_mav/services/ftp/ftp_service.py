@@ -19,7 +19,7 @@ from anafi_mav.services.component_metadata import COMPRESSED, GENERAL
 from anafi_mav.services.files import FileTree, Query, ServedFile, absolute
 from anafi_mav.services.flavours import FLAVOURS, Flavour, flavour_of
 from anafi_mav.services.ftp.ftp import FtpServer
-from anafi_mav.services.paced_sender import Trickle
+from anafi_mav.services.paced_sender import PacedSender
 from anafi_mav.services.service import Host, MessageHandler, Request, Service, client_of
 
 EXPIRE_EVERY = 1.0
@@ -32,7 +32,7 @@ class FtpService(Service):
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self._server = FtpServer()
-        self._trickle = Trickle(host)
+        self._sender = PacedSender(host)
         self._next_look = 0.0
         self._files: Mapping[str, ServedFile] = {}
         self._trees: dict[str, FileTree] = {}
@@ -71,7 +71,7 @@ class FtpService(Service):
         self._made.clear()
 
     def link_down(self) -> None:
-        self._trickle.clear()
+        self._sender.clear()
 
     def tick(self, now: float) -> None:
         if now >= self._next_look:
@@ -79,7 +79,7 @@ class FtpService(Service):
             self._server.expire(now)
 
     def channel_closed(self, channel: Channel) -> None:
-        self._trickle.closed(channel)
+        self._sender.closed(channel)
         self._server.forget(lambda who: isinstance(who, tuple) and who[0] is channel)
 
     # FTP.
@@ -92,7 +92,7 @@ class FtpService(Service):
             return
         self.host.send(_message(answer, inbound), inbound.channel)
         if self._server.bursting(who):
-            self._trickle.start(inbound.channel, who, self._burst(who, inbound))
+            self._sender.start(inbound.channel, who, self._burst(who, inbound))
 
     def _burst(self, who: Hashable, inbound: Inbound) -> Iterator[dialect.MAVLink_message]:
         """Yield the remaining messages of a burst."""

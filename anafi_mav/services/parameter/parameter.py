@@ -44,7 +44,7 @@ class Parameter:
     """None: the limits of the type. Returns None while the drone has not reported them."""
     values: Mapping[int, str] = field(default_factory=dict)
     """The values that may be written, with their meaning, for a parameter with a fixed choice."""
-    news: tuple[type[Message], ...] = ()
+    updates: tuple[type[Message], ...] = ()
     """The drone's events that may change it."""
     polled: bool = False
     """A setting of the gateway's that others may change, too: looked at ten times a second."""
@@ -109,7 +109,7 @@ def fact(name: str, value: float, short: str, kind: ParamType = ParamType.INT32,
     return Parameter(name, kind, short, lambda host: value, **more)  # type: ignore[arg-type]
 
 
-def twin(
+def alias(
     native: Parameter, name: str, kind: ParamType = ParamType.REAL32, *, scale: float = 1.0, **more: object
 ) -> Parameter:
     """The same value by another name, `scale` times the native one (cm for m: 100)."""

@@ -23,7 +23,7 @@ from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.component_metadata import to_json
 from anafi_mav.services.files import Query, ServedFile
 from anafi_mav.services.flavours import FLAVOURS, Flavour, flavour_of
-from anafi_mav.services.paced_sender import Trickle
+from anafi_mav.services.paced_sender import PacedSender
 from anafi_mav.services.parameter.parameter import Parameter
 from anafi_mav.services.parameter.parameter_codec import (
     HASH_NAME,
@@ -156,7 +156,7 @@ class ParameterService(Service):
         """The gateway's own settings, each once."""
         self._seen = b""
         """Their values at the last look."""
-        self._trickle = Trickle(host)
+        self._sender = PacedSender(host)
         self._refused_at: dict[Channel, float] = {}
         """When a text was last sent about a refused write."""
         self._waiting: deque[tuple[Inbound, Parameter, float]] = deque()
@@ -196,17 +196,17 @@ class ParameterService(Service):
                 own = (one for one in listed.parameters if one.polled and not one.derived)
                 self._own += [one for one in own if one not in self._own]
                 for index, parameter in enumerate(listed.parameters):
-                    for event in parameter.news:
+                    for event in parameter.updates:
                         self._by_news.setdefault(event, {}).setdefault(name, []).append(index)
         for name, listed in self._lists.items():
             self._tell(name, listed.changed(range(len(listed))))
 
     def link_down(self) -> None:
-        self._trickle.clear()
+        self._sender.clear()
         self._waiting.clear()  # the writers end with the host's tasks
 
     def channel_closed(self, channel: Channel) -> None:
-        self._trickle.closed(channel)
+        self._sender.closed(channel)
         self._refused_at.pop(channel, None)
 
     def subscriptions(self) -> Subscriptions:
@@ -291,7 +291,7 @@ class ParameterService(Service):
             for index in range(len(listed)):
                 yield listed.message(index)
 
-        self._trickle.start(inbound.channel, client_of(inbound), messages())
+        self._sender.start(inbound.channel, client_of(inbound), messages())
 
     def _request_read(self, inbound: Inbound) -> None:
         if self._storing.locked():  # a value that is read has to be one that is stored
@@ -323,7 +323,7 @@ class ParameterService(Service):
         flavour = flavour_of(inbound.channel)
         name = name_of(message.param_id)
         if name == HASH_NAME and flavour.bytewise:
-            self._trickle.stop(inbound.channel, client_of(inbound))
+            self._sender.stop(inbound.channel, client_of(inbound))
             return
         listed = self._lists[flavour.name]
         index = listed.index.get(name)

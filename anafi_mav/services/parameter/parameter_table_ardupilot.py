@@ -11,7 +11,7 @@ import math
 
 from anafi_mav import texts
 from anafi_mav.drone import events
-from anafi_mav.services.parameter.parameter import Limits, Parameter, current, fact, mapped, number, twin
+from anafi_mav.services.parameter.parameter import Limits, Parameter, alias, current, fact, mapped, number
 from anafi_mav.services.parameter.parameter_codec import ParamType
 from anafi_mav.services.parameter.parameter_table import (
     CLIMB_SPEED,
@@ -80,7 +80,7 @@ FINAL_ALTITUDE = Parameter(
     read=_final_altitude,
     write=_set_final_altitude,
     limits=_final_limits,
-    news=(events.ReturnEndingAltitude,),
+    updates=(events.ReturnEndingAltitude,),
     polled=True,
     derived=True,
     present=RETURN_END_ALTITUDE.present,
@@ -92,21 +92,21 @@ FINAL_ALTITUDE = Parameter(
     source=RETURN_LANDING.source,
 )
 
-TWINS: tuple[Parameter, ...] = (
-    twin(MAX_TILT, "ANGLE_MAX", ParamType.INT16, scale=CM, unit="centi-degrees"),
-    twin(TILT_RATE, "ATC_RATE_R_MAX"),
-    twin(TILT_RATE, "ATC_RATE_P_MAX"),
-    twin(YAW_RATE, "PILOT_Y_RATE"),
-    twin(VERTICAL_SPEED, "PILOT_SPEED_UP", ParamType.INT16, scale=CM, unit="cm/s", decimals=0),
-    twin(VERTICAL_SPEED, "PILOT_SPEED_DN", ParamType.INT16, scale=CM, unit="cm/s", decimals=0),
-    twin(CRUISE_SPEED, "WPNAV_SPEED", scale=CM, unit="cm/s", decimals=0),
-    twin(CLIMB_SPEED, "WPNAV_SPEED_UP", scale=CM, unit="cm/s", decimals=0),
-    twin(CLIMB_SPEED, "WPNAV_SPEED_DN", scale=CM, unit="cm/s", decimals=0),
-    twin(MAX_ALTITUDE, "FENCE_ALT_MAX"),
-    twin(MAX_DISTANCE, "FENCE_RADIUS"),
-    twin(RETURN_ALTITUDE, "RTL_ALT", ParamType.INT32, scale=CM, unit="cm", decimals=0),
+ALIASES: tuple[Parameter, ...] = (
+    alias(MAX_TILT, "ANGLE_MAX", ParamType.INT16, scale=CM, unit="centi-degrees"),
+    alias(TILT_RATE, "ATC_RATE_R_MAX"),
+    alias(TILT_RATE, "ATC_RATE_P_MAX"),
+    alias(YAW_RATE, "PILOT_Y_RATE"),
+    alias(VERTICAL_SPEED, "PILOT_SPEED_UP", ParamType.INT16, scale=CM, unit="cm/s", decimals=0),
+    alias(VERTICAL_SPEED, "PILOT_SPEED_DN", ParamType.INT16, scale=CM, unit="cm/s", decimals=0),
+    alias(CRUISE_SPEED, "WPNAV_SPEED", scale=CM, unit="cm/s", decimals=0),
+    alias(CLIMB_SPEED, "WPNAV_SPEED_UP", scale=CM, unit="cm/s", decimals=0),
+    alias(CLIMB_SPEED, "WPNAV_SPEED_DN", scale=CM, unit="cm/s", decimals=0),
+    alias(MAX_ALTITUDE, "FENCE_ALT_MAX"),
+    alias(MAX_DISTANCE, "FENCE_RADIUS"),
+    alias(RETURN_ALTITUDE, "RTL_ALT", ParamType.INT32, scale=CM, unit="cm", decimals=0),
     FINAL_ALTITUDE,
-    twin(RETURN_WAIT, "RTL_LOIT_TIME", ParamType.INT32, scale=1000.0, unit="ms", decimals=0),
+    alias(RETURN_WAIT, "RTL_LOIT_TIME", ParamType.INT32, scale=1000.0, unit="ms", decimals=0),
     mapped(
         RETURN_BY_ITSELF,
         "BATT_FS_LOW_ACT",
@@ -121,8 +121,8 @@ TWINS: tuple[Parameter, ...] = (
         {0: "Disabled", 1: "RTL", 5: "Land", 7: "Brake"},
         {0: LossAction.NOTHING, 1: LossAction.RETURN, 5: LossAction.LAND, 7: LossAction.HOLD},
     ),
-    twin(GCS_LOSS_TIME, "FS_GCS_TIMEOUT"),
-    twin(GUIDED_TIME, "GUID_TIMEOUT"),
+    alias(GCS_LOSS_TIME, "FS_GCS_TIMEOUT"),
+    alias(GUIDED_TIME, "GUID_TIMEOUT"),
 )
 
 
@@ -158,7 +158,7 @@ FACTS_ARDUPILOT: tuple[Parameter, ...] = (
         ParamType.INT32,
         "Charge of the full battery",
         lambda host: number(host.drone.battery.state.full_charge_mah),
-        news=(events.BatteryCapacity,),
+        updates=(events.BatteryCapacity,),
         unit="mAh",
         group=FACTS,
         source=events.BatteryCapacity.NAME,
@@ -182,7 +182,7 @@ FACTS_ARDUPILOT: tuple[Parameter, ...] = (
             ParamType.REAL32,
             "Compass offset: 0 while the drone demands a calibration",
             _compass_offset,
-            news=(events.MagnetoCalibrationRequiredState,),
+            updates=(events.MagnetoCalibrationRequiredState,),
             group=FACTS,
             long=UNTOLD,
             source=events.MagnetoCalibrationRequiredState.NAME,
@@ -211,7 +211,7 @@ FACTS_ARDUPILOT: tuple[Parameter, ...] = (
         ParamType.INT32,
         "Total flight time",
         lambda host: number(host.drone.product.state.total_flight_s),
-        news=(events.MotorFlightsStatusChanged,),
+        updates=(events.MotorFlightsStatusChanged,),
         volatile=True,
         unit="s",
         group=FACTS,
@@ -219,4 +219,4 @@ FACTS_ARDUPILOT: tuple[Parameter, ...] = (
     ),
 )
 
-ARDUPILOT_NAMES: tuple[Parameter, ...] = (*TWINS, *FENCE_ARDUPILOT, *FACTS_ARDUPILOT, *SETUP_ARDUPILOT)
+ARDUPILOT_NAMES: tuple[Parameter, ...] = (*ALIASES, *FENCE_ARDUPILOT, *FACTS_ARDUPILOT, *SETUP_ARDUPILOT)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from anafi_mav import texts
 from anafi_mav.drone import events
-from anafi_mav.services.parameter.parameter import Parameter, mapped, own, twin
+from anafi_mav.services.parameter.parameter import Parameter, alias, mapped, own
 from anafi_mav.services.parameter.parameter_codec import ParamType
 from anafi_mav.services.parameter.parameter_table import GEOFENCE, OFF_ON
 from anafi_mav.services.service import Host
@@ -207,7 +207,7 @@ FENCE_TYPE = Parameter(
         types: ", ".join(word for bit, word in _TYPE_WORDS.items() if types & bit).capitalize()
         for types in range(CEILING, EVERYTHING + 1, 2)
     },
-    news=(events.NoFlyOverMaxDistanceChanged,),
+    updates=(events.NoFlyOverMaxDistanceChanged,),
     polled=True,
     present=GEOFENCE.present,
     group=GROUP,
@@ -225,6 +225,6 @@ FENCE_ARDUPILOT: tuple[Parameter, ...] = (
         {number: _NUMBERS[ARDUPILOT_ACTIONS[number]] for number in (0, 2, 3, 4, 5, 1)},
     ),
     mapped(FENCE_ENABLED, "FENCE_ENABLE", ParamType.INT8, OFF_ON, {0: 0, 1: 1}),
-    twin(FENCE_FLOOR, "FENCE_ALT_MIN"),
+    alias(FENCE_FLOOR, "FENCE_ALT_MIN"),
     FENCE_TYPE,
 )

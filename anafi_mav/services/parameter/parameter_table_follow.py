@@ -5,7 +5,7 @@ MAVSDK's follow me writes the aliases.
 
 from __future__ import annotations
 
-from anafi_mav.services.parameter.parameter import Parameter, mapped, own, twin
+from anafi_mav.services.parameter.parameter import Parameter, alias, mapped, own
 from anafi_mav.services.parameter.parameter_codec import ParamType
 from anafi_mav.services.service import Host
 from anafi_mav.vehicle.follow import AltitudeMode
@@ -80,10 +80,10 @@ ALTITUDE = Parameter(
 FOLLOW_NATIVE: tuple[Parameter, ...] = (HEIGHT, DISTANCE, ANGLE, RESPONSIVENESS, ALTITUDE, TANGENTIAL)
 
 FOLLOW_PX4: tuple[Parameter, ...] = (
-    twin(HEIGHT, "FLW_TGT_HT"),
-    twin(DISTANCE, "FLW_TGT_DST"),
-    twin(ANGLE, "FLW_TGT_FA"),
-    twin(RESPONSIVENESS, "FLW_TGT_RS"),
+    alias(HEIGHT, "FLW_TGT_HT"),
+    alias(DISTANCE, "FLW_TGT_DST"),
+    alias(ANGLE, "FLW_TGT_FA"),
+    alias(RESPONSIVENESS, "FLW_TGT_RS"),
     mapped(ALTITUDE, "FLW_TGT_ALT_M", ParamType.INT32, ALTITUDE.values, {0: 0, 1: 1, 2: 2}),
-    twin(TANGENTIAL, "FLW_TGT_MAX_VEL"),
+    alias(TANGENTIAL, "FLW_TGT_MAX_VEL"),
 )

@@ -11,7 +11,7 @@ import math
 
 from anafi_mav import texts
 from anafi_mav.drone import events
-from anafi_mav.services.parameter.parameter import Limits, Parameter, current, fact, mapped, number, twin
+from anafi_mav.services.parameter.parameter import Limits, Parameter, alias, current, fact, mapped, number
 from anafi_mav.services.parameter.parameter_codec import ParamType
 from anafi_mav.services.parameter.parameter_table import (
     AVOIDANCE,
@@ -85,7 +85,7 @@ FENCE_RADIUS = Parameter(
     read=_fence_radius,
     write=_set_fence_radius,
     limits=_fence_limits,
-    news=(events.MaxDistanceChanged, events.NoFlyOverMaxDistanceChanged),
+    updates=(events.MaxDistanceChanged, events.NoFlyOverMaxDistanceChanged),
     present=lambda drone: MAX_DISTANCE.present(drone) and GEOFENCE.present(drone),
     unit="m",
     step=10.0,
@@ -152,23 +152,23 @@ def _low_word(host: Host) -> float:
     return float(low - (1 << 32) if low >= 1 << 31 else low)
 
 
-TWINS: tuple[Parameter, ...] = (
-    twin(TAKEOFF_HEIGHT, "MIS_TAKEOFF_ALT"),
-    twin(RETURN_ALTITUDE, "RTL_RETURN_ALT"),
-    twin(RETURN_END_ALTITUDE, "RTL_DESCEND_ALT"),
+ALIASES: tuple[Parameter, ...] = (
+    alias(TAKEOFF_HEIGHT, "MIS_TAKEOFF_ALT"),
+    alias(RETURN_ALTITUDE, "RTL_RETURN_ALT"),
+    alias(RETURN_END_ALTITUDE, "RTL_DESCEND_ALT"),
     LAND_DELAY,
-    twin(MAX_TILT, "MPC_TILTMAX_AIR"),
-    twin(MAX_TILT, "MPC_MAN_TILT_MAX"),
-    twin(TILT_RATE, "MC_ROLLRATE_MAX"),
-    twin(TILT_RATE, "MC_PITCHRATE_MAX"),
-    twin(YAW_RATE, "MPC_MAN_Y_MAX"),
-    twin(VERTICAL_SPEED, "MPC_Z_VEL_MAX_UP"),
-    twin(VERTICAL_SPEED, "MPC_Z_VEL_MAX_DN"),
-    twin(HORIZONTAL_SPEED, "MPC_VEL_MANUAL"),
-    twin(CRUISE_SPEED, "MPC_XY_CRUISE"),
-    twin(CLIMB_SPEED, "MPC_Z_V_AUTO_UP"),
-    twin(CLIMB_SPEED, "MPC_Z_V_AUTO_DN"),
-    twin(MAX_ALTITUDE, "GF_MAX_VER_DIST"),
+    alias(MAX_TILT, "MPC_TILTMAX_AIR"),
+    alias(MAX_TILT, "MPC_MAN_TILT_MAX"),
+    alias(TILT_RATE, "MC_ROLLRATE_MAX"),
+    alias(TILT_RATE, "MC_PITCHRATE_MAX"),
+    alias(YAW_RATE, "MPC_MAN_Y_MAX"),
+    alias(VERTICAL_SPEED, "MPC_Z_VEL_MAX_UP"),
+    alias(VERTICAL_SPEED, "MPC_Z_VEL_MAX_DN"),
+    alias(HORIZONTAL_SPEED, "MPC_VEL_MANUAL"),
+    alias(CRUISE_SPEED, "MPC_XY_CRUISE"),
+    alias(CLIMB_SPEED, "MPC_Z_V_AUTO_UP"),
+    alias(CLIMB_SPEED, "MPC_Z_V_AUTO_DN"),
+    alias(MAX_ALTITUDE, "GF_MAX_VER_DIST"),
     FENCE_RADIUS,
     mapped(
         RETURN_BY_ITSELF,
@@ -179,7 +179,7 @@ TWINS: tuple[Parameter, ...] = (
     ),
     mapped(AVOIDANCE, "COM_OBS_AVOID", ParamType.INT32, {0: "Off", 1: "On"}, {0: 0, 1: 1}),
     mapped(GCS_LOSS, "NAV_DLL_ACT", ParamType.INT32, GCS_LOSS.values, {number: number for number in GCS_LOSS.values}),
-    twin(GCS_LOSS_TIME, "COM_DL_LOSS_T", ParamType.INT32, decimals=0),
+    alias(GCS_LOSS_TIME, "COM_DL_LOSS_T", ParamType.INT32, decimals=0),
     mapped(
         RC_OVERRIDE,
         "COM_RC_OVERRIDE",
@@ -187,7 +187,7 @@ TWINS: tuple[Parameter, ...] = (
         RC_OVERRIDE.values,
         {number: number for number in RC_OVERRIDE.values},
     ),
-    twin(RC_OVERRIDE_STICK, "COM_RC_STICK_OV"),
+    alias(RC_OVERRIDE_STICK, "COM_RC_STICK_OV"),
 )
 
 
@@ -208,7 +208,7 @@ FACTS_PX4: tuple[Parameter, ...] = (
         ParamType.INT32,
         "Magnetometer: 0 while the drone demands its calibration",
         _calibrated,
-        news=(events.MagnetoCalibrationRequiredState,),
+        updates=(events.MagnetoCalibrationRequiredState,),
         group=FACTS,
         source=events.MagnetoCalibrationRequiredState.NAME,
     ),
@@ -263,7 +263,7 @@ FACTS_PX4: tuple[Parameter, ...] = (
         ParamType.INT32,
         "Total flight time, high word of microseconds",
         _high_word,
-        news=(events.MotorFlightsStatusChanged,),
+        updates=(events.MotorFlightsStatusChanged,),
         volatile=True,
         group=FACTS,
         source=events.MotorFlightsStatusChanged.NAME,
@@ -273,11 +273,11 @@ FACTS_PX4: tuple[Parameter, ...] = (
         ParamType.INT32,
         "Total flight time, low word of microseconds",
         _low_word,
-        news=(events.MotorFlightsStatusChanged,),
+        updates=(events.MotorFlightsStatusChanged,),
         volatile=True,
         group=FACTS,
         source=events.MotorFlightsStatusChanged.NAME,
     ),
 )
 
-PX4_NAMES: tuple[Parameter, ...] = (*TWINS, *FENCE_PX4, *FOLLOW_PX4, *FACTS_PX4, *SETUP_PX4)
+PX4_NAMES: tuple[Parameter, ...] = (*ALIASES, *FENCE_PX4, *FOLLOW_PX4, *FACTS_PX4, *SETUP_PX4)

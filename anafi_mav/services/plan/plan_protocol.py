@@ -46,7 +46,7 @@ MESSAGES = (
 """Messages of a transfer."""
 
 
-class PlanDesk:
+class MissionProtocol:
     """All transfers of one vehicle."""
 
     def __init__(self, kinds: Iterable[PlanKind]) -> None:

@@ -24,7 +24,7 @@ from anafi_mav.services.memory import NOT_KEPT
 from anafi_mav.services.plan import plan_files
 from anafi_mav.services.plan.fence_kind import FenceKind, summary
 from anafi_mav.services.plan.mission_kind import MissionKind
-from anafi_mav.services.plan.plan_protocol import MESSAGES, PlanDesk
+from anafi_mav.services.plan.plan_protocol import MESSAGES, MissionProtocol
 from anafi_mav.services.plan.plan_transfer import Changed, Commit, Effect, Peer, PlanKind, Reply, Say
 from anafi_mav.services.plan.rally_kind import RallyKind
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
@@ -50,7 +50,7 @@ class PlanService(Service):
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self._mission = MissionKind(self._home_item, self._version)
-        self._desk = PlanDesk([self._mission, FenceKind(), RallyKind()])
+        self._protocol = MissionProtocol([self._mission, FenceKind(), RallyKind()])
         self._alarm = Alarm(self._expire)
         self._due = 0.0
         """When the timer ends."""
@@ -83,7 +83,7 @@ class PlanService(Service):
         }
 
     def _packed(self, kind: int, flavour: Flavour, query: Query) -> bytes:
-        transfer = self._desk.transfers[kind]
+        transfer = self._protocol.transfers[kind]
         return plan_files.pack_plan(transfer.kind.shown(transfer.items, flavour), kind)
 
     def _written(self, kind: int, inbound: Inbound, content: bytes) -> bool:
@@ -91,7 +91,7 @@ class PlanService(Service):
 
         What is wrong with it is a text; the list then stays.
         """
-        transfer = self._desk.transfers[kind]
+        transfer = self._protocol.transfers[kind]
         items = plan_files.unpack_plan(content, kind)
         if isinstance(items, PlanFault):
             outcome: list[Effect] | PlanFault = items
@@ -110,7 +110,7 @@ class PlanService(Service):
 
     def link_up(self) -> None:
         memory = self.host.memory
-        for kind, transfer in self._desk.transfers.items():
+        for kind, transfer in self._protocol.transfers.items():
             items = memory.plans.get(kind, ())
             wrong = self._wrong(transfer.kind, items)
             if wrong is not None:
@@ -130,11 +130,11 @@ class PlanService(Service):
         return None if fault is None else fault.reason
 
     def link_down(self) -> None:
-        self._desk.reset()
+        self._protocol.reset()
         self._set_timer()
 
     def channel_closed(self, channel: Channel) -> None:
-        self._desk.leave(lambda client: isinstance(client, tuple) and client[0] is channel)
+        self._protocol.leave(lambda client: isinstance(client, tuple) and client[0] is channel)
         self._set_timer()
 
     # What arrives.
@@ -144,7 +144,7 @@ class PlanService(Service):
         if message.get_msgId() in _ITEMS and (handler := self._item_commands.get(message.current)) is not None:
             handler(inbound)
             return
-        self._perform(self._desk.receive(message, self._peer(inbound), self.host.clock.monotonic()))
+        self._perform(self._protocol.receive(message, self._peer(inbound), self.host.clock.monotonic()))
 
     def _perform(self, effects: Sequence[Effect]) -> None:
         for effect in effects:
@@ -176,10 +176,10 @@ class PlanService(Service):
                 logger.exception("%s: a plan could not be stored", self.host.drone.name)
                 fault = PlanFault(dialect.MAV_MISSION_ERROR, texts.NOT_STORED)
             if fault is not None:
-                transfer = self._desk.transfers.get(commit.mission_type)
+                transfer = self._protocol.transfers.get(commit.mission_type)
                 what = "Plans" if transfer is None else transfer.kind.name.capitalize()
                 self.host.warn_throttled(texts.REFUSED.fill(what=what, reason=fault.reason))
-            self._perform(self._desk.stored(commit, self.host.clock.monotonic(), fault))
+            self._perform(self._protocol.stored(commit, self.host.clock.monotonic(), fault))
 
     async def _put(self, commit: Commit) -> PlanFault | None:
         """Keep plans; what is wrong with the mission, if anything is."""
@@ -202,7 +202,7 @@ class PlanService(Service):
 
         A timer that ends too early is let run, for the deadline goes on with each item of an upload; it looks again.
         """
-        deadline = self._desk.deadline()
+        deadline = self._protocol.deadline()
         if self._alarm.is_set and deadline is not None and self._due <= deadline:
             return
         self._alarm.cancel()
@@ -211,7 +211,7 @@ class PlanService(Service):
             self._due = deadline
 
     def _expire(self) -> None:
-        self._perform(self._desk.expire(self.host.clock.monotonic()))
+        self._perform(self._protocol.expire(self.host.clock.monotonic()))
 
     # What missions need.
 
@@ -233,13 +233,13 @@ class PlanService(Service):
     def _changed(self, kind: int) -> None:
         """Put an uploaded plan in force and notify all clients."""
         mission = self.host.vehicle.mission
-        if kind == MissionKind.mission_type and self._desk.transfers[kind].opaque_id == mission.identity:
+        if kind == MissionKind.mission_type and self._protocol.transfers[kind].opaque_id == mission.identity:
             mission.taken_again()
         self._take(kind)
         self.host.vehicle.mission.news()
 
     def _take(self, kind: int) -> None:
-        vehicle, transfer = self.host.vehicle, self._desk.transfers[kind]
+        vehicle, transfer = self.host.vehicle, self._protocol.transfers[kind]
         items, identity = transfer.items, transfer.opaque_id
         vehicle.plan_ids[kind] = identity
         if kind == MissionKind.mission_type:

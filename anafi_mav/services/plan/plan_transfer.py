@@ -2,7 +2,7 @@
 
 A client's upload replaces the plan as a whole, once all of it has arrived, was found good and is stored; whatever goes
 wrong before leaves the old plan as it was. A download is answered from the plan as it was when the client asked for
-its list. `PlanDesk` (plan_protocol) holds the three lists and sorts the messages.
+its list. `MissionProtocol` (plan_protocol) holds the three lists and sorts the messages.
 
 Rules: MAVLink mission.md; conformance A7, C5, D1, items 46, 61-72.
 """
@@ -91,7 +91,7 @@ class Reply(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True)
 class Commit:
-    """Store these lists, then say so to `PlanDesk.stored`."""
+    """Store these lists, then say so to `MissionProtocol.stored`."""
 
     plans: dict[int, tuple[PlanItem, ...]]
     """By MAV_MISSION_TYPE."""

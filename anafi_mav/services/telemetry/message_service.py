@@ -21,7 +21,7 @@ from anafi_mav.services.flavours import flavour_of
 from anafi_mav.services.service import Answer, Host, MessageHandler, Query, Request, Service
 from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.services.telemetry import data_streams
-from anafi_mav.services.telemetry.update_tracker import News
+from anafi_mav.services.telemetry.update_tracker import UpdateTracker
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 
 logger = logging.getLogger(__name__)
@@ -55,7 +55,7 @@ class MessageService(Service):
         self._intervals: Streams[Channel] = Streams({})
         self._table: Mapping[int, MessageStream] = {}
         self._requests: Mapping[int, Request] = {}
-        self._news = News()
+        self._tracker = UpdateTracker()
         self._events: set[type[Message]] = set()
         """Those that are news for some message."""
         self._repeated: tuple[int, ...] = ()
@@ -72,9 +72,9 @@ class MessageService(Service):
         defaults = {id: stream.every for id, stream in streams.items() if stream.every is not None}
         self._intervals = Streams(defaults, without=lambda channel: flavour_of(channel).unstreamed)
         for id, stream in streams.items():
-            self._news.register(id, (id,))
+            self._tracker.register(id, (id,))
             for event in stream.updates:
-                self._news.register(event, (id,))
+                self._tracker.register(event, (id,))
                 self._events.add(event)
             if stream.on_change:
                 self._on_change.append(id)
@@ -100,29 +100,29 @@ class MessageService(Service):
 
     def link_up(self) -> None:
         self._linked_at = self.host.clock.monotonic()
-        self._news.reset(self._linked_at)
+        self._tracker.reset(self._linked_at)
 
     def link_down(self) -> None:
-        self._news.reset(self.host.clock.monotonic())
+        self._tracker.reset(self.host.clock.monotonic())
 
     def subscriptions(self) -> Subscriptions:
         return dict.fromkeys(self._events, self._on_update)
 
     def _on_update(self, message: Message, now: float) -> None:
-        if self._news.note(type(message), now):
-            asyncio.get_running_loop().call_soon(self._tell_news)
+        if self._tracker.mark(type(message), now):
+            asyncio.get_running_loop().call_soon(self._send_updated)
 
     def mark_updated(self, id: int, at: float) -> None:
         """Send this message at the end of the event-loop iteration."""
-        if self._news.note(id, at):
-            asyncio.get_running_loop().call_soon(self._tell_news)
+        if self._tracker.mark(id, at):
+            asyncio.get_running_loop().call_soon(self._send_updated)
 
     def is_streamed(self, id: int) -> bool:
         """Return True when this message is streamed on some channel."""
         return any(self._intervals.interval(channel, id) is not None for channel in self.host.channels)
 
     def tick(self, now: float) -> None:
-        self._news.pass_time(now)
+        self._tracker.pass_time(now)
         for id, due in self._intervals.due_on(self.host.channels, self._repeated, now):
             self._leave(id, due, self._times(id))
 
@@ -133,8 +133,8 @@ class MessageService(Service):
 
     # Streams.
 
-    def _tell_news(self) -> None:
-        ids, at = self._news.take()
+    def _send_updated(self) -> None:
+        ids, at = self._tracker.take()
         due = self._intervals.due_on(self.host.channels, ids, at)
         for id, channels in due:
             self._leave(id, channels, self._stamp(id, at))
@@ -146,7 +146,7 @@ class MessageService(Service):
         """
         if self._table[id].is_repeated:
             return self._stamp(id, self.host.clock.monotonic())
-        return self._stamp(id, self._news.at(id) or self._linked_at)
+        return self._stamp(id, self._tracker.at(id) or self._linked_at)
 
     def _stamp(self, id: int, at: float) -> Times:
         """The time for a message of this kind; an event that was handled late does not put it back."""
@@ -251,4 +251,4 @@ class MessageService(Service):
         """
         if self._table[id].is_repeated:
             return 0.0
-        return self._news.interval(id, self.host.clock.monotonic()) or 0.0
+        return self._tracker.interval(id, self.host.clock.monotonic()) or 0.0

@@ -33,7 +33,7 @@ class _Bundle:
         """And in the one before."""
 
 
-class News:
+class UpdateTracker:
     """Updates of one drone's messages.
 
     A source is anything hashable: a kind of event, the number of a message.
@@ -41,7 +41,7 @@ class News:
 
     def __init__(self) -> None:
         self._ids: dict[Hashable, tuple[int, ...]] = {}
-        self._fresh: dict[Hashable, None] = {}
+        self._updated: dict[Hashable, None] = {}
         """The sources that had news in this turn, in their order."""
         self._at = 0.0
         self._bundles: dict[tuple[Hashable, ...], _Bundle] = {}
@@ -60,18 +60,18 @@ class News:
 
     def reset(self, now: float) -> None:
         """Forget all updates and intervals."""
-        self._fresh = {}
+        self._updated = {}
         self._bundles.clear()
         self._of.clear()
         self._since = self._window = now
 
-    def note(self, source: Hashable, at: float) -> bool:
+    def mark(self, source: Hashable, at: float) -> bool:
         """Record an update of a registered source.
 
         Returns True for the first update of an event-loop iteration: `take` is to be called at its end.
         """
-        first = not self._fresh
-        self._fresh[source] = None
+        first = not self._updated
+        self._updated[source] = None
         self._at = at
         return first
 
@@ -80,10 +80,10 @@ class News:
 
         They are empty if `reset` was called meanwhile.
         """
-        if not self._fresh:
+        if not self._updated:
             return (), self._at
-        key = tuple(self._fresh)
-        self._fresh = {}
+        key = tuple(self._updated)
+        self._updated = {}
         bundle = self._bundles.get(key) or self._new_bundle(key)
         bundle.count += 1
         bundle.at = self._at

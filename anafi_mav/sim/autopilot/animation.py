@@ -18,8 +18,8 @@ from anafi_mav.arsdk.messages import animation
 from anafi_mav.arsdk.messages.animation import AnimationState, Indicator, Mode, Type
 from anafi_mav.arsdk.messages.generic import ListFlags
 from anafi_mav.sim.autopilot.animation_paths import NEEDS_TARGET, Figure, Leg, Stage, Target, figure
-from anafi_mav.sim.payload.camera_operator import Operator
-from anafi_mav.sim.world.airframe import Body
+from anafi_mav.sim.payload.camera_operator import CameraOperator
+from anafi_mav.sim.world.airframe import Airframe
 from anafi_mav.sim.world.model import AircraftModel
 from anafi_mav.sim.world.motion import Pose
 from anafi_mav.units import clip, wrap_pi
@@ -55,7 +55,9 @@ class _Begun(NamedTuple):
 class Animations:
     """One drone's. `emit` takes the events, `body` does the flying."""
 
-    def __init__(self, model: AircraftModel, body: Body, operator: Operator, emit: Callable[[Message], None]) -> None:
+    def __init__(
+        self, model: AircraftModel, body: Airframe, operator: CameraOperator, emit: Callable[[Message], None]
+    ) -> None:
         types = set(_ALONE) if model.modern else _ALONE - {Type.SUPER_WIDE_PHOTO_PANORAMA}  # animation.xml: 091a
         self._model = model
         self._alone = frozenset(types)

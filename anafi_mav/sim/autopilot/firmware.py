@@ -1,4 +1,4 @@
-"""The simulated firmware: commands in, events out, with a `Body` that flies.
+"""The simulated firmware: commands in, events out, with a `Airframe` that flies.
 
 No I/O and no clock: `receive` takes a command and the time of its arrival, `tick` (see `flight`) lets time pass, events
 leave through `emit`.

@@ -32,12 +32,12 @@ from anafi_mav.sim.autopilot.poi import Poi
 from anafi_mav.sim.autopilot.power import Battery
 from anafi_mav.sim.autopilot.safety import Alarms, Warnings, check_changed, checklist
 from anafi_mav.sim.features.settings import DroneSettings
-from anafi_mav.sim.payload.camera_operator import Operator
+from anafi_mav.sim.payload.camera_operator import CameraOperator
 from anafi_mav.sim.payload.gimbal import Gimbals
 from anafi_mav.sim.payload.jpeg_scene import Scene
 from anafi_mav.sim.payload.payload import Payload
 from anafi_mav.sim.plan.plan_store import FlightPlanStore
-from anafi_mav.sim.world.airframe import Body
+from anafi_mav.sim.world.airframe import Airframe
 from anafi_mav.sim.world.faults import Faults
 from anafi_mav.sim.world.model import AircraftModel
 from anafi_mav.sim.world.motion import Pose
@@ -73,7 +73,7 @@ class Autopilot:
         self,
         model: AircraftModel,
         identity: Identity,
-        body: Body,
+        body: Airframe,
         origin: WorldOrigin,
         emit: Callable[[Message], None],
         note: Callable[[str, dict[str, Any]], None],
@@ -105,7 +105,7 @@ class Autopilot:
         model, body, origin, emit, note = self.model, self._body, self._origin, self._emit, self._note
         self.compass = Compass()
         self.gimbal = Gimbals(model)
-        self.operator = Operator(self.gimbal, self.payload, lambda: (self.time, self.pose), emit, note)
+        self.operator = CameraOperator(self.gimbal, self.payload, lambda: (self.time, self.pose), emit, note)
         self.alarms = Alarms()
         self.warnings = Warnings()
         self.endurance = Endurance(model, self.settings)

@@ -17,11 +17,11 @@ from anafi_mav.arsdk.messages.common import FlightPlanComponent as Part
 from anafi_mav.arsdk.messages.common import MavlinkType, PlayError, PlayingState
 from anafi_mav.sim.autopilot.poi import look
 from anafi_mav.sim.features.settings import DroneSettings
-from anafi_mav.sim.payload.camera_operator import Operator
+from anafi_mav.sim.payload.camera_operator import CameraOperator
 from anafi_mav.sim.plan.panorama import Panorama
 from anafi_mav.sim.plan.plan_camera import COMMANDS, PlanCamera
 from anafi_mav.sim.plan.plan_file import PlanCommand, PlanFileError, PlanLine, read
-from anafi_mav.sim.world.airframe import Body
+from anafi_mav.sim.world.airframe import Airframe
 from anafi_mav.sim.world.faults import Faults
 from anafi_mav.sim.world.model import AircraftModel
 from anafi_mav.sim.world.motion import Pose, Turn
@@ -73,11 +73,11 @@ class FlightPlan:
     def __init__(
         self,
         model: AircraftModel,
-        body: Body,
+        body: Airframe,
         origin: WorldOrigin,
         settings: DroneSettings,
         pilot: Pilot,
-        operator: Operator,
+        operator: CameraOperator,
         emit: Callable[[Message], None],
         note: Callable[[str, dict[str, Any]], None],
         faults: Faults,

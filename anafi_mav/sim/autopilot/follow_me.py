@@ -18,7 +18,7 @@ from anafi_mav.arsdk.messages import controller_info, follow_me
 from anafi_mav.arsdk.messages.follow_me import Animation, Behavior, GeoRelConfigureParam, Input, Mode
 from anafi_mav.sim.autopilot.poi import look
 from anafi_mav.sim.features.settings import DroneSettings
-from anafi_mav.sim.world.airframe import Body
+from anafi_mav.sim.world.airframe import Airframe
 from anafi_mav.sim.world.motion import Pose
 from anafi_mav.sim.world.place import WorldOrigin
 from anafi_mav.units import DEG_PER_RAD, RAD_PER_DEG, clip, wrap_pi
@@ -112,7 +112,7 @@ class FollowMe:
 
     def __init__(
         self,
-        body: Body,
+        body: Airframe,
         origin: WorldOrigin,
         settings: DroneSettings,
         emit: Callable[[Message], None],

@@ -16,7 +16,7 @@ from anafi_mav.arsdk.messages.rth import RthEndingBehavior
 from anafi_mav.sim.autopilot.homing import Homing
 from anafi_mav.sim.autopilot.moves import MoveBy, MoveTo, asked_speeds, own_speeds
 from anafi_mav.sim.features.settings import DroneSettings
-from anafi_mav.sim.world.airframe import Body
+from anafi_mav.sim.world.airframe import Airframe
 from anafi_mav.sim.world.faults import Faults
 from anafi_mav.sim.world.model import AircraftModel
 from anafi_mav.sim.world.motion import Pose
@@ -37,7 +37,7 @@ class Guidance:
     def __init__(
         self,
         model: AircraftModel,
-        body: Body,
+        body: Airframe,
         origin: WorldOrigin,
         settings: DroneSettings,
         homing: Homing,

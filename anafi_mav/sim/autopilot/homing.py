@@ -17,7 +17,7 @@ from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import ardrone3, rth
 from anafi_mav.arsdk.messages.rth import RthEndingBehavior, RthHomeType, RthState, StateReason
 from anafi_mav.sim.features.settings import HOME_TYPES, DroneSettings
-from anafi_mav.sim.world.airframe import Body
+from anafi_mav.sim.world.airframe import Airframe
 from anafi_mav.sim.world.faults import Faults
 from anafi_mav.sim.world.motion import Pose, Turn
 from anafi_mav.sim.world.place import WorldOrigin
@@ -59,7 +59,7 @@ class Homing:
 
     def __init__(
         self,
-        body: Body,
+        body: Airframe,
         origin: WorldOrigin,
         settings: DroneSettings,
         emit: Callable[[Message], None],

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from anafi_mav.arsdk.messages import ardrone3, move
 from anafi_mav.arsdk.messages.ardrone3 import MoveByError, MoveToStatus, OrientationMode
 from anafi_mav.sim.features.settings import DroneSettings
-from anafi_mav.sim.world.airframe import Body
-from anafi_mav.sim.world.model import Airframe
+from anafi_mav.sim.world.airframe import Airframe
+from anafi_mav.sim.world.model import AirframeModel
 from anafi_mav.sim.world.motion import FLOOR, Pose, Turn
 from anafi_mav.units import RAD_PER_DEG
 
@@ -45,7 +45,7 @@ def own_speeds(settings: DroneSettings) -> Speeds:
 
 
 def asked_speeds(
-    command: move.ExtendedMoveBy | move.ExtendedMoveTo, airframe: Airframe, settings: DroneSettings
+    command: move.ExtendedMoveBy | move.ExtendedMoveTo, airframe: AirframeModel, settings: DroneSettings
 ) -> Speeds:
     """The speeds of a command, within what the aircraft can do."""
     _, _, climb = settings.limits("max_vertical_speed")
@@ -83,7 +83,7 @@ class MoveBy:
             for want, speed in zip(wants, (speeds.horizontal, speeds.vertical, speeds.yaw), strict=True)
         )
 
-    def begin(self, body: Body, pose: Pose) -> None:
+    def begin(self, body: Airframe, pose: Pose) -> None:
         forward, right, down, turn = self._wanted
         cos, sin = math.cos(pose.yaw), math.sin(pose.yaw)
         self._start, self._start_heading = pose, body.heading
@@ -97,7 +97,7 @@ class MoveBy:
             yaw_rate=self._speeds.yaw,
         )
 
-    def end(self, error: MoveByError, body: Body, pose: Pose) -> ardrone3.MoveByEnd:
+    def end(self, error: MoveByError, body: Airframe, pose: Pose) -> ardrone3.MoveByEnd:
         """The event that reports what was flown."""
         start = self._start
         if start is None:
@@ -149,7 +149,7 @@ class MoveTo:
             and (self.mode < OrientationMode.HEADING_START or math.isfinite(command.heading))
         )
 
-    def begin(self, body: Body, pose: Pose, north: float, east: float) -> None:
+    def begin(self, body: Airframe, pose: Pose, north: float, east: float) -> None:
         """Start towards the place, which lies at (north, east) in the simulator's plane."""
         command = self._command
         yaw, turn = body.heading, Turn.DURING

@@ -16,7 +16,7 @@ from anafi_mav.sim.payload.payload import Payload
 from anafi_mav.sim.world.motion import Pose
 
 
-class Operator:
+class CameraOperator:
     """One drone's. `moment` gives the simulated time (s) and the pose."""
 
     def __init__(

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import math
 
-from anafi_mav.sim.payload.camera_operator import Operator
+from anafi_mav.sim.payload.camera_operator import CameraOperator
 from anafi_mav.sim.plan.plan_file import PlanLine
-from anafi_mav.sim.world.airframe import Body
+from anafi_mav.sim.world.airframe import Airframe
 from anafi_mav.sim.world.motion import Pose
 from anafi_mav.units import RAD_PER_DEG, clip
 
@@ -27,7 +27,9 @@ _MOST_TURN, _MOST_TILT = 3600.0, 180.0
 class Panorama:
     """One item."""
 
-    def __init__(self, item: PlanLine, body: Body, operator: Operator, pose: Pose, time: float, speed: float) -> None:
+    def __init__(
+        self, item: PlanLine, body: Airframe, operator: CameraOperator, pose: Pose, time: float, speed: float
+    ) -> None:
         """Begin the panorama; `speed` (m/s) is available to hold the position against wind."""
         turn = clip(item.p1, -_MOST_TURN, _MOST_TURN) if math.isfinite(item.p1) else 0.0
         self._tilt = clip(item.p2, -_MOST_TILT, _MOST_TILT) if math.isfinite(item.p2) else 0.0

@@ -6,14 +6,14 @@ from collections.abc import Callable
 
 from anafi_mav.arsdk.messages import camera
 from anafi_mav.arsdk.messages.common import MavlinkType
-from anafi_mav.sim.payload.camera_operator import Operator
+from anafi_mav.sim.payload.camera_operator import CameraOperator
 from anafi_mav.sim.plan.plan_file import PlanCommand, PlanLine
 
 
 class PlanCamera:
     """The camera in the hands of the plan that plays."""
 
-    def __init__(self, operator: Operator) -> None:
+    def __init__(self, operator: CameraOperator) -> None:
         self._operator = operator
         self._type = MavlinkType.FLIGHT_PLAN
         self._still: tuple[float, float] = (0.0, 0.0)

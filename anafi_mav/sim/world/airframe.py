@@ -8,7 +8,7 @@ from anafi_mav.sim.world.motion import NO_FENCE, G, Mode, Motion, Turn
 from anafi_mav.units import wrap_pi
 
 
-class Body:
+class Airframe:
     """One drone's place in a `Motion`: the verbs of its autopilot. Metres, m/s, rad."""
 
     def __init__(self, motion: Motion, index: int) -> None:

@@ -20,7 +20,7 @@ MAX_UNDER_WAY = 2000
 Deliver = Callable[[bytes], None]
 
 
-class Air:
+class LinkEmulation:
     """Both directions of one drone's link.
 
     `later(seconds, function)` calls a function after a while.

@@ -34,7 +34,7 @@ class SettingRange:
 
 
 @dataclass(frozen=True)
-class Airframe:
+class AirframeModel:
     """How it flies (see `motion`)."""
 
     max_speed: float
@@ -105,7 +105,7 @@ class AircraftModel:
     serial_prefix: str
     software: str
     hardware: str
-    airframe: Airframe
+    airframe: AirframeModel
     envelope: Envelope
     battery: BatteryModel
     gimbals: tuple[GimbalModel, ...]
@@ -186,7 +186,7 @@ MODELS: dict[str, AircraftModel] = {
         serial_prefix="PI040416DA9H",
         software="1.8.2",
         hardware="HW_03",
-        airframe=Airframe(max_speed=15.0, yaw_delay=0.1, climb_delay=0.15, flight_time=25.0 * 60.0),
+        airframe=AirframeModel(max_speed=15.0, yaw_delay=0.1, climb_delay=0.15, flight_time=25.0 * 60.0),
         envelope=Envelope((242, 315, 65), 320, 125, 13.9, 4500.0, (-10.0, 40.0)),
         battery=BatteryModel(cells=2, capacity_mah=2700, full_mv=8700, empty_mv=6600),
         gimbals=(GimbalModel(pitch=(-90.0, 90.0), roll=_ROLL),),
@@ -201,7 +201,7 @@ MODELS: dict[str, AircraftModel] = {
         serial_prefix="PI040443AA9K",  # assumed, as those below
         software="1.8.2",
         hardware="HW_01",
-        airframe=Airframe(max_speed=15.0, yaw_delay=0.1, climb_delay=0.15, flight_time=26.0 * 60.0),
+        airframe=AirframeModel(max_speed=15.0, yaw_delay=0.1, climb_delay=0.15, flight_time=26.0 * 60.0),
         envelope=Envelope((242, 315, 64), 315, 125, 13.9, 4500.0, (-10.0, 40.0)),
         battery=BatteryModel(cells=2, capacity_mah=2700, full_mv=8700, empty_mv=6600),
         gimbals=(GimbalModel(pitch=(-90.0, 90.0), roll=_ROLL),),
@@ -216,7 +216,7 @@ MODELS: dict[str, AircraftModel] = {
         serial_prefix="PI040456AA0L",
         software="1.8.2",  # assumed
         hardware="HW_01",
-        airframe=Airframe(max_speed=14.7, yaw_delay=0.1, climb_delay=0.15, flight_time=32.0 * 60.0),
+        airframe=AirframeModel(max_speed=14.7, yaw_delay=0.1, climb_delay=0.15, flight_time=32.0 * 60.0),
         envelope=Envelope((303, 398, 84), 499, 195, 14.7, 6000.0, (-35.0, 43.0)),
         battery=BatteryModel(cells=3, capacity_mah=3400, full_mv=13200, empty_mv=9900),
         gimbals=(GimbalModel(pitch=(-90.0, 90.0), roll=_ROLL),),
@@ -231,7 +231,7 @@ MODELS: dict[str, AircraftModel] = {
         serial_prefix="PI040455BA1B",
         software="7.7.0",
         hardware="HW_11",
-        airframe=Airframe(max_speed=16.0, yaw_delay=0.2, climb_delay=0.15, flight_time=32.0 * 60.0),
+        airframe=AirframeModel(max_speed=16.0, yaw_delay=0.2, climb_delay=0.15, flight_time=32.0 * 60.0),
         envelope=Envelope((378, 498, 118), 898, 366, 12.7, 5000.0, (-10.0, 40.0)),
         battery=BatteryModel(cells=3, capacity_mah=6800, full_mv=13200, empty_mv=9900),
         # Roll and yaw of the first and the whole second one (it carries the stereo sensor) are assumed.

@@ -30,7 +30,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from anafi_mav.sim.world.model import Airframe
+from anafi_mav.sim.world.model import AirframeModel
 from anafi_mav.sim.world.vector_math import Array, DelayLine, bounded, limit
 from anafi_mav.units import RAD_PER_DEG, wrap_pi
 
@@ -204,9 +204,9 @@ class _Orders:
 class Motion:
     """The fleet's motion.
 
-    `step()` advances all of it; `airframe.Body` is the handle of one drone."""
+    `step()` advances all of it; `airframe.Airframe` is the handle of one drone."""
 
-    def __init__(self, airframes: Sequence[Airframe]) -> None:
+    def __init__(self, airframes: Sequence[AirframeModel]) -> None:
         count = len(airframes)
         self.count = count
         self.mode: NDArray[np.int8] = np.zeros(count, np.int8)

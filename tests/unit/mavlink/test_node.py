@@ -32,7 +32,7 @@ LISTENER = 200
 """A system that nothing is addressed to: its host gets broadcasts alone."""
 
 
-class Desk:
+class Bench:
     """A node and what it told its owner."""
 
     def __init__(self) -> None:
@@ -55,8 +55,8 @@ class Desk:
 
 
 @asynccontextmanager
-async def desk(*urls: str) -> AsyncIterator[Desk]:
-    held = Desk()
+async def bench(*urls: str) -> AsyncIterator[Bench]:
+    held = Bench()
     await held.node.start(urls)
     try:
         yield held
@@ -80,10 +80,10 @@ def numbers(client: Client) -> list[int]:
 
 
 @asynccontextmanager
-async def three(host: str) -> AsyncIterator[tuple[Desk, Client, Client, Client]]:
+async def three(host: str) -> AsyncIterator[tuple[Bench, Client, Client, Client]]:
     """Systems 10 and 20 by TCP, 30 by UDP; the node has heard of all of them."""
     port = udp_port(host)
-    async with desk(f"tcpin://{host}:5760", f"udpin://{host}:{port}") as d:
+    async with bench(f"tcpin://{host}:5760", f"udpin://{host}:{port}") as d:
         ten, twenty = await Client(10).connect(5760, host), await Client(20).connect(5760, host)
         thirty = await UdpClient(30).open(host, (host, port))
         await d.until(lambda: len(d.node.channels) == 2)
@@ -176,7 +176,7 @@ def newest(frames: list[ReceivedFrame]) -> int:
 
 async def test_a_reader_that_stands_still_holds_up_nobody() -> None:
     host = loopback()
-    async with desk(f"tcpin://{host}:5760") as d:
+    async with bench(f"tcpin://{host}:5760") as d:
         # A window that was shut is opened by the kernel, after a while.
         with clock.everybodys(), socket.socket() as still:
             still.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
@@ -237,7 +237,7 @@ async def test_tcpout_comes_back() -> None:
         return await asyncio.start_server(lambda r, w: accepted.put_nowait((r, w)), host, 5760)
 
     url = f"tcpout://{host}:5760"
-    async with desk(url) as d:
+    async with bench(url) as d:
         await d.until(lambda: "Connection refused" in d.node.endpoints[0].describe())
         assert d.node.endpoints[0].describe() == f"{url}: not connected (Connection refused), retrying"
         server = await listen()
@@ -274,7 +274,7 @@ async def test_closing_in_the_moment_of_connecting() -> None:
 async def test_udpin_learns_its_peers() -> None:
     host, elsewhere = loopback(), loopback()
     port = udp_port(host)
-    async with desk(f"udpin://{host}:{port}") as d:
+    async with bench(f"udpin://{host}:{port}") as d:
         one = await UdpClient(10).open(host, (host, port))
         two = await UdpClient(20).open(elsewhere, (host, port))
         noise = await UdpClient(30).open(host, (host, port))
@@ -301,7 +301,7 @@ async def test_udpin_learns_its_peers() -> None:
 
 async def test_a_full_endpoint_refuses_and_the_others_stay() -> None:
     host = loopback()
-    async with desk(f"tcpin://{host}:5760") as d:
+    async with bench(f"tcpin://{host}:5760") as d:
         clients = [await Client(n + 1).connect(5760, host) for n in range(MAX_PEERS)]
         await d.until(lambda: len(d.node.channels) == MAX_PEERS)
         reader, writer = await asyncio.open_connection(host, 5760)
@@ -317,7 +317,7 @@ async def test_a_full_endpoint_refuses_and_the_others_stay() -> None:
 
 async def test_a_serial_line_that_comes_later(tmp_path: Path) -> None:
     device = tmp_path / "ttyUSB0"
-    async with desk(f"serial://{device}:57600") as d:
+    async with bench(f"serial://{device}:57600") as d:
         expected = f"serial://{device}:57600: not connected (No such file or directory), retrying"
         assert d.node.endpoints[0].describe() == expected
         async with pseudo_terminal() as (master, name):
@@ -339,7 +339,7 @@ async def test_a_failing_service_costs_no_connection() -> None:
     def fail(inbound: Inbound) -> None:
         raise RuntimeError("a mistake of ours")
 
-    async with desk(f"tcpin://{host}:5760") as d:
+    async with bench(f"tcpin://{host}:5760") as d:
         d.node.add_host(1, 1, fail)
         client = await Client().connect(5760, host)
         await d.until(lambda: len(d.node.channels) == 1)
@@ -369,7 +369,7 @@ async def test_a_start_that_fails_leaves_nothing_open() -> None:
 
 async def test_closing_ends_every_connection_and_frees_the_port() -> None:
     host = loopback()
-    async with desk(f"tcpin://{host}:5760") as d:
+    async with bench(f"tcpin://{host}:5760") as d:
         reader, writer = await asyncio.open_connection(host, 5760)
         await d.until(lambda: len(d.node.channels) == 1)
         (channel,) = d.node.channels
@@ -394,7 +394,7 @@ async def test_frames_of_one_iteration_leave_in_order_in_as_many_datagrams_as_co
         client.setblocking(False)
         client.bind((host, 0))
         port = client.getsockname()[1] if scheme == "udpout" else udp_port(host)
-        async with desk(f"{scheme}://{host}:{port}{query}") as d:
+        async with bench(f"{scheme}://{host}:{port}{query}") as d:
             if scheme == "udpin":
                 await loop.sock_connect(client, (host, port))
                 await loop.sock_sendall(client, BEAT.pack(stock.MAVLink(None, 255, 190)))
@@ -426,7 +426,7 @@ async def test_the_last_words_leave_before_a_socket_closes() -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client:
         client.setblocking(False)
         client.bind((host, 0))
-        async with desk(f"udpout://{host}:{client.getsockname()[1]}", f"tcpin://{host}:5760") as d:
+        async with bench(f"udpout://{host}:{client.getsockname()[1]}", f"tcpin://{host}:5760") as d:
             stream = await Client().connect(5760, host)
             await d.until(lambda: len(d.node.channels) == 2)
             d.node.send(ATTITUDE, sysid=7, compid=1)

@@ -1,11 +1,12 @@
-"""The ground station's side of the mission protocol: against the gateway's own desk, and against scripted vehicles."""
+"""The ground station's side of the mission protocol: against the gateway's own mission_protocol, and against scripted
+vehicles."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import pytest
-from support.plan_wire import FENCE, Wire, an_item, desk, items, peer
+from support.plan_wire import FENCE, Wire, an_item, items, mission_protocol, peer
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.plan_client import (
@@ -65,7 +66,7 @@ def run(transfer: Upload | Download, plans: Any, **trouble: Any) -> Wire:
 
 
 def test_a_plan_goes_up_and_comes_down() -> None:
-    plans = desk()
+    plans = mission_protocol()
     upload = Upload(builds(items(5)), 1, 1, FENCE)
     run(upload, plans)
     assert (upload.result, upload.done, upload.total) == (TransferResult(Outcome.DONE), 5, 5)
@@ -78,7 +79,7 @@ def test_a_plan_goes_up_and_comes_down() -> None:
 
 
 def test_an_empty_plan() -> None:
-    plans = desk()
+    plans = mission_protocol()
     run(Upload(builds(items(3)), 1, 1, FENCE), plans)
     clear = Upload([], 1, 1, FENCE)
     run(clear, plans)
@@ -89,7 +90,7 @@ def test_an_empty_plan() -> None:
 
 
 def test_a_refusal_has_its_reason() -> None:
-    plans = desk()
+    plans = mission_protocol()
     upload = Upload(builds((*items(3), an_item(3, 666), an_item(4))), 1, 1, FENCE)
     run(upload, plans)
     assert upload.result == TransferResult(Outcome.REFUSED, dialect.MAV_MISSION_UNSUPPORTED)
@@ -100,7 +101,7 @@ def test_a_refusal_has_its_reason() -> None:
 @pytest.mark.parametrize("seed", range(8))
 def test_a_quarter_lost_each_way(seed: int) -> None:
     """500 items, up and down; messages come twice and out of order, too."""
-    plans = desk()
+    plans = mission_protocol()
     upload = Upload(builds(items(500)), 1, 1, FENCE)
     run(upload, plans, loss=0.25, duplicate=0.05, delay=(0.005, 0.06), seed=seed)
     # The last word may be lost as often as it is said; that the vehicle has the plan is then found out by asking.

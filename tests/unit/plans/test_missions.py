@@ -15,7 +15,7 @@ from anafi_mav.plans.formats import files, parrot
 from anafi_mav.plans.formats.files import Format
 from anafi_mav.plans.path import place_of
 from anafi_mav.plans.plan import WAYPOINT, Item, Loss, Plan
-from anafi_mav.plans.translation.parrot_export import twin
+from anafi_mav.plans.translation.parrot_export import export_parrot
 from anafi_mav.sim.plan import plan_file
 
 MISSIONS = Path(__file__).parents[3] / "missions"
@@ -200,7 +200,7 @@ def test_a_samples_twin_read_and_written_again_stays_the_same(path: Path, versio
     plan = files.parse(kept, path.name, version)
     for _ in range(3):
         editable = files.encode(plan, Format.QGC)[0]
-        again, _ = twin(files.parse(editable, path.name), version, path.name)
+        again, _ = export_parrot(files.parse(editable, path.name), version, path.name)
         assert again == kept
         plan = files.parse(again, path.name, version)
 

@@ -1,4 +1,4 @@
-"""The I/O-free cores of services/: modes, texts, heights, the command desk."""
+"""The I/O-free cores of services/: modes, texts, heights, the command history."""
 
 from __future__ import annotations
 
@@ -259,55 +259,57 @@ def mode_command(id: int, *params: float) -> commands.Command:
 
 
 def test_a_resent_command_is_known_while_it_runs_and_for_a_while_after_its_success() -> None:
-    desk = commands.CommandDesk()
-    assert desk.retransmission("a", command(), 0.0) is None
-    execution = desk.begin("a", command())
-    assert desk.retransmission("a", command(), 60.0) == dialect.MAV_RESULT_IN_PROGRESS
+    history = commands.CommandHistory()
+    assert history.retransmission("a", command(), 0.0) is None
+    execution = history.begin("a", command())
+    assert history.retransmission("a", command(), 60.0) == dialect.MAV_RESULT_IN_PROGRESS
     execution.result, execution.ended = dialect.MAV_RESULT_ACCEPTED, 60.0
-    assert desk.retransmission("a", command(), 63.4) == dialect.MAV_RESULT_ACCEPTED
-    assert desk.retransmission("a", command(), 63.5) is None
+    assert history.retransmission("a", command(), 63.4) == dialect.MAV_RESULT_ACCEPTED
+    assert history.retransmission("a", command(), 63.5) is None
 
 
 def test_a_refusal_is_soon_forgotten() -> None:
-    desk = commands.CommandDesk()
-    execution = desk.begin("a", command())
+    history = commands.CommandHistory()
+    execution = history.begin("a", command())
     execution.result, execution.ended = dialect.MAV_RESULT_TEMPORARILY_REJECTED, 10.0
-    assert desk.retransmission("a", command(), 10.9) == dialect.MAV_RESULT_TEMPORARILY_REJECTED
-    assert desk.retransmission("a", command(), 11.0) is None
+    assert history.retransmission("a", command(), 10.9) == dialect.MAV_RESULT_TEMPORARILY_REJECTED
+    assert history.retransmission("a", command(), 11.0) is None
 
 
 def test_what_another_client_has_replaced_is_neither_flown_nor_confirmed_again() -> None:
-    desk = commands.CommandDesk()
+    history = commands.CommandHistory()
     for client in ("a", "b"):
-        execution = desk.begin(client, command())
+        execution = history.begin(client, command())
         execution.result, execution.ended = dialect.MAV_RESULT_ACCEPTED, 0.0
     stop = command(dialect.MAV_CMD_DO_REPOSITION, NAN)
-    stopped = desk.begin("c", stop)
+    stopped = history.begin("c", stop)
     stopped.result, stopped.ended = dialect.MAV_RESULT_ACCEPTED, 0.0
-    desk.supersede("b")
-    assert desk.retransmission("a", command(), 1.0) == dialect.MAV_RESULT_CANCELLED
-    assert desk.retransmission("b", command(), 1.0) == dialect.MAV_RESULT_ACCEPTED
-    assert desk.retransmission("c", stop, 1.0) is None  # an order to stop is always carried out
+    history.supersede("b")
+    assert history.retransmission("a", command(), 1.0) == dialect.MAV_RESULT_CANCELLED
+    assert history.retransmission("b", command(), 1.0) == dialect.MAV_RESULT_ACCEPTED
+    assert history.retransmission("c", stop, 1.0) is None  # an order to stop is always carried out
 
 
 def test_a_return_is_asked_for_anew_unless_another_client_has_taken_over() -> None:
-    desk = commands.CommandDesk()
-    execution = desk.begin("a", command(dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH))
+    history = commands.CommandHistory()
+    execution = history.begin("a", command(dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH))
     execution.result, execution.ended = dialect.MAV_RESULT_ACCEPTED, 0.0
-    assert desk.retransmission("a", command(dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH), 1.0) is None
-    desk.supersede("b")
-    assert desk.retransmission("a", command(dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH), 1.0) == dialect.MAV_RESULT_CANCELLED
+    assert history.retransmission("a", command(dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH), 1.0) is None
+    history.supersede("b")
+    assert (
+        history.retransmission("a", command(dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH), 1.0) == dialect.MAV_RESULT_CANCELLED
+    )
 
 
 def test_offboard_that_has_ended_by_itself_is_entered_anew() -> None:
-    desk = commands.CommandDesk()
+    history = commands.CommandHistory()
     offboard = mode_command(dialect.MAV_CMD_DO_SET_MODE, 1.0, 6.0, 0.0)
-    execution = desk.begin("a", offboard)
+    execution = history.begin("a", offboard)
     execution.result, execution.ended = dialect.MAV_RESULT_ACCEPTED, 0.0
-    assert desk.retransmission("a", offboard, 1.0, FlightMode.OFFBOARD) == dialect.MAV_RESULT_ACCEPTED
-    assert desk.retransmission("a", offboard, 1.0, FlightMode.HOLD) is None
-    desk.supersede("b")
-    assert desk.retransmission("a", offboard, 1.0, FlightMode.HOLD) == dialect.MAV_RESULT_CANCELLED
+    assert history.retransmission("a", offboard, 1.0, FlightMode.OFFBOARD) == dialect.MAV_RESULT_ACCEPTED
+    assert history.retransmission("a", offboard, 1.0, FlightMode.HOLD) is None
+    history.supersede("b")
+    assert history.retransmission("a", offboard, 1.0, FlightMode.HOLD) == dialect.MAV_RESULT_CANCELLED
 
 
 @pytest.mark.parametrize(
@@ -319,32 +321,32 @@ def test_offboard_that_has_ended_by_itself_is_entered_anew() -> None:
     ],
 )
 def test_a_mission_that_is_not_flown_any_more_is_not_confirmed_again(mission: commands.Command) -> None:
-    desk = commands.CommandDesk()
-    execution = desk.begin("a", mission)
+    history = commands.CommandHistory()
+    execution = history.begin("a", mission)
     execution.result, execution.ended = dialect.MAV_RESULT_ACCEPTED, 0.0
-    assert desk.retransmission("a", mission, 1.0, FlightMode.MISSION) == dialect.MAV_RESULT_ACCEPTED
-    assert desk.retransmission("a", mission, 1.0, FlightMode.RETURN) is None
-    desk.supersede("b")
-    assert desk.retransmission("a", mission, 1.0, FlightMode.HOLD) == dialect.MAV_RESULT_CANCELLED
+    assert history.retransmission("a", mission, 1.0, FlightMode.MISSION) == dialect.MAV_RESULT_ACCEPTED
+    assert history.retransmission("a", mission, 1.0, FlightMode.RETURN) is None
+    history.supersede("b")
+    assert history.retransmission("a", mission, 1.0, FlightMode.HOLD) == dialect.MAV_RESULT_CANCELLED
 
 
 def test_what_is_another_command() -> None:
-    desk = commands.CommandDesk()
-    desk.begin("a", command())
-    assert desk.retransmission("b", command(), 0.1) is None
-    assert desk.retransmission("a", command(p1=0.0), 0.1) is None
-    assert desk.retransmission("a", command(dialect.MAV_CMD_NAV_TAKEOFF), 0.1) is None
+    history = commands.CommandHistory()
+    history.begin("a", command())
+    assert history.retransmission("b", command(), 0.1) is None
+    assert history.retransmission("a", command(p1=0.0), 0.1) is None
+    assert history.retransmission("a", command(dialect.MAV_CMD_NAV_TAKEOFF), 0.1) is None
     # arm, disarm, arm: the third is no repetition of the first
-    desk.begin("a", command(p1=0.0))
-    assert desk.retransmission("a", command(), 0.3) is None
+    history.begin("a", command(p1=0.0))
+    assert history.retransmission("a", command(), 0.3) is None
 
 
 def test_the_desk_remembers_a_bounded_number_of_clients() -> None:
-    desk = commands.CommandDesk()
+    history = commands.CommandHistory()
     for client in range(commands.MAX_CLIENTS + 1):
-        desk.begin(client, command())
-    assert desk.retransmission(0, command(), 0.0) is None
-    assert desk.retransmission(1, command(), 0.0) == dialect.MAV_RESULT_IN_PROGRESS
+        history.begin(client, command())
+    assert history.retransmission(0, command(), 0.0) is None
+    assert history.retransmission(1, command(), 0.0) == dialect.MAV_RESULT_IN_PROGRESS
 
 
 @pytest.mark.parametrize(

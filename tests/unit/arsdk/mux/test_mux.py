@@ -9,7 +9,7 @@ import tracemalloc
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support.listener import Ear, Listener
+from support.listener import Listener, MessageListener
 
 from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
 from anafi_mav.arsdk.link.handshake import DeviceInfo
@@ -117,7 +117,7 @@ class Device:
 
 @pytest.mark.parametrize("version", [1, 2, 3])
 async def test_a_session_over_the_mux(version: int) -> None:
-    device, ear = Device(), Ear()
+    device, ear = Device(), MessageListener()
     server = await mux_link.MuxServer.start(
         "127.0.0.1", port=0, info=INFO, versions=(1, version), on_session=device.on_session
     )
@@ -141,7 +141,7 @@ async def test_a_session_over_the_mux(version: int) -> None:
 
 
 async def test_looking_hears_the_introduction_and_disturbs_nobody() -> None:
-    device, ear = Device(), Ear()
+    device, ear = Device(), MessageListener()
     server = await mux_link.MuxServer.start("127.0.0.1", port=0, info=INFO, on_session=device.on_session)
     port = server.discovery_port
     try:

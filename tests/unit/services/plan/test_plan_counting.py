@@ -6,12 +6,12 @@ from typing import Any
 
 import pytest
 from support.plan_counting import CountingClient
-from support.plan_wire import FENCE, Wire, desk, items, peer, replies
+from support.plan_wire import FENCE, Wire, items, mission_protocol, peer, replies
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.flavours import ARDUPILOT
 from anafi_mav.services.plan.item_messages import item_int
-from anafi_mav.services.plan.plan_protocol import PlanDesk
+from anafi_mav.services.plan.plan_protocol import MissionProtocol
 from anafi_mav.services.plan.plan_requests import REQUEST_EVERY
 
 ME = peer(245, 190)
@@ -21,15 +21,15 @@ def asked(effects: Any) -> list[int]:
     return [message.seq for message in replies(effects)]
 
 
-def begun(plans: PlanDesk, number: int) -> list[int]:
+def begun(plans: MissionProtocol, number: int) -> list[int]:
     return asked(plans.receive(dialect.MAVLink_mission_count_message(1, 1, number, FENCE), ME, 0.0))
 
 
-def given(plans: PlanDesk, seq: int) -> list[int]:
+def given(plans: MissionProtocol, seq: int) -> list[int]:
     return asked(plans.receive(item_int(items(seq + 1)[seq], seq, 1, 1, FENCE), ME, 0.0))
 
 
-def again(plans: PlanDesk, number: int) -> list[int]:
+def again(plans: MissionProtocol, number: int) -> list[int]:
     """What the next so many repetitions ask for."""
     found: list[int] = []
     for _ in range(number):
@@ -40,7 +40,7 @@ def again(plans: PlanDesk, number: int) -> list[int]:
 
 
 def test_what_is_asked_for_again() -> None:
-    plans = desk()
+    plans = mission_protocol()
     assert begun(plans, 6) == [0]
     assert again(plans, 4) == [0, 0, 0, 0]  # there is none before it
     assert given(plans, 0) == [1]
@@ -53,7 +53,7 @@ def test_what_is_asked_for_again() -> None:
 
 
 def test_each_try_takes_200_ms() -> None:
-    plans = desk()
+    plans = mission_protocol()
     begun(plans, 9)
     for seq in range(3):
         given(plans, seq)
@@ -67,7 +67,7 @@ def test_each_try_takes_200_ms() -> None:
 
 
 def test_what_has_come_is_not_asked_for_any_more() -> None:
-    plans = desk()
+    plans = mission_protocol()
     begun(plans, 9)
     for seq in range(3):
         given(plans, seq)
@@ -77,7 +77,7 @@ def test_what_has_come_is_not_asked_for_any_more() -> None:
 
 
 def test_a_partial_list_is_asked_for_within_its_bounds() -> None:
-    plans, client = desk(), peer(255, 230, ARDUPILOT)
+    plans, client = mission_protocol(), peer(255, 230, ARDUPILOT)
     plans.transfers[FENCE].put(items(9))
     effects = plans.receive(dialect.MAVLink_mission_write_partial_list_message(1, 1, 4, 7, FENCE), client, 0.0)
     assert asked(effects) == [4]
@@ -87,7 +87,7 @@ def test_a_partial_list_is_asked_for_within_its_bounds() -> None:
 
 
 def upload(loss: float, seed: int, delay: tuple[float, float], number: int = 500) -> CountingClient:
-    plans, client = desk(), CountingClient(ME, items(number))
+    plans, client = mission_protocol(), CountingClient(ME, items(number))
     wire = Wire(plans, [client], seed=seed, loss=loss, delay=delay)
     wire.to_desk(client, client.upload(0.0))
     wire.run()
@@ -120,7 +120,7 @@ def test_a_link_on_which_messages_overtake_each_other(seed: int) -> None:
 
 def test_no_repetition_meets_the_next_list() -> None:
     """MAVSDK takes an acknowledgement of any list for one of that which it uploads."""
-    plans, other = desk(), 2
+    plans, other = mission_protocol(), 2
     begun(plans, 1)
     again(plans, 1)
     effects = plans.receive(item_int(items(1)[0], 0, 1, 1, FENCE), ME, 0.3)
@@ -131,7 +131,7 @@ def test_no_repetition_meets_the_next_list() -> None:
 
 
 def test_a_copy_of_the_announcement_costs_no_request() -> None:
-    plans = desk()
+    plans = mission_protocol()
     assert begun(plans, 3) == [0]
     assert begun(plans, 3) == []
     assert begun(plans, 2) == [0]  # another upload

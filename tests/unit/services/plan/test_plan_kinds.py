@@ -13,7 +13,7 @@ from anafi_mav.services.flavours import ARDUPILOT, PX4, STANDARD, Flavour
 from anafi_mav.services.plan.fence_kind import FenceKind
 from anafi_mav.services.plan.item_messages import item_int
 from anafi_mav.services.plan.mission_kind import MissionKind
-from anafi_mav.services.plan.plan_protocol import PlanDesk
+from anafi_mav.services.plan.plan_protocol import MissionProtocol
 from anafi_mav.services.plan.plan_transfer import Commit
 from anafi_mav.services.statustext import CHUNK
 from anafi_mav.vehicle.fence.plan_items import PlanItem
@@ -40,11 +40,11 @@ def circle(command: int, radius: float) -> PlanItem:
     return PlanItem(command, dialect.MAV_FRAME_GLOBAL, (radius, 0.0, 0.0, 0.0), LAT, LON, 0.0)
 
 
-def plans() -> PlanDesk:
-    return PlanDesk([MissionKind(lambda: HOME, lambda: 2), FenceKind()])
+def plans() -> MissionProtocol:
+    return MissionProtocol([MissionKind(lambda: HOME, lambda: 2), FenceKind()])
 
 
-def upload(plans: PlanDesk, items: list[PlanItem], kind: int, flavour: Flavour) -> tuple[Any, list[str]]:
+def upload(plans: MissionProtocol, items: list[PlanItem], kind: int, flavour: Flavour) -> tuple[Any, list[str]]:
     """The acknowledgement, and the texts."""
     who = peer(flavour=flavour)
     effects = plans.receive(dialect.MAVLink_mission_count_message(1, 1, len(items), kind), who, 0.0)
@@ -57,7 +57,7 @@ def upload(plans: PlanDesk, items: list[PlanItem], kind: int, flavour: Flavour) 
     return replies(effects)[-1], said
 
 
-def read_back(plans: PlanDesk, kind: int, flavour: Flavour) -> list[Any]:
+def read_back(plans: MissionProtocol, kind: int, flavour: Flavour) -> list[Any]:
     who = peer(flavour=flavour)
     (count,) = replies(plans.receive(dialect.MAVLink_mission_request_list_message(1, 1, kind), who, 1.0))
     asked = [dialect.MAVLink_mission_request_int_message(1, 1, seq, kind) for seq in range(count.count)]
@@ -65,19 +65,19 @@ def read_back(plans: PlanDesk, kind: int, flavour: Flavour) -> list[Any]:
 
 
 def test_autocontinue_0_of_an_ardupilot_client_is_1_for_every_client() -> None:
-    desk = plans()
-    ack, _ = upload(desk, [HOME, waypoint(1000, 0), waypoint(2000, 0), waypoint(3000, 1)], MISSION, ARDUPILOT)
+    protocol = plans()
+    ack, _ = upload(protocol, [HOME, waypoint(1000, 0), waypoint(2000, 0), waypoint(3000, 1)], MISSION, ARDUPILOT)
     assert ack.type == ACCEPTED
-    assert [item.autocontinue for item in desk.transfers[MISSION].items] == [1, 1, 1]
-    assert [item.autocontinue for item in read_back(desk, MISSION, ARDUPILOT)] == [1, 1, 1, 1]
-    assert [item.autocontinue for item in read_back(desk, MISSION, PX4)] == [1, 1, 1]
+    assert [item.autocontinue for item in protocol.transfers[MISSION].items] == [1, 1, 1]
+    assert [item.autocontinue for item in read_back(protocol, MISSION, ARDUPILOT)] == [1, 1, 1, 1]
+    assert [item.autocontinue for item in read_back(protocol, MISSION, PX4)] == [1, 1, 1]
 
 
 @pytest.mark.parametrize("flavour", [PX4, STANDARD])
 def test_autocontinue_0_of_other_clients_stays_a_stop(flavour: Flavour) -> None:
-    desk = plans()
-    upload(desk, [waypoint(1000, 0), waypoint(2000, 1)], MISSION, flavour)
-    stops = desk.transfers[MISSION].items
+    protocol = plans()
+    upload(protocol, [waypoint(1000, 0), waypoint(2000, 1)], MISSION, flavour)
+    stops = protocol.transfers[MISSION].items
     assert [item.autocontinue for item in stops] == [0, 1]
     fault = MissionKind(lambda: HOME, lambda: 2).examine(stops, flavour)
     assert fault is not None
@@ -94,12 +94,12 @@ def test_autocontinue_0_of_other_clients_stays_a_stop(flavour: Flavour) -> None:
     ],
 )
 def test_fence_circle_of_radius_0_is_left_out_with_a_warning(command: int, flavour: Flavour) -> None:
-    desk = plans()
+    protocol = plans()
     good = circle(dialect.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, 80.0)
-    ack, said = upload(desk, [good, circle(command, 0.0), circle(command, -0.0)], FENCE, flavour)
+    ack, said = upload(protocol, [good, circle(command, 0.0), circle(command, -0.0)], FENCE, flavour)
     assert ack.type == ACCEPTED
-    assert desk.transfers[FENCE].items == (good,)
-    assert [item.param1 for item in read_back(desk, FENCE, flavour)] == [80.0]
+    assert protocol.transfers[FENCE].items == (good,)
+    assert [item.param1 for item in read_back(protocol, FENCE, flavour)] == [80.0]
     assert said == ["Fence circle 1 ignored: radius 0", "Fence circle 2 ignored: radius 0"]
 
 

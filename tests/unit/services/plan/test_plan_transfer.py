@@ -8,12 +8,25 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support.plan_wire import FENCE, MISSION, RALLY, Client, Kind, Wire, an_item, desk, items, peer, replies, texts
+from support.plan_wire import (
+    FENCE,
+    MISSION,
+    RALLY,
+    Client,
+    Kind,
+    Wire,
+    an_item,
+    items,
+    mission_protocol,
+    peer,
+    replies,
+    texts,
+)
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.flavours import ARDUPILOT, PX4, STANDARD, Flavour
 from anafi_mav.services.plan.item_messages import item_float, item_int, item_of
-from anafi_mav.services.plan.plan_protocol import ALL, MAX_WAITING, PlanDesk
+from anafi_mav.services.plan.plan_protocol import ALL, MAX_WAITING, MissionProtocol
 from anafi_mav.services.plan.plan_requests import MAX_TRIES, REQUEST_EVERY
 from anafi_mav.services.plan.plan_transfer import (
     ECHOES,
@@ -70,7 +83,7 @@ def commit_of(effects: Any) -> Commit:
     return commit
 
 
-def uploaded(plans: PlanDesk, number: int, who: Peer = ME, kind: int = FENCE, now: float = 0.0) -> Any:
+def uploaded(plans: MissionProtocol, number: int, who: Peer = ME, kind: int = FENCE, now: float = 0.0) -> Any:
     """Upload and store; the final acknowledgement."""
     plans.receive(count(number, kind), who, now)
     for seq in range(number):
@@ -86,7 +99,7 @@ class Bench:
     """A transfer in a state of one's choice, and each event done to it."""
 
     def __init__(self, state: State) -> None:
-        self.plans = desk()
+        self.plans = mission_protocol()
         self.transfer = self.plans.transfers[FENCE]
         self.transfer.put(items(3))
         self.commit: Commit | None = None
@@ -145,7 +158,7 @@ def test_every_state_can_be_left_and_reached() -> None:
 
 
 def test_upload_step_by_step() -> None:
-    plans = desk()
+    plans = mission_protocol()
     (request,) = replies(plans.receive(count(3), ME, 0.0))
     assert (request.get_type(), request.seq, request.mission_type) == ("MISSION_REQUEST_INT", 0, FENCE)
     assert (request.target_system, request.target_component) == (255, 190)
@@ -177,7 +190,7 @@ def test_upload_step_by_step() -> None:
     ],
 )
 def test_the_form_of_requests(flavour: Flavour, compid: int, forms: list[str]) -> None:
-    plans, client = desk(), peer(255, compid, flavour)
+    plans, client = mission_protocol(), peer(255, compid, flavour)
     seen = replies(plans.receive(count(2), client, 0.0))
     for step in range(1, 4):
         seen += replies(plans.expire(step * REQUEST_EVERY))
@@ -187,7 +200,7 @@ def test_the_form_of_requests(flavour: Flavour, compid: int, forms: list[str]) -
 
 def test_the_form_that_was_answered_is_kept() -> None:
     """dronekit on a PX4 endpoint: only its first item costs a second request."""
-    plans, client = desk(), peer(255, 0)
+    plans, client = mission_protocol(), peer(255, 0)
     plans.receive(count(3), client, 0.0)
     (request,) = replies(plans.expire(REQUEST_EVERY))
     assert request.get_type() == "MISSION_REQUEST"
@@ -196,7 +209,7 @@ def test_the_form_that_was_answered_is_kept() -> None:
 
 
 def test_repeated_within_250_ms_until_it_gives_up() -> None:
-    plans = desk()
+    plans = mission_protocol()
     plans.transfers[FENCE].put(items(1))
     plans.receive(count(5), ME, 10.0)
     times = []
@@ -212,7 +225,7 @@ def test_repeated_within_250_ms_until_it_gives_up() -> None:
 
 
 def test_copies_and_strays_are_ignored_and_the_expected_item_is_requested_again() -> None:
-    plans = desk()
+    plans = mission_protocol()
     plans.receive(count(4), ME, 0.0)
     plans.receive(item(0), ME, 0.0)
     for stray in (0, 3, 0, 77):
@@ -222,7 +235,7 @@ def test_copies_and_strays_are_ignored_and_the_expected_item_is_requested_again(
     assert uploaded_rest(plans, 1, 4) == items(4)
 
 
-def uploaded_rest(plans: PlanDesk, first: int, end: int) -> Any:
+def uploaded_rest(plans: MissionProtocol, first: int, end: int) -> Any:
     for seq in range(first, end):
         effects = plans.receive(item(seq), ME, 0.3)
     plans.stored(commit_of(effects), 0.3)
@@ -230,7 +243,7 @@ def uploaded_rest(plans: PlanDesk, first: int, end: int) -> Any:
 
 
 def test_refused_items_and_plans() -> None:
-    plans = desk()
+    plans = mission_protocol()
     uploaded(plans, 2)
     plans.receive(count(3), ME, 1.0)
     plans.receive(item(0), ME, 1.0)
@@ -247,7 +260,7 @@ def test_refused_items_and_plans() -> None:
 
 
 def test_capacity() -> None:
-    plans = desk()
+    plans = mission_protocol()
     (final,) = replies(plans.receive(count(MAX_ITEMS + 1), ME, 0.0))
     assert final.type == NO_SPACE
     (request,) = replies(plans.receive(count(MAX_ITEMS), ME, 0.0))
@@ -258,7 +271,7 @@ def test_a_kind_that_takes_nothing() -> None:
     class Closed(Kind):
         refusal = PlanFault(UNSUPPORTED, "not yet")
 
-    plans = PlanDesk([Closed(MISSION, "mission")])
+    plans = MissionProtocol([Closed(MISSION, "mission")])
     effects = plans.receive(count(3, MISSION), ME, 0.0)
     assert [m.type for m in replies(effects)] == [UNSUPPORTED]
     assert texts(effects) == ["Mission refused: not yet"]
@@ -270,7 +283,7 @@ def test_a_kind_that_takes_nothing() -> None:
 
 
 def test_a_plan_that_turns_out_bad_when_it_is_stored() -> None:
-    plans = desk()
+    plans = mission_protocol()
     uploaded(plans, 2)
     plans.receive(count(1), ME, 1.0)
     commit = commit_of(plans.receive(item(0), ME, 1.0))
@@ -281,7 +294,7 @@ def test_a_plan_that_turns_out_bad_when_it_is_stored() -> None:
 
 def test_an_upload_that_begins_anew() -> None:
     """Nothing of the first one is in the second."""
-    plans = desk()
+    plans = mission_protocol()
     plans.receive(count(3), ME, 0.0)
     plans.receive(item(0, an_item(99)), ME, 0.0)
     (request,) = replies(plans.receive(count(2), ME, 0.1))
@@ -291,7 +304,7 @@ def test_an_upload_that_begins_anew() -> None:
 
 @pytest.mark.parametrize("result", [CANCELLED, UNSUPPORTED, ERROR])
 def test_the_client_cancels(result: int) -> None:
-    plans = desk()
+    plans = mission_protocol()
     uploaded(plans, 2)
     plans.receive(count(3), ME, 1.0)
     plans.receive(item(0), ME, 1.0)
@@ -303,7 +316,7 @@ def test_the_client_cancels(result: int) -> None:
 
 
 def test_the_channel_of_the_client_is_gone() -> None:
-    plans = desk()
+    plans = mission_protocol()
     plans.transfers[FENCE].put(items(2))
     plans.receive(count(3), ME, 0.0)
     plans.receive(ask_list(RALLY), ME, 0.0)
@@ -319,7 +332,7 @@ def test_the_channel_of_the_client_is_gone() -> None:
 
 
 def test_a_second_client_during_an_upload_is_refused() -> None:
-    plans = desk()
+    plans = mission_protocol()
     plans.transfers[FENCE].put(items(3))
     plans.receive(count(2), ME, 0.0)
     for message in (count(4), count(0), clear()):
@@ -336,7 +349,7 @@ def test_a_second_client_during_an_upload_is_refused() -> None:
 
 
 def test_a_silent_client_gives_way_to_another() -> None:
-    plans = desk()
+    plans = mission_protocol()
     plans.receive(count(2), ME, 0.0)
     assert replies(plans.receive(count(1), OTHER, PATIENCE - 0.01))[0].type == DENIED
     first, second = plans.receive(count(1), OTHER, PATIENCE)
@@ -347,7 +360,7 @@ def test_a_silent_client_gives_way_to_another() -> None:
 
 
 def test_an_upload_during_another_clients_download_is_refused() -> None:
-    plans = desk()
+    plans = mission_protocol()
     plans.transfers[FENCE].put(items(3))
     plans.receive(ask_list(), ME, 0.0)
     plans.receive(ask(0), ME, 1.0)
@@ -360,7 +373,7 @@ def test_an_upload_during_another_clients_download_is_refused() -> None:
 
 
 def test_asking_how_many_there_are_keeps_nobody_away() -> None:
-    plans = desk()
+    plans = mission_protocol()
     plans.transfers[FENCE].put(items(3))
     plans.receive(ask_list(), ME, 0.0)
     assert replies(plans.receive(count(1), OTHER, 0.0))[0].seq == 0
@@ -368,7 +381,7 @@ def test_asking_how_many_there_are_keeps_nobody_away() -> None:
 
 def test_a_download_that_has_all_it_asked_for_keeps_nobody_away() -> None:
     """MAVProxy does not say that it is done."""
-    plans = desk()
+    plans = mission_protocol()
     plans.transfers[FENCE].put(items(2))
     plans.receive(ask_list(), ME, 0.0)
     for seq in range(2):
@@ -378,7 +391,7 @@ def test_a_download_that_has_all_it_asked_for_keeps_nobody_away() -> None:
 
 def test_a_download_is_of_one_plan() -> None:
     """An upload that comes between its items does not show in it; a new list does."""
-    plans = desk()
+    plans = mission_protocol()
     plans.transfers[FENCE].put(items(3))
     plans.receive(ask_list(), ME, 0.0)
     plans.receive(ask(0), ME, 0.0)
@@ -396,7 +409,7 @@ def test_a_download_is_of_one_plan() -> None:
 
 
 def test_download_in_any_order_again_and_pipelined() -> None:
-    plans = desk()
+    plans = mission_protocol()
     plans.transfers[FENCE].put(items(6))
     (total,) = replies(plans.receive(ask_list(), ME, 0.0))
     assert (total.count, total.opaque_id, total.mission_type) == (6, opaque_id(items(6)), FENCE)
@@ -414,7 +427,7 @@ def test_download_in_any_order_again_and_pipelined() -> None:
 
 
 def test_empty_lists_and_unknown_ones() -> None:
-    plans = desk()
+    plans = mission_protocol()
     for kind in (MISSION, FENCE, RALLY):
         (total,) = replies(plans.receive(ask_list(kind), ME, 0.0))
         assert (total.get_type(), total.count, total.opaque_id, total.mission_type) == ("MISSION_COUNT", 0, 0, kind)
@@ -428,7 +441,7 @@ def test_empty_lists_and_unknown_ones() -> None:
 
 
 def test_many_downloads_are_bounded() -> None:
-    plans = desk()
+    plans = mission_protocol()
     plans.transfers[FENCE].put(items(2))
     for sysid in range(1, 200):
         plans.receive(ask_list(), peer(sysid), 0.0)
@@ -441,7 +454,7 @@ def test_many_downloads_are_bounded() -> None:
 @pytest.mark.parametrize("empty", [False, True])
 @pytest.mark.parametrize("kind", [MISSION, FENCE, RALLY, ALL])
 def test_clear(kind: int, empty: bool) -> None:
-    plans = desk()
+    plans = mission_protocol()
     if not empty:
         for other in (MISSION, FENCE, RALLY):
             uploaded(plans, 2, kind=other)
@@ -455,7 +468,7 @@ def test_clear(kind: int, empty: bool) -> None:
 
 def test_what_comes_while_a_plan_is_stored_waits() -> None:
     """MAVProxy does not wait for the acknowledgement of a clear before it uploads."""
-    plans = desk()
+    plans = mission_protocol()
     commit = commit_of(plans.receive(clear(), ME, 0.0))
     (total,) = replies(plans.receive(ask_list(RALLY), OTHER, 0.0))  # another list does not
     assert total.count == 0
@@ -471,7 +484,7 @@ def test_what_comes_while_a_plan_is_stored_waits() -> None:
 
 def test_who_asks_for_a_list_while_it_is_stored_is_told_of_the_new_one() -> None:
     """dronekit asks as soon as it has sent its last item."""
-    plans = desk()
+    plans = mission_protocol()
     plans.receive(count(1), ME, 0.0)
     commit = commit_of(plans.receive(item(0), ME, 0.0))
     assert plans.receive(ask_list(), ME, 0.0) == []
@@ -481,7 +494,7 @@ def test_who_asks_for_a_list_while_it_is_stored_is_told_of_the_new_one() -> None
 
 
 def test_who_gives_up_while_it_waits_is_not_asked_for_items() -> None:
-    plans = desk()
+    plans = mission_protocol()
     commit = commit_of(plans.receive(clear(), ME, 0.0))
     assert plans.receive(count(2), OTHER, 0.0) == []
     assert plans.receive(ask_list(), ME, 0.0) == []
@@ -491,7 +504,7 @@ def test_who_gives_up_while_it_waits_is_not_asked_for_items() -> None:
 
 
 def test_what_waits_is_bounded() -> None:
-    plans = desk()
+    plans = mission_protocol()
     plans.receive(clear(), ME, 0.0)
     for _ in range(MAX_WAITING):
         assert plans.receive(count(2), OTHER, 0.0) == []
@@ -499,7 +512,7 @@ def test_what_waits_is_bounded() -> None:
 
 
 def test_the_link_is_lost_while_a_plan_is_stored() -> None:
-    plans = desk()
+    plans = mission_protocol()
     commit = commit_of(plans.receive(clear(), ME, 0.0))
     plans.reset()
     assert plans.stored(commit, 0.0) == []
@@ -516,7 +529,7 @@ AP = peer(flavour=ARDUPILOT)
     [(1, 1, {1}, 4), (0, 3, {0, 1, 2, 3}, 4), (2, 4, {2, 3}, 4), (4, 4, {4}, 5)],
 )
 def test_partial_write(first: int, last: int, changed: set[int], total: int) -> None:
-    plans = desk()
+    plans = mission_protocol()
     plans.transfers[FENCE].put(items(4))
     effects = plans.receive(partial(first, last), AP, 0.0)
     while requests := replies(effects):
@@ -529,7 +542,7 @@ def test_partial_write(first: int, last: int, changed: set[int], total: int) -> 
 
 @pytest.mark.parametrize(("first", "last"), [(5, 5), (2, 1), (0, 6), (-1, 0), (-3, -1), (3, 5)])
 def test_partial_write_of_what_is_not_there(first: int, last: int) -> None:
-    plans = desk()
+    plans = mission_protocol()
     plans.transfers[FENCE].put(items(4))
     (final,) = replies(plans.receive(partial(first, last), AP, 0.0))
     assert final.type == INVALID_SEQUENCE
@@ -537,13 +550,13 @@ def test_partial_write_of_what_is_not_there(first: int, last: int) -> None:
 
 
 def test_partial_write_is_not_px4s() -> None:
-    plans = desk()
+    plans = mission_protocol()
     plans.transfers[FENCE].put(items(4))
     assert replies(plans.receive(partial(0, 0), ME, 0.0))[0].type == UNSUPPORTED
 
 
 def test_partial_write_given_up_changes_nothing() -> None:
-    plans = desk()
+    plans = mission_protocol()
     plans.transfers[FENCE].put(items(4))
     plans.receive(partial(0, 1), AP, 0.0)
     plans.receive(item(0, an_item(100)), AP, 0.0)
@@ -562,7 +575,7 @@ class WithHome(Kind):
 
 
 def test_a_list_that_clients_of_one_flavour_see_otherwise() -> None:
-    plans = PlanDesk([WithHome()])
+    plans = MissionProtocol([WithHome()])
     effects = plans.receive(count(3), AP, 0.0)
     for seq, number in enumerate((-1, 0, 1)):
         effects = plans.receive(item(seq, an_item(number)), AP, 0.0)
@@ -581,13 +594,13 @@ def test_a_list_that_clients_of_one_flavour_see_otherwise() -> None:
 
 
 def test_one_acknowledgement_where_nothing_was_lost() -> None:
-    plans = desk()
+    plans = mission_protocol()
     uploaded(plans, 3)
     assert plans.deadline() is None
 
 
 def test_the_acknowledgement_is_repeated_after_losses() -> None:
-    plans = desk()
+    plans = mission_protocol()
     plans.receive(count(1), ME, 0.0)
     plans.expire(REQUEST_EVERY)
     commit = commit_of(plans.receive(item(0), ME, 0.3))
@@ -600,7 +613,7 @@ def test_the_acknowledgement_is_repeated_after_losses() -> None:
 
 @pytest.mark.parametrize("next_message", [count(2), ask_list(), ask(0), clear(), ack(ACCEPTED)])
 def test_no_repetition_meets_what_the_client_does_next(next_message: Any) -> None:
-    plans = desk()
+    plans = mission_protocol()
     plans.receive(count(1), ME, 0.0)
     plans.expire(REQUEST_EVERY)
     plans.stored(commit_of(plans.receive(item(0), ME, 0.3)), 0.3)
@@ -610,7 +623,7 @@ def test_no_repetition_meets_what_the_client_does_next(next_message: Any) -> Non
 
 def test_the_last_item_again_is_acknowledged_again() -> None:
     """Mission Planner says it again until it has heard."""
-    plans = desk()
+    plans = mission_protocol()
     uploaded(plans, 2)
     assert replies(plans.receive(item(1), ME, 0.5))[0].type == ACCEPTED
     assert plans.receive(item(0), ME, 0.5) == []
@@ -621,7 +634,7 @@ def test_the_last_item_again_is_acknowledged_again() -> None:
 @pytest.mark.parametrize("at_fault", ["item", "plan", "plan, found in a thread"])
 def test_a_refusal_that_was_lost_is_the_answer_again(at_fault: str) -> None:
     """Same result and no second text, also with the link as it is repeated; another upload has nothing of it."""
-    plans = desk()
+    plans = mission_protocol()
     uploaded(plans, 1)
     plans.receive(count(3), ME, 1.0)
     plans.receive(item(0), ME, 1.0)
@@ -669,7 +682,7 @@ def test_upload_over_a_bad_link(
     seed: int, number: int, loss: float, duplicate: float, slow: float, as_float: bool
 ) -> None:
     """Whatever is lost, doubled or overtaken: what the client holds for accepted is the plan, item by item."""
-    plans = desk()
+    plans = mission_protocol()
     who = peer(255, 0 if as_float else 190)
     client = Client(who, items(number), as_float)
     wire = Wire(plans, [client], seed=seed, loss=loss, duplicate=duplicate, delay=(0.001, slow))
@@ -685,7 +698,7 @@ def test_upload_over_a_bad_link(
 
 def test_500_items_with_a_quarter_lost_both_ways() -> None:
     for seed in range(4):
-        plans = desk()
+        plans = mission_protocol()
         client = Client(ME, items(500))
         wire = Wire(plans, [client], seed=seed, loss=0.25)
         wire.to_desk(client, client.upload(0.0))
@@ -701,7 +714,7 @@ def test_500_items_with_a_quarter_lost_both_ways() -> None:
 
 def test_copies_do_not_multiply() -> None:
     """On a link slower than the repetition every request is made several times, and no more than that."""
-    plans = desk()
+    plans = mission_protocol()
     client = Client(ME, items(30), patience=10.0, repeat=1.0)
     wire = Wire(plans, [client], duplicate=0.5, delay=(0.25, 0.25), seed=7)
     wire.to_desk(client, client.upload(0.0))
@@ -714,7 +727,7 @@ def test_copies_do_not_multiply() -> None:
 
 def test_two_clients_at_once_on_a_bad_link() -> None:
     """Different lists; each hears its own answers only (`Client.receive` looks at every address)."""
-    plans = desk()
+    plans = mission_protocol()
     clients = [Client(ME, items(40)), Client(OTHER, items(25), kind=RALLY)]
     wire = Wire(plans, clients, loss=0.1, seed=3)
     for client in clients:
@@ -767,7 +780,7 @@ def some_message(draw: Any) -> Any:
 def test_nothing_that_is_sent_raises_or_gets_stuck(data: st.DataObject) -> None:
     """A list only ever changes by a commit that was stored, every answer goes to who asked, and when all fall silent
     the desk comes to rest."""
-    plans, now = desk(), 0.0
+    plans, now = mission_protocol(), 0.0
     clients = [ME, OTHER, peer(1, 0, ARDUPILOT, "c")]
     waiting: list[Commit] = []
 

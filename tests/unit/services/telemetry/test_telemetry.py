@@ -29,72 +29,72 @@ from anafi_mav.services.telemetry import (
     telemetry_status,
 )
 from anafi_mav.services.telemetry.flight_record_service import FlightRecord
-from anafi_mav.services.telemetry.update_tracker import News
+from anafi_mav.services.telemetry.update_tracker import UpdateTracker
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.vehicle import Landed
 
 NOW = Times(1_234_567_890)
 
 
-def bundled(news: News, sources: str, at: float) -> tuple[int, ...]:
+def bundled(tracker: UpdateTracker, sources: str, at: float) -> tuple[int, ...]:
     """One turn of the loop in which these sources have news."""
-    assert [news.note(source, at) for source in sources] == [True] + [False] * (len(sources) - 1)
-    ids, when = news.take()
+    assert [tracker.mark(source, at) for source in sources] == [True] + [False] * (len(sources) - 1)
+    ids, when = tracker.take()
     assert when == at
     return ids
 
 
-def registered() -> News:
+def registered() -> UpdateTracker:
     """a makes 1 and 2 new, b makes 2 and 3 new, c makes 3 new."""
-    news = News()
-    news.register("a", (1, 2))
-    news.register("b", (2,))
-    news.register("b", (3, 2))
-    news.register("c", (3,))
-    news.reset(0.0)
-    return news
+    tracker = UpdateTracker()
+    tracker.register("a", (1, 2))
+    tracker.register("b", (2,))
+    tracker.register("b", (3, 2))
+    tracker.register("c", (3,))
+    tracker.reset(0.0)
+    return tracker
 
 
 def test_news_of_one_turn_is_one_bundle() -> None:
-    news = registered()
-    assert bundled(news, "ab", 1.0) == (1, 2, 3)
-    assert bundled(news, "b", 2.0) == (2, 3)
-    assert bundled(news, "aac", 3.0) == (1, 2, 3)
-    assert (news.at(1), news.at(2), news.at(3), news.at(4)) == (3.0, 3.0, 3.0, None)
-    assert bundled(news, "c", 4.0) == (3,)
-    assert (news.at(1), news.at(3)) == (3.0, 4.0)
-    assert news.take() == ((), 4.0)
+    tracker = registered()
+    assert bundled(tracker, "ab", 1.0) == (1, 2, 3)
+    assert bundled(tracker, "b", 2.0) == (2, 3)
+    assert bundled(tracker, "aac", 3.0) == (1, 2, 3)
+    assert (tracker.at(1), tracker.at(2), tracker.at(3), tracker.at(4)) == (3.0, 3.0, 3.0, None)
+    assert bundled(tracker, "c", 4.0) == (3,)
+    assert (tracker.at(1), tracker.at(3)) == (3.0, 4.0)
+    assert tracker.take() == ((), 4.0)
 
 
 def test_how_often_a_message_is_new() -> None:
-    news = registered()
-    assert news.interval(1, 0.0) is None
+    tracker = registered()
+    assert tracker.interval(1, 0.0) is None
     for number in range(1, 51):  # ten seconds: all at 5 Hz in one turn, and b once a second in a turn of its own
-        bundled(news, "abc", 0.2 * number)
+        bundled(tracker, "abc", 0.2 * number)
         if number % 5 == 0:
-            bundled(news, "b", 0.2 * number + 0.01)
-        news.pass_time(0.2 * number)
-    assert news.interval(1, 10.0) == pytest.approx(0.2)
-    assert news.interval(2, 10.0) == pytest.approx(1 / 6)
+            bundled(tracker, "b", 0.2 * number + 0.01)
+        tracker.pass_time(0.2 * number)
+    assert tracker.interval(1, 10.0) == pytest.approx(0.2)
+    assert tracker.interval(2, 10.0) == pytest.approx(1 / 6)
     for number in range(51, 200):  # from then on at 1 Hz, and after two windows nothing is left of the old pace
         if number % 5 == 0:
-            bundled(news, "a", 0.2 * number)
-        news.pass_time(0.2 * number)
-    assert news.interval(1, 39.8) == pytest.approx(1.0, rel=0.1)
-    news.reset(40.0)
-    assert news.interval(1, 41.0) is None
-    assert news.at(1) is None
+            bundled(tracker, "a", 0.2 * number)
+        tracker.pass_time(0.2 * number)
+    assert tracker.interval(1, 39.8) == pytest.approx(1.0, rel=0.1)
+    tracker.reset(40.0)
+    assert tracker.interval(1, 41.0) is None
+    assert tracker.at(1) is None
 
 
 def test_bundles_are_bounded() -> None:
-    news = News()
+    tracker = UpdateTracker()
     for source in range(600):
-        news.register(source, (source,))
-    news.reset(0.0)
+        tracker.register(source, (source,))
+    tracker.reset(0.0)
     for source in range(600):
-        news.note(source, 1.0)
-        assert news.take() == ((source,), 1.0)
-    assert len(news._bundles) <= 256
+        tracker.mark(source, 1.0)
+        assert tracker.take() == ((source,), 1.0)
+    assert len(tracker._bundles) <= 256
 
 
 def test_groups_of_ardupilot_have_what_we_stream() -> None:

@@ -7,7 +7,7 @@ from collections.abc import AsyncIterator, Callable
 from dataclasses import replace
 
 import pytest
-from support.listener import Ear
+from support.listener import MessageListener
 from support.sim_bench import Bench
 
 from anafi_mav.arsdk.link.controller import ControllerSession, connect
@@ -16,17 +16,17 @@ from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.messages.proto import camera2
 from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
 from anafi_mav.sim.world.faults import CLEAR, Faults, Impairment
-from anafi_mav.sim.world.link_emulation import HELD, MAX_UNDER_WAY, Air
+from anafi_mav.sim.world.link_emulation import HELD, MAX_UNDER_WAY, LinkEmulation
 
 
 class Sky:
-    """An `Air` whose clock the test turns."""
+    """An `LinkEmulation` whose clock the test turns."""
 
     def __init__(self, **faults: Impairment) -> None:
         self.now = 0.0
         self.arrived: list[tuple[float, int]] = []
         self._waiting: list[tuple[float, int, Callable[[], None]]] = []
-        self.air = Air(Faults(**faults), random.Random(7), self._later)
+        self.air = LinkEmulation(Faults(**faults), random.Random(7), self._later)
 
     def _later(self, seconds: float, function: Callable[[], None]) -> None:
         self._waiting.append((self.now + seconds, len(self._waiting), function))
@@ -135,8 +135,8 @@ async def real() -> AsyncIterator[SimulatedDrone]:
         yield simulator.drones[0]
 
 
-async def join(real: SimulatedDrone) -> tuple[ControllerSession, Ear]:
-    ear = Ear()
+async def join(real: SimulatedDrone) -> tuple[ControllerSession, MessageListener]:
+    ear = MessageListener()
     session = await connect("127.0.0.1", discovery_port=real.discovery_port, on_message=ear, silence_limit=None)
     return session, ear
 

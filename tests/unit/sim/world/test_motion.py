@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from anafi_mav.sim.world.airframe import Body
+from anafi_mav.sim.world.airframe import Airframe
 from anafi_mav.sim.world.model import MODELS
 from anafi_mav.sim.world.motion import STEP, Motion, Pose, Turn
 
@@ -19,7 +19,7 @@ class Flyer:
 
     def __init__(self, heading_deg: float = 0.0, height: float = 50.0, drones: int = 1) -> None:
         self.motion = Motion([AIRFRAME] * drones)
-        self.body = Body(self.motion, 0)
+        self.body = Airframe(self.motion, 0)
         self.body.place(0.0, 0.0, heading_deg * RAD)
         self.motion.position[2, 0] = -height
         self.body.limits(tilt_rate=300.0 * RAD, ceiling=4000.0)
@@ -130,7 +130,7 @@ def test_poses_of_drones_at_rest_are_kept_until_one_is_carried() -> None:
     before = motion.poses()
     motion.step()
     assert motion.poses() is before
-    Body(motion, 1).place(3.0, 4.0, 0.5)
+    Airframe(motion, 1).place(3.0, 4.0, 0.5)
     assert motion.poses() == [before[0], Pose(3.0, 4.0, 0.0, 0.0, 0.0, 0.5, 0.0, 0.0, 0.0)]
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from anafi_mav.arsdk.messages.ardrone3 import WarningLevel
 from anafi_mav.errors import ConfigError
-from anafi_mav.sim.world.airframe import Body
+from anafi_mav.sim.world.airframe import Airframe
 from anafi_mav.sim.world.model import MODELS
 from anafi_mav.sim.world.motion import STEP, Motion, Pose
 from anafi_mav.sim.world.wind import CALM, Wind, WindSpec, WindWatch
@@ -23,7 +23,7 @@ class Hover:
 
     def __init__(self, spec: WindSpec, model: str = "4k") -> None:
         self.motion = Motion([MODELS[model].airframe])
-        self.body = Body(self.motion, 0)
+        self.body = Airframe(self.motion, 0)
         self.wind = Wind(spec, random.Random(4))
         self.motion.position[2, 0] = -50.0
         self.body.limits(tilt_rate=300.0 * RAD, ceiling=4000.0)
