@@ -623,7 +623,7 @@ class Drone:
             await asyncio.wait(either, timeout=timeout, return_when=asyncio.FIRST_COMPLETED)
         finally:
             if not (lost.done() or delivery.done()):
-                self._commander.take_back(delivery, timed_out)
+                self._commander.withdraw(delivery, timed_out)
         delivery.result()
 
     async def reboot(self, timeout: float = REBOOT_TIMEOUT) -> None:

@@ -21,7 +21,7 @@ message_log = logging.getLogger("anafi_mav.message")
 
 T = TypeVar("T")
 
-WITHHELD = 0
+BLOCKED = 0
 """The token of a command that the gate kept back; the transport's begin at 1."""
 
 ANSWER_TIMEOUT = 5.0
@@ -112,7 +112,7 @@ class Expectation(Generic[T]):
         finally:
             self.close()
 
-    async def came(self, delivery: asyncio.Future[None], what: str, timeout: float) -> bool:
+    async def wait_or_quiet(self, delivery: asyncio.Future[None], what: str, timeout: float) -> bool:
         """Wait for an answer that may be absent; return True when it was received.
 
         False when the drone has received the command and then reported nothing. Raises `CommandTimeout` when neither
@@ -157,7 +157,7 @@ class Commander:
         self._open: set[Expectation[Any]] = set()
         self._waiting: dict[type[Message], list[Expectation[Any]]] = {}
         self._deliveries: dict[int, asyncio.Future[None]] = {}
-        self.halting: set[asyncio.Future[None]] = set()
+        self.pending_stops: set[asyncio.Future[None]] = set()
         """Stop commands from any task that the drone may not have received yet."""
         self._retired: weakref.WeakSet[asyncio.Task[Any]] = weakref.WeakSet()
         """Tasks that newer commands have replaced: they send nothing but what stops something."""
@@ -165,7 +165,7 @@ class Commander:
         """Tasks that send nothing at all."""
         self._beginning: dict[type[Message], _Beginning] = {}
         """By the kind of command that undoes it."""
-        self._given_up: dict[type[Message], float] = {}
+        self._aborted: dict[type[Message], float] = {}
         """Loop time of the last aborted, unanswered start, by the command class that undoes it."""
 
     @property
@@ -197,7 +197,7 @@ class Commander:
                 delivery.set_exception(LinkLost(reason))
                 delivery.exception()  # nobody may be waiting; asyncio would complain
         self._deliveries.clear()
-        self._given_up.clear()
+        self._aborted.clear()
 
     def retire(self, tasks: Iterable[asyncio.Task[Any]]) -> None:
         """From now on let these tasks send only commands that stop something.
@@ -229,7 +229,7 @@ class Commander:
             raise LinkLost("not connected")
         self._require_current(stops=stops)
         if self.gate is not None and not self.gate(message):
-            return WITHHELD
+            return BLOCKED
         if message_log.isEnabledFor(logging.DEBUG):
             message_log.debug("%s: sent %r", self.name, message)
         return self._wire.send(message)
@@ -237,7 +237,7 @@ class Commander:
     def deliver(self, message: Message, *, stops: bool = False) -> asyncio.Future[None]:
         """Send an acknowledged command; the future is done when the drone has received it.
 
-        The command is not meant to be withdrawn (but see `take_back`). The future fails with `LinkLost`, or
+        The command is not meant to be withdrawn (but see `withdraw`). The future fails with `LinkLost`, or
         `CommandTimeout` when the transport drops the command. Do not await it bare, a cancelled wait would cancel it:
         use `asyncio.wait`.
         """
@@ -246,40 +246,40 @@ class Commander:
         self._deliveries[token] = delivery
         return delivery
 
-    def halt(self, message: Message) -> asyncio.Future[None]:
-        """`deliver` a stop command and add it to `halting`.
+    def send_stop(self, message: Message) -> asyncio.Future[None]:
+        """`deliver` a stop command and add it to `pending_stops`.
 
-        A task that has to confirm a stop waits for `halting`.
+        A task that has to confirm a stop waits for `pending_stops`.
         """
         delivery = self.deliver(message, stops=True)
-        self.halting.add(delivery)
-        delivery.add_done_callback(self.halting.discard)
+        self.pending_stops.add(delivery)
+        delivery.add_done_callback(self.pending_stops.discard)
         return delivery
 
-    def halt_if_connected(self, message: Message) -> None:
-        """`halt` for a verb that aborts; ignores a lost link and a newer command.
+    def send_stop_if_connected(self, message: Message) -> None:
+        """`send_stop` for a verb that aborts; ignores a lost link and a newer command.
 
         Both are reported elsewhere.
         """
         with contextlib.suppress(LinkLost, CommandRejected):
-            self.halt(message)
+            self.send_stop(message)
 
-    async def halted(self, what: str, timeout: float) -> None:
+    async def stops_delivered(self, what: str, timeout: float) -> None:
         """Return when the drone has received every stop command, at once when none is pending.
 
         Raises `CommandTimeout` about `what`, or the error of a stop command that failed.
         """
-        halting = list(self.halting)
-        if not halting:
+        pending_stops = list(self.pending_stops)
+        if not pending_stops:
             return
-        _, late = await asyncio.wait(halting, timeout=max(timeout, 0.0))
+        _, late = await asyncio.wait(pending_stops, timeout=max(timeout, 0.0))
         self.require_link()
         if late:
             raise CommandTimeout(what, timeout)
-        for delivery in halting:
+        for delivery in pending_stops:
             delivery.result()
 
-    def take_back(self, delivery: asyncio.Future[None], error: AnafiMavError) -> None:
+    def withdraw(self, delivery: asyncio.Future[None], error: AnafiMavError) -> None:
         """Withdraw what `deliver` sent, if the drone has not received it yet.
 
         The delivery fails with this error.
@@ -363,7 +363,7 @@ class Commander:
 
         When this times out or is cancelled, the command is withdrawn and undone; with `undo_refused` also when
         the drone refused it, for a command that would begin later. Hover and other commands that replace it end it by
-        `call_off`, a newer one with the same kind of `undo` replaces it: both raise `CommandRejected` here.
+        `abort_pending`, a newer one with the same kind of `undo` replaces it: both raise `CommandRejected` here.
         """
         answer = self.expect(answers, judge)
         self.dispatch(answer, command, timeout)
@@ -379,13 +379,13 @@ class Commander:
         except BaseException as error:
             refused = isinstance(error, CommandRejected)
             if self._beginning.get(kind) is mine and (undo_refused or not refused):
-                self._give_up(mine)
+                self._abort(mine)
             raise
         finally:
             if self._beginning.get(kind) is mine:
                 del self._beginning[kind]
 
-    def call_off(self, why: str, undo: type[Message] | None = None) -> None:
+    def abort_pending(self, why: str, undo: type[Message] | None = None) -> None:
         """Withdraw and undo the starts that have not been answered.
 
         With `undo` only those that this kind of command undoes, else all.
@@ -397,11 +397,11 @@ class Commander:
             beginning.answer.fail(CommandRejected(why))
             if beginning.answer.token is not None:
                 self.cancel(beginning.answer.token)
-            self._give_up(beginning)
+            self._abort(beginning)
 
-    def _give_up(self, beginning: _Beginning) -> None:
-        self._given_up[type(beginning.undo)] = loop_time()
-        self.halt_if_connected(beginning.undo)
+    def _abort(self, beginning: _Beginning) -> None:
+        self._aborted[type(beginning.undo)] = loop_time()
+        self.send_stop_if_connected(beginning.undo)
 
     def may_begin(self, undo: type[Message], memory: float) -> bool:
         """Return True when something that this kind of command undoes can still begin.
@@ -409,15 +409,15 @@ class Commander:
         It can while it is on its way, or when it was aborted less than `memory` s ago and the drone may have received
         it already.
         """
-        given_up = self._given_up.get(undo)
+        given_up = self._aborted.get(undo)
         return undo in self._beginning or (given_up is not None and loop_time() - given_up < memory)
 
-    def certainly_not(self, undo: type[Message]) -> None:
+    def rule_out(self, undo: type[Message]) -> None:
         """Note that an aborted start has not begun, and will not.
 
         The drone has received the command against it and reports nothing.
         """
-        self._given_up.pop(undo, None)
+        self._aborted.pop(undo, None)
 
     def dispatch(self, expectation: Expectation[Any], command: Message, timeout: float, *, stops: bool = False) -> None:
         """Send the command whose answer is expected. `stops`: see `send`."""

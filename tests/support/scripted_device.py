@@ -89,7 +89,7 @@ class ScriptedDevice:
         commander = drone._commander
         assert not commander._open, "somebody still waits for an answer"
         assert not commander._waiting
-        assert not commander.halting
+        assert not commander.pending_stops
         assert not commander.begins
 
     @property

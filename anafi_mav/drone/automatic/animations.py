@@ -265,8 +265,8 @@ class Animations(Commanding[AnimationsState]):
     async def cancel(self, timeout: float = ANSWER_TIMEOUT) -> None:
         """End the animation; returns when none is flown, at once when none is running or starting."""
         self._require(self.state.running, "animations")
-        self._commander.call_off("stopped", animation.Cancel)
-        await self._commander.halted(animation.Cancel.NAME, timeout)
+        self._commander.abort_pending("stopped", animation.Cancel)
+        await self._commander.stops_delivered(animation.Cancel.NAME, timeout)
         if self.state.running == Type.NONE:
             return
         await self._commander.confirm(

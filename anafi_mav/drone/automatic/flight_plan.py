@@ -145,7 +145,7 @@ class FlightPlan(Commanding[FlightPlanState]):
         uid, until = self._unwanted
         if uid == message.filepath and now < until:
             # It took the drone so long to read the plan that the order against it came before its beginning.
-            self._commander.halt_if_connected(common.Stop())
+            self._commander.send_stop_if_connected(common.Stop())
 
     @property
     def version(self) -> int:
@@ -270,9 +270,9 @@ class FlightPlan(Commanding[FlightPlanState]):
 
     def suspend(self) -> None:
         """Pause without waiting for the drone's confirmation; an unconfirmed start is withdrawn."""
-        self._commander.call_off("something else flies", common.Stop)
+        self._commander.abort_pending("something else flies", common.Stop)
         if self.state.playing == PlayingState.PLAYING:
-            self._commander.halt_if_connected(common.Pause())
+            self._commander.send_stop_if_connected(common.Pause())
 
     async def pause(self, timeout: float = ANSWER_TIMEOUT) -> None:
         """Hover; `start` with the same plan resumes it. Raises `CommandRejected` when no plan plays."""
@@ -284,8 +284,8 @@ class FlightPlan(Commanding[FlightPlanState]):
     async def stop(self, timeout: float = ANSWER_TIMEOUT) -> None:
         """End the plan and hover; returns at once when none is playing, paused or starting."""
         self._available()
-        self._commander.call_off("stopped", common.Stop)
-        await self._commander.halted(common.Stop.NAME, timeout)
+        self._commander.abort_pending("stopped", common.Stop)
+        await self._commander.stops_delivered(common.Stop.NAME, timeout)
         if self.state.playing == PlayingState.STOPPED:
             return
         await self._end(common.Stop(), PlayingState.STOPPED, timeout)

@@ -120,8 +120,8 @@ class FollowMe(Commanding[FollowMeState]):
         Returns at once when the drone is neither following nor about to.
         """
         self._require(self.state.mode, "follow me")
-        self._commander.call_off("stopped", follow_me.Stop)
-        await self._commander.halted(follow_me.Stop.NAME, timeout)
+        self._commander.abort_pending("stopped", follow_me.Stop)
+        await self._commander.stops_delivered(follow_me.Stop.NAME, timeout)
         if self.state.mode == Mode.NONE:
             return
         await self._commander.confirm(

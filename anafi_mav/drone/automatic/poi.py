@@ -81,8 +81,8 @@ class Poi(Commanding[PoiState]):
     async def stop(self, timeout: float = ANSWER_TIMEOUT) -> None:
         """End pointing at the place; returns at once when none is active or about to be."""
         self._require(self.state.status, "points of interest")
-        self._commander.call_off("stopped", ardrone3.StopPilotedPOI)
-        await self._commander.halted(ardrone3.StopPilotedPOI.NAME, timeout)
+        self._commander.abort_pending("stopped", ardrone3.StopPilotedPOI)
+        await self._commander.stops_delivered(ardrone3.StopPilotedPOI.NAME, timeout)
         if self.state.status not in (PoiStatus.RUNNING, PoiStatus.PENDING):
             return
         await self._commander.confirm(

@@ -64,7 +64,7 @@ class GuidedMoves:
                 timeout += abs(turn) / (turn_rate_dps * RAD_PER_DEG)
         move = Move(self._commander.expect((), _decided_elsewhere))
         self._sticks.let_go()
-        self._commander.call_off("a move was asked for")
+        self._commander.abort_pending("a move was asked for")
         self._moves.by.append(move)
         try:
             self._commander.dispatch(move.answer, command, timeout)
@@ -74,7 +74,7 @@ class GuidedMoves:
                 self._moves.drop_by(move, loop_time())
                 # Otherwise the drone is busy with what is not ours to disturb.
                 if self._sticks.blocked is None and not self._home.state.returning:
-                    self._commander.halt_if_connected(ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0))
+                    self._commander.send_stop_if_connected(ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0))
         return flown
 
     def _move_by_command(
@@ -108,7 +108,7 @@ class GuidedMoves:
         command = self._move_to_command(target, heading_deg, horizontal_speed, vertical_speed)
         move = Move(self._commander.expect((), _decided_elsewhere), target)
         self._sticks.let_go()
-        self._commander.call_off("a move was asked for")
+        self._commander.abort_pending("a move was asked for")
         obsolete = self._moves.begin_to(move)
         if obsolete is not None and obsolete.answer.token is not None:
             self._commander.cancel(obsolete.answer.token)
@@ -121,7 +121,7 @@ class GuidedMoves:
             if not move.running and self._moves.to is move:  # given up: it must not start later
                 self._moves.cancel_to("given up")
                 move.answer.close()  # not awaited when it was refused before it was sent
-                self._commander.halt_if_connected(ardrone3.CancelMoveTo())
+                self._commander.send_stop_if_connected(ardrone3.CancelMoveTo())
         return move
 
     def _move_to_command(
@@ -160,13 +160,13 @@ class GuidedMoves:
         if journey is not None:
             if journey.answer.token is not None:
                 self._commander.cancel(journey.answer.token)
-            self._commander.halt(ardrone3.CancelMoveTo())
+            self._commander.send_stop(ardrone3.CancelMoveTo())
         moves = self._moves.cancel_by(why, loop_time())
         for move in moves:
             if move.answer.token is not None:
                 self._commander.cancel(move.answer.token)
         if moves:
-            self._commander.halt(ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0))
+            self._commander.send_stop(ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0))
         return journey is not None
 
     def require_free(self) -> None:

@@ -99,9 +99,9 @@ class Motors:
         if loop_time() >= self._stays_down_until:
             return
         if message.state == FlyingState.MOTOR_RAMPING:
-            self._commander.halt_if_connected(ardrone3.UserTakeOff(0))
+            self._commander.send_stop_if_connected(ardrone3.UserTakeOff(0))
         if message.state in _RISING:
-            self._commander.halt_if_connected(ardrone3.Landing())
+            self._commander.send_stop_if_connected(ardrone3.Landing())
 
     def take_off_wanted(self) -> None:
         """Note that a command that starts the motors is about to be sent.
@@ -149,8 +149,8 @@ class Motors:
             (ardrone3.FlyingStateChanged,), lambda message: True if message.state in _LANDING else None
         )
         try:
-            began = await answer.came(
-                self._commander.halt(ardrone3.CancelMoveTo()), ardrone3.CancelMoveTo.NAME, timeout
+            began = await answer.wait_or_quiet(
+                self._commander.send_stop(ardrone3.CancelMoveTo()), ardrone3.CancelMoveTo.NAME, timeout
             )
             self._may_land_until = -math.inf
         finally:
@@ -189,7 +189,7 @@ class Motors:
             raise
         except BaseException:
             # Given up: the motors of a drone that somebody holds must not start a moment later.
-            self._commander.halt_if_connected(ardrone3.UserTakeOff(0))
+            self._commander.send_stop_if_connected(ardrone3.UserTakeOff(0))
             raise
 
     async def _launch(self, command: Message, up: frozenset[FlyingState], timeout: float) -> None:
@@ -241,7 +241,7 @@ class Motors:
 
     async def land(self, timeout: float) -> None:
         self._commander.require_link()
-        self._commander.call_off("the drone is to land")
+        self._commander.abort_pending("the drone is to land")
         if self._lands and not self.about_to_fly:
             return
         # Level at once, then nothing, from here on and not from the drone's answer on: a positive gaz would cancel
@@ -289,7 +289,7 @@ class Motors:
         answer.expire_after(seconds, CommandTimeout(ardrone3.Landing.NAME, seconds))
         try:
             send()
-            began = doubtful and await answer.came(sent[0], ardrone3.Landing.NAME, timeout)
+            began = doubtful and await answer.wait_or_quiet(sent[0], ardrone3.Landing.NAME, timeout)
             if doubtful and not began and self._flight.state.flying in _LANDING:
                 self._doubtful_until = -math.inf  # it has received the Landing, and reports nothing else
                 return
@@ -297,14 +297,14 @@ class Motors:
         except BaseException:
             self._may_land_until = loop_time() + LAND_MEMORY
             for delivery in sent:
-                self._commander.take_back(delivery, CommandRejected("the landing was withdrawn"))
+                self._commander.withdraw(delivery, CommandRejected("the landing was withdrawn"))
             raise
         finally:
             answer.close()
 
     async def stop_motors(self, *, force: bool) -> None:
         self._commander.require_link()
-        self._commander.call_off("the motors are to stop")
+        self._commander.abort_pending("the motors are to stop")
         self._sticks.let_go()
         self._sticks.silence()
         for launch in self._launches:
@@ -315,9 +315,9 @@ class Motors:
 
         def judge(message: ardrone3.FlyingStateChanged) -> bool | None:
             if message.state in _TAKEN_OFF:
-                self._commander.halt(ardrone3.Landing())
+                self._commander.send_stop(ardrone3.Landing())
                 if cut is not None:  # from here on it would fall
-                    self._commander.take_back(cut, CommandRejected("the drone has left the ground"))
+                    self._commander.withdraw(cut, CommandRejected("the drone has left the ground"))
             return True if message.state in MOTORS_OFF else None
 
         answer = self._commander.expect((ardrone3.FlyingStateChanged,), judge)
@@ -325,8 +325,8 @@ class Motors:
         self._sticks.landings_asked += 1
         try:
             if self._flight.state.flying in TURNING:
-                self._commander.halt(ardrone3.UserTakeOff(0))
-            self._commander.halt(ardrone3.Landing())
+                self._commander.send_stop(ardrone3.UserTakeOff(0))
+            self._commander.send_stop(ardrone3.Landing())
             if force:
                 await asyncio.wait({answer.future}, timeout=FORCED_AFTER)
                 if self._flight.state.flying == FlyingState.MOTOR_RAMPING:
@@ -339,7 +339,7 @@ class Motors:
     def _end_hand_launch(self) -> None:
         """A drone that idles in a hand has no use for a Landing: it waits to be thrown, or for this."""
         if self.about_to_fly or self._flight.state.flying in TURNING:
-            self._commander.halt(ardrone3.UserTakeOff(0))
+            self._commander.send_stop(ardrone3.UserTakeOff(0))
 
     async def _catch_take_off(self, timeout: float) -> None:
         """Return when the drone is off the ground, or when it certainly stays there.
@@ -354,9 +354,9 @@ class Motors:
         )
         try:
             delivery = self._commander.deliver(ardrone3.Landing())
-            if not await answer.came(delivery, ardrone3.Landing.NAME, timeout):
+            if not await answer.wait_or_quiet(delivery, ardrone3.Landing.NAME, timeout):
                 self._may_take_off_until = -math.inf
-                self._commander.certainly_not(common.Stop)
+                self._commander.rule_out(common.Stop)
         finally:
             answer.close()
 
@@ -365,7 +365,7 @@ class Motors:
         self._sticks.silence()
         cut = self._flight.state.flying in _MOTORS_CUT and not self.about_to_fly
         # Emergency overtakes what waits in the queue: nothing of that may follow it.
-        self._commander.call_off("the motors are cut")
+        self._commander.abort_pending("the motors are cut")
         for launch in self._launches:
             launch.fail(CommandRejected("the motors are cut"))
             if launch.token is not None:
@@ -375,9 +375,9 @@ class Motors:
         )
         try:
             delivery = self._commander.deliver(ardrone3.Emergency())
-            said = await answer.came(delivery, ardrone3.Emergency.NAME, EMERGENCY_TIMEOUT)
+            said = await answer.wait_or_quiet(delivery, ardrone3.Emergency.NAME, EMERGENCY_TIMEOUT)
         except CommandTimeout as error:
-            self._commander.take_back(delivery, error)  # said to have failed, it must not be carried out later
+            self._commander.withdraw(delivery, error)  # said to have failed, it must not be carried out later
             raise
         finally:
             answer.close()

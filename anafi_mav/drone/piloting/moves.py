@@ -31,7 +31,7 @@ from anafi_mav.drone.piloting.state import MOTORS_OFF
 from anafi_mav.drone.status.home import Home
 from anafi_mav.errors import CommandRejected
 
-MAX_UNHEARD = 8
+MAX_UNANSWERED = 8
 """Aborted moveTos that are remembered.
 
 The drone answers one within a few tenths of a second.
@@ -169,7 +169,7 @@ class Moves:
         """The moveTo that still runs while `to` waits for its answer: a refused newer one leaves it alone."""
         self._cancelling: Move | None = None
         """The moveTo that we cancelled and whose CANCELED has not come yet."""
-        self._unheard: deque[Position] = deque(maxlen=MAX_UNHEARD)
+        self._unanswered: deque[Position] = deque(maxlen=MAX_UNANSWERED)
         """Targets of moveTos that were aborted or replaced before the drone had reported on them.
 
         It may still do so until it flies a newer one.
@@ -195,7 +195,7 @@ class Moves:
         It is this target, or one a little below it when the drone's events about an aborted move would be taken for
         its own. Not above it, which the ceiling may forbid.
         """
-        while any(_same(target, other) for other in self._unheard):
+        while any(_same(target, other) for other in self._unanswered):
             step = max(_APART, _APART_SHARE * abs(target.altitude))
             target = msgspec.structs.replace(target, altitude=target.altitude - step)
         return target
@@ -211,7 +211,7 @@ class Moves:
         if before.running:
             self._older = before
             return None
-        self._unhear(before)
+        self._note_unanswered(before)
         before.end(MoveEnd.REPLACED)
         before.answer.fail(CommandRejected("replaced by a newer moveTo"))
         return before
@@ -230,13 +230,13 @@ class Moves:
             if move.running:
                 self._cancelling = move
             else:
-                self._unhear(move)
+                self._note_unanswered(move)
                 move.end(MoveEnd.CANCELED)
         return newest
 
-    def _unhear(self, move: Move) -> None:
+    def _note_unanswered(self, move: Move) -> None:
         if move.target is not None:
-            self._unheard.append(move.target)
+            self._unanswered.append(move.target)
 
     def cancel_by(self, why: str, now: float) -> list[Move]:
         """The moveBys are about to be cancelled; returns them.
@@ -275,7 +275,7 @@ class Moves:
                 move.answer.fail(CommandRejected(how.value))
         self.to = self.returning = self._older = self._cancelling = None
         self.by.clear()
-        self._unheard.clear()
+        self._unanswered.clear()
         self._stray_until = 0.0
         self.aborting = False
         self.inherited = True
@@ -312,7 +312,7 @@ class Moves:
                 self._older.end(how)
                 self._older = None
                 return
-        if any(_same(message, target) for target in self._unheard):
+        if any(_same(message, target) for target in self._unanswered):
             return
         if move is None or (not move.is_to(message) and (move.running or how is MoveEnd.DONE)):
             return
@@ -323,7 +323,7 @@ class Moves:
     @property
     def _is_alone(self) -> bool:
         """True when no other moveTo of ours is left that the drone's next event could be about."""
-        return not self._unheard and self._older is None and self._cancelling is None
+        return not self._unanswered and self._older is None and self._cancelling is None
 
     def _under_way(self, move: Move) -> None:
         """The newest moveTo is being flown, so that all before it are over."""
@@ -333,7 +333,7 @@ class Moves:
         if self._cancelling is not None:
             self._cancelling.end(MoveEnd.CANCELED)
             self._cancelling = None
-        self._unheard.clear()
+        self._unanswered.clear()
         move.running = True
         move.answer.succeed(move)
 

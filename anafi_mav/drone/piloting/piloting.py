@@ -318,20 +318,20 @@ class Piloting(PilotingSettings):
         """
         self._commander.require_link()
         state = self.state
-        self._commander.call_off("stopped by hover")
+        self._commander.abort_pending("stopped by hover")
         cancelled = self._guided.stop("stopped by hover")
         if not self._home.state.returning_by_itself:
             if state.move_to == MoveToStatus.RUNNING and not cancelled:
-                self._commander.halt(ardrone3.CancelMoveTo())
+                self._commander.send_stop(ardrone3.CancelMoveTo())
             if self._moves.inherited and state.flying in _IN_FLIGHT and not self._home.state.returning:
                 self._moves.expect_stray(loop_time())
-                self._commander.halt(ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0))
+                self._commander.send_stop(ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0))
         if state.poi in (PoiStatus.RUNNING, PoiStatus.PENDING):
-            self._commander.halt(ardrone3.StopPilotedPOI())
+            self._commander.send_stop(ardrone3.StopPilotedPOI())
         self._stop_following()
         self._stop_animation()
         if state.plan == PlayingState.PLAYING:
-            self._commander.halt(common.Pause())
+            self._commander.send_stop(common.Pause())
         if self._returns.drop("stopped by hover"):
             self._returns.abort()
         self._sticks.centre()
@@ -359,7 +359,7 @@ class Piloting(PilotingSettings):
             for answer in answers:
                 await answer.wait()
             # Of what was given up before it was confirmed no event may speak; but the order to stop has to arrive.
-            await self._commander.halted("hover", timeout - (loop_time() - began))
+            await self._commander.stops_delivered("hover", timeout - (loop_time() - began))
         finally:
             for answer in answers:
                 answer.close()
@@ -386,7 +386,7 @@ class Piloting(PilotingSettings):
             if kind in self._stopping:
                 self._stopping[kind] = loop_time() + QUIET
 
-        self._commander.halt(order).add_done_callback(heard)
+        self._commander.send_stop(order).add_done_callback(heard)
 
 
 def _ends_move_to(message: ardrone3.MoveToChanged) -> bool | None:

@@ -59,7 +59,7 @@ class ReturnHome:
                 return CommandRejected(f"return home is unavailable: {spoken(message.reason)}")
             return None
 
-        self._commander.call_off("the drone is to return home")
+        self._commander.abort_pending("the drone is to return home")
         self._sticks.release()  # raises while the pilot at a Skycontroller flies: nothing waits for an answer then
         move = Move(self._commander.expect((rth.State,), judge))
         self._moves.returning = move
@@ -85,11 +85,11 @@ class ReturnHome:
         answer = self._commander.expect((rth.State,), _ends_return)
         began = loop_time()
         try:
-            await answer.came(self.abort(even_its_own), rth.Abort.NAME, timeout)
+            await answer.wait_or_quiet(self.abort(even_its_own), rth.Abort.NAME, timeout)
         finally:
             answer.close()
         # The event may have been about an earlier return: what ends this one is that the drone has the order.
-        await self._commander.halted(rth.Abort.NAME, timeout - (loop_time() - began))
+        await self._commander.stops_delivered(rth.Abort.NAME, timeout - (loop_time() - began))
         if self._home.state.returning:
             raise CommandTimeout(rth.Abort.NAME, timeout)
 
@@ -108,7 +108,7 @@ class ReturnHome:
         def heard(delivery: asyncio.Future[None]) -> None:
             asyncio.get_running_loop().call_later(QUIET, quiet, delivery)
 
-        delivery = self._abortion = self._commander.halt(rth.Abort())
+        delivery = self._abortion = self._commander.send_stop(rth.Abort())
         delivery.add_done_callback(heard)
         return delivery
 
@@ -134,7 +134,7 @@ class ReturnHome:
         self._moves.on_return(message, now)
         if self._home.state.returning_by_itself and self._abortion is not None and not self._abortion_insists:
             # It was given against a return that a user had asked for.
-            self._commander.take_back(self._abortion, CommandRejected("the drone returns home by itself"))
+            self._commander.withdraw(self._abortion, CommandRejected("the drone returns home by itself"))
 
     def ends_ours(self, message: rth.State) -> bool | AnafiMavError | None:
         """A judge: has the return that we asked for ended?"""

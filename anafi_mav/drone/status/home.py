@@ -246,13 +246,13 @@ class Home(Commanding[HomeState]):
             answer = self._commander.expect((rth.CustomLocation,), judge)
             delivery = self._commander.deliver(command)
             try:
-                if not await answer.came(delivery, command.NAME, timeout):
+                if not await answer.wait_or_quiet(delivery, command.NAME, timeout):
                     raise refused
                 return answer.future.result()
             finally:
                 answer.close()
                 if not delivery.done():
-                    self._commander.take_back(delivery, CommandTimeout(command.NAME, timeout))
+                    self._commander.withdraw(delivery, CommandTimeout(command.NAME, timeout))
 
     async def set_precise(self, on: bool) -> bool:
         """Switch the precise return, which looks for the picture of the take-off place."""

@@ -310,7 +310,7 @@ async def test_retired_task_sends_no_command_but_may_stop_what_it_began(drone: D
         drone.piloting.hover()
         drone.silence([task])
         with pytest.raises(CommandRejected, match="replaced by a newer command"):
-            drone._commander.halt(ardrone3.CancelMoveTo())
+            drone._commander.send_stop(ardrone3.CancelMoveTo())
 
     task = asyncio.get_running_loop().create_task(replaced())
     await task
