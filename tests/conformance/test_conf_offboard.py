@@ -35,7 +35,7 @@ from support.world import HOLD, HOME, World, world
 
 from anafi_mav import geo, mav_enums
 from anafi_mav.arsdk.messages import ardrone3, piloting_style
-from anafi_mav.vehicle.offboard.stream import GUIDED_TIMEOUT, STRAGGLING
+from anafi_mav.vehicle.offboard.stream import GUIDED_TIMEOUT, LATE_AFTER_STREAM
 
 REJECTED = dialect.MAV_RESULT_TEMPORARILY_REJECTED
 SET_MODE, GOTO = mav_enums.MAV_CMD_DO_SET_MODE, mav_enums.MAV_CMD_DO_REPOSITION
@@ -144,7 +144,7 @@ async def test_conf_105_a_late_position_of_a_stream_that_has_ended() -> None:
         halt = await w.drone.wait_log(lambda e: e.name.endswith("CancelMoveTo"), 5.0, since=late)
         assert halt.t - late <= HOVER_WITHIN
         # When the stream is long over, the same words are an order of their own.
-        await asyncio.sleep(STRAGGLING)
+        await asyncio.sleep(LATE_AFTER_STREAM)
         again = now()
         w.client.send(place)
         await arrived(w, again)

@@ -41,7 +41,7 @@ from anafi_mav.vehicle.base.velocity_loop import (
 from anafi_mav.vehicle.offboard.goals import Goal, demand, resolve
 from anafi_mav.vehicle.offboard.moves import OffboardMoves
 from anafi_mav.vehicle.offboard.setpoints import NOTHING, AttitudeSetpoint, MotionSetpoint, Setpoint
-from anafi_mav.vehicle.offboard.stream import GUIDED_TIMEOUT, OffboardStream, State, ends, lasts
+from anafi_mav.vehicle.offboard.stream import GUIDED_TIMEOUT, OffboardStream, State, is_position, lasts
 from anafi_mav.vehicle.offboard.takeoff import Launcher, SetpointTakeoff, TakeoffPhase, TakeoffStep, climbs
 
 WARN_AGAIN = 1.0
@@ -131,7 +131,7 @@ class OffboardFlight:
         moves = isinstance(setpoint, MotionSetpoint) and (not stands or climbs(setpoint, self._vehicle.height.ato))
         if moves and isinstance(setpoint, MotionSetpoint) and (reason := self._objection(sender, setpoint)):
             return reason
-        follows = self._stream.follows(sender, now)
+        follows = self._stream.continues_stream(sender, now)
         if not self._stream.receive(sender, setpoint, now, lasts(setpoint, self.guided_timeout if guided else None)):
             return texts.OTHER_PROGRAM
         deadline = self._stream.deadline()
@@ -140,7 +140,7 @@ class OffboardFlight:
         if stands:
             return self._on_ground(sender, setpoint, now, guided=guided)
         pilot = self.engaged and sender == self._stream.pilot
-        if pilot and self._stream.state is State.SINGLE and (follows or not ends(setpoint)):
+        if pilot and self._stream.state is State.SINGLE and (follows or not is_position(setpoint)):
             self._stream.engage(sender)
             self._watch()
             self._vehicle.select(FlightMode.OFFBOARD, self)
@@ -327,7 +327,7 @@ class OffboardFlight:
             return texts.PAUSED_BY_CLIENT
         if mode is not FlightMode.GUIDED:
             return texts.IN_MODE.fill(mode=mode.value)
-        self._alone = ends(setpoint) and not (follows or self._stream.straggles(sender, now))
+        self._alone = is_position(setpoint) and not (follows or self._stream.is_late_after_stream(sender, now))
         if self._engaging is None or self._engaging.done():
             self._engaging = self.run_action(sender, self._engage_guided(sender, setpoint, now))
         return None

@@ -7,7 +7,7 @@ A session has one pilot: the client that engages it. Setpoints of others change 
 engage is mode Offboard, refused without setpoints. ArduPilot's way is to send setpoints in mode Guided, and there a
 single position is a move of its own, which nothing but its end or another order ends; a second setpoint of the same
 program within `TOGETHER` makes a stream of it, whose end is silence. After that end a position of the same program is
-a part of the stream for `STRAGGLING` longer: what a bad link delivers late must not send the drone off for good.
+a part of the stream for `LATE_AFTER_STREAM` longer: what a bad link delivers late must not send the drone off for good.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ TOLD_EARLY = 0.5 - SILENCE
 TOGETHER = 0.5
 """s within which a second setpoint makes a stream of the first."""
 
-STRAGGLING = 3.0
+LATE_AFTER_STREAM = 3.0
 """s after the silence for which a position may still be one of the stream's; the time after which ArduCopter takes a
 stream of velocities for ended."""
 
@@ -85,7 +85,7 @@ TRANSITIONS: dict[State, dict[Event, State]] = {
 stream does not become a single setpoint again, and a single one is followed by silence."""
 
 
-def ends(setpoint: Setpoint) -> bool:
+def is_position(setpoint: Setpoint) -> bool:
     """It can be flown to its end: a position can, a velocity has none."""
     return isinstance(setpoint, MotionSetpoint) and setpoint.moves
 
@@ -151,18 +151,20 @@ class OffboardStream:
         """
         return max(0.0, self.age(now) - (self._heard[self.pilot].lasts - SILENCE)) if self.flying else 0.0
 
-    def follows(self, sender: Hashable, now: float) -> bool:
+    def continues_stream(self, sender: Hashable, now: float) -> bool:
         """This program's last setpoint is so young that one that arrives now is of the same stream."""
         heard = self._heard.get(sender)
         return heard is not None and now - heard.at < TOGETHER
 
-    def straggles(self, sender: Hashable, now: float) -> bool:
+    def is_late_after_stream(self, sender: Hashable, now: float) -> bool:
         """Return True if a position of this program may be a late one of a stream that has ended.
 
         It is then flown as a part of that stream.
         """
         return (
-            self._fell_silent is not None and self._fell_silent[0] == sender and now < self._fell_silent[1] + STRAGGLING
+            self._fell_silent is not None
+            and self._fell_silent[0] == sender
+            and now < self._fell_silent[1] + LATE_AFTER_STREAM
         )
 
     def newest(self, sender: Hashable) -> Setpoint | None:
@@ -225,7 +227,7 @@ class OffboardStream:
         if deadline is None or now < deadline:
             return False
         engaged = self.state is State.ENGAGED
-        if engaged and ends(self._heard[self.pilot].setpoint):
+        if engaged and is_position(self._heard[self.pilot].setpoint):
             self._fell_silent = self.pilot, now
         self._prune(now)
         self.pilot = None

@@ -13,8 +13,8 @@ from anafi_mav.vehicle.base.silence import SILENCE
 from anafi_mav.vehicle.base.velocity_loop import turn_towards
 from anafi_mav.vehicle.offboard.setpoints import AttitudeSetpoint, MotionSetpoint, PositionReference, Setpoint
 from anafi_mav.vehicle.offboard.stream import (
+    LATE_AFTER_STREAM,
     MAX_PILOTS,
-    STRAGGLING,
     TOGETHER,
     TRANSITIONS,
     Event,
@@ -195,12 +195,12 @@ def test_a_single_setpoint_may_have_waited_for_its_turn() -> None:
 
 def test_a_second_setpoint_makes_a_stream_of_the_first() -> None:
     stream = OffboardStream()
-    assert not stream.follows("a", 0.0)
+    assert not stream.continues_stream("a", 0.0)
     stream.receive("a", PLACE, 0.0)
     stream.engage_single("a", PLACE, 0.0)
-    assert stream.follows("a", TOGETHER - 0.01)
-    assert not stream.follows("a", TOGETHER)
-    assert not stream.follows("b", 0.1)
+    assert stream.continues_stream("a", TOGETHER - 0.01)
+    assert not stream.continues_stream("a", TOGETHER)
+    assert not stream.continues_stream("b", 0.1)
     stream.receive("a", PLACE, 0.4)
     stream.engage("a")
     assert stream.expire(0.4 + SILENCE)
@@ -210,15 +210,15 @@ def test_a_position_straggles_after_the_silence_of_positions_alone() -> None:
     stream = OffboardStream()
     stream.receive("a", PLACE, 0.0)
     stream.engage("a")
-    assert not stream.straggles("a", 0.1)
+    assert not stream.is_late_after_stream("a", 0.1)
     assert stream.expire(SILENCE)
-    assert stream.straggles("a", SILENCE + STRAGGLING - 0.01)
-    assert not stream.straggles("a", SILENCE + STRAGGLING)
-    assert not stream.straggles("b", SILENCE + 0.1)
+    assert stream.is_late_after_stream("a", SILENCE + LATE_AFTER_STREAM - 0.01)
+    assert not stream.is_late_after_stream("a", SILENCE + LATE_AFTER_STREAM)
+    assert not stream.is_late_after_stream("b", SILENCE + 0.1)
     stream.receive("b", LEVEL, 10.0)
     stream.engage("b")
     assert stream.expire(10.0 + SILENCE)
-    assert not stream.straggles("b", 10.0 + SILENCE)
+    assert not stream.is_late_after_stream("b", 10.0 + SILENCE)
 
 
 IGNORE_POSITION, IGNORE_VELOCITY, IGNORE_ACCELERATION = 0x007, 0x038, 0x1C0
