@@ -71,7 +71,7 @@ async def test_a_plan_is_uploaded_and_fetched_again(tmp_path: Path, flavour: str
         assert again.process.returncode == 0, str(again)
 
 
-async def test_what_the_drone_cannot_fly_is_refused_with_its_words(tmp_path: Path) -> None:
+async def test_upload_of_an_impossible_plan_prints_the_vehicles_reason(tmp_path: Path) -> None:
     address = loopback()
     url = f"tcpout://{address}:5760"
     async with product(tmp_path, fleet(address, loopback())):
@@ -87,7 +87,7 @@ async def test_what_the_drone_cannot_fly_is_refused_with_its_words(tmp_path: Pat
         await other.close()
 
 
-async def test_a_vehicle_of_somebody_else(tmp_path: Path) -> None:
+async def test_plans_with_a_vehicle_of_mavsdk(tmp_path: Path) -> None:
     """MAVSDK's own mission server takes every sample and gives it back."""
     address = loopback()
     url = f"udpin://{address}:14550"
@@ -108,7 +108,7 @@ async def test_a_vehicle_of_somebody_else(tmp_path: Path) -> None:
             ]
 
 
-async def test_where_nobody_is(tmp_path: Path) -> None:
+async def test_plan_download_without_a_vehicle_fails(tmp_path: Path) -> None:
     out = tmp_path / "none.plan"
     alone = await plan("download", out, "--endpoint", f"udpin://{loopback()}:0")
     assert alone.process.returncode == 1
@@ -155,7 +155,7 @@ async def test_a_plan_is_flown_and_followed(tmp_path: Path) -> None:
 
 
 @pytest.mark.timeout(240)
-async def test_who_stops_following_leaves_the_flight_alone(tmp_path: Path) -> None:
+async def test_interrupted_plan_fly_leaves_the_flight_alone(tmp_path: Path) -> None:
     address = loopback()
     url = f"tcpout://{address}:5760"
     config = fleet(address, loopback()).replace("sim: {", "sim: {speed: 2, ")

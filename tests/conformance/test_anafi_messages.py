@@ -30,7 +30,7 @@ async def stream(client: Client, id: int, interval: float = 0.1) -> None:
     assert (await client.command(stock.MAV_CMD_SET_MESSAGE_INTERVAL, id, interval * 1e6)).result == ACCEPTED
 
 
-async def test_they_are_told_to_who_asks_only() -> None:
+async def test_anafi_messages_go_to_the_requester_only() -> None:
     async with world(clients=2) as w:
         asking, other = w.clients
         await stream(asking, dialect.MAVLINK_MSG_ID_ANAFI_HOME)
@@ -139,7 +139,7 @@ async def test_camera_exposure_and_intrinsics(model: str) -> None:
 
 
 @pytest.mark.parametrize("model", ["4k", "ai"])
-async def test_the_video_runs_while_somebody_wants_what_only_it_says(model: str) -> None:
+async def test_video_runs_while_a_stream_needs_its_metadata(model: str) -> None:
     async with world(model=model, speed=1.0) as w:
         if w.drone.rtsp_port is None:
             pytest.skip(w.drone.rtsp_problem)
@@ -211,7 +211,7 @@ async def test_where_the_skycontroller_points(angles: tuple[float, float, float]
         await w.client.wait("ANAFI_CONTROLLER_ATTITUDE", lambda m: m.q == pytest.approx(q, abs=1e-5))
 
 
-async def test_the_sticks_of_the_skycontroller_are_told_while_a_program_flies() -> None:
+async def test_skycontroller_sticks_are_reported_while_a_program_flies() -> None:
     """Each is moved as little as a hand that rests on it does: the program goes on."""
     told = {YAW: 4, THROTTLE: -7, ROLL: -5, PITCH: 10}
     places = {YAW: 0, THROTTLE: 1, ROLL: 2, PITCH: 3}  # ANAFI_AXIS, by its bits

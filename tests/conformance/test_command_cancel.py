@@ -38,7 +38,7 @@ def call_off(client: Client, command: int) -> None:
     client.send(dialect.MAVLink_command_cancel_message(1, 1, command))
 
 
-async def test_a_goto_that_is_called_off_is_not_flown() -> None:
+async def test_cancelled_goto_is_not_flown() -> None:
     async with world(speed=1.0) as w:
         await w.take_off()
         deaf(w, 1.5)
@@ -53,7 +53,7 @@ async def test_a_goto_that_is_called_off_is_not_flown() -> None:
 
 
 @pytest.mark.parametrize("order", [(ARM, 0.0, 21196.0), (MAV_CMD_DO_FLIGHTTERMINATION, 1.0)])
-async def test_cutting_the_motors_cannot_be_called_off(order: tuple[Any, ...]) -> None:
+async def test_motor_cut_cannot_be_cancelled(order: tuple[Any, ...]) -> None:
     async with world(allow_kill=True) as w:
         other = await w.connect(sysid=250)
         await w.take_off()
@@ -67,7 +67,7 @@ async def test_cutting_the_motors_cannot_be_called_off(order: tuple[Any, ...]) -
 
 
 @pytest.mark.parametrize("order", [(TAKEOFF_CMD,), (SET_MODE, 1.0, 4.0, 2.0), (STANDARD_MODE, 8.0)])
-async def test_a_take_off_that_the_drone_has_heard_cannot_be_called_off(order: tuple[Any, ...]) -> None:
+async def test_received_takeoff_cannot_be_cancelled(order: tuple[Any, ...]) -> None:
     async with world(speed=1.0) as w:
         assert (await w.client.command(ARM, 1)).result == ACCEPTED
         muted = now_mute(w, "ardrone3.Piloting.TakeOff", 0.7)
@@ -79,7 +79,7 @@ async def test_a_take_off_that_the_drone_has_heard_cannot_be_called_off(order: t
         await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "takingoff")
 
 
-async def test_a_return_that_the_drone_has_heard_cannot_be_called_off() -> None:
+async def test_received_return_cannot_be_cancelled() -> None:
     async with world(speed=1.0) as w:
         await w.take_off()
         muted = now_mute(w, "rth.return_to_home", 0.5)
@@ -91,7 +91,7 @@ async def test_a_return_that_the_drone_has_heard_cannot_be_called_off() -> None:
         await w.client.heartbeat(lambda beat: beat.custom_mode == RETURN)
 
 
-async def test_an_order_to_stop_is_not_called_off_by_somebody_else() -> None:
+async def test_stop_is_not_cancelled_by_another_client() -> None:
     async with world(speed=1.0) as w:
         other = await w.connect(sysid=250)
         await w.take_off()

@@ -435,7 +435,7 @@ async def test_a_circle_around_the_start_is_the_drones_own_too(flavour: str, ite
         await until(lambda: own_fence(w) == before)
 
 
-async def test_what_the_drone_cannot_express_leaves_it_alone() -> None:
+async def test_fence_beyond_the_drones_geofence_leaves_its_settings_alone() -> None:
     async with world() as w:
         elsewhere = around(PLACE, (40.0, 0.0))[0]
         for items in (
@@ -451,7 +451,7 @@ async def test_what_the_drone_cannot_express_leaves_it_alone() -> None:
             assert (w.commands(DISTANCE), w.commands(SWITCH)) == ([], [])
 
 
-async def test_a_geofence_that_somebody_changed_meanwhile_stays() -> None:
+async def test_geofence_changed_by_another_client_stays() -> None:
     async with world() as w:
         assert (await upload(w.client, [circle(PLACE, 60.0)], FENCE)).type == TAKEN
         await until(lambda: own_fence(w) == (60.0, 1))
@@ -503,7 +503,7 @@ async def pilot_goes_to(w: World, north: float) -> None:
 
 
 @both
-async def test_goto_within_the_drones_limit_of_the_pilot_is_flown_and_beyond_it_refused(flavour: str) -> None:
+async def test_goto_beyond_the_distance_limit_around_the_pilot_is_refused(flavour: str) -> None:
     async with world(flavour=flavour, skycontroller=3) as w:
         w.drone.firmware.receive(ardrone3.MaxDistance(60.0), 0.0)
         w.drone.firmware.receive(ardrone3.NoFlyOverMaxDistance(1), 0.0)
@@ -518,7 +518,7 @@ async def test_goto_within_the_drones_limit_of_the_pilot_is_flown_and_beyond_it_
         assert len(w.commands("ardrone3.Piloting.moveTo")) == 1
 
 
-async def test_fence_circle_is_the_drones_own_only_while_its_centre_is_near() -> None:
+async def test_fence_circle_becomes_the_drones_geofence_only_near_its_centre() -> None:
     async with world(skycontroller=3) as w:
         assert (await upload(w.client, [circle(PLACE, 60.0)], FENCE)).type == TAKEN
         await until(lambda: own_fence(w) == (60.0, 1))
@@ -606,7 +606,7 @@ async def test_conf_077_a_rally_point_outside_the_fence_is_not_used() -> None:
         await said(w.client, "Returns end at rally point 1", since=0, timeout=10.0)
 
 
-async def test_conf_077_a_home_that_somebody_chose_is_left_alone() -> None:
+async def test_conf_077_home_chosen_by_a_client_is_left_alone() -> None:
     async with world() as w:
         await put(w, "RTL_TYPE", 1)
         await w.take_off()

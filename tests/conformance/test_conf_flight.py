@@ -53,7 +53,7 @@ async def test_disarming_takes_back_a_takeoff_that_waits(flavour: str) -> None:
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
-async def test_a_takeoff_that_nobody_arms_is_forgotten(flavour: str) -> None:
+async def test_takeoff_without_arming_expires(flavour: str) -> None:
     """QGroundControl arms as soon as its take-off is accepted; who arms after ARM_WAIT wants something else."""
     async with world(flavour=flavour) as w:
         mark, began = w.client.mark(), time.monotonic()

@@ -91,7 +91,7 @@ async def test_conf_107_a_target_leads(flavour: str) -> None:
         assert (pose.vn, pose.ve) == pytest.approx((1.06, 1.06), abs=0.4)
 
 
-async def test_follow_target_that_asks_for_less_than_1_m_is_followed_at_the_present_height() -> None:
+async def test_follow_height_below_1_m_keeps_the_present_height() -> None:
     """MAVSDK's example sends an altitude of 0, which above sea level is far below the ground."""
     async with world(speed=1.0) as w:
         await w.take_off(6.0)
@@ -128,7 +128,7 @@ async def test_a_target_that_falls_silent_is_hovered_for(flavour: str) -> None:
         assert idle_mode(flavour)
 
 
-async def test_the_target_of_the_first_who_tells_of_one_leads() -> None:
+async def test_follow_target_of_the_first_sender_leads() -> None:
     async with world(speed=1.0) as w:
         other = await w.connect(sysid=250)
         await w.take_off()

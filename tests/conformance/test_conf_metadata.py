@@ -94,7 +94,7 @@ async def test_conf_125_metadata(flavour: str) -> None:
         assert version.capabilities & dialect.MAV_PROTOCOL_CAPABILITY_FTP
 
 
-async def test_conf_125_the_crc_tells_what_has_changed() -> None:
+async def test_conf_125_crc_differs_by_model_only() -> None:
     """Another model, other files; the same one again, the same: a cache by CRC is right."""
     seen = []
     for model in ("4k", "ai", "4k"):

@@ -418,7 +418,7 @@ async def test_conf_072_a_reset_gives_a_loop_its_turns_again_at_the_same_item(fl
         assert flown(w).count("takeoff") == 1
 
 
-async def test_conf_072_an_ai_begins_in_the_middle_of_the_file_that_it_has() -> None:
+async def test_conf_072_ai_starts_inside_the_file_that_it_has() -> None:
     async with world(web=True, model="ai") as w:
         await put(w, [takeoff(6.0), way(12.0, 0.0, 6.0), way(12.0, 12.0, 6.0), way(0.0, 12.0, 6.0)])
         await start(w)

@@ -132,7 +132,7 @@ async def written(folder: Path, item: int) -> None:
         await asyncio.sleep(0.05)
 
 
-async def test_conf_122_a_gateway_that_was_killed_knows_the_drones_plan_again(tmp_path: Path) -> None:
+async def test_conf_122_killed_gateway_recognises_the_drones_plan(tmp_path: Path) -> None:
     drone, address = loopback(), loopback()
     spec = DroneSpec(address=drone, home=HOME, http_port=WEB_PORT)
     config = fleet(tmp_path, drone, address)
@@ -256,7 +256,7 @@ async def test_items_that_the_gateway_flies_between_two_files() -> None:
 
 
 @pytest.mark.parametrize("returns", [0, 1])
-async def test_without_the_gateway_what_it_flies_and_what_follows_is_not_flown(returns: int) -> None:
+async def test_items_that_the_gateway_flies_are_not_flown_without_it(returns: int) -> None:
     """The drone may fly its first file to the end while the link is lost; the turn behind it is nobody's then."""
     async with world(web=True, speed=1.5) as w:
         await put(w, [takeoff(6.0), way(40.0, 0.0, 6.0), TURN, way(40.0, 10.0, 6.0)])
@@ -295,7 +295,7 @@ def with_a_memory(folder: Path) -> tuple[DroneSpec, Config, str]:
     return DroneSpec(address=drone, home=HOME, http_port=WEB_PORT), config, address
 
 
-async def test_a_gateway_that_ends_between_two_files_goes_on_there(tmp_path: Path) -> None:
+async def test_gateway_restart_between_two_files_continues_there(tmp_path: Path) -> None:
     """Another run of it knows that the first file is flown, and which item was next: neither is flown again."""
     spec, config, address = with_a_memory(tmp_path)
     async with Simulator([spec], speed=1.5, seed=1) as simulator:
@@ -320,7 +320,7 @@ async def test_a_gateway_that_ends_between_two_files_goes_on_there(tmp_path: Pat
     assert len(w.commands("camera.set_zoom_target")) == 1
 
 
-async def test_a_link_that_is_lost_between_two_files_does_not_take_the_mission_back() -> None:
+async def test_link_loss_between_two_files_keeps_the_mission_progress() -> None:
     """Not behind what was flown, and not behind the item that a client has chosen since."""
     async with world(web=True, speed=1.5) as w:
         await turning(w)
@@ -353,9 +353,7 @@ def spoil(folder: Path, key: str) -> None:
         ("line", "Mission complete", COMPLETE),
     ],
 )
-async def test_what_was_kept_of_a_flight_is_looked_at_before_it_is_believed(
-    tmp_path: Path, key: str, words: str, then: int
-) -> None:
+async def test_invalid_mission_record_is_not_used(tmp_path: Path, key: str, words: str, then: int) -> None:
     """What is none of the mission is ignored with a text: people can write files. What was flown is complete."""
     spec, config, address = with_a_memory(tmp_path)
     async with Simulator([spec], speed=1.5, seed=1) as simulator:

@@ -172,7 +172,7 @@ async def test_conf_074_the_same_mission_before_the_drone_has_begun_disturbs_not
 
 
 @both
-async def test_conf_074_the_same_mission_while_a_start_fails_is_a_new_one(flavour: str) -> None:
+async def test_conf_074_same_mission_uploaded_during_a_failed_start_is_new(flavour: str) -> None:
     """The drone hears the start and cannot: what was uploaded meanwhile begins at its first item."""
     async with world(flavour=flavour, web=True) as w:
         await w.take_off(6.0)
@@ -195,7 +195,7 @@ async def test_conf_074_the_same_mission_while_a_start_fails_is_a_new_one(flavou
 # Between two files, and by somebody else.
 
 
-async def test_conf_074_paused_before_a_file_begins_it_goes_on_behind_what_was_flown() -> None:
+async def test_conf_074_mission_paused_before_a_file_continues_after_the_flown_items() -> None:
     """A loop whose turn was just made: the drone turns as often as without the pause, and goes round as often."""
     async with world(web=True) as w:
         await w.take_off(6.0)
@@ -231,7 +231,7 @@ def turned(w: World) -> int:
 
 @both
 @pytest.mark.parametrize("after", ["the same again", "another item"])
-async def test_conf_074_what_somebody_else_continues_is_followed(flavour: str, after: str) -> None:
+async def test_conf_074_mission_resumed_by_another_controller_is_followed(flavour: str, after: str) -> None:
     """Paused, and uploaded once more or begun elsewhere next: the drone flies our file, so that is what is told."""
     async with world(flavour=flavour, web=True) as w:
         await on_the_way(w, 2)
@@ -253,7 +253,7 @@ async def test_conf_074_what_somebody_else_continues_is_followed(flavour: str, a
         assert reached(w) == [0, 1, 2, 3]
 
 
-async def test_conf_074_a_plan_that_is_not_the_missions_is_told() -> None:
+async def test_conf_074_plan_of_another_mission_is_reported() -> None:
     async with world(web=True) as w:
         await on_the_way(w, 2)
         (begun,) = w.commands("common.Mavlink.Start")

@@ -94,7 +94,7 @@ async def without_its_ack(w: World, items: list[Item]) -> tuple[AckLost, list[It
 
 @both
 @pytest.mark.parametrize("often", [-1.0, 60000.0])
-async def test_conf_066_a_loop_in_which_nothing_is_flown_is_refused_at_upload(flavour: str, often: float) -> None:
+async def test_conf_066_endless_loop_without_flight_is_refused_at_upload(flavour: str, often: float) -> None:
     async with world(flavour=flavour) as w:
         jump = Item(mav_enums.MAV_CMD_DO_JUMP, 0.0, 0.0, p1=1.0 + first(w), p2=often, frame=2)
         listed = [*([Item(mav_enums.MAV_CMD_NAV_WAYPOINT, *HOME)] if first(w) else []), *ROUND_AND_ROUND, jump]
@@ -107,7 +107,7 @@ async def test_conf_066_a_loop_in_which_nothing_is_flown_is_refused_at_upload(fl
 
 @both
 @pytest.mark.parametrize(("items", "result"), [(SERVO, UNSUPPORTED), (NOTHING, INVALID)], ids=["item", "plan"])
-async def test_conf_066_a_refusal_that_was_lost_is_heard_when_the_last_item_comes_again(
+async def test_conf_066_lost_refusal_is_repeated_for_a_repeated_last_item(
     flavour: str, items: list[Item], result: int
 ) -> None:
     """As MAVSDK does after half a second: the same result, and one text in all."""
@@ -151,7 +151,7 @@ async def test_conf_074_the_same_mission_again_disturbs_nothing(flavour: str) ->
 
 
 @both
-async def test_conf_074_the_same_mission_again_after_its_end_is_a_new_one(flavour: str) -> None:
+async def test_conf_074_same_mission_uploaded_after_its_end_is_new(flavour: str) -> None:
     """A program that uploads, starts and waits for the end must not take the last end for this one's."""
     async with world(flavour=flavour, web=True) as w:
         await on_the_way(w, 2)
@@ -241,7 +241,7 @@ async def up_to_the_last_item(w: World, items: list[Item]) -> None:
 
 
 @both
-async def test_conf_073_an_order_to_start_right_after_the_last_item_is_for_the_new_mission(flavour: str) -> None:
+async def test_conf_073_start_right_after_the_last_item_starts_the_new_mission(flavour: str) -> None:
     async with world(flavour=flavour, web=True) as w:
         await put(w, ONE_WAY)
         assert (await w.client.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)).result == ACCEPTED
@@ -260,7 +260,7 @@ async def test_conf_073_an_order_to_start_right_after_the_last_item_is_for_the_n
 
 
 @both
-async def test_conf_074_an_item_chosen_right_after_the_last_one_is_of_the_new_mission(flavour: str) -> None:
+async def test_conf_074_item_selected_after_the_upload_is_of_the_new_mission(flavour: str) -> None:
     async with world(flavour=flavour, web=True) as w:
         await put(w, ONE_WAY)
         mark = w.client.mark()
@@ -271,7 +271,7 @@ async def test_conf_074_an_item_chosen_right_after_the_last_one_is_of_the_new_mi
         assert whole(told).total == len(OTHER_WAY)  # home is not one of them
 
 
-async def test_conf_063_a_mission_that_cannot_be_stored_is_told_and_the_next_one_is_taken(
+async def test_conf_063_failed_storing_is_reported_and_the_next_upload_succeeds(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Whatever goes wrong in the gateway: clients must not wait for an answer that never comes."""
@@ -317,7 +317,7 @@ async def test_conf_074_an_edited_mission_is_flown_with_the_new_numbers(flavour:
         await settled(w, (0.0, 14.0, 6.0))
 
 
-async def test_mission_uploaded_while_another_is_paused_is_flown_by_a_drone_that_takes_no_file_then() -> None:
+async def test_mission_uploaded_during_a_pause_is_flown_when_the_drone_refuses_files() -> None:
     """The paused plan is stopped before the upload, as GroundSDK does."""
     async with world(web=True) as w:
         w.drone.faults.quirks = frozenset({Quirk.UPLOAD_REFUSED_WHILE_PAUSED})

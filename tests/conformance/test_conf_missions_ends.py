@@ -98,7 +98,7 @@ async def test_conf_073_an_end_that_the_drone_does_not_tell(flavour: str, model:
         assert reached(w) == [0, 1, 2, 3]
 
 
-async def test_conf_073_a_last_line_that_is_told_after_the_end_completes_it() -> None:
+async def test_conf_073_last_line_reported_after_the_end_completes_the_mission() -> None:
     """The drone says that its plan has ended, and only then that the last line was executed."""
     async with world(web=True) as w:
 

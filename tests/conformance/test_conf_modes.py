@@ -112,7 +112,7 @@ async def test_conf_057_current_mode(flavour: str) -> None:
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
-async def test_conf_058_the_monitor_tells_when_the_list_has_changed(flavour: str) -> None:
+async def test_conf_058_modes_monitor_counts_changes_of_the_list(flavour: str) -> None:
     stop, home = ("Hold", "Return") if flavour == "px4" else ("Brake", "RTL")
     async with world(flavour=flavour) as w:
         selectable = {

@@ -400,7 +400,7 @@ async def test_a_position_with_a_velocity_ahead_of_it() -> None:
         assert pose.north == pytest.approx(target, abs=1.5)
 
 
-async def test_one_axis_as_a_position_the_other_as_a_velocity_of_the_body() -> None:
+async def test_setpoint_with_position_and_body_velocity_axes() -> None:
     """Keep 3 m to the right of the line, and fly along it: front is east here, right is south."""
     async with world(speed=1.0) as w:
         await w.take_off(8.0)
@@ -434,7 +434,7 @@ async def test_an_acceleration() -> None:
 # Repetition and change.
 
 
-async def test_a_position_that_changes_all_the_time_is_followed_in_steps() -> None:
+async def test_moving_position_setpoint_is_followed_in_steps() -> None:
     async with world(speed=1.0) as w:
         await w.take_off(8.0)
         began = now()
@@ -596,7 +596,7 @@ async def test_a_single_place_is_flown_to_its_end() -> None:
         assert (w.drone.pose.north, w.drone.pose.east, w.drone.pose.up) == pytest.approx((20.0, 10.0, 12.0), abs=1.0)
 
 
-async def test_a_second_setpoint_makes_a_stream_whose_silence_ends_it() -> None:
+async def test_second_setpoint_begins_a_stream_that_ends_by_silence() -> None:
     async with world(speed=1.0, flavour="ardupilot") as w:
         await w.take_off(8.0)
         setpoint = local(POSITION_ONLY, at=(60.0, 0.0, -8.0))
@@ -651,7 +651,7 @@ async def test_sticks_that_follow_the_camera_are_no_sticks_for_setpoints(flavour
         assert motion(w, began + 0.1) == []
 
 
-async def test_offboard_asked_for_again_does_not_interrupt_it() -> None:
+async def test_repeated_offboard_command_does_not_interrupt_offboard() -> None:
     async with world(speed=1.0) as w:
         await w.take_off()
         async with streaming(w.client, attitude(pitch=-0.1)):
@@ -683,7 +683,7 @@ async def test_setpoints_have_one_pilot(flavour: str) -> None:
 # What is being flown is told back.
 
 
-async def test_what_is_flown_is_told_back() -> None:
+async def test_flown_setpoint_is_reported_as_position_target() -> None:
     async with world(speed=1.0) as w:
         await w.take_off(8.0)
         await turn_to(w, LOOKS_EAST)
@@ -715,7 +715,7 @@ async def test_what_is_flown_is_told_back() -> None:
         assert w.client.since(mark, "ATTITUDE_TARGET") == []
 
 
-async def test_where_a_goto_leads_is_told_too() -> None:
+async def test_goto_is_reported_as_position_target() -> None:
     async with world() as w:
         await w.take_off()
         place = geo.destination(*HOME[:2], 30.0, -10.0)

@@ -313,7 +313,7 @@ async def test_many_writes_at_once_are_all_carried_out() -> None:
         assert heights[-1] == 59.0
 
 
-async def test_a_write_that_the_drone_does_not_confirm_changes_nothing() -> None:
+async def test_unconfirmed_parameter_write_changes_nothing() -> None:
     """A mode of home that this drone does not have: the value that holds comes back, and a text says why."""
     async with world() as w:
         before = value_of(await read(w.client, "ANF_HOME_TYPE"))
@@ -504,7 +504,7 @@ async def lost_ground_station(w: World, action: int) -> Client:
     ],
     ids=["return", "land", "hold"],
 )
-async def test_what_nav_dll_act_promises_is_done(action: int, mode: int, command: str) -> None:
+async def test_nav_dll_act_is_executed_at_link_loss(action: int, mode: int, command: str) -> None:
     """conformance E11; the drone is on its way somewhere when the ground station falls silent."""
     async with world() as w:
         onlooker = await lost_ground_station(w, action)
@@ -523,7 +523,7 @@ async def test_what_nav_dll_act_promises_is_done(action: int, mode: int, command
         assert len(w.commands(command)) == 1
 
 
-async def test_what_is_set_in_the_gateway_outlives_it(tmp_path: Path) -> None:
+async def test_gateway_parameters_outlive_a_restart(tmp_path: Path) -> None:
     """By drone. Not what makes motors turn, and not what MAV_CMD_DO_CHANGE_SPEED changes in passing."""
     mine = {"ANF_TKOFF_ALT": (4.5, REAL32, 2.5), "ANF_GCS_LOSS": (2, INT32, 0), "ANF_GCS_LOSS_T": (7.0, REAL32, 10.0)}
     passing = {"ANF_HAND_LAUNCH": (1, INT32, 0), "ANF_CRUISE_SPEED": (3.0, REAL32, 0.0)}

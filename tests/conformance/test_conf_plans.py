@@ -99,7 +99,7 @@ async def test_conf_047_upload_and_download_are_equal(flavour: str, kind: int) -
 
 
 @both
-async def test_conf_048_answers_go_to_who_asked(flavour: str) -> None:
+async def test_conf_048_answers_go_to_the_requester(flavour: str) -> None:
     """Five clients with the addresses of real ones, two of them on one channel; each uploads, and all read at once."""
     async with world(flavour=flavour) as w:
         others = [await w.connect(*address) for address in ((255, 230), (245, 190), (255, 0), (7, 42))]
@@ -184,7 +184,7 @@ async def test_conf_063_an_aborted_upload_keeps_the_old_plan(flavour: str, kind:
 
 
 @both
-async def test_conf_063_a_client_whose_channel_is_gone_keeps_nobody_away(flavour: str) -> None:
+async def test_conf_063_closed_channel_frees_its_transfer(flavour: str) -> None:
     async with world(flavour=flavour) as w:
         other = await w.connect(254)
         mark = send_count(other, 5, FENCE)

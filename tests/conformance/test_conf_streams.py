@@ -106,7 +106,7 @@ async def test_conf_108_the_lower_of_request_and_source(flavour: str) -> None:
             assert await interval(w.client, name) == pytest.approx(1 / measured[name], rel=0.2), name
 
 
-async def test_conf_108_a_fast_source_is_thinned_out_and_told_fresh() -> None:
+async def test_conf_108_fast_source_is_thinned_out_to_the_newest_values() -> None:
     """What leaves is the newest, with its own time; nothing is told twice."""
     async with world(speed=1.0, telemetry_rate=30.0) as w:
         names = ["ATTITUDE", "GLOBAL_POSITION_INT"]

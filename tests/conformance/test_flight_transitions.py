@@ -70,7 +70,7 @@ async def test_pause_that_replaces_another_one_holds_against_setpoints() -> None
             await flies_nowhere(w)
 
 
-async def test_pause_while_the_take_off_is_on_its_way_holds_against_setpoints() -> None:
+async def test_pause_during_the_takeoff_command_holds_against_setpoints() -> None:
     """TakeOff has left and is not confirmed: the drone may rise to 1 m, and hovers there."""
     async with world(speed=1.0, flavour="ardupilot", clients=2) as w, streaming(w.clients[1], NORTH):
         assert (await w.client.command(SET_MODE, 1, 4)).result == ACCEPTED
@@ -98,7 +98,7 @@ async def test_land_in_the_second_before_a_guided_takeoff_ends_it() -> None:
         assert heard(w, "TakeOff") == []
 
 
-async def test_take_off_that_waits_for_arming_replaces_a_session_on_the_ground() -> None:
+async def test_takeoff_that_waits_for_arming_ends_a_session_on_the_ground() -> None:
     """QGroundControl sends its take-off before it arms; a program in Offboard on the ground streams a velocity."""
     async with world(clients=2) as w:
         station = w.clients[1]
@@ -113,7 +113,7 @@ async def test_take_off_that_waits_for_arming_replaces_a_session_on_the_ground()
         assert [e for e in heard(w, "PCMD") if e.args["pitch"]] == []
 
 
-async def test_session_on_the_ground_does_not_fly_a_drone_that_somebody_else_takes_off() -> None:
+async def test_session_on_the_ground_does_not_fly_after_takeoff_by_another_client() -> None:
     """The pilot at a Skycontroller takes off while a program, not armed, is in Offboard: the flight is the pilot's."""
     async with world(clients=1) as w:
         async with streaming(w.client, NORTH):
@@ -127,7 +127,7 @@ async def test_session_on_the_ground_does_not_fly_a_drone_that_somebody_else_tak
         assert [e for e in heard(w, "PCMD") if e.args["pitch"]] == []
 
 
-async def test_offboard_in_a_climb_replaces_a_goto_that_waits_for_it() -> None:
+async def test_offboard_during_the_climb_replaces_a_waiting_goto() -> None:
     """The newer of two commands is flown, and the client of the older one receives CANCELLED."""
     async with world(clients=2) as w:
         program = w.clients[1]
@@ -145,7 +145,7 @@ async def test_offboard_in_a_climb_replaces_a_goto_that_waits_for_it() -> None:
         assert heard(w, "moveTo") == []
 
 
-async def test_goto_that_is_refused_leaves_the_one_that_waits_for_a_takeoff() -> None:
+async def test_refused_goto_keeps_the_goto_that_waits_for_takeoff() -> None:
     async with world(clients=2) as w:
         assert (await w.client.command(ARM, 1)).result == ACCEPTED
         assert (await w.client.command(TAKEOFF, x=0.0, y=0.0, z=6.0)).result == ACCEPTED
@@ -162,7 +162,7 @@ async def test_goto_that_is_refused_leaves_the_one_that_waits_for_a_takeoff() ->
 
 
 @pytest.mark.parametrize("kind", ["position", "attitude"])
-async def test_setpoint_after_a_velocity_of_guided_lasts_as_long_as_its_own_kind(kind: str) -> None:
+async def test_setpoint_after_a_guided_velocity_has_its_own_timeout(kind: str) -> None:
     """A program that ends its velocities, sends one kind that lasts half a second, and dies."""
     async with world(speed=1.0, flavour="ardupilot") as w:
         await w.take_off()
@@ -178,7 +178,7 @@ async def test_setpoint_after_a_velocity_of_guided_lasts_as_long_as_its_own_kind
         assert loop.time() - died < 0.8
 
 
-async def test_landing_at_home_by_the_drones_setting_that_is_ended_elsewhere_is_not_shown_for_ever() -> None:
+async def test_landing_at_home_ended_by_another_controller_ends_in_the_heartbeat() -> None:
     """While Return is shown, station loss and fence leave the drone alone: it has to be true."""
     async with world(speed=1.0) as w:
         w.drone.firmware.receive(
@@ -194,7 +194,7 @@ async def test_landing_at_home_by_the_drones_setting_that_is_ended_elsewhere_is_
         await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD, since=mark)
 
 
-async def test_silence_before_the_takeoff_waits_half_a_second_for_what_it_replaces() -> None:
+async def test_silence_before_takeoff_waits_half_a_second_for_the_replaced_command() -> None:
     """A home that is being undone takes five seconds: the motors stop before."""
     async with world(speed=1.0, clients=2) as w:
         program: Any = attitude(thrust=0.4)
@@ -230,7 +230,7 @@ async def test_hold_while_the_fence_acts_replaces_what_the_fence_commanded(actio
         assert w.drone.pose.up > 8.0
 
 
-async def test_landing_that_another_client_has_ended_does_not_begin_again_by_a_repetition() -> None:
+async def test_repeated_land_does_not_restart_a_landing_ended_by_another_client() -> None:
     """The acknowledgement of Land was lost, and its client's program repeats it after another client's Hold."""
     async with world(speed=1.0, clients=2) as w:
         await w.take_off(10.0)
@@ -245,7 +245,7 @@ async def test_landing_that_another_client_has_ended_does_not_begin_again_by_a_r
         await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.land)
 
 
-async def test_land_is_carried_out_again_when_another_client_has_taken_off_since() -> None:
+async def test_repeated_land_after_a_takeoff_by_another_client_is_executed() -> None:
     """It had nothing to do on the ground. Now it has, and a landing may not have to wait."""
     async with world(speed=1.0, clients=2) as w:
         assert (await w.client.command(LAND)).result == ACCEPTED

@@ -52,7 +52,7 @@ def moves(w: World) -> list[dict[str, Any]]:
 # -- pause and continue
 
 
-async def test_a_second_pause_stops_what_somebody_else_began_meanwhile() -> None:
+async def test_second_pause_stops_a_goto_of_another_client() -> None:
     async with world(speed=1.0) as w:
         other = await w.connect(sysid=250)
         await w.take_off()
@@ -101,7 +101,7 @@ async def test_two_pauses_are_continued_like_one() -> None:
 # -- what was refused
 
 
-async def test_a_change_of_height_does_not_fly_to_a_place_that_was_refused() -> None:
+async def test_altitude_change_does_not_fly_to_a_refused_position() -> None:
     async with world(speed=1.0) as w:
         await w.take_off()
         assert await goto(w, 80.0, 10.0) == ACCEPTED
@@ -123,7 +123,7 @@ async def test_a_change_of_height_does_not_fly_to_a_place_that_was_refused() -> 
 
 
 @pytest.mark.parametrize("how", ["a return", "cancel"])
-async def test_a_home_that_is_given_up_leaves_the_old_one(how: str) -> None:
+async def test_cancelled_home_leaves_the_old_one(how: str) -> None:
     """In between the drone prefers a place that was chosen some other day."""
     async with world(speed=1.0) as w:
         await w.take_off()
@@ -146,7 +146,7 @@ async def test_a_home_that_is_given_up_leaves_the_old_one(how: str) -> None:
 # -- the ground station is back
 
 
-async def test_who_comes_back_while_its_loss_is_being_acted_upon_has_the_say() -> None:
+async def test_command_of_a_returning_client_ends_the_link_loss_action() -> None:
     async with world(speed=1.0) as w:
         other = await w.connect(sysid=254)
         await w.take_off(8.0)

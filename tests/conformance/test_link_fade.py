@@ -60,7 +60,7 @@ async def test_silence_of_three_seconds_keeps_session_and_hovers() -> None:
         assert abs(w.drone.pose.north - stopped) < 15.0  # it brakes, and does not go on to 200 m
 
 
-async def test_silence_after_command_fails_it_and_it_is_not_sent_again() -> None:
+async def test_command_in_silence_fails_and_is_not_repeated() -> None:
     async with world(speed=1.0) as w:
         await w.take_off()
         w.drone.faults.mute = True

@@ -42,7 +42,7 @@ def listening(beginning: str) -> Iterator[Lines]:
         logging.getLogger().removeHandler(handler)
 
 
-async def test_link_of_a_drone_that_is_lost_and_back_is_logged_at_one_level() -> None:
+async def test_drone_link_loss_and_recovery_are_logged_at_one_level() -> None:
     with listening("alpha: ") as lines:
         async with world() as w:
             assert lines.none()  # a first connection is nothing to warn of
@@ -56,7 +56,7 @@ async def test_link_of_a_drone_that_is_lost_and_back_is_logged_at_one_level() ->
             assert level == logging.WARNING
 
 
-async def test_link_of_an_endpoint_that_is_lost_and_back_is_logged_at_one_level() -> None:
+async def test_endpoint_loss_and_recovery_are_logged_at_one_level() -> None:
     address, port = loopback(), 5760
     accepted: asyncio.Queue[asyncio.StreamWriter] = asyncio.Queue()
     server = await asyncio.start_server(lambda reader, writer: accepted.put_nowait(writer), address, port)

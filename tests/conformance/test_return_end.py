@@ -242,7 +242,7 @@ async def test_return_to_a_home_that_was_set_lands_only_in_the_same_flight(when:
         assert math.hypot(w.drone.pose.north - 8.0, w.drone.pose.east) < 1.0
 
 
-async def test_return_that_the_drone_does_not_report_as_finished_hovers_with_a_text() -> None:
+async def test_return_not_reported_as_finished_hovers_with_a_text() -> None:
     """Quirk rth-finished-missing: nothing is landed, everybody reads it, and Hold still ends it."""
     async with world(speed=FAST) as w:
         w.drone.faults.quirks = frozenset({Quirk.RTH_FINISHED_MISSING})

@@ -104,7 +104,7 @@ def pitches(w: World, since: int = 0) -> list[int]:
 # Orders that overtake each other.
 
 
-async def test_of_two_orders_in_one_segment_the_newer_is_flown_and_both_are_answered() -> None:
+async def test_two_commands_in_one_segment_are_both_answered_and_the_newer_is_flown() -> None:
     async with world() as w:
         await w.take_off()
         mark = w.client.mark()
@@ -142,7 +142,7 @@ async def test_a_late_repetition_is_not_flown_over_the_head_of_another_client() 
         assert len(heard(w, "CancelMoveTo")) == len(before) + 1
 
 
-async def test_a_take_off_that_succeeded_is_not_refused_when_it_is_sent_again() -> None:
+async def test_repeated_takeoff_after_success_is_not_refused() -> None:
     async with world(speed=1.0) as w:
         assert (await w.client.command(ARM, 1)).result == ACCEPTED
         assert (await w.client.command(TAKEOFF_CMD, x=0.0, y=0.0, z=3.0)).result == ACCEPTED
@@ -178,7 +178,7 @@ async def test_disarm_while_the_take_off_is_in_bad_air() -> None:
         assert w.drone.flying_state.name == "LANDED"
 
 
-async def test_land_while_the_drone_takes_off_and_could_not_say_so() -> None:
+async def test_land_during_an_unreported_takeoff() -> None:
     async with world(speed=1.0) as w:
         assert (await w.client.command(ARM, 1)).result == ACCEPTED
         muted = now_mute(w, "ardrone3.Piloting.TakeOff", 0.7)
@@ -192,7 +192,7 @@ async def test_land_while_the_drone_takes_off_and_could_not_say_so() -> None:
         assert w.drone.flying_state.name == "LANDED"
 
 
-async def test_goto_while_the_return_has_begun_and_could_not_say_so() -> None:
+async def test_goto_during_an_unreported_return() -> None:
     async with world(speed=1.0) as w:
         await w.take_off()
         muted = now_mute(w, "rth.return_to_home", 0.5)
@@ -204,7 +204,7 @@ async def test_goto_while_the_return_has_begun_and_could_not_say_so() -> None:
         assert heard(w, "return_to_home", "abort", "moveTo") == ["return_to_home"]
 
 
-async def test_return_again_while_the_hold_before_it_is_under_way() -> None:
+async def test_return_repeated_during_a_hold() -> None:
     async with world(speed=1.0) as w:
         await w.take_off()
         assert await goto(w, 40.0, 10.0) == ACCEPTED
@@ -248,7 +248,7 @@ async def test_hold_is_confirmed_when_the_climb_has_ended() -> None:
         assert w.drone.pose.up < height + 3.0
 
 
-async def test_a_second_hold_does_not_confirm_what_the_first_one_waits_for() -> None:
+async def test_second_hold_does_not_confirm_the_first() -> None:
     async with world(speed=1.0) as w:
         other = await w.connect(sysid=250)
         await w.take_off()
@@ -262,7 +262,7 @@ async def test_a_second_hold_does_not_confirm_what_the_first_one_waits_for() -> 
         assert heard(w, "CancelMoveTo") != []
 
 
-async def test_a_return_is_not_confirmed_on_account_of_one_that_is_being_aborted() -> None:
+async def test_return_is_not_confirmed_by_a_return_under_abort() -> None:
     async with world(speed=1.0) as w:
         await w.take_off()
         assert await goto(w, 60.0, 10.0) == ACCEPTED
@@ -281,7 +281,7 @@ async def test_a_return_is_not_confirmed_on_account_of_one_that_is_being_aborted
         await w.client.heartbeat(lambda beat: beat.custom_mode == RETURN, since=mark)
 
 
-async def test_land_and_return_are_carried_out_each_time_they_are_asked_for() -> None:
+async def test_repeated_land_and_return_are_executed_each_time() -> None:
     async with world(speed=1.0) as w:
         await w.take_off(8.0)
         assert (await w.client.command(LAND_CMD)).result == ACCEPTED
@@ -326,7 +326,7 @@ async def test_the_sticks_are_level_before_a_landing_begins() -> None:
         assert [e for e in sent[landing:] if e.name == "ardrone3.Piloting.PCMD"] == []
 
 
-async def test_a_setpoint_ends_with_its_own_sender_not_with_the_last_of_all() -> None:
+async def test_setpoint_ends_with_its_own_sender() -> None:
     async with world(speed=1.0) as w:
         other = await w.connect(sysid=250)
         await w.take_off()
@@ -355,7 +355,7 @@ async def test_a_refused_return_leaves_no_stick_deflected() -> None:
         assert set(pitches(w, flown)) <= {0}
 
 
-async def test_setpoints_end_when_somebody_else_sends_the_drone_home() -> None:
+async def test_setpoints_end_at_a_return_by_another_controller() -> None:
     async with world() as w:
         await w.take_off()
         async with streaming(w.client, pitch=FORWARD):
@@ -482,7 +482,7 @@ async def test_the_climb_belongs_to_its_own_take_off() -> None:
         assert w.drone.pose.up < 2.0
 
 
-async def test_hold_ends_a_move_that_somebody_else_began() -> None:
+async def test_hold_ends_a_move_of_another_client() -> None:
     async with world(speed=1.0) as w:
         await w.take_off()
         place = geo.destination(*HOME[:2], 80.0, 0.0)
@@ -510,7 +510,7 @@ async def test_hold_pauses_a_flight_plan() -> None:
 # The motors.
 
 
-async def test_an_accepted_cut_cannot_be_called_off() -> None:
+async def test_accepted_motor_cut_cannot_be_cancelled() -> None:
     async with world(allow_kill=True) as w:
         other = await w.connect(sysid=250)
         await w.take_off()
@@ -580,7 +580,7 @@ async def test_a_speed_alone_is_refused() -> None:
         assert (await w.client.command(GOTO, 5.0, 1, 0, NAN)).result == DENIED
 
 
-async def test_an_interval_beyond_what_can_be_said_is_still_answered() -> None:
+async def test_interval_beyond_the_int32_range_is_answered() -> None:
     async with world() as w:
         assert (await w.client.command(mav_enums.MAV_CMD_SET_MESSAGE_INTERVAL, 30, 1e12)).result == ACCEPTED
         mark = w.client.mark()

@@ -71,7 +71,7 @@ async def test_gateway_that_found_the_drone_flying_yields(tmp_path: Path) -> Non
             assert await goto(w, 30.0, 8.0) == 0
 
 
-async def test_gateway_that_yielded_comes_back_at_once_on_a_command(tmp_path: Path) -> None:
+async def test_yielded_gateway_reconnects_at_once_on_a_command(tmp_path: Path) -> None:
     async with world(speed=1.0) as w:
         await w.take_off()
         async with second(w, tmp_path) as (_, client):
@@ -128,7 +128,7 @@ async def test_gateway_from_before_takeoff_yields_after_five_losses() -> None:
     ("cause", "taken"),
     [(common.DisconnectionCause.UNKNOWN, True), (common.DisconnectionCause.OFF_BUTTON, False)],
 )
-async def test_disconnection_event_tells_a_switched_off_drone_from_a_taken_one(
+async def test_disconnection_cause_distinguishes_switched_off_from_taken_over(
     cause: common.DisconnectionCause, taken: bool
 ) -> None:
     async with world(speed=1.0) as w:

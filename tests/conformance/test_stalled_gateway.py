@@ -155,7 +155,7 @@ def deflected(w: World, since: float) -> list[float]:
     return [e.t for e in w.commands("ardrone3.Piloting.PCMD") if e.t > since and any(e.args[axis] for axis in AXES)]
 
 
-async def test_what_clients_sent_to_a_stopped_gateway_is_not_carried_out(tmp_path: Path) -> None:
+async def test_commands_sent_to_a_stalled_gateway_are_dropped(tmp_path: Path) -> None:
     """A program's setpoints and a goto wait in the gateway's socket; the program is gone when it runs again."""
     async with apart(tmp_path, None) as (w, gateway):
         task = await set_out(w, "offboard")

@@ -108,7 +108,7 @@ async def test_landing_is_ended_by_modes_of_ardupilot(mode: int, shown: int) -> 
         assert "landed" not in flown(w)
 
 
-async def test_landing_of_an_ai_is_ended_by_take_off_as_ground_sdk_does() -> None:
+async def test_landing_of_an_ai_is_ended_by_takeoff_like_ground_sdk() -> None:
     async with world(speed=1.0, model="ai") as w:
         await landing(w)
         taken_off = len(heard(w, "TakeOff"))
@@ -138,7 +138,7 @@ async def test_landing_is_not_ended_by_goto_setpoints_or_sticks() -> None:
 
 @pytest.mark.parametrize("quirk", [Quirk.LANDING_IGNORES_TAKEOFF, Quirk.LANDING_IGNORES_GAZ])
 @pytest.mark.parametrize("model", ["4k", "ai"])
-async def test_take_off_ends_a_landing_of_a_firmware_that_knows_one_of_its_ways(quirk: Quirk, model: str) -> None:
+async def test_takeoff_ends_a_landing_of_firmware_with_one_way_to_end_it(quirk: Quirk, model: str) -> None:
     async with world(speed=1.0, model=model) as w:
         w.drone.faults.quirks = frozenset({quirk})
         await landing(w, 12.0)
@@ -147,7 +147,7 @@ async def test_take_off_ends_a_landing_of_a_firmware_that_knows_one_of_its_ways(
         assert "landed" not in flown(w)
 
 
-async def test_hold_of_a_landing_that_ignores_gaz_is_refused_when_it_has_landed() -> None:
+async def test_hold_is_refused_after_a_landing_that_ignored_gaz() -> None:
     async with world(speed=2.0) as w:
         w.drone.faults.quirks = frozenset({Quirk.LANDING_IGNORES_GAZ})
         await landing(w, 4.0)
@@ -288,7 +288,7 @@ async def test_abort_raced_with_touchdown(stop: str, offset: float) -> None:
 
 
 @pytest.mark.parametrize("offset", RACE)
-async def test_take_off_raced_with_touchdown_of_a_firmware_that_executes_it_late(offset: float) -> None:
+async def test_takeoff_near_touchdown_with_late_firmware(offset: float) -> None:
     await _race("Takeoff", offset, frozenset({Quirk.TAKEOFF_FROM_GROUND_LATE}))
 
 
@@ -352,7 +352,7 @@ async def test_mode_that_cannot_begin_leaves_the_landing_alone(mode: tuple[int, 
         assert flown(w)[-2:] == ["landing", "landed"]
 
 
-async def test_landing_of_a_mission_is_ended_by_hold_and_not_by_its_own_mode() -> None:
+async def test_mission_landing_is_ended_by_hold_but_not_by_mission_mode() -> None:
     async with world(speed=2.0, web=True) as w:
         await put(w, [takeoff(8.0), way(8.0, 0.0, 8.0), LAND_ITEM])
         await start(w)

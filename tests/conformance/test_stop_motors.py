@@ -65,7 +65,7 @@ async def test_disarm_stops_ramping_motors(force: int) -> None:
         assert "takingoff" not in flown(w)
 
 
-async def test_forced_disarm_cuts_motors_that_do_not_take_a_landing_without_allow_kill() -> None:
+async def test_forced_disarm_without_allow_kill_cuts_motors_that_ignore_a_landing() -> None:
     async with world(speed=0.5) as w:
         await ramping(w, Quirk.RAMPING_IGNORES_LANDING)
         assert (await w.client.command(*DISARM, FORCE)).result == ACCEPTED
@@ -73,7 +73,7 @@ async def test_forced_disarm_cuts_motors_that_do_not_take_a_landing_without_allo
         assert "takingoff" not in flown(w)
 
 
-async def test_disarm_of_motors_that_ignore_a_landing_lands_the_drone_and_is_accepted_then() -> None:
+async def test_disarm_with_ignored_landing_is_accepted_after_landing() -> None:
     async with world(speed=1.0) as w:
         await ramping(w, Quirk.RAMPING_IGNORES_LANDING)
         mark = w.client.mark()
@@ -84,7 +84,7 @@ async def test_disarm_of_motors_that_ignore_a_landing_lands_the_drone_and_is_acc
         assert progress != []
 
 
-async def test_disarm_of_a_drone_that_has_hardly_left_the_ground_lands_it() -> None:
+async def test_disarm_just_above_the_ground_lands_the_drone() -> None:
     async with world(speed=0.3) as w:
         await ramping(w)
         await state(w, "takingoff", 20.0)
@@ -224,7 +224,7 @@ async def test_emergency_leaves_before_what_it_replaces_has_ended() -> None:
 
 
 @pytest.mark.parametrize("stop", ["land", "hold"])
-async def test_land_and_hold_wait_half_a_second_for_what_they_replace(stop: str) -> None:
+async def test_land_and_hold_wait_half_a_second_for_the_replaced_command(stop: str) -> None:
     async with world(speed=1.0) as w:
         await w.take_off(5.0)
         w.drone.faults.untold = frozenset({rth.CustomLocation.NAME, rth.PreferredHomeType.NAME})

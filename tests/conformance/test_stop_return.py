@@ -118,7 +118,7 @@ async def test_own_return_is_ended_by_each_stop_command(stop: str) -> None:
 
 
 @pytest.mark.parametrize(("mode", "result"), [(4, REJECTED), (3, REJECTED), (17, ACCEPTED), (5, ACCEPTED)])
-async def test_own_return_is_ended_by_brake_and_loiter_and_not_by_guided_and_auto(mode: int, result: int) -> None:
+async def test_own_return_is_ended_by_brake_and_loiter_only(mode: int, result: int) -> None:
     async with world(speed=1.0, flavour="ardupilot") as w:
         await away(w)
         by_itself(w)
@@ -156,7 +156,7 @@ async def test_hold_within_five_seconds_of_another_does_not_end_the_drones_own_r
         assert await hold(w.client) == ACCEPTED
 
 
-async def test_return_of_a_drone_with_a_motor_down_is_ended_by_no_client() -> None:
+async def test_return_with_a_failed_motor_is_ended_by_no_client() -> None:
     async with world(speed=1.0) as w:
         await away(w)
         by_itself(w, StateReason.MOTOR_DOWN)
@@ -231,7 +231,7 @@ async def test_no_caller_without_a_clients_right_ends_a_return(caller: str, own:
 
 
 @pytest.mark.parametrize("command", [RTL, LAND_CMD])
-async def test_gateway_that_ends_withdraws_no_return_or_landing_that_is_not_confirmed(command: int) -> None:
+async def test_ending_gateway_keeps_an_unconfirmed_return_or_landing(command: int) -> None:
     async with world(speed=1.0) as w:
         await away(w)
         w.drone.faults.up = w.drone.faults.down = Impairment(delay=0.2)
@@ -280,7 +280,7 @@ async def test_second_hold_of_the_same_client_cancels_an_announced_return() -> N
         assert not returned(w)
 
 
-async def test_second_hold_too_early_or_too_late_is_no_second_one() -> None:
+async def test_second_hold_counts_neither_too_early_nor_too_late() -> None:
     async with world(speed=1.0) as w:
         await away(w)
         await announced(w, 29.0)
@@ -294,7 +294,7 @@ async def test_second_hold_too_early_or_too_late_is_no_second_one() -> None:
         assert heard(w, "cancel_auto_trigger") == []
 
 
-async def test_program_that_holds_at_one_hertz_never_cancels_an_announced_return() -> None:
+async def test_hold_at_one_hertz_never_cancels_an_announced_return() -> None:
     """200 ms each way and a quarter lost, through the countdown and the return that follows."""
     async with world(speed=1.0) as w:
         program = await w.connect(sysid=240)

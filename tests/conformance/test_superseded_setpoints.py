@@ -69,7 +69,7 @@ def moves(w: World) -> list[tuple[float, float]]:
     ],
     ids=["speed", "height", "heading", "pause and continue"],
 )
-async def test_a_place_that_was_reached_is_not_flown_to_again(orders: list[Any], up: float) -> None:
+async def test_reached_position_is_not_flown_to_again(orders: list[Any], up: float) -> None:
     """What changes a move changes the one that is under way, a single setpoint's too."""
     async with world(speed=1.0, flavour="ardupilot") as w:
         await w.take_off(8.0)
@@ -91,7 +91,7 @@ async def test_a_place_that_was_reached_is_not_flown_to_again(orders: list[Any],
 
 
 @pytest.mark.parametrize("together", [False, True], ids=["later", "together"])
-async def test_setpoints_do_not_undo_a_landing_that_the_drone_has_yet_to_begin(together: bool) -> None:
+async def test_setpoints_do_not_end_a_landing_that_has_not_begun(together: bool) -> None:
     """A program that sends one velocity a second, as MAVProxy's does, flies the drone for half of each second only."""
     async with world(speed=1.0, flavour="ardupilot") as w:
         await w.take_off(8.0)
@@ -109,7 +109,7 @@ async def test_setpoints_do_not_undo_a_landing_that_the_drone_has_yet_to_begin(t
 
 @both
 @pytest.mark.parametrize("order", [RTL, PAUSE])
-async def test_a_stick_that_is_held_does_not_undo_what_the_drone_has_yet_to_begin(flavour: str, order: int) -> None:
+async def test_held_stick_does_not_end_a_command_that_has_not_begun(flavour: str, order: int) -> None:
     """It is streamed all the time; the mode that it flies in is over when something else is ordered."""
     async with world(speed=1.0, flavour=flavour) as w:
         await w.take_off(8.0)
@@ -128,7 +128,7 @@ async def test_a_stick_that_is_held_does_not_undo_what_the_drone_has_yet_to_begi
 
 
 @pytest.mark.parametrize("order", [LAND_CMD, RTL, PAUSE])
-async def test_an_order_that_the_link_ends_brings_no_mode_of_before_back(order: int) -> None:
+async def test_command_ended_by_link_loss_does_not_restore_an_old_mode(order: int) -> None:
     """The setpoint that comes when the drone is there again finds it in Brake, not in Guided."""
     async with world(speed=1.0, flavour="ardupilot") as w:
         await w.take_off(8.0)
@@ -159,7 +159,7 @@ async def silent(w: World) -> None:
 # -- single setpoints of before
 
 
-async def test_a_single_position_that_failed_is_not_tried_again() -> None:
+async def test_failed_single_position_is_not_repeated() -> None:
     """Its sender was told that it is not flown, and is silent since."""
     async with world(speed=1.0, flavour="ardupilot") as w:
         await w.take_off(8.0)
@@ -175,7 +175,7 @@ async def test_a_single_position_that_failed_is_not_tried_again() -> None:
         assert abs(w.drone.pose.north) < 0.5
 
 
-async def test_a_stream_of_positions_that_failed_is_tried_again() -> None:
+async def test_failed_stream_of_positions_is_repeated() -> None:
     """As long as it is asked for."""
     async with world(speed=1.0, flavour="ardupilot") as w:
         await w.take_off(8.0)
@@ -192,7 +192,7 @@ async def test_a_stream_of_positions_that_failed_is_tried_again() -> None:
 # -- an armed state of before
 
 
-async def test_nobody_is_told_disarmed_while_a_mission_is_about_to_lift_off() -> None:
+async def test_heartbeat_stays_armed_while_a_mission_is_about_to_lift_off() -> None:
     """The start is on a bad way to the drone when the ten seconds since arming are over."""
     async with world(flavour="ardupilot", web=True) as w:
         await put(w, ROUND)

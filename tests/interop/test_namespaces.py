@@ -230,7 +230,7 @@ async def test_media_and_video_of_two_aircraft_with_one_address(spaces: tuple[st
         assert len([entry for entry in entries(log, "command") if "take_photo" in entry["name"]]) == 1
 
 
-async def test_an_interface_that_is_not_there_is_told_and_retried(tmp_path: Path) -> None:
+async def test_missing_interface_is_reported_and_retried(tmp_path: Path) -> None:
     path = tmp_path / "fleet.yaml"
     path.write_text(
         "endpoints: ['tcpin://127.0.0.1:0']\n"

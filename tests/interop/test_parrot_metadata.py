@@ -178,7 +178,7 @@ def test_parrot_finds_unknown_what_we_say_is() -> None:
     )
 
 
-def test_what_parrot_refuses_we_do_not_read() -> None:
+def test_metadata_that_parrot_refuses_is_not_read() -> None:
     short = encode_v3(FLOWN)[:64]
     refused = ask({"format": "v3", "hex": whole_v3(short)}, {"format": "proto", "hex": "ff"})
     assert ["refused" in answer for answer in refused] == [True, True]

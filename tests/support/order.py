@@ -18,7 +18,7 @@ LONGEST = {
     "test_conf_061_items_by_mavsdk_on_a_bad_link": 30,
     "test_olympe_watches_a_flight": 25,
     "test_conf_118_setpoints": 22,
-    "test_who_stops_following_leaves_the_flight_alone": 22,
+    "test_interrupted_plan_fly_leaves_the_flight_alone": 22,
     "test_conf_119_the_ardupilot_flavour": 20,
     "test_mavsdk_follow_me": 19,
     "test_conf_116_mavsdk_action_and_calibration": 19,

@@ -30,9 +30,7 @@ _SAFETY = "conformance/test_safety.py::"
 
 REACHED: dict[str, Reach] = {
     "camera/command": Reach("", waits=PAYLOAD),
-    "drone/command": Reach(
-        "`SET_ATTITUDE_TARGET`", _SAFETY + "test_a_setpoint_ends_with_its_own_sender_not_with_the_last_of_all"
-    ),
+    "drone/command": Reach("`SET_ATTITUDE_TARGET`", _SAFETY + "test_setpoint_ends_with_its_own_sender"),
     "drone/moveby": Reach(
         "`MAV_CMD_CONDITION_YAW`, `MAV_CMD_DO_CHANGE_ALTITUDE`; `SET_POSITION_TARGET_LOCAL_NED`",
         _GUIDED + "test_conf_143_condition_yaw",
@@ -43,25 +41,21 @@ REACHED: dict[str, Reach] = {
     "battery/percentage": Reach("`BATTERY_STATUS`.battery_remaining", _TELEMETRY + "test_conf_037_battery"),
     "battery/voltage": Reach("`BATTERY_STATUS`.voltages", _TELEMETRY + "test_conf_037_battery"),
     "camera/awb_b_gain": Reach(
-        "`ANAFI_CAMERA_EXPOSURE`.awb_b_gain", _ANAFI + "test_the_video_runs_while_somebody_wants_what_only_it_says"
+        "`ANAFI_CAMERA_EXPOSURE`.awb_b_gain", _ANAFI + "test_video_runs_while_a_stream_needs_its_metadata"
     ),
     "camera/awb_r_gain": Reach(
-        "`ANAFI_CAMERA_EXPOSURE`.awb_r_gain", _ANAFI + "test_the_video_runs_while_somebody_wants_what_only_it_says"
+        "`ANAFI_CAMERA_EXPOSURE`.awb_r_gain", _ANAFI + "test_video_runs_while_a_stream_needs_its_metadata"
     ),
     "camera/camera_info": Reach("`ANAFI_CAMERA_INTRINSICS`", _ANAFI + "test_camera_exposure_and_intrinsics"),
     "camera/exposure_time": Reach(
-        "`ANAFI_CAMERA_EXPOSURE`.exposure_time", _ANAFI + "test_the_video_runs_while_somebody_wants_what_only_it_says"
+        "`ANAFI_CAMERA_EXPOSURE`.exposure_time", _ANAFI + "test_video_runs_while_a_stream_needs_its_metadata"
     ),
     "camera/image": Reach("", waits=PAYLOAD),
-    "camera/hfov": Reach(
-        "`ANAFI_CAMERA_EXPOSURE`.hfov", _ANAFI + "test_the_video_runs_while_somebody_wants_what_only_it_says"
-    ),
+    "camera/hfov": Reach("`ANAFI_CAMERA_EXPOSURE`.hfov", _ANAFI + "test_video_runs_while_a_stream_needs_its_metadata"),
     "camera/iso_gain": Reach(
-        "`ANAFI_CAMERA_EXPOSURE`.iso", _ANAFI + "test_the_video_runs_while_somebody_wants_what_only_it_says"
+        "`ANAFI_CAMERA_EXPOSURE`.iso", _ANAFI + "test_video_runs_while_a_stream_needs_its_metadata"
     ),
-    "camera/vfov": Reach(
-        "`ANAFI_CAMERA_EXPOSURE`.vfov", _ANAFI + "test_the_video_runs_while_somebody_wants_what_only_it_says"
-    ),
+    "camera/vfov": Reach("`ANAFI_CAMERA_EXPOSURE`.vfov", _ANAFI + "test_video_runs_while_a_stream_needs_its_metadata"),
     "camera/zoom": Reach("`ANAFI_CAMERA_EXPOSURE`.zoom", _ANAFI + "test_camera_exposure_and_intrinsics"),
     "drone/altitude": Reach(
         "`ALTITUDE`.bottom_clearance, `DISTANCE_SENSOR`",
@@ -82,7 +76,7 @@ REACHED: dict[str, Reach] = {
     "link/quality": Reach("`RC_CHANNELS`.rssi, `ANAFI_LINK`.quality", _TELEMETRY + "test_conf_134_rssi"),
     "skycontroller/attitude": Reach("`ANAFI_CONTROLLER_ATTITUDE`", _ANAFI + "test_where_the_skycontroller_points"),
     "skycontroller/command": Reach(
-        "`ANAFI_CONTROLLER_INPUT`", _ANAFI + "test_the_sticks_of_the_skycontroller_are_told_while_a_program_flies"
+        "`ANAFI_CONTROLLER_INPUT`", _ANAFI + "test_skycontroller_sticks_are_reported_while_a_program_flies"
     ),
     "skycontroller/rpy": Reach("`ANAFI_CONTROLLER_ATTITUDE`", _ANAFI + "test_where_the_skycontroller_points"),
     "storage/available": Reach("", waits=PAYLOAD),

@@ -19,7 +19,7 @@ async def test_alarm_calls_once_at_its_time() -> None:
     assert start + 3.0 <= called[0] < start + 20.0
 
 
-async def test_alarm_that_is_set_again_calls_at_the_newer_time_only() -> None:
+async def test_alarm_set_twice_calls_at_the_newer_time_only() -> None:
     loop, called = asyncio.get_running_loop(), []
     alarm = Alarm(lambda: called.append(loop.time()))
     start = loop.time()
@@ -50,7 +50,7 @@ async def test_alarm_that_is_cancelled_does_not_call() -> None:
     assert not alarm.is_set
 
 
-async def test_alarm_may_be_set_again_by_what_it_calls() -> None:
+async def test_alarm_may_be_set_again_by_its_callback() -> None:
     times: list[float] = []
 
     def call() -> None:

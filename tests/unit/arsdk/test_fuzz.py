@@ -57,7 +57,7 @@ def test_no_command_bytes_raise(fuzz_seed: int) -> None:
 NOISE = [b"[", b"{", b"1e999", b'"', b"\xff", b"null", b""]
 
 
-def test_no_handshake_bytes_do_more_than_say_that_they_are_wrong(fuzz_seed: int) -> None:
+def test_random_handshake_bytes_raise_protocol_errors_only(fuzz_seed: int) -> None:
     rng = random.Random(fuzz_seed)
     info = handshake.DeviceInfo(0x0914, "PI040416DA9H000001", 44444, "ANAFI")
     reply = handshake.ConnectReply(0, 2233, 0, 3)

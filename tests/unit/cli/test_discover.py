@@ -38,7 +38,7 @@ def spec(model: str, skycontroller: int | None = None) -> DroneSpec:
     return DroneSpec(model=model, address=loopback(), http_port=None, skycontroller=skycontroller)
 
 
-async def test_what_it_prints_is_a_configuration() -> None:
+async def test_discover_prints_a_valid_configuration() -> None:
     async with Simulator([spec("4k"), spec("usa", 3), spec("ai", 4)], seed=1) as simulator:
         direct, behind, modern = simulator.drones
         async with words("discover", *(one.address for one in simulator.drones), "--timeout", "5") as held:
@@ -107,7 +107,7 @@ def test_where_it_looks() -> None:
     assert SearchAddress("192.168.42.1") in places([], [])
 
 
-def test_the_interface_is_told_where_an_address_is_not_enough() -> None:
+def test_discover_names_the_interface_of_ambiguous_addresses() -> None:
     def find(address: str, on: str, serial: str, name: str = "ANAFI") -> Find:
         return Find(SearchAddress(address, on), DeviceInfo(0x0914, serial, 44444, name))
 
@@ -127,7 +127,7 @@ def test_whatever_a_device_calls_itself_is_no_trouble(name: str) -> None:
     assert drone.address == "192.168.42.1"
 
 
-async def test_info_tells_what_there_is() -> None:
+async def test_info_prints_the_drone() -> None:
     async with Simulator([spec("thermal", 3)], seed=1) as simulator:
         drone = simulator.drones[0]
         async with words("info", drone.address, "--take") as held:
@@ -173,7 +173,7 @@ async def test_escapes_of_a_drone_reach_no_terminal() -> None:
     assert simulator.drones[0].identity.name.startswith("\x1b")
 
 
-async def test_info_of_nobody() -> None:
+async def test_info_without_a_drone_fails() -> None:
     address = loopback()
     async with words("info", address, "--take") as held:
         assert await held.end() == 1

@@ -85,7 +85,7 @@ def introduction(model_id: int) -> Callable[[], bytes]:
 
 
 @pytest.mark.parametrize(("model", "skycontroller"), [("4k", None), ("usa", 3), ("ai", 4)])
-async def test_doctor_with_a_sound_drone_finds_nothing_and_takes_nothing(model: str, skycontroller: int | None) -> None:
+async def test_doctor_with_a_healthy_drone_reports_no_problem(model: str, skycontroller: int | None) -> None:
     async with simulated(model, skycontroller) as drone:
         before = sessions(drone)
         findings, seen = await before_handshake(place(drone.address))
@@ -109,7 +109,7 @@ async def test_doctor_without_any_device_names_the_ports() -> None:
     assert f"{address} answers, and none of 44445, 44444, 4321, {HTTP}, {RTSP} is open" in faults(findings)["ports"]
 
 
-async def test_doctor_with_a_mute_drone_says_that_no_introduction_came(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_doctor_with_a_mute_drone_reports_no_discovery_answer(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(doctor, "ANSWER_LIMIT", 0.5)
     async with device({44445: lambda: b"", 44444: lambda: b""}) as address:
         findings, seen = await before_handshake(place(address))

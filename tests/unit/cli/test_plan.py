@@ -67,7 +67,7 @@ def test_show_on_a_terminal_folds_the_last_column_only(monkeypatch: pytest.Monke
     assert max(map(len, lines)) <= max(columns, 21 + 2 + 6 + 2 + 24 + 2)
 
 
-def test_convert_tells_what_is_lost(flight: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_convert_lists_losses(flight: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = flight.with_suffix(".waypoints")
     assert main(["plan", "convert", str(flight), str(out)]) == 0
     said = capsys.readouterr().out.splitlines()
@@ -192,7 +192,7 @@ def test_check_for_a_fleet_is_for_its_models(flight: Path, tmp_path: Path, capsy
     assert capsys.readouterr().out.count(" flies it") == 4
 
 
-def test_check_of_a_parrot_file_without_a_model_is_for_those_that_can_read_it(
+def test_check_of_a_parrot_file_covers_the_models_that_read_it(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     assert main(["plan", "check", str(MISSIONS / "loop.v1.mavlink")]) == 0

@@ -118,7 +118,7 @@ async def test_a_simulated_drone_takes_wind_card_and_scenario_from_the_configura
         assert [entry["drone"] for entry in p.entries("scenario")] == [alpha]
 
 
-def test_what_the_simulator_is_told_of_a_drone(tmp_path: Path) -> None:
+def test_simulator_arguments_of_a_configured_drone(tmp_path: Path) -> None:
     path = tmp_path / "fleet.yaml"
     path.write_text(
         f"drones: [{{name: a, sysid: 1, sim: {{address: {loopback()}, storage: 500k, skycontroller: 4,"
@@ -289,7 +289,7 @@ async def test_a_killed_gateway_leaves_no_simulator(tmp_path: Path) -> None:
         assert free(drone, 44445)
 
 
-async def test_a_killed_simulator_is_told_and_survived(tmp_path: Path) -> None:
+async def test_killed_simulator_is_reported_and_survived(tmp_path: Path) -> None:
     async with product(tmp_path, fleet(loopback(), loopback())) as p:
         child = p.child()
         assert child is not None

@@ -91,7 +91,7 @@ async def discover(address: str) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-async def test_it_says_ready_and_ends_on_a_signal(number: signal.Signals) -> None:
+async def test_sim_prints_ready_and_ends_on_a_signal(number: signal.Signals) -> None:
     address = loopback()
     ports = ("--http-port", "0", "--rtsp-port", "0")
     async with running("--address", address, *ports, "--protocol", "2") as (process, lines):

@@ -123,7 +123,7 @@ def test_anchors_and_merges_are_not_mistaken_for_keys_written_twice() -> None:
     ]
 
 
-def test_a_scenario_is_looked_for_beside_the_file_that_names_it(tmp_path: Path) -> None:
+def test_scenario_path_is_relative_to_the_configuration(tmp_path: Path) -> None:
     path = tmp_path / "fleet.yaml"
     path.write_text(
         "drones: [{name: a, sysid: 1, sim: {scenario: days/bad.yaml}}, {name: b, sysid: 2, sim: {scenario: /bad.yaml}}]"

@@ -134,7 +134,7 @@ async def test_a_verb_returns_what_the_drone_confirms(
     assert device.got(type(command)) == [command]
 
 
-async def test_what_was_never_reported_is_not_supported(device: ScriptedDevice) -> None:
+async def test_setting_that_was_never_reported_is_not_supported(device: ScriptedDevice) -> None:
     device.script[common.AllSettings] = lambda _: [*SETTINGS, common.AllSettingsChanged()]
     drone = device.drone()
     with pytest.raises(LinkLost):
@@ -190,7 +190,7 @@ async def test_hand_launch(device: ScriptedDevice, drone: Drone) -> None:
     assert [m.state for m in device.got(ardrone3.UserTakeOff)] == [1, 0]
 
 
-async def test_a_hand_launch_that_is_given_up_is_taken_back(device: ScriptedDevice, drone: Drone) -> None:
+async def test_hand_launch_that_times_out_is_cancelled(device: ScriptedDevice, drone: Drone) -> None:
     with pytest.raises(CommandTimeout):
         await drone.piloting.hand_launch(timeout=0.3)
     assert (await device.until(ardrone3.UserTakeOff, 2)).state == 0

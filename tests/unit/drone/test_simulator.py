@@ -139,7 +139,7 @@ async def test_move_to_above_the_ceiling_is_refused(drone: Drone) -> None:
         await drone.piloting.move_to(HOME[0], HOME[1], 1000.0)
 
 
-async def test_hover_stops_a_move_to_and_says_so_in_the_log(drone: Drone, real: SimulatedDrone) -> None:
+async def test_hover_stops_a_move_to_and_logs_it(drone: Drone, real: SimulatedDrone) -> None:
     await flying(drone)
     latitude, longitude = geo.destination(HOME[0], HOME[1], 80.0, 0.0)
     journey = await drone.piloting.move_to(latitude, longitude, 5.0)

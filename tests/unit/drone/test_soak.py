@@ -76,7 +76,7 @@ async def flies(pair: Pair) -> None:
 
 @pytest.mark.timeout(300)
 @pytest.mark.parametrize("seed", range(3))
-async def test_after_stop_nothing_moves_and_nothing_comes(seed: int) -> None:
+async def test_drone_after_stop_neither_moves_nor_reports(seed: int) -> None:
     chance = random.Random(seed)
     async with connected("4k", speed=3.0) as pair:
         drone, real = pair

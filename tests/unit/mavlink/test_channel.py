@@ -87,7 +87,7 @@ def test_the_oldest_telemetry_is_dropped_first_and_counted() -> None:
     assert wire.channel.counters == {"sent_frames": 10, "dropped_frames": 91}
 
 
-def test_answers_are_dropped_only_when_nothing_else_is_left() -> None:
+def test_answers_are_dropped_last() -> None:
     size = len(pack(ACK).payload) + FRAME_BYTES
     wire = Wire(queue_bytes=3 * size)
     wire.channel.pause()

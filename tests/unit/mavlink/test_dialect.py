@@ -102,7 +102,7 @@ def test_overlaid_enum_entry_is_upstreams(name: str, value: int) -> None:
     assert getattr(dialect, name) == value
 
 
-def test_it_speaks_version_2_and_knows_both_ground_station_families() -> None:
+def test_dialect_has_version_2_and_messages_of_both_autopilots() -> None:
     assert dialect.WIRE_PROTOCOL_VERSION == "2.0"
     assert dialect.MAVLink_available_modes_message.id == 435
     assert dialect.MAVLink_ekf_status_report_message.id == 193  # ArduPilot's own
@@ -166,7 +166,7 @@ def test_module_of_another_mavgen_is_refused(generator: ModuleType, text: str) -
         generator.split(text)
 
 
-def test_what_is_there_already_is_left_alone(generator: ModuleType) -> None:
+def test_merge_leaves_equal_definitions_unchanged(generator: ModuleType) -> None:
     trees = generator.read_definitions()
     before = {name: ET.tostring(tree.getroot()) for name, tree in trees.items()}
     ping = next(m for m in trees["common.xml"].iterfind("messages/message") if m.get("name") == "PING")

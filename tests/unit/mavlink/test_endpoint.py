@@ -99,7 +99,7 @@ def test_udp_url_with_options_keeps_each(scheme: str, query: str, flavour: str |
     assert (url.flavour, url.frames) == (flavour, frames)
 
 
-def test_every_scheme_makes_its_endpoint_and_says_what_it_is() -> None:
+def test_each_scheme_makes_its_endpoint_with_a_description() -> None:
     for name, scheme in SCHEMES.items():
         url = parse_endpoint(f"{name}://{'/dev/null:57600' if name == 'serial' else '127.0.0.1:1'}")
         endpoint = make_endpoint(url, Node(), SystemClock())

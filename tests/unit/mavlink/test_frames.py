@@ -81,7 +81,7 @@ def test_version_1_with_extension_fields_as_pymavlink_sends_it() -> None:
 
 
 @pytest.mark.parametrize("id", sorted(dialect.mavlink_map))
-def test_every_message_is_framed_as_pymavlink_frames_it_and_comes_back(id: int) -> None:
+def test_each_message_is_framed_like_pymavlink(id: int) -> None:
     source = random.Random(id)
     sender = dialect.MAVLink(None, 17, 18)
     parser = Parser()
@@ -99,7 +99,7 @@ def test_every_message_is_framed_as_pymavlink_frames_it_and_comes_back(id: int) 
 
 
 @pytest.mark.parametrize("id", sorted(dialect.mavlink_map))
-def test_every_message_is_read_as_pymavlink_reads_it_cut_short_or_too_long(id: int) -> None:
+def test_truncated_or_extended_message_is_read_like_pymavlink(id: int) -> None:
     source, theirs, parser = random.Random(id), dialect.MAVLink(None), Parser()
     size = dialect.mavlink_map[id].unpacker.size
     for number, length in enumerate({1, size // 2 or 1, size, min(size + 3, 255)}):
@@ -144,7 +144,7 @@ def test_trailing_zeros_are_cut_but_for_one_byte() -> None:
         dialect.MAVLink_bad_data(b"", "no message at all"),
     ],
 )
-def test_what_does_not_fit_is_our_own_mistake(message: Any) -> None:
+def test_value_that_does_not_fit_raises_local_error(message: Any) -> None:
     with pytest.raises(LocalProtocolError, match="cannot encode"):
         pack(message)
 
@@ -184,7 +184,7 @@ def in_chunks(stream: bytes, source: random.Random, largest: int) -> tuple[Parse
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_any_split_of_a_stream_gives_the_same_frames_and_none_is_lost(seed: int) -> None:
+def test_any_split_of_a_byte_stream_gives_the_same_frames(seed: int) -> None:
     source = random.Random(seed)
     stream, sent = mixed_stream(source, 60)
     # What a start mark in the noise makes the parser wait for.

@@ -124,7 +124,7 @@ async def test_a_message_with_a_target_goes_there_alone() -> None:
         assert d.got("PING", 30) == []
 
 
-async def test_what_is_for_our_systems_stays_with_us() -> None:
+async def test_message_for_our_system_is_not_forwarded() -> None:
     async with three(loopback()) as (d, ten, twenty, thirty):
         d.node.add_host(1, 1, d.inbound.append)
         ten.send(ping(1, 1, 1))
@@ -143,7 +143,7 @@ async def test_what_is_for_our_systems_stays_with_us() -> None:
         assert (numbers(twenty), numbers(thirty)) == ([3], [3])
 
 
-async def test_a_component_added_as_host_gets_what_is_for_it() -> None:
+async def test_component_added_as_host_receives_its_messages() -> None:
     """A camera component beside the autopilot: one line at its owner's, and nothing else knows of it."""
     async with three(loopback()) as (d, ten, twenty, _):
         autopilot: list[Inbound] = []
@@ -174,7 +174,7 @@ def newest(frames: list[ReceivedFrame]) -> int:
     return time
 
 
-async def test_a_reader_that_stands_still_holds_up_nobody() -> None:
+async def test_stalled_reader_does_not_delay_other_clients() -> None:
     host = loopback()
     async with bench(f"tcpin://{host}:5760") as d:
         # A window that was shut is opened by the kernel, after a while.

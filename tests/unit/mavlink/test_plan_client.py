@@ -127,7 +127,7 @@ def through_silence(transfer: Transfer | Any, now: float) -> list[tuple[float, s
     return sent
 
 
-def test_a_vehicle_that_says_nothing() -> None:
+def test_silent_vehicle_ends_the_transfer() -> None:
     upload = Upload(builds(items(2)), 1, 1, FENCE)
     (first,) = upload.start(10.0)
     assert (first.get_type(), first.count, first.mission_type) == ("MISSION_COUNT", 2, FENCE)
@@ -149,7 +149,7 @@ def test_a_vehicle_that_falls_silent_within_a_download() -> None:
     assert download.result == TransferResult(Outcome.SILENT)
 
 
-def test_a_vehicle_that_takes_everything_and_does_not_say_so() -> None:
+def test_vehicle_without_acknowledgement_ends_the_transfer() -> None:
     upload = Upload(builds(items(1)), 1, 1, FENCE)
     upload.start(0.0)
     (item,) = upload.receive(dialect.MAVLink_mission_request_message(255, 190, 0, FENCE), 1, 1, 0.1)
@@ -159,7 +159,7 @@ def test_a_vehicle_that_takes_everything_and_does_not_say_so() -> None:
     assert upload.result == TransferResult(Outcome.UNCONFIRMED)
 
 
-def test_what_is_not_of_this_transfer_is_ignored() -> None:
+def test_messages_of_other_transfers_are_ignored() -> None:
     upload = Upload(builds(items(2)), 1, 1, FENCE)
     upload.start(0.0)
     request = dialect.MAVLink_mission_request_int_message(255, 190, 0, FENCE)

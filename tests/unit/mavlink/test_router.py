@@ -106,14 +106,14 @@ def test_hosts_removed_with_their_system_leave_the_others() -> None:
     assert router.hosts(1, 1) == ()
 
 
-def test_a_companion_in_our_system_gets_what_is_addressed_to_it(router: Router[str, str]) -> None:
+def test_companion_component_receives_messages_for_it(router: Router[str, str]) -> None:
     router.route("c", heartbeat(source=(OURS, 191)), 0.0)
     assert router.route("a", command(OURS, 191), 0.0).forward == ("c",)
     assert router.route("a", command(OURS, 1), 0.0).forward == ()
     assert router.route("a", command(OURS, 0), 0.0).forward == ()
 
 
-def test_a_foreign_system_is_reached_where_it_was_heard_and_only_there(router: Router[str, str]) -> None:
+def test_foreign_system_is_reached_on_its_channel_only(router: Router[str, str]) -> None:
     assert router.route("a", command(FOREIGN, 1, seq=1), 0.0).forward == ()
     router.route("b", heartbeat(source=(FOREIGN, 1)), 0.0)
     route = router.route("a", command(FOREIGN, 1, seq=2), 0.0)
@@ -172,7 +172,7 @@ def test_a_frame_that_went_round_is_passed_on_once(router: Router[str, str]) -> 
     assert router.route("a", frame, 10.0 + RING_WINDOW).forward == ("b", "c")
 
 
-def test_what_a_peer_can_make_us_remember_is_bounded(router: Router[str, str]) -> None:
+def test_router_remembers_a_bounded_number_of_sources(router: Router[str, str]) -> None:
     for sysid in range(2, 250):
         for compid in (1, 2, 3):
             router.route("a", heartbeat(seq=compid, source=(sysid, compid)), 0.0)

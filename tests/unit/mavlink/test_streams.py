@@ -23,7 +23,7 @@ def sent(streams: Streams[Key], channel: Key, id: int, times: list[float]) -> li
     return [now for now in times if streams.due(channel, id, now)]
 
 
-def test_default_interval_holds_until_it_is_set_and_after_it_is_reset() -> None:
+def test_default_interval_applies_before_set_and_after_reset() -> None:
     streams, channel = Streams[Key](DEFAULTS), Key()
     assert streams.interval(channel, ATTITUDE) == 0.1
     streams.set(channel, ATTITUDE, 0.5)
@@ -87,7 +87,7 @@ def test_no_burst_after_a_silence() -> None:
     assert sent(streams, channel, ATTITUDE, [0.0, 50.0, 50.1, 50.2, 50.3]) == [0.0, 50.0]
 
 
-def test_a_channel_that_is_gone_is_forgotten() -> None:
+def test_closed_channel_is_removed() -> None:
     streams, channel = Streams[Key](DEFAULTS), Key()
     streams.set(channel, ATTITUDE, 0.5)
     assert len(streams._channels) == 1
@@ -103,7 +103,7 @@ def due_on(streams: Streams[Key], channels: list[Key], now: float) -> list[Key]:
     return found.get(ATTITUDE, [])
 
 
-def test_due_on_asks_each_channel_anew_when_something_changed() -> None:
+def test_due_on_recomputes_each_channel_after_a_change() -> None:
     streams, one, other = Streams[Key](DEFAULTS), Key(), Key()
     channels = [one]
     assert due_on(streams, channels, 0.0) == [one]

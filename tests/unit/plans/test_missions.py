@@ -76,7 +76,7 @@ def same(before: Item, after: Item) -> bool:
 
 @pytest.mark.parametrize("form", FORMS, ids=lambda form: form.name)
 @pytest.mark.parametrize("path", SAMPLES, ids=lambda path: path.stem)
-def test_a_sample_there_and_back_differs_as_its_losses_say(path: Path, form: Format) -> None:
+def test_sample_converted_and_back_differs_by_its_losses_only(path: Path, form: Format) -> None:
     """Each difference has a loss, and each loss is a difference."""
     plan = files.load(path)
     data, losses = files.encode(plan, form)
@@ -159,7 +159,7 @@ def test_a_hundred_megabytes_are_refused_quickly(tmp_path: Path, content: bytes)
     assert time.process_time() - begun < 1.0
 
 
-def test_what_is_not_converted_leaves_the_old_file(tmp_path: Path) -> None:
+def test_failed_conversion_leaves_the_old_file(tmp_path: Path) -> None:
     """Nothing is half-stored: neither the file that was there is touched nor another one left behind."""
     out = tmp_path / "out.plan"
     out.write_text("the old one")

@@ -134,7 +134,7 @@ def test_scale_bar_has_a_round_length(metres: float, wanted: float) -> None:
 
 
 @pytest.mark.parametrize("name", ["orbit", "inspection", "survey"])
-def test_scale_bar_of_a_picture_is_as_long_as_it_says(name: str) -> None:
+def test_scale_bar_has_the_length_of_its_label(name: str) -> None:
     """Measured where it counts: on the map as it is drawn, after both axes have got one scale."""
     figure = pytest.importorskip("matplotlib.figure", reason="the extra `plots` is not installed").Figure(
         figsize=(8, 9)

@@ -166,7 +166,7 @@ def test_the_package_itself_imports_no_room() -> None:
     assert [name for _, name in imports(PACKAGE / "__init__.py") if target(name)] == []
 
 
-def test_nobody_imports_the_command_line() -> None:
+def test_command_line_is_imported_by_no_room() -> None:
     assert [room for room, may in TABLE.items() if "cli" in may] == ["cli", "__main__"]
 
 

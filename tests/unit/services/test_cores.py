@@ -258,7 +258,7 @@ def mode_command(id: int, *params: float) -> commands.Command:
     return commands.Command(id, definition, (*params, *[NAN] * (4 - len(params))), NAN, NAN, NAN, None)
 
 
-def test_a_resent_command_is_known_while_it_runs_and_for_a_while_after_its_success() -> None:
+def test_resent_command_is_recognised_during_and_shortly_after_execution() -> None:
     history = commands.CommandHistory()
     assert history.retransmission("a", command(), 0.0) is None
     execution = history.begin("a", command())
@@ -276,7 +276,7 @@ def test_a_refusal_is_soon_forgotten() -> None:
     assert history.retransmission("a", command(), 11.0) is None
 
 
-def test_what_another_client_has_replaced_is_neither_flown_nor_confirmed_again() -> None:
+def test_replaced_command_of_another_client_is_not_repeated() -> None:
     history = commands.CommandHistory()
     for client in ("a", "b"):
         execution = history.begin(client, command())
@@ -290,7 +290,7 @@ def test_what_another_client_has_replaced_is_neither_flown_nor_confirmed_again()
     assert history.retransmission("c", stop, 1.0) is None  # an order to stop is always carried out
 
 
-def test_a_return_is_asked_for_anew_unless_another_client_has_taken_over() -> None:
+def test_repeated_return_runs_again_unless_another_client_commanded() -> None:
     history = commands.CommandHistory()
     execution = history.begin("a", command(dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH))
     execution.result, execution.ended = dialect.MAV_RESULT_ACCEPTED, 0.0
@@ -301,7 +301,7 @@ def test_a_return_is_asked_for_anew_unless_another_client_has_taken_over() -> No
     )
 
 
-def test_offboard_that_has_ended_by_itself_is_entered_anew() -> None:
+def test_repeated_offboard_command_is_executed_again_after_its_end() -> None:
     history = commands.CommandHistory()
     offboard = mode_command(dialect.MAV_CMD_DO_SET_MODE, 1.0, 6.0, 0.0)
     execution = history.begin("a", offboard)
@@ -320,7 +320,7 @@ def test_offboard_that_has_ended_by_itself_is_entered_anew() -> None:
         mode_command(dialect.MAV_CMD_DO_SET_STANDARD_MODE, 6.0),
     ],
 )
-def test_a_mission_that_is_not_flown_any_more_is_not_confirmed_again(mission: commands.Command) -> None:
+def test_repeated_mission_start_after_its_end_is_not_confirmed(mission: commands.Command) -> None:
     history = commands.CommandHistory()
     execution = history.begin("a", mission)
     execution.result, execution.ended = dialect.MAV_RESULT_ACCEPTED, 0.0
@@ -330,7 +330,7 @@ def test_a_mission_that_is_not_flown_any_more_is_not_confirmed_again(mission: co
     assert history.retransmission("a", mission, 1.0, FlightMode.HOLD) == dialect.MAV_RESULT_CANCELLED
 
 
-def test_what_is_another_command() -> None:
+def test_command_with_other_values_is_no_retransmission() -> None:
     history = commands.CommandHistory()
     history.begin("a", command())
     assert history.retransmission("b", command(), 0.1) is None
@@ -341,7 +341,7 @@ def test_what_is_another_command() -> None:
     assert history.retransmission("a", command(), 0.3) is None
 
 
-def test_the_desk_remembers_a_bounded_number_of_clients() -> None:
+def test_command_history_is_bounded_in_clients() -> None:
     history = commands.CommandHistory()
     for client in range(commands.MAX_CLIENTS + 1):
         history.begin(client, command())
@@ -389,7 +389,7 @@ def test_a_ground_station_is_lost_once_for_each_silence() -> None:
     assert not watch.heard(122.0)
 
 
-def test_a_silence_in_which_nobody_could_be_heard_does_not_count() -> None:
+def test_silence_before_a_restart_of_the_watch_does_not_count() -> None:
     watch = GcsWatch()
     watch.restart(50.0)
     assert not watch.expire(100.0, 10.0)

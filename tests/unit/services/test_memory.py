@@ -36,7 +36,7 @@ def same(one: tuple[PlanItem, ...], other: tuple[PlanItem, ...]) -> bool:
     return repr(one) == repr(other)
 
 
-async def test_what_is_put_is_there_again(tmp_path: Path) -> None:
+async def test_memory_returns_stored_values_after_reopening(tmp_path: Path) -> None:
     folder = tmp_path / "new" / "state"
     memory = Memory(folder)
     assert memory.load(SERIAL) is None
@@ -133,7 +133,7 @@ def test_the_good_one_is_good(tmp_path: Path) -> None:
     )
 
 
-async def test_what_cannot_be_read_now_is_not_replaced(tmp_path: Path) -> None:
+async def test_unreadable_memory_file_is_not_replaced(tmp_path: Path) -> None:
     """A folder in its place stands for a file that this user may not read: the tests may run as root."""
     (tmp_path / f"{SERIAL}.json").mkdir()
     memory = Memory(tmp_path)

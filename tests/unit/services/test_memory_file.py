@@ -11,7 +11,7 @@ from anafi_mav.services.memory import Memory
 SERIAL, OTHER = "PI040416DA9H839157", "PI040416DA9H839158"
 
 
-async def test_what_could_not_be_written_is_there_after_a_loss_of_the_link(tmp_path: Path) -> None:
+async def test_unwritten_value_is_in_memory_after_a_link_loss(tmp_path: Path) -> None:
     (tmp_path / "a file").touch()
     memory = Memory(tmp_path / "a file" / "state")
     assert memory.load(SERIAL) is not None  # the line for people

@@ -55,7 +55,7 @@ async def join(real: SimulatedDrone, timeout: float = 3.0) -> tuple[ControllerSe
     return session, heard
 
 
-async def test_where_there_is_no_air_nobody_connects(real: SimulatedDrone) -> None:
+async def test_connection_without_a_radio_link_fails(real: SimulatedDrone) -> None:
     real.faults.mute = True
     with pytest.raises(LinkLost):
         await join(real, timeout=0.3)

@@ -65,7 +65,7 @@ async def site() -> AsyncIterator[Site]:
     await site.server.close()
 
 
-async def test_who_asks_while_the_air_is_gone_waits(site: Site) -> None:
+async def test_request_during_a_link_loss_waits(site: Site) -> None:
     async with site.client.ws_connect(f"{API}/media/notifications") as socket:
         site.server.mute = True
         asking = asyncio.ensure_future(site.ask("GET", f"{API}/media/medias"))
@@ -116,7 +116,7 @@ async def test_files_are_what_the_list_says(site: Site) -> None:
             assert (status, thumbnail[:2]) == (200, b"\xff\xd8")
 
 
-async def test_what_is_deleted_is_gone(site: Site) -> None:
+async def test_deleted_media_are_absent(site: Site) -> None:
     first, second, third = site.photo(MediaKind.JPG, MediaKind.DNG), site.photo(), site.film()
     raw = first.resources[1].id
     assert (await site.ask("DELETE", f"{API}/media/resources/{raw}"))[0] == 200
@@ -142,11 +142,11 @@ async def test_what_is_deleted_is_gone(site: Site) -> None:
         "/api/v2/media/medias",
     ],
 )
-async def test_what_is_not_there(site: Site, path: str) -> None:
+async def test_request_for_an_unknown_path_is_refused(site: Site, path: str) -> None:
     assert (await site.ask("GET", path))[0] == 404
 
 
-async def test_without_an_index_media_are_not_told(site: Site) -> None:
+async def test_media_list_without_an_index_is_refused(site: Site) -> None:
     photo = site.photo()
     site.media.unplug()
     for method, path in (
@@ -167,7 +167,7 @@ async def test_without_an_index_media_are_not_told(site: Site) -> None:
 # -- notifications
 
 
-async def test_changes_are_told_to_every_listener(site: Site) -> None:
+async def test_media_changes_reach_every_websocket(site: Site) -> None:
     async with (
         site.client.ws_connect(f"{API}/media/notifications") as one,
         site.client.ws_connect(f"{API}/media/notifications") as two,
@@ -186,7 +186,7 @@ async def test_changes_are_told_to_every_listener(site: Site) -> None:
             assert told[2]["data"] == {}
 
 
-async def test_who_does_not_read_is_cut_off(site: Site) -> None:
+async def test_websocket_that_does_not_read_is_closed(site: Site) -> None:
     async with site.client.ws_connect(f"{API}/media/notifications") as deaf:
         for _ in range(MAX_UNREAD + 1):
             site.media.notify("media_removed", {"media_id": "x"})
@@ -232,7 +232,7 @@ async def test_a_plan_is_kept(site: Site) -> None:
         (b"x" * (MAX_BODY + 1), 413, str(MAX_BODY)),
     ],
 )
-async def test_what_is_no_plan_is_refused(site: Site, data: bytes, status: int, words: str) -> None:
+async def test_upload_of_an_invalid_plan_is_refused(site: Site, data: bytes, status: int, words: str) -> None:
     got, told = await site.ask("PUT", f"{API}/upload/flightplan", data=data)
     assert got == status
     assert words in told["error"]
@@ -274,7 +274,7 @@ async def test_no_path_leads_out(site: Site, path: bytes) -> None:
     "text",
     [b"\0\1\2\r\n\r\n", b"GET\r\n\r\n", b"GET / HTTP/9.9\r\n\r\n", b"PUT / HTTP/1.1\r\nContent-Length: -5\r\n\r\n"],
 )
-async def test_what_is_no_http(site: Site, text: bytes) -> None:
+async def test_bytes_that_are_no_http_are_refused(site: Site, text: bytes) -> None:
     line = await site.raw(text)
     assert line.split()[1] == b"400"
     assert await site.ask("GET", f"{API}/media/medias") == (200, [])

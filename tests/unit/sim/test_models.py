@@ -62,7 +62,7 @@ def features(messages: list[Message]) -> set[str]:
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_what_is_told_at_the_connection(name: str) -> None:
+def test_states_at_connection_are_those_of_the_model(name: str) -> None:
     firmware = Bench(name).firmware
     states, settings = all_states(firmware), all_settings(firmware)
     for message in states + settings:
@@ -77,7 +77,7 @@ def test_what_is_told_at_the_connection(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ALL)
-async def test_it_introduces_itself(name: str) -> None:
+async def test_simulated_drone_announces_its_model(name: str) -> None:
     spec = DroneSpec(
         model=name, address="127.0.0.1", discovery_port=0, handshake_port=0, c2d_port=0, http_port=None, storage=1000
     )
@@ -103,7 +103,7 @@ def test_only_these() -> None:
 # -- the Ai's services
 
 
-def test_what_a_move_lacks_is_told_as_it_changes() -> None:
+def test_missing_inputs_of_a_move_are_reported_on_change() -> None:
     bench = Bench("ai")
     gps, magneto, flying = (1 << bit for bit in (0, 1, 5))
     assert bench.of(move.Info) == [move.Info(flying)]

@@ -89,7 +89,7 @@ def is_stick(entry: LogEntry) -> bool:
     return entry.kind == "command" and entry.name == "ardrone3.Piloting.PCMD"
 
 
-async def test_it_says_what_it_is_and_which_drone_is_behind_it() -> None:
+async def test_skycontroller_reports_its_model_and_the_drone_behind_it() -> None:
     async with flying("thermal") as station:
         device = station.session.device
         assert device.model_id == 0x0918
@@ -158,7 +158,7 @@ async def test_the_sticks_fly_until_the_source_is_the_controller() -> None:
         assert station.sc.source is Source.SKY_CONTROLLER
 
 
-async def test_what_is_grabbed_is_told_and_does_nothing() -> None:
+async def test_grabbed_axes_and_buttons_are_reported_without_effect() -> None:
     async with flying() as station:
         await hovering(station)
         state = await station.ask(mapper.Grab(1 << RETURN_HOME | 1 << 11, 1 << PITCH), mapper.GrabState)
@@ -187,7 +187,7 @@ async def test_the_take_off_button_lands_too() -> None:
         await station.wait(ardrone3.FlyingStateChanged, lambda event: event.state is FlyingState.LANDING)
 
 
-async def test_the_sticks_fly_again_when_the_computer_is_gone_and_the_drone_flies_on() -> None:
+async def test_sticks_fly_the_drone_after_the_computer_disconnects() -> None:
     async with flying() as station:
         await hovering(station)
         await station.ask(skyctrl.SetPilotingSource(Source.CONTROLLER), skyctrl.PilotingSource)

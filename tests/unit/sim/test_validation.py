@@ -67,7 +67,7 @@ def test_a_turn_is_counted_through() -> None:
     assert not results["yaw: rate"].agrees  # 200 were asked for
 
 
-def test_what_a_picture_says() -> None:
+def test_metadata_of_a_picture_is_read() -> None:
     # Turned right by 90 deg, tilted right by 20; the camera looks along the heading, 176 deg up: over the top and back
     # down to 4 deg above the horizon behind. Quaternions as turns about down, right and forward, one after the other.
     half = math.radians(45.0)

@@ -77,7 +77,7 @@ def test_a_lap_is_counted_the_way_it_is_flown(direction: int) -> None:
     assert lap.flown == pytest.approx(math.pi / 2)
 
 
-def test_nobody_knows_where_it_is() -> None:
+def test_lap_without_a_position_has_no_demand() -> None:
     assert Lap(circle()).demand(MotionEstimate()) is None
 
 

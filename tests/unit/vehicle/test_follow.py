@@ -56,7 +56,7 @@ def test_the_target_goes_on_for_a_moment_and_then_stands() -> None:
     assert wanted.x.velocity == 0.0
 
 
-def test_a_target_that_has_not_moved_is_followed_from_where_the_drone_is() -> None:
+def test_unmoved_target_is_followed_from_the_drones_direction() -> None:
     follower = TargetFollower(FollowSettings(distance=10.0))
     assert follower.aim(0.0, 30.0, 8.0, 0.0) is None
     follower.see(0.0, 0.0, None, None, 1.0)
@@ -65,7 +65,7 @@ def test_a_target_that_has_not_moved_is_followed_from_where_the_drone_is() -> No
     assert (wanted.x.position, wanted.y.position) == pytest.approx((0.0, 10.0), abs=1e-6)
 
 
-def test_a_target_that_tells_no_velocity_is_seen_to_move() -> None:
+def test_velocity_of_a_target_without_velocity_is_estimated() -> None:
     follower = TargetFollower(FollowSettings(responsiveness=0.0))
     for second in range(5):
         follower.see(0.0, 3.0 * second, None, None, float(second))
@@ -75,7 +75,7 @@ def test_a_target_that_tells_no_velocity_is_seen_to_move() -> None:
     assert wanted.y.velocity == pytest.approx(3.0)
 
 
-def test_a_position_that_is_said_twice_stops_nobody() -> None:
+def test_repeated_target_position_keeps_the_estimated_velocity() -> None:
     """MAVSDK repeats the last one each second, right before its user tells the next."""
     follower = TargetFollower(FollowSettings(responsiveness=0.0))
     for second in range(8):
@@ -135,7 +135,7 @@ def target(capabilities: int, vel: tuple[float, float, float] = (1.0, 2.0, 0.0),
     )
 
 
-def test_what_a_follow_target_says() -> None:
+def test_follow_target_is_read() -> None:
     assert sighting(target(1)) == Sighting(48.8789, 2.3677, 40.0, None)  # MAVSDK says so, whatever its velocity field
     assert sighting(target(3)) == Sighting(48.8789, 2.3677, 40.0, (1.0, 2.0))
     assert sighting(target(1, (NAN, NAN, NAN), NAN)) == Sighting(48.8789, 2.3677, None, None)
@@ -144,5 +144,5 @@ def test_what_a_follow_target_says() -> None:
 @pytest.mark.parametrize(
     ("capabilities", "vel"), [(0, (0, 0, 0)), (2, (0, 0, 0)), (3, (NAN, 0, 0)), (3, (math.inf, 0, 0)), (3, (50, 0, 0))]
 )
-def test_what_is_no_target(capabilities: int, vel: tuple[float, float, float]) -> None:
+def test_invalid_follow_target_is_refused(capabilities: int, vel: tuple[float, float, float]) -> None:
     assert isinstance(sighting(target(capabilities, vel)), str)

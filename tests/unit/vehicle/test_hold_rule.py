@@ -22,7 +22,7 @@ def test_hold_at_one_hertz_counts_once() -> None:
 
 
 @pytest.mark.parametrize(("after", "cancels"), [(4.9, False), (APART, True), (ANSWER, True), (15.1, False)])
-def test_second_hold_answers_the_offer_from_5_to_15_s_after_it(after: float, cancels: bool) -> None:
+def test_second_hold_counts_from_5_to_15_s_after_the_offer(after: float, cancels: bool) -> None:
     rule = HoldRule()
     rule.offer("a", 50.0)
     assert rule.answers("a", 50.0 + after) is cancels

@@ -40,14 +40,14 @@ def test_landing_long_after_the_command_is_not_its() -> None:
     assert lands(who, skycontroller=True) is PILOT
 
 
-def test_landing_of_the_pilot_stays_his_when_a_client_commands_it_too() -> None:
+def test_landing_of_the_pilot_keeps_its_initiator_after_a_client_command() -> None:
     who = Initiators()
     assert lands(who, skycontroller=True) is PILOT
     who.land_commanded(101.0)
     assert who.landing is PILOT
 
 
-def test_landing_after_a_return_belongs_to_who_began_the_return() -> None:
+def test_landing_after_a_return_has_the_initiator_of_the_return() -> None:
     who = Initiators()
     returns(who, own=True)
     assert lands(who) is DRONE  # reported before the return's end

@@ -33,7 +33,7 @@ def test_refusals_to_end_a_landing_or_return_fit_one_text(mode: FlightMode) -> N
     assert [text for reason in UNENDABLE if len(text := f"{mode.value} refused: {reason}") > CHUNK] == []
 
 
-def test_texts_about_a_landing_that_goes_on_fit_one_text() -> None:
+def test_texts_about_a_continuing_landing_fit_one_statustext() -> None:
     reasons = (
         landing.ALREADY_LANDED,
         landing.STILL_LANDING,

@@ -152,7 +152,7 @@ def test_known_bytes(text: str, record: Submessage) -> None:
         ),
     ],
 )
-def test_what_peers_may_also_send(text: str, record: Submessage) -> None:
+def test_unknown_fields_and_other_encodings_are_accepted(text: str, record: Submessage) -> None:
     assert protobuf.parse(type(record), bytes.fromhex(text)) == record
 
 
@@ -178,7 +178,7 @@ def test_what_peers_may_also_send(text: str, record: Submessage) -> None:
         "8080808080808080808001 00",  # a tag of more than 32 bits
     ],
 )
-def test_what_is_no_protobuf_is_refused(text: str) -> None:
+def test_bytes_that_are_no_protobuf_are_refused(text: str) -> None:
     assert protobuf.parse(All, bytes.fromhex(text)) is None
 
 
@@ -333,7 +333,7 @@ def test_names_and_queues() -> None:
         "e6b2 1a00 04000000  d201 01 08",  # cut off inside
     ],
 )
-def test_what_cannot_be_opened_is_kept_as_it_came(text: str) -> None:
+def test_undecodable_envelope_is_kept_undecoded(text: str) -> None:
     packed = bytes.fromhex(text)
     data = bytes.fromhex("85 00 0100") + packed
     message = wire.decode(data)

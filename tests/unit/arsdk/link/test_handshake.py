@@ -25,14 +25,14 @@ OLYMPE = ConnectRequest("olympe", "desktop", 9988, "", 0, 1, 3)
 WELCOME = ConnectReply(0, 2233, 0, 3)
 
 
-def test_what_parrot_writes_is_read() -> None:
+def test_handshake_json_of_parrot_is_read() -> None:
     assert handshake.parse_discovery(DISCOVERY) == INFO
     assert handshake.parse_request(REQUEST) == OLYMPE
     assert handshake.parse_request(REQUEST + b"\0") == OLYMPE
     assert handshake.parse_reply(REPLY) == WELCOME
 
 
-def test_what_we_write_has_parrots_members() -> None:
+def test_handshake_json_has_the_members_of_parrot() -> None:
     assert handshake.format_discovery(INFO).endswith(b"\0")
     assert json.loads(handshake.format_discovery(INFO)[:-1]) == json.loads(DISCOVERY[:-1])
     # libarsdk's ends read one JSON text and know no NUL
@@ -79,13 +79,13 @@ def test_a_refusal_needs_no_port() -> None:
     ],
 )
 @pytest.mark.parametrize("parse", [handshake.parse_discovery, handshake.parse_request, handshake.parse_reply])
-def test_what_can_never_become_an_answer_is_the_peers_fault(parse: object, text: bytes) -> None:
+def test_invalid_handshake_reply_raises_remote_error(parse: object, text: bytes) -> None:
     assert callable(parse)
     with pytest.raises(RemoteProtocolError):
         parse(text)
 
 
-def test_a_model_number_that_is_none_is_an_unknown_model() -> None:
+def test_invalid_model_number_is_an_unknown_model() -> None:
     for model in ("null", '"anafi"', "2324", '""'):
         info = handshake.parse_discovery(b'{"model.id": %s, "port": 1}' % model.encode())
         assert info == DeviceInfo(0, "", 1, "")

@@ -117,7 +117,7 @@ async def test_no_common_version_is_a_refusal() -> None:
         assert drone.sessions == []
 
 
-async def test_nobody_there() -> None:
+async def test_connect_without_a_drone_raises_link_lost() -> None:
     with socket.socket() as closed:
         closed.bind((HOST, 0))
         with pytest.raises(LinkLost, match=r"cannot connect to 127\.0\.0\.1:\d+: Connection refused"):
@@ -147,13 +147,13 @@ async def answering(text: bytes | None) -> AsyncIterator[int]:
         await server.wait_closed()
 
 
-async def test_what_is_no_drone_is_named_so() -> None:
+async def test_peer_that_is_no_drone_raises_remote_error() -> None:
     async with answering(b"220 ftp.example.org ready\r\n\0") as port:
         with pytest.raises(RemoteProtocolError, match="unreadable discovery: b'220 ftp"):
             await connect(HOST, discovery_port=port, on_message=Heard())
 
 
-async def test_a_drone_that_says_nothing_is_a_lost_link() -> None:
+async def test_silent_drone_is_a_lost_link() -> None:
     async with answering(b"") as port:
         with pytest.raises(LinkLost, match=r"no answer from 127\.0\.0\.1 within 0\.2 s"):
             await connect(HOST, discovery_port=port, on_message=Heard(), timeout=0.2)
@@ -320,7 +320,7 @@ async def test_a_message_cancelled_in_the_same_turn_never_leaves() -> None:
         await session.close()
 
 
-async def test_what_was_sent_before_close_leaves() -> None:
+async def test_messages_sent_before_close_leave() -> None:
     async with flying() as (drone, server):
         session = await join(server)
         session.send(STICKS)

@@ -100,7 +100,7 @@ def test_low_priority_events_have_a_queue_of_their_own(monkeypatch: pytest.Monke
     assert transport.receive(ack(3, 125, 0), 0.0) == [Delivered(token)]
 
 
-def test_high_priority_queue_is_heard_although_nobody_uses_it() -> None:
+def test_unused_high_priority_queue_is_received() -> None:
     transport = Transport(Role.DEVICE, 3, 0.0)
     assert messages(transport.receive(data_frame(3, 12, 0, ardrone3.Emergency()), 0.0)) == [ardrone3.Emergency()]
     assert frames(transport, transport.outgoing(0.0)) == [Frame(FrameType.ACK, 140, 0, b"\0\0")]
@@ -393,7 +393,7 @@ def test_pings_go_out_in_silence_and_three_unanswered_ones_end_the_link() -> Non
     assert transport.deadline() is None
 
 
-def test_any_frame_starts_the_silence_anew() -> None:
+def test_any_frame_restarts_the_silence_timer() -> None:
     transport = Transport(Role.CONTROLLER, 3, 0.0, ping_after=0.5, silence_limit=2.5)
     for step in range(40):
         now = step * 0.45
@@ -543,7 +543,7 @@ def test_each_acknowledged_message_arrives_once_and_in_order(version: int, seed:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_cancelled_message_is_not_sent_after_the_cancel_on_a_bad_link(seed: int) -> None:
+def test_cancelled_message_is_not_sent_again_on_a_bad_link(seed: int) -> None:
     rng = random.Random(seed)
     controller, device = Transport(Role.CONTROLLER, 3, 0.0, ping_after=60.0), Transport(Role.DEVICE, 3, 0.0)
     link = FaultyWire(seed, BAD_AIR, controller, device)
@@ -620,7 +620,7 @@ def test_no_bytes_of_a_peer_raise(role: Role, version: int, seed: int) -> None:
     assert any(frame.id == 1 for frame in frames(victim, victim.outgoing(1.2)))
 
 
-def test_a_fading_link_drops_what_waits_and_goes_on_when_the_peer_speaks() -> None:
+def test_fading_link_drops_waiting_messages_and_recovers() -> None:
     transport = Transport(Role.CONTROLLER, 3, 0.0, ping_after=0.5, silence_limit=2.5, fades=True)
     transport.send(tilt(1.0), 0.0)
     transport.outgoing(0.0)

@@ -255,7 +255,7 @@ def test_nothing_is_missing_that_the_aircraft_stands_on() -> None:
     assert wanted <= {message.NAME for message in declared()}
 
 
-def test_the_transport_knows_which_commands_are_never_given_up(parrot: dict[wire.MessageId, Description]) -> None:
+def test_commands_without_retry_limit_are_those_of_the_xml(parrot: dict[wire.MessageId, Description]) -> None:
     commands = {id for id, message in parrot.items() if message.retried and message.direction is wire.Direction.COMMAND}
     assert commands == RETRIED_FOR_EVER
 

@@ -140,7 +140,7 @@ async def test_a_session_over_the_mux(version: int) -> None:
         await server.close()
 
 
-async def test_looking_hears_the_introduction_and_disturbs_nobody() -> None:
+async def test_discovery_through_the_mux_disturbs_no_connection() -> None:
     device, ear = Device(), MessageListener()
     server = await mux_link.MuxServer.start("127.0.0.1", port=0, info=INFO, on_session=device.on_session)
     port = server.discovery_port
@@ -274,7 +274,7 @@ async def test_datagrams_over_the_mux() -> None:
         await session.open_udp("skycontroller", ear.hear)
 
 
-async def test_what_was_opened_over_the_mux_ends_with_it() -> None:
+async def test_connections_over_the_mux_end_with_the_mux() -> None:
     device = Device()
     server = await mux_link.MuxServer.start("127.0.0.1", port=0, info=INFO, on_session=device.on_session)
     web = await asyncio.start_server(lambda reader, writer: writer.close(), "127.0.0.1", 0)

@@ -65,7 +65,7 @@ def test_sources_and_padding_are_not_payload() -> None:
         "a0 60 0007 00015f90 00000001 65 00",  # no padding where it says so
     ],
 )
-def test_what_is_no_packet_is_none(broken: str) -> None:
+def test_bytes_that_are_no_rtp_packet_are_dropped(broken: str) -> None:
     assert decode_packet(bytes.fromhex(broken)) is None
 
 
@@ -125,7 +125,7 @@ def test_a_missing_packet_is_waited_for_and_then_a_gap() -> None:
     assert window.counts == {"received": 3, "lost": 2, "late": 2}
 
 
-def test_one_stray_packet_ends_nothing_and_two_begin_anew() -> None:
+def test_one_stray_packet_is_dropped_and_two_restart_the_stream() -> None:
     window = ReorderWindow()
     packets = [packet(10), packet(40000), packet(11), packet(500, ssrc=2), packet(501, ssrc=2), packet(502, ssrc=2)]
     assert order(window, packets) == [(10, False), (11, False), (501, True), (502, False)]
@@ -133,7 +133,7 @@ def test_one_stray_packet_ends_nothing_and_two_begin_anew() -> None:
     assert window.counts == {"received": 4, "stray": 2, "restarted": 1}
 
 
-def test_what_is_held_back_is_bounded() -> None:
+def test_reorder_window_is_bounded() -> None:
     window = ReorderWindow()
     assert order(window, [packet(0)]) == [(0, False)]
     given = order(window, [packet(number) for number in range(2, 1000)])

@@ -84,7 +84,7 @@ def test_a_stream_may_be_cut_anywhere() -> None:
         (b"RTSP/1.0 20 OK\r\n\r\n", Status.BAD_REQUEST),
     ],
 )
-def test_what_is_no_rtsp_is_answered_and_then_not_read(data: bytes, status: Status) -> None:
+def test_bytes_that_are_no_rtsp_are_answered_and_end_reading(data: bytes, status: Status) -> None:
     reader = MessageReader()
     (event,) = reader.feed(data)
     assert isinstance(event, MalformedRtsp)
@@ -227,7 +227,7 @@ def test_streams_that_are_no_video_are_left_out() -> None:
 
 
 @pytest.mark.parametrize("data", [b"", b"v=1\n", b"HTTP/1.1 200 OK", b"v=0\n" + b"m=video 0 RTP/AVP 96\n" * 17])
-def test_what_is_no_description(data: bytes) -> None:
+def test_invalid_sdp_is_none(data: bytes) -> None:
     assert parse_description(data) is None
 
 

@@ -102,7 +102,7 @@ def test_the_modes_of_version_3_have_other_numbers(number: int, mode: PilotingMo
     assert animated == msgspec.structs.replace(metadata, animation_in_progress=True)
 
 
-def test_what_version_3_says_is_unknown_is_none() -> None:
+def test_unknown_values_of_version_3_are_none() -> None:
     grounded = FrameMetadata(
         ground_distance=0.0, speed=Ned(0.0, 0.0, 0.0), battery_percentage=0, flying_state=FlyingState.LANDED
     )
@@ -112,7 +112,7 @@ def test_what_version_3_says_is_unknown_is_none() -> None:
 
 
 @pytest.mark.parametrize("field", ["ground_distance", "speed", "battery_percentage", "flying_state"])
-def test_what_version_3_cannot_leave_out_is_asked_for(field: str) -> None:
+def test_required_values_of_version_3_are_demanded(field: str) -> None:
     with pytest.raises(LocalProtocolError, match="unknown"):
         encode_v3(msgspec.structs.replace(FLOWN, **{field: None}))
 

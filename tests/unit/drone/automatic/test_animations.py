@@ -108,7 +108,7 @@ def states() -> list[Message]:
     ]
 
 
-async def test_what_it_reported(drone: Drone) -> None:
+async def test_animations_state_has_the_reported_values(drone: Drone) -> None:
     state = drone.animations.state
     assert state.modes == {Mode.MANUAL: {Type.VERTIGO, Type.CANDLE, Type.DRONIE}}
     assert state.missing == {Type.VERTIGO: frozenset(), Type.CANDLE: {Indicator.DRONE_GPS, Indicator.DRONE_BATTERY}}
@@ -130,7 +130,7 @@ async def test_only_values_that_are_given_count(drone: Drone, device: ScriptedDe
         await drone.animations.vertigo(duration=math.nan)
 
 
-async def test_a_start_without_an_answer_is_taken_back(
+async def test_unanswered_animation_start_is_withdrawn(
     drone: Drone, device: ScriptedDevice, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("anafi_mav.drone.automatic.animations.ANSWER_TIMEOUT", 0.2)

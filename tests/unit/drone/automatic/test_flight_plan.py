@@ -119,7 +119,7 @@ def states() -> list[Message]:
     ]
 
 
-async def test_a_start_without_an_answer_is_taken_back(device: ScriptedDevice) -> None:
+async def test_unanswered_plan_start_is_withdrawn(device: ScriptedDevice) -> None:
     drone = device.drone()
     await drone.connect()
     with pytest.raises(CommandTimeout):

@@ -52,7 +52,7 @@ async def test_a_point_of_interest(model: str) -> None:
             await drone.poi.start(500.0, 500.0, 0.0)
 
 
-async def test_a_point_without_an_answer_is_taken_back(device: ScriptedDevice, drone: Drone) -> None:
+async def test_unanswered_poi_is_withdrawn(device: ScriptedDevice, drone: Drone) -> None:
     # An event about another point is no answer.
     device.script[ardrone3.StartPilotedPOIV2] = lambda _: [
         ardrone3.PilotedPOIV2(1.0, 1.0, 1.0, PoiMode.LOCKED_GIMBAL, PoiStatus.RUNNING)
@@ -97,7 +97,7 @@ async def test_follow_me(device: ScriptedDevice, drone: Drone) -> None:
     assert len(device.got(follow_me.Stop)) == stops
 
 
-async def test_the_target_is_told_of(device: ScriptedDevice, drone: Drone) -> None:
+async def test_follow_target_is_sent(device: ScriptedDevice, drone: Drone) -> None:
     drone.follow_me.tell_target(Position(48.0, 2.0, 40.0), (1.0, 2.0, -0.5), 3.0)
     told = await device.until(controller_info.Gps)
     assert (told.latitude, told.longitude, told.altitude) == (48.0, 2.0, 40.0)
@@ -157,7 +157,7 @@ async def test_a_reboot_is_confirmed_by_the_lost_link(device: ScriptedDevice, dr
 
 
 @pytest.mark.parametrize("skycontroller", [None, 3])
-async def test_a_drone_that_reboots_comes_back_with_a_fresh_state(skycontroller: int | None) -> None:
+async def test_rebooted_drone_has_a_new_state(skycontroller: int | None) -> None:
     async with connected("4k", speed=5.0, skycontroller=skycontroller) as (drone, real):
         await drone.piloting.set_max_tilt(23.0)
         await drone.camera.set_mode(CameraMode.PHOTO)
@@ -188,7 +188,7 @@ async def test_no_reboot_in_the_air() -> None:
         assert not real.log.find("command", "common.Common.Reboot")
 
 
-async def test_what_a_drone_never_reported() -> None:
+async def test_verbs_of_unreported_features_are_not_supported() -> None:
     async with ScriptedDevice() as device:
         drone = device.drone()
         await drone.connect()

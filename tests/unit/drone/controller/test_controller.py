@@ -261,7 +261,7 @@ async def test_a_controller_that_loses_the_drone_is_a_lost_link(crew: Crew) -> N
     assert crew.drone.identity.model.key == "thermal"
 
 
-async def test_what_may_be_grabbed(crew: Crew) -> None:
+async def test_grab_of_axes_and_buttons(crew: Crew) -> None:
     controller = crew.drone.controller
     await controller.grab(axes=1 << TILT, buttons=1 << 2)
     crew.sc.stick(TILT, 30)
@@ -406,7 +406,7 @@ async def test_without_a_controller_there_is_none() -> None:
         (animation.Cancel(), False),
     ],
 )
-def test_what_motion_is(message: Message, motion: bool) -> None:
+def test_is_motion_of_controller_messages(message: Message, motion: bool) -> None:
     assert is_motion(message) is motion
 
 

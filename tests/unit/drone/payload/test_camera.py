@@ -223,7 +223,7 @@ async def test_another_cameras_answer_is_none(device: ScriptedDevice, drone: Dro
     assert device.got(old.SetEvCompensation)[0].value == old.CameraEvCompensation.EV_1_33
 
 
-async def test_what_an_older_camera_never_reported(drone: Drone) -> None:
+async def test_verbs_that_an_older_camera_lacks_are_not_supported(drone: Drone) -> None:
     for call in (
         drone.camera.set_hdr(True),
         drone.camera.set_autorecord(True),
@@ -260,7 +260,7 @@ async def test_a_photo_is_done_when_it_is_stored(device: ScriptedDevice, drone: 
         await drone.camera.take_photo(timeout=0.2)
 
 
-async def test_what_the_camera_said_it_cannot(drone: Drone) -> None:
+async def test_verbs_that_the_camera_reports_unavailable_are_rejected(drone: Drone) -> None:
     with pytest.raises(CommandRejected):
         await drone.camera.start_recording()
     with pytest.raises(CommandRejected):

@@ -70,9 +70,7 @@ async def test_an_attitude_that_is_no_number_is_none(device: ScriptedDevice, dro
     assert drone.gimbal[0].attitude is None
 
 
-async def test_aim_is_clipped_to_the_bounds_of_its_frame_and_leaves_other_axes_alone(
-    device: ScriptedDevice, drone: Drone
-) -> None:
+async def test_aim_is_clipped_to_its_frame_and_keeps_other_axes(device: ScriptedDevice, drone: Drone) -> None:
     drone.gimbal.aim(pitch=Aim(-95.0), roll=Aim(50.0, RELATIVE))
     drone.gimbal.aim(pitch=Aim(-95.0, RELATIVE))
     await device.until(gimbal.SetTarget, 2)
@@ -109,9 +107,7 @@ async def test_wrong_targets(drone: Drone) -> None:
         drone.gimbal.aim(pitch=Aim(1.0))
 
 
-async def test_point_repeats_a_target_that_was_lost_until_the_attitude_shows_it(
-    device: ScriptedDevice, drone: Drone
-) -> None:
+async def test_point_repeats_a_lost_target_until_the_attitude_shows_it(device: ScriptedDevice, drone: Drone) -> None:
     sent = 0
 
     def answer(_: gimbal.SetTarget) -> list[Message]:

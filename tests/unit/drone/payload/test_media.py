@@ -70,7 +70,7 @@ async def test_a_photo_is_listed_copied_and_deleted(pair: Pair, tmp_path: Path) 
     assert (drone.media.state.index, drone.media.state.photos) == (MediastoreState.INDEXED, 0)
 
 
-async def test_the_drone_tells_of_a_new_media(pair: Pair) -> None:
+async def test_new_media_is_notified(pair: Pair) -> None:
     drone = pair.drone
     heard: list[Notification] = []
     ready = asyncio.Event()

@@ -199,7 +199,7 @@ async def test_a_wanted_take_off_after_a_lost_race_is_not_stopped(drone: Drone, 
 # Landing again.
 
 
-async def test_landing_is_repeated_at_each_state_of_a_drone_that_rises(drone: Drone, device: ScriptedDevice) -> None:
+async def test_landing_is_repeated_at_each_state_of_the_climb(drone: Drone, device: ScriptedDevice) -> None:
     await reported(drone, device, FlyingState.MOTOR_RAMPING)
     landing = await begun(drone.piloting.land())
     await device.until(ardrone3.Landing, 1)
@@ -277,9 +277,7 @@ async def test_stop_motors_by_force_cuts_motors_that_ramp_on(drone: Drone, devic
     assert times[-1] - times[0] >= 0.25
 
 
-async def test_stop_motors_by_force_never_cuts_a_drone_that_has_left_the_ground(
-    drone: Drone, device: ScriptedDevice
-) -> None:
+async def test_forced_stop_never_cuts_motors_in_the_air(drone: Drone, device: ScriptedDevice) -> None:
     await reported(drone, device, FlyingState.MOTOR_RAMPING)
     stopping = await begun(drone.piloting.stop_motors(force=True))
     await device.until(ardrone3.Landing)
@@ -295,7 +293,7 @@ async def test_stop_motors_by_force_never_cuts_a_drone_that_has_left_the_ground(
 # What newer commands have replaced.
 
 
-async def test_retired_task_sends_no_command_but_may_stop_what_it_began(drone: Drone, device: ScriptedDevice) -> None:
+async def test_retired_task_may_only_stop_its_own_start(drone: Drone, device: ScriptedDevice) -> None:
     await reported(drone, device, FlyingState.HOVERING)
     results: list[BaseException | None] = []
 

@@ -115,7 +115,7 @@ async def test_hover_calls_off_what_has_not_begun(
 
 
 @pytest.mark.parametrize(("verb", "start", "stop"), BEGINNINGS)
-async def test_what_the_drone_has_not_heard_is_not_sent_after_hover(
+async def test_undelivered_start_is_not_sent_after_hover(
     drone: Drone, device: ScriptedDevice, verb: Verb, start: type[Message], stop: type[Message]
 ) -> None:
     await flies(drone, device)
@@ -169,7 +169,7 @@ async def test_a_stop_is_confirmed_when_the_drone_has_the_order(
     ],
     ids=["flight plan", "point of interest", "follow me", "animation"],
 )
-async def test_a_stop_of_what_has_not_begun_is_no_stop_of_nothing(
+async def test_stop_before_the_start_is_confirmed_still_stops(
     drone: Drone, device: ScriptedDevice, verb: Verb, stop: Verb, start: type[Message], order: type[Message]
 ) -> None:
     await flies(drone, device)
@@ -207,7 +207,7 @@ async def test_a_newer_intention_calls_off_what_has_not_begun(
 
 
 @pytest.mark.parametrize(("verb", "start", "stop"), BEGINNINGS)
-async def test_emergency_ends_what_has_not_begun_and_sends_nothing_else(
+async def test_emergency_ends_pending_starts_and_sends_no_other_command(
     drone: Drone, device: ScriptedDevice, verb: Verb, start: type[Message], stop: type[Message]
 ) -> None:
     """No stop delays it, and no start follows it: the motors are cut."""
@@ -222,7 +222,7 @@ async def test_emergency_ends_what_has_not_begun_and_sends_nothing_else(
     assert len(device.got(start)) == 1
 
 
-async def test_a_start_that_is_given_up_does_not_end_the_newer_one(drone: Drone, device: ScriptedDevice) -> None:
+async def test_replaced_start_does_not_end_the_newer_one(drone: Drone, device: ScriptedDevice) -> None:
     await flies(drone, device)
     elsewhere = (48.0, 2.0, 5.0)
     older = asyncio.ensure_future(drone.poi.start(*elsewhere, timeout=0.3))
@@ -247,7 +247,7 @@ async def test_hover_ends_follow_me(drone: Drone, device: ScriptedDevice) -> Non
     await stopping
 
 
-async def test_what_goes_on_although_it_was_told_to_stop_is_told_again(drone: Drone, device: ScriptedDevice) -> None:
+async def test_hover_repeats_the_stop_when_follow_me_continues(drone: Drone, device: ScriptedDevice) -> None:
     await flies(drone, device)
     await reported(drone, device, following(LOOK_AT))
     drone.piloting.hover()
@@ -263,7 +263,7 @@ async def test_what_goes_on_although_it_was_told_to_stop_is_told_again(drone: Dr
 # -- flight plans
 
 
-async def test_a_plan_that_begins_after_it_was_called_off_is_stopped(drone: Drone, device: ScriptedDevice) -> None:
+async def test_plan_that_begins_after_hover_is_stopped(drone: Drone, device: ScriptedDevice) -> None:
     """A drone reads the whole file before it says anything."""
     await flies(drone, device)
     starting = asyncio.ensure_future(drone.flight_plan.start("abc"))
@@ -282,7 +282,7 @@ async def test_a_plan_that_begins_after_it_was_called_off_is_stopped(drone: Dron
     assert len(device.got(common.Stop)) == 2
 
 
-async def test_a_plan_of_somebody_else_is_not_stopped(drone: Drone, device: ScriptedDevice) -> None:
+async def test_plan_of_another_controller_is_not_stopped(drone: Drone, device: ScriptedDevice) -> None:
     """Ours of the same name was refused, by ourselves or by the drone: there is nothing to take back."""
     await flies(drone, device, FlyingState.LANDING)
     with pytest.raises(CommandRejected, match="landing"):
@@ -324,7 +324,7 @@ async def test_sticks_are_silent_while_a_plan_plays(drone: Drone, device: Script
     assert {(p.roll, p.pitch, p.yaw, p.gaz) for p in device.got(ardrone3.PCMD)[flown:]} == {(0, 0, 0, 0)}
 
 
-async def test_a_plan_on_its_way_to_a_drone_that_stands_is_caught(drone: Drone, device: ScriptedDevice) -> None:
+async def test_plan_sent_to_a_landed_drone_is_stopped(drone: Drone, device: ScriptedDevice) -> None:
     starting = asyncio.ensure_future(drone.flight_plan.start("abc"))
     await device.until(common.Start)
     assert drone.piloting.about_to_fly
@@ -386,9 +386,7 @@ async def test_no_return_during_an_emergency_landing(drone: Drone, device: Scrip
 
 
 @pytest.mark.parametrize("verb", ["hover", "cancel"])
-async def test_an_abort_that_comes_too_late_does_not_end_the_drones_own_return(
-    drone: Drone, device: ScriptedDevice, verb: str
-) -> None:
+async def test_late_abort_does_not_end_the_drones_own_return(drone: Drone, device: ScriptedDevice, verb: str) -> None:
     await flies(drone, device)
     device.script[rth.ReturnToHome] = lambda _: [rth.State(RthState.IN_PROGRESS, StateReason.USER_REQUEST)]
     await drone.piloting.return_home()
@@ -405,9 +403,7 @@ async def test_an_abort_that_comes_too_late_does_not_end_the_drones_own_return(
     assert device.got(rth.Abort) == []
 
 
-async def test_an_abort_that_is_meant_for_its_own_return_is_not_taken_back(
-    drone: Drone, device: ScriptedDevice
-) -> None:
+async def test_abort_of_the_drones_own_return_is_not_withdrawn(drone: Drone, device: ScriptedDevice) -> None:
     await flies(drone, device)
     await reported(drone, device, rth.State(RthState.PENDING, StateReason.LOW_BATTERY))
     deaf(device)
@@ -419,7 +415,7 @@ async def test_an_abort_that_is_meant_for_its_own_return_is_not_taken_back(
     await stopping
 
 
-async def test_a_return_is_not_confirmed_by_one_whose_second_abort_is_on_its_way(
+async def test_return_is_not_confirmed_by_a_return_whose_second_abort_is_sent(
     drone: Drone, device: ScriptedDevice
 ) -> None:
     await flies(drone, device)
@@ -447,7 +443,7 @@ async def test_a_return_is_not_confirmed_by_one_whose_second_abort_is_on_its_way
     ]
 
 
-async def test_a_move_that_ends_in_a_return_leaves_the_return_alone(drone: Drone, device: ScriptedDevice) -> None:
+async def test_move_that_ends_in_a_return_does_not_end_the_return(drone: Drone, device: ScriptedDevice) -> None:
     """The pilot at a Skycontroller pressed his button: nothing of ours is sent into his return."""
     await flies(drone, device)
     moving = asyncio.ensure_future(drone.piloting.move_by(50.0, 0.0, 0.0, 0.0))
@@ -503,7 +499,7 @@ async def test_no_take_off_in_other_states(drone: Drone, device: ScriptedDevice,
     assert device.got(ardrone3.TakeOff) == []
 
 
-async def test_a_drone_that_says_nothing_of_its_state_does_not_take_off(device: ScriptedDevice) -> None:
+async def test_drone_with_unknown_state_does_not_take_off(device: ScriptedDevice) -> None:
     device.script[common.AllStates] = lambda _: [common.AllStatesChanged()]
     drone = device.drone()
     await drone.connect()
@@ -513,9 +509,7 @@ async def test_a_drone_that_says_nothing_of_its_state_does_not_take_off(device: 
 
 
 @pytest.mark.parametrize("verb", ["take_off", "hand_launch"])
-async def test_motors_do_not_start_in_the_hands_of_who_calibrates(
-    drone: Drone, device: ScriptedDevice, verb: str
-) -> None:
+async def test_motors_do_not_start_during_a_calibration(drone: Drone, device: ScriptedDevice, verb: str) -> None:
     device.script[common.MagnetoCalibration] = lambda m: [common.MagnetoCalibrationStartedChanged(m.calibrate)]
     await drone.calibration.start_magnetometer()
     assert drone.takeoff_blockers() == ["the magnetometer is being calibrated"]
@@ -557,7 +551,7 @@ async def test_emergency_overtakes_and_nothing_follows_it(drone: Drone, device: 
     await asyncio.wait([tilt])
 
 
-async def test_a_cut_that_was_said_to_have_failed_is_not_made_later(
+async def test_failed_motor_cut_is_not_executed_later(
     drone: Drone, device: ScriptedDevice, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("anafi_mav.drone.piloting.motors.EMERGENCY_TIMEOUT", 0.4)
@@ -573,7 +567,7 @@ async def test_a_cut_that_was_said_to_have_failed_is_not_made_later(
 # -- reboot
 
 
-async def test_a_reboot_that_is_given_up_is_taken_back(drone: Drone, device: ScriptedDevice) -> None:
+async def test_cancelled_reboot_is_withdrawn(drone: Drone, device: ScriptedDevice) -> None:
     deaf(device)
     rebooting = asyncio.ensure_future(drone.reboot())
     await asyncio.sleep(0.2)
@@ -600,9 +594,7 @@ async def test_no_reboot_of_what_falls_or_is_about_to_fly(drone: Drone, device: 
 # -- moves
 
 
-async def test_the_zero_move_of_a_hover_does_not_confirm_one_of_two_newer_moves(
-    drone: Drone, device: ScriptedDevice
-) -> None:
+async def test_zero_move_of_hover_confirms_none_of_two_newer_moves(drone: Drone, device: ScriptedDevice) -> None:
     await flies(drone, device)
     given_up = asyncio.ensure_future(drone.piloting.move_by(9.0, 0.0, 0.0, 0.0))
     await device.until(ardrone3.MoveBy)
@@ -628,7 +620,7 @@ async def test_the_zero_move_of_a_hover_does_not_confirm_one_of_two_newer_moves(
 # -- version 1 of the protocol
 
 
-async def test_an_order_to_stop_is_repeated_for_ever_in_version_1() -> None:
+async def test_stop_is_repeated_without_limit_in_version_1() -> None:
     async with ScriptedDevice(versions=(1, 1)) as device:
         drone = device.drone()
         await drone.connect()

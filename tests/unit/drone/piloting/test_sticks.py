@@ -179,7 +179,7 @@ def test_a_late_call_keeps_the_grid_but_missed_ones_are_not_made_up_for() -> Non
     assert sticks.due(0.5) is None
 
 
-def test_the_stamp_counts_and_tells_the_milliseconds() -> None:
+def test_pcmd_stamp_has_counter_and_milliseconds() -> None:
     sticks = StickSchedule()
     sticks.command(CENTRED, 1.0)
     stamps = [p.timestampAndSeqNum for _, p in run(sticks, 1.0, 1.11)]

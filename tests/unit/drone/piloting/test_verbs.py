@@ -75,7 +75,7 @@ async def test_message_log_has_each_command_that_is_sent(
     assert any("MoveToChanged(" in record.getMessage() for record in caplog.records)
 
 
-async def test_connect_asks_for_everything_and_returns_when_it_came(device: ScriptedDevice) -> None:
+async def test_connect_requests_all_states_and_waits_for_them(device: ScriptedDevice) -> None:
     drone = device.drone()
     assert not drone.connected
     seen: list[str] = []
@@ -115,9 +115,7 @@ async def test_the_date_is_local_time_with_its_offset(device: ScriptedDevice) ->
     await drone.close()
 
 
-async def test_a_drone_that_does_not_send_all_its_states_is_no_connection(
-    device: ScriptedDevice, monkeypatch: pytest.MonkeyPatch
-) -> None:
+async def test_connect_without_all_states_fails(device: ScriptedDevice, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("anafi_mav.drone.startup_queries.STATES_TIMEOUT", SHORT)
     del device.script[common.AllSettings]
     drone = device.drone()
@@ -127,12 +125,12 @@ async def test_a_drone_that_does_not_send_all_its_states_is_no_connection(
     assert drone.lost.done()
 
 
-async def test_nobody_at_the_address() -> None:
+async def test_connect_to_an_empty_address_raises_link_lost() -> None:
     with pytest.raises(LinkLost):
         await Drone("127.0.0.1", discovery_port=1).connect()
 
 
-async def test_a_lost_link_ends_every_wait_and_is_told(drone: Drone, device: ScriptedDevice) -> None:
+async def test_lost_link_ends_every_wait_and_is_reported(drone: Drone, device: ScriptedDevice) -> None:
     await flying(drone, device)
     waits = [
         asyncio.ensure_future(wait)
@@ -184,7 +182,7 @@ async def test_a_new_connection_begins_with_nothing_of_the_old(drone: Drone, dev
     assert [type(m) for _, m in device.received] == [common.CurrentDateTime, common.AllStates, common.AllSettings]
 
 
-async def test_a_failing_subscriber_harms_nobody(
+async def test_failing_subscriber_does_not_affect_others(
     drone: Drone, device: ScriptedDevice, caplog: pytest.LogCaptureFixture
 ) -> None:
     def fail(message: Message, now: float) -> None:
@@ -200,13 +198,13 @@ async def test_a_failing_subscriber_harms_nobody(
     assert "a subscriber failed on common.CommonState.BatteryStateChanged" in caplog.text
 
 
-async def test_a_message_nobody_knows_is_counted(drone: Drone, device: ScriptedDevice) -> None:
+async def test_unknown_message_is_counted(drone: Drone, device: ScriptedDevice) -> None:
     device.session.send(UnknownMessage(MessageId(200, 1, 2), b"whatever"))
     await reported(drone, device, common.BatteryStateChanged(50))
     assert drone.counters["unknown message"] == 1
 
 
-async def test_a_model_nobody_knows_is_named_by_its_number() -> None:
+async def test_unknown_model_is_named_by_its_number() -> None:
     async with ScriptedDevice(model_id=0x0999) as device:
         drone = device.drone()
         await drone.connect()
@@ -382,9 +380,7 @@ async def test_a_newer_move_by_interrupts_the_older(drone: Drone, device: Script
     assert (await newer).right == 5.0
 
 
-async def test_ends_of_a_cancelled_move_by_are_not_taken_for_those_of_the_next(
-    drone: Drone, device: ScriptedDevice
-) -> None:
+async def test_end_of_a_cancelled_move_by_does_not_end_the_next(drone: Drone, device: ScriptedDevice) -> None:
     await flying(drone, device)
     first = asyncio.ensure_future(drone.piloting.move_by(10.0, 0.0, 0.0, 0.0))
     await device.until(ardrone3.MoveBy)
@@ -402,7 +398,7 @@ async def test_ends_of_a_cancelled_move_by_are_not_taken_for_those_of_the_next(
     assert (await second).right == 5.0
 
 
-async def test_a_move_by_given_up_is_stopped(drone: Drone, device: ScriptedDevice) -> None:
+async def test_move_by_that_times_out_is_stopped(drone: Drone, device: ScriptedDevice) -> None:
     await flying(drone, device)
     with pytest.raises(CommandTimeout):
         await drone.piloting.move_by(10.0, 0.0, 0.0, 0.0, timeout=SHORT)
@@ -430,7 +426,7 @@ async def test_moves_that_are_no_numbers_are_our_own_mistake(drone: Drone, devic
 # -- absolute moves
 
 
-async def test_move_to_returns_under_way_and_tells_its_end(drone: Drone, device: ScriptedDevice) -> None:
+async def test_move_to_returns_under_way_and_its_result_is_the_end(drone: Drone, device: ScriptedDevice) -> None:
     device.script[ardrone3.MoveTo] = lambda command: [running(command)]
     journey = await drone.piloting.move_to(48.8789, 2.3677, 15.0)
     assert device.got(ardrone3.MoveTo) == [ardrone3.MoveTo(48.8789, 2.3677, 15.0, OrientationMode.NONE, 0.0)]
@@ -451,7 +447,7 @@ async def test_move_to_with_a_heading_turns_on_the_way(
     assert (command.orientation_mode, command.heading) == (OrientationMode.HEADING_DURING, sent)
 
 
-async def test_move_to_with_a_speed_takes_the_other_limits_from_the_drone(drone: Drone, device: ScriptedDevice) -> None:
+async def test_move_to_with_one_speed_uses_the_drones_other_limits(drone: Drone, device: ScriptedDevice) -> None:
     device.script[move.ExtendedMoveTo] = lambda c: [
         ardrone3.MoveToChanged(
             c.latitude, c.longitude, c.altitude, OrientationMode(c.orientation_mode), c.heading, MoveToStatus.RUNNING
@@ -563,7 +559,7 @@ async def test_an_older_move_to_may_arrive_while_the_newer_waits(drone: Drone, d
     assert drone.moves_started == (newer,)
 
 
-async def test_a_move_to_replaced_while_it_waits_is_rejected_and_taken_back(
+async def test_move_to_replaced_before_its_answer_is_rejected_and_withdrawn(
     drone: Drone, device: ScriptedDevice
 ) -> None:
     older = asyncio.ensure_future(drone.piloting.move_to(48.0, 2.0, 15.0))
@@ -576,7 +572,7 @@ async def test_a_move_to_replaced_while_it_waits_is_rejected_and_taken_back(
     assert device.got(ardrone3.CancelMoveTo) == []
 
 
-async def test_the_cancelled_of_a_move_does_not_end_the_next_to_the_same_place(
+async def test_canceled_event_of_a_move_does_not_end_the_next_to_the_same_place(
     drone: Drone, device: ScriptedDevice
 ) -> None:
     await flying(drone, device)
@@ -591,9 +587,7 @@ async def test_the_cancelled_of_a_move_does_not_end_the_next_to_the_same_place(
     assert await second.result() is MoveEnd.DONE
 
 
-async def test_what_a_move_called_off_unheard_still_says_is_not_of_the_next_to_the_same_place(
-    drone: Drone, device: ScriptedDevice
-) -> None:
+async def test_late_event_of_an_aborted_move_is_not_of_the_next_move(drone: Drone, device: ScriptedDevice) -> None:
     await flying(drone, device)
     first = asyncio.ensure_future(drone.piloting.move_to(48.0, 2.0, 15.0))
     await device.until(ardrone3.MoveTo)
@@ -617,7 +611,7 @@ async def test_what_a_move_called_off_unheard_still_says_is_not_of_the_next_to_t
 
 
 @pytest.mark.parametrize(("height", "again"), [(2000.0, 1999.996), (1e300, 1e300 - 2e294)])
-async def test_moves_are_told_apart_at_any_height(
+async def test_moves_are_distinguished_at_any_height(
     drone: Drone, device: ScriptedDevice, height: float, again: float
 ) -> None:
     await flying(drone, device)
@@ -630,7 +624,7 @@ async def test_moves_are_told_apart_at_any_height(
     assert [move.altitude for move in device.got(ardrone3.MoveTo)] == pytest.approx([height, again], rel=1e-12)
 
 
-async def test_a_move_to_given_up_is_cancelled(drone: Drone, device: ScriptedDevice) -> None:
+async def test_move_to_that_times_out_is_cancelled(drone: Drone, device: ScriptedDevice) -> None:
     with pytest.raises(CommandTimeout):
         await drone.piloting.move_to(48.0, 2.0, 15.0, timeout=SHORT)
     await device.until(ardrone3.CancelMoveTo)
@@ -700,7 +694,7 @@ async def test_cancel_return_home(drone: Drone, device: ScriptedDevice) -> None:
     assert len(device.got(rth.Abort)) == 1
 
 
-async def test_a_return_is_asked_for_again_while_it_is_being_cancelled(drone: Drone, device: ScriptedDevice) -> None:
+async def test_return_during_its_cancellation_is_commanded_again(drone: Drone, device: ScriptedDevice) -> None:
     await reported(drone, device, rth.State(RthState.IN_PROGRESS, StateReason.USER_REQUEST))
     cancelled = asyncio.ensure_future(drone.piloting.cancel_return_home())
     await device.until(rth.Abort)  # what the drone last said, that it returns, is not true for long
@@ -741,7 +735,7 @@ async def test_pilot_sends_percent_of_the_drones_own_limits_at_20_hz(drone: Dron
     assert device.got(ardrone3.PCMD)[-1].roll == 0
 
 
-async def test_sticks_that_nobody_holds_any_more_centre_by_themselves(drone: Drone, device: ScriptedDevice) -> None:
+async def test_sticks_that_are_not_repeated_centre_after_half_a_second(drone: Drone, device: ScriptedDevice) -> None:
     await flying(drone, device)
     drone.piloting.pilot(PilotingCommand(roll_deg=5.0))
     await device.until(ardrone3.PCMD, 50)
@@ -831,7 +825,7 @@ async def test_hover_cancels_what_we_started(drone: Drone, device: ScriptedDevic
     assert device.got(rth.Abort) == []
 
 
-async def test_hover_cancels_a_move_to_of_somebody_else_also_when_a_move_by_is_ours(
+async def test_hover_during_our_move_by_cancels_the_move_to_of_another_controller(
     drone: Drone, device: ScriptedDevice
 ) -> None:
     await flying(drone, device)
@@ -905,9 +899,7 @@ async def test_hover_leaves_a_return_that_the_drone_began(
     assert device.received == []
 
 
-async def test_a_return_of_ours_that_the_battery_takes_over_is_no_longer_ours(
-    drone: Drone, device: ScriptedDevice
-) -> None:
+async def test_return_taken_over_by_the_battery_is_the_drones_own(drone: Drone, device: ScriptedDevice) -> None:
     await flying(drone, device)
     device.script[rth.ReturnToHome] = lambda _: [rth.State(RthState.IN_PROGRESS, StateReason.USER_REQUEST)]
     home = await drone.piloting.return_home()
@@ -930,7 +922,7 @@ async def test_a_setpoint_takes_over_from_a_move_of_ours(drone: Drone, device: S
     assert drone.moves_started == ()
 
 
-async def test_letting_go_of_sticks_that_nobody_held_is_nothing(drone: Drone, device: ScriptedDevice) -> None:
+async def test_release_of_sticks_that_were_not_held_sends_nothing(drone: Drone, device: ScriptedDevice) -> None:
     await flying(drone, device)
     device.script[ardrone3.MoveTo] = lambda command: [running(command)]
     journey = await drone.piloting.move_to(48.0, 2.0, 15.0)

@@ -39,7 +39,7 @@ async def watched(server: VideoServer) -> AsyncIterator[tuple[Drone, ScriptedDev
 
 
 @pytest.mark.parametrize("profile", [V3_PROFILE, PROTO_PROFILE])
-async def test_what_the_pictures_say(profile: int) -> None:
+async def test_frame_metadata_is_that_of_the_pictures(profile: int) -> None:
     server = VideoServer(profile=profile)
     async with watched(server) as (drone, _):
         assert drone.video.state == VideoState()
@@ -112,7 +112,7 @@ async def test_the_drones_description_of_its_video() -> None:
     assert [one.uri.rpartition("/")[2] for one in server.asked if one.method == "SETUP"] == ["stream=1", "stream=0"]
 
 
-async def test_it_runs_while_somebody_watches() -> None:
+async def test_video_runs_while_it_is_watched() -> None:
     server = VideoServer()
     async with watched(server) as (drone, _):
         async with drone.video.watching():
@@ -133,7 +133,7 @@ async def test_it_runs_while_somebody_watches() -> None:
 
 
 @pytest.mark.parametrize("method", ["OPTIONS", "DESCRIBE", "SETUP", "PLAY"])
-async def test_who_leaves_before_it_began_leaves_nothing_behind(method: str) -> None:
+async def test_watching_cancelled_before_the_start_leaves_no_session(method: str) -> None:
     server = VideoServer()
     async with watched(server) as (drone, _):
         server.answers = {method: lambda asked: None}
@@ -267,7 +267,7 @@ async def test_a_server_without_pictures() -> None:
                 await drone.video.next_frame(0.3)
 
 
-async def test_a_stream_that_falls_silent_is_forgotten_and_begun_anew() -> None:
+async def test_silent_stream_is_ended_and_started_again() -> None:
     server = VideoServer()
     async with watched(server) as (drone, _), drone.video.watching():
         await drone.video.next_frame(10.0)
@@ -294,7 +294,7 @@ async def test_a_stream_that_falls_silent_is_forgotten_and_begun_anew() -> None:
     ],
     ids=["hang up", "teardown", "announce", "nonsense"],
 )
-async def test_a_server_that_ends_it_is_asked_again(end: Callable[[VideoServer], None]) -> None:
+async def test_stream_ended_by_the_server_is_started_again(end: Callable[[VideoServer], None]) -> None:
     server = VideoServer()
     async with watched(server) as (drone, _), drone.video.watching():
         await drone.video.next_frame(10.0)
@@ -303,7 +303,7 @@ async def test_a_server_that_ends_it_is_asked_again(end: Callable[[VideoServer],
         await drone.video.next_frame(10.0)
 
 
-async def test_a_server_that_stays_away_is_asked_less_and_less_often() -> None:
+async def test_unreachable_server_is_retried_at_growing_intervals() -> None:
     server = VideoServer()
     async with watched(server) as (drone, _), drone.video.watching():
         await drone.video.next_frame(10.0)
@@ -322,7 +322,7 @@ async def test_a_server_that_stays_away_is_asked_less_and_less_often() -> None:
         assert drone.video.state.problem == ""
 
 
-async def test_what_the_server_asks_is_answered() -> None:
+async def test_requests_of_the_rtsp_server_are_answered() -> None:
     server = VideoServer()
     async with watched(server) as (drone, _), drone.video.watching():
         server.say("OPTIONS * RTSP/1.0\r\nCSeq: 1\r\n\r\nREDIRECT rtsp://x/ RTSP/1.0\r\nCSeq: 2\r\n\r\n")
@@ -459,7 +459,7 @@ async def test_noise_in_the_pictures_raises_nothing() -> None:
     assert drone.video.counters["malformed"] > 100
 
 
-async def test_a_subscriber_that_fails_harms_nobody(caplog: pytest.LogCaptureFixture) -> None:
+async def test_failing_video_subscriber_does_not_affect_others(caplog: pytest.LogCaptureFixture) -> None:
     def fails(frame: VideoFrame) -> None:
         raise RuntimeError("mine")
 

@@ -55,7 +55,7 @@ async def test_the_pictures_say_what_the_drone_does(model: str) -> None:
 
 
 @pytest.mark.parametrize("model", MODELS)
-async def test_what_was_set_is_seen_in_the_pictures(model: str) -> None:
+async def test_camera_settings_are_visible_in_the_pictures(model: str) -> None:
     async with connected(model) as pair, pair.drone.video.watching():
         drone = pair.drone
         await drone.camera.set_mode(CameraMode.RECORDING)
@@ -151,7 +151,7 @@ async def test_the_video_behind_a_skycontroller(model: str, generation: int) -> 
         await drone.close()
 
 
-async def test_the_simulator_saw_one_session_for_all_who_watched() -> None:
+async def test_several_viewers_share_one_session() -> None:
     async with connected("4k") as pair:
         drone, real = pair
         async with drone.video.watching(), drone.video.watching():

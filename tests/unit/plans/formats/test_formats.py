@@ -321,7 +321,7 @@ def test_formats_of_photos_in_version_1() -> None:
     assert starts == [["5.0", "10.0", "12.0"], ["0.0", "1.0", "12.0"], ["0.0", "0.0", "14.0"], ["2.0", "3.0", "0.0"]]
 
 
-def test_what_parrots_format_cannot_hold() -> None:
+def test_parrot_format_reports_what_it_cannot_hold() -> None:
     plan = Plan(
         (
             waypoint(0, 0, 20.0, frame=10),
@@ -348,7 +348,7 @@ def test_what_parrots_format_cannot_hold() -> None:
 # All of them.
 
 
-def test_formats_are_told_apart_by_content(tmp_path: Path) -> None:
+def test_file_format_is_recognised_by_content(tmp_path: Path) -> None:
     for form in Format:
         path = tmp_path / "anything"
         files.save(FLIGHT, path, form)

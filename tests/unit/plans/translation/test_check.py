@@ -51,7 +51,7 @@ def test_the_planners_speed_counts_where_the_mission_has_none() -> None:
     assert slow.seconds - fast.seconds == pytest.approx(2 * 111.2 * (1 / 5.0 - 1 / 10.0), abs=0.1)
 
 
-def test_what_cannot_be_flown() -> None:
+def test_check_of_items_that_cannot_be_flown_names_each() -> None:
     findings = found(UP, action(mav_enums.MAV_CMD_DO_SET_SERVO, 1.0), waypoint(1, 0, frame=10))
     assert told(findings) == [
         "item 1: DO_SET_SERVO: the drone has no actuator that a flight plan could move",
@@ -156,7 +156,7 @@ def test_how_an_ai_begins() -> None:
     assert told(high) == ["item 0: 30 m above take-off is higher than the limit of 25 m"]
 
 
-def test_what_the_gateway_flies_is_told() -> None:
+def test_check_names_items_that_the_gateway_flies() -> None:
     findings = found(UP, action(mav_enums.MAV_CMD_SET_CAMERA_ZOOM, 2.0, 50.0), waypoint(1, 0), BACK)
     assert told(findings, FindingSeverity.WARNING) == [
         "item 1: flown by the gateway: SET_CAMERA_ZOOM: the gateway zooms: a flight plan cannot"

@@ -133,7 +133,7 @@ def test_in_the_air_a_take_off_alone_is_nothing_to_do() -> None:
     assert (flight.parts, flight.done, flight.rest) == ((), (0,), None)
 
 
-def test_without_a_take_off_it_is_put_in_front_and_told() -> None:
+def test_mission_without_takeoff_gets_one_in_front() -> None:
     items = [action(mav_enums.MAV_CMD_DO_CHANGE_SPEED, 1.0, 4.0), waypoint(1, 0, 20.0)]
     flight = translate(items, 1, GROUND)
     assert [line.split()[1] for line in lines(flight)] == ["22", "16", "178", "16"]
@@ -179,7 +179,7 @@ def test_heights_above_the_sea_count_from_the_take_off_point() -> None:
     assert [(fault.item, fault.kind) for fault in terrain] == [(0, FaultKind.FRAME)]
 
 
-def test_what_an_item_does_not_say_stays_as_it_is() -> None:
+def test_values_that_an_item_leaves_out_stay() -> None:
     here = Item(mav_enums.MAV_CMD_NAV_WAYPOINT, RELATIVE, (5.0, 0.0, 0.0, None, None, None, None))
     there = Item(mav_enums.MAV_CMD_NAV_WAYPOINT, RELATIVE, (0.0, 0.0, 0.0, None, LAT + 1e-4, LON, None))
     zeros = Item(mav_enums.MAV_CMD_NAV_WAYPOINT, RELATIVE, (0.0,) * 7)
@@ -223,7 +223,7 @@ def test_a_jump_without_end_is_flown_file_after_file() -> None:
     assert again.rest is not None
 
 
-def test_a_long_mission_is_flown_file_after_file_and_told_of_to_its_end() -> None:
+def test_long_mission_becomes_files_in_sequence() -> None:
     items = [take_off(20.0), *[waypoint(number % 9, 0) for number in range(MAX_LINES)]]
     items += [
         action(mav_enums.MAV_CMD_CONDITION_DELAY, 5.0),
@@ -483,7 +483,9 @@ def test_a_loop_of_many_items_that_need_no_line() -> None:
 
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize(("items", "fault"), WRONG.values(), ids=WRONG)
-def test_what_is_refused(items: list[Item], fault: TranslationFault, version: Version) -> None:
+def test_mission_item_that_cannot_be_translated_is_refused(
+    items: list[Item], fault: TranslationFault, version: Version
+) -> None:
     assert examine(items, version).faults == (fault,)
     with pytest.raises(PlanError):
         translate(items, version, AIR)
@@ -558,7 +560,7 @@ def test_the_table_knows_what_is_put_into_plans() -> None:
 
 
 @pytest.mark.parametrize("command", [row.command for row in TABLE.values() if row.verdict is Fidelity.REFUSED])
-def test_what_the_table_refuses_is_refused(command: int) -> None:
+def test_command_that_the_table_refuses_is_refused(command: int) -> None:
     (fault,) = examine([waypoint(0, 1), action(command)], 2).faults
     assert (fault.item, fault.kind) == (1, FaultKind.COMMAND)
     assert fault.reason == f"{TABLE[command].name}: {TABLE[command].why}"

@@ -265,7 +265,7 @@ def test_aiming_the_gimbal_ends_looking_at_something(version: Version) -> None:
     assert [item.command for item in found][-3:] == [ends, PlanCommand.MOUNT_CONTROL, PlanCommand.WAYPOINT]
 
 
-def test_what_the_gimbal_is_not_told_stays() -> None:
+def test_gimbal_axes_that_an_item_leaves_out_keep_their_angle() -> None:
     """Version 1 has no word for it: a line with 0 would be an order to look ahead."""
     items = [GO, action(mav_enums.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, None, 0.0, None, None, 0.0, None, 0.0)]
     assert [row[0] for row in told(items, 1)] == [16]
@@ -351,7 +351,7 @@ def test_beginning_in_the_middle_begins_what_runs_there() -> None:
     assert [int(item.command) for item in plan_file.read(leg.content, 1)] == [2500, 16, 2501]
 
 
-def test_a_camera_mode_that_nothing_comes_of_is_told() -> None:
+def test_camera_mode_without_effect_is_reported() -> None:
     items = [action(mav_enums.MAV_CMD_SET_CAMERA_MODE, 0.0, 1.0), GO]
     assert examine(items, 2).approximations[-1] == Loss(
         "the camera's mode changes only with a photo or video, and none comes after it", 0
@@ -488,7 +488,9 @@ WRONG = {
 
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize(("items", "reason", "kind", "param"), WRONG.values(), ids=WRONG)
-def test_what_is_refused(items: list[Item], reason: str, kind: FaultKind, param: int | None, version: Version) -> None:
+def test_camera_item_that_cannot_be_translated_is_refused(
+    items: list[Item], reason: str, kind: FaultKind, param: int | None, version: Version
+) -> None:
     (fault,) = examine([GO, *items], version).faults
     assert isinstance(fault, TranslationFault)
     assert (fault.item, fault.kind, fault.param) == (len(items), kind, param)
@@ -497,7 +499,7 @@ def test_what_is_refused(items: list[Item], reason: str, kind: FaultKind, param:
         translate([GO, *items], version, AIR)
 
 
-def test_what_only_a_jump_brings_together_is_refused_too() -> None:
+def test_video_restarted_by_a_jump_during_photos_is_refused() -> None:
     """The video is begun a second time with photos being taken, which the list does not show."""
     items = [
         GO,

@@ -131,7 +131,7 @@ def test_every_mode_has_an_effect() -> None:
         (Effect.IRREVOCABLE, False, False),
     ],
 )
-def test_effect_says_what_is_repeated_and_what_is_cancelled(effect: Effect, stops: bool, revocable: bool) -> None:
+def test_effect_decides_repetition_and_cancellation(effect: Effect, stops: bool, revocable: bool) -> None:
     assert (effect.stops, effect.is_revocable) == (stops, revocable)
 
 

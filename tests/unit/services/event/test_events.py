@@ -37,7 +37,7 @@ def test_events_come_again() -> None:
     assert sequences(log, 5, 7) == [5, -6, -7]
 
 
-def test_what_is_not_kept() -> None:
+def test_request_for_a_discarded_event_is_answered_by_an_error() -> None:
     """The error tells where to go on."""
     log = filled(KEPT + 10)
     assert sequences(log, 10, 11) == [-10, 11]

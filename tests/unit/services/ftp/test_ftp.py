@@ -172,7 +172,7 @@ def test_a_burst_ends_after_a_while() -> None:
 
 
 @pytest.mark.parametrize("interruption", [Opcode.TERMINATE_SESSION, Opcode.RESET_SESSIONS, Opcode.READ_FILE])
-def test_what_ends_a_burst(interruption: Opcode) -> None:
+def test_burst_ends_on_each_of_these_requests(interruption: Opcode) -> None:
     b = Bench()
     b.ask(request(Opcode.OPEN_FILE_RO, b"/data.bin"))
     b.ask(request(Opcode.BURST_READ_FILE, seq=2, size=10))
@@ -304,7 +304,7 @@ def test_a_number_that_is_still_open() -> None:
     assert b.ask(request(Opcode.READ_FILE, seq=8, size=5)).data == OTHER
 
 
-def test_a_file_stays_as_it_was_when_it_was_opened() -> None:
+def test_open_file_keeps_its_content() -> None:
     contents = iter([b"first", b"second"])
     changing = FileTree({"/x": lambda query: next(contents)})
     server = FtpServer()

@@ -53,7 +53,7 @@ def test_file_is_written_when_its_session_is_terminated() -> None:
     assert b.files.written == [b"hello world"]
 
 
-def test_copy_of_the_request_that_created_a_file_does_not_empty_it() -> None:
+def test_repeated_create_request_does_not_empty_the_file() -> None:
     b = Bench()
     b.ask(Opcode.CREATE_FILE, PATH, seq=5)
     b.ask(Opcode.WRITE_FILE, b"hello")
@@ -62,7 +62,7 @@ def test_copy_of_the_request_that_created_a_file_does_not_empty_it() -> None:
     assert b.files.written == [b"hello"]
 
 
-def test_file_that_is_created_again_begins_empty() -> None:
+def test_recreated_file_is_empty() -> None:
     b = Bench()
     b.ask(Opcode.CREATE_FILE, PATH, seq=5)
     b.ask(Opcode.WRITE_FILE, b"hello")
@@ -79,7 +79,7 @@ def test_refused_content_is_an_error_of_the_termination() -> None:
     assert b.server.sessions == 0
 
 
-def test_file_that_is_too_long_is_refused_at_the_part_that_exceeds() -> None:
+def test_too_long_file_is_refused_at_the_exceeding_part() -> None:
     b = Bench()
     b.ask(Opcode.CREATE_FILE, PATH)
     assert b.ask(Opcode.WRITE_FILE, b"x" * 100, offset=ROOM - 100) == (ACK, b"")
@@ -102,7 +102,7 @@ def expired(b: Bench) -> None:
     b.server.expire(b.now)
 
 
-def test_file_that_is_written_cannot_be_read_in_its_session() -> None:
+def test_file_under_writing_cannot_be_read_in_its_session() -> None:
     b = Bench()
     b.ask(Opcode.CREATE_FILE, PATH)
     for opcode in (Opcode.READ_FILE, Opcode.BURST_READ_FILE):

@@ -46,7 +46,7 @@ def test_without_a_place_the_same_fields_are_plain_numbers() -> None:
         (math.inf, "inf"),
     ],
 )
-def test_numbers_come_back_as_short_as_they_mean_the_same(single: float, shortest: str) -> None:
+def test_single_precision_parameter_is_read_as_the_shortest_decimal(single: float, shortest: str) -> None:
     assert (
         repr(
             from_wire(PlanItem(mav_enums.MAV_CMD_DO_MOUNT_CONTROL, MISSION, (single, 0.0, 0.0, 0.0), 0, 0, 0.0)).params[
@@ -58,7 +58,7 @@ def test_numbers_come_back_as_short_as_they_mean_the_same(single: float, shortes
 
 
 @pytest.mark.parametrize("params", [(1e39,), (0, 0, 0, 0, 3e9), (0, 0, 0, 0, 0, -3e9)])
-def test_what_a_message_cannot_carry(params: tuple[float, ...]) -> None:
+def test_number_too_large_for_the_wire_raises(params: tuple[float, ...]) -> None:
     with pytest.raises(ValueError, match="too large a number"):
         to_wire(action(mav_enums.MAV_CMD_CONDITION_GATE, *params))
 

@@ -39,7 +39,7 @@ def again(plans: MissionProtocol, number: int) -> list[int]:
     return found
 
 
-def test_what_is_asked_for_again() -> None:
+def test_missing_items_are_requested_again() -> None:
     plans = mission_protocol()
     assert begun(plans, 6) == [0]
     assert again(plans, 4) == [0, 0, 0, 0]  # there is none before it
@@ -66,7 +66,7 @@ def test_each_try_takes_200_ms() -> None:
     assert times == pytest.approx([0.2, *(0.4, 0.42, 0.44), *(0.6, 0.62, 0.64), 0.8])
 
 
-def test_what_has_come_is_not_asked_for_any_more() -> None:
+def test_received_items_are_not_requested_again() -> None:
     plans = mission_protocol()
     begun(plans, 9)
     for seq in range(3):

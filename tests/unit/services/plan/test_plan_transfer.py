@@ -282,7 +282,7 @@ def test_a_kind_that_takes_nothing() -> None:
     ]
 
 
-def test_a_plan_that_turns_out_bad_when_it_is_stored() -> None:
+def test_plan_refused_while_it_is_stored() -> None:
     plans = mission_protocol()
     uploaded(plans, 2)
     plans.receive(count(1), ME, 1.0)
@@ -292,7 +292,7 @@ def test_a_plan_that_turns_out_bad_when_it_is_stored() -> None:
     assert plans.transfers[FENCE].items == items(2)
 
 
-def test_an_upload_that_begins_anew() -> None:
+def test_upload_restarted_by_a_second_count() -> None:
     """Nothing of the first one is in the second."""
     plans = mission_protocol()
     plans.receive(count(3), ME, 0.0)
@@ -372,14 +372,14 @@ def test_an_upload_during_another_clients_download_is_refused() -> None:
     assert replies(plans.receive(count(1), OTHER, 2.0 + PATIENCE))[0].seq == 0  # it fell silent
 
 
-def test_asking_how_many_there_are_keeps_nobody_away() -> None:
+def test_list_request_alone_does_not_block_other_clients() -> None:
     plans = mission_protocol()
     plans.transfers[FENCE].put(items(3))
     plans.receive(ask_list(), ME, 0.0)
     assert replies(plans.receive(count(1), OTHER, 0.0))[0].seq == 0
 
 
-def test_a_download_that_has_all_it_asked_for_keeps_nobody_away() -> None:
+def test_finished_download_does_not_block_other_clients() -> None:
     """MAVProxy does not say that it is done."""
     plans = mission_protocol()
     plans.transfers[FENCE].put(items(2))
@@ -466,7 +466,7 @@ def test_clear(kind: int, empty: bool) -> None:
         assert plans.transfers[other].items == (() if gone else items(2))
 
 
-def test_what_comes_while_a_plan_is_stored_waits() -> None:
+def test_messages_during_storing_wait() -> None:
     """MAVProxy does not wait for the acknowledgement of a clear before it uploads."""
     plans = mission_protocol()
     commit = commit_of(plans.receive(clear(), ME, 0.0))
@@ -482,7 +482,7 @@ def test_what_comes_while_a_plan_is_stored_waits() -> None:
     assert uploaded_rest(plans, 0, 2) == items(2)
 
 
-def test_who_asks_for_a_list_while_it_is_stored_is_told_of_the_new_one() -> None:
+def test_list_request_during_storing_is_answered_with_the_new_plan() -> None:
     """dronekit asks as soon as it has sent its last item."""
     plans = mission_protocol()
     plans.receive(count(1), ME, 0.0)
@@ -493,7 +493,7 @@ def test_who_asks_for_a_list_while_it_is_stored_is_told_of_the_new_one() -> None
     assert (total.get_type(), total.count) == ("MISSION_COUNT", 1)
 
 
-def test_who_gives_up_while_it_waits_is_not_asked_for_items() -> None:
+def test_waiting_client_that_cancels_is_not_asked_for_items() -> None:
     plans = mission_protocol()
     commit = commit_of(plans.receive(clear(), ME, 0.0))
     assert plans.receive(count(2), OTHER, 0.0) == []
@@ -503,7 +503,7 @@ def test_who_gives_up_while_it_waits_is_not_asked_for_items() -> None:
     assert plans.deadline() is None
 
 
-def test_what_waits_is_bounded() -> None:
+def test_number_of_waiting_messages_is_bounded() -> None:
     plans = mission_protocol()
     plans.receive(clear(), ME, 0.0)
     for _ in range(MAX_WAITING):
@@ -555,7 +555,7 @@ def test_partial_write_is_not_px4s() -> None:
     assert replies(plans.receive(partial(0, 0), ME, 0.0))[0].type == UNSUPPORTED
 
 
-def test_partial_write_given_up_changes_nothing() -> None:
+def test_cancelled_partial_write_changes_nothing() -> None:
     plans = mission_protocol()
     plans.transfers[FENCE].put(items(4))
     plans.receive(partial(0, 1), AP, 0.0)

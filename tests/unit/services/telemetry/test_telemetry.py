@@ -55,7 +55,7 @@ def registered() -> UpdateTracker:
     return tracker
 
 
-def test_news_of_one_turn_is_one_bundle() -> None:
+def test_updates_of_one_loop_iteration_are_one_bundle() -> None:
     tracker = registered()
     assert bundled(tracker, "ab", 1.0) == (1, 2, 3)
     assert bundled(tracker, "b", 2.0) == (2, 3)
@@ -167,7 +167,7 @@ def test_a_flight_is_armed_takes_off_and_lands() -> None:
     assert (record.armed_at, record.took_off_at, record.landed_at, record.number) == (30, 0, 0, 0)
 
 
-def test_what_began_before_we_looked_is_unknown() -> None:
+def test_flight_that_began_before_the_record_has_no_start() -> None:
     record = FlightRecord()
     record.look(armed=True, landed=Landed.IN_AIR, now=1)
     record.look(armed=True, landed=Landed.UNKNOWN, now=2)

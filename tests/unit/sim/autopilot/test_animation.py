@@ -61,7 +61,7 @@ def available(bench: Bench) -> set[Type]:
 # -- what there is
 
 
-def test_figures_are_told_of_as_they_become_available() -> None:
+def test_available_animations_are_reported_on_change() -> None:
     bench = Bench()
     assert not bench.of(animation.Availability)
     bench.take_off()
@@ -249,7 +249,7 @@ def test_where_figures_about_a_point_end(bench: Bench, command: Message, north: 
     ],
     ids=repr,
 )
-def test_what_cannot_be_flown_is_ignored(bench: Bench, command: Message) -> None:
+def test_unavailable_animation_is_ignored(bench: Bench, command: Message) -> None:
     assert bench.send(command) == []
     assert not bench.firmware.animations.running
 
@@ -283,7 +283,7 @@ def test_a_photo_panorama_is_one_media_of_many_pictures(model: str, command: Mes
     assert not bench.firmware.payload.cameras.busy
 
 
-def test_the_photos_of_a_panorama_are_told_of_as_photos_are(bench: Bench) -> None:
+def test_photos_of_a_panorama_are_reported_like_photos(bench: Bench) -> None:
     said = perform(bench, animation.StartHorizontal180PhotoPanorama())
     bench.run(0.5)
     results = [event.result for event in bench.of(camera.PhotoProgress)]
@@ -346,7 +346,7 @@ def test_piloting_commands_are_ignored_meanwhile(bench: Bench) -> None:
 
 
 @pytest.mark.parametrize("command", [ardrone3.Landing(), rth.ReturnToHome(), ardrone3.Emergency()], ids=repr)
-def test_what_ends_it(bench: Bench, command: Message) -> None:
+def test_animation_ends_by_each_of_these(bench: Bench, command: Message) -> None:
     bench.sticks(4.0, pitch=50)
     bench.rest()
     bench.send(animation.StartSphericalPhotoPanorama())
@@ -369,7 +369,7 @@ def test_a_lost_link_ends_it(bench: Bench) -> None:
     bench.rest()
 
 
-def test_who_is_followed_can_be_flown_around(bench: Bench) -> None:
+def test_followed_target_is_the_target_of_animations(bench: Bench) -> None:
     assert bench.firmware.target is None
     bench.send(follow_me.TargetImageDetection(0.0, -45.0 * RAD, 0.0, 200, 1, 0))
     assert bench.firmware.target == pytest.approx((10.0, 0.0, 0.0), abs=0.2)

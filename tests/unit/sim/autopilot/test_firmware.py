@@ -71,7 +71,7 @@ def test_hand_launch(bench: Bench) -> None:
     assert bench.states() == [S.MOTOR_RAMPING, S.USERTAKEOFF, S.TAKINGOFF, S.HOVERING]
 
 
-def test_hand_launch_called_off(bench: Bench) -> None:
+def test_cancelled_hand_launch_stops_the_motors(bench: Bench) -> None:
     bench.send(ardrone3.UserTakeOff(1))
     bench.run(3.0)
     bench.send(ardrone3.UserTakeOff(0))
@@ -207,7 +207,7 @@ def test_an_empty_battery_brings_it_down(bench: Bench) -> None:
 # -- alarms
 
 
-def test_the_ceiling_is_told(bench: Bench) -> None:
+def test_ceiling_reached_is_reported(bench: Bench) -> None:
     bench.take_off()
     bench.send(ardrone3.MaxAltitude(5.0))
     bench.sticks(4.0, gaz=100)
@@ -217,7 +217,7 @@ def test_the_ceiling_is_told(bench: Bench) -> None:
     assert [e.state for e in bench.of(alarms.Alarms)] == [State.ON, State.OFF]
 
 
-def test_the_fence_is_told_and_holds(bench: Bench) -> None:
+def test_geofence_reached_is_reported_and_holds(bench: Bench) -> None:
     bench.take_off()
     bench.send(ardrone3.MaxDistance(10.0))
     bench.send(ardrone3.NoFlyOverMaxDistance(1))
@@ -229,7 +229,7 @@ def test_the_fence_is_told_and_holds(bench: Bench) -> None:
 # -- words
 
 
-def test_what_it_does_not_know_it_keeps_to_itself(bench: Bench) -> None:
+def test_unknown_message_is_not_answered(bench: Bench) -> None:
     bench.events.clear()
     assert not bench.firmware.receive(UnknownMessage(MessageId(200, 1, 2), b"\x00"), bench.now)
     assert bench.events == []

@@ -198,7 +198,7 @@ def test_pause_and_go_on() -> None:
     assert flight.executed == [0, 1]
 
 
-def test_stop_hovers_and_begins_anew() -> None:
+def test_stop_hovers_and_next_start_begins_again() -> None:
     flight = Flight(line(93, 1), line(16, 0, 2, at=(40.0, 0.0, 10.0)), flying=True)
     bench = flight.bench
     flight.start()
@@ -222,7 +222,9 @@ def test_the_pilot_has_no_say_meanwhile() -> None:
 
 
 @pytest.mark.parametrize("command", [ardrone3.Landing(), ardrone3.Emergency(), rth.ReturnToHome()])
-def test_what_is_stronger_ends_it(command: ardrone3.Landing | ardrone3.Emergency | rth.ReturnToHome) -> None:
+def test_flight_plan_is_ended_by_landing_emergency_and_return(
+    command: ardrone3.Landing | ardrone3.Emergency | rth.ReturnToHome,
+) -> None:
     flight = Flight(line(93, 30), flying=True)
     flight.start()
     flight.bench.run(0.5)
@@ -296,7 +298,7 @@ def test_photos_and_videos() -> None:
 
 
 @pytest.mark.parametrize("model", ["4k", "ai"])
-def test_so_many_photos_and_no_more(model: str) -> None:
+def test_photo_item_takes_its_number_of_photos(model: str) -> None:
     """One every 2 s until there are three, although the plan waits for 12 s."""
     photos = line(2000, 2, 3, 12) if model == "4k" else line(2000, 0, 2, 3)
     flight = Flight(photos, line(93, 12), model=model, flying=True)
@@ -335,7 +337,7 @@ def test_a_panorama_upwards(model: str) -> None:
     assert not flight.bench.firmware.payload.cameras.busy
 
 
-def test_a_panorama_that_is_stopped_keeps_what_it_has() -> None:
+def test_stopped_panorama_keeps_its_photos() -> None:
     flight = Flight(line(2800, 360, 0, 30), flying=True)
     flight.start()
     flight.bench.run(4.0)
@@ -371,7 +373,7 @@ def test_an_unknown_file_and_a_bad_one() -> None:
     assert refused(flight) == {Part.MAVLINK_FILE}
 
 
-def test_it_is_forgotten_with_the_next_start() -> None:
+def test_refused_file_is_cleared_by_the_next_start() -> None:
     flight = Flight(line(93, 1))
     good, flight.uid = flight.uid, "gone"
     refused(flight)
@@ -422,7 +424,7 @@ def test_not_with_a_part_that_a_test_has_broken(part: Part) -> None:
 # -- without a controller
 
 
-def test_a_plan_ends_with_the_link_unless_it_may_go_on() -> None:
+def test_plan_ends_at_link_loss_unless_it_may_continue() -> None:
     flight = Flight(line(93, 5), flying=True)
     bench = flight.bench
     flight.start()
@@ -483,7 +485,7 @@ def test_start_at_an_item_under_another_name() -> None:
     assert bench.send(flight_plan.ClearRecoveryInfo()) == [flight_plan.RecoveryInfo("", "", 0, 0, "")]
 
 
-def test_plan_that_is_stopped_as_soon_as_it_starts_has_run_for_no_time() -> None:
+def test_plan_stopped_at_its_start_reports_no_run_time() -> None:
     """Start and Landing may arrive between two steps of the simulation; the running time is unsigned."""
     flight = Flight(line(22), line(93, 50), model="ai", flying=True)
     bench = flight.bench
@@ -494,7 +496,7 @@ def test_plan_that_is_stopped_as_soon_as_it_starts_has_run_for_no_time() -> None
     assert recovery.running_time == 0
 
 
-def test_what_an_ai_misses() -> None:
+def test_ai_reports_missing_inputs_of_a_flight_plan() -> None:
     bench = Bench("ai")
     bench.faults.gps = False
     bench.run(0.1)

@@ -59,7 +59,7 @@ def state(bench: Bench) -> tuple[Mode, Behavior]:
     return last.mode, last.behavior
 
 
-def test_what_is_missing_is_a_bit_that_is_not_set() -> None:
+def test_missing_input_is_a_cleared_bit() -> None:
     bench = Bench()
     assert missing(bench, Mode.LOOK_AT) == {Input.IMAGE_DETECTION, Input.DRONE_HIGH_ENOUGH}
     bench.send(follow_me.SetTargetIsController(1))
@@ -79,7 +79,7 @@ def test_what_is_missing_is_a_bit_that_is_not_set() -> None:
     assert {info.mode for info in bench.of(follow_me.ModeInfo)} == {Mode.LOOK_AT, Mode.GEOGRAPHIC, Mode.RELATIVE}
 
 
-def test_what_would_be_better(bench: Bench) -> None:
+def test_follow_me_reports_inputs_to_improve(bench: Bench) -> None:
     Walk(bench, 70.0, 0.0, vn=20.0).tell()
     bench.run(0.1)
     info = bench.of(follow_me.ModeInfo)[-1]
@@ -120,7 +120,7 @@ def test_look_at_turns_nose_and_camera_and_leaves_the_flying_to_the_sticks(bench
 
 
 @pytest.mark.parametrize("mode", [Mode.GEOGRAPHIC, Mode.RELATIVE])
-def test_it_keeps_its_place_beside_a_walker(bench: Bench, mode: Mode) -> None:
+def test_follow_me_keeps_its_place_beside_a_walker(bench: Bench, mode: Mode) -> None:
     walk = Walk(bench, 10.0, 0.0, vn=2.0)
     walk.walk(0.4)
     bench.send(follow_me.Start(mode))
@@ -198,7 +198,7 @@ def test_a_lost_target_stops_the_drone(bench: Bench) -> None:
     assert state(bench) == (Mode.GEOGRAPHIC, Behavior.FOLLOW)
 
 
-def test_nobody_is_followed_from_the_ground_or_on_a_leash() -> None:
+def test_follow_me_on_the_ground_or_by_leash_is_refused() -> None:
     bench = Bench()
     (answer,) = bench.send(follow_me.Start(Mode.LOOK_AT))
     assert answer == follow_me.State(Mode.NONE, Behavior.IDLE, follow_me.Animation.NONE, 0)
@@ -218,7 +218,7 @@ def test_nobody_is_followed_from_the_ground_or_on_a_leash() -> None:
     ],
     ids=lambda command: command.NAME,
 )
-def test_what_ends_it(bench: Bench, command: Message) -> None:
+def test_follow_me_ends_by_each_of_these(bench: Bench, command: Message) -> None:
     walk = Walk(bench, 10.0, 0.0, vn=2.0)
     walk.walk(0.4)
     bench.send(follow_me.Start(Mode.GEOGRAPHIC))
@@ -241,7 +241,7 @@ def test_a_lost_link_ends_it(bench: Bench) -> None:
     assert state(bench) == (Mode.NONE, Behavior.IDLE)
 
 
-def test_it_takes_over_from_a_move_and_a_point(bench: Bench) -> None:
+def test_follow_me_replaces_a_move_and_a_poi(bench: Bench) -> None:
     walk = Walk(bench, 10.0, 0.0)
     walk.walk(0.4)
     bench.send(ardrone3.StartPilotedPOIV2(*WorldOrigin(*HOME).place(50.0, 0.0), 0.0, PoiMode.LOCKED_GIMBAL))
@@ -260,7 +260,7 @@ def test_the_framing_is_kept() -> None:
     assert bench.send(follow_me.TargetFramingPosition(-1, 70)) == [follow_me.TargetFramingPositionChanged(30, 70)]
 
 
-def test_a_plan_is_not_given_up_for_a_target(bench: Bench) -> None:
+def test_flight_plan_is_not_replaced_by_follow_me(bench: Bench) -> None:
     uid = bench.firmware.plans.put(b"QGC WPL 120\n0\t0\t3\t93\t60\t0\t0\t0\t0\t0\t0\t1\n")
     bench.send(common.Start(uid, common.MavlinkType.FLIGHT_PLAN))
     assert bench.firmware.flight_plan.playing

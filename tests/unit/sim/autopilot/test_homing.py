@@ -121,7 +121,7 @@ def test_a_lost_fix_is_no_home_type_and_no_return(bench: Bench) -> None:
     assert returns(bench)[-1] == (RthState.AVAILABLE, StateReason.ENABLED)
 
 
-def test_nobody_is_followed(bench: Bench) -> None:
+def test_home_type_followee_falls_back_to_takeoff(bench: Bench) -> None:
     bench.send(rth.SetPreferredHomeType(RthHomeType.FOLLOWEE))
     assert bench.of(rth.PreferredHomeType)[-1].type is RthHomeType.TAKEOFF
     capabilities = next(
@@ -217,7 +217,7 @@ def test_sticks_do_not_touch_a_return(bench: Bench) -> None:
 
 
 @pytest.mark.parametrize("command", [ardrone3.Landing(), ardrone3.Emergency()])
-def test_what_is_stronger_ends_a_return(bench: Bench, command: ardrone3.Landing | ardrone3.Emergency) -> None:
+def test_return_is_ended_by_landing_and_emergency(bench: Bench, command: ardrone3.Landing | ardrone3.Emergency) -> None:
     bench.send(rth.ReturnToHome())
     bench.run(1.0)
     bench.send(command)

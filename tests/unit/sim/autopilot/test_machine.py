@@ -50,6 +50,6 @@ def test_every_state_is_reached_and_left_to_the_ground() -> None:
     assert all(S.LANDED in reachable(state) for state in S)
 
 
-def test_who_flies() -> None:
+def test_guided_states_are_airborne_states() -> None:
     assert GUIDED < AIRBORNE
     assert AIRBORNE.isdisjoint({S.LANDED, S.MOTOR_RAMPING, S.USERTAKEOFF, S.EMERGENCY})

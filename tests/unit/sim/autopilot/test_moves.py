@@ -312,7 +312,7 @@ def test_a_move_into_the_fence_gives_up(bench: Bench) -> None:
 
 
 @pytest.mark.parametrize("command", [ardrone3.Landing(), ardrone3.Emergency()])
-def test_what_is_stronger_ends_a_move_and_says_so(bench: Bench, command: ardrone3.Landing | ardrone3.Emergency) -> None:
+def test_move_is_ended_by_landing_and_emergency(bench: Bench, command: ardrone3.Landing | ardrone3.Emergency) -> None:
     bench.send(move_to(60.0, 0.0, 5.0))
     bench.run(1.0)
     bench.send(command)

@@ -103,7 +103,7 @@ def test_in_flight_it_waits_for_the_hover(bench: Bench) -> None:
     assert statuses(bench) == [PoiStatus.PENDING, PoiStatus.RUNNING]
 
 
-def test_it_does_not_wait_for_ever(bench: Bench) -> None:
+def test_poi_that_waits_for_calm_sticks_ends_after_ten_seconds(bench: Bench) -> None:
     bench.sticks(1.0, pitch=20)
     bench.send(at(20.0, 0.0, 0.0))
     bench.sticks(9.5, pitch=20)
@@ -157,7 +157,7 @@ def test_not_on_the_ground_and_not_without_gps() -> None:
 @pytest.mark.parametrize(
     "command", [ardrone3.MoveBy(2.0, 0.0, 0.0, 0.0), rth.ReturnToHome(), ardrone3.Landing(), ardrone3.Emergency()]
 )
-def test_what_takes_over(
+def test_poi_ends_when_another_flight_begins(
     bench: Bench, command: ardrone3.MoveBy | rth.ReturnToHome | ardrone3.Landing | ardrone3.Emergency
 ) -> None:
     bench.send(at(0.0, 20.0, 0.0))

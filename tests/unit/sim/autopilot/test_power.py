@@ -60,7 +60,7 @@ def returns(bench: Bench) -> list[tuple[RthState, StateReason]]:
         (at(400.0, 60.0), 90.0),  # from above the return height nothing up, but 60 m down
     ],
 )
-def test_what_the_way_home_takes(pose: Pose, seconds: float) -> None:
+def test_charge_needed_for_the_return(pose: Pose, seconds: float) -> None:
     assert endurance().needed(pose, (0.0, 0.0)) == pytest.approx(seconds * RATE)
 
 
@@ -110,7 +110,7 @@ def test_the_announcement_counts_down() -> None:
     assert looked.returned() == [rth.RthAutoTrigger(AutoTriggerReason.NONE, 0)]
 
 
-def test_the_announcement_is_taken_back_when_home_comes_nearer() -> None:
+def test_return_announcement_is_withdrawn_when_home_is_nearer() -> None:
     looked = endurance()
     charge = 10.0 + 70.0 * RATE + 20.0 * RATE
     first = looked.tick(0.0, charge, at(400.0), (0.0, 0.0), flying=True, returning=False)
@@ -144,7 +144,7 @@ def bench() -> Bench:
     return bench
 
 
-def test_it_goes_home_by_itself(bench: Bench) -> None:
+def test_low_battery_starts_a_return(bench: Bench) -> None:
     # 60 m: 7.5 s and 20 s more, 1.83 %; at 12 % there are 2.5 s left, so that the shortest notice counts.
     bench.faults.battery = 12
     waited = bench.run_until(lambda: bool(returns(bench)))
@@ -211,7 +211,7 @@ def test_a_landing_is_announced_and_comes(bench: Bench) -> None:
     assert bench.of(ardrone3.AlertStateChanged)[-1].state is AlertState.ALMOST_EMPTY_BATTERY
 
 
-def test_a_report_tells_the_same(bench: Bench) -> None:
+def test_report_of_all_states_has_the_return_values(bench: Bench) -> None:
     bench.faults.battery = 12
     bench.run(1.5)
     report = all_states(bench.firmware)
@@ -270,7 +270,7 @@ def test_motor_error_of_another_motor_is_reported(bench: Bench) -> None:
     assert ardrone3.MotorErrorStateChanged(0b0101, MotorError.ERROR_MOSFET) in all_settings(bench.firmware)
 
 
-def test_vibration_is_told() -> None:
+def test_vibration_is_reported() -> None:
     bench = Bench()
     bench.faults.vibration = WarningLevel.CRITICAL
     bench.run(0.1)
@@ -278,7 +278,7 @@ def test_vibration_is_told() -> None:
     assert ardrone3.VibrationLevelChanged(WarningLevel.CRITICAL) in all_states(bench.firmware)
 
 
-def test_who_carries_it_moves_it() -> None:
+def test_motion_state_of_a_carried_drone_is_moving() -> None:
     bench = Bench()
     bench.body.place(1.0, 0.0)
     bench.run(0.1)

@@ -58,7 +58,7 @@ def test_landing_with_its_quirk_goes_on(quirk: Quirk, message: ardrone3.Message)
     assert bench.state is FlyingState.LANDING
 
 
-def test_take_off_with_late_quirk_starts_the_motors_of_a_drone_that_has_landed() -> None:
+def test_late_takeoff_quirk_starts_motors_after_landing() -> None:
     bench = landing("4k", Quirk.TAKEOFF_FROM_GROUND_LATE)
     bench.run_until(lambda: bench.pose.up < 0.3)
     bench.send(ardrone3.TakeOff())

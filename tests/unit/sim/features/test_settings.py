@@ -77,7 +77,7 @@ def test_a_choice(bench: Bench, command: Message, answer: Message) -> None:
     assert bench.send(command) == [answer]
 
 
-def test_a_delay_is_told_in_both_words(bench: Bench) -> None:
+def test_return_delay_is_reported_by_both_features(bench: Bench) -> None:
     assert bench.send(rth.SetDelay(500)) == [rth.Delay(120, 0, 120), ardrone3.ReturnHomeDelayChanged(120)]
     assert bench.send(ardrone3.ReturnHomeDelay(7)) == [rth.Delay(7, 0, 120), ardrone3.ReturnHomeDelayChanged(7)]
 
@@ -86,7 +86,7 @@ def test_a_name_has_a_limit(bench: Bench) -> None:
     assert bench.send(common.ProductName("x" * 1000)) == [common.ProductNameChanged("x" * 64)]
 
 
-def test_reset_says_every_setting_and_then_that_it_is_done(bench: Bench) -> None:
+def test_reset_reports_each_setting_and_then_its_end(bench: Bench) -> None:
     bench.send(ardrone3.MaxTilt(35.0))
     answer = bench.send(common.Reset())
     assert ardrone3.MaxTiltChanged(10.0, 1.0, 40.0) in answer

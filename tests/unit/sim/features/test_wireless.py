@@ -34,7 +34,7 @@ def radio(answer: object) -> connectivity.State:
     return answer
 
 
-def test_the_ai_tells_of_its_radio() -> None:
+def test_ai_reports_its_radio() -> None:
     bench = Bench("ai")
     (listed,) = bench.send(connectivity.ListRadios())
     assert listed == connectivity.RadioList(radios={0: connectivity.RadioType.WIFI})

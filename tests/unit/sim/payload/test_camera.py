@@ -162,7 +162,7 @@ def test_a_style_keeps_its_own_parameters() -> None:
     )
 
 
-def test_a_camera_that_is_not_there_says_nothing(bench: Bench) -> None:
+def test_absent_camera_does_not_answer(bench: Bench) -> None:
     for command in (camera.TakePhoto(1), camera.SetEvCompensation(9, CameraEvCompensation.EV_0_00)):
         assert bench.send(command) == []
 
@@ -296,7 +296,7 @@ def test_hdr_is_for_settings_that_allow_it(bench: Bench) -> None:
     assert camera.Hdr(0, Availability.NOT_AVAILABLE, State.INACTIVE) in bench.send(fast)
 
 
-def test_a_mode_says_what_can_be_done_in_it(bench: Bench) -> None:
+def test_camera_mode_reports_its_available_functions(bench: Bench) -> None:
     answer = bench.send(camera.SetCameraMode(0, PHOTO))
     assert answer[0] == camera.CameraMode(0, PHOTO)
     assert answer[-2:] == [
@@ -391,7 +391,7 @@ def test_a_raw_photo_is_two_files(bench: Bench) -> None:
     assert [resource.id for resource in media.resources] == ["100000010001.JPG", "100000010001.DNG"]
 
 
-def test_a_burst_tells_each_shot_but_not_too_often(bench: Bench) -> None:
+def test_burst_reports_shots_at_a_limited_rate(bench: Bench) -> None:
     told = shoot(bench, photo_mode(CameraPhotoMode.BURST))
     counts = [m.photo_count for m in told if isinstance(m, camera.PhotoProgress) and m.result.name == "PHOTO_TAKEN"]
     # A shot each 71 ms, a report each 100 ms at most, and always one of the last.
@@ -423,7 +423,7 @@ def test_the_files_of_a_burst_arrive_one_by_one(bench: Bench) -> None:
         (BracketingPreset.PRESET_1EV_2EV_3EV, 7),
     ],
 )
-def test_a_bracketing_is_told_at_its_end(bench: Bench, preset: BracketingPreset, count: int) -> None:
+def test_bracketing_is_reported_at_its_end(bench: Bench, preset: BracketingPreset, count: int) -> None:
     told = shoot(bench, photo_mode(CameraPhotoMode.BRACKETING, bracketing=preset))
     results = [(m.result.name, m.photo_count) for m in told if isinstance(m, camera.PhotoProgress)]
     assert results == [("TAKING_PHOTO", 0), ("PHOTO_TAKEN", count), ("PHOTO_SAVED", count)]

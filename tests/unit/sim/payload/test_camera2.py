@@ -134,7 +134,7 @@ def test_a_lapse_ends_when_it_is_stopped(bench: Bench) -> None:
     assert len(media.resources) == 3
 
 
-def test_what_cannot_be_photographed(bench: Bench) -> None:
+def test_photo_that_cannot_be_taken_is_answered_with_the_reason(bench: Bench) -> None:
     bench.send(camera2.StartPhoto(camera_id=0))
     assert photos(bench) == [("STOP", "", "ALREADY")]
     configure(bench, camera_mode=PHOTO)
@@ -162,7 +162,7 @@ def test_a_recording(bench: Bench) -> None:
     assert bench.of(camera2.Recording)[-1].stop_reason is camera2.RecordingStopReason.CONFIGURATION_CHANGE
 
 
-def test_it_records_by_itself(bench: Bench) -> None:
+def test_camera2_autorecord_starts_a_recording(bench: Bench) -> None:
     configure(bench, auto_record_mode=camera2.AutoRecordMode.FLIGHT)
     bench.take_off()
     assert bench.of(camera2.Recording)[-1].type is camera2.RecordingEvent.START

@@ -118,7 +118,7 @@ def test_a_change_of_frame_does_not_make_it_jump(bench: Bench) -> None:
     assert look(bench).pitch_absolute == pytest.approx(before.pitch_absolute, abs=0.01)
 
 
-def test_what_is_no_target_changes_nothing(bench: Bench) -> None:
+def test_invalid_gimbal_target_changes_nothing(bench: Bench) -> None:
     bench.send(target(pitch=-30.0))
     bench.run(1.0)
     for odd in (

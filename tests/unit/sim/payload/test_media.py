@@ -161,7 +161,7 @@ def test_ids_and_description() -> None:
     assert told.store.by_thumbnail("nothing") is None
 
 
-def test_what_is_told_of_each_change() -> None:
+def test_each_media_change_is_notified() -> None:
     told = Told()
     first, burst = told.photo(), told.photo(3)
     assert told.names() == ["media_created", "media_created", *["resource_created"] * 2]

@@ -144,7 +144,7 @@ async def test_the_live_stream_plays() -> None:
         assert said.timestamp == max(1, round(held.bench.firmware.time * 1e6))
 
 
-async def test_each_picture_says_the_moment_it_was_taken() -> None:
+async def test_each_picture_has_its_capture_time() -> None:
     async with watching() as (held, client):
         eye = await client.setup("live/video")
         await client.play()
@@ -203,7 +203,7 @@ async def test_pictures_of_a_world_that_turns_late_are_of_different_moments() ->
     assert held.told("end")[0]["pictures"] == pytest.approx(100, abs=5)
 
 
-async def test_a_pause_ends_the_pictures_and_play_begins_with_a_key_picture() -> None:
+async def test_pause_stops_pictures_and_play_starts_with_a_key_picture() -> None:
     async with watching() as (held, client):
         eye = await client.setup("live/video")
         await client.play()
@@ -301,7 +301,7 @@ async def test_a_recording_can_be_paused() -> None:
         assert (await client.ask("PLAY", resource, Range="clock=1-")).status == 457
 
 
-async def test_what_is_no_recording_is_not_found() -> None:
+async def test_rtsp_of_an_unknown_recording_is_not_found() -> None:
     async with watching() as (held, client):
         store = held.bench.firmware.payload.media
         photo = store.begin(video=False, mode="SINGLE", date="20261121T101112+0100")
@@ -316,7 +316,7 @@ async def test_what_is_no_recording_is_not_found() -> None:
 # -- sessions
 
 
-async def test_a_silent_client_is_forgotten_and_one_that_speaks_is_not() -> None:
+async def test_silent_rtsp_client_expires_and_active_one_stays() -> None:
     async with studio(session_timeout=1) as held, viewer(held.server.port) as silent, viewer(held.server.port) as other:
         await silent.setup("live/video")
         await silent.play()
@@ -464,7 +464,7 @@ async def test_sessions_and_connections_are_bounded() -> None:
 # -- the air
 
 
-async def test_nothing_is_heard_and_nothing_said_without_air() -> None:
+async def test_rtsp_server_without_a_radio_link_is_silent() -> None:
     async with watching() as (held, client):
         eye = await client.setup("live/video")
         await client.play()

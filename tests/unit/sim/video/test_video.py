@@ -74,7 +74,7 @@ def test_a_decoder_shows_sky_above_ground(width: int, height: int, tmp_path: Pat
     assert count == KEY_INTERVAL + 20
 
 
-def test_it_is_small() -> None:
+def test_video_of_one_second_is_small() -> None:
     second = [len(unit) for number in range(KEY_INTERVAL) for unit in pictures(1280, 720).units(number)]
     assert sum(second) < 5000
     assert max(second[3:]) < 12  # a picture that repeats the one before
@@ -148,7 +148,7 @@ def test_the_picture_tilts_with_the_gimbal() -> None:
     assert said.base_quat == pytest.approx((1.0, 0.0, 0.0, 0.0), abs=1e-6)
 
 
-def test_who_flies() -> None:
+def test_metadata_names_the_piloting_mode() -> None:
     bench = Bench()
     bench.take_off()
     bench.climb(20.0)
@@ -164,7 +164,7 @@ def test_who_flies() -> None:
     assert say(bench).piloting_mode is PilotingMode.MANUAL
 
 
-def test_animations_and_the_following_of_a_target_are_told() -> None:
+def test_metadata_reports_animations_and_tracking() -> None:
     bench = Bench()
     bench.take_off()
     bench.climb(10.0)

@@ -185,7 +185,7 @@ def test_without_a_home_it_stays_where_it_is() -> None:
     assert [event for event in bench.of(rth.State) if event.state is rth.RthState.IN_PROGRESS] == []
 
 
-def test_a_reboot_forgets_what_flies_and_keeps_what_is_set() -> None:
+def test_reboot_clears_the_flight_and_keeps_settings() -> None:
     bench = Bench("ai")
     bench.take_off()
     bench.send(ardrone3.MaxTilt(25.0))
@@ -225,7 +225,7 @@ def test_sticks_are_let_go_with_the_link() -> None:
     assert bench.pose.ground_speed < 0.2
 
 
-def test_a_second_loss_waits_anew() -> None:
+def test_second_link_loss_waits_its_full_delay() -> None:
     bench = Bench()
     bench.take_off()
     bench.send(rth.SetDelay(4))

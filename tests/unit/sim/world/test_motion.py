@@ -142,7 +142,7 @@ def test_tilt_is_no_faster_than_its_limit() -> None:
     assert flyer.run(1.5).pitch == pytest.approx(-40.0 * RAD, abs=0.5 * RAD)
 
 
-def test_what_the_paper_measured() -> None:
+def test_step_responses_are_those_of_the_paper() -> None:
     """Section IV of the anafi_ros paper: 2 s of full stick along each axis."""
     ahead = Flyer()
     ahead.body.sticks(0.0, -40.0 * RAD, 0.0, 0.0)

@@ -69,7 +69,7 @@ def test_gusts_do_not_carry_it_away() -> None:
     assert max(pose.ground_speed for pose in places) < 1.0
 
 
-def test_a_wind_that_is_too_strong_carries_it_away() -> None:
+def test_too_strong_wind_carries_the_drone_away() -> None:
     pose = Hover(WindSpec(20.0, 0.0, 0.0)).run(60.0)
     # Full tilt balances 15 m/s of air: what is beyond goes over ground, to the south.
     assert pose.vn == pytest.approx(-5.0, abs=0.1)
@@ -104,7 +104,7 @@ def test_on_the_ground_there_is_none() -> None:
     assert (pose.north, pose.east, pose.vn, pose.ve) == (0.0, 0.0, 0.0, 0.0)
 
 
-def test_what_the_drone_makes_of_it() -> None:
+def test_wind_warning_level_follows_the_felt_wind() -> None:
     watch = WindWatch(13.9)  # a 4K; three quarters are 10.4
 
     def after(speed: float, seconds: float) -> WarningLevel:

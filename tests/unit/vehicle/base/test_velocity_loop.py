@@ -87,7 +87,7 @@ def test_a_velocity_of_the_body_knows_no_north(yaw: float) -> None:
     assert command.roll_deg == pytest.approx(-tilt(VELOCITY_GAIN), abs=0.6)
 
 
-def test_what_is_reached_needs_no_push_but_against_drag() -> None:
+def test_reached_velocity_needs_tilt_against_drag_only() -> None:
     motion = still()
     motion.on_velocity(5.0, 0.0, 0.0, 0.001)
     command = sticks(Demand(Axis(5.0), Axis(0.0)), motion, 0.001)
@@ -182,7 +182,7 @@ def test_the_tilt_is_limited_as_a_whole_and_keeps_its_direction() -> None:
     assert right / front == pytest.approx(0.75)
 
 
-def test_a_limit_that_lasts_is_told() -> None:
+def test_lasting_limit_is_reported() -> None:
     motion, controller = still(), None
     controller = VelocityController(motion)
     short = []
@@ -198,7 +198,7 @@ def test_a_limit_that_lasts_is_told() -> None:
     assert controller.short_of is None
 
 
-def test_what_is_not_known_any_more_is_not_flown_by() -> None:
+def test_demand_with_stale_estimates_has_no_sticks() -> None:
     motion = still()
     controller = VelocityController(motion)
     assert controller.sticks(Demand(Axis(1.0)), LIMITS, STALE) is None
@@ -219,7 +219,7 @@ def test_the_tilt_that_a_speed_needs() -> None:
 # What the drone tells.
 
 
-def test_a_hover_in_wind_tells_what_the_air_does() -> None:
+def test_hover_in_wind_estimates_the_air() -> None:
     """Nose north, it leans 5 degrees forward and does not move: the air pushes it south with g tan 5."""
     motion = MotionEstimate()
     for step in range(20):
@@ -236,7 +236,7 @@ def test_one_look_believes_a_share() -> None:
     assert motion.air[0] == pytest.approx(AIR_GAIN * 0.5)
 
 
-def test_the_air_is_looked_at_no_more_often_at_high_rates() -> None:
+def test_air_estimate_ignores_ripple_at_high_rates() -> None:
     """A speed with a ripple, 200 times a second: its difference would be 20 m/s2."""
     motion = MotionEstimate()
     for step in range(400):

@@ -399,7 +399,7 @@ def test_a_breach_is_acted_upon_once(action: Reaction) -> None:
     assert watch.breaches == 2
 
 
-def test_it_acts_before_the_boundary() -> None:
+def test_fence_acts_before_the_boundary() -> None:
     """At 10 m/s a drone goes 6 m before it brakes and 20 m until it stands."""
     watch = watching()
     assert watch.look(sight(73.0, speed=(10.0, 0.0)), 0.0) is None
@@ -415,7 +415,7 @@ def test_it_acts_before_the_boundary() -> None:
     assert watch.breaches == 1
 
 
-def test_who_drives_on_is_stopped_again() -> None:
+def test_drone_that_continues_outward_is_stopped_again() -> None:
     watch = watching()
     assert watch.look(sight(85.0, speed=(9.0, 0.0)), 0.0) is Reaction.HOLD
     watch.done(2)
@@ -456,7 +456,7 @@ def test_without_prediction() -> None:
     assert watch.look(sight(101.0, speed=(15.0, 0.0)), 0.2) is Reaction.HOLD
 
 
-def test_a_return_or_a_landing_outside_is_told_of_and_not_fought() -> None:
+def test_return_or_landing_outside_is_reported_and_continues() -> None:
     watch = watching(Reaction.LAND)
     assert watch.look(sight(110.0, flying=False), 0.0) is Reaction.WARN
     assert watch.look(sight(120.0, flying=False), 1.0) is None
@@ -612,7 +612,7 @@ def test_beyond_two_boundaries_nothing_is_done_again() -> None:
     assert (watch.state, watch.breaches) == (State.OUTSIDE, 2)
 
 
-def test_back_inside_the_zones_they_hold_again_whatever_the_height() -> None:
+def test_zones_act_again_after_return_inside_below_the_floor() -> None:
     watch = beyond(8.0)
     assert watch.look(sight(103.0, ato=8.0, orders=3), 2.0) is Reaction.HOLD
     watch.done(4)
@@ -627,7 +627,7 @@ def test_back_inside_the_zones_they_hold_again_whatever_the_height() -> None:
     assert (watch.state, watch.verdict, watch.healthy) == (State.INSIDE, None, True)
 
 
-def test_two_boundaries_at_once_are_both_told_of() -> None:
+def test_two_breaches_at_once_are_both_reported() -> None:
     watch = watching()
     watch.floor = 10.0
     watch.look(sight(ato=12.0), 0.0)
@@ -643,7 +643,7 @@ def test_two_boundaries_at_once_are_both_told_of() -> None:
     assert watch.breaches == 2
 
 
-def test_a_warning_of_the_ceiling_stops_nobody() -> None:
+def test_ceiling_with_action_warn_does_not_stop_the_drone() -> None:
     """So it does not pass for the hold that brakes a vehicle before the zones."""
     watch = watching()
     assert watch.look(sight(85.0, speed=(9.0, 0.0)), 0.0) is Reaction.HOLD
@@ -652,7 +652,7 @@ def test_a_warning_of_the_ceiling_stops_nobody() -> None:
     assert watch.look(sight(101.0, ato=152.0, orders=3), 2.0) is Reaction.HOLD
 
 
-def test_what_is_enabled() -> None:
+def test_fence_watch_present_in_force_and_enabled() -> None:
     watch = FenceWatch()
     assert (watch.present, watch.in_force, watch.enabled) == (False, False, True)
     watch.take(

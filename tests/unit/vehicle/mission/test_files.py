@@ -47,7 +47,7 @@ def told(mission: tuple[Item, ...], flown: FlightPlanFile, after: int) -> list[t
     return done
 
 
-async def test_the_same_mission_goes_on_in_the_middle_of_its_file(files: FilesOnDrone) -> None:
+async def test_same_mission_continues_inside_its_file(files: FilesOnDrone) -> None:
     whole, name, _ = await files.beginning_with(leg(WHOLE, GROUND), WHOLE)
     flown, again, line = await files.beginning_with(leg(WHOLE, AIR, 3), WHOLE)
     assert flown is whole
@@ -71,7 +71,7 @@ async def test_an_edited_mission_has_the_new_numbers(
     assert told(mission, flown, line) == done
 
 
-async def test_what_was_flown_before_another_mission_is_not_of_this_one(files: FilesOnDrone) -> None:
+async def test_file_of_an_earlier_mission_is_not_reused(files: FilesOnDrone) -> None:
     """Also where the rest is the same and has the same numbers: the file's first lines are the old mission's."""
     mission = (UP, A, X, C, D)
     await files.beginning_with(leg(WHOLE, GROUND), WHOLE)
@@ -82,7 +82,7 @@ async def test_what_was_flown_before_another_mission_is_not_of_this_one(files: F
     assert (await files.beginning_with(leg(WHOLE, AIR, 3), WHOLE))[2] == -1
 
 
-async def test_the_same_text_of_other_items_of_one_mission_is_not_gone_on_with(files: FilesOnDrone) -> None:
+async def test_equal_file_of_other_items_is_not_continued(files: FilesOnDrone) -> None:
     """A place that a mission has twice: lines alone do not say which item they are."""
     mission = (UP, A, B, C, B, C)
     long, short = leg(mission[:4], GROUND), leg(mission, AIR, 4)

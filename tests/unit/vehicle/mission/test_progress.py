@@ -85,7 +85,7 @@ def test_turns_of_loops_are_counted() -> None:
     assert progress.jumps == {}
 
 
-def test_what_was_told_before_or_is_no_line_says_nothing() -> None:
+def test_repeated_or_invalid_line_changes_no_progress() -> None:
     progress = flying()
     assert progress.executed(1) == (0,)
     for line in (1, 0, -1, 6, 4_000_000_000):
@@ -93,7 +93,7 @@ def test_what_was_told_before_or_is_no_line_says_nothing() -> None:
     assert (progress.line, progress.current) == (1, 1)
 
 
-def test_lines_that_were_never_told_are_not_claimed() -> None:
+def test_skipped_lines_are_not_reported_as_reached() -> None:
     """The link was away while items 1 to 3 may have been flown."""
     progress = flying()
     progress.executed(1)
@@ -101,7 +101,7 @@ def test_lines_that_were_never_told_are_not_claimed() -> None:
     assert progress.current == 5
 
 
-def test_an_item_that_was_left_out_is_not_done_and_what_needs_no_line_behind_it_is() -> None:
+def test_omitted_item_is_not_done_but_items_without_a_line_after_it_are() -> None:
     progress = flying()
     progress.executed(2)
     assert progress.skip(3) == 2
@@ -162,7 +162,7 @@ def kept(following: int | None = None) -> MissionRecord:
     return MissionRecord.of(77, "abc", FlightPlanFile(content.encode(), LEG.origins, LEG.done), 2, following, {3: 2})
 
 
-def test_what_is_kept_is_read_again() -> None:
+def test_mission_record_is_read_as_written() -> None:
     record = kept(5)
     again = MissionRecord.read(record.written, KEPT)
     assert again == record
@@ -175,7 +175,7 @@ def test_what_is_kept_is_read_again() -> None:
     assert without.jumps == ()
 
 
-def test_what_is_kept_when_the_file_is_flown() -> None:
+def test_mission_record_after_some_lines() -> None:
     behind = kept().flown_up_to(4, {3: 1})
     assert (behind.line, behind.next, behind.jumps) == (5, 4, ((3, 1),))
     assert MissionRecord.read(behind.written, KEPT) == behind
@@ -205,12 +205,12 @@ def test_what_is_kept_when_the_file_is_flown() -> None:
         ("content", "QGC WPL 120\n" + f"0{PLACE}\n" * 5 + f"0{PLACE}\n".replace("48.0", "nan")),
     ],
 )
-def test_what_is_kept_and_can_be_nothing_of_the_mission_is_not_read(key: str, wrong: object) -> None:
+def test_mission_record_with_invalid_values_is_not_read(key: str, wrong: object) -> None:
     """People can write files: each number is looked at before anything is looked up with it."""
     assert MissionRecord.read({**kept().written, key: wrong}, KEPT) is None
 
 
-def test_what_is_kept_of_no_line_or_of_nothing_is_not_read() -> None:
+def test_mission_record_without_lines_or_of_a_shorter_mission_is_not_read() -> None:
     empty = {"content": "QGC WPL 120\n", "origins": [], "done": [], "line": -1}
     assert MissionRecord.read({**kept().written, **empty}, KEPT) is None
     assert MissionRecord.read(kept().written, KEPT[:5]) is None, "a shorter mission"

@@ -134,7 +134,7 @@ def test_sticks_of_a_velocity_stay_young_until_shortly_before_its_end() -> None:
     assert stream.expire(11.45)
 
 
-def test_silence_of_a_stream_that_flies_nothing_changes_nothing() -> None:
+def test_silence_of_an_idle_stream_changes_nothing() -> None:
     stream = OffboardStream()
     stream.receive("a", LEVEL, 0.0)
     assert not stream.expire(5.0)
@@ -249,7 +249,7 @@ def masked(first: int, mask: int, values: tuple[float, float, float]) -> tuple[f
     return tuple(None if mask & bit else value for bit, value in zip(bits, values, strict=True))
 
 
-def test_every_type_mask_says_what_it_asks_for() -> None:
+def test_each_type_mask_selects_its_fields() -> None:
     """All 4096 of them."""
     refused = set()
     for mask in range(0x1000):
@@ -303,7 +303,7 @@ def test_all_other_frames_are_refused_by_name() -> None:
 
 
 @pytest.mark.parametrize("value", [NAN, math.inf, -math.inf])
-def test_a_value_that_is_no_number_is_refused_when_it_is_asked_for(value: float) -> None:
+def test_nan_in_a_used_setpoint_field_is_refused(value: float) -> None:
     for name, bit in [("x", 0x001), ("vz", 0x020), ("afy", 0x080), ("yaw", IGNORE_YAW), ("yaw_rate", IGNORE_YAW_RATE)]:
         assert local_setpoint(local(0, **{name: value})) == "a value is not a number"
         assert isinstance(local_setpoint(local(bit, **{name: value})), MotionSetpoint)
@@ -338,7 +338,7 @@ def test_half_a_place_on_earth_is_none() -> None:
         (IGNORE_POSITION | IGNORE_ACCELERATION | IGNORE_YAW_RATE, False),  # 4039 without yaw: MAVProxy's velocity
     ],
 )
-def test_what_the_drone_flies_by_itself(mask: int, moves: bool) -> None:
+def test_setpoint_moves_by_type_mask(mask: int, moves: bool) -> None:
     setpoint = local_setpoint(local(mask))
     assert isinstance(setpoint, MotionSetpoint)
     assert setpoint.moves is moves
