@@ -560,7 +560,7 @@ def operator_texts() -> str:
     from anafi_mav import texts
 
     severities, page = _severities(), TEXTS
-    for line in _read(HERE.parent / "anafi_mav" / "texts.py").splitlines():  # type: ignore[union-attr]
+    for line in Path(texts.__file__).read_text(encoding="utf-8").splitlines():
         if heading := re.fullmatch(r"# == (.*) ==", line):
             page += f"\n## {heading[1]}\n\n| text | severity |\n|---|---|\n"
         elif assigned := re.match(r"([A-Z]\w+) = ", line):
