@@ -41,8 +41,8 @@ _NUMBER = re.compile(r"test_conf_(\d{3})")
 HEAD = """\
 # Conformance
 
-<!-- Made by `pytest tests/conformance tests/clients -m "not soak" --conformance=docs/conformance.md` from its results,
-with the combinations marked `full`. -->
+<!-- Made by `pytest --conformance=docs/conformance.md` from its results. With `-m "not soak"` the combinations marked
+`full` count too. -->
 
 For people who choose a client, or doubt an answer of the gateway. After reading you know what a client can rely on, and
 the test that shows it.

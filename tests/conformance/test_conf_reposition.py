@@ -103,6 +103,8 @@ async def without_fix(w: World) -> None:
 async def test_change_of_height_without_gps_is_flown_by_move_by(flavour: str, command: str) -> None:
     async with world(flavour=flavour) as w:
         await w.take_off(5.0)
+        # The climb counts from the reported height: the report of the take-off's end may still be on its way.
+        await w.client.wait("GLOBAL_POSITION_INT", lambda m: abs(m.relative_alt / 1000.0 - w.drone.pose.up) < 0.2)
         await without_fix(w)
         assert await goto(w, CHANGE_MODE) == REJECTED  # a place needs a fix
         if command == "DO_REPOSITION":
