@@ -43,7 +43,7 @@ def test_there_are_samples_of_each_kind() -> None:
 
 
 @pytest.mark.parametrize("path", SAMPLES, ids=lambda path: path.stem)
-def test_a_sample_is_written_as_it_was(path: Path) -> None:
+def test_sample_mission_is_written_as_it_was_read(path: Path) -> None:
     data, losses = files.encode(files.load(path), Format.QGC)
     assert losses == []
     assert json.loads(data) == json.loads(path.read_bytes())
@@ -76,7 +76,7 @@ def same(before: Item, after: Item) -> bool:
 
 @pytest.mark.parametrize("form", FORMS, ids=lambda form: form.name)
 @pytest.mark.parametrize("path", SAMPLES, ids=lambda path: path.stem)
-def test_sample_converted_and_back_differs_by_its_losses_only(path: Path, form: Format) -> None:
+def test_converted_sample_differs_by_its_listed_losses_only(path: Path, form: Format) -> None:
     """Each difference has a loss, and each loss is a difference."""
     plan = files.load(path)
     data, losses = files.encode(plan, form)
@@ -194,7 +194,7 @@ def test_a_samples_twin_is_current(path: Path, version: parrot.Version, tmp_path
 
 
 @pytest.mark.parametrize(("path", "version"), TWINS, ids=lambda value: getattr(value, "stem", None))
-def test_a_samples_twin_read_and_written_again_stays_the_same(path: Path, version: parrot.Version) -> None:
+def test_parrot_export_of_a_sample_survives_rewriting(path: Path, version: parrot.Version) -> None:
     """Through Parrot's file, QGroundControl's and Parrot's again, as often as somebody converts it."""
     kept = path.with_name(f"{path.stem}.v{version}.mavlink").read_bytes()
     plan = files.parse(kept, path.name, version)
@@ -205,7 +205,7 @@ def test_a_samples_twin_read_and_written_again_stays_the_same(path: Path, versio
         plan = files.parse(again, path.name, version)
 
 
-def test_a_twin_of_what_a_gateway_flies_is_none(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_parrot_export_of_gateway_items_does_not_exist(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for name, item in GATEWAYS.items():
         out = tmp_path / "out.mavlink"
         assert main(["plan", "convert", str(MISSIONS / f"{name}.plan"), str(out), "--model", "4k"]) == 1

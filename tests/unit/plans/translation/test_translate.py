@@ -109,7 +109,7 @@ def test_a_flight_of_version_2() -> None:
     ]
 
 
-def test_a_take_off_at_a_place_goes_up_and_then_over() -> None:
+def test_takeoff_at_a_place_climbs_before_moving() -> None:
     found = lines(
         translate(
             [take_off(15.0, LAT, LON + 1e-4, heading=45.0), action(mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH)], 2, GROUND
@@ -121,14 +121,14 @@ def test_a_take_off_at_a_place_goes_up_and_then_over() -> None:
     ]
 
 
-def test_a_take_off_in_the_air_climbs_and_never_sinks() -> None:
+def test_takeoff_in_the_air_climbs_and_never_descends() -> None:
     assert lines(translate([take_off(15.0), waypoint(1, 0)], 2, AIR))[0] == f"3 16 0.0 1.0 nan nan {LAT} {LON} 15.0"
     flight = translate([take_off(5.0), waypoint(1, 0)], 2, AIR)
     assert len(lines(flight)) == 1
     assert flight.parts[0].done == ((0, 1),)  # nothing was to be done for the take-off
 
 
-def test_in_the_air_a_take_off_alone_is_nothing_to_do() -> None:
+def test_lone_takeoff_in_the_air_does_nothing() -> None:
     flight = translate([take_off(5.0)], 2, AIR)
     assert (flight.parts, flight.done, flight.rest) == ((), (0,), None)
 
@@ -146,7 +146,7 @@ def test_mission_without_takeoff_gets_one_in_front() -> None:
     assert in_the_air.notes == ()
 
 
-def test_a_way_point_below_the_take_off_is_not_sunk_to_first() -> None:
+def test_waypoint_below_the_takeoff_height_needs_no_descent_first() -> None:
     flight = translate([waypoint(1, 0, -5.0)], 1, GROUND)
     assert [line.split()[1] for line in lines(flight)] == ["22", "16"]
     assert flight.notes == (Loss("no item takes off", 0),)
@@ -161,7 +161,7 @@ def test_on_the_ground_there_is_nothing_to_land() -> None:
         translate([action(mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH)], 1, GROUND)
 
 
-def test_landing_at_a_place_goes_over_it_first() -> None:
+def test_landing_at_a_place_flies_there_first() -> None:
     land = Item(mav_enums.MAV_CMD_NAV_LAND, RELATIVE, (0.0, 0.0, 0.0, None, LAT, LON, 0.0))
     assert lines(translate([waypoint(1, 0, 20.0), land], 2, AIR))[1:] == [
         f"3 16 0.0 1.0 nan nan {LAT} {LON} 20.0",
@@ -169,7 +169,7 @@ def test_landing_at_a_place_goes_over_it_first() -> None:
     ]
 
 
-def test_heights_above_the_sea_count_from_the_take_off_point() -> None:
+def test_amsl_heights_count_from_the_takeoff_point() -> None:
     items = [waypoint(1, 0, 60.5, frame=GLOBAL)]
     assert examine(items, 1).faults == ()
     assert lines(translate(items, 1, AIR))[0].endswith(" 25.5")
@@ -179,7 +179,7 @@ def test_heights_above_the_sea_count_from_the_take_off_point() -> None:
     assert [(fault.item, fault.kind) for fault in terrain] == [(0, FaultKind.FRAME)]
 
 
-def test_values_that_an_item_leaves_out_stay() -> None:
+def test_omitted_values_of_an_item_stay() -> None:
     here = Item(mav_enums.MAV_CMD_NAV_WAYPOINT, RELATIVE, (5.0, 0.0, 0.0, None, None, None, None))
     there = Item(mav_enums.MAV_CMD_NAV_WAYPOINT, RELATIVE, (0.0, 0.0, 0.0, None, LAT + 1e-4, LON, None))
     zeros = Item(mav_enums.MAV_CMD_NAV_WAYPOINT, RELATIVE, (0.0,) * 7)
@@ -248,7 +248,7 @@ def test_long_mission_becomes_files_in_sequence() -> None:
     assert done == list(range(MAX_LINES + 4))
 
 
-def test_a_loop_in_a_loop_counts_for_the_whole_mission() -> None:
+def test_nested_loop_counts_for_the_whole_mission() -> None:
     """As in PX4 and ArduPilot: the inner jump is used up in the first round of the outer one."""
     items = [waypoint(1, 0), action(DO_JUMP, 0.0, 2.0), waypoint(2, 0), action(DO_JUMP, 0.0, 1.0)]
     (leg,) = translate(items, 1, AIR).parts
@@ -445,7 +445,7 @@ BUSY = {
 
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize("what", [*IDLE, *BUSY])
-def test_loops_without_end_in_which_something_or_nothing_is_flown(what: str, version: Version) -> None:
+def test_endless_loop_is_refused_only_without_flight(what: str, version: Version) -> None:
     """A photo is nothing: that the drone waits until it is taken, nobody says."""
     items = [take_off(8.0), *{**IDLE, **BUSY}[what]]
     report = examine([*items, action(DO_JUMP, 1.0, -1.0)], version)
@@ -453,7 +453,7 @@ def test_loops_without_end_in_which_something_or_nothing_is_flown(what: str, ver
     assert report.faults == ((idle,) if what in IDLE else ())
 
 
-def test_a_few_photos_of_one_place_are_a_loop_with_an_end() -> None:
+def test_few_photos_at_one_place_are_a_finite_loop() -> None:
     flight = translate(
         [waypoint(0, 1), action(mav_enums.MAV_CMD_IMAGE_START_CAPTURE, 0.0, 0.0, 1.0), action(DO_JUMP, 1.0, 300.0)],
         2,
@@ -462,7 +462,7 @@ def test_a_few_photos_of_one_place_are_a_loop_with_an_end() -> None:
     assert len([line for line in lines(flight) if line.startswith("2 2000 ")]) == 301
 
 
-def test_a_loop_of_many_items_that_need_no_line() -> None:
+def test_loop_of_lineless_items_is_cut_by_item_count() -> None:
     """It is cut by the items that are come by, not by its lines: 2000 of them were ten million items."""
     items = [
         waypoint(0, 1),
@@ -483,9 +483,7 @@ def test_a_loop_of_many_items_that_need_no_line() -> None:
 
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize(("items", "fault"), WRONG.values(), ids=WRONG)
-def test_mission_item_that_cannot_be_translated_is_refused(
-    items: list[Item], fault: TranslationFault, version: Version
-) -> None:
+def test_untranslatable_mission_item_is_refused(items: list[Item], fault: TranslationFault, version: Version) -> None:
     assert examine(items, version).faults == (fault,)
     with pytest.raises(PlanError):
         translate(items, version, AIR)
@@ -498,7 +496,7 @@ def test_an_empty_mission() -> None:
 
 
 @pytest.mark.parametrize("version", VERSIONS)
-def test_the_simulated_drone_reads_what_is_written(version: Version) -> None:
+def test_simulated_drone_reads_the_translated_file(version: Version) -> None:
     items = [
         take_off(15.0),
         waypoint(1, 0, 20.0, 3.0),
@@ -551,7 +549,7 @@ PARROT = (16, 20, 21, 22, 93, 112, 178, 195, 197, 201, 205, 206, 214, 2000, 2001
 """Its flight plan page."""
 
 
-def test_the_table_knows_what_is_put_into_plans() -> None:
+def test_command_table_covers_the_planners_commands() -> None:
     assert set(QGROUNDCONTROL) | set(PARROT) | {531, 1001} <= set(TABLE)
     assert all(TABLE[command].verdict is not Fidelity.REFUSED for command in PARROT)
     for row in TABLE.values():
@@ -560,7 +558,7 @@ def test_the_table_knows_what_is_put_into_plans() -> None:
 
 
 @pytest.mark.parametrize("command", [row.command for row in TABLE.values() if row.verdict is Fidelity.REFUSED])
-def test_command_that_the_table_refuses_is_refused(command: int) -> None:
+def test_command_refused_by_the_table_is_refused(command: int) -> None:
     (fault,) = examine([waypoint(0, 1), action(command)], 2).faults
     assert (fault.item, fault.kind) == (1, FaultKind.COMMAND)
     assert fault.reason == f"{TABLE[command].name}: {TABLE[command].why}"
@@ -661,7 +659,7 @@ def test_any_mission_is_refused_or_flown_whole(seed: int, version: Version, flyi
     assert start.flying or commands[0] is plan_file.PlanCommand.TAKEOFF
 
 
-def test_the_missions_of_the_property_test_are_flown_often_enough() -> None:
+def test_missions_of_the_property_test_mostly_fly() -> None:
     """Else it would show nothing."""
     flown = [seed for seed in range(300) if not examine(mission(seed), 1).faults]
     assert len(flown) > 30
