@@ -18,7 +18,6 @@ from typing import Any
 
 from pymavlink import mavutil
 
-
 ROOT = Path(__file__).resolve().parents[2]
 
 TICKS = os.sysconf("SC_CLK_TCK")
