@@ -135,7 +135,7 @@ def test_scenario_path_is_relative_to_the_configuration(tmp_path: Path) -> None:
 def test_system_id_245_is_legal_and_remarked_upon() -> None:
     config = from_text("drones: [{name: a, sysid: 1, sim: {}}, {name: b, sysid: 245, sim: {}}]", "fleet.yaml")
     assert remarks(config) == [
-        "drones[1].sysid: 245 is what MAVSDK calls itself unless told otherwise: such a client will not see this drone"
+        "drones[1].sysid: 245 is the default system id of MAVSDK: such a client will not see this drone"
     ]
     assert remarks(Config()) == []
 
