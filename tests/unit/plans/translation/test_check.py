@@ -55,7 +55,7 @@ def test_check_names_each_item_that_cannot_fly() -> None:
     findings = found(UP, action(mav_enums.MAV_CMD_DO_SET_SERVO, 1.0), waypoint(1, 0, frame=10))
     assert told(findings) == [
         "item 1: DO_SET_SERVO: the drone has no actuator that a flight plan could move",
-        "item 2: NAV_WAYPOINT: its height is above the terrain, which the drone does not know",
+        "item 2: NAV_WAYPOINT: heights above terrain are unsupported",
     ]
     assert findings.errors
     assert (findings.distance, findings.seconds) == (None, None)
@@ -81,8 +81,7 @@ def test_check_without_home_has_no_amsl_heights() -> None:
     findings = found(UP, waypoint(1, 0, 60.0, frame=GLOBAL), BACK, home=None)
     assert told(findings) == []
     assert told(findings, FindingSeverity.WARNING) == [
-        "item 1: its height is above mean sea level, and that of the take-off point is not known: "
-        "its path cannot be checked"
+        "item 1: height above mean sea level, but that of the take-off point is unknown: its path cannot be checked"
     ]
 
 
