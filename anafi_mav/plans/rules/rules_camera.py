@@ -144,7 +144,7 @@ def _pitch_yaw(writer: FlightPlanWriter, item: Item) -> None:
     earth = bits & (mav_enums.GIMBAL_MANAGER_FLAGS_YAW_LOCK | mav_enums.GIMBAL_MANAGER_FLAGS_YAW_IN_EARTH_FRAME)
     if yaw is not None and (earth or (yaw != 0.0 and writer.version == 1)):
         writer.refuse("the camera does not pan: turn the drone" if writer.version == 1
-                   else "yaw from north is unsupported", 2)  # fmt: skip
+                   else "the camera's yaw from north is unsupported", 2)  # fmt: skip
     _tilt(writer, pitch, 1, None, yaw)
 
 

@@ -459,7 +459,7 @@ WRONG = {
     "a region": ([action(50000, 2.0, 3.0)], "unknown region of interest", FaultKind.PARAM, 2),
     "north": (
         [action(mav_enums.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, 0.0, 90.0, None, None, 16.0)],
-        "yaw from north",
+        "the camera",
         FaultKind.PARAM,
         2,
     ),
