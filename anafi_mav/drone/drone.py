@@ -553,6 +553,7 @@ class Drone:
             self.controller.link_silent()
         else:
             self.controller.link_lost()
+        self.streams.link_lost()
         self.video.link_lost()
         if not self._lost.done():
             self._lost.set_result(why)
@@ -572,6 +573,7 @@ class Drone:
                 await asyncio.sleep(0)  # a session sends at the end of a turn of the loop
                 await session.close()
                 self._on_lost(session, session.lost)
+        self.streams.link_lost()
         await self.video.close()
         await self._rest.close()
 

@@ -83,6 +83,7 @@ class StreamChoice:
         self._chosen = StreamKind.VISIBLE
         """Stream of a model whose client chooses it."""
         self._kind = StreamKind.VISIBLE
+        self._is_linked = False
         self._showing = asyncio.Lock()
         self._callbacks: tuple[ChangeCallback, ...] = ()
 
@@ -123,7 +124,8 @@ class StreamChoice:
                 if kind is not self._shown_by_drone():
                     await self._change(kind)
             finally:
-                self._follow()
+                if self._is_linked:
+                    self._follow()
 
     async def _change(self, kind: StreamKind) -> None:
         if self.is_recording:
@@ -151,10 +153,16 @@ class StreamChoice:
     def link_up(self) -> None:
         """Take the stream that the drone shows; what was chosen on an earlier connection is forgotten."""
         self._chosen = StreamKind.VISIBLE
+        self._is_linked = True
         self._follow()
 
+    def link_lost(self) -> None:
+        """Keep the stream until the drone has sent its states again."""
+        self._is_linked = False
+
     def _on_event(self) -> None:
-        if not self._showing.locked():  # mode and rendering follow each other: one change, not two
+        # Mode and rendering follow each other, in a change and when the states are sent: one change, not two.
+        if self._is_linked and not self._showing.locked():
             self._follow()
 
     def _shown_by_drone(self) -> StreamKind:
