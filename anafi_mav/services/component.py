@@ -169,7 +169,7 @@ class Component:
         self._system.send_heartbeat()
 
     def text(self, severity: Severity, text: OperatorText, to: Channel | None = None) -> None:
-        """A STATUSTEXT of the autopilot to everybody, and a line in the log; or to one channel alone."""
+        """Send a STATUSTEXT of the autopilot to everybody, with a line in the log, or to one channel."""
         self._system.text(severity, text, to)
 
     def warn_throttled(self, text: OperatorText) -> None:

@@ -275,7 +275,8 @@ class System:
     def owner(self, message: Any) -> Component:
         """Return the component that answers this message to component 0.
 
-        It is a command, or a message that several components handle. The autopilot answers for commands that no component has.
+        It is a command, or a message that several components handle. The autopilot answers for commands that no
+        component has.
         """
         if message.get_msgId() in BY_AUTOPILOT:
             return self._autopilot
