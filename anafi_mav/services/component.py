@@ -169,7 +169,7 @@ class Component:
         self._system.send_heartbeat()
 
     def text(self, severity: Severity, text: OperatorText, to: Channel | None = None) -> None:
-        """Send a STATUSTEXT of the autopilot to everybody, with a line in the log, or to one channel."""
+        """Send a STATUSTEXT of the autopilot to all, or to one channel alone."""
         self._system.text(severity, text, to)
 
     def warn_throttled(self, text: OperatorText) -> None:
