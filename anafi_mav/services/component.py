@@ -21,6 +21,7 @@ from anafi_mav.mavlink.node import Inbound
 from anafi_mav.mavlink.router import EVERY_COMPONENT
 from anafi_mav.services.command.command_service import CommandService
 from anafi_mav.services.commands import Action, ActionGroup
+from anafi_mav.services.definition_link import DefinitionLink
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.ftp.ftp_service import FtpService
 from anafi_mav.services.memory import Memory
@@ -96,6 +97,7 @@ class Component:
         self.vehicle = system.vehicle
         self.clock = system.clock
         self.memory = system.memory
+        self.definition = DefinitionLink()
         self._system = system
         self.commands = CommandService(self)
         self.messages = MessageService(self)
@@ -103,8 +105,10 @@ class Component:
         self.services: list[Service] = [self.commands, self.messages, self._ftp]
         self.services += [kind(self) for kind in services]
         self.capabilities: int = 0
+        self.camera_flags: int = 0
         for service in self.services:
             self.capabilities |= service.capabilities()
+            self.camera_flags |= service.camera_flags()
         self.telemetry: frozenset[int] = frozenset()
         """Messages that the next one of their kind replaces: a full channel drops them rather than answers."""
         self._handlers: dict[int, MessageHandler] = {}

@@ -16,6 +16,7 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import Action, ActionGroup, Command
+from anafi_mav.services.definition_link import DefinitionLink
 from anafi_mav.services.files import ServedFile
 from anafi_mav.services.flavours import Flavour
 from anafi_mav.services.memory import Memory
@@ -47,6 +48,10 @@ class Host(Protocol):
     capabilities: int
     """MAV_PROTOCOL_CAPABILITY bits of all services of the component."""
     memory: Memory
+    definition: DefinitionLink
+    """Camera definition of the component."""
+    camera_flags: int
+    """CAMERA_CAP_FLAGS of all services of the component that do not depend on the drone."""
 
     @property
     def channels(self) -> Sequence[Channel]:
@@ -140,6 +145,10 @@ class Service:
 
     def capabilities(self) -> int:
         """MAV_PROTOCOL_CAPABILITY bits that this service is the reason for."""
+        return 0
+
+    def camera_flags(self) -> int:
+        """CAMERA_CAP_FLAGS bits that this service is the reason for."""
         return 0
 
     def messages(self) -> Mapping[int, MessageHandler]:

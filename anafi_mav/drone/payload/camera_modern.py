@@ -296,8 +296,10 @@ def photo_news(m: Any) -> CaptureUpdate | None:
 
     The events are START, then STOP with the media id, once for a series as for a single picture.
     """
-    if m.type in (wire.PhotoEvent.START, wire.PhotoEvent.TAKING_PHOTO):
+    if m.type == wire.PhotoEvent.START:
         return CaptureUpdate(m.camera_id, CaptureProgress.STARTED)
+    if m.type == wire.PhotoEvent.TAKING_PHOTO:
+        return CaptureUpdate(m.camera_id, CaptureProgress.TAKEN)
     if m.type != wire.PhotoEvent.STOP:
         return None
     if m.media_id:

@@ -206,6 +206,8 @@ class CaptureProgress(enum.Enum):
     """Progress of a requested photo or recording."""
 
     STARTED = enum.auto()
+    TAKEN = enum.auto()
+    """Photo: the shutter has opened."""
     SAVED = enum.auto()
     """Photo: the media is stored."""
     ENDED = enum.auto()
@@ -222,3 +224,5 @@ class CaptureUpdate(msgspec.Struct, frozen=True):
     """Media id, of SAVED and ENDED."""
     reason: str = ""
     """Reason of FAILED, and of an end that was not requested."""
+    count: int | None = None
+    """Pictures so far, of TAKEN and SAVED, modulo 256; None where the drone does not report it."""
