@@ -31,6 +31,7 @@ from anafi_mav.services.event.event_service import EventService
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.ftp.ftp_service import FtpService
 from anafi_mav.services.ftp.log_service import LogService
+from anafi_mav.services.gimbal.gimbal_service import GimbalService
 from anafi_mav.services.ground_station.banner_service import BannerService
 from anafi_mav.services.ground_station.identity_service import IdentityService
 from anafi_mav.services.ground_station.node_status_service import NodeStatusService
@@ -77,6 +78,7 @@ SERVICES: tuple[type[Service], ...] = (
     CalibrationService,
     CompassService,
     OrbitService,
+    GimbalService,
     TelemetryService,
     ParameterService,
     LinkLossService,
