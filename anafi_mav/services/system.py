@@ -30,6 +30,7 @@ from anafi_mav.services.command.orbit_service import OrbitService
 from anafi_mav.services.component import BY_AUTOPILOT, COMMANDS, Component, joined
 from anafi_mav.services.event.event_service import EventService
 from anafi_mav.services.ftp.log_service import LogService
+from anafi_mav.services.gimbal.gimbal_service import GimbalService
 from anafi_mav.services.ground_station.banner_service import BannerService
 from anafi_mav.services.ground_station.identity_service import IdentityService
 from anafi_mav.services.ground_station.node_status_service import NodeStatusService
@@ -76,6 +77,7 @@ AUTOPILOT_SERVICES: tuple[type[Service], ...] = (
     CalibrationService,
     CompassService,
     OrbitService,
+    GimbalService,
     TelemetryService,
     ParameterService,
     LinkLossService,

@@ -43,6 +43,8 @@ CORES = [
     "vehicle/joystick_override.py",
     *("services/capabilities.py", "services/checksum.py", "services/commands.py", "services/component_metadata.py"),
     *("services/event/events.py", "services/ftp/ftp.py"),
+    *("services/gimbal/control.py", "services/gimbal/gimbal_messages.py", "services/gimbal/mount.py"),
+    *("services/gimbal/rates.py", "services/gimbal/targets.py"),
     *("services/parameter/parameter_codec.py", "services/parameter/parameter_metadata.py"),
     *("services/plan/fence_kind.py", "services/plan/item_messages.py", "services/plan/mission_kind.py"),
     *("services/plan/plan_files.py", "services/plan/plan_protocol.py", "services/plan/plan_requests.py"),
