@@ -50,6 +50,7 @@ from anafi_mav.services.plan.fence_service import FenceService
 from anafi_mav.services.plan.mission_service import MissionService
 from anafi_mav.services.plan.plan_service import PlanService
 from anafi_mav.services.plan.rally_service import RallyService
+from anafi_mav.services.pose import VehiclePose
 from anafi_mav.services.service import MessageHandler, Service
 from anafi_mav.services.setpoint.follow_service import FollowService
 from anafi_mav.services.setpoint.manual_control_service import ManualControlService
@@ -147,8 +148,10 @@ class System:
         *,
         allow_kill: bool,
         state: Path | None = None,
+        has_picture_pose: bool = True,
     ) -> None:
         self.sysid = sysid
+        self.has_picture_pose = has_picture_pose
         self.drone = drone
         self.clock = clock
         self.memory = Memory(state)
@@ -271,9 +274,19 @@ class System:
             self._told = (self._node.channels, told)
         return told
 
-    def is_streamed(self, id: int) -> bool:
-        """Return True when this message is streamed on some channel."""
-        return self._messages.is_streamed(id)
+    @property
+    def needs_pictures(self) -> bool:
+        """True while a client requests pose more often than events are reported."""
+        return self._messages.needs_pictures
+
+    @property
+    def needs_video(self) -> bool:
+        """True while a client has a stream whose fields are in the live video only."""
+        return self._messages.needs_video
+
+    def show_picture(self, pose: VehiclePose, shot: float, now: float) -> None:
+        """Send the pose that a picture reports; `shot`: when it was taken (s, monotonic)."""
+        self._messages.show_picture(pose, shot, now)
 
     def mark_updated(self, id: int, at: float) -> None:
         """Send a streamed message for a value that no event reports.
