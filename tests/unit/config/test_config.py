@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from anafi_mav.config import Config, DroneConfig, SimConfig, from_text, load, remarks
+from anafi_mav.config import Config, DroneConfig, HttpConfig, SimConfig, from_text, load, remarks
 from anafi_mav.config.schema import WindConfig
 from anafi_mav.errors import ConfigError
 
@@ -20,6 +20,7 @@ REPOSITORY = Path(__file__).parents[3]
 HOST = "expected an IPv4 address or a host name, like 192.168.42.1, got"
 NAME = "expected 1 to 32 letters, digits, '-', '_' or '.', beginning with a letter or digit, got"
 SYSID = "expected a whole number from 1 to 250"
+KEYS = ", ".join(Config.__struct_fields__)
 KEYS_OF_A_DRONE = "name, sysid, address, interface, sim, discovery_port, http_port, rtsp_port, allow_kill"
 
 
@@ -110,7 +111,7 @@ def test_every_value_survives() -> None:
     )
 
 
-def test_anchors_and_merges_are_not_mistaken_for_keys_written_twice() -> None:
+def test_anchors_and_merges_are_no_duplicate_keys() -> None:
     text = (
         "drones:\n  - &a {name: a, sysid: 1, sim: {seed: 1}}\n"
         "  - &b {<<: *a, name: b, sysid: 2}\n  - {<<: *b, sysid: 3, name: c}\n"
@@ -121,6 +122,25 @@ def test_anchors_and_merges_are_not_mistaken_for_keys_written_twice() -> None:
         ("b", 2, SimConfig(seed=1)),
         ("c", 3, SimConfig(seed=1)),
     ]
+
+
+def test_web_server_is_configured_left_out_or_off() -> None:
+    assert from_text("http: {host: 0.0.0.0, port: 0}", "f").http_server == HttpConfig(host="0.0.0.0", port=0)
+    assert from_text("http: off", "f").http_server is None
+    assert from_text("http: on", "f").http_server == from_text("", "f").http_server == HttpConfig()
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("http: 8088", "http: expected a mapping like {host: 127.0.0.1, port: 8088}, or off, got 8088"),
+        ("http: {port: 65536}", "http.port: expected a port from 0 to 65535, got 65536"),
+        ("http: {host: 1.2.3}", "http.host: expected an IPv4 address or a host name of this computer, like 0.0.0.0"),
+        ("http: {address: x}", "http.address: unknown key; expected one of host, port"),
+    ],
+)
+def test_web_server_of_wrong_kind_is_named_with_its_key(text: str, line: str) -> None:
+    assert problem(text).startswith(f"fleet.yaml: {line}")
 
 
 def test_scenario_path_is_relative_to_the_configuration(tmp_path: Path) -> None:
@@ -135,7 +155,7 @@ def test_scenario_path_is_relative_to_the_configuration(tmp_path: Path) -> None:
 def test_system_id_245_is_legal_and_remarked_upon() -> None:
     config = from_text("drones: [{name: a, sysid: 1, sim: {}}, {name: b, sysid: 245, sim: {}}]", "fleet.yaml")
     assert remarks(config) == [
-        "drones[1].sysid: 245 is what MAVSDK calls itself unless told otherwise: such a client will not see this drone"
+        "drones[1].sysid: 245 is the default system id of MAVSDK: such a client will not see this drone"
     ]
     assert remarks(Config()) == []
 
@@ -157,13 +177,13 @@ def two(first: str, second: str) -> str:
 
 MISTAKES = {
     # Whole file
-    "[]": "expected a mapping with the keys endpoints, drones, allow_kill, pose, state, got []",
-    "just text": "expected a mapping with the keys endpoints, drones, allow_kill, pose, state, got 'just text'",
+    "[]": f"expected a mapping with the keys {KEYS}, got []",
+    "just text": f"expected a mapping with the keys {KEYS}, got 'just text'",
     # Unknown keys, at each level
     "drons: []": "drons: unknown key; did you mean drones?",
-    "x: 1": "x: unknown key; expected one of endpoints, drones, allow_kill, pose, state",
-    "3: 4": "3: unknown key; expected one of endpoints, drones, allow_kill, pose, state",
-    "'a b': 4": "'a b': unknown key; expected one of endpoints, drones, allow_kill, pose, state",
+    "x: 1": f"x: unknown key; expected one of {KEYS}",
+    "3: 4": f"3: unknown key; expected one of {KEYS}",
+    "'a b': 4": f"'a b': unknown key; expected one of {KEYS}",
     one("sysid: 1, sim: {}, adress: x"): "drones[0].adress: unknown key; did you mean address?",
     sim("hme: 1"): "drones[0].sim.hme: unknown key; did you mean home?",
     # Wrong types
@@ -249,12 +269,12 @@ MISTAKES = {
 
 
 @pytest.mark.parametrize("text", MISTAKES, ids=lambda text: text[:60])
-def test_each_mistake_is_one_line_with_its_place(text: str) -> None:
+def test_configuration_mistake_is_one_line_with_its_place(text: str) -> None:
     wanted = MISTAKES[text]
     assert problem(text) == (wanted if wanted.startswith("fleet.yaml") else f"fleet.yaml: {wanted}")
 
 
-def test_bytes_that_are_not_text_are_one_line() -> None:
+def test_undecodable_configuration_is_one_line() -> None:
     assert problem(b"a: \xff").startswith("fleet.yaml: unacceptable character #x00ff")
     assert problem("a: \x00").startswith("fleet.yaml: unacceptable character #x0000")
 
@@ -274,14 +294,14 @@ def test_the_error_keeps_the_key_path() -> None:
     assert caught.value.key_path == "drones[0].sysid"
 
 
-def test_a_file_that_cannot_be_read(tmp_path: Path) -> None:
+def test_unreadable_configuration_is_reported(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"^cannot read .*missing\.yaml: No such file or directory$"):
         load(tmp_path / "missing.yaml")
     with pytest.raises(ConfigError, match=r"^cannot read .*: Is a directory$"):
         load(tmp_path)
 
 
-def test_a_file_that_is_no_configuration_is_not_read_whole(tmp_path: Path) -> None:
+def test_oversized_configuration_is_not_read_whole(tmp_path: Path) -> None:
     path = tmp_path / "film.mp4"
     path.write_bytes(b"#" * (1 << 20) + b"#")
     with pytest.raises(ConfigError, match=r"expected a file of at most 1048576 bytes$"):
