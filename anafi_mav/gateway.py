@@ -297,7 +297,14 @@ class Gateway:
             )
             allow_kill = self.config.allow_kill if config.allow_kill is None else config.allow_kill
             system = System(
-                self._node, drone, config.sysid, self._clock, started, allow_kill=allow_kill, state=self._state
+                self._node,
+                drone,
+                config.sysid,
+                self._clock,
+                started,
+                allow_kill=allow_kill,
+                state=self._state,
+                has_picture_pose=self.config.pose == "video",
             )
             supervised = _Supervised(config, drone, system, self._write_lock)
             supervised.task = asyncio.get_running_loop().create_task(supervised.run())

@@ -150,8 +150,10 @@ class System:
         *,
         allow_kill: bool,
         state: Path | None = None,
+        has_picture_pose: bool = True,
     ) -> None:
         self.sysid = sysid
+        self.has_picture_pose = has_picture_pose
         self.drone = drone
         self.clock = clock
         self.memory = Memory(state)
