@@ -335,7 +335,13 @@ class SimulatedDrone:
             "hardware": model.hardware,
         }
         calendar = firmware.payload.calendar
-        return WebServer(firmware.payload.media, firmware.plans, properties, lambda: calendar.date(firmware.time))
+        return WebServer(
+            firmware.payload.media,
+            firmware.plans,
+            properties,
+            lambda: calendar.date(firmware.time),
+            lambda: Quirk.NO_HTTP_RANGE not in self.faults.quirks,
+        )
 
     async def close(self) -> None:
         """Close the sockets, without a word to the controller: ARSDK has no goodbye. Idempotent."""

@@ -15,11 +15,14 @@ from typing import Any
 from aiohttp import WSCloseCode, web
 from aiohttp.typedefs import Handler
 
-from anafi_mav.sim.payload.media import MediaKind, MediaStore
+from anafi_mav.sim.payload.media import PART, MediaKind, MediaStore
 from anafi_mav.sim.plan.plan_store import FlightPlanStore
 
 MAX_BODY = 1 << 20
 """Bytes of a request body that are read; a flight plan of a thousand items is a tenth of it."""
+
+SENT_PART = 1 << 16
+"""Bytes of a file that are sent at a time."""
 
 MAX_UNREAD = 1000
 """Notifications that wait for a client that does not read; then its socket is closed."""
@@ -41,16 +44,23 @@ _ORDERS = {"oldest": False, "newest": True}
 class WebServer:
     """One drone's HTTP server.
 
-    `properties` are what it says of itself, `date` the time on its clock.
+    `properties` are what it says of itself, `date` the time on its clock. `has_ranges` returns False while it ignores
+    Range in requests.
     """
 
     def __init__(
-        self, media: MediaStore, plans: FlightPlanStore, properties: Mapping[str, str], date: Callable[[], str]
+        self,
+        media: MediaStore,
+        plans: FlightPlanStore,
+        properties: Mapping[str, str],
+        date: Callable[[], str],
+        has_ranges: Callable[[], bool] = lambda: True,
     ) -> None:
         self._media = media
         self._plans = plans
         self._properties = dict(properties)
         self._date = date
+        self.has_ranges = has_ranges
         self._audible = asyncio.Event()
         self._audible.set()
         self._listeners: dict[web.WebSocketResponse, tuple[asyncio.Queue[str], asyncio.Transport | None]] = {}
@@ -168,14 +178,39 @@ class WebServer:
         resource = self._media.resource(request.match_info["id"])
         if resource is None:
             return _unknown("resource")
-        told = {"resource_id": resource.id, "media_id": resource.media_id, "md5": resource.md5()}
-        return web.json_response(told)
+        # A video may have gigabytes: the drone's link must not wait for their digest.
+        md5 = resource.md5() if resource.size < PART else await asyncio.to_thread(resource.md5)
+        return web.json_response({"resource_id": resource.id, "media_id": resource.media_id, "md5": md5})
 
-    async def _file(self, request: web.Request) -> web.Response:
+    async def _file(self, request: web.Request) -> web.StreamResponse:
+        """Send a file part by part.
+
+        All of it, or the one range that the client wants (RFC 9110 §14).
+        """
         resource = self._media.resource(request.match_info["id"]) if self._media.indexed else None
         if resource is None:
             return _unknown("file")
-        return web.Response(body=resource.content(), content_type=_TYPES[resource.kind])
+        first, end = 0, resource.size
+        headers = {"Accept-Ranges": "bytes"} if self.has_ranges() else {}
+        status = 200
+        if self.has_ranges() and "Range" in request.headers:
+            try:
+                first, end, _ = request.http_range.indices(resource.size)
+            except ValueError:  # a range that cannot be read is none (RFC 9110 §14.2)
+                pass
+            else:
+                if first >= end:
+                    return web.Response(status=416, headers={"Content-Range": f"bytes */{resource.size}"})
+                status, headers["Content-Range"] = 206, f"bytes {first}-{end - 1}/{resource.size}"
+        response = web.StreamResponse(status=status, headers=headers)
+        response.content_type = _TYPES[resource.kind]
+        response.content_length = end - first
+        await response.prepare(request)
+        for part in resource.parts(first, end, SENT_PART):
+            await self._audible.wait()
+            await response.write(part)
+        await response.write_eof()
+        return response
 
     async def _thumbnail(self, request: web.Request) -> web.Response:
         resource = self._media.by_thumbnail(request.match_info["id"]) if self._media.indexed else None
