@@ -569,6 +569,7 @@ class Drone:
                 await session.close()
                 self._on_lost(session, session.lost)
         await self.video.close()
+        await self.media.close()
         await self._rest.close()
 
     @property
