@@ -195,7 +195,10 @@ class System:
         for service in self.services:
             if isinstance(service, PlanService):
                 service.take_tables(_joined(service.item_commands() for service in self.services))
-        self._ftp.take_tables(_joined(service.files() for service in self.services))
+        self._ftp.take_tables(
+            _joined(service.files() for service in self.services),
+            _joined(service.folders() for service in self.services),
+        )
         self._handlers: dict[int, MessageHandler] = _joined(service.messages() for service in self.services)
         self._handlers[dialect.MAVLINK_MSG_ID_HEARTBEAT] = self._heard
         self._receiving = [service for service in self.services if type(service).received is not Service.received]
