@@ -33,6 +33,7 @@ ANSWER_TIMEOUT = 10.0
 CONNECTIONS = 8
 """At a time: two files, notifications, a list, a checksum and a flight plan, which must not wait for them."""
 
+NOT_INDEXED_YET = "the drone has not indexed its media yet"
 NOT_INDEXED = 541
 """Parrot's status for a question about media while there is no index yet (developer.parrot.com, media API)."""
 
@@ -191,7 +192,7 @@ class Rest:
 
 async def _refusal(what: str, response: aiohttp.ClientResponse) -> str:
     if response.status == NOT_INDEXED:
-        return "the drone has not indexed its media yet"
+        return NOT_INDEXED_YET
     told = ""
     with suppress(aiohttp.ClientError, asyncio.TimeoutError, msgspec.DecodeError, AttributeError):
         answer = msgspec.json.decode(await response.content.read(1 << 12))

@@ -237,6 +237,11 @@ class SimulatedDrone:
         return None if self._web is None else self._web.port
 
     @property
+    def web(self) -> WebServer | None:
+        """The web server; None without one."""
+        return self._web
+
+    @property
     def rtsp_port(self) -> int | None:
         """Return the video server's port, or None without a video server."""
         return self._video.port or None

@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -63,6 +64,10 @@ class WebServer:
         self.has_ranges = has_ranges
         self._audible = asyncio.Event()
         self._audible.set()
+        self.refuses_sockets = False
+        """True: no notifications, as a firmware without them."""
+        self.served: Counter[str] = Counter()
+        """Requests of some kinds so far: "medias", the list."""
         self._listeners: dict[web.WebSocketResponse, tuple[asyncio.Queue[str], asyncio.Transport | None]] = {}
         app = web.Application(client_max_size=MAX_BODY, middlewares=[self._through_the_air])
         api = "/api/v1"
@@ -84,7 +89,7 @@ class WebServer:
                 web.delete(f"{api}/upload/flightplan/{{id}}", self._delete_plan),
             ]
         )
-        app.on_shutdown.append(self._close_sockets)
+        app.on_shutdown.append(lambda app: self.close_sockets())
         self._runner = web.AppRunner(app, access_log=None, shutdown_timeout=SHUTDOWN)
         self.port = 0
 
@@ -133,6 +138,7 @@ class WebServer:
         return web.json_response(self._properties)
 
     async def _medias(self, request: web.Request) -> web.Response:
+        self.served["medias"] += 1
         if not self._media.indexed:
             return _not_indexed()
         query = request.query
@@ -233,7 +239,9 @@ class WebServer:
                 if transport is not None:
                     transport.abort()
 
-    async def _notifications(self, request: web.Request) -> web.WebSocketResponse:
+    async def _notifications(self, request: web.Request) -> web.StreamResponse:
+        if self.refuses_sockets:
+            return _unknown("page")
         socket = web.WebSocketResponse(heartbeat=30.0, max_msg_size=MAX_WORD)
         await socket.prepare(request)
         queue: asyncio.Queue[str] = asyncio.Queue(MAX_UNREAD)
@@ -247,7 +255,8 @@ class WebServer:
             writer.cancel()
         return socket
 
-    async def _close_sockets(self, app: web.Application) -> None:
+    async def close_sockets(self) -> None:
+        """Close the websockets of all clients."""
         for socket in list(self._listeners):
             with contextlib.suppress(ConnectionError):
                 await socket.close(code=WSCloseCode.GOING_AWAY)

@@ -24,6 +24,8 @@ from anafi_mav.drone.expectation import Commander
 from anafi_mav.drone.payload.media_file import Place as Place
 from anafi_mav.drone.payload.media_file import Resource as Resource
 from anafi_mav.drone.payload.media_file import fetch, file_name
+from anafi_mav.drone.payload.media_index import Listing as Listing
+from anafi_mav.drone.payload.media_index import MediaIndex
 from anafi_mav.drone.payload.media_reader import MediaReader, OpenedFile
 from anafi_mav.drone.rest import Rest
 from anafi_mav.drone.settings import Commanding
@@ -201,6 +203,7 @@ class Media(Commanding[MediaState]):
         super().__init__(commander)
         self._client = MediaClient(rest)
         self._reader = MediaReader(self._client)
+        self._index = MediaIndex(self._client)
 
     # -- what there is
 
@@ -212,13 +215,25 @@ class Media(Commanding[MediaState]):
         """Return one media. Raises `CommandRejected` when no media has this id."""
         return await self._available().get(media_id)
 
+    @property
+    def kept_listing(self) -> Listing | None:
+        """All files as `listing` returns them, while they are known without a question to the drone."""
+        return self._index.kept(self.state)
+
+    async def listing(self) -> Listing:
+        """Return all files by day and name; requested from the drone only after a change."""
+        self._available()
+        return await self._index.get(self.state)
+
     async def md5(self, resource: Resource) -> str:
         """Return the MD5 of a file on the drone, hexadecimal."""
         return await self._available().md5(resource)
 
     async def thumbnail(self, of: MediaItem | Resource) -> bytes:
         """Return a small JPEG. Raises `CommandRejected` when the drone has none."""
-        return await self._available().thumbnail(of)
+        client = self._available()
+        async with self._reader.turn():
+            return await client.thumbnail(of)
 
     # -- files
 
@@ -251,7 +266,8 @@ class Media(Commanding[MediaState]):
         return tuple([await self.download(resource, directory) for resource in item.resources])
 
     async def close(self) -> None:
-        """End the reads of files."""
+        """End the reads of files and lists."""
+        await self._index.close()
         await self._reader.close()
 
     # -- away with them
@@ -259,14 +275,17 @@ class Media(Commanding[MediaState]):
     async def delete(self, media_id: str) -> None:
         """Delete a media with all its files."""
         await self._available().delete(media_id)
+        self._index.changed()
 
     async def delete_resource(self, resource_id: str) -> None:
         """Delete one file."""
         await self._available().delete_resource(resource_id)
+        self._index.changed()
 
     async def delete_all(self) -> None:
         """Delete all media."""
         await self._available().delete_all()
+        self._index.changed()
 
     # -- news
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import asyncio
 from collections import OrderedDict
 from collections.abc import AsyncGenerator, AsyncIterator, Hashable
-from contextlib import AbstractAsyncContextManager, suppress
+from contextlib import AbstractAsyncContextManager, asynccontextmanager, suppress
 from typing import Protocol
 
 from anafi_mav.drone.payload.media_file import Resource
@@ -51,6 +51,8 @@ class MediaReader:
         self._reads: list[_Read] = []
         """The one that was used last is last."""
         self._pieces: OrderedDict[Hashable, bytes] = OrderedDict()
+        self._others = 0
+        """Other reads of the drone, that count like the reads of files."""
         self._changed = asyncio.Event()
         """Set, and replaced, when a read has delivered a piece or ended."""
 
@@ -83,6 +85,18 @@ class MediaReader:
             offset += len(part)
             yield part
 
+    @asynccontextmanager
+    async def turn(self) -> AsyncIterator[None]:
+        """Count what runs inside as one of the reads; wait until there are few enough."""
+        while len(self._reads) + self._others >= READS:
+            await self._free()
+        self._others += 1
+        try:
+            yield
+        finally:
+            self._others -= 1
+            self.notify()
+
     async def close(self) -> None:
         """End all reads and forget all pieces; waiting readers get `LinkLost`."""
         self._pieces.clear()
@@ -101,7 +115,7 @@ class MediaReader:
                 self._pieces.move_to_end(key)
                 return piece
             if read is None:
-                if len(self._reads) >= READS:
+                if len(self._reads) + self._others >= READS:
                     await self._free()
                     continue
                 read = _Read(self, resource, index)
