@@ -557,6 +557,16 @@ AXIS_YAW = Reason("about its vertical axis")
 DRONE_RESTARTS = OperatorText("Drone is restarting")
 RESTART_FAILED = OperatorText("Restart failed: drone is still connected")
 
+# == Media ==
+
+MEDIA_NOT_INDEXED = OperatorText("Media unavailable: drone indexes its storage")
+MEDIA_UNAVAILABLE = Template("Media unavailable: {error}", error=BELOW)
+FILE_TOO_LARGE = OperatorText("File too large for FTP: use media download")
+FILE_DAMAGED = OperatorText("File damaged: MD5 is not the drone's")
+DELETE = Subject("Delete")
+CAMERA_RECORDING = Reason("camera is recording")
+CAMERA_SAVING = Reason("camera is saving photos")
+
 # == Ground stations ==
 
 STATION_BACK = OperatorText("Ground station is back")

@@ -128,7 +128,10 @@ class Component:
         actions = joined(service.actions() for service in self.services)
         self._own = frozenset({*queries, *actions})
         self.commands.take_tables(queries, joined([actions, others]))
-        self._ftp.take_tables(joined(service.files() for service in self.services))
+        self._ftp.take_tables(
+            joined(service.files() for service in self.services),
+            joined(service.folders() for service in self.services),
+        )
         self._handlers = joined(service.messages() for service in self.services)
         self._handlers[dialect.MAVLINK_MSG_ID_HEARTBEAT] = self._heard
 
