@@ -374,7 +374,7 @@ class System:
         base = dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
         if vehicle.armed:
             base |= dialect.MAV_MODE_FLAG_SAFETY_ARMED
-        mode = FlightMode.MISSION if self._mission_over.is_set else vehicle.mode
+        mode = FlightMode.MISSION if self._mission_over.at is not None else vehicle.mode
         health = vehicle.health.value
         self.send_by_flavour(
             lambda flavour: dialect.MAVLink_heartbeat_message(
@@ -446,7 +446,7 @@ class System:
         """
         vehicle = self.vehicle
         hovers = vehicle.armed and vehicle.mode in (FlightMode.HOLD, FlightMode.GUIDED)
-        if self._mission_over.is_set:
+        if self._mission_over.at is not None:
             if not hovers:
                 self._mission_over.cancel()
         elif hovers and last is not None and last[0] is FlightMode.MISSION:

@@ -221,5 +221,4 @@ class FollowFlight:
 
     def _watch(self, patience: float) -> None:
         """Schedule the end of the mode after `patience` s without a report of the target."""
-        delay = max(self._heard_at + patience - self._clock.monotonic(), 0.0)
-        self._silence.set_in(delay)
+        self._silence.set(self._heard_at + patience)

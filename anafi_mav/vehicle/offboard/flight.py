@@ -84,8 +84,6 @@ class OffboardFlight:
         self._lift = SetpointTakeoff()
         self._stream = OffboardStream()
         self._silence = Alarm(self._expired)
-        self._watched_until = math.inf
-        """The silence that the alarm is set for."""
         self._engaging: asyncio.Task[None] | None = None
         self._alone = False
         """True while a single setpoint is being engaged."""
@@ -135,7 +133,7 @@ class OffboardFlight:
         if not self._stream.receive(sender, setpoint, now, lasts(setpoint, self.guided_timeout if guided else None)):
             return texts.OTHER_PROGRAM
         deadline = self._stream.deadline()
-        if not self._silence.is_set or (deadline is not None and deadline < self._watched_until):
+        if self._silence.at is None or (deadline is not None and deadline < self._silence.at):
             self._watch()  # the pilot's newest setpoint may last for less time than the one before
         if stands:
             return self._on_ground(sender, setpoint, now, guided=guided)
@@ -145,7 +143,7 @@ class OffboardFlight:
             self._watch()
             self._vehicle.select(FlightMode.OFFBOARD, self)
         if pilot:
-            self._fly()
+            self._fly(now)
         elif guided:
             return self._begin_guided(sender, setpoint, now, follows=follows)
         return None
@@ -407,7 +405,7 @@ class OffboardFlight:
         else:
             self.motion.on_attitude(attitude.roll, attitude.pitch, attitude.yaw, now)
         if isinstance(self._stream.setpoint, AttitudeSetpoint):
-            self._fly()
+            self._fly(now)
 
     def _on_speed(self, message: events.SpeedChanged, now: float) -> None:
         if (velocity := self._vehicle.drone.piloting.state.velocity) is None:
@@ -415,7 +413,7 @@ class OffboardFlight:
         else:
             self.motion.on_velocity(velocity.north, velocity.east, velocity.down, now)
         if isinstance(self._stream.setpoint, MotionSetpoint):
-            self._fly()
+            self._fly(now)
 
     def _on_altitude(self, message: events.AltitudeChanged, now: float) -> None:
         if (altitude := self._vehicle.drone.piloting.state.altitude) is None:
@@ -438,9 +436,9 @@ class OffboardFlight:
         if self._vehicle.in_air:
             self._vehicle.drone.piloting.hover()  # ends a moveTo or moveBy of ours, which would ignore sticks
         self._vehicle.select(mode, self)
-        self._fly()
+        self._fly(self._clock.monotonic())
 
-    def _fly(self) -> None:
+    def _fly(self, now: float) -> None:
         """Do what the pilot's newest setpoint asks for at this moment."""
         vehicle, setpoint = self._vehicle, self._stream.setpoint
         limits = vehicle.drone.piloting.limits
@@ -459,7 +457,6 @@ class OffboardFlight:
             vehicle.select(FlightMode.HOLD)
             vehicle.text(Severity.WARNING, texts.OFFBOARD_ENDED.fill(reason=reason))
             return
-        now = self._clock.monotonic()
         if isinstance(setpoint, AttitudeSetpoint):
             self._hold(self._attitude(setpoint, limits, now), now)
             return
@@ -569,12 +566,11 @@ class OffboardFlight:
 
     def _watch(self) -> None:
         """Come back when those that matter have been silent for too long."""
-        self._silence.cancel()
         deadline = self._stream.deadline()
-        if deadline is not None:
-            self._watched_until = deadline
-            delay = max(deadline - self._clock.monotonic(), 0.0)
-            self._silence.set_in(delay)
+        if deadline is None:
+            self._silence.cancel()
+        else:
+            self._silence.set(deadline)
 
 
 def _at_once(client: Hashable, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
