@@ -297,7 +297,7 @@ class System:
         """
         if self.active:
             channels = self.channels if to is None else to
-            give_way = message.get_msgId() in self.telemetry
+            give_way = message.id in self.telemetry
             self._node.send(message, sysid=self.sysid, compid=AUTOPILOT, to=channels, give_way=give_way)
 
     def send_by_flavour(
@@ -476,15 +476,15 @@ class System:
 
     def _commands_us(self, message: Any) -> bool:
         """Return True for a command to this system by its id that is no query."""
-        if message.get_msgId() == dialect.MAVLINK_MSG_ID_SET_MODE:
+        if message.id == dialect.MAVLINK_MSG_ID_SET_MODE:
             return bool(message.target_system == self.sysid)
-        known = message.get_msgId() in COMMANDS and message.target_system == self.sysid
+        known = message.id in COMMANDS and message.target_system == self.sysid
         return known and self._commands.acts_on(message.command)
 
     def _receive(self, inbound: Inbound) -> None:
         """Handle a message to our autopilot, to its system, or to all."""
         message = inbound.message
-        handler = self._handlers.get(message.get_msgId())
+        handler = self._handlers.get(message.id)
         if handler is None:
             return
         try:
@@ -500,7 +500,7 @@ class System:
     def _refuse(self, inbound: Inbound) -> None:
         """Answer a command to one of the components in `ABSENT` alone: it is unsupported."""
         message = inbound.message
-        if message.get_msgId() in COMMANDS and message.target_system == self.sysid and message.target_component:
+        if message.id in COMMANDS and message.target_system == self.sysid and message.target_component:
             answer = _unsupported(inbound)
             self._node.send(answer, sysid=self.sysid, compid=message.target_component, to=inbound.channel)
 
