@@ -364,7 +364,8 @@ class System:
 
     def times(self, at: float | None = None) -> Times:
         """A moment of the monotonic clock (None: now) in the clock of this system's messages."""
-        return Times(round(((self.clock.monotonic() if at is None else at) - self._started) * 1e9))
+        ns = round(((self.clock.monotonic() if at is None else at) - self._started) * 1e9)
+        return Times(ns, ns // 1_000, ns // 1_000_000 & 0xFFFFFFFF)
 
     # The heart.
 
