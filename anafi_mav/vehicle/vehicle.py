@@ -50,6 +50,7 @@ from anafi_mav.vehicle.base.link_loss import LossPolicy
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.right import Extent, Right
+from anafi_mav.vehicle.base.roll_sign import RollSign
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.fence.rally import RallyPoints
@@ -642,7 +643,7 @@ class Vehicle(Aircraft):
     def standing_warnings(self) -> list[OperatorText]:
         """Texts that stay true for a while: a client that connects later gets them with its banner."""
         warnings = [ESTIMATED] if self.height.estimated and not self.on_ground else []
-        return [*warnings, texts.ROLL_SIGN_INVERTED] if self.roll.inverted else warnings
+        return [*warnings, texts.ROLL_SIGN_INVERTED] if self.roll.sign is RollSign.INVERTED else warnings
 
     @property
     def takeoff_record(self) -> TakeoffRecord | None:

@@ -20,6 +20,7 @@ from anafi_mav.drone.events import MoveToStatus
 from anafi_mav.drone.piloting.state import Attitude, Velocity
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.stream import MessageStream, Times
+from anafi_mav.vehicle.base.roll_sign import RollSign
 from anafi_mav.vehicle.vehicle import Vehicle
 
 NAN = math.nan
@@ -34,7 +35,7 @@ MOVING = 0.5
 def _attitude(vehicle: Vehicle) -> Attitude | None:
     """Return the attitude with right wing down +, also of a drone known to report roll inverted."""
     state = vehicle.drone.piloting.state.attitude
-    if state is None or not vehicle.roll.inverted:
+    if state is None or vehicle.roll.sign is not RollSign.INVERTED:
         return state
     return replace(state, roll=-state.roll)
 

@@ -25,6 +25,7 @@ from anafi_mav.vehicle.base.bounds import TooLow
 from anafi_mav.vehicle.base.clients import system_of
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused, reason_of, text_of
+from anafi_mav.vehicle.base.roll_sign import RollSign
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.silence import SILENCE
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
@@ -253,7 +254,7 @@ class OffboardFlight:
 
     def _objection(self, sender: Hashable, setpoint: MotionSetpoint) -> OperatorText | None:
         """Why a position cannot be flown to; None when it can, or is being flown to."""
-        if self._vehicle.roll.inverted and setpoint.needs_loop:
+        if self._vehicle.roll.sign is RollSign.INVERTED and setpoint.needs_loop:
             return texts.ROLL_INVERTED
         if setpoint.position == NOTHING:
             return None
@@ -279,7 +280,7 @@ class OffboardFlight:
         self._require_freedom(texts.OFFBOARD)
         candidate = self._stream.candidate(client, self._clock.monotonic())
         if candidate is None:
-            reason = texts.ROLL_INVERTED if self._vehicle.roll.inverted else texts.NO_SETPOINTS
+            reason = texts.ROLL_INVERTED if self._vehicle.roll.sign is RollSign.INVERTED else texts.NO_SETPOINTS
             raise Refused(texts.OFFBOARD, reason)
         if self._stream.state is State.ENGAGED and candidate == self._stream.pilot:
             return  # it flies already, and goes on without a jolt
@@ -450,7 +451,7 @@ class OffboardFlight:
             reason = texts.PILOT
         elif vehicle.sticks_follow_camera:
             reason = texts.STICKS_FOLLOW_CAMERA
-        elif vehicle.roll.inverted and isinstance(setpoint, MotionSetpoint) and setpoint.needs_loop:
+        elif vehicle.roll.sign is RollSign.INVERTED and isinstance(setpoint, MotionSetpoint) and setpoint.needs_loop:
             reason = texts.ROLL_INVERTED
         if reason is not None:
             self.end()
