@@ -283,7 +283,7 @@ class System:
         It is a command, or a message that several components handle. The autopilot answers for commands that no
         component has.
         """
-        if message.get_msgId() in BY_AUTOPILOT:
+        if message.id in BY_AUTOPILOT:
             return self._autopilot
         return next((component for component in self.components if component.owns(message)), self._autopilot)
 
@@ -335,7 +335,8 @@ class System:
 
     def times(self, at: float | None = None) -> Times:
         """A moment of the monotonic clock (None: now) in the clock of this system's messages."""
-        return Times(round(((self.clock.monotonic() if at is None else at) - self._started) * 1e9))
+        ns = round(((self.clock.monotonic() if at is None else at) - self._started) * 1e9)
+        return Times(ns, ns // 1_000, ns // 1_000_000 & 0xFFFFFFFF)
 
     # The heart.
 
@@ -345,7 +346,7 @@ class System:
         base = dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
         if vehicle.armed:
             base |= dialect.MAV_MODE_FLAG_SAFETY_ARMED
-        mode = FlightMode.MISSION if self._mission_over.is_set else vehicle.mode
+        mode = FlightMode.MISSION if self._mission_over.at is not None else vehicle.mode
         health = vehicle.health.value
         self._autopilot.send_by_flavour(
             lambda flavour: dialect.MAVLink_heartbeat_message(
@@ -431,7 +432,7 @@ class System:
         """
         vehicle = self.vehicle
         hovers = vehicle.armed and vehicle.mode in (FlightMode.HOLD, FlightMode.GUIDED)
-        if self._mission_over.is_set:
+        if self._mission_over.at is not None:
             if not hovers:
                 self._mission_over.cancel()
         elif hovers and last is not None and last[0] is FlightMode.MISSION:
@@ -461,15 +462,15 @@ class System:
 
     def _commands_us(self, message: Any) -> bool:
         """Return True for a command to this system by its id that is no query."""
-        if message.get_msgId() == dialect.MAVLINK_MSG_ID_SET_MODE:
+        if message.id == dialect.MAVLINK_MSG_ID_SET_MODE:
             return bool(message.target_system == self.sysid)
-        known = message.get_msgId() in COMMANDS and message.target_system == self.sysid
+        known = message.id in COMMANDS and message.target_system == self.sysid
         return known and any(component.commands.acts_on(message.command) for component in self.components)
 
     def _refuse(self, inbound: Inbound) -> None:
         """Answer a command to one of the components in `ABSENT` alone: it is unsupported."""
         message = inbound.message
-        if message.get_msgId() in COMMANDS and message.target_system == self.sysid and message.target_component:
+        if message.id in COMMANDS and message.target_system == self.sysid and message.target_component:
             answer = _unsupported(inbound)
             self._node.send(answer, sysid=self.sysid, compid=message.target_component, to=inbound.channel)
 
