@@ -37,7 +37,7 @@ CORES = [
     *("vehicle/base/clients.py", "vehicle/base/height.py", "vehicle/base/link_loss.py", "vehicle/base/modes.py"),
     *("vehicle/base/roll_sign.py", "vehicle/base/severity.py", "vehicle/base/silence.py"),
     *("vehicle/base/subscriptions.py", "vehicle/base/velocity_loop.py", "vehicle/fence"),
-    *("vehicle/mission/course.py", "vehicle/mission/progress.py"),
+    *("vehicle/mission/course.py", "vehicle/mission/payload_items.py", "vehicle/mission/progress.py"),
     *("vehicle/offboard/setpoints.py", "vehicle/offboard/stream.py", "vehicle/offboard/takeoff.py"),
     *("vehicle/circle.py", "vehicle/follow.py", "vehicle/hold_rule.py", "vehicle/initiator.py"),
     "vehicle/joystick_override.py",
