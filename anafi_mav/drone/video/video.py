@@ -114,6 +114,9 @@ class Video(Element[VideoState]):
         self._route: VideoRoute | None = None
         self._users = 0
         self._wanted: str | None = None
+        """The stream that a user has named; None: the selected one."""
+        self._selected: str | None = None
+        """The stream of all users who name none; None: the drone's own choice."""
         self._task: asyncio.Task[None] | None = None
         self._stream: VideoStream | None = None
         self._ending: set[asyncio.Task[None]] = set()
@@ -158,7 +161,7 @@ class Video(Element[VideoState]):
 
         It continues through interruptions, of the link too, until the last block has ended.
 
-        `title` names a stream ("DefaultVideo", "Front camera"); None: the drone's own choice, or what runs already.
+        `title` names a stream ("DefaultVideo", "Front camera"); None: what runs already, or the selected stream.
         Raises `CommandRejected` when another stream is being watched, `NotSupported` when the drone has no such
         stream, `CommandTimeout` when no picture comes, `LinkLost`.
         """
@@ -181,6 +184,19 @@ class Video(Element[VideoState]):
                 self._end()
                 self.reset()
                 await self._ended()
+
+    def select(self, title: str | None) -> None:
+        """Show this stream to all users who name none; None is the drone's own choice.
+
+        A running stream is replaced, unless a user has named it.
+        """
+        if title == self._selected:
+            return
+        self._selected = title
+        if self._users and self._wanted is None:
+            self._end()
+            self.state = replace(self.state, shown=None, problem="")
+            self._start()
 
     def subscribe(self, callback: FrameCallback) -> Callable[[], None]:
         """Call `callback` with the metadata of every picture, after the state is updated.
@@ -261,7 +277,8 @@ class Video(Element[VideoState]):
         delay = RETRY / 2.0
         while self._task is task:
             begun = loop.time()
-            played = await self._play(VideoStream(route, self._wanted, self._take, lambda: self._task is task))
+            title = self._selected if self._wanted is None else self._wanted
+            played = await self._play(VideoStream(route, title, self._take, lambda: self._task is task))
             delay = RETRY if played and loop.time() - begun > HEALTHY else min(2.0 * delay, MAX_RETRY)
             await asyncio.sleep(delay)
 

@@ -20,20 +20,20 @@ ENDINGS = (mav_enums.MAV_CMD_NAV_LAND, mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH)
 
 
 class State(enum.Enum):
-    NONE = "there is no mission"
+    NONE = "no mission stored"
     READY = "not begun"
-    ACTIVE = "it is flown"
-    PAUSED = "it was begun, and somebody or something has stopped it"
-    COMPLETE = "flown to its end"
+    ACTIVE = "the drone flies the mission"
+    PAUSED = "begun and then stopped"
+    COMPLETE = "flown completely"
 
 
 class Event(enum.Enum):
     TAKE = "a mission is uploaded"
-    CLEAR = "there is none any more"
+    CLEAR = "the mission is deleted"
     CHOOSE = "a client sets the current item"
-    BEGIN = "the drone flies it, from its beginning or where it was stopped"
-    STOP = "it is stopped"
-    FINISH = "its last item is done"
+    BEGIN = "the drone starts or resumes the mission"
+    STOP = "the drone stops flying the mission"
+    FINISH = "the last item is completed"
 
 
 TRANSITIONS: dict[State, dict[Event, State]] = {
