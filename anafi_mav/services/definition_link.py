@@ -1,4 +1,4 @@
-"""Address and version of the camera definition: between the room that makes it and the one that announces it."""
+"""Address and version of the camera definition, from its maker to CAMERA_INFORMATION."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 
 class DefinitionLink:
-    """What CAMERA_INFORMATION says of the definition; empty before the first connection."""
+    """Address and version; empty before the first connection."""
 
     def __init__(self) -> None:
         self.uri = ""

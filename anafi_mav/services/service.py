@@ -16,6 +16,7 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import Action, ActionGroup, Command
+from anafi_mav.services.definition_link import DefinitionLink
 from anafi_mav.services.files import ServedFile
 from anafi_mav.services.flavours import Flavour
 from anafi_mav.services.memory import Memory
@@ -47,6 +48,8 @@ class Host(Protocol):
     capabilities: int
     """MAV_PROTOCOL_CAPABILITY bits of all services of the component."""
     memory: Memory
+    definition: DefinitionLink
+    """Camera definition of the component."""
 
     @property
     def channels(self) -> Sequence[Channel]:

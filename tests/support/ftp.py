@@ -41,9 +41,10 @@ def taken_apart(message: Any) -> Reply:
 class Ftp:
     """One client's conversation."""
 
-    def __init__(self, client: Client, sender: tuple[int, int] | None = None) -> None:
-        """`sender`: another system and component that speak over the same connection."""
+    def __init__(self, client: Client, sender: tuple[int, int] | None = None, component: int = 1) -> None:
+        """`sender`: another system and component that speak over the same connection; `component`: whose files."""
         self.client = client
+        self.component = component
         self.ids = sender or (client.sysid, client.compid)
         self.seq = 0
         self._out = dialect.MAVLink(None, *self.ids)
@@ -53,7 +54,7 @@ class Ftp:
     ) -> None:
         header = struct.pack("<HBBBBBBI", seq, session, opcode, len(data) if size is None else size, 0, 0, 0, offset)
         payload = (header + data).ljust(251, b"\0")
-        message = dialect.MAVLink_file_transfer_protocol_message(0, 1, 1, list(payload))
+        message = dialect.MAVLink_file_transfer_protocol_message(0, 1, self.component, list(payload))
         self.client.send_raw(message.pack(self._out))
 
     async def ask(self, opcode: int, data: bytes = b"", *, timeout: float = 2.0, **more: Any) -> Reply:

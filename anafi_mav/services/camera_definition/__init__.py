@@ -1,1 +1,1 @@
-"""Settings of the camera: their table, the camera definition file, and the extended parameter protocol."""
+"""Settings of the camera: their table, their definition file, and extended parameters."""

@@ -1,4 +1,4 @@
-"""One setting of the camera: its name and type, its options, and where it is read and written. No I/O.
+"""One setting of the camera: name, type and options, and how it is read and written. No I/O.
 
 The tables of them are `setting_table` and `thermal_table`. Options and ranges are what the drone reports for each of
 its cameras, so that a row has functions of a camera's state in their place. A value is stored in the drone alone.
@@ -23,7 +23,7 @@ class Option(NamedTuple):
     text: str
 
 
-class Limits(NamedTuple):
+class ValueLimits(NamedTuple):
     """Range of a setting without options."""
 
     low: float
@@ -67,7 +67,7 @@ class CameraSetting:
     write: Write
     options: Callable[[View], tuple[Option, ...]] | None = None
     """Values that this camera accepts; empty: it has no such setting. None: see `limits`."""
-    limits: Callable[[View], Limits | None] | None = None
+    limits: Callable[[View], ValueLimits | None] | None = None
     """Range that this camera accepts; None: it has no such setting."""
     unit: str = ""
     decimals: int | None = None
@@ -93,12 +93,12 @@ class CameraSetting:
             return ()
         return tuple(Option(self.kind.normalise(value), text) for value, text in self.options(view))
 
-    def limits_of(self, view: View) -> Limits | None:
+    def limits_of(self, view: View) -> ValueLimits | None:
         """Return the range that this camera accepts."""
         found = None if self.limits is None else self.limits(view)
         if found is None or not math.isfinite(found.low + found.high) or found.low > found.high:
             return None
-        return Limits(self.kind.normalise(found.low), self.kind.normalise(found.high), found.step)
+        return ValueLimits(self.kind.normalise(found.low), self.kind.normalise(found.high), found.step)
 
     def is_of(self, view: View) -> bool:
         """Return True when this camera has the setting."""

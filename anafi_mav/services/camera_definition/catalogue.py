@@ -18,7 +18,7 @@ from msgspec.structs import replace
 from anafi_mav.drone import CameraKind, CamerasState, CameraState, Range, StyleSettings, ThermalState
 from anafi_mav.drone.events import ThermalMode
 from anafi_mav.services.camera_definition import setting_table, thermal_table
-from anafi_mav.services.camera_definition.camera_setting import CameraSetting, Limits, Option, View
+from anafi_mav.services.camera_definition.camera_setting import CameraSetting, Option, ValueLimits, View
 from anafi_mav.services.camera_definition.param_ext_codec import ExtType
 
 SETTINGS: tuple[CameraSetting, ...] = (
@@ -58,12 +58,12 @@ class Restriction(NamedTuple):
     """Other settings with the value that they must have."""
 
 
-class Entry(NamedTuple):
+class CatalogueEntry(NamedTuple):
     """A setting that the drone has: either with options, or with limits."""
 
     setting: CameraSetting
     options: tuple[Option, ...]
-    limits: Limits | None
+    limits: ValueLimits | None
 
 
 class Catalogue:
@@ -73,7 +73,7 @@ class Catalogue:
         self._cameras: dict[int, CameraState] = {}
         self._shared = CamerasState()
         self._thermal = ThermalState()
-        self.entries: tuple[Entry, ...] = ()
+        self.entries: tuple[CatalogueEntry, ...] = ()
         self.index: dict[str, int] = {}
         """Place of each setting in the list."""
 
@@ -86,7 +86,7 @@ class Catalogue:
         self.entries = tuple(entry for entry in found if entry is not None)
         self.index = {entry.setting.name: place for place, entry in enumerate(self.entries)}
 
-    def __getitem__(self, name: str) -> Entry:
+    def __getitem__(self, name: str) -> CatalogueEntry:
         return self.entries[self.index[name]]
 
     def exclusions(self) -> Mapping[tuple[str, float], tuple[str, ...]]:
@@ -137,7 +137,7 @@ class Catalogue:
             *self._of_thermal_modes(),
         ]
 
-    def _entry(self, setting: CameraSetting) -> Entry | None:
+    def _entry(self, setting: CameraSetting) -> CatalogueEntry | None:
         """Return a setting with the options of all cameras; None when no camera has it."""
         views = [self._view(camera) for camera in self._cameras.values()]
         options: dict[float, Option] = {}
@@ -152,8 +152,8 @@ class Catalogue:
         if limits:
             steps = {one.step for one in limits}
             step = steps.pop() if len(steps) == 1 else None
-            widest = Limits(min(one.low for one in limits), max(one.high for one in limits), step)
-        return Entry(setting, tuple(ordered), widest)
+            widest = ValueLimits(min(one.low for one in limits), max(one.high for one in limits), step)
+        return CatalogueEntry(setting, tuple(ordered), widest)
 
     def _view(self, camera: CameraState) -> View:
         return View(camera, self._shared, self._thermal)

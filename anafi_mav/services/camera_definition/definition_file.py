@@ -10,28 +10,29 @@ import xml.etree.ElementTree as ET
 from typing import NamedTuple
 
 from anafi_mav.services.camera_definition.camera_setting import Option
-from anafi_mav.services.camera_definition.catalogue import Catalogue, Entry, Restriction
+from anafi_mav.services.camera_definition.catalogue import Catalogue, CatalogueEntry, Restriction
 from anafi_mav.services.camera_definition.param_ext_codec import ExtType
 from anafi_mav.services.checksum import crc32
 
 VENDOR = "Parrot"
 
 
-class Definition(NamedTuple):
+class DefinitionFile(NamedTuple):
     """A definition file and the version by which clients know it."""
 
     content: bytes
     version: int
 
 
-def definition_file(catalogue: Catalogue, model: str) -> Definition:
-    """Return the definition of a drone's camera; `model` is the camera's name in CAMERA_INFORMATION.
+def definition_file(catalogue: Catalogue, model: str) -> DefinitionFile:
+    """Return the definition of a drone's camera.
 
-    The version is a hash of the content: QGroundControl and MAVSDK keep a file for each name and version for good.
+    `model` is the camera's name in CAMERA_INFORMATION. The version is a hash of the content: QGroundControl and MAVSDK
+    keep a file for each name and version for good.
     """
     version = crc32(_content(catalogue, model, 0))
     folded = (version ^ version >> 16) & 0xFFFF or 1  # 0 means that there is no definition
-    return Definition(_content(catalogue, model, folded), folded)
+    return DefinitionFile(_content(catalogue, model, folded), folded)
 
 
 def _content(catalogue: Catalogue, model: str, version: int) -> bytes:
@@ -59,7 +60,7 @@ def _content(catalogue: Catalogue, model: str, version: int) -> bytes:
     return content + b"\n"
 
 
-def _parameter(parent: ET.Element, entry: Entry, catalogue: Catalogue) -> ET.Element:
+def _parameter(parent: ET.Element, entry: CatalogueEntry, catalogue: Catalogue) -> ET.Element:
     setting, kind = entry.setting, entry.setting.kind
     attributes = {"name": setting.name, "type": kind.xml, "default": kind.text(_default(entry))}
     if not setting.is_listed:
@@ -82,7 +83,7 @@ def _parameter(parent: ET.Element, entry: Entry, catalogue: Catalogue) -> ET.Ele
     return element
 
 
-def _default(entry: Entry) -> float:
+def _default(entry: CatalogueEntry) -> float:
     """Return the possible value that is nearest to the default of the table."""
     wanted = entry.setting.kind.normalise(entry.setting.default)
     if entry.limits is not None:

@@ -1,4 +1,4 @@
-"""Values of the extended parameter protocol: types, 128-byte fields and the texts of the definition file. No I/O."""
+"""Values of extended parameters: their types, 128-byte fields, and texts in a file. No I/O."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class ExtType(enum.Enum):
         return self._struct.pack(self._number(value)).ljust(VALUE_LENGTH, b"\0")
 
     def decode(self, field: bytes) -> float | None:
-        """Return the value in the field of a message as both ends hold it; None for NaN and infinities."""
+        """Return the value in a field as both ends hold it; None for NaN and infinities."""
         (value,) = self._struct.unpack(field[: self._struct.size].ljust(self._struct.size, b"\0"))
         return self.normalise(value) if math.isfinite(value) else None
 

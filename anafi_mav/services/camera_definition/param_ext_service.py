@@ -1,4 +1,4 @@
-"""MAVLink service for the camera's settings: the extended parameter protocol and the definition file.
+"""MAVLink service for the camera's settings: extended parameters and their definition file.
 
 The values are the drone's: a write is acknowledged with what the drone reported after it, and whatever else changes a
 setting (the pilot's application, another client, a mission) is sent to all clients. Rules: MAVLink parameter_ext.md,
@@ -21,8 +21,8 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.camera_definition.camera_setting import Guard, View
-from anafi_mav.services.camera_definition.catalogue import Catalogue, Entry
-from anafi_mav.services.camera_definition.definition_file import Definition, definition_file
+from anafi_mav.services.camera_definition.catalogue import Catalogue, CatalogueEntry
+from anafi_mav.services.camera_definition.definition_file import DefinitionFile, definition_file
 from anafi_mav.services.camera_definition.param_ext_codec import VALUE_LENGTH
 from anafi_mav.services.component_metadata import COMPRESSED, compress
 from anafi_mav.services.files import Query, ServedFile
@@ -76,12 +76,12 @@ class Write:
 
 
 class ParamExtService(Service):
-    """PARAM_EXT_REQUEST_LIST, PARAM_EXT_REQUEST_READ and PARAM_EXT_SET of the camera, and its definition file."""
+    """Answers PARAM_EXT_REQUEST_LIST, _READ and PARAM_EXT_SET, and serves the definition."""
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self._catalogue = Catalogue()
-        self._definition: Definition | None = None
+        self._definition: DefinitionFile | None = None
         self._packed = b""
         self._sender = PacedSender(host)
         self._sent: dict[str, float] = {}
@@ -105,7 +105,7 @@ class ParamExtService(Service):
         return {PATH: ServedFile(self._plain_file), PATH + COMPRESSED: ServedFile(self._packed_file)}
 
     @property
-    def definition(self) -> Definition | None:
+    def definition(self) -> DefinitionFile | None:
         """The camera definition in effect; None before the first connection."""
         return self._definition
 
@@ -162,7 +162,7 @@ class ParamExtService(Service):
 
     # Values.
 
-    def _value(self, entry: Entry) -> float:
+    def _value(self, entry: CatalogueEntry) -> float:
         """Return the value of the camera at work; of another one where it has no such setting."""
         drone = self.host.drone
         cameras, thermal = drone.camera.state, drone.thermal.state
@@ -239,7 +239,10 @@ class ParamExtService(Service):
         self._queue(write)
 
     def _queue(self, write: Write) -> None:
-        """Carry it out when it is its turn: one at a time, because a command of the drone carries several settings."""
+        """Carry it out when it is its turn.
+
+        One at a time: a command of the drone carries several settings.
+        """
         for place, other in enumerate(self._waiting):
             if other.key == write.key:
                 self._waiting[place] = write
@@ -316,7 +319,7 @@ class ParamExtService(Service):
         self.host.send(message, inbound.channel)
 
 
-def _accepts(entry: Entry, value: float) -> bool:
+def _accepts(entry: CatalogueEntry, value: float) -> bool:
     """Return True for a value of the definition."""
     if entry.options:
         return any(option.value == value for option in entry.options)

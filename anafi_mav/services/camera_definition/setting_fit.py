@@ -18,7 +18,10 @@ WordT = TypeVar("WordT", bound=enum.Enum)
 
 
 def fitting_photo(camera: CameraState, wish: PhotoSettings) -> PhotoSettings:
-    """Return the wish, with projection and file that go with it; mode, projection, file in this order."""
+    """Return the wish with a projection and a file that go with it.
+
+    Mode, projection, file: each narrows those after it.
+    """
     now = camera.photo or PhotoSettings()
     mode = wish.mode or now.mode
     fits = [one for one in camera.photos if mode in one.modes]
@@ -34,7 +37,10 @@ def fitting_photo(camera: CameraState, wish: PhotoSettings) -> PhotoSettings:
 
 
 def fitting_recording(camera: CameraState, wish: RecordingSettings) -> RecordingSettings:
-    """Return the wish, with resolution and frame rate that go with it; mode, resolution, frame rate in this order."""
+    """Return the wish with a resolution and a frame rate that go with it.
+
+    Mode, resolution, frame rate: each narrows those after it.
+    """
     now = camera.recording or RecordingSettings()
     mode = wish.mode or now.mode
     fits = [one for one in camera.recordings if mode in one.modes]

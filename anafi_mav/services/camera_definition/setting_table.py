@@ -1,4 +1,4 @@
-"""The settings of the cameras as extended parameters, in the order in which stations list them.
+"""The settings of the cameras as extended parameters, in the order of stations' lists.
 
 Names that QGroundControl looks for by name: CAM_MODE, CAM_EXPMODE, CAM_EV, CAM_ISO, CAM_SHUTTERSPD, CAM_WBMODE
 (VehicleCameraControl.h). The numbers of a choice are ours and stay: stations store them. Parrot's own numbers differ
@@ -35,8 +35,8 @@ from anafi_mav.drone import (
     StyleSettings,
     WhiteBalance,
 )
-from anafi_mav.errors import NotSupported
-from anafi_mav.services.camera_definition.camera_setting import CameraSetting, Guard, Limits, Option, View
+from anafi_mav.errors import CommandRejected, NotSupported
+from anafi_mav.services.camera_definition.camera_setting import CameraSetting, Guard, Option, ValueLimits, View
 from anafi_mav.services.camera_definition.param_ext_codec import ExtType
 from anafi_mav.services.camera_definition.setting_fit import fitting_photo, fitting_recording
 
@@ -164,7 +164,7 @@ def number_of(choice: Choice[WordT], word: WordT | None) -> float | None:
 
 
 def word_of(choice: Choice[WordT], value: float) -> WordT:
-    """Return the value of a number. Raises `NotSupported` for a number that the choice does not have."""
+    """Return the value of a number. Raises `NotSupported` for one that has no value."""
     for word, (number, _) in choice.items():
         if number == value:
             return word
@@ -186,9 +186,9 @@ def flag(value: bool | None) -> float | None:
     return None if value is None else float(value)
 
 
-def limits_of(setting: Range | None, step: float | None = None) -> Limits | None:
+def limits_of(setting: Range | None, step: float | None = None) -> ValueLimits | None:
     """Return the range that the drone reports with a setting."""
-    return None if setting is None else Limits(setting.min, setting.max, step)
+    return None if setting is None else ValueLimits(setting.min, setting.max, step)
 
 
 def shutter_text(seconds: float) -> str:
@@ -269,7 +269,7 @@ def set_axis(drone: Drone, id: int, axis: str, value: float) -> Awaitable[object
 
 
 def level(name: str, parameter: str, title: str) -> CameraSetting:
-    def limits(view: View) -> Limits | None:
+    def limits(view: View) -> ValueLimits | None:
         # The older cameras count whole steps (camera.xml style), the Ai has a continuous scale.
         step = 1.0 if view.camera.feature == "camera" else None
         return limits_of(getattr(style(view), name), step)
@@ -298,14 +298,24 @@ def axis(name: str, parameter: str, title: str) -> CameraSetting:
     )
 
 
-def intervals(view: View) -> Limits | None:
-    """Return the range of the interval: of both kinds of series, since it is one setting."""
-    bounds = [one for one in (view.camera.time_lapse_bounds, view.camera.gps_lapse_bounds) if one is not None]
-    modes = {mode for option in view.camera.photos for mode in option.modes}
-    if not bounds or not modes & {PhotoMode.TIME_LAPSE, PhotoMode.GPS_LAPSE}:
-        return None
-    longest = max(high for _, high in bounds)
-    return Limits(min(low for low, _ in bounds), longest if math.isfinite(longest) else LONGEST_INTERVAL)
+def bounded(bounds: tuple[float, float] | None) -> ValueLimits | None:
+    """Return the range of an interval."""
+    if bounds is None or bounds[0] <= 0.0:
+        return None  # a camera without such a series reports 0
+    return ValueLimits(bounds[0], bounds[1] if math.isfinite(bounds[1]) else LONGEST_INTERVAL)
+
+
+def interval(mode: PhotoMode, view: View) -> float | None:
+    """Return the interval of a series; None in another photo mode: the drone has one number for both."""
+    settings = photo(view)
+    return settings.interval if settings.mode is mode else None
+
+
+def set_interval(drone: Drone, id: int, mode: PhotoMode, value: float) -> Awaitable[object]:
+    now = drone.camera[id].photo
+    if now is None or now.mode is not mode:
+        raise CommandRejected("other photo mode")
+    return set_photo(drone, id, PhotoSettings(interval=value))
 
 
 def union(sets: Iterable[Iterable[WordT]]) -> frozenset[WordT]:
@@ -357,7 +367,7 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
         write=lambda drone, id, value: set_photo(drone, id, PhotoSettings(mode=word_of(PHOTO_MODES, value))),
         options=lambda view: choices(PHOTO_MODES, union(one.modes for one in view.camera.photos)),
         guard=Guard.CAPTURE,
-        changes=("CAM_PHOTOPROJ", "CAM_PHOTOFMT", "CAM_PHOTOLAPSE"),
+        changes=("CAM_PHOTOPROJ", "CAM_PHOTOFMT", "CAM_PHOTOLAPSE", "CAM_PHOTODIST"),
         only_in={"CAM_MODE": PHOTO},
     ),
     CameraSetting(
@@ -416,17 +426,28 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
     CameraSetting(
         "CAM_PHOTOLAPSE",
         ExtType.REAL32,
-        "Photo interval (s, GPS-lapse: m)",
-        read=lambda view: photo(view).interval,
-        write=lambda drone, id, value: set_photo(drone, id, PhotoSettings(interval=value)),
-        limits=intervals,
+        "Time-lapse interval",
+        read=lambda view: interval(PhotoMode.TIME_LAPSE, view),
+        write=lambda drone, id, value: set_interval(drone, id, PhotoMode.TIME_LAPSE, value),
+        limits=lambda view: bounded(view.camera.time_lapse_bounds),
+        unit="s",
         decimals=1,
         default=2.0,
         guard=Guard.CAPTURE,
-        only_in={
-            "CAM_MODE": PHOTO,
-            "CAM_PHOTOMODE": frozenset({PHOTO_MODES[mode][0] for mode in (PhotoMode.TIME_LAPSE, PhotoMode.GPS_LAPSE)}),
-        },
+        only_in={"CAM_MODE": PHOTO, "CAM_PHOTOMODE": frozenset({PHOTO_MODES[PhotoMode.TIME_LAPSE][0]})},
+    ),
+    CameraSetting(
+        "CAM_PHOTODIST",
+        ExtType.REAL32,
+        "GPS-lapse distance",
+        read=lambda view: interval(PhotoMode.GPS_LAPSE, view),
+        write=lambda drone, id, value: set_interval(drone, id, PhotoMode.GPS_LAPSE, value),
+        limits=lambda view: bounded(view.camera.gps_lapse_bounds),
+        unit="m",
+        decimals=1,
+        default=10.0,
+        guard=Guard.CAPTURE,
+        only_in={"CAM_MODE": PHOTO, "CAM_PHOTOMODE": frozenset({PHOTO_MODES[PhotoMode.GPS_LAPSE][0]})},
     ),
     # -- videos
     CameraSetting(

@@ -21,7 +21,7 @@ from anafi_mav.drone.events import (
     ThermalSensitivity,
 )
 from anafi_mav.errors import NotSupported
-from anafi_mav.services.camera_definition.camera_setting import CameraSetting, Guard, Limits, Option, View
+from anafi_mav.services.camera_definition.camera_setting import CameraSetting, Guard, Option, ValueLimits, View
 from anafi_mav.services.camera_definition.param_ext_codec import ExtType
 
 ZERO_C = 273.15
@@ -38,7 +38,10 @@ _PALETTE_MODES = {PaletteMode.ABSOLUTE: "Absolute", PaletteMode.RELATIVE: "Relat
 
 
 def _has_thermal(options: tuple[Option, ...]) -> Callable[[View], tuple[Option, ...]]:
-    """Return options that exist where the drone has a thermal camera: it reports no capabilities for them."""
+    """Return options that exist where the drone has a thermal camera.
+
+    It reports no capabilities for them.
+    """
     return lambda view: options if view.thermal.mode is not None else ()
 
 
@@ -58,12 +61,12 @@ def _celsius(kelvin: float | None) -> float | None:
     return None if kelvin is None else round(kelvin - ZERO_C, 3)
 
 
-def _share(view: View) -> Limits | None:
-    return None if view.thermal.mode is None else Limits(0.0, 1.0)
+def _share(view: View) -> ValueLimits | None:
+    return None if view.thermal.mode is None else ValueLimits(0.0, 1.0)
 
 
-def _temperatures(view: View) -> Limits | None:
-    return None if view.thermal.mode is None else Limits(COLDEST, HOTTEST)
+def _temperatures(view: View) -> ValueLimits | None:
+    return None if view.thermal.mode is None else ValueLimits(COLDEST, HOTTEST)
 
 
 def _set_rendering(drone: Drone, mode: RenderingMode | None = None, share: float | None = None) -> Awaitable[object]:
