@@ -592,6 +592,10 @@ PARAMETER_NOT_SET = Template("{name} not set: {reason}", name="N" * 16, reason="
 WRONG_TYPE = Reason("wrong type")
 READ_ONLY = Reason("read only")
 OUT_OF_RANGE = Reason("out of range")
+CAMERA_RECORDS = Reason("camera is recording")
+CAMERA_TAKES_PHOTOS = Reason("camera takes photos")
+MISSION_USES_CAMERA = Reason("mission uses camera")
+VALUE_KEPT = Reason("drone keeps its value")
 RTL_ALT_FINAL = Template("RTL_ALT_FINAL: hovers at {height:.0f} m (ANF_RTH_END_ALT)", height=99)
 
 # == Warnings of the drone ==

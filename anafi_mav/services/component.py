@@ -21,6 +21,7 @@ from anafi_mav.mavlink.node import Inbound
 from anafi_mav.mavlink.router import EVERY_COMPONENT
 from anafi_mav.services.command.command_service import CommandService
 from anafi_mav.services.commands import Action, ActionGroup
+from anafi_mav.services.definition_link import DefinitionLink
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.ftp.ftp_service import FtpService
 from anafi_mav.services.memory import Memory
@@ -100,6 +101,7 @@ class Component:
         self.clock = system.clock
         self.memory = system.memory
         self.has_picture_pose = system.has_picture_pose
+        self.definition = DefinitionLink()
         self._system = system
         self.commands = CommandService(self)
         self.messages = MessageService(self)
