@@ -69,7 +69,7 @@ def from_mapping(document: object) -> Config:
 def remarks(config: Config) -> list[str]:
     """Return a line for each value that is legal but probably not meant."""
     return [
-        f"drones[{index}].sysid: {MAVSDK_SYSID} is what MAVSDK calls itself unless told otherwise: "
+        f"drones[{index}].sysid: {MAVSDK_SYSID} is the default system id of MAVSDK: "
         "such a client will not see this drone"
         for index, drone in enumerate(config.drones)
         if drone.sysid == MAVSDK_SYSID

@@ -41,17 +41,17 @@ GESTURE = 0.95
 class State(enum.Enum):
     """State of the sticks."""
 
-    IDLE = "centred, or nobody holds them"
-    HELD = "somebody holds them away from the middle"
+    IDLE = "sticks centred or not received"
+    HELD = "a client holds deflected sticks"
 
 
 class Event(enum.Enum):
     """Event that changes the state of the sticks."""
 
-    CENTRED = "who holds them has let go, or somebody else's are centred"
-    DEFLECTED = "somebody moves them"
-    SILENCE = "who holds them has said nothing for too long"
-    END = "something else flies"
+    CENTRED = "the holding client's sticks are centred, or another client's are"
+    DEFLECTED = "a client deflects its sticks"
+    SILENCE = "no stick input of the holding client for too long"
+    END = "another flight task is active"
 
 
 TRANSITIONS: dict[State, dict[Event, State]] = {

@@ -256,6 +256,16 @@ class Vehicle(Aircraft):
         return Health.ACTIVE if self.armed else Health.STANDBY
 
     @property
+    def mission_needs_gimbal(self) -> bool:
+        """True while the gimbal belongs to the mission that is flown; a paused mission frees it."""
+        return self.mission.progress.needs_gimbal
+
+    @property
+    def mission_needs_camera(self) -> bool:
+        """True while the camera belongs to the mission that is flown; a paused mission frees it."""
+        return self.mission.progress.needs_camera
+
+    @property
     def enterable_modes(self) -> frozenset[FlightMode]:
         """Modes that a client may ask for as things stand.
 

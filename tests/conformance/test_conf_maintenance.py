@@ -51,7 +51,7 @@ async def test_conf_130_the_gimbal() -> None:
 
 
 @pytest.mark.parametrize("numbers", [(1, 0, 0, 0), (0, 0, 1, 0), (0, 1, 1, 0), (0, math.inf, 0, 0)])
-async def test_conf_130_sensors_that_cannot_be_calibrated(numbers: tuple[float, ...]) -> None:
+async def test_conf_130_calibration_of_unsupported_sensors_is_refused(numbers: tuple[float, ...]) -> None:
     async with world() as w:
         assert (await w.client.command(CALIBRATE, *numbers, **MAGNETOMETER)).result == DENIED
 

@@ -143,7 +143,7 @@ async def test_conf_108_off_default_and_refused_on_each_link_alone(flavour: str)
         assert await interval(first, "ATTITUDE") == pytest.approx(0.1, rel=0.05)
 
 
-async def test_message_added_by_one_row_leaves_at_its_default_interval(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_message_of_a_new_row_leaves_at_default_interval(monkeypatch: pytest.MonkeyPatch) -> None:
     """An element's value in a message of its own: builder, events that update it, and default interval in one row."""
 
     def heading(vehicle: Vehicle, times: Times) -> newer.MAVLink_message | None:

@@ -294,7 +294,7 @@ async def handled(w: World) -> list[int]:
 
 @pytest.mark.timeout(400)
 @pytest.mark.parametrize("flavour", FLAVOURS)
-async def test_commands_with_numbers_that_make_no_sense(flavour: str, mistakes: list[str]) -> None:
+async def test_commands_with_invalid_numbers_are_answered(flavour: str, mistakes: list[str]) -> None:
     async with world(flavour=flavour, speed=5.0) as w:
         known = await handled(w)
         assert {*GOING_DOWN, *MAY_MOVE} <= set(known)
@@ -314,7 +314,7 @@ async def test_commands_with_numbers_that_make_no_sense(flavour: str, mistakes: 
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
-async def test_commands_about_a_mission_with_numbers_that_make_no_sense(flavour: str, mistakes: list[str]) -> None:
+async def test_mission_commands_with_invalid_numbers_are_answered(flavour: str, mistakes: list[str]) -> None:
     async with world(flavour=flavour, web=True) as w:
         await put(w, ROUND)
         began = w.drone.log[-1].t

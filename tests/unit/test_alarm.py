@@ -30,7 +30,7 @@ async def test_alarm_set_twice_calls_at_the_newer_time_only() -> None:
     assert called[0] >= start + 5.0
 
 
-async def test_alarm_for_a_time_that_has_passed_calls_as_soon_as_possible() -> None:
+async def test_alarm_for_a_past_time_calls_soon() -> None:
     called = asyncio.Event()
     alarm = Alarm(called.set)
     alarm.set(asyncio.get_running_loop().time() - 10.0)
@@ -38,7 +38,7 @@ async def test_alarm_for_a_time_that_has_passed_calls_as_soon_as_possible() -> N
     await asyncio.wait_for(called.wait(), 5.0)
 
 
-async def test_alarm_that_is_cancelled_does_not_call() -> None:
+async def test_cancelled_alarm_does_not_call() -> None:
     called: list[int] = []
     alarm = Alarm(lambda: called.append(1))
     alarm.cancel()

@@ -35,7 +35,7 @@ def test_default_interval_applies_before_set_and_after_reset() -> None:
     streams.reset(channel, ATTITUDE)  # twice does no harm
 
 
-def test_a_message_without_default_is_streamed_only_when_asked_for() -> None:
+def test_message_without_default_is_streamed_on_request_only() -> None:
     streams, channel = Streams[Key](DEFAULTS), Key()
     assert streams.interval(channel, UNKNOWN) is None
     assert not streams.due(channel, UNKNOWN, 0.0)
@@ -57,7 +57,7 @@ def test_an_interval_is_a_positive_number(interval: float) -> None:
         Streams[Key](DEFAULTS).set(Key(), ATTITUDE, interval)
 
 
-def test_the_first_message_is_due_at_once_and_the_next_not() -> None:
+def test_first_message_is_due_immediately_the_next_later() -> None:
     streams, channel = Streams[Key](DEFAULTS), Key()
     assert streams.due(channel, SYS_STATUS, 1000.0)
     assert not streams.due(channel, SYS_STATUS, 1000.05)
@@ -123,7 +123,7 @@ def test_due_on_recomputes_each_channel_after_a_change() -> None:
     assert due_on(streams, [], 9.0) == []
 
 
-def test_groups_that_share_a_message_share_its_interval() -> None:
+def test_groups_sharing_a_message_share_its_interval() -> None:
     streams, one = Streams[Key]({ATTITUDE: 1.0, SYS_STATUS: 0.25}), Key()
     channels = [one]
     both, first = (ATTITUDE, SYS_STATUS), (ATTITUDE,)

@@ -108,5 +108,5 @@ def test_exception_from_public_access_is_still_needed(name: str) -> None:
         ("w.drone.__class__", 0),
     ],
 )
-def test_private_access_in_each_way_to_write_it_is_found(statement: str, count: int) -> None:
+def test_private_access_is_found_in_each_spelling(statement: str, count: int) -> None:
     assert len([*private_attributes(statement)]) == count

@@ -12,7 +12,7 @@ from anafi_mav.services.command.command_service import CommandService
 
 
 @pytest.mark.parametrize("newer", ["order", "stream", "gateway"])
-async def test_replaced_action_learns_whether_an_order_has_ended_it(newer: str) -> None:
+async def test_replaced_action_reads_if_a_command_ended_it(newer: str) -> None:
     host: Any = SimpleNamespace(spawn=asyncio.ensure_future)
     service = CommandService(host)
     began, learned = asyncio.Event(), []

@@ -56,7 +56,7 @@ class Flight:
 @pytest.mark.parametrize("yaw", [0.0, 90.0, 200.0])
 @pytest.mark.parametrize(("sign", "verdict"), [(1, Sign.RIGHT), (-1, Sign.LEFT)])
 @pytest.mark.parametrize("wind", [0.0, 3.0, -3.0])
-def test_roll_check_after_twenty_changes_of_one_sign_knows_it(
+def test_roll_check_after_twenty_equal_changes_knows_the_sign(
     yaw: float, sign: int, verdict: Sign, wind: float
 ) -> None:
     """10 degrees push with 9.81 * tan 10 = 1.73 m/s2, their mean with level 0.86: each sample changes by 1.73."""
@@ -74,7 +74,7 @@ def test_roll_check_after_twenty_changes_of_one_sign_knows_it(
 
 
 @pytest.mark.parametrize("wind", [-3.0, -1.0, 3.0])
-def test_roll_check_of_a_steady_lean_in_wind_learns_nothing(wind: float) -> None:
+def test_roll_check_of_steady_lean_in_wind_stays_undecided(wind: float) -> None:
     """Drag and wind outweigh the lean of a drone that slows down: where it accelerates says nothing of roll's sign."""
     check = RollCheck()
     flight = Flight(check)
@@ -119,7 +119,7 @@ def test_roll_check_while_the_drone_turns_fast_learns_nothing() -> None:
     assert check.sign is Sign.UNKNOWN
 
 
-def test_roll_check_overturns_a_verdict_after_three_times_the_samples() -> None:
+def test_roll_check_reverses_after_three_times_the_samples() -> None:
     check = RollCheck(Sign.LEFT)
     flight = Flight(check)
     flight.rock(OVERTURN // 2)
@@ -129,7 +129,7 @@ def test_roll_check_overturns_a_verdict_after_three_times_the_samples() -> None:
 
 
 @pytest.mark.parametrize("kept", [None, 3, {}, {"firmware": "1.8.2"}, {"firmware": "1.8.2", "inverted": "no"}])
-def test_roll_record_that_is_none_is_not_read(kept: object) -> None:
+def test_invalid_roll_record_is_not_read(kept: object) -> None:
     assert read(kept, "1.8.2") is Sign.UNKNOWN
 
 
@@ -144,7 +144,7 @@ def test_roll_record_counts_for_its_firmware_only(sign: Sign) -> None:
 # The loop until the sign is known.
 
 
-def test_loop_with_unverified_roll_leans_by_ten_degrees_at_most() -> None:
+def test_loop_with_unverified_roll_leans_ten_degrees_at_most() -> None:
     motion = MotionEstimate(RollCheck())
     motion.on_attitude(0.0, 0.0, 0.0, 0.0)
     motion.on_velocity(0.0, 0.0, 0.0, 0.0)
@@ -156,7 +156,7 @@ def test_loop_with_unverified_roll_leans_by_ten_degrees_at_most() -> None:
 
 
 @pytest.mark.parametrize("reported", [-5.0, 0.0, 5.0])
-def test_loop_with_unverified_roll_does_not_use_the_reported_tilt(reported: float) -> None:
+def test_loop_with_unverified_roll_ignores_the_reported_tilt(reported: float) -> None:
     motion = MotionEstimate(RollCheck())
     for step in range(20):
         motion.on_attitude(math.radians(reported), math.radians(reported), 0.0, 0.2 * step)
