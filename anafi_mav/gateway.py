@@ -29,6 +29,8 @@ from anafi_mav.drone.rest import HTTP_PORT
 from anafi_mav.errors import AnafiMavError, ConfigError, HandshakeRefused
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Node
+from anafi_mav.relay.server import RelayServer
+from anafi_mav.relay.source import DroneSource
 from anafi_mav.services.flavours import FLAVOURS
 from anafi_mav.services.system import System
 from anafi_mav.state_lock import FILE, NO_LOCKS, HeldDrone, Holder, StateLock, state_folder
@@ -191,6 +193,8 @@ class Gateway:
         self.config = config
         self._clock: Clock = clock or SystemClock()
         self._node = Node(on_channel=self._on_channel, clock=self._clock, flavours=tuple(FLAVOURS))
+        self.relay = RelayServer(config.video.host, config.video.rtsp_port, self._clock)
+        """The video server."""
         self._supervised: list[_Supervised] = []
         self._state: Path | None = None
         self._lock: StateLock | None = None
@@ -207,7 +211,7 @@ class Gateway:
         await self.close()
 
     async def open(self) -> None:
-        """Lock the state folder and open every endpoint.
+        """Lock the state folder, open every endpoint and the video server.
 
         Raises `ConfigError`; nothing is then left open or locked.
 
@@ -220,7 +224,10 @@ class Gateway:
         self._lock_state()
         try:
             await self._node.start(self.config.endpoints)
+            await self.relay.start()
         except BaseException:
+            await self.relay.close()
+            await self._node.close()
             self._unlock_state()
             raise
 
@@ -278,6 +285,7 @@ class Gateway:
             system = System(
                 self._node, drone, config.sysid, self._clock, started, allow_kill=allow_kill, state=self._state
             )
+            self.relay.add(DroneSource(config.sysid, config.name, drone))
             supervised = _Supervised(config, drone, system, self._write_lock)
             supervised.task = asyncio.get_running_loop().create_task(supervised.run())
             self._supervised.append(supervised)
@@ -301,6 +309,7 @@ class Gateway:
         Clients are not heard any more, or one of them would fly on what has just been stopped.
         """
         self._node.stop_delivering()
+        await self.relay.close()
         await asyncio.gather(*(self._leave(s) for s in self._supervised))
         self._supervised.clear()
         await self._node.close()
@@ -326,9 +335,11 @@ class Gateway:
 
     def lines(self) -> list[str]:
         """One line per drone and per endpoint."""
-        return [s.line() for s in self._supervised] + [
-            f"endpoint {endpoint.describe()}" for endpoint in self._node.endpoints
-        ]
+        return (
+            [s.line() for s in self._supervised]
+            + [f"endpoint {endpoint.describe()}" for endpoint in self._node.endpoints]
+            + [f"video {self.relay.describe()}"]
+        )
 
     def counters(self) -> Counter[str]:
         """Return all counters: MAVLink's under their own names, each drone's behind its name."""

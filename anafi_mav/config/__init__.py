@@ -11,3 +11,4 @@ from anafi_mav.config.load import remarks as remarks
 from anafi_mav.config.schema import Config as Config
 from anafi_mav.config.schema import DroneConfig as DroneConfig
 from anafi_mav.config.schema import SimConfig as SimConfig
+from anafi_mav.config.schema import VideoConfig as VideoConfig

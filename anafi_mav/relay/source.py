@@ -1,4 +1,4 @@
-"""One drone as a source for viewers: its video runs while somebody needs it, and what it shows becomes a feed."""
+"""One drone as a source for viewers: runs its video while they need it."""
 
 from __future__ import annotations
 

@@ -157,13 +157,13 @@ def two(first: str, second: str) -> str:
 
 MISTAKES = {
     # Whole file
-    "[]": "expected a mapping with the keys endpoints, drones, allow_kill, state, got []",
-    "just text": "expected a mapping with the keys endpoints, drones, allow_kill, state, got 'just text'",
+    "[]": "expected a mapping with the keys endpoints, drones, allow_kill, state, video, got []",
+    "just text": "expected a mapping with the keys endpoints, drones, allow_kill, state, video, got 'just text'",
     # Unknown keys, at each level
     "drons: []": "drons: unknown key; did you mean drones?",
-    "x: 1": "x: unknown key; expected one of endpoints, drones, allow_kill, state",
-    "3: 4": "3: unknown key; expected one of endpoints, drones, allow_kill, state",
-    "'a b': 4": "'a b': unknown key; expected one of endpoints, drones, allow_kill, state",
+    "x: 1": "x: unknown key; expected one of endpoints, drones, allow_kill, state, video",
+    "3: 4": "3: unknown key; expected one of endpoints, drones, allow_kill, state, video",
+    "'a b': 4": "'a b': unknown key; expected one of endpoints, drones, allow_kill, state, video",
     one("sysid: 1, sim: {}, adress: x"): "drones[0].adress: unknown key; did you mean address?",
     sim("hme: 1"): "drones[0].sim.hme: unknown key; did you mean home?",
     # Wrong types
