@@ -17,7 +17,7 @@ from typing import Any
 import msgspec
 
 from anafi_mav import documents, models
-from anafi_mav.config.schema import MAVSDK_SYSID, Config, DroneConfig, SimConfig, VideoConfig, alternatives
+from anafi_mav.config.schema import MAVSDK_SYSID, Config, DroneConfig, HttpConfig, SimConfig, VideoConfig, alternatives
 from anafi_mav.errors import ConfigError
 
 _HOST_NAME = re.compile(r"(?!-)[A-Za-z0-9-]{1,63}(?<!-)(\.(?!-)[A-Za-z0-9-]{1,63}(?<!-))*\.?")
@@ -202,6 +202,9 @@ def _contradictions(config: Config) -> Iterator[tuple[str, str]]:
     }
     yield from _twice("an address", bound)
     yield from _twice("an address and discovery_port", met)
+    http = config.http_server
+    if http is not None and not _is_host(http.host):
+        yield "http.host", _wrong(HttpConfig, "host", http.host)
     for key in ("host", "public_host"):
         host = getattr(config.video, key)
         if host is not None and not _is_host(host):

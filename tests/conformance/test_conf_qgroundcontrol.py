@@ -16,7 +16,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.flavours import both
 from support.ftp import Ftp
-from support.mav import Client
+from support.mav import Client, kind_of
 from support.missions import ACTIVE, COMPLETE, MISSION_MODE, ROUND, first, mode, put, said, start, state, takeoff, way
 from support.params import fetch, read, send_set, value_of
 from support.world import ARMED, HOLD, HOME, World, world
@@ -170,7 +170,7 @@ def position_of(w: World, mark: int, kind: str, true: Any) -> int:
     return next(
         index
         for index, (_, message) in enumerate(w.client.received[mark:])
-        if message.get_type() == kind and true(message)
+        if kind_of(message) == kind and true(message)
     )
 
 
@@ -200,7 +200,7 @@ def resume_index(messages: list[Any], mode: int, items: int, home: int) -> int:
         if message.get_type() == "MISSION_CURRENT":
             if message.seq not in (last, cached):
                 cached = message.seq
-        elif message.get_type() == "HEARTBEAT" and cached != -1 and message.custom_mode == mode:
+        elif kind_of(message) == "HEARTBEAT" and cached != -1 and message.custom_mode == mode:
             cached, last = -1, cached
     index = last + (0 if home else 1)
     return index - 1 if index > 1 and index != items else 0
@@ -217,7 +217,7 @@ async def test_complete_mission_is_not_offered_for_resuming(flavour: str) -> Non
         messages = [message for _, message in w.client.received[mark:]]
         assert resume_index(messages, MISSION_MODE[flavour], len(ROUND), first(w)) == 0
         # One change of mode, from Mission to Return, and not by way of Hold.
-        modes = [message.custom_mode for message in messages if message.get_type() == "HEARTBEAT"]
+        modes = [message.custom_mode for message in messages if kind_of(message) == "HEARTBEAT"]
         begun = modes.index(MISSION_MODE[flavour])
         assert [number for number, _ in itertools.groupby(modes[begun:])] == [MISSION_MODE[flavour], w.modes.returning]
 

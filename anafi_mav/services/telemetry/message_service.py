@@ -10,6 +10,7 @@ import asyncio
 import logging
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from anafi_mav.drone.events import Message
 from anafi_mav.mavlink import dialect
@@ -26,13 +27,22 @@ from anafi_mav.vehicle.base.subscriptions import Subscriptions
 
 logger = logging.getLogger(__name__)
 
-LEGACY_REQUESTS = {
-    dialect.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
-    dialect.MAV_CMD_REQUEST_PROTOCOL_VERSION: dialect.MAVLINK_MSG_ID_PROTOCOL_VERSION,
-    dialect.MAV_CMD_GET_HOME_POSITION: dialect.MAVLINK_MSG_ID_HOME_POSITION,
+LEGACY_REQUESTS: Mapping[int, tuple[int, bool]] = {
+    dialect.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: (dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION, False),
+    dialect.MAV_CMD_REQUEST_PROTOCOL_VERSION: (dialect.MAVLINK_MSG_ID_PROTOCOL_VERSION, False),
+    dialect.MAV_CMD_GET_HOME_POSITION: (dialect.MAVLINK_MSG_ID_HOME_POSITION, False),
+    dialect.MAV_CMD_REQUEST_CAMERA_INFORMATION: (dialect.MAVLINK_MSG_ID_CAMERA_INFORMATION, False),
+    dialect.MAV_CMD_REQUEST_CAMERA_SETTINGS: (dialect.MAVLINK_MSG_ID_CAMERA_SETTINGS, False),
+    dialect.MAV_CMD_REQUEST_STORAGE_INFORMATION: (dialect.MAVLINK_MSG_ID_STORAGE_INFORMATION, True),
+    dialect.MAV_CMD_REQUEST_CAMERA_CAPTURE_STATUS: (dialect.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS, False),
+    dialect.MAV_CMD_REQUEST_CAMERA_IMAGE_CAPTURE: (dialect.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED, True),
+    dialect.MAV_CMD_REQUEST_VIDEO_STREAM_INFORMATION: (dialect.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION, True),
+    dialect.MAV_CMD_REQUEST_VIDEO_STREAM_STATUS: (dialect.MAVLINK_MSG_ID_VIDEO_STREAM_STATUS, True),
 }
-"""Commands of before REQUEST_MESSAGE, and the message each asks for. MAVSDK falls back on them, MAVProxy knows no
-other."""
+"""Commands of before REQUEST_MESSAGE, the message that each requests, and True where param1 is its id or index.
+
+A component has those of its own messages. MAVSDK falls back on them, MAVProxy knows no other.
+"""
 
 LOG_EVERY = 5.0
 """s before it is logged again that a message cannot be made."""
@@ -67,7 +77,10 @@ class MessageService(Service):
         """When it was last logged that a message cannot be made."""
 
     def take_tables(self, streams: Mapping[int, MessageStream], requests: Mapping[int, Request]) -> None:
-        """Adopt the streams and the request handlers of all services of the system."""
+        """Adopt the streams and the request handlers of all services of the component.
+
+        The queries follow from them.
+        """
         self._table, self._requests = streams, requests
         defaults = {id: stream.every for id, stream in streams.items() if stream.every is not None}
         self._intervals = Streams(defaults, without=lambda channel: flavour_of(channel).unstreamed)
@@ -87,7 +100,7 @@ class MessageService(Service):
             ),
             dialect.MAV_CMD_SET_MESSAGE_INTERVAL: self._set_interval,
             dialect.MAV_CMD_GET_MESSAGE_INTERVAL: self._get_interval,
-            **{old: self._legacy(id) for old, id in LEGACY_REQUESTS.items()},
+            **{old: self._legacy(id, indexed) for old, (id, indexed) in LEGACY_REQUESTS.items() if self.has(id)},
         }
 
     def messages(self) -> Mapping[int, MessageHandler]:
@@ -97,6 +110,10 @@ class MessageService(Service):
         return {
             dialect.MAVLINK_MSG_ID_MESSAGE_INTERVAL: lambda inbound, command: self._interval(inbound, command.params[1])
         }
+
+    def has(self, id: float) -> bool:
+        """True for a message that this component streams or sends on request."""
+        return id in self._table or id in self._requests
 
     def link_up(self) -> None:
         self._linked_at = self.host.clock.monotonic()
@@ -206,8 +223,14 @@ class MessageService(Service):
         message = stream.build(self.host.vehicle, times)
         return dialect.MAV_RESULT_TEMPORARILY_REJECTED if message is None else message
 
-    def _legacy(self, id: int) -> Query:
-        return lambda inbound, command: self._request(inbound, id, command)
+    def _legacy(self, id: int, indexed: bool) -> Query:
+        """Return the query that answers as REQUEST_MESSAGE does, with the index in its param2."""
+
+        def answer(inbound: Inbound, command: Command) -> int:
+            index = command.params[0] if indexed else math.nan
+            return self._request(inbound, id, replace(command, params=(float(id), index, math.nan, math.nan)))
+
+        return answer
 
     def _set_interval(self, inbound: Inbound, command: Command) -> int:
         id, interval = command.params[0], command.params[1]

@@ -192,14 +192,14 @@ async def test_row_contradicting_another_or_mavlink_is_refused(
     monkeypatch: pytest.MonkeyPatch, id: int, row: Action, reason: str
 ) -> None:
     wrong = type("Wrong", (_Refused,), {"rows": {id: row}})
-    monkeypatch.setattr(system, "SERVICES", (*system.SERVICES, wrong))
+    monkeypatch.setattr(system, "AUTOPILOT_SERVICES", (*system.AUTOPILOT_SERVICES, wrong))
     with pytest.raises(ValueError, match=reason):
         await make_system()
 
 
 async def test_query_with_a_location_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     wrong = type("Wrong", (_Refused,), {"rows": {}, "asked": (dialect.MAV_CMD_NAV_LOITER_UNLIM,)})
-    monkeypatch.setattr(system, "SERVICES", (*system.SERVICES, wrong))
+    monkeypatch.setattr(system, "AUTOPILOT_SERVICES", (*system.AUTOPILOT_SERVICES, wrong))
     with pytest.raises(ValueError, match="MAV_CMD 17: MAVLink says True of its location"):
         await make_system()
 
