@@ -243,7 +243,7 @@ class Storage(Commanding[Storages]):
 
     @staticmethod
     def formatted(message: Message) -> int | None:
-        """Return the id of the storage that one of `RESULT_EVENTS` reports as formatted; None: it was not."""
+        """Return the id of the storage that a result reports as formatted; None: it was not."""
         return _id(message) if _result(message) == FormattingResult.SUCCESS else None
 
     def __getitem__(self, id: int) -> StorageState:

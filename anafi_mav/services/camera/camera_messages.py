@@ -1,4 +1,4 @@
-"""Messages that describe the camera: information, settings, field of view, thermal range. No I/O.
+"""Builders of the messages that describe the camera. No I/O.
 
 The flags of CAMERA_INFORMATION are what the drone reported of its main camera: each is a command that works.
 """
@@ -16,7 +16,7 @@ from anafi_mav.drone.payload.camera_enums import CameraMode
 from anafi_mav.drone.payload.camera_state import CameraState
 from anafi_mav.mavlink import dialect
 from anafi_mav.models import Model, PayloadSensor
-from anafi_mav.services.camera.pose_track import Pose
+from anafi_mav.services.camera.pose_track import CameraPose
 from anafi_mav.services.stream import Times
 from anafi_mav.vehicle.vehicle import Vehicle
 
@@ -25,6 +25,9 @@ UNKNOWN = 2**31 - 1
 """INT32_MAX: an unknown position."""
 AT_INFINITY = -(2**31)
 """INT32_MIN: the image shows no ground."""
+
+MEBIBYTE = 1024.0 * 1024.0
+"""Bytes."""
 
 KELVIN = 273.15
 """0 °C in K."""
@@ -37,6 +40,9 @@ PHOTO_WIDTHS = {"4k": (5344, 4016), "thermal": (5344, 4016), "usa": (5344, 4016)
 
 LEVEL_GROUND = math.radians(0.5)
 """The camera shows ground when it looks further down than this; above, a flat world ends nowhere."""
+
+ZOOM_STEP = 1.25
+"""Ratio of one step of the zoom: a range of 3 is five steps."""
 
 MODES = {
     CameraMode.PHOTO: dialect.CAMERA_MODE_IMAGE,
@@ -113,7 +119,7 @@ def zoom_factor(camera: CameraState, percent: float) -> float:
 
 def settings(drone: Drone, times: Times) -> dialect.MAVLink_message | None:
     """Return CAMERA_SETTINGS; None before the drone has reported the mode."""
-    camera = drone.camera[drone.camera.active]
+    camera = drone.camera[drone.camera.active_id]
     if camera.mode is None:
         return None
     return dialect.MAVLink_camera_settings_message(times.boot_ms, MODES[camera.mode], zoom_percent(camera), NAN, 0)
@@ -125,21 +131,21 @@ def field_of_view(drone: Drone) -> tuple[float, float]:
     if frame is not None and frame.metadata.hfov is not None and frame.metadata.vfov is not None:
         return frame.metadata.hfov * units.DEG_PER_RAD, frame.metadata.vfov * units.DEG_PER_RAD
     zoom = drone.camera[MAIN].zoom
-    if lens is None or zoom is None or drone.camera.active != MAIN:
+    if lens is None or zoom is None or drone.camera.active_id != MAIN:
         return NAN, NAN
     across = 2.0 * math.degrees(math.atan(lens.width / (2.0 * lens.fx * zoom)))
     down = 2.0 * math.degrees(math.atan(lens.height / (2.0 * lens.fy * zoom)))
     return across, down
 
 
-def fov_status(vehicle: Vehicle, times: Times, pose: Pose) -> dialect.MAVLink_message:
+def fov_status(vehicle: Vehicle, times: Times, pose: CameraPose) -> dialect.MAVLink_message:
     """Return CAMERA_FOV_STATUS.
 
     The centre of the image is where the optical axis meets a level ground at the height of the take-off point.
     """
     amsl = None if pose.height is None else vehicle.height.amsl(pose.height)
     latitude, longitude = (UNKNOWN, UNKNOWN) if pose.place is None else map(units.deg_e7, pose.place)
-    image: tuple[int, ...] = (UNKNOWN, UNKNOWN, UNKNOWN)
+    image = (UNKNOWN, UNKNOWN, UNKNOWN)
     if pose.camera is not None and pose.camera[1] > -LEVEL_GROUND:
         image = (AT_INFINITY, AT_INFINITY, AT_INFINITY)
     elif pose.camera is not None and pose.place is not None and pose.height is not None and pose.height > 0.0:
@@ -147,7 +153,8 @@ def fov_status(vehicle: Vehicle, times: Times, pose: Pose) -> dialect.MAVLink_me
         reach = pose.height / math.tan(-pitch)
         there = geo.destination(*pose.place, reach * math.cos(yaw), reach * math.sin(yaw))
         ground = None if amsl is None else amsl - pose.height
-        image = (*map(units.deg_e7, there), UNKNOWN if ground is None else units.millimetres(ground))
+        height = UNKNOWN if ground is None else units.millimetres(ground)
+        image = (units.deg_e7(there[0]), units.deg_e7(there[1]), height)
     return dialect.MAVLink_camera_fov_status_message(
         times.boot_ms,
         latitude,
@@ -156,14 +163,14 @@ def fov_status(vehicle: Vehicle, times: Times, pose: Pose) -> dialect.MAVLink_me
         *image,
         list(pose.quaternion or (NAN, NAN, NAN, NAN)),
         *field_of_view(vehicle.drone),
-        0,
     )
 
 
 def thermal_range(drone: Drone, times: Times) -> dialect.MAVLink_message | None:
-    """Return CAMERA_THERMAL_RANGE: the temperatures of the palette's ends; None while it follows the picture.
+    """Return CAMERA_THERMAL_RANGE; None while the palette follows the picture.
 
-    An ANAFI reports no measured temperature, so that the points are unknown.
+    Its values are the temperatures of the palette's ends. An ANAFI reports no measured temperature, so that the points
+    are unknown.
     """
     palette = drone.thermal.state.palette
     shown = drone.streams.shown

@@ -1,11 +1,11 @@
-"""Pose of the camera by the drone's states, and the samples of its events and pictures for the geotags."""
+"""Pose of the camera by the drone's states, and its samples for the geotags."""
 
 from __future__ import annotations
 
 from anafi_mav.drone import Drone
 from anafi_mav.drone.payload.gimbal import MAIN
 from anafi_mav.drone.video.video import VideoFrame
-from anafi_mav.services.camera.pose_track import Pose, PoseTrack
+from anafi_mav.services.camera.pose_track import CameraPose, PoseTrack
 from anafi_mav.units import RAD_PER_DEG
 
 
@@ -24,11 +24,11 @@ def camera_angles(drone: Drone) -> tuple[float, float, float] | None:
     )
 
 
-def current_pose(drone: Drone) -> Pose:
+def current_pose(drone: Drone) -> CameraPose:
     """Return the newest pose."""
     location = drone.gps.state.location
     place = None if location is None else (location.latitude, location.longitude)
-    return Pose(place, drone.piloting.state.altitude, camera_angles(drone))
+    return CameraPose(place, drone.piloting.state.altitude, camera_angles(drone))
 
 
 def add_states(track: PoseTrack, drone: Drone, now: float, *, located: bool) -> None:
@@ -47,7 +47,7 @@ def add_states(track: PoseTrack, drone: Drone, now: float, *, located: bool) -> 
 
 def add_frame(track: PoseTrack, frame: VideoFrame) -> None:
     """Add what a picture of the live video reports."""
-    pictures, metadata, at = track.pictures, frame.metadata, frame.arrived
+    pictures, metadata, at = track.pictures, frame.metadata, frame.shot
     if metadata.location is not None:
         pictures.places.add(at, metadata.location.latitude, metadata.location.longitude)
     if metadata.speed is not None:

@@ -1,4 +1,4 @@
-"""CAMERA_INFORMATION, CAMERA_SETTINGS, CAMERA_FOV_STATUS: the camera, and the commands that set it up.
+"""Messages about the camera itself, and the commands that set it up.
 
 MAVLink camera.md; conformance A8, C6. What a client or the pilot changes is sent to every client.
 """
@@ -35,9 +35,6 @@ from anafi_mav.services.service import Answer, Host, Request, Service
 from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.vehicle.base.refusal import Refused, Unsupported
 from anafi_mav.vehicle.vehicle import Vehicle
-
-ZOOM_STEP = 1.25
-"""Ratio of one step of the zoom: a range of 3 is five steps."""
 
 ZOOM_SHOWN = 0.5
 """% of the zoom range by which CAMERA_SETTINGS must differ from the last one to be sent again."""
@@ -92,7 +89,7 @@ class CameraService(Service):
         self.host.send(self._made())
 
     def _settings(self) -> tuple[CameraMode | None, float]:
-        camera = self.host.drone.camera[self.host.drone.camera.active]
+        camera = self.host.drone.camera[self.host.drone.camera.active_id]
         return camera.mode, camera_messages.zoom_percent(camera)
 
     def _send_settings(self) -> None:
@@ -102,7 +99,7 @@ class CameraService(Service):
             self.host.send(message)
 
     def tick(self, now: float) -> None:
-        """Send what has changed, whoever changed it."""
+        """Send what has changed, by a client or otherwise."""
         mode, zoom = self._settings()
         if self._sent_settings is not None and mode is not None:
             last_mode, last_zoom = self._sent_settings
@@ -165,7 +162,7 @@ class CameraService(Service):
     async def change_mode(self, wanted: CameraMode | None) -> None:
         """Change between photos and video; None is a mode that the camera does not have."""
         drone = self.host.drone
-        camera = drone.camera[drone.camera.active]
+        camera = drone.camera[drone.camera.active_id]
         if camera.modes is None:
             raise Refused(texts.CAMERA_MODE, texts.CAMERA_UNKNOWN)
         if wanted is None or wanted not in camera.modes:
@@ -173,7 +170,7 @@ class CameraService(Service):
         if camera.mode is not wanted:
             require_free(self.host.vehicle, texts.CAMERA_MODE)
             require_idle(drone, texts.CAMERA_MODE)
-            if await drone.camera.set_mode(wanted, drone.camera.active) is not wanted:
+            if await drone.camera.set_mode(wanted, drone.camera.active_id) is not wanted:
                 raise Refused(texts.CAMERA_MODE, texts.CAMERA_MODE_KEPT)
         self._send_settings()
 
@@ -182,7 +179,7 @@ class CameraService(Service):
         kind, value = command.params[0], command.params[1]
         require_camera(texts.ZOOM, command.params[2])
         drone = self.host.drone
-        id = drone.camera.active
+        id = drone.camera.active_id
         camera = drone.camera[id]
         if camera.zoom_max is None or camera.zoom_max <= 1.0:
             raise Unsupported(texts.ZOOM, texts.CAMERA_UNKNOWN)
@@ -197,13 +194,13 @@ class CameraService(Service):
         if kind == dialect.ZOOM_TYPE_CONTINUOUS:
             await drone.camera.start_zoom(value, id)
         elif kind == dialect.ZOOM_TYPE_STEP:
-            await drone.camera.zoom((camera.zoom or 1.0) * ZOOM_STEP**value, id)
+            await drone.camera.zoom((camera.zoom or 1.0) * camera_messages.ZOOM_STEP**value, id)
         else:
             await drone.camera.zoom(camera_messages.zoom_factor(camera, value), id)
         self._send_settings()
 
     async def _set_source(self, command: Command) -> None:
-        """MAV_CMD_SET_CAMERA_SOURCE: param2 the picture that is shown; param3 not 0: visible and thermal blended."""
+        """MAV_CMD_SET_CAMERA_SOURCE: param2 the shown picture; param3 not 0: blended."""
         require_camera(texts.CAMERA_SOURCE, command.params[0])
         drone = self.host.drone
         if not camera_messages.has_thermal(drone.identity.model):
@@ -220,7 +217,7 @@ class CameraService(Service):
         await drone.streams.show(kind)
 
     async def _reset(self, command: Command) -> None:
-        """MAV_CMD_RESET_CAMERA_SETTINGS: the settings of the active camera that an ANAFI has after its factory reset.
+        """MAV_CMD_RESET_CAMERA_SETTINGS: set the active camera as after a factory reset.
 
         ARSDK resets all settings of a drone or none, so that each is set. Mode and storage stay.
         """
@@ -236,7 +233,7 @@ class CameraService(Service):
 
     def _defaults(self) -> list[Callable[[], Coroutine[Any, Any, Any]]]:
         camera = self.host.drone.camera
-        id = camera.active
+        id = camera.active_id
         state = camera[id]
         changes: list[tuple[object, Callable[[], Coroutine[Any, Any, Any]]]] = [
             (state.exposure, lambda: camera.set_exposure(AUTOMATIC, id)),

@@ -1,4 +1,4 @@
-"""Checks that the camera's commands have in common: the camera they name, and who owns it at present."""
+"""Checks that the camera's commands have in common: camera, owner, storage."""
 
 from __future__ import annotations
 
@@ -29,6 +29,8 @@ FILE_SYSTEM_PROBLEMS: dict[FsState, Reason] = {
     FsState.PASSWORD_NEEDED: texts.STORAGE_PASSWORD,
     FsState.CHECKING: texts.STORAGE_CHECKING,
 }
+PASSING = (texts.STORAGE_FORMATTING, texts.STORAGE_CHECKING)
+"""Problems that end by themselves; others need another card."""
 
 
 def is_at_autopilot(flavour: Flavour) -> bool:
@@ -45,7 +47,7 @@ def require_camera(what: OperatorText, id: float) -> None:
 def require_free(vehicle: Vehicle, what: OperatorText) -> None:
     """Refuse a change of the camera while the items of a flown mission need it."""
     if vehicle.mission_needs_camera:
-        raise Refused(what, texts.MISSION_NEEDS_CAMERA)
+        raise Refused(what, texts.MISSION_USES_CAMERA)
 
 
 def require_idle(drone: Drone, what: OperatorText) -> None:
@@ -57,7 +59,7 @@ def require_idle(drone: Drone, what: OperatorText) -> None:
 
 
 def storage_problem(drone: Drone, id: int | None = None) -> Reason | None:
-    """Return why nothing can be stored; None when the storage is ready, or the drone has not reported it."""
+    """Return the reason why nothing can be stored; None for a storage that is ready or unknown."""
     state = drone.storage[drone.storage.main if id is None else id]
     if state.physical is not None and state.physical in PROBLEMS:
         return PROBLEMS[state.physical]
@@ -69,6 +71,4 @@ def storage_problem(drone: Drone, id: int | None = None) -> Reason | None:
 def require_storage(drone: Drone, what: OperatorText) -> None:
     """Refuse a photo or recording that could not be stored."""
     if (problem := storage_problem(drone)) is not None:
-        # A card that is formatted or checked is usable in a while; another must be exchanged.
-        passes = problem in (texts.STORAGE_FORMATTING, texts.STORAGE_CHECKING)
-        raise Refused(what, problem, lasting=not passes)
+        raise Refused(what, problem, lasting=problem not in PASSING)

@@ -6,7 +6,7 @@ format only. A picture that the drone could not store has one, too.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import msgspec
@@ -44,6 +44,11 @@ class CapturedImage(msgspec.Struct, frozen=True):
     url: str = ""
 
 
+def renumbered(image: CapturedImage, number: int, index: int) -> CapturedImage:
+    """Return another picture of the same burst, whose own time was not reported."""
+    return replace(image, index=index, number=number, url="")
+
+
 class PhotoLog:
     """The photos by index; the oldest are forgotten."""
 
@@ -72,19 +77,18 @@ class PhotoLog:
             del self._images[next(iter(self._images))]
         return image
 
-    def change(self, capture: int, number: int, **changes: Any) -> CapturedImage | None:
-        """Change what is known of a picture; None when it is forgotten."""
-        for image in reversed(self._images.values()):
-            if (image.capture, image.number) == (capture, number):
-                self._images[image.index] = replace(image, **changes)
-                return self._images[image.index]
-        return None
+    def find(self, index: int) -> CapturedImage | None:
+        """Return the photo with this index; None when it is forgotten."""
+        return self._images.get(index)
 
-    def unnamed(self, capture: int) -> Iterator[CapturedImage]:
-        """Yield the stored pictures of a capture that have no address yet."""
-        for image in tuple(self._images.values()):
-            if image.capture == capture and image.is_saved and not image.url:
-                yield image
+    def change(self, index: int, **changes: Any) -> None:
+        """Change what is known of a photo, unless it is forgotten."""
+        if (image := self._images.get(index)) is not None:
+            self._images[index] = replace(image, **changes)
+
+    def of_capture(self, capture: int) -> list[CapturedImage]:
+        """Return the pictures of a photo, burst or series, in their sequence."""
+        return [image for image in self._images.values() if image.capture == capture]
 
     def range(self, first: int, last: int) -> list[CapturedImage]:
         """Return the photos that are asked for with the params 2 and 3 of MAV_CMD_REQUEST_MESSAGE.

@@ -1,4 +1,4 @@
-"""Pose of drone and camera at a moment of the last seconds, for the geotag of a photo. No I/O.
+"""Pose of drone and camera at a moment, for the geotag of a photo. No I/O.
 
 Positions, heights and angles arrive in events of their own, and together with each picture of the live video. A moment
 between two of them is interpolated; after the newest position the drone goes on at its reported velocity.
@@ -24,7 +24,7 @@ NEAR = 0.2
 """s from a picture within which the pictures of the video are the source: six of them."""
 
 
-class Pose(msgspec.Struct, frozen=True):
+class CameraPose(msgspec.Struct, frozen=True):
     """Pose at a moment. None: unknown."""
 
     place: tuple[float, float] | None = None
@@ -40,7 +40,7 @@ class Pose(msgspec.Struct, frozen=True):
         return None if self.camera is None else quaternion_from_euler(*self.camera)
 
 
-class Track:
+class SampleTrack:
     """Values of one kind over time; angles (rad) are unwrapped."""
 
     def __init__(self, *, angles: bool = False) -> None:
@@ -70,9 +70,10 @@ class Track:
         return min((abs(time - at) for time, _ in self._samples), default=math.inf)
 
     def value(self, at: float) -> tuple[float, ...] | None:
-        """Return the values at a moment; before the first and after the last sample those of that one.
+        """Return the values at a moment.
 
-        None without a sample within `FURTHEST`.
+        Before the first and after the last sample they are those of that sample. None without a sample within
+        `FURTHEST`.
         """
         before = after = None
         for sample in reversed(self._samples):
@@ -91,13 +92,13 @@ class PoseSource:
     """Samples of one source: the drone's events, or the pictures of its video."""
 
     def __init__(self) -> None:
-        self.places = Track()
+        self.places = SampleTrack()
         """Latitude, longitude, deg."""
-        self.velocities = Track()
+        self.velocities = SampleTrack()
         """North, east, m/s."""
-        self.heights = Track()
+        self.heights = SampleTrack()
         """m above take-off."""
-        self.cameras = Track(angles=True)
+        self.cameras = SampleTrack(angles=True)
         """Roll, pitch, yaw, rad."""
 
     def clear(self) -> None:
@@ -135,14 +136,14 @@ class PoseTrack:
         sources = (self.events, self.pictures)
         return any(min(source.places.newest, source.cameras.newest) >= at for source in sources)
 
-    def pose(self, at: float) -> Pose:
-        """Return the pose at a moment: of the pictures where there is one near it, else of the events."""
+    def pose(self, at: float) -> CameraPose:
+        """Return the pose at a moment, by the pictures if one is near it, else by the events."""
         events, pictures = self.events, self.pictures
         by_picture = pictures.cameras.distance(at) <= NEAR
         camera = pictures.cameras.value(at) if by_picture else events.cameras.value(at)
         place = pictures.place(at) if by_picture and pictures.places.distance(at) <= NEAR else events.place(at)
         height = (pictures.heights if pictures.heights.distance(at) <= NEAR else events.heights).value(at)
-        return Pose(
+        return CameraPose(
             place,
             None if height is None else height[0],
             None if camera is None else (camera[0], camera[1], wrap_pi(camera[2])),
