@@ -36,6 +36,8 @@ from anafi_mav.subject import DRONE
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.flying import ON_GROUND
 from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.web.live_page import DroneEntry, LivePage
+from anafi_mav.web.server import HttpServer
 
 logger = logging.getLogger(__name__)
 
@@ -162,6 +164,17 @@ class _Supervised:
         serial = self.drone.identity.serial if self.system.active else ""
         return HeldDrone(self.config.name, self.config.address, self.config.interface, serial)
 
+    def entry(self) -> DroneEntry:
+        """Return the drone as the page for browsers lists it."""
+        connected = self.system.active
+        return DroneEntry(
+            name=self.config.name,
+            sysid=self.config.sysid,
+            model=self.drone.identity.model.title if connected else "",
+            connected=connected,
+            problem="" if connected else self.problem or "no answer yet",
+        )
+
     def line(self) -> str:
         """Return one line for people: the drone, its address and its state."""
         where = f" on {self.config.interface}" if self.config.interface else ""
@@ -196,6 +209,11 @@ class Gateway:
         self._lock: StateLock | None = None
         self._state_problem = ""
         """Why the state folder cannot be used; empty while it can."""
+        http = config.http_server
+        self.web = None if http is None else HttpServer(http.host, http.port)
+        """The web server; None when it is configured off. Routes are added before `open`."""
+        if self.web is not None:
+            LivePage(self.web, lambda: [supervised.entry() for supervised in self._supervised])
 
     async def __aenter__(self) -> Self:
         await self.start()
@@ -207,7 +225,7 @@ class Gateway:
         await self.close()
 
     async def open(self) -> None:
-        """Lock the state folder and open every endpoint.
+        """Lock the state folder, open every endpoint and the web server.
 
         Raises `ConfigError`; nothing is then left open or locked.
 
@@ -220,7 +238,10 @@ class Gateway:
         self._lock_state()
         try:
             await self._node.start(self.config.endpoints)
+            if self.web is not None:
+                await self.web.start()
         except BaseException:
+            await self._node.close()
             self._unlock_state()
             raise
 
@@ -276,7 +297,14 @@ class Gateway:
             )
             allow_kill = self.config.allow_kill if config.allow_kill is None else config.allow_kill
             system = System(
-                self._node, drone, config.sysid, self._clock, started, allow_kill=allow_kill, state=self._state
+                self._node,
+                drone,
+                config.sysid,
+                self._clock,
+                started,
+                allow_kill=allow_kill,
+                state=self._state,
+                has_picture_pose=self.config.pose == "video",
             )
             supervised = _Supervised(config, drone, system, self._write_lock)
             supervised.task = asyncio.get_running_loop().create_task(supervised.run())
@@ -303,6 +331,8 @@ class Gateway:
         self._node.stop_delivering()
         await asyncio.gather(*(self._leave(s) for s in self._supervised))
         self._supervised.clear()
+        if self.web is not None:
+            await self.web.close()
         await self._node.close()
         self._unlock_state()
 
@@ -325,10 +355,10 @@ class Gateway:
         return tuple(supervised.system for supervised in self._supervised)
 
     def lines(self) -> list[str]:
-        """One line per drone and per endpoint."""
-        return [s.line() for s in self._supervised] + [
-            f"endpoint {endpoint.describe()}" for endpoint in self._node.endpoints
-        ]
+        """One line per drone and per endpoint, and one for the web server."""
+        lines = [s.line() for s in self._supervised]
+        lines += [f"endpoint {endpoint.describe()}" for endpoint in self._node.endpoints]
+        return lines if self.web is None else [*lines, f"web page {self.web.describe()}"]
 
     def counters(self) -> Counter[str]:
         """Return all counters: MAVLink's under their own names, each drone's behind its name."""

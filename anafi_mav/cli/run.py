@@ -25,6 +25,7 @@ from anafi_mav.mavlink.endpoint import is_open_to_network, parse_endpoint
 from anafi_mav.services.flavours import FLAVOURS
 from anafi_mav.sim.world import quirks
 from anafi_mav.state_lock import read_holder, state_folder
+from anafi_mav.web.server import is_loopback
 
 READY_LIMIT = 15.0
 """s after which "ready" is said though a drone has not answered: its connection takes 3 s at most, its settings and
@@ -87,6 +88,10 @@ def _serve(arguments: argparse.Namespace) -> int:
                     "is open to the network and MAVLink has no password: any program that reaches it can fly the drones"
                 )
                 complain(f"warning: endpoints[{index}]: {text} {what}", "yellow")
+    http = config.http_server
+    if http is not None and not is_loopback(http.host):
+        what = "is open to the network and has no password: any program that reaches it can watch the drones' video"
+        complain(f"warning: http.host: {http.host} {what}", "yellow")
     heap.settle()
     problems = asyncio.run(_run(config, arguments.sim_log.absolute() if arguments.sim_log else None))
     for problem in problems:

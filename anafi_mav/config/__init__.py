@@ -10,4 +10,5 @@ from anafi_mav.config.load import load as load
 from anafi_mav.config.load import remarks as remarks
 from anafi_mav.config.schema import Config as Config
 from anafi_mav.config.schema import DroneConfig as DroneConfig
+from anafi_mav.config.schema import HttpConfig as HttpConfig
 from anafi_mav.config.schema import SimConfig as SimConfig

@@ -17,7 +17,7 @@ from typing import Any
 import msgspec
 
 from anafi_mav import documents, models
-from anafi_mav.config.schema import MAVSDK_SYSID, Config, DroneConfig, SimConfig, alternatives
+from anafi_mav.config.schema import MAVSDK_SYSID, Config, DroneConfig, HttpConfig, SimConfig, alternatives
 from anafi_mav.errors import ConfigError
 
 _HOST_NAME = re.compile(r"(?!-)[A-Za-z0-9-]{1,63}(?<!-)(\.(?!-)[A-Za-z0-9-]{1,63}(?<!-))*\.?")
@@ -202,6 +202,9 @@ def _contradictions(config: Config) -> Iterator[tuple[str, str]]:
     }
     yield from _twice("an address", bound)
     yield from _twice("an address and discovery_port", met)
+    http = config.http_server
+    if http is not None and not _is_host(http.host):
+        yield "http.host", _wrong(HttpConfig, "host", http.host)
     yield from _agree("speed", {path: sim.speed for path, sim in simulated.items()})
     yield from _agree("seed", {path: sim.seed for path, sim in simulated.items() if sim.seed is not None})
 

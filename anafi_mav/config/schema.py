@@ -262,6 +262,32 @@ class DroneConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     ] = None
 
 
+class HttpConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The gateway's web server: a page for browsers, and files for ground stations.
+
+    It has no password.
+    """
+
+    host: Annotated[
+        str,
+        Meta(
+            min_length=1,
+            max_length=MAX_TEXT,
+            description="The address that it listens on: 127.0.0.1 for this computer alone, 0.0.0.0 for every network "
+            "that this computer is in.",
+            extra=expected("an IPv4 address or a host name of this computer, like 0.0.0.0"),
+        ),
+    ] = "127.0.0.1"
+    port: Annotated[
+        Annotated[int, Meta(ge=0, le=65535)] | None,
+        Meta(
+            description="Its TCP port; 0 is a free one. Left out: 8088, or a free one where that is in use. The "
+            "gateway prints it.",
+            extra=expected("a port from 0 to 65535"),
+        ),
+    ] = None
+
+
 class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The whole file.
 
@@ -299,6 +325,15 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
             extra=expected("true or false"),
         ),
     ] = False
+    pose: Annotated[
+        Literal["video", "events"],
+        Meta(
+            description="Source of attitude, position and speed for a client that requests them more than ten times a "
+            "second: the metadata of the live video, up to 30 times a second, or the drone's events, 5 times a second. "
+            "The video costs the radio some Mbit/s while such a client has its streams.",
+            extra=expected("video or events"),
+        ),
+    ] = "video"
     state: Annotated[
         Annotated[str, Meta(min_length=1, max_length=MAX_PATH)] | None,
         Meta(
@@ -308,6 +343,20 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
             extra=expected("the path of a folder"),
         ),
     ] = None
+    http: Annotated[
+        HttpConfig | bool,
+        Meta(
+            description="The gateway's web server; `off` for none.",
+            extra=expected("a mapping like {host: 127.0.0.1, port: 8088}, or off"),
+        ),
+    ] = HttpConfig()
+
+    @property
+    def http_server(self) -> HttpConfig | None:
+        """The web server as configured; None: off."""
+        if isinstance(self.http, HttpConfig):
+            return self.http
+        return HttpConfig() if self.http else None
 
 
 SECTIONS: dict[str, type[msgspec.Struct]] = {
@@ -315,5 +364,6 @@ SECTIONS: dict[str, type[msgspec.Struct]] = {
     "drones[…]": DroneConfig,
     "drones[…].sim": SimConfig,
     "drones[…].sim.wind": WindConfig,
+    "http": HttpConfig,
 }
 """Place in the file of each group of keys, in the order of the manual."""

@@ -70,6 +70,7 @@ from anafi_mav.arsdk.messages.flight_plan import WaypointSkipped as WaypointSkip
 from anafi_mav.arsdk.messages.follow_me import Mode as FollowMeMode
 from anafi_mav.arsdk.messages.gimbal import Attitude as GimbalAttitudeChanged
 from anafi_mav.arsdk.messages.gimbal import Axis as Axis
+from anafi_mav.arsdk.messages.gimbal import Error as GimbalError
 from anafi_mav.arsdk.messages.gimbal import FrameOfReference as FrameOfReference
 from anafi_mav.arsdk.messages.gimbal import GimbalCalibrationState as GimbalCalibrationState
 from anafi_mav.arsdk.messages.gimbal import MaxSpeed as GimbalMaxSpeed
@@ -146,6 +147,7 @@ __all__ = [
     "GPSFixStateChanged",
     "GimbalAttitudeChanged",
     "GimbalCalibrationState",
+    "GimbalError",
     "GimbalMaxSpeed",
     "GpsLocationChanged",
     "GrabAxisEvent",

@@ -7,14 +7,16 @@ import lzma
 from collections.abc import Iterable, Iterator
 
 import pytest
+from msgspec import structs
 from support.camera_states import MODEL_KEYS
 from support.definition_readers import Described, ReadDefinition, read_definition
-from support.ext_params import fetch, value_of, write
+from support.ext_params import fetch, read, send_set, value_of, write
 from support.ftp import Ftp
 from support.mav import CAMERA, Client
 from support.sim_settings import sim_value
 from support.world import World, world
 
+from anafi_mav.arsdk.messages.camera import CameraEvCompensation, EvCompensation, ExposureSettings, ZoomLevel
 from anafi_mav.mavlink import dialect
 from anafi_mav.sim.world.faults import Impairment
 
@@ -220,7 +222,7 @@ async def test_conf_095_silent_drone_is_a_failure() -> None:
 async def test_conf_095_recording_keeps_its_settings(model: str) -> None:
     async with world(model=model) as w:
         ours = await station(w)
-        await w.gateway.drones[0].camera.start_recording()
+        await w.gateway.systems[0].drone.camera.start_recording()
         for name, value in (("CAM_VIDRES", 3.0), ("CAM_MODE", 0.0)):
             before = ours.values[name]
             mark = w.client.mark()
@@ -229,7 +231,7 @@ async def test_conf_095_recording_keeps_its_settings(model: str) -> None:
             pushed = await w.client.wait("PARAM_EXT_VALUE", lambda m, name=name: m.param_id == name, since=mark)
             assert value_of(pushed) == before
         await w.client.wait("STATUSTEXT", lambda m: "camera is recording" in m.text, since=0)
-        assert w.gateway.drones[0].camera[0].recording_now
+        assert w.gateway.systems[0].drone.camera[0].recording_now
         assert (await write(w.client, "CAM_EV", 1.0, 9)).param_result == ACCEPTED
 
 
@@ -279,6 +281,6 @@ async def test_definition_grows_with_reported_shutter_times() -> None:
         (exposure,) = (report for report in reports if isinstance(report, ExposureSettings))
         few = structs.replace(exposure, manual_shutter_speed_capabilities=0b11)
         w.drone.inject(few)
-        await w.gateway.drones[0].expect(ExposureSettings, lambda m: True, 5.0)
+        await w.gateway.systems[0].drone.expect(ExposureSettings, lambda m: True, 5.0)
         assert (await load(w.client)).version == before.version
         assert [option.value for option in (await load(w.client)).parameters["CAM_SHUTTERSPD"].options] == times

@@ -215,6 +215,16 @@ class CamerasState(msgspec.Struct, frozen=True):
     next_photo: float | None = None
     """Until the next picture of a series: s, or m of a GPS_LAPSE."""
 
+    @property
+    def is_recording(self) -> bool:
+        """True while a camera records a video."""
+        return any(camera.recording_now for camera in self.cameras.values())
+
+    @property
+    def is_taking(self) -> bool:
+        """True while a camera takes or saves a photo, or a series of them."""
+        return any(camera.taking for camera in self.cameras.values())
+
 
 def changed(state: CamerasState, id: int, **changes: Any) -> CamerasState:
     """The state with these fields of one camera changed."""

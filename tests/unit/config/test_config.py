@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from anafi_mav.config import Config, DroneConfig, SimConfig, from_text, load, remarks
+from anafi_mav.config import Config, DroneConfig, HttpConfig, SimConfig, from_text, load, remarks
 from anafi_mav.config.schema import WindConfig
 from anafi_mav.errors import ConfigError
 
@@ -20,6 +20,7 @@ REPOSITORY = Path(__file__).parents[3]
 HOST = "expected an IPv4 address or a host name, like 192.168.42.1, got"
 NAME = "expected 1 to 32 letters, digits, '-', '_' or '.', beginning with a letter or digit, got"
 SYSID = "expected a whole number from 1 to 250"
+KEYS = ", ".join(Config.__struct_fields__)
 KEYS_OF_A_DRONE = "name, sysid, address, interface, sim, discovery_port, http_port, rtsp_port, allow_kill"
 
 
@@ -123,6 +124,25 @@ def test_anchors_and_merges_are_no_duplicate_keys() -> None:
     ]
 
 
+def test_web_server_is_configured_left_out_or_off() -> None:
+    assert from_text("http: {host: 0.0.0.0, port: 0}", "f").http_server == HttpConfig(host="0.0.0.0", port=0)
+    assert from_text("http: off", "f").http_server is None
+    assert from_text("http: on", "f").http_server == from_text("", "f").http_server == HttpConfig()
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("http: 8088", "http: expected a mapping like {host: 127.0.0.1, port: 8088}, or off, got 8088"),
+        ("http: {port: 65536}", "http.port: expected a port from 0 to 65535, got 65536"),
+        ("http: {host: 1.2.3}", "http.host: expected an IPv4 address or a host name of this computer, like 0.0.0.0"),
+        ("http: {address: x}", "http.address: unknown key; expected one of host, port"),
+    ],
+)
+def test_web_server_of_wrong_kind_is_named_with_its_key(text: str, line: str) -> None:
+    assert problem(text).startswith(f"fleet.yaml: {line}")
+
+
 def test_scenario_path_is_relative_to_the_configuration(tmp_path: Path) -> None:
     path = tmp_path / "fleet.yaml"
     path.write_text(
@@ -157,13 +177,13 @@ def two(first: str, second: str) -> str:
 
 MISTAKES = {
     # Whole file
-    "[]": "expected a mapping with the keys endpoints, drones, allow_kill, state, got []",
-    "just text": "expected a mapping with the keys endpoints, drones, allow_kill, state, got 'just text'",
+    "[]": f"expected a mapping with the keys {KEYS}, got []",
+    "just text": f"expected a mapping with the keys {KEYS}, got 'just text'",
     # Unknown keys, at each level
     "drons: []": "drons: unknown key; did you mean drones?",
-    "x: 1": "x: unknown key; expected one of endpoints, drones, allow_kill, state",
-    "3: 4": "3: unknown key; expected one of endpoints, drones, allow_kill, state",
-    "'a b': 4": "'a b': unknown key; expected one of endpoints, drones, allow_kill, state",
+    "x: 1": f"x: unknown key; expected one of {KEYS}",
+    "3: 4": f"3: unknown key; expected one of {KEYS}",
+    "'a b': 4": f"'a b': unknown key; expected one of {KEYS}",
     one("sysid: 1, sim: {}, adress: x"): "drones[0].adress: unknown key; did you mean address?",
     sim("hme: 1"): "drones[0].sim.hme: unknown key; did you mean home?",
     # Wrong types

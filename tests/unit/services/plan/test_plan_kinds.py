@@ -81,7 +81,7 @@ def test_autocontinue_0_of_other_clients_stays_a_stop(flavour: Flavour) -> None:
     assert [item.autocontinue for item in stops] == [0, 1]
     fault = MissionKind(lambda: HOME, lambda: 2).examine(stops, flavour)
     assert fault is not None
-    assert "it waits to be continued" in fault.reason
+    assert "autocontinue 0 is unsupported" in fault.reason
 
 
 @pytest.mark.parametrize("flavour", [PX4, ARDUPILOT])

@@ -1,0 +1,59 @@
+"""The page for browsers: the drones of the gateway, at "/".
+
+Its files lie in the folder `page` and are read once. The list of drones is JSON at "/drones", which the page requests
+every second.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Final
+
+import msgspec
+from aiohttp import web
+
+from anafi_mav.web.server import HttpServer, RequestCallback
+
+FOLDER = Path(__file__).parent / "page"
+
+FILES: Final = {
+    "/": ("index.html", "text/html"),
+    "/live.css": ("live.css", "text/css"),
+    "/live.js": ("live.js", "text/javascript"),
+}
+"""Path: file and its type. Nothing else of the folder is served."""
+
+
+class DroneEntry(msgspec.Struct, frozen=True, kw_only=True):
+    """One drone as the page lists it."""
+
+    name: str
+    sysid: int
+    model: str
+    """Title for people; empty while the drone has never been connected."""
+    connected: bool
+    problem: str
+    """Reason why it is not connected; empty while it is."""
+
+
+class LivePage:
+    """Serves the page and its list."""
+
+    def __init__(self, server: HttpServer, drones: Callable[[], Sequence[DroneEntry]]) -> None:
+        """`drones` returns the entries in the order of the configuration."""
+        self._drones = drones
+        for path, (name, kind) in FILES.items():
+            server.add_get(path, _file((FOLDER / name).read_bytes(), kind))
+        server.add_get("/drones", self._list)
+
+    async def _list(self, request: web.Request) -> web.Response:
+        body = msgspec.json.encode(list(self._drones()))
+        return web.Response(body=body, content_type="application/json", headers={"Cache-Control": "no-store"})
+
+
+def _file(content: bytes, kind: str) -> RequestCallback:
+    async def answer(request: web.Request) -> web.Response:
+        return web.Response(body=content, content_type=kind, charset="utf-8", headers={"Cache-Control": "no-cache"})
+
+    return answer

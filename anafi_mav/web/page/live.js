@@ -1,0 +1,47 @@
+"use strict";
+
+// The list of drones, requested every second.
+
+const PERIOD = 1000; // ms
+
+const rows = new Map(); // system id -> list item
+
+function row(drone) {
+  let item = rows.get(drone.sysid);
+  if (item === undefined) {
+    item = document.createElement("li");
+    for (const name of ["name", "state"]) {
+      const part = document.createElement("span");
+      part.className = name;
+      item.append(part);
+    }
+    rows.set(drone.sysid, item);
+    document.getElementById("drones").append(item);
+  }
+  return item;
+}
+
+function show(drones) {
+  for (const drone of drones) {
+    const item = row(drone);
+    item.querySelector(".name").textContent = drone.name;
+    item.querySelector(".state").textContent =
+      `System ${drone.sysid}` + (drone.model ? `, ${drone.model}` : "") +
+      (drone.connected ? ", connected" : `, not connected: ${drone.problem}`);
+  }
+}
+
+async function refresh() {
+  const problem = document.getElementById("problem");
+  try {
+    const answer = await fetch("/drones");
+    if (!answer.ok) throw new Error(`status ${answer.status}`);
+    show(await answer.json());
+    problem.textContent = "";
+  } catch (error) {
+    problem.textContent = `The gateway does not answer (${error.message}).`;
+  }
+  setTimeout(refresh, PERIOD);
+}
+
+refresh();

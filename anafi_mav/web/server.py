@@ -1,0 +1,280 @@
+"""The one HTTP server of the gateway, on aiohttp.
+
+    server = HttpServer("127.0.0.1", 8088)
+    server.add_get("/", page)
+    await server.start()
+
+`gateway` registers the routes before the start; a handler takes an `aiohttp.web.Request` and returns a response.
+
+HTTP has no password here, so it is open to this computer only unless it is configured otherwise, and even there a web
+page of somebody else's must not reach it through the user's browser:
+
+- The Host header has to be an IP address or a name of this gateway. A page whose own name was made to point to
+  127.0.0.1 (DNS rebinding) sends that name.
+- A request with an Origin has to come from a page of this server. A WebSocket knows no other protection.
+- Responses permit no other page to embed or read them: no CORS, Cross-Origin-Resource-Policy, no frames.
+
+A path with ".." is refused, and a handler looks names up in what it serves; it never joins them to a folder.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+import ipaddress
+import logging
+import socket
+from collections.abc import Awaitable, Callable, Collection
+from typing import Final
+from urllib.parse import urlsplit
+
+from aiohttp import web
+from aiohttp.http_exceptions import HttpProcessingError
+from aiohttp.typedefs import Handler
+from aiohttp.web_protocol import RequestHandler
+
+from anafi_mav.errors import ConfigError, LocalProtocolError
+
+log = logging.getLogger("anafi_mav.web")
+
+DEFAULT_PORT = 8088
+"""Where the configuration names none. 8080 is the simulated drones' and much else's."""
+
+LOOPBACK_HOST = "127.0.0.1"
+
+MAX_CONNECTIONS = 64
+"""At a time. A browser opens six, a ground station one; each costs a file descriptor, which MAVLink needs too."""
+
+MAX_BODY = 64 * 1024
+"""Bytes of a request's body. The largest is an SDP offer of a browser, some 6 kB."""
+
+FIRST_REQUEST_LIMIT = 10.0
+"""s that a connection may stay without a complete request."""
+
+KEEP_ALIVE = 30.0
+"""s that a connection waits for its next request."""
+
+CLOSE_LIMIT = 1.0
+"""s that closing waits for running responses: the drones still have to be left in a hover."""
+
+HEADERS: Final = {
+    "Content-Security-Policy": "default-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+}
+"""Of every response."""
+
+RequestCallback = Callable[[web.Request], Awaitable[web.StreamResponse]]
+"""Answers one request."""
+
+
+def _is_ours(record: logging.LogRecord) -> bool:
+    """False for the log line of a request that is no HTTP: bytes of a peer are no error of ours."""
+    return record.exc_info is None or not isinstance(record.exc_info[1], HttpProcessingError)
+
+
+log.addFilter(_is_ours)
+
+
+class _Refusing(asyncio.Protocol):
+    """A connection for which there is no room."""
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        assert isinstance(transport, asyncio.Transport)
+        transport.abort()
+
+
+class HttpServer:
+    """Routes, and the socket that serves them. `start` once, `close` once (twice does no harm)."""
+
+    def __init__(self, host: str = LOOPBACK_HOST, port: int | None = None, *, names: Collection[str] = ()) -> None:
+        """`port` 0 is a free one; None is `DEFAULT_PORT`, or a free one where that is taken.
+
+        `names` are host names of this gateway besides its own, as users write them in a URL.
+        """
+        self.host = host
+        self.port = 0
+        """TCP port while it is open, else 0."""
+        self.refused_connections = 0
+        """Connections closed because there were too many."""
+        own = socket.gethostname().lower()
+        self._names = {"localhost", own, f"{own}.local", host.lower(), *(name.lower() for name in names)}
+        self._wanted_port = port
+        self._app = web.Application(client_max_size=MAX_BODY, middlewares=[self._guard])
+        self._app.on_response_prepare.append(_add_headers)
+        self._runner: web.AppRunner | None = None
+        self._server: asyncio.Server | None = None
+        self._silent: set[RequestHandler] = set()
+        """Connections of the last `FIRST_REQUEST_LIMIT` that have sent no request."""
+
+    def add_get(self, path: str, handler: RequestCallback) -> None:
+        """Serve GET and HEAD of a path, which may contain placeholders: "/media/{date}/{name}"."""
+        self._app.router.add_get(path, handler)
+
+    def add_post(self, path: str, handler: RequestCallback) -> None:
+        """Serve POST of a path; the body is at most `MAX_BODY` long."""
+        self._app.router.add_post(path, handler)
+
+    def add_delete(self, path: str, handler: RequestCallback) -> None:
+        """Serve DELETE of a path."""
+        self._app.router.add_delete(path, handler)
+
+    def on_close(self, callback: Callable[[], Awaitable[None]]) -> None:
+        """Await `callback` before the connections are closed: it ends what would go on for ever."""
+
+        async def close(_: web.Application) -> None:
+            await callback()
+
+        self._app.on_shutdown.append(close)
+
+    async def start(self) -> None:
+        """Open the port.
+
+        Raises `ConfigError` at `http.port` or `http.host`; nothing is then left open.
+        """
+        runner = web.AppRunner(
+            self._app,
+            handle_signals=False,
+            access_log=None,
+            logger=log,
+            keepalive_timeout=KEEP_ALIVE,
+            shutdown_timeout=CLOSE_LIMIT,
+        )
+        await runner.setup()
+        self._runner = runner
+        try:
+            self._server = await self._listen()
+        except OSError as error:
+            await self.close()
+            raise self._explain(error) from error
+        except BaseException:
+            await self.close()
+            raise
+        self.port = self._server.sockets[0].getsockname()[1]
+
+    async def _listen(self) -> asyncio.Server:
+        loop = asyncio.get_running_loop()
+        port = DEFAULT_PORT if self._wanted_port is None else self._wanted_port
+        try:
+            return await loop.create_server(self._accept, self.host, port, family=socket.AF_INET)
+        except OSError as error:
+            if self._wanted_port is not None or error.errno != errno.EADDRINUSE:
+                raise
+        return await loop.create_server(self._accept, self.host, 0, family=socket.AF_INET)
+
+    def _explain(self, error: OSError) -> ConfigError:
+        place = f"{self.host}:{DEFAULT_PORT if self._wanted_port is None else self._wanted_port}"
+        if error.errno == errno.EADDRINUSE:
+            return ConfigError("http.port", f"{place} is in use by another program; expected a free port, or 0")
+        if error.errno in (errno.EACCES, errno.EPERM):
+            return ConfigError("http.port", f"this user may not open {place}; expected a port from 1024 to 65535")
+        if isinstance(error, socket.gaierror) or error.errno == errno.EADDRNOTAVAIL:
+            return ConfigError("http.host", f"expected an address of this computer, got {self.host}")
+        return ConfigError("http", f"cannot open {place}: {error.strerror or error}")
+
+    async def close(self) -> None:
+        """Close the port and every connection."""
+        server, self._server = self._server, None
+        runner, self._runner = self._runner, None
+        self.port = 0
+        if server is not None:
+            server.close()
+        if runner is not None:
+            await runner.cleanup()
+
+    def url_for(self, local_host: str | None, path: str) -> str | None:
+        """Return the URL of a path for a client that sees this computer as `local_host`.
+
+        None when such a client cannot reach it: the server is closed, open to this computer only, or its address
+        towards the client is not known (`local_host` None).
+        """
+        if not path.startswith("/"):
+            raise LocalProtocolError(f"expected a path from the root, got {path!r}")
+        if not self.port:
+            return None
+        host = self._host_for(local_host)
+        return None if host is None else f"http://{host}:{self.port}{path}"
+
+    def _host_for(self, local_host: str | None) -> str | None:
+        if is_loopback(self.host):
+            return self.host if local_host is not None and is_loopback(local_host) else None
+        if self.host == "0.0.0.0":
+            return local_host
+        # A name was configured; another address of this computer leads nowhere.
+        return local_host if local_host is not None and not _is_address(local_host) else self.host
+
+    @property
+    def is_open_to_network(self) -> bool:
+        """True when other computers can connect."""
+        return not is_loopback(self.host)
+
+    def describe(self) -> str:
+        """One line for people: the URL on this computer."""
+        return f"http://{LOOPBACK_HOST if self.host == '0.0.0.0' else self.host}:{self.port}/"
+
+    # -- connections
+
+    def _accept(self) -> asyncio.Protocol:
+        """Return the protocol of a new connection."""
+        server = self._runner.server if self._runner is not None else None
+        if server is None or len(server.connections) >= MAX_CONNECTIONS:
+            self.refused_connections += 1
+            return _Refusing()
+        connection = server()
+        self._silent.add(connection)
+        asyncio.get_running_loop().call_later(FIRST_REQUEST_LIMIT, self._end_silent, connection)
+        return connection
+
+    def _end_silent(self, connection: RequestHandler) -> None:
+        if connection in self._silent:
+            self._silent.discard(connection)
+            connection.force_close()
+
+    @web.middleware
+    async def _guard(self, request: web.Request, handler: Handler) -> web.StreamResponse:
+        """Refuse a request that a foreign page could have made a browser send."""
+        self._silent.discard(request.protocol)
+        host = request.headers.get("Host", "")
+        if not self._is_own(host):
+            raise web.HTTPForbidden(text=f"{host[:100]!r} is no name of this gateway; use its address\n")
+        origin = request.headers.get("Origin")
+        if origin is not None and _place_of(origin) != host.lower():
+            raise web.HTTPForbidden(text="a page of another server may not use this one\n")
+        if "\0" in request.path or ".." in request.path.replace("\\", "/").split("/"):
+            raise web.HTTPNotFound
+        return await handler(request)
+
+    def _is_own(self, host: str) -> bool:
+        """True for the Host header of a client that knows this gateway."""
+        try:
+            name = urlsplit(f"//{host}").hostname
+        except ValueError:
+            return False
+        return name is not None and (_is_address(name) or name.rstrip(".") in self._names)
+
+
+async def _add_headers(request: web.Request, response: web.StreamResponse) -> None:
+    for name, value in HEADERS.items():
+        response.headers.setdefault(name, value)
+
+
+def _place_of(origin: str) -> str | None:
+    """Return host and port of an Origin header; None when it has none, as "null"."""
+    try:
+        return urlsplit(origin).netloc.lower() or None
+    except ValueError:
+        return None
+
+
+def _is_address(host: str) -> bool:
+    try:
+        ipaddress.ip_address(host)
+    except ValueError:
+        return False
+    return True
+
+
+def is_loopback(host: str) -> bool:
+    """True for an address, or the name, that never leaves this computer."""
+    return host.lower() == "localhost" or (_is_address(host) and ipaddress.ip_address(host).is_loopback)
