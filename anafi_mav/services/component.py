@@ -100,11 +100,8 @@ class Component:
         self.vehicle = system.vehicle
         self.clock = system.clock
         self.memory = system.memory
-<<<<<<< HEAD
         self.definition = DefinitionLink()
-=======
         self.has_picture_pose = system.has_picture_pose
->>>>>>> main
         self._system = system
         self.commands = CommandService(self)
         self.messages = MessageService(self)

@@ -16,12 +16,8 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import Action, ActionGroup, Command
-<<<<<<< HEAD
 from anafi_mav.services.definition_link import DefinitionLink
-from anafi_mav.services.files import ServedFile
-=======
 from anafi_mav.services.files import Folder, ServedFile
->>>>>>> main
 from anafi_mav.services.flavours import Flavour
 from anafi_mav.services.memory import Memory
 from anafi_mav.services.pose import VehiclePose
@@ -53,13 +49,10 @@ class Host(Protocol):
     capabilities: int
     """MAV_PROTOCOL_CAPABILITY bits of all services of the component."""
     memory: Memory
-<<<<<<< HEAD
     definition: DefinitionLink
     """Camera definition of the component."""
-=======
     has_picture_pose: bool
     """True when the configuration allows pose from the live video."""
->>>>>>> main
 
     @property
     def channels(self) -> Sequence[Channel]:

@@ -108,11 +108,7 @@ AUTOPILOT_SERVICES: tuple[type[Service], ...] = (
 )
 """Services of component 1, beside commands, messages and files themselves."""
 
-<<<<<<< HEAD
-CAMERA_SERVICES: tuple[type[Service], ...] = (ParamExtService,)
-=======
-CAMERA_SERVICES: tuple[type[Service], ...] = (MediaService,)
->>>>>>> main
+CAMERA_SERVICES: tuple[type[Service], ...] = (ParamExtService, MediaService)
 """Services of component 100."""
 
 AUTOPILOT = dialect.MAV_COMP_ID_AUTOPILOT1
