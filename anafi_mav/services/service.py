@@ -49,10 +49,10 @@ class Host(Protocol):
     capabilities: int
     """MAV_PROTOCOL_CAPABILITY bits of all services of the component."""
     memory: Memory
-    definition: DefinitionLink
-    """Camera definition of the component."""
     has_picture_pose: bool
     """True when the configuration allows pose from the live video."""
+    definition: DefinitionLink
+    """Camera definition of the component."""
 
     @property
     def channels(self) -> Sequence[Channel]:
