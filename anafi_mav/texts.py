@@ -131,6 +131,7 @@ RESTART = Subject("Restart")
 RETURN = Subject("Return")
 RTL_LAND_DELAY = Subject("RTL_LAND_DELAY")
 ROI = Subject("ROI")
+STREAM = Subject("Video stream")
 SETPOINT = Subject("Setpoint")
 SETPOINT_TAKEOFF = Subject("Takeoff by setpoints")
 SPEED = Subject("Speed")
@@ -151,6 +152,7 @@ TAKEOFF_POINT_UNKNOWN = Reason("take-off point unknown")
 AMSL_UNKNOWN = Reason("AMSL unknown, no GPS fix")
 TILT_UNKNOWN = Reason("tilt limits unknown")
 FLYING_STATE_UNKNOWN = Reason("flying state unknown")
+RECORDS = Reason("camera is recording")
 EMERGENCY_STOP = Reason("emergency stop")
 ON_GROUND = Reason("drone is on the ground")
 NOT_ON_GROUND = Reason("not on the ground")
@@ -209,6 +211,7 @@ OTHER_STICKS = Reason("another joystick flies")
 # == Reasons: parameters of commands ==
 
 MOTOR_CUT_FORBIDDEN = Reason("set allow_kill: true")
+NO_SUCH_STREAM = Reason("no such stream")
 BY_COMMAND_ONLY = Reason("started by command only")
 NO_CHANGE_MODE = Reason("flag CHANGE_MODE is missing")
 NOT_GUIDED = Reason("not in Guided")
@@ -551,6 +554,11 @@ BANNER_DRONE = Template(
 TUNE_REFUSED = OperatorText("Tune refused: drone is not on the ground")
 TUNE_FAILED = Template("Tune not played: {error}", error=BELOW)
 NO_EXPOSURE = Template("Exposure unknown: no video: {error}", error=BELOW)
+
+# == Video ==
+
+VIDEO_NEEDS_HOST = OperatorText("Video open to this computer only: set video.host")
+VIDEO_NEEDS_PUBLIC_HOST = OperatorText("Video without URI: set video.public_host")
 
 # == Parameters ==
 

@@ -23,6 +23,7 @@ from anafi_mav.services.command.command_service import CommandService
 from anafi_mav.services.commands import Action, ActionGroup
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.ftp.ftp_service import FtpService
+from anafi_mav.services.gateway_uris import GatewayUris
 from anafi_mav.services.memory import Memory
 from anafi_mav.services.service import MessageHandler, Service
 from anafi_mav.services.stream import Times
@@ -54,6 +55,7 @@ class ComponentSystem(Protocol):
     vehicle: Vehicle
     clock: Clock
     memory: Memory
+    uris: GatewayUris
 
     @property
     def channels(self) -> Sequence[Channel]:
@@ -96,6 +98,7 @@ class Component:
         self.vehicle = system.vehicle
         self.clock = system.clock
         self.memory = system.memory
+        self.uris = system.uris
         self._system = system
         self.commands = CommandService(self)
         self.messages = MessageService(self)

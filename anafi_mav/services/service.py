@@ -18,6 +18,7 @@ from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import Action, ActionGroup, Command
 from anafi_mav.services.files import ServedFile
 from anafi_mav.services.flavours import Flavour
+from anafi_mav.services.gateway_uris import GatewayUris
 from anafi_mav.services.memory import Memory
 from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.texts import OperatorText
@@ -47,6 +48,8 @@ class Host(Protocol):
     capabilities: int
     """MAV_PROTOCOL_CAPABILITY bits of all services of the component."""
     memory: Memory
+    uris: GatewayUris
+    """What the gateway serves beside MAVLink."""
 
     @property
     def channels(self) -> Sequence[Channel]:

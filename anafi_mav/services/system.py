@@ -30,6 +30,7 @@ from anafi_mav.services.command.orbit_service import OrbitService
 from anafi_mav.services.component import BY_AUTOPILOT, COMMANDS, Component, joined
 from anafi_mav.services.event.event_service import EventService
 from anafi_mav.services.ftp.log_service import LogService
+from anafi_mav.services.gateway_uris import GatewayUris
 from anafi_mav.services.ground_station.banner_service import BannerService
 from anafi_mav.services.ground_station.identity_service import IdentityService
 from anafi_mav.services.ground_station.node_status_service import NodeStatusService
@@ -59,6 +60,7 @@ from anafi_mav.services.telemetry.flight_record_service import FlightRecordServi
 from anafi_mav.services.telemetry.high_latency_service import HighLatencyService
 from anafi_mav.services.telemetry.telemetry_service import CHANGES, TelemetryService
 from anafi_mav.services.telemetry.video_service import VideoTelemetryService
+from anafi_mav.services.video.video_stream_service import VideoStreamService
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.height import TakeoffRecord
 from anafi_mav.vehicle.base.modes import FlightMode
@@ -104,7 +106,7 @@ AUTOPILOT_SERVICES: tuple[type[Service], ...] = (
 )
 """Services of component 1, beside commands, messages and files themselves."""
 
-CAMERA_SERVICES: tuple[type[Service], ...] = ()
+CAMERA_SERVICES: tuple[type[Service], ...] = (VideoStreamService,)
 """Services of component 100."""
 
 AUTOPILOT = dialect.MAV_COMP_ID_AUTOPILOT1
@@ -148,11 +150,13 @@ class System:
         *,
         allow_kill: bool,
         state: Path | None = None,
+        uris: GatewayUris = GatewayUris(),  # noqa: B008  # frozen
     ) -> None:
         self.sysid = sysid
         self.drone = drone
         self.clock = clock
         self.memory = Memory(state)
+        self.uris = uris
         self.active = False
         self._node = node
         self._started = started

@@ -43,6 +43,7 @@ CORES = [
     *("vehicle/circle.py", "vehicle/follow.py", "vehicle/hold_rule.py", "vehicle/initiator.py"),
     "vehicle/joystick_override.py",
     *("services/capabilities.py", "services/checksum.py", "services/commands.py", "services/component_metadata.py"),
+    "services/gateway_uris.py",
     *("services/event/events.py", "services/ftp/ftp.py"),
     *("services/parameter/parameter_codec.py", "services/parameter/parameter_metadata.py"),
     *("services/plan/fence_kind.py", "services/plan/item_messages.py", "services/plan/mission_kind.py"),
