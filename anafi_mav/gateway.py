@@ -319,6 +319,7 @@ class Gateway:
                 allow_kill=allow_kill,
                 state=self._state,
                 uris=self._uris(),
+                has_picture_pose=self.config.pose == "video",
             )
             if self.relay is not None:
                 self.relay.add(DroneSource(config.sysid, config.name, drone))

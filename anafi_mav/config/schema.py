@@ -359,6 +359,15 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
             extra=expected("true or false"),
         ),
     ] = False
+    pose: Annotated[
+        Literal["video", "events"],
+        Meta(
+            description="Source of attitude, position and speed for a client that requests them more than ten times a "
+            "second: the metadata of the live video, up to 30 times a second, or the drone's events, 5 times a second. "
+            "The video costs the radio some Mbit/s while such a client has its streams.",
+            extra=expected("video or events"),
+        ),
+    ] = "video"
     state: Annotated[
         Annotated[str, Meta(min_length=1, max_length=MAX_PATH)] | None,
         Meta(

@@ -7,7 +7,7 @@ import socket
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -146,6 +146,8 @@ async def world(
     web: bool = False,
     udp: bool = False,
     video: VideoConfig | None = None,
+    video_latency: float = 0.0,
+    pose: Literal["video", "events"] = "video",
 ) -> AsyncIterator[World]:
     """One simulated drone, one gateway with a TCP endpoint, and its clients, connected and ready.
 
@@ -163,6 +165,7 @@ async def world(
         rtsp_port=VIDEO_PORT,
         telemetry_rate=telemetry_rate,
         skycontroller=skycontroller,
+        video_latency=video_latency,
     )
     config = Config(
         endpoints=(
@@ -175,6 +178,7 @@ async def world(
         ),
         video=video or VideoConfig(),
         allow_kill=allow_kill,
+        pose=pose,
     )
     flavours.note(*config.endpoints)
     async with Simulator([spec], speed=speed, seed=1) as simulator, Gateway(config) as gateway:

@@ -36,13 +36,13 @@ NAMES = {
 
 
 class VideoStreamService(Service):
-    """VIDEO_STREAM_INFORMATION, VIDEO_STREAM_STATUS and the commands that start and stop streams."""
+    """Answers requests for the streams, and the commands that start and stop them."""
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self._undo: Callable[[], None] | None = None
         self._informed: set[Channel] = set()
-        """Channels that know why they got no URI."""
+        """Channels that received the text which explains a missing URI."""
 
     def requests(self) -> Mapping[int, Request]:
         return {
@@ -89,7 +89,7 @@ class VideoStreamService(Service):
         if stream.kind is streams.shown.kind:
             return
         if streams.is_recording:
-            raise Refused(texts.STREAM, texts.RECORDS)
+            raise Refused(texts.VIDEO_STREAM, texts.CAMERA_RECORDS)
         self.host.end_others(ActionGroup.STREAM)
         await streams.show(stream.kind)
 
@@ -106,7 +106,7 @@ class VideoStreamService(Service):
             return None
         stream = self._stream(id)
         if stream is None:
-            raise Refused(texts.STREAM, texts.NO_SUCH_STREAM, lasting=True)
+            raise Refused(texts.VIDEO_STREAM, texts.STREAM_UNKNOWN, lasting=True)
         return stream
 
     def _stream(self, id: float) -> OfferedStream | None:

@@ -187,7 +187,7 @@ async def test_run_prints_each_drone_and_endpoint_before_ready(tmp_path: Path) -
         assert ready.startswith("ready")
         # 245 is MAVSDK's own: a warning, and it flies.
         (warning,) = (line for line in p.complaints if "warning" in line)
-        assert warning.startswith("anafi-mav: warning: drones[1].sysid: 245 is what MAVSDK calls itself")
+        assert warning.startswith("anafi-mav: warning: drones[1].sysid: 245 is the default system id of MAVSDK")
 
 
 # End.
