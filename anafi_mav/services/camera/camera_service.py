@@ -214,6 +214,7 @@ class CameraService(Service):
         if drone.streams.shown.kind is not kind:
             require_free(self.host.vehicle, texts.CAMERA_SOURCE)
             require_idle(drone, texts.CAMERA_SOURCE)
+            self.host.end_others(ActionGroup.STREAM)
         await drone.streams.show(kind)
 
     async def _reset(self, command: Command) -> None:

@@ -1,7 +1,7 @@
-"""Commands for photos and recordings, and CAMERA_CAPTURE_STATUS (MAVLink camera.md; conformance C6).
+"""Commands for photos and recordings, and CAMERA_CAPTURE_STATUS.
 
-`photo_control` takes photos, `photo_reporter` reports them. A recording that the pilot, a mission or the drone began
-is shown as one of a client.
+MAVLink camera.md; conformance C6. `photo_control` takes photos, `photo_reporter` reports them. A recording that the
+pilot, a mission or the drone began is shown as one of a client.
 """
 
 from __future__ import annotations
@@ -325,7 +325,7 @@ class CaptureService(Service):
         if camera != -1.0:
             require_camera(texts.RECORDING, camera)
         if record not in (0.0, 1.0):
-            raise Refused(texts.RECORDING, texts.RECORD_VALUE, lasting=True)
+            raise Refused(texts.RECORDING, texts.PARAM4_BINARY, lasting=True)
         if record == 0.0:
             await self._stop_recording()
             return

@@ -1,4 +1,4 @@
-"""Photos and series of the active camera on a client's behalf: single, by time, by distance.
+"""Photos and series of the active camera by command of a client.
 
 A command starts or ends them after the one before it has been answered, so that a stop never overtakes a start.
 """
@@ -23,7 +23,7 @@ SERIES = (PhotoMode.TIME_LAPSE, PhotoMode.GPS_LAPSE)
 
 
 class PhotoControl:
-    """The photos of one drone. `limit` and `restore` belong to the series that it has begun itself."""
+    """The photos of one drone."""
 
     def __init__(self, host: Host) -> None:
         self.host = host
@@ -72,9 +72,10 @@ class PhotoControl:
             await self._shoot()
 
     async def begin_series(self, mode: PhotoMode, interval: float | None, limit: int | None) -> None:
-        """Begin a series of `limit` pictures (None: until it is stopped); the settings are restored at its end.
+        """Begin a series; the settings are restored at its end.
 
-        `interval`: s or m between two pictures; None: as the camera is set.
+        `interval`: s or m between two pictures; None: as the camera is set. `limit`: pictures after which it ends;
+        None: when it is stopped.
         """
         async with self._commands:
             require_free(self.host.vehicle, texts.PHOTO)

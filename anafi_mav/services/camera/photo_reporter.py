@@ -1,4 +1,4 @@
-"""CAMERA_IMAGE_CAPTURED for every photo of the active camera, and the history of these messages.
+"""CAMERA_IMAGE_CAPTURED for every photo of the active camera, and its history.
 
 One message per picture leaves when the drone has stored it, whether a client, a mission or the pilot took it. Its
 place and orientation are those of the camera when the shutter opened (MAVLink camera.md; conformance C6).
