@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from anafi_mav.drone import Drone
+from collections.abc import Callable, Mapping
+
+from anafi_mav.drone import Drone, events
 from anafi_mav.drone.payload.gimbal import MAIN
 from anafi_mav.drone.video.video import VideoFrame
 from anafi_mav.services.camera.pose_track import CameraPose, PoseTrack
@@ -31,18 +33,47 @@ def current_pose(drone: Drone) -> CameraPose:
     return CameraPose(place, drone.piloting.state.altitude, camera_angles(drone))
 
 
-def add_states(track: PoseTrack, drone: Drone, now: float, *, located: bool) -> None:
-    """Add what an event has changed; `located`: it was a position."""
-    events, state = track.events, drone.piloting.state
-    location = drone.gps.state.location
-    if located and location is not None:
-        events.places.add(now, location.latitude, location.longitude)
-    if state.velocity is not None:
-        events.velocities.add(now, state.velocity.north, state.velocity.east)
-    if state.altitude is not None:
-        events.heights.add(now, state.altitude)
-    if (angles := camera_angles(drone)) is not None:
-        events.cameras.add(now, *angles)
+def add_attitude(track: PoseTrack, drone: Drone, now: float) -> None:
+    """Add the heading that an event has reported."""
+    if (attitude := drone.piloting.state.attitude) is not None:
+        track.events.headings.add(now, attitude.yaw)
+
+
+def add_gimbal(track: PoseTrack, drone: Drone, now: float) -> None:
+    """Add the attitude of the gimbal that an event has reported."""
+    if (attitude := drone.gimbal[MAIN].attitude) is not None:
+        roll, pitch = attitude.absolute.roll * RAD_PER_DEG, attitude.absolute.pitch * RAD_PER_DEG
+        track.events.gimbals.add(now, roll, pitch, attitude.relative.yaw * RAD_PER_DEG)
+
+
+def add_velocity(track: PoseTrack, drone: Drone, now: float) -> None:
+    """Add the velocity that an event has reported."""
+    if (velocity := drone.piloting.state.velocity) is not None:
+        track.events.velocities.add(now, velocity.north, velocity.east)
+
+
+def add_height(track: PoseTrack, drone: Drone, now: float) -> None:
+    """Add the height that an event has reported."""
+    if (height := drone.piloting.state.altitude) is not None:
+        track.events.heights.add(now, height)
+
+
+def add_place(track: PoseTrack, drone: Drone, now: float) -> None:
+    """Add the position that an event has reported."""
+    if (location := drone.gps.state.location) is not None:
+        track.events.places.add(now, location.latitude, location.longitude)
+
+
+Sampler = Callable[[PoseTrack, Drone, float], None]
+
+SAMPLERS: Mapping[type[events.Message], Sampler] = {
+    events.AttitudeChanged: add_attitude,
+    events.GimbalAttitudeChanged: add_gimbal,
+    events.SpeedChanged: add_velocity,
+    events.AltitudeChanged: add_height,
+    events.GpsLocationChanged: add_place,
+}
+"""By event. Each adds what its event reports: other values are older than it."""
 
 
 def add_frame(track: PoseTrack, frame: VideoFrame) -> None:
@@ -55,4 +86,5 @@ def add_frame(track: PoseTrack, frame: VideoFrame) -> None:
     if metadata.altitude_ato is not None:
         pictures.heights.add(at, metadata.altitude_ato)
     if (attitude := frame.camera_attitude) is not None:
-        pictures.cameras.add(at, attitude.roll, attitude.pitch, attitude.yaw)
+        pictures.gimbals.add(at, attitude.roll, attitude.pitch, attitude.yaw)
+        pictures.headings.add(at, 0.0)

@@ -14,15 +14,16 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
+from msgspec.structs import replace
+
 from anafi_mav import texts, units
-from anafi_mav.drone import events
 from anafi_mav.drone.payload.camera_state import CaptureProgress, CaptureUpdate
 from anafi_mav.drone.payload.media import MediaItem
 from anafi_mav.drone.payload.media_file import Resource
 from anafi_mav.errors import AnafiMavError, CommandRejected
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
-from anafi_mav.services.camera.camera_pose import add_frame, add_states
+from anafi_mav.services.camera.camera_pose import SAMPLERS, Sampler, add_frame
 from anafi_mav.services.camera.photo_log import KEY, CapturedImage, PhotoLog, renumbered
 from anafi_mav.services.camera.pose_track import CameraPose, PoseTrack
 from anafi_mav.services.camera.shot_tracker import CapturedShot, ShotTracker, named
@@ -62,6 +63,8 @@ class PhotoReporter:
         """Poses of photos whose shutter has opened, by that time."""
         self._undo: Callable[[], None] | None = None
         self._saving: asyncio.Task[None] | None = None
+        self._turn = asyncio.Lock()
+        """Photos are sent in the sequence of their index."""
 
     @property
     def count(self) -> int:
@@ -87,6 +90,7 @@ class PhotoReporter:
             self._serial = drone.identity.serial
             self._log = PhotoLog(PhotoLog.stored_count(self.host.memory.settings))
         self._shots, self._poses = ShotTracker(self._shots.capture), {}
+        self._turn = asyncio.Lock()
         self._undo = drone.video.subscribe(lambda frame: add_frame(self._track, frame))
 
     def link_down(self) -> None:
@@ -101,14 +105,10 @@ class PhotoReporter:
 
     def subscriptions(self) -> Subscriptions:
         """Return the handlers of the events that change the camera's pose."""
-        handlers: dict[type[events.Message], EventHandler] = dict.fromkeys(
-            (events.AttitudeChanged, events.GimbalAttitudeChanged, events.SpeedChanged, events.AltitudeChanged),
-            lambda message, now: add_states(self._track, self.host.drone, now, located=False),
-        )
-        handlers[events.GpsLocationChanged] = lambda message, now: add_states(
-            self._track, self.host.drone, now, located=True
-        )
-        return handlers
+        return {kind: self._sampling(sampler) for kind, sampler in SAMPLERS.items()}
+
+    def _sampling(self, sampler: Sampler) -> EventHandler:
+        return lambda message, now: sampler(self._track, self.host.drone, now)
 
     def receive(self, update: CaptureUpdate, now: float) -> None:
         """Handle an event about a photo of the active camera."""
@@ -149,10 +149,9 @@ class PhotoReporter:
         images = [self._log.add(partial(self._image, shot)) for shot in shots]
         if images:
             self._remember()
-        if media and self.host.drone.media.state.index is not None:
-            self.host.spawn(self._send_named(images, media, self._shots.capture, is_last=is_last))
-        else:
-            self._send(images)
+        listed = media if self.host.drone.media.state.index is not None else ""
+        if images or listed:
+            self.host.spawn(self._finish(images, listed, self._shots.capture, is_last=is_last))
 
     def _send(self, images: list[CapturedImage]) -> None:
         for image in images:
@@ -160,39 +159,57 @@ class PhotoReporter:
 
     def _image(self, shot: CapturedShot, index: int) -> CapturedImage:
         host = self.host
-        pose = self._poses.pop(shot.at, None) or self._track.pose(shot.at)
-        amsl = None if pose.height is None else host.vehicle.height.amsl(pose.height)
-        if amsl is None and (location := host.drone.gps.state.location) is not None:
-            amsl = location.altitude
         age = host.clock.monotonic() - shot.at
-        return CapturedImage(
+        image = CapturedImage(
             index=index,
             at=shot.at,
             utc_us=round((host.clock.time() - age) * 1e6),
             capture=shot.capture,
             number=shot.number,
             is_saved=shot.is_saved,
-            latitude=None if pose.place is None else pose.place[0],
-            longitude=None if pose.place is None else pose.place[1],
-            amsl=amsl,
-            height=pose.height,
-            quaternion=pose.quaternion,
         )
+        return replace(image, **self._pose(shot.at))
+
+    def _pose(self, at: float) -> dict[str, Any]:
+        """Return the fields of a photo that are the camera's pose at a moment."""
+        host = self.host
+        pose = self._poses.pop(at, None) or self._track.pose(at)
+        amsl = None if pose.height is None else host.vehicle.height.amsl(pose.height)
+        if amsl is None and (location := host.drone.gps.state.location) is not None:
+            amsl = location.altitude
+        return {
+            "latitude": None if pose.place is None else pose.place[0],
+            "longitude": None if pose.place is None else pose.place[1],
+            "amsl": amsl,
+            "height": pose.height,
+            "quaternion": pose.quaternion,
+        }
 
     # Names of files.
 
-    async def _send_named(self, images: list[CapturedImage], media: str, capture: int, *, is_last: bool) -> None:
-        """Send the pictures once their files are known, or after `ADDRESS` without them."""
-        item = await self._listed(media, ADDRESS)
-        if item is None:
-            self._send(images)
-            images, item = [], await self._listed(media, LISTED)
-        if item is not None:
-            added = self._name(item, capture, is_last=is_last)
+    async def _finish(self, images: list[CapturedImage], media: str, capture: int, *, is_last: bool) -> None:
+        """Send pictures once their pose and files are known; without files after `ADDRESS`."""
+        async with self._turn:
+            _, item = await asyncio.gather(self._settle(images), self._listed(media, ADDRESS))
+            added = [] if item is None else self._name(item, capture, is_last=is_last)
             self._send([*images, *added])
+        if item is None and (item := await self._listed(media, LISTED)) is not None:
+            self._send(self._name(item, capture, is_last=is_last))
+
+    async def _settle(self, images: list[CapturedImage]) -> None:
+        """Correct poses by what the drone reports just after the shutter."""
+        recent = [image for image in images if self.host.clock.monotonic() - image.at < LATCH]
+        if not recent:
+            return
+        last = max(image.at for image in recent)
+        await asyncio.sleep(last + LATCH - self.host.clock.monotonic())
+        for image in recent:
+            self._log.change(image.index, **self._pose(image.at))
 
     async def _listed(self, media: str, timeout: float) -> MediaItem | None:
         """Return a media as the drone lists it; None when it does not list it in time."""
+        if not media:
+            return None
         try:
             async with asyncio.timeout(timeout):
                 while True:

@@ -98,12 +98,14 @@ class PoseSource:
         """North, east, m/s."""
         self.heights = SampleTrack()
         """m above take-off."""
-        self.cameras = SampleTrack(angles=True)
-        """Roll, pitch, yaw, rad."""
+        self.gimbals = SampleTrack(angles=True)
+        """Roll and pitch of the camera to the horizon, its yaw to `headings`, rad."""
+        self.headings = SampleTrack(angles=True)
+        """Yaw of the drone, rad; 0 in a source whose camera's yaw is that to true north."""
 
     def clear(self) -> None:
         """Forget all samples."""
-        for track in (self.places, self.velocities, self.heights, self.cameras):
+        for track in (self.places, self.velocities, self.heights, self.gimbals, self.headings):
             track.clear()
 
     def place(self, at: float) -> tuple[float, float] | None:
@@ -117,6 +119,13 @@ class PoseSource:
         if late <= 0.0 or velocity is None:
             return latitude, longitude
         return geo.destination(latitude, longitude, velocity[0] * late, velocity[1] * late)
+
+    def camera(self, at: float) -> tuple[float, float, float] | None:
+        """Return roll, pitch and yaw of the camera to the horizon and true north at a moment, rad."""
+        gimbal, heading = self.gimbals.value(at), self.headings.value(at)
+        if gimbal is None or heading is None:
+            return None
+        return gimbal[0], gimbal[1], wrap_pi(heading[0] + gimbal[2])
 
 
 class PoseTrack:
@@ -134,17 +143,13 @@ class PoseTrack:
     def is_complete(self, at: float) -> bool:
         """True when nothing that is still to come makes the pose of this moment better."""
         sources = (self.events, self.pictures)
-        return any(min(source.places.newest, source.cameras.newest) >= at for source in sources)
+        return any(min(source.places.newest, source.gimbals.newest) >= at for source in sources)
 
     def pose(self, at: float) -> CameraPose:
         """Return the pose at a moment, by the pictures if one is near it, else by the events."""
         events, pictures = self.events, self.pictures
-        by_picture = pictures.cameras.distance(at) <= NEAR
-        camera = pictures.cameras.value(at) if by_picture else events.cameras.value(at)
+        by_picture = pictures.gimbals.distance(at) <= NEAR
         place = pictures.place(at) if by_picture and pictures.places.distance(at) <= NEAR else events.place(at)
         height = (pictures.heights if pictures.heights.distance(at) <= NEAR else events.heights).value(at)
-        return CameraPose(
-            place,
-            None if height is None else height[0],
-            None if camera is None else (camera[0], camera[1], wrap_pi(camera[2])),
-        )
+        camera = (pictures if by_picture else events).camera(at)
+        return CameraPose(place, None if height is None else height[0], camera)
