@@ -26,6 +26,7 @@ _MAINTENANCE = "conformance/test_conf_maintenance.py::"
 _TWIN = "conformance/test_conf_params.py::test_alias_and_native_parameter_are_one_value"
 _PARAMETER = "conformance/test_conf_params.py::test_native_settings_reach_the_drone"
 _MISSIONS = "conformance/test_conf_missions.py::"
+_CAMERA = "conformance/test_conf_camera_settings.py::"
 _SAFETY = "conformance/test_safety.py::"
 
 REACHED: dict[str, Reach] = {
@@ -124,15 +125,25 @@ REACHED: dict[str, Reach] = {
     ),
     "storage/download": Reach("", waits=PAYLOAD),
     "storage/format": Reach("", waits=PAYLOAD),
-    "camera/autorecord": Reach("", waits=PAYLOAD),
-    "camera/ev_compensation": Reach("", waits=PAYLOAD),
-    "camera/hdr": Reach("", waits=PAYLOAD),
-    "camera/max_zoom_speed": Reach("", waits=PAYLOAD),
-    "camera/mode": Reach("", waits=PAYLOAD),
+    "camera/autorecord": Reach(
+        "extended parameter `CAM_AUTOREC`", _CAMERA + "test_conf_094_every_option_reaches_the_drone"
+    ),
+    "camera/ev_compensation": Reach(
+        "extended parameter `CAM_EV`", _CAMERA + "test_conf_094_every_option_reaches_the_drone"
+    ),
+    "camera/hdr": Reach("extended parameter `CAM_HDR`", _CAMERA + "test_conf_094_every_option_reaches_the_drone"),
+    "camera/max_zoom_speed": Reach(
+        "extended parameter `CAM_ZOOMSPEED`", _CAMERA + "test_conf_094_every_option_reaches_the_drone"
+    ),
+    "camera/mode": Reach("extended parameter `CAM_MODE`", _CAMERA + "test_conf_094_every_option_reaches_the_drone"),
     "camera/relative": Reach("", waits=PAYLOAD),
-    "camera/rendering": Reach("", waits=PAYLOAD),
-    "camera/streaming": Reach("", waits=PAYLOAD),
-    "camera/style": Reach("", waits=PAYLOAD),
+    "camera/rendering": Reach(
+        "extended parameter `CAM_THM_RENDER`", _CAMERA + "test_conf_094_every_option_reaches_the_drone"
+    ),
+    "camera/streaming": Reach(
+        "extended parameter `CAM_STREAMING`", _CAMERA + "test_conf_094_every_option_reaches_the_drone"
+    ),
+    "camera/style": Reach("extended parameter `CAM_STYLE`", _CAMERA + "test_conf_094_every_option_reaches_the_drone"),
     "drone/banked_turn": Reach("`ANF_BANKED_TURN`", _PARAMETER),
     "drone/max_altitude": Reach("`ANF_MAX_ALT`", _TWIN),
     "drone/max_distance": Reach("`ANF_MAX_DIST`, `ANF_GEOFENCE`", _TWIN),
