@@ -21,7 +21,7 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.mavlink.stall import STALL
 from anafi_mav.services.command_targets import height, place
-from anafi_mav.services.commands import Action, Altitude, Command, Effect
+from anafi_mav.services.commands import Action, ActionGroup, Altitude, Command, Effect
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.gimbal import gimbal_messages, mount, targets
 from anafi_mav.services.gimbal.control import Answer, ClientId, GimbalControl, Heartbeats
@@ -100,7 +100,13 @@ class GimbalService(Service):
 
     def actions(self) -> Mapping[int, Action]:
         def aim(handler: mount.Handler) -> Action:
-            return Action(handler, location=False, altitude=Altitude.UNUSED, effect=Effect.CHANGE)
+            return Action(
+                handler,
+                location=False,
+                altitude=Altitude.UNUSED,
+                effect=Effect.TARGET,
+                group=ActionGroup.GIMBAL,
+            )
 
         return {
             dialect.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW: aim(self._pitch_yaw),
@@ -227,6 +233,8 @@ class GimbalService(Service):
                 reason = texts.RATE_CLIENT_SILENT.fill(system=client[0])
                 self.host.text(Severity.NOTICE, texts.GIMBAL_STOPPED.fill(reason=reason))
             return
+        if self._command is not None:
+            return  # the command ends when the gimbal turns, or is at the end of its range
         gimbal = self.host.drone.gimbal.main
         at_end = [axis for axis, aim in self._rates.rates.items() if aim.value and gimbal.is_at_end(axis, aim.value)]
         if at_end and self._rates.limit(at_end):
