@@ -557,6 +557,16 @@ AXIS_YAW = Reason("about its vertical axis")
 DRONE_RESTARTS = OperatorText("Drone is restarting")
 RESTART_FAILED = OperatorText("Restart failed: drone is still connected")
 
+# == Media ==
+
+MEDIA_NOT_INDEXED = OperatorText("Media unavailable: drone indexes its storage")
+MEDIA_UNAVAILABLE = Template("Media unavailable: {error}", error=BELOW)
+FILE_TOO_LARGE = OperatorText("File too large for FTP: use media download")
+FILE_DAMAGED = OperatorText("File damaged: MD5 is not the drone's")
+DELETE = Subject("Delete")
+CAMERA_RECORDING = Reason("camera is recording")
+CAMERA_SAVING = Reason("camera is saving photos")
+
 # == Ground stations ==
 
 STATION_BACK = OperatorText("Ground station is back")
@@ -574,6 +584,7 @@ BANNER_DRONE = Template(
 TUNE_REFUSED = OperatorText("Tune refused: drone is not on the ground")
 TUNE_FAILED = Template("Tune not played: {error}", error=BELOW)
 NO_EXPOSURE = Template("Exposure unknown: no video: {error}", error=BELOW)
+NO_PICTURES = Template("Pose from events: no video: {error}", error=BELOW)
 
 # == Parameters ==
 
@@ -581,6 +592,10 @@ PARAMETER_NOT_SET = Template("{name} not set: {reason}", name="N" * 16, reason="
 WRONG_TYPE = Reason("wrong type")
 READ_ONLY = Reason("read only")
 OUT_OF_RANGE = Reason("out of range")
+CAMERA_RECORDS = Reason("camera is recording")
+CAMERA_TAKES_PHOTOS = Reason("camera takes photos")
+MISSION_USES_CAMERA = Reason("mission uses camera")
+VALUE_KEPT = Reason("drone keeps its value")
 RTL_ALT_FINAL = Template("RTL_ALT_FINAL: hovers at {height:.0f} m (ANF_RTH_END_ALT)", height=99)
 
 # == Warnings of the drone ==

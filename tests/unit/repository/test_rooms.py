@@ -32,7 +32,8 @@ CORES = [
     *("arsdk/codec", "arsdk/messages", "arsdk/video", "arsdk/mux/mux.py"),
     *("arsdk/link/frame.py", "arsdk/link/handshake.py", "arsdk/link/packing.py", "arsdk/link/transport.py"),
     *("mavlink/channel.py", "mavlink/frames.py", "mavlink/plan_client.py", "mavlink/router.py", "mavlink/streams.py"),
-    *("drone/contention.py", "drone/piloting/sticks.py"),
+    *("drone/contention.py", "drone/piloting/sticks.py", "drone/video/picture_clock.py"),
+    *("relay/dialogue.py", "relay/feed.py"),
     *("sim/autopilot/firmware.py", "sim/autopilot/flight.py"),
     *("vehicle/base/clients.py", "vehicle/base/height.py", "vehicle/base/link_loss.py", "vehicle/base/modes.py"),
     *("vehicle/base/roll_sign.py", "vehicle/base/severity.py", "vehicle/base/silence.py"),
@@ -42,6 +43,9 @@ CORES = [
     *("vehicle/circle.py", "vehicle/follow.py", "vehicle/hold_rule.py", "vehicle/initiator.py"),
     "vehicle/joystick_override.py",
     *("services/capabilities.py", "services/checksum.py", "services/commands.py", "services/component_metadata.py"),
+    *("services/camera_definition/camera_setting.py", "services/camera_definition/catalogue.py"),
+    *("services/camera_definition/definition_file.py", "services/camera_definition/param_ext_codec.py"),
+    "services/camera_definition/setting_fit.py",
     *("services/event/events.py", "services/ftp/ftp.py"),
     *("services/gimbal/control.py", "services/gimbal/gimbal_messages.py", "services/gimbal/mount.py"),
     *("services/gimbal/rates.py", "services/gimbal/targets.py"),
@@ -51,7 +55,8 @@ CORES = [
     *("services/plan/plan_transfer.py", "services/plan/rally_kind.py"),
     *("services/setpoint/setpoint_messages.py", "services/setpoint/stick_messages.py"),
     "services/setpoint/target_messages.py",
-    *("services/telemetry/data_streams.py", "services/telemetry/update_tracker.py"),
+    *("services/telemetry/data_streams.py", "services/telemetry/height_track.py"),
+    *("services/telemetry/pose_sources.py", "services/telemetry/update_tracker.py"),
 ]
 """Modules and folders that know neither sockets nor clocks. The list may only grow."""
 

@@ -33,7 +33,7 @@ from anafi_mav.services.telemetry.update_tracker import UpdateTracker
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.vehicle import Landed
 
-NOW = Times(1_234_567_890)
+NOW = Times(1_234_567_890, 1_234_567, 1_234)
 
 
 def bundled(tracker: UpdateTracker, sources: str, at: float) -> tuple[int, ...]:
